@@ -45,11 +45,8 @@ _Function = ast.FunctionDef | ast.AsyncFunctionDef
 
 def _is_bare(name: str) -> bool:
     words = name.strip("_").split("_")
-    participle = re.compile("..+(ed|ing|en)")
-    empty = (
-        _PREPOSITIONS + _EMPTY + [w for w in words if participle.fullmatch(w) and w not in _NOUNS]
-    )
-    return words[0] in _PREPOSITIONS or set(words) <= set(empty)
+    participles = {word for word in words if re.fullmatch("..+(ed|ing|en)", word)} - {*_NOUNS}
+    return words[0] in _PREPOSITIONS or {*words} <= {*_PREPOSITIONS, *_EMPTY, *participles}
 
 
 def _lines(node: ast.AST) -> set[int]:

@@ -12,7 +12,7 @@ from pydantic import BaseModel, Field
 import pteron
 from pteron.errors import DataError, ModelError, shown
 from pteron.export import from_klipper
-from pteron.toml import parsed_toml, read_toml, validated
+from pteron.toml import parsed_toml, read_toml, to_model
 
 
 @pytest.mark.parametrize(
@@ -140,14 +140,14 @@ class Machine(BaseModel, extra="forbid"):
 def test_a_fault_says_where_what_was_given_and_what_was_expected(change, line):
     document = {"name": "toy", "legs": []} | change
     with pytest.raises(ModelError) as caught:
-        validated(Machine, document, "toy.toml", ModelError)
+        to_model(Machine, document, "toy.toml", ModelError)
     assert str(caught.value) == f"toy.toml: {line}"
 
 
 def test_all_faults_are_told_each_on_a_line_and_none_at_length():
     legs = [{"length": "x" * 10_000_000}] * 30
     with pytest.raises(ModelError) as caught:
-        validated(Machine, {"legs": legs}, "toy.toml", ModelError)
+        to_model(Machine, {"legs": legs}, "toy.toml", ModelError)
     lines = str(caught.value).splitlines()
     assert lines[0] == "toy.toml: 31 faults"
     assert lines[1] == "  name: missing; the file must give a text"

@@ -31,7 +31,7 @@ from pteron.thresholds import (
     rounding_of,
 )
 from pteron.workspace import home_pose, home_poses, pose_margins
-from pteron.workspace.holding import holding, holding_warnings
+from pteron.workspace.holding import holding_warnings, measure_holding
 from pteron.workspace.leg_layout import layout_warnings
 
 BUILT = Path(__file__).parent / "data" / "built"
@@ -253,7 +253,7 @@ def test_their_originals_are_not(name):
 def test_no_machine_of_the_catalog_is_doubted(name):
     robot = MACHINES[name]
     home = home_pose(robot)
-    of = holding(robot, home)
+    of = measure_holding(robot, home)
     assert (layout_warnings(robot, home), holding_warnings(of)) == ((), ())
     assert of.least_singular_value > 0.3
     assert of.everywhere > 20.0 * of.rounding

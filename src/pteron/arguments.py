@@ -57,17 +57,17 @@ class _Kind(NamedTuple):
 def checking(function: types.FunctionType) -> types.FunctionType:
     """Return a function that first refuses arguments of another kind than its type hints say."""
     hints = {hint for key, hint in function.__annotations__.items() if key != "return"}
-    return _checking(function) if hints - _CHECKED_LATER - {"bool"} else function
+    return _add_check(function) if hints - _CHECKED_LATER - {"bool"} else function
 
 
-def checked_arguments(checked_class: type[_Class]) -> type[_Class]:
+def checked_arguments(decorated: type[_Class]) -> type[_Class]:
     """Let a class refuse arguments of another kind than its type hints say, as a decorator.
 
     It is for classes that are made from what a user gives, and have no check of their own.
     """
-    any_class: Any = checked_class
-    any_class.__init__ = _checking(any_class.__init__)
-    return checked_class
+    any_class: Any = decorated
+    any_class.__init__ = _add_check(any_class.__init__)
+    return decorated
 
 
 def expect_kinds(
@@ -84,15 +84,15 @@ def expect_kinds(
     kinds, order, others = _kinds_of(function)
     names = [*order, *[others] * (len(args) - len(order))]
     arguments = [*zip(names, args, strict=False), *named.items()]
-    for name, value in arguments:
+    for name, argument in arguments:
         kind, default = kinds.get(name, (None, None))
-        if kind is not None and value is not default and not kind.holds(value):
-            wrong.append(f"{name}: {shown(value)} given, {kind.words} expected")
+        if kind is not None and argument is not default and not kind.holds(argument):
+            wrong.append(f"{name}: {shown(argument)} given, {kind.words} expected")
     if wrong:
         raise DataError("; ".join(wrong))
 
 
-def expect(holds: object, name: str, argument: object, expected: object) -> None:
+def expect(holds: object, name: str, actual: object, expected: object) -> None:
     """Refuse an argument of which a condition does not hold, in the words of all such messages.
 
     Parameters
@@ -115,7 +115,7 @@ def expect(holds: object, name: str, argument: object, expected: object) -> None
     pteron.errors.DataError: corner: -1.0 given, 0 m or more expected
     """
     if not holds:
-        raise DataError(f"{name}: {argument} given, {expected} expected")
+        raise DataError(f"{name}: {actual} given, {expected} expected")
 
 
 def expect_share(name: str, share: float) -> None:
@@ -129,7 +129,7 @@ def expect_share(name: str, share: float) -> None:
     expect(0.0 < share < 1.0, name, repr(share), "a share above 0 and below 1")
 
 
-def number_or_nan(value: object) -> float:
+def number_or_nan(argument: object) -> float:
     """Return what `float` makes of a value, NaN of what is no number.
 
     Examples
@@ -139,7 +139,7 @@ def number_or_nan(value: object) -> float:
     (2.0, nan)
     """
     try:
-        return float(value)  # type: ignore[arg-type]
+        return float(argument)  # type: ignore[arg-type]
     except (TypeError, ValueError):
         return float("nan")
 
@@ -148,12 +148,12 @@ def expect_one_of(
     choices: Sequence[str], error: type[PteronError] = DataError, **arguments: object
 ) -> None:
     """Refuse values, by the names of their arguments, that are none of the choices."""
-    for name, value in arguments.items():
-        if value not in choices:
-            raise error(f"{name}: {value!r} is not one of {', '.join(choices)}")
+    for name, argument in arguments.items():
+        if argument not in choices:
+            raise error(f"{name}: {argument!r} is not one of {', '.join(choices)}")
 
 
-def expect_to_fit(name: str, argument: object, numbers: float) -> None:
+def expect_to_fit(name: str, count: object, numbers: float) -> None:
     """Refuse a size whose arrays do not fit into this computer's memory, before they are made.
 
     Parameters
@@ -170,8 +170,8 @@ def expect_to_fit(name: str, argument: object, numbers: float) -> None:
     """
     if 8.0 * numbers > _memory():
         raise DataError(
-            f"{name}: {argument} given, which takes {8e-9 * numbers:.3g} GB of memory; this "
-            f"computer has {1e-9 * _memory():.3g} GB: give less"
+            f"{name}: {count} given, which takes {8e-9 * numbers:.3g} GB of memory; this computer "
+            f"has {1e-9 * _memory():.3g} GB: give less"
         )
 
 
@@ -184,7 +184,7 @@ def _memory() -> float:
         return 16e9
 
 
-def _checking(function: types.FunctionType) -> types.FunctionType:
+def _add_check(function: types.FunctionType) -> types.FunctionType:
     expect = expect_kinds
 
     def call(*args: Any, **named: Any) -> Any:
@@ -192,10 +192,10 @@ def _checking(function: types.FunctionType) -> types.FunctionType:
         return function(*args, **named)
 
     # With the globals of its module: a doctest is looked for where they are the module's.
-    wrapped = types.FunctionType(
+    wrapper = types.FunctionType(
         call.__code__, function.__globals__, function.__name__, None, call.__closure__
     )
-    return typing.cast(types.FunctionType, update_wrapper(wrapped, function))
+    return typing.cast(types.FunctionType, update_wrapper(wrapper, function))
 
 
 @cache
@@ -233,17 +233,19 @@ def _kind(hint: Any) -> _Kind | None:
     if origin in (typing.Union, types.UnionType):
         # ArrayLike is a union too, and one with another flattens it.
         numbers = set(inner) >= _ARRAY_LIKE
-        alternatives = [
-            _alternative(part) for part in inner if not (numbers and part in _ARRAY_LIKE)
+        kinds = [
+            _alternative(choice) for choice in inner if not (numbers and choice in _ARRAY_LIKE)
         ]
-        return _either([*alternatives, *([_Kind("real numbers", _are_numbers)] if numbers else [])])
+        return _either([*kinds, *([_Kind("real numbers", _are_numbers)] if numbers else [])])
     if origin is typing.Annotated and isinstance(inner[1], Between):
-        return _bounded(_kind(inner[0]), inner[1])
+        return _with_bounds(_kind(inner[0]), inner[1])
     if origin is typing.Literal:
-        choices = tuple({type(part) for part in inner})
+        choices = tuple({type(choice) for choice in inner})
         return _Kind(
-            _listed([f'"{part}"' if isinstance(part, str) else repr(part) for part in inner]),
-            lambda value: isinstance(value, choices),
+            _join_words(
+                [f'"{choice}"' if isinstance(choice, str) else repr(choice) for choice in inner]
+            ),
+            lambda argument: isinstance(argument, choices),
         )
     kind: Any = origin or hint
     if not isinstance(kind, type):
@@ -251,7 +253,7 @@ def _kind(hint: Any) -> _Kind | None:
     if kind is collections.abc.Callable:
         return _Kind("a function", callable)
     if issubclass(kind, Mapping):
-        return _Kind("a mapping", lambda value: isinstance(value, Mapping))
+        return _Kind("a mapping", lambda argument: isinstance(argument, Mapping))
     if issubclass(kind, collections.abc.Iterable) and kind.__module__ in _COLLECTIONS:
         every = _kind(inner[0]) if inner else None
         if kind is tuple and Ellipsis not in inner:
@@ -261,7 +263,7 @@ def _kind(hint: Any) -> _Kind | None:
         return None
     article = "an" if kind.__name__[0] in "AEIO" else "a"
     called = _CALLED.get(kind.__name__, f"{article} {kind.__name__}")
-    return _Kind(called, lambda value: isinstance(value, kind))
+    return _Kind(called, lambda argument: isinstance(argument, kind))
 
 
 def _has_shape(hint: Any) -> bool:
@@ -281,7 +283,8 @@ def _alternative(hint: Any) -> _Kind | None:
         return kind
     choices = typing.get_args(hint)
     return _Kind(
-        kind.words, lambda value: any(value is choice or value == choice for choice in choices)
+        kind.words,
+        lambda argument: any(argument is choice or argument == choice for choice in choices),
     )
 
 
@@ -290,64 +293,64 @@ def _either(kinds: list[_Kind | None]) -> _Kind | None:
     if len(known) < len(kinds):
         return None
     words = [kind.words for kind in known if kind.words != "None"]
-    return _Kind(_listed(words), lambda value: any(kind.holds(value) for kind in known))
+    return _Kind(_join_words(words), lambda argument: any(kind.holds(argument) for kind in known))
 
 
-def _listed(words: list[str]) -> str:
+def _join_words(words: list[str]) -> str:
     return " or ".join([", ".join(words[:-1]), words[-1]] if words[:-1] else words)
 
 
-def _bounded(kind: _Kind | None, bounds: Between) -> _Kind | None:
+def _with_bounds(kind: _Kind | None, bounds: Between) -> _Kind | None:
     if kind is None:
         return None
     least, most = bounds
     words = f"of {least:g} or more" if most == math.inf else f"from {least:g} to {most:g}"
     return _Kind(
-        f"{kind.words} {words}", lambda value: kind.holds(value) and least <= value <= most
+        f"{kind.words} {words}", lambda argument: kind.holds(argument) and least <= argument <= most
     )
 
 
 def _sequence(every: _Kind | None, *, lazy: bool = False, count: int | None = None) -> _Kind:
-    def holds(value: Any) -> bool:
-        if isinstance(value, str | bytes | Mapping) or not hasattr(value, "__iter__"):
+    def holds(argument: Any) -> bool:
+        if isinstance(argument, str | bytes | Mapping) or not hasattr(argument, "__iter__"):
             return False
-        if np.ndim(value) == 0 if isinstance(value, np.ndarray) else lazy:
+        if np.ndim(argument) == 0 if isinstance(argument, np.ndarray) else lazy:
             return lazy
-        if not hasattr(value, "__len__") or count not in (None, len(value)):
+        if not hasattr(argument, "__len__") or count not in (None, len(argument)):
             return False
-        return every is None or len(value) > _LOOKED_AT or all(map(every.holds, value))
+        return every is None or len(argument) > _LOOKED_AT or all(map(every.holds, argument))
 
     called = "a sequence" if count is None else f"{count} values"
     return _Kind(f"{called} (each {every.words})" if every else called, holds)
 
 
-def _is_number(value: Any) -> bool:
-    if isinstance(value, bool | np.bool_ | str | bytes) or not hasattr(value, "__float__"):
+def _is_number(argument: Any) -> bool:
+    if isinstance(argument, bool | np.bool_ | str | bytes) or not hasattr(argument, "__float__"):
         return False
     try:
-        return np.ndim(value) == 0 and float(value) is not None
+        return np.ndim(argument) == 0 and float(argument) is not None
     except (TypeError, ValueError, OverflowError):
         return False
 
 
-def _is_array(value: Any) -> bool:
-    return _are_numbers(value) and np.ndim(value) > 0
+def _is_array(argument: Any) -> bool:
+    return _are_numbers(argument) and np.ndim(argument) > 0
 
 
-def _is_whole(value: Any) -> bool:
-    if isinstance(value, bool | np.bool_):
+def _is_whole(argument: Any) -> bool:
+    if isinstance(argument, bool | np.bool_):
         return False
     try:
-        return abs(operator.index(value)) < _LARGEST
+        return abs(operator.index(argument)) < _LARGEST
     except TypeError:
         return False
 
 
-def _are_numbers(value: Any) -> bool:
-    if isinstance(value, str | bytes) or value is None:
+def _are_numbers(argument: Any) -> bool:
+    if isinstance(argument, str | bytes) or argument is None:
         return False
     try:
-        array = np.asarray(value)
+        array = np.asarray(argument)
         if array.dtype.kind == "O":
             array = array.astype(float) if not _has_text(array) else array
     except (TypeError, ValueError, OverflowError):
@@ -355,8 +358,8 @@ def _are_numbers(value: Any) -> bool:
     return array.dtype.kind in "biuf"
 
 
-def _has_text(values: np.ndarray[Any, Any]) -> bool:
-    return any(isinstance(element, str | bytes) for element in values.flat)
+def _has_text(array: np.ndarray[Any, Any]) -> bool:
+    return any(isinstance(element, str | bytes) for element in array.flat)
 
 
 _ARRAY_LIKE = set(typing.get_args(ArrayLike))

@@ -23,16 +23,16 @@ def write_texts(folder: str | Path, texts: Mapping[str, str]) -> list[Path]:
     """
     target = make_folder(folder)
     return write_files(
-        {target / name: _encoded(target / name, text) for name, text in texts.items()}
+        {target / name: _encode(target / name, text) for name, text in texts.items()}
     )
 
 
 def write_text(path: str | Path, text: str) -> Path:
     """Write `text` to `path` in UTF-8, through a temporary file beside it and a rename."""
-    return write_bytes(path, _encoded(path, text))
+    return write_bytes(path, _encode(path, text))
 
 
-def write_bytes(path: str | Path, data: bytes) -> Path:
+def write_bytes(path: str | Path, content: bytes) -> Path:
     """Write `data` to `path`, through a temporary file beside it and a rename.
 
     Raises
@@ -40,7 +40,7 @@ def write_bytes(path: str | Path, data: bytes) -> Path:
     OutputError
         If the folder is missing or cannot be written; a former file is then unchanged.
     """
-    return write_files({Path(path): data})[0]
+    return write_files({Path(path): content})[0]
 
 
 def write_files(files: Mapping[Path, bytes]) -> list[Path]:
@@ -60,11 +60,11 @@ def write_files(files: Mapping[Path, bytes]) -> list[Path]:
             raise OutputError(f"{target}: cannot be written (it is a folder); name another file")
     written: dict[Path, Path] = {}
     try:
-        for target, data in files.items():
+        for target, content in files.items():
             handle, name = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
             written[target] = Path(name)
             with os.fdopen(handle, "wb") as file:
-                file.write(data)
+                file.write(content)
                 file.flush()
                 os.fsync(file.fileno())
             written[target].chmod(_mode_of(target))
@@ -147,7 +147,7 @@ def make_folder(path: str | Path) -> Path:
         raise OutputError(f"{folder}: cannot be written to as a folder ({reason})") from None
 
 
-def _encoded(path: str | Path, text: str) -> bytes:
+def _encode(path: str | Path, text: str) -> bytes:
     try:
         return text.encode("utf-8")
     except UnicodeEncodeError as error:

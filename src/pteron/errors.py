@@ -34,10 +34,12 @@ class PteronError(ValueError):
 
     def __reduce__(self) -> tuple[Any, ...]:
         # Errors cross to other processes; most ask for more than what `args` has.
-        return _restored, (type(self), self.args, self.__dict__)
+        return _restore_error, (type(self), self.args, self.__dict__)
 
 
-def _restored(kind: type[PteronError], args: tuple[Any, ...], state: dict[str, Any]) -> PteronError:
+def _restore_error(
+    kind: type[PteronError], args: tuple[Any, ...], state: dict[str, Any]
+) -> PteronError:
     error = kind.__new__(kind, *args)
     error.__dict__.update(state)
     return error

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from pteron.errors import PteronError
 
 
-def of_extra(extra: str, module: str, need: str, error: type[PteronError] | None = None) -> Any:
+def import_extra(extra: str, module: str, need: str, error: type[PteronError] | None = None) -> Any:
     """Return a module that an extra brings, or say how to install it.
 
     Parameters
@@ -32,17 +32,17 @@ def of_extra(extra: str, module: str, need: str, error: type[PteronError] | None
         # Where nothing of Pteron is installed, this file still runs for its command.
         from pteron.errors import ModelError
 
-        reason = f"{need}, which is not installed; {install_command(extra)}"
-        raise (error or ModelError)(reason) from None
+        message = f"{need}, which is not installed; {install_command(extra)}"
+        raise (error or ModelError)(message) from None
 
 
 def expect_extra(extra: str, module: str, need: str) -> None:
     """Refuse, before anything slow is imported, to go on without a module that an extra brings.
 
-    The parameters are those of `of_extra`; the module's name has no dots.
+    The parameters are those of `import_extra`; the module's name has no dots.
     """
     if find_spec(module) is None:
-        of_extra(extra, module, need)
+        import_extra(extra, module, need)
 
 
 def install_command(extra: str) -> str:
@@ -51,10 +51,10 @@ def install_command(extra: str) -> str:
     Pteron may come from a folder of sources, a wheel, a repository or a registry; pip keeps which
     (PEP 610, direct_url.json).
     """
-    return f"{_quoted(sys.executable or 'python')} -m pip install {_wanted(extra)}"
+    return f"{_quote_path(sys.executable or 'python')} -m pip install {_requirement(extra)}"
 
 
-def _wanted(extra: str) -> str:
+def _requirement(extra: str) -> str:
     # Only where something is missing: these are slow to import.
     import json
     from importlib.metadata import PackageNotFoundError, distribution
@@ -78,5 +78,5 @@ def _wanted(extra: str) -> str:
     return f'"{name} @ {url}"'
 
 
-def _quoted(path: str) -> str:
+def _quote_path(path: str) -> str:
     return f'"{path}"' if " " in path else path

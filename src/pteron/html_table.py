@@ -59,17 +59,17 @@ def html_table(
     >>> "<td>1 &lt; 2</td>" in html_table("A", "", [Column("sum")], [["1 < 2"]])
     True
     """
-    page_part = template("", "html_table.html.j2", cell=_cell, kind=_kind)
+    page = template("", "html_table.html.j2", cell=_cell, kind=_kind)
     cells = [list(zip(columns, row, strict=True)) for row in rows]
-    return page_part.render(title=title, about=about, columns=columns, rows=cells, notes=notes)
+    return page.render(title=title, about=about, columns=columns, rows=cells, notes=notes)
 
 
 def _kind(kind: str) -> Markup:
     return Markup(f' class="{kind}"') if kind else Markup("")
 
 
-def _cell(value: Cell) -> str:
-    if value is None or isinstance(value, str):
-        return value or ""
-    text = f"{value:.{_DIGITS}g}" if isinstance(value, float) else str(value)
+def _cell(cell: Cell) -> str:
+    if cell is None or isinstance(cell, str):
+        return cell or ""
+    text = f"{cell:.{_DIGITS}g}" if isinstance(cell, float) else str(cell)
     return text.replace("-", "\u2212").replace("nan", "").replace("inf", "\u221e")

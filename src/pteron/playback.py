@@ -104,9 +104,9 @@ def playback(robot: Manipulator, motion: Given, start: PoseLike | None = None) -
     if isinstance(motion, Playback):
         return motion
     if isinstance(motion, Simulation):
-        return Playback(_checked(robot, motion.motion), motion.forces)
+        return Playback(_check_motion_of(robot, motion.motion), motion.forces)
     if isinstance(motion, Motion):
-        return Playback(_checked(robot, motion))
+        return Playback(_check_motion_of(robot, motion))
     if isinstance(motion, str | Path):
         motion = read_motion(robot, motion)
     if isinstance(motion, Log):
@@ -129,10 +129,10 @@ def read_motion(robot: Manipulator, path: str | Path) -> Table | Log:
     if is_table(robot, plain.columns):
         return whole_table(plain)
     # Semicolons, decimal commas: a table may be written as logs are.
-    table_or_log = open_table(path, dialect=Dialect())
+    dialect_table = open_table(path, dialect=Dialect())
     return (
-        whole_table(table_or_log)
-        if is_table(robot, table_or_log.columns)
+        whole_table(dialect_table)
+        if is_table(robot, dialect_table.columns)
         else read_log(path, robot)
     )
 
@@ -143,10 +143,10 @@ def read_content(robot: Manipulator, data: bytes, source: str) -> Table | Log:
         plain = CsvFile(data, source)
         if is_table(robot, plain.columns):
             return whole_table(plain)
-        table_or_log = CsvFile(data, source, Dialect())
-        if is_table(robot, table_or_log.columns):
-            return whole_table(table_or_log)
-        return LogFile(table_or_log, robot, Description()).read()
+        dialect_file = CsvFile(data, source, Dialect())
+        if is_table(robot, dialect_file.columns):
+            return whole_table(dialect_file)
+        return LogFile(dialect_file, robot, Description()).read()
     with TemporaryDirectory() as folder:
         path = Path(folder) / "motion.parquet"
         path.write_bytes(data)
@@ -190,20 +190,22 @@ def of_table(robot: Manipulator, rows: Table, start: PoseLike | None = None) -> 
 def of_log(robot: Manipulator, log: Log) -> Playback:
     """Return the motion of a log's joints, smoothed, with its forces where they are N or N m."""
     # All of it is to be seen, and not the part alone that repeats.
-    full_log = replace(log, description=replace(log.description, period=None, start=None, end=None))
-    how = preprocessing_of(robot, full_log)
+    whole_log = replace(
+        log, description=replace(log.description, period=None, start=None, end=None)
+    )
+    how = preprocessing_of(robot, whole_log)
     if len(log.segments) == 1:
         moves = spline_motion(log.time, log.joints, how.cutoff)
         states = [States.of_joints(robot, moves, log.time, how.start, source=log.source)]
         forces = log.forces
     else:
         # Filters lose what is next to a gap, where a spline would invent a motion.
-        parts = list(samples(robot, full_log, how))
+        parts = list(samples(robot, whole_log, how))
         states = [part.states for part in parts]
         forces = np.concatenate([part.forces for part in parts])
 
     def joined(name: str) -> Array:
-        return np.concatenate([getattr(part_states, name) for part_states in states])
+        return np.concatenate([getattr(state, name) for state in states])
 
     time = joined("time")
     motion = Motion(time - time[0], joined("pose"), joined("velocity"), joined("acceleration"))
@@ -213,6 +215,6 @@ def of_log(robot: Manipulator, log: Log) -> Playback:
     return Playback(motion, forces if known else None, Path(log.source).name, log=True)
 
 
-def _checked(robot: Manipulator, motion: Motion) -> Motion:
+def _check_motion_of(robot: Manipulator, motion: Motion) -> Motion:
     check_motion(robot, motion)
     return motion

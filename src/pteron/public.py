@@ -60,8 +60,8 @@ def publish(
     places = _places(names["__loader__"].get_code(package))
     extras = extras or {}
     lacking = {name for name, needed in extras.items() if find_spec(needed) is None}
-    public_names = (name for name in names.keys() - _OTHERS if not name.startswith("_"))
-    listed = [name for name in public_names if not isinstance(names[name], ModuleType)]
+    own = (name for name in names.keys() - _OTHERS if not name.startswith("_"))
+    listed = [name for name in own if not isinstance(names[name], ModuleType)]
     listed = names.setdefault("__all__", sorted({*listed, *places} - lacking))
 
     def public(name: str, value: Any) -> Any:

@@ -85,14 +85,14 @@ def former_name(package: str, name: str) -> Any:
     present = RENAMED.get(package, {}).get(name)
     if present is None:
         raise AttributeError(f"module {package!r} has no attribute {name!r}")
-    module, _, attribute = present.rpartition(".")
+    module, _, own = present.rpartition(".")
     warnings.warn(
-        f"{package}.{name} goes with version {UNTIL}; write from {module} import {attribute}",
+        f"{package}.{name} goes with version {UNTIL}; write from {module} import {own}",
         DeprecationWarning,
         stacklevel=3,
     )
     try:
-        return getattr(import_module(module), attribute)
+        return getattr(import_module(module), own)
     except AttributeError:
         return import_module(present)
 
@@ -111,12 +111,12 @@ def former_attribute(former: str, present: str) -> property:
         It gives the attribute, with a `DeprecationWarning` that has what to write instead.
     """
 
-    def attribute(instance: Any) -> Any:
+    def attribute(own: Any) -> Any:
         warnings.warn(
-            f"{type(instance).__name__}.{former} goes with version {UNTIL}; write .{present}",
+            f"{type(own).__name__}.{former} goes with version {UNTIL}; write .{present}",
             DeprecationWarning,
             stacklevel=2,
         )
-        return getattr(instance, present)
+        return getattr(own, present)
 
     return property(attribute)

@@ -26,8 +26,8 @@ else:
         Its import takes most of a tenth of a second, and what it says is for type checkers.
         """
 
-        def __class_getitem__(cls, parameters: tuple[Any, str]) -> Any:
-            return parameters[0]
+        def __class_getitem__(cls, subscript: tuple[Any, str]) -> Any:
+            return subscript[0]
 
     Float = Int = _Unchecked
 

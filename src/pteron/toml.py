@@ -1,6 +1,6 @@
 """TOML files, read and checked against pydantic models; one message lists a file's faults.
 
-`read_toml` returns a file's content, `validated` makes an object of it, `table_keys` has the keys
+`read_toml` returns a file's content, `to_model` makes an object of it, `table_keys` has the keys
 that it may have. A file that could exhaust memory or time (huge, deeply nested, keys of very many
 parts) is refused.
 """
@@ -133,25 +133,25 @@ def language_of(text: str) -> str:
     """
     start = text.lstrip("\ufeff \t\r\n")[:_SNIFFED]
     if start.startswith("<"):
-        language = next((name for tag, name in _TAGS.items() if re.search(rf"<{tag}\b", start)), "")
-        return language or "XML"
+        dialect = next((name for tag, name in _TAGS.items() if re.search(rf"<{tag}\b", start)), "")
+        return dialect or "XML"
     if start.startswith("{"):
         return "JSON"
     return "YAML" if start.startswith(("%YAML", "---\n", "---\r\n")) else ""
 
 
-def _integers(value: Any) -> Iterator[int]:
+def _integers(node: Any) -> Iterator[int]:
     """Yield the whole numbers of a document."""
-    if isinstance(value, bool):
+    if isinstance(node, bool):
         return
-    if isinstance(value, int):
-        yield value
-    elif isinstance(value, dict | list):
-        for part in value.values() if isinstance(value, dict) else value:
+    if isinstance(node, int):
+        yield node
+    elif isinstance(node, dict | list):
+        for part in node.values() if isinstance(node, dict) else node:
             yield from _integers(part)
 
 
-def parsed_toml(data: bytes, source: str, error: type[PteronError]) -> dict[str, Any]:
+def parsed_toml(content: bytes, source: str, error: type[PteronError]) -> dict[str, Any]:
     """Return the content of a TOML text in UTF-8; messages call it `source`.
 
     Raises
@@ -160,12 +160,12 @@ def parsed_toml(data: bytes, source: str, error: type[PteronError]) -> dict[str,
         If it is not TOML, or could exhaust memory or time: too large, nested too deeply, with keys
         of very many parts or numbers of thousands of digits.
     """
-    if len(data) > _LARGEST:
+    if len(content) > _LARGEST:
         raise error(
             f"has over {_LARGEST >> 20} MB; a TOML file of settings is short", subject=source
         )
     try:
-        text = data.decode("utf-8-sig")
+        text = content.decode("utf-8-sig")
     except UnicodeDecodeError:
         raise error("not a TOML file (it is not UTF-8 text)", subject=source) from None
     # The parser's time and memory grow with the square of a dotted key's length.
@@ -197,7 +197,7 @@ def parsed_toml(data: bytes, source: str, error: type[PteronError]) -> dict[str,
     raise error(f"not a TOML file ({reason})", subject=source)
 
 
-def validated(
+def to_model(
     model: type[_Model], document: dict[str, Any], source: str, error: type[PteronError]
 ) -> _Model:
     """Return a document as an instance of a pydantic model or dataclass.
@@ -212,10 +212,10 @@ def validated(
     try:
         return TypeAdapter(model).validate_python(document)
     except ValidationError as fault:
-        raise error(told(fault_lines(fault, model)), subject=source) from None
+        raise error(joined_faults(fault_lines(fault, model)), subject=source) from None
 
 
-def told(lines: Sequence[str]) -> str:
+def joined_faults(lines: Sequence[str]) -> str:
     """Return the faults of a file as the reason of one error: a line each, `_MANY` at most."""
     if len(lines) == 1:
         return lines[0]
@@ -223,10 +223,10 @@ def told(lines: Sequence[str]) -> str:
     return "\n  ".join([f"{len(lines)} faults", *lines[:_MANY], *remainder])
 
 
-def refuse(faults: Sequence[str]) -> None:
+def raise_faults(faults: Sequence[str]) -> None:
     """Raise one `ModelError` of all faults, if there are any."""
     if faults:
-        raise ModelError(told(faults), faults=faults)
+        raise ModelError(joined_faults(faults), faults=faults)
 
 
 def keep_checked(
@@ -247,7 +247,7 @@ def keep_checked(
             object.__setattr__(part, name, check(getattr(part, name), name))
         except ModelError as error:
             all_faults += error.faults
-    refuse(all_faults)
+    raise_faults(all_faults)
 
 
 def fault_lines(
@@ -277,7 +277,7 @@ def fault_lines(
     schema = _schema(model)
     listed = set() if listed is None else listed
     faults = error.errors(include_url=False)
-    meant = {_meant(f["loc"], schema) for f in faults if f["type"] in _UNKNOWN}
+    meant = {_nearest_key(f["loc"], schema) for f in faults if f["type"] in _UNKNOWN}
     lines = []
     for fault in faults:
         if fault["type"] == "missing" and fault["loc"] in meant:
@@ -313,10 +313,10 @@ def _key(location: tuple[int | str, ...]) -> str:
 def _valid(location: tuple[int | str, ...], schema: _Node) -> tuple[str, tuple[str, ...]]:
     """Return what aliases of an unknown key's table begin with, and the keys that it may have."""
     table, dot, _ = str(location[-1]).rpartition(".")
-    return table + dot, _keys(_at(schema, location[:-1]), table + dot)
+    return table + dot, _keys(_subschema(schema, location[:-1]), table + dot)
 
 
-def _meant(location: tuple[int | str, ...], schema: _Node) -> tuple[int | str, ...]:
+def _nearest_key(location: tuple[int | str, ...], schema: _Node) -> tuple[int | str, ...]:
     """Return the location of the valid key that is nearest to an unknown one; empty if none is."""
     table, valid = _valid(location, schema)
     close = get_close_matches(str(location[-1]).removeprefix(table), valid, n=1)
@@ -326,33 +326,33 @@ def _meant(location: tuple[int | str, ...], schema: _Node) -> tuple[int | str, .
 def _fault(
     fault: Any, schema: _Node, location: tuple[int | str, ...], listed: set[tuple[str, ...]]
 ) -> str:
-    kind, text, context = fault["type"], shown(fault["input"]), fault.get("ctx", {})
+    kind, shown_input, context = fault["type"], shown(fault["input"]), fault.get("ctx", {})
     if kind == "value_error":
         return str(context["error"])
     if kind in _UNKNOWN:
         table, valid = _valid(location, schema)
         if location[-1] in valid:
-            return f"{text} given, a table expected"
-        meant = _meant(location, schema)
+            return f"{shown_input} given, a table expected"
+        meant = _nearest_key(location, schema)
         guess = f" did you mean {str(meant[-1]).removeprefix(table)}?" if meant else ""
         if valid in listed:
             return f"unknown key;{guess or ' the valid ones there are listed above'}"
         listed.add(valid)
         the = " The" if guess else " the"
         return f"unknown key;{guess}{the} valid ones there are {', '.join(valid)}"
-    node = _at(schema, location)
+    node = _subschema(schema, location)
     if kind == "list_type" and isinstance(fault["input"], dict):
         key = ".".join(str(part) for part in location)
         return f"[{key}] is one table, a list of tables expected; write [[{key}]] above each"
     expected = _words(node)
-    is_named = all(isinstance(part, str) for part in location)
-    if expected == "a table" and is_named and not isinstance(fault["input"], dict):
+    is_key = all(isinstance(part, str) for part in location)
+    if expected == "a table" and is_key and not isinstance(fault["input"], dict):
         key = ".".join(str(part) for part in location)
-        return f"{text} given, a table expected: [{key}] with {', '.join(_keys(node, ''))}"
+        return f"{shown_input} given, a table expected: [{key}] with {', '.join(_keys(node, ''))}"
     if kind in ("too_short", "too_long") and "prefixItems" not in node:
         least, most = context.get("min_length"), context.get("max_length")
         count = f"at least {least}" if kind == "too_short" else f"at most {most}"
-        return f"{text} given, {expected} expected, {count} of them"
+        return f"{shown_input} given, {expected} expected, {count} of them"
     if kind == "missing" and fault["loc"] == location:
         return f"missing; the file must give {expected or 'it'}"
     if kind in _BOUNDS:
@@ -362,8 +362,8 @@ def _fault(
     elif kind == "literal_error":
         expected = context["expected"]
     if not expected:
-        return f"{text} given; {fault['msg'][0].lower()}{fault['msg'][1:]}"
-    return f"{text} given, {expected} expected"
+        return f"{shown_input} given; {fault['msg'][0].lower()}{fault['msg'][1:]}"
+    return f"{shown_input} given, {expected} expected"
 
 
 def _schema(model: Any) -> _Node:
@@ -374,21 +374,21 @@ def _schema(model: Any) -> _Node:
 
     def resolved(node: Any) -> Any:
         if isinstance(node, list):
-            return [resolved(part) for part in node]
+            return [resolved(member) for member in node]
         if not isinstance(node, dict):
             return node
         if "$ref" in node:
             return resolved(schema["$defs"][node["$ref"].rpartition("/")[2]])
-        others = [part for part in node.get("anyOf", []) if part.get("type") != "null"]
+        others = [member for member in node.get("anyOf", []) if member.get("type") != "null"]
         if len(others) == 1:
             return resolved(others[0])
-        return {key: resolved(value) for key, value in node.items() if key != "$defs"}
+        return {key: resolved(member) for key, member in node.items() if key != "$defs"}
 
-    resolved_schema: _Node = resolved(schema)
-    return resolved_schema
+    expanded: _Node = resolved(schema)
+    return expanded
 
 
-def _at(node: _Node, location: tuple[int | str, ...]) -> _Node:
+def _subschema(node: _Node, location: tuple[int | str, ...]) -> _Node:
     """Return the schema at a location."""
     for part in location:
         inner: Any
@@ -412,9 +412,9 @@ def _words(node: _Node) -> str:
     if node.get("type") != "array":
         return _WORDS.get(node.get("type", ""), "")
     several = node.get("prefixItems", [])
-    item = _words(several[0] if several else node.get("items", {}))
+    element = _words(several[0] if several else node.get("items", {}))
     count = f"{len(several)} " if several else ""
-    item = item.removeprefix("a ")
-    if item.startswith("list"):
-        return f"a list of {count}lists{item.removeprefix('list')}"
-    return f"a list of {count}{item}{'s' * (len(several) != 1)}" if item else "a list"
+    element = element.removeprefix("a ")
+    if element.startswith("list"):
+        return f"a list of {count}lists{element.removeprefix('list')}"
+    return f"a list of {count}{element}{'s' * (len(several) != 1)}" if element else "a list"

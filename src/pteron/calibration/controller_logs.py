@@ -23,7 +23,7 @@ from pteron.export.printers.printer_cfg import printer_cfg, setting, way_a_step
 from pteron.kinematics import inverse_kinematics
 from pteron.manipulator import Manipulator
 from pteron.manipulator.readings import to_readings
-from pteron.toml import told
+from pteron.toml import joined_faults
 
 _TABLES = (".csv", ".parquet")
 _LARGEST = 1 << 28
@@ -155,7 +155,7 @@ def _stable(robot: Manipulator, text: str, source: str) -> Measurements:
     if not rows:
         faults.append("[delta_calibrate]: no height0 nor distance0; run DELTA_CALIBRATE, save it")
     if faults:
-        raise DataError(told(faults))
+        raise DataError(joined_faults(faults))
     keys, counts, heights, distances, origins = zip(*rows, strict=True)
     readings = to_readings(robot, np.array(ends) + away * np.array(counts))
     return replace(
@@ -281,7 +281,7 @@ def _linuxcnc(text: str, source: str) -> Iterator[_Touched]:
     if not rows or len(faults) > len(rows):
         return
     if faults:
-        raise DataError(told(faults))
+        raise DataError(joined_faults(faults))
     for k, row in rows:
         yield _Touched(f"{source}, line {k}", dict(zip("XYZABCUVW", row, strict=False)), 0.0)
 
@@ -316,7 +316,7 @@ def _where_touched(robot: Manipulator, touched: Sequence[_Touched]) -> Measureme
             if bad
         ]
         if 2 * lost.sum() > len(lost):
-            raise DataError(told(faults))
+            raise DataError(joined_faults(faults))
         more = f" and {len(faults) - 1} more" if len(faults) > 1 else ""
         warn_unlikely(f"{faults[0]} It is left out{more}.")
         touched = [one for one, bad in zip(touched, lost, strict=True) if not bad]

@@ -25,7 +25,7 @@ from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.manipulator.readings import from_readings
 from pteron.tables import Dialect, Table, listed, open_table, whole_table
 from pteron.tables.units import FACTORS
-from pteron.toml import told
+from pteron.toml import joined_faults
 
 Array = NDArray[np.float64]
 
@@ -92,7 +92,7 @@ def _read(robot: Manipulator, path: str | Path) -> Measurements:
     source = shown(str(path), bare=True, longest=1000)
     faults = [*_undescribed(found)]
     if faults:
-        raise DataError(told(faults), subject=source)
+        raise DataError(joined_faults(faults), subject=source)
     for text in _unlikely(robot, found, source):
         warn_unlikely(text)
     return found
@@ -134,7 +134,7 @@ def _opened(robot: Manipulator, path: str | Path, dialect: Dialect | None) -> _O
     if missing := [name for name in robot.joint_names if name not in columns]:
         faults.append(f"no column {listed(missing)} (found: {listed(file.columns)}); {file.hint}")
     if faults:
-        raise DataError(told(faults), subject=file.source)
+        raise DataError(joined_faults(faults), subject=file.source)
     others = {*robot.force_names, *(f"{d}{name}" for d in ("d", "dd") for name in units)}
     if unread := [name for name in unread if name not in others]:
         text = f"{file.source}: {listed(unread)}: not read; what is measured is called "
@@ -203,7 +203,7 @@ def _of_table(robot: Manipulator, opened: _Opened, source: str) -> Measurements:
     for i in np.flatnonzero(~apart & (starts > 0)):
         fault(i, ": from or anchor, but no distance; give all, or none")
     if faults:
-        raise DataError(told(list(dict.fromkeys(faults))), subject=table.source)
+        raise DataError(joined_faults(list(dict.fromkeys(faults))), subject=table.source)
     names = texts("mark"), texts("plane"), anchors, _places(table, source)
     return Measurements(readings, *values, distances, origins, *names, times)
 

@@ -14,7 +14,7 @@ from pteron.bodies.vectors import unit_vector
 from pteron.calibration.measurements import KINDS, Place, Plane, Setup
 from pteron.errors import DataError, shown
 from pteron.tables import Dialect
-from pteron.toml import read_toml, validated
+from pteron.toml import read_toml, to_model
 
 _ABSENT = "no such file; it should describe a log of measurements"
 
@@ -128,7 +128,7 @@ def read_setup_file(log: str | Path) -> MeasuredLog:
     document = read_toml(path, DataError, _ABSENT)
     if document.keys() >= _OF_A_MANIPULATOR:
         return MeasuredLog()
-    return validated(MeasuredLog, document, shown(str(path), bare=True, longest=1000), DataError)
+    return to_model(MeasuredLog, document, shown(str(path), bare=True, longest=1000), DataError)
 
 
 def joined(setups: Sequence[Setup], sources: Sequence[str]) -> Setup:

@@ -28,7 +28,7 @@ def standard_motion(
 
     from pteron.motion import check_path, cycle_path, pick_and_place, time_optimal
     from pteron.motion.trajectories.pick_and_place import PEAK_ACCELERATION, farthest_point
-    from pteron.motion.trajectories.time_law import in_time
+    from pteron.motion.trajectories.time_law import time_curve
 
     middle = given_pose(machine, around, "--around")
     standard = pick_and_place(machine, middle, scale=scale)
@@ -47,7 +47,7 @@ def standard_motion(
             duration = standard.duration
         else:
             limits = replace(limits, tool_acceleration=PEAK_ACCELERATION)
-    return in_time(machine, standard.cycle.at, duration, limits, step)
+    return time_curve(machine, standard.cycle.at, duration, limits, step)
 
 
 def line_motion(

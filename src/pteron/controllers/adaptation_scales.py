@@ -67,22 +67,24 @@ class AdaptationScales:
         First moments count as the mass times the body's radius of gyration, also where they are
         zero; drives' estimates are at least `_DRIVES` of what their joint takes.
         """
-        values, sizes = parameters(self.robot), np.abs(parameters(self.robot))
+        nominal, sizes = parameters(self.robot), np.abs(parameters(self.robot))
         for places in body_places(parameter_data(self.robot)).values():
             if "I" in places:
                 sizes[[places[k] for k in ("mgx", "mgy") if k in places]] = np.sqrt(
-                    np.abs(values[places["m"]] * values[places["I"]])
+                    np.abs(nominal[places["m"]] * nominal[places["I"]])
                 )
         forces = drive_forces(self.robot, *self.motion)
         force = _DRIVES * np.sqrt((forces**2).mean(axis=0))
         rates = joint_rates(self.robot, *self.motion[:2]).actuated
         speed = np.sqrt((rates**2).mean(axis=0))
         least = _DRIVES * joint_masses(self.robot), force, force / speed, force
-        drive_values = np.abs(drive_numbers(self.robot)[: len(ADAPTED) * self.robot.joint_count])
-        drives = np.maximum(drive_values, np.concatenate(least))
+        model_numbers = np.abs(drive_numbers(self.robot)[: len(ADAPTED) * self.robot.joint_count])
+        drives = np.maximum(model_numbers, np.concatenate(least))
         return np.concatenate([np.abs(self.base.grouping) @ sizes, drives])
 
-    def learning(self, damping: Array, count: int, rate: float, most: float) -> tuple[Array, float]:
+    def adaptation_matrix(
+        self, damping: Array, count: int, rate: float, most: float
+    ) -> tuple[Array, float]:
         """Return L (count, count), with which the first estimates learn at one rate, rad/s.
 
         An estimate's error x acts as Y x, the joints of damping K (n,) answer with K^-1 Y x, and
@@ -92,15 +94,15 @@ class AdaptationScales:
         `scales`, theta - theta_0 = L eta, on average over signs.
         """
         scales = self.scales[:count]
-        shown = self.columns[..., :count] * (scales / np.sqrt(damping)[:, None])
-        mean = np.einsum("bik,bil->kl", shown, shown) / len(shown)
-        seen, axes = np.linalg.eigh(mean)
-        seen = seen + _HARDLY * seen[-1]
-        part = shown @ (axes / np.sqrt(seen))
-        fastest = float(np.linalg.eigvalsh(part @ np.swapaxes(part, -1, -2)).max())
+        effects = self.columns[..., :count] * (scales / np.sqrt(damping)[:, None])
+        mean = np.einsum("bik,bil->kl", effects, effects) / len(effects)
+        excitations, axes = np.linalg.eigh(mean)
+        excitations = excitations + _HARDLY * excitations[-1]
+        whitened = effects @ (axes / np.sqrt(excitations))
+        fastest = float(np.linalg.eigvalsh(whitened @ np.swapaxes(whitened, -1, -2)).max())
         rate = min(rate, most / fastest)
-        matrix = scales[:, None] * axes * np.sqrt(rate / seen)
-        return matrix, float(np.sqrt(seen.sum() / rate))
+        matrix = scales[:, None] * axes * np.sqrt(rate / excitations)
+        return matrix, float(np.sqrt(excitations.sum() / rate))
 
 
 @runtime_checkable
@@ -131,13 +133,18 @@ def scales_of(robot: Manipulator, motion: Moves | None) -> AdaptationScales:
         )
     if not (np.any(motion.velocity) and np.any(motion.acceleration)):
         raise DataError("motion: the platform rests all along, which shows nothing; give a motion")
-    thinned = slice(None, None, max(len(motion.pose) // _SAMPLES, 1))
+    every_few = slice(None, None, max(len(motion.pose) // _SAMPLES, 1))
     rng, unit = np.random.default_rng(0), _units(robot)
     parts = []
-    for part, share in ((motion.pose, 0.0), (motion.velocity, _NEAR), (motion.acceleration, _NEAR)):
-        size = np.sqrt(((part[thinned] / unit) ** 2).sum(axis=-1).mean())
+    for samples, share in (
+        (motion.pose, 0.0),
+        (motion.velocity, _NEAR),
+        (motion.acceleration, _NEAR),
+    ):
+        size = np.sqrt(((samples[every_few] / unit) ** 2).sum(axis=-1).mean())
         parts.append(
-            part[thinned] + share * size * unit * rng.uniform(-1.0, 1.0, part[thinned].shape)
+            samples[every_few]
+            + share * size * unit * rng.uniform(-1.0, 1.0, samples[every_few].shape)
         )
     return AdaptationScales(robot, typical_scales(robot).base, (parts[0], parts[1], parts[2]))
 

@@ -10,7 +10,7 @@ import numpy as np
 from pteron.controllers.adaptation_scales import Moves, scales_of, typical_scales
 from pteron.controllers.controller import Controller
 from pteron.controllers.joint_masses import joint_masses
-from pteron.controllers.joint_numbers import PerJoint, per_joint
+from pteron.controllers.joint_numbers import PerJoint, joint_array
 from pteron.equations.control import ADAPTED
 from pteron.equations.drives import drive_numbers
 from pteron.kernels import Array
@@ -94,13 +94,13 @@ class Adaptive(Controller):
         slope = -np.expm1(-self.bandwidths(model) * self.period) / self.period
         derivative = slope * joint_masses(model)
         if self.derivative is not None:
-            derivative = per_joint(model, "derivative", self.derivative)
+            derivative = joint_array(model, "derivative", self.derivative)
         start = self.base(model).values(model)
         if self.friction:
             drives = drive_numbers(model)[: len(ADAPTED) * model.joint_count]
             start = np.concatenate([start, drives])
         rate = _SHARE * slope.min() if self.adaptation is None else self.adaptation
-        known = scales_of(model, self.motion)
-        learning, size = known.learning(derivative, len(start), rate, float(slope.min()))
-        room = [self.uncertainty * size]
-        return np.concatenate([slope, derivative, [self.period], start, learning.ravel("F"), room])
+        scales = scales_of(model, self.motion)
+        matrix, size = scales.adaptation_matrix(derivative, len(start), rate, float(slope.min()))
+        bounds = [self.uncertainty * size]
+        return np.concatenate([slope, derivative, [self.period], start, matrix.ravel("F"), bounds])

@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar
 
-from pteron.controllers.joint_numbers import PerJoint, above_zero, per_joint, period_of
+from pteron.controllers.joint_numbers import PerJoint, joint_array, period_of, positive_numbers
 from pteron.controllers.law import Law
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
@@ -40,7 +40,7 @@ class Controller(ABC):
     def __post_init__(self) -> None:
         object.__setattr__(self, "period", period_of(self.period))
         for name in self.positive:
-            object.__setattr__(self, name, above_zero(name, getattr(self, name)))
+            object.__setattr__(self, name, positive_numbers(name, getattr(self, name)))
 
     positive: ClassVar[tuple[str, ...]] = ("bandwidth",)
     """The fields that are numbers above 0, one or one for each joint, or None."""
@@ -52,7 +52,7 @@ class Controller(ABC):
     def bandwidths(self, model: Manipulator) -> Array:
         """Return the bandwidth of each joint (n,), rad/s."""
         usual = self.share / self.period
-        return per_joint(model, "bandwidth", usual if self.bandwidth is None else self.bandwidth)
+        return joint_array(model, "bandwidth", usual if self.bandwidth is None else self.bandwidth)
 
     @abstractmethod
     def gains(self, model: Manipulator) -> Array:

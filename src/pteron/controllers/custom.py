@@ -18,7 +18,7 @@ from pteron.kernels.exponential import with_lowered_exponentials
 from pteron.kernels.graph import graph_of
 from pteron.kernels.loop_code import LOOP_INPUTS
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
-from pteron.toml import told
+from pteron.toml import joined_faults
 
 _REFERENCE = ("pose", "velocity", "acceleration")
 _MEMORY = ("memory", "next_memory")
@@ -76,24 +76,27 @@ class Custom:
         if not isinstance(self.function, ca.Function):
             raise DataError(f"function: {shown(self.function)} given, a casadi.Function expected")
         object.__setattr__(self, "period", period_of(self.period))
-        named, faults = set(self.parameters), []
+        parameter_names, faults = set(self.parameters), []
         names = self.function.name_in(), self.function.name_out()
-        unknown = [name for name in names[0] if name not in {*LOOP_INPUTS, *named}]
+        unknown = [name for name in names[0] if name not in {*LOOP_INPUTS, *parameter_names}]
         if unknown:
             faults.append(
                 f"{', '.join(unknown)}: no sensor gives it; there are the readings joints, "
                 "joint_rates, motors, motor_rates, the reference pose, velocity, acceleration, and "
                 "memory; for a parameter give its numbers in `parameters`"
             )
-        faults += [f"parameters: {n}: no input has that name" for n in named - set(names[0])]
         faults += [
-            f"parameters: {n}: is a reading or the reference" for n in named & set(LOOP_INPUTS)
+            f"parameters: {n}: no input has that name" for n in parameter_names - set(names[0])
         ]
-        expected = ["forces", *_MEMORY[1:]] if _MEMORY[0] in names[0] else ["forces"]
-        if sorted(names[1]) != sorted(expected):
-            faults.append(f"outputs: {', '.join(names[1])} given, {', '.join(expected)} expected")
+        faults += [
+            f"parameters: {n}: is a reading or the reference"
+            for n in parameter_names & set(LOOP_INPUTS)
+        ]
+        needed = ["forces", *_MEMORY[1:]] if _MEMORY[0] in names[0] else ["forces"]
+        if sorted(names[1]) != sorted(needed):
+            faults.append(f"outputs: {', '.join(names[1])} given, {', '.join(needed)} expected")
         if faults:
-            raise DataError(f"controller: {told(faults)}")
+            raise DataError(f"controller: {joined_faults(faults)}")
         _ = self._program
 
     @property
@@ -122,7 +125,7 @@ class Custom:
             if port.size != sizes.get(port.name, port.size)
         ]
         if wrong:
-            raise DataError(f"controller: {told(wrong)} for {model.name}")
+            raise DataError(f"controller: {joined_faults(wrong)} for {model.name}")
         return CustomLaw(self, model)
 
     @cached_property
@@ -139,33 +142,30 @@ class Custom:
             ca.SX.sym(name, function.numel_in(k)) for k, name in enumerate(function.name_in())
         ]
         symbols = zip(columns, function.sx_in(), strict=True)
-        outputs_of_call = function.call(
-            [ca.reshape(operation, *like.shape) for operation, like in symbols]
-        )
-        results = dict(zip(function.name_out(), outputs_of_call, strict=True))
-        names = sorted(results)
+        outputs = function.call([ca.reshape(column, *like.shape) for column, like in symbols])
+        by_name = dict(zip(function.name_out(), outputs, strict=True))
+        names = sorted(by_name)
         function = ca.Function(
-            function.name(), columns, [ca.vec(ca.densify(results[name])) for name in names],
+            function.name(), columns, [ca.vec(ca.densify(by_name[name])) for name in names],
             function.name_in(), names,
         )  # fmt: skip
         function = with_lowered_exponentials(function)
         graph = graph_of(function)
-        without = sorted({graph.nodes[k].operation for k in graph.operations()} - {*C})
-        if without:
+        missing = sorted({graph.nodes[k].operation for k in graph.operations()} - {*C})
+        if missing:
             codes = {str(getattr(ca, name)): name[3:] for name in dir(ca) if name.startswith("OP_")}
-            named = ", ".join(codes.get(operation, operation).lower() for operation in without)
             raise DataError(
-                f"controller: {named} cannot be C here; there are {', '.join(C)}, tanh, sign and "
-                "tan"
+                f"controller: {', '.join(codes.get(code, code).lower() for code in missing)} "
+                f"cannot be C here; there are {', '.join(C)}, tanh, sign and tan"
             )
-        inputs = tuple(
+        input_ports = tuple(
             Port(name, (function.numel_in(k),), name in self.parameters)
             for k, name in enumerate(function.name_in())
         )
-        outputs = tuple(
+        output_ports = tuple(
             Port(name, (function.numel_out(k),)) for k, name in enumerate(function.name_out())
         )
-        return Program(function.name(), function, inputs, outputs)
+        return Program(function.name(), function, input_ports, output_ports)
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,24 +184,24 @@ class CustomLaw:
     def numbers(self) -> dict[str, Array]:
         """Its parameters, as `pteron.kernels.loops.Loop.run` takes them."""
         return {
-            f"law_{port.name}": _numbers(self.controller.parameters[port.name], port)
+            f"law_{port.name}": _port_numbers(self.controller.parameters[port.name], port)
             for port in self.program.inputs
             if port.shared
         }
 
     def memory(self, pose: Array, velocity: Array) -> Array:
         """Return what it keeps before the first sample, (K,)."""
-        memory = self.controller.memory
-        value = memory(pose, velocity) if callable(memory) else memory
+        initial = self.controller.memory
+        numbers = initial(pose, velocity) if callable(initial) else initial
         size = sum(port.size for port in self.program.inputs if port.name == _MEMORY[0])
-        return _numbers(value, Port(_MEMORY[0], (size,))).ravel()
+        return _port_numbers(numbers, Port(_MEMORY[0], (size,))).ravel()
 
 
-def _numbers(value: ArrayLike, port: Port) -> Array:
+def _port_numbers(array: ArrayLike, port: Port) -> Array:
     """Return a port's numbers, (1, 1, size), by columns where they are a matrix, after a check."""
-    numbers = as_array(value, port.name, ()).ravel("F")
-    if numbers.size != port.size or not np.isfinite(numbers).all():
+    column = as_array(array, port.name, ()).ravel("F")
+    if column.size != port.size or not np.isfinite(column).all():
         raise DataError(
-            f"controller: {port.name}: {shown(value)} given, {port.size} finite numbers expected"
+            f"controller: {port.name}: {shown(array)} given, {port.size} finite numbers expected"
         )
-    return numbers.reshape(1, 1, -1)
+    return column.reshape(1, 1, -1)

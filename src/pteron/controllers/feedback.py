@@ -9,7 +9,7 @@ import numpy as np
 
 from pteron.controllers.controller import Controller
 from pteron.controllers.joint_masses import joint_masses
-from pteron.controllers.joint_numbers import PerJoint, per_joint
+from pteron.controllers.joint_numbers import PerJoint, joint_array
 from pteron.equations.control import GAINS
 from pteron.errors import DataError
 from pteron.kernels import Array
@@ -45,10 +45,10 @@ class Feedback(Controller):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        pair = {"proportional": self.proportional, "derivative": self.derivative}
-        missing = [name for name, value in pair.items() if value is None]
+        gains = {"proportional": self.proportional, "derivative": self.derivative}
+        missing = [name for name, gain in gains.items() if gain is None]
         if len(missing) == 1:
-            (other,) = pair.keys() - missing
+            (other,) = gains.keys() - missing
             raise DataError(
                 f"{missing[0]}: missing, but {other} is given; give both, or bandwidth and damping"
             )
@@ -57,14 +57,14 @@ class Feedback(Controller):
         """Return its gains (G,) for a machine; see `Controller.gains`."""
         if self.proportional is not None and self.derivative is not None:
             pair = [
-                per_joint(model, name, value)
-                for name, value in (
+                joint_array(model, name, setting)
+                for name, setting in (
                     ("proportional", self.proportional),
                     ("derivative", self.derivative),
                 )
             ]
         else:
-            poles = self.bandwidths(model), per_joint(model, "damping", self.damping)
+            poles = self.bandwidths(model), joint_array(model, "damping", self.damping)
             masses = 1.0 if self.of_accelerations else joint_masses(model)
             pair = [masses * gain for gain in pole_gains(*poles, self.period)]
         period = [self.period] if "period" in GAINS[self.what] else []

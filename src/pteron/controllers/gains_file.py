@@ -49,19 +49,21 @@ def gains_text(
         gains = controller.gains(robot)
         numbers |= {"proportional": gains[:n].tolist(), "derivative": gains[n : 2 * n].tolist()}
     entries |= {
-        name: list(value) if isinstance(value, tuple) else value
-        for name, value in numbers.items()
-        if value is not None
+        name: list(setting) if isinstance(setting, tuple) else setting
+        for name, setting in numbers.items()
+        if setting is not None
     }
-    lines = [f"{name} = {tomlkit.item(value).as_string()}" for name, value in entries.items()]
+    lines = [f"{name} = {tomlkit.item(setting).as_string()}" for name, setting in entries.items()]
     if margins:
         lines += ["", "[margins]  # the least anywhere: factor, rad, s and the disk margin"]
-        lines += [f"{name} = {tomlkit.item(value).as_string()}" for name, value in margins.items()]
+        lines += [
+            f"{name} = {tomlkit.item(setting).as_string()}" for name, setting in margins.items()
+        ]
     record = machine_record(robot)
     lines += ["", "[machine]  # compared with the machine that the gains are given to"]
     lines += [f"{name} = {tomlkit.item(record[name]).as_string()}" for name in _IDENTITY]
     lines += ["", "[machine.dimensions]"]
-    lines += [f'"{name}" = {values}' for name, values in record["dimensions"].items()]
+    lines += [f'"{name}" = {dimension}' for name, dimension in record["dimensions"].items()]
     return "\n".join(lines) + "\n"
 
 
@@ -101,21 +103,21 @@ def read_gains(robot: RobotLike, path: str | Path) -> Controller:
         joints, of another topology, or with a dimension that differs by more than 1 %.
     """
     robot = as_manipulator(robot)
-    document = read_toml(path, DataError, "there is no such file; pteron tune writes one")
-    kind = _KINDS.get(str(document.get("controller")))
+    record = read_toml(path, DataError, "there is no such file; pteron tune writes one")
+    kind = _KINDS.get(str(record.get("controller")))
     if kind is None:
         raise DataError(
-            f"{path}: controller: {shown(document.get('controller'))} given, one of "
+            f"{path}: controller: {shown(record.get('controller'))} given, one of "
             f"{', '.join(_KINDS)} expected"
         )
-    joints = document.get("joints", list(robot.joint_names))
+    joints = record.get("joints", list(robot.joint_names))
     if joints != list(robot.joint_names):
         raise DataError(
             f"{path}: its joints are {shown(joints)}, of {robot.name} they are "
             f"{' '.join(robot.joint_names)}; tune this machine"
         )
-    expect_machine(document.get("machine"), robot, path)
-    numbers = {key: value for key, value in document.items() if key not in _ABOUT}
+    expect_machine(record.get("machine"), robot, path)
+    numbers = {key: number for key, number in record.items() if key not in _ABOUT}
     allowed = _numbers(kind)
     unknown = [key for key in numbers if key not in allowed]
     if unknown:

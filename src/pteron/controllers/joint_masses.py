@@ -61,12 +61,12 @@ def _joint_masses(robot: Manipulator) -> Array:
     poses = light_poses(robot)
     rows = jacobian(robot, poses)
     rotors = np.diag([(leg.drive or Drive()).inertia for leg in robot.legs])
-    transposed = np.swapaxes(rows, -1, -2)
-    masses = mass_matrix(robot, poses) + transposed @ rotors @ rows
-    mobility = np.einsum("kij,kji->ki", rows, np.linalg.solve(masses, transposed))
-    joint_masses: Array = np.quantile(1.0 / mobility, _SHARE, axis=0)
-    joint_masses.setflags(write=False)
-    return joint_masses
+    columns = np.swapaxes(rows, -1, -2)
+    masses = mass_matrix(robot, poses) + columns @ rotors @ rows
+    mobility = np.einsum("kij,kji->ki", rows, np.linalg.solve(masses, columns))
+    quantile: Array = np.quantile(1.0 / mobility, _SHARE, axis=0)
+    quantile.setflags(write=False)
+    return quantile
 
 
 def light_poses(robot: Manipulator) -> Array:

@@ -18,31 +18,33 @@ _SLOWEST = 0.1
 """Longest period, s; a larger number is taken for a rate."""
 
 
-def above_zero(name: str, value: PerJoint | None) -> float | tuple[float, ...] | None:
+def positive_numbers(name: str, numbers: PerJoint | None) -> float | tuple[float, ...] | None:
     """Return a number, or one for each joint, after a check that each is above zero."""
-    if value is None:
+    if numbers is None:
         return None
-    several: object = value
+    several: object = numbers
     if isinstance(several, np.ndarray):
         several = several.tolist()
     if not isinstance(several, list | tuple):
-        return _number(f"{name}: {{}} given, a number above 0 expected", several)
+        return _positive_number(f"{name}: {{}} given, a number above 0 expected", several)
     return tuple(
-        _number(f"{name}: {{}} given for joint {i}, a number above 0 expected", number)
+        _positive_number(f"{name}: {{}} given for joint {i}, a number above 0 expected", number)
         for i, number in enumerate(several, start=1)
     )
 
 
-def _number(message: str, value: object) -> float:
-    number = number_or_nan(value)
-    if isinstance(value, str | bool) or not (np.isfinite(number) and number > 0.0):
-        raise DataError(message.format(shown(value)))
+def _positive_number(message: str, argument: object) -> float:
+    number = number_or_nan(argument)
+    if isinstance(argument, str | bool) or not (np.isfinite(number) and number > 0.0):
+        raise DataError(message.format(shown(argument)))
     return number
 
 
-def period_of(value: float) -> float:
-    """Return a period in s, or refuse what is none."""
-    period = _number("period: {} given, seconds between two samples expected, such as 0.001", value)
+def period_of(seconds: float) -> float:
+    """Return a period in s after a check that it is positive, finite and no rate."""
+    period = _positive_number(
+        "period: {} given, seconds between two samples expected, such as 0.001", seconds
+    )
     if period > _SLOWEST:
         raise DataError(
             f"period: {period:g} s given, at most {_SLOWEST:g} s expected; is it a rate in Hz? "
@@ -51,12 +53,12 @@ def period_of(value: float) -> float:
     return period
 
 
-def per_joint(model: Manipulator, name: str, value: PerJoint) -> Array:
+def joint_array(model: Manipulator, name: str, numbers: PerJoint) -> Array:
     """Return a number for each joint (n,)."""
-    numbers = np.asarray(value, dtype=float)
-    if numbers.ndim and numbers.shape != (model.joint_count,):
+    array = np.asarray(numbers, dtype=float)
+    if array.ndim and array.shape != (model.joint_count,):
         raise DataError(
-            f"{name}: {numbers.size} numbers given, but {model.name} has {model.joint_count} "
-            f"joints ({', '.join(model.joint_names)}); give one for each, or one for all"
+            f"{name}: {array.size} numbers given, but {model.name} has {model.joint_count} joints "
+            f"({', '.join(model.joint_names)}); give one for each, or one for all"
         )
-    return np.broadcast_to(numbers, model.joint_count)
+    return np.broadcast_to(array, model.joint_count)

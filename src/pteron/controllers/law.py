@@ -65,8 +65,8 @@ class Law:
         """
         robot = self.model
         place, rate = (
-            as_array(value, name, (robot.freedom,), columns=robot.column_names[name])
-            for name, value in (("pose", pose), ("velocity", velocity))
+            as_array(coordinates, name, (robot.freedom,), columns=robot.column_names[name])
+            for name, coordinates in (("pose", pose), ("velocity", velocity))
         )
         place = np.broadcast_arrays(place, rate)[0]
         zeros = [
@@ -121,8 +121,8 @@ class Law:
     @property
     def numbers(self) -> dict[str, Array]:
         """The gains and the model's numbers, as `pteron.kernels.loops.Loop.run` takes them."""
-        machine = machine_numbers(self.model, self.program, "law")
-        return machine | {"law_gains": self.gains.reshape(1, 1, -1)}
+        model_numbers = machine_numbers(self.model, self.program, "law")
+        return model_numbers | {"law_gains": self.gains.reshape(1, 1, -1)}
 
     @cached_property
     def _kernel(self) -> TieredKernel:

@@ -23,7 +23,7 @@ from pteron.motion import Motion, Sizing, size
 from pteron.renamed import former_attribute
 from pteron.workspace import Box, Region
 from pteron.workspace.fit import UNKNOWN, Fit, largest_fit
-from pteron.workspace.samples import cube, shape_samples
+from pteron.workspace.shape_samples import cube, shape_samples
 
 _STARTS = 8
 """Worst sampled poses about which a worse one is sought."""

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pteron.extras import of_extra
+from pteron.extras import import_extra
 from pteron.kernels import Array
 
 
 def _pymoo(module: str) -> Any:
-    return of_extra("design", f"pymoo.{module}", "a search needs pymoo")
+    return import_extra("design", f"pymoo.{module}", "a search needs pymoo")
 
 
 def non_dominated(costs: Array) -> NDArray[np.int_]:

@@ -14,8 +14,8 @@ from pteron.indices import ALUMINIUM, STEEL, Elasticity, Section, Tolerances
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
 from pteron.motion import Motion, line_path, pick_and_place
-from pteron.motion.payload import carrying
-from pteron.motion.trajectories.time_law import sampled
+from pteron.motion.payload import add_payload
+from pteron.motion.trajectories.time_law import sample_curve
 from pteron.motion.trajectories.time_polynomials import polynomial
 from pteron.motion.trajectories.timed_path import timed_path
 
@@ -69,7 +69,7 @@ class PayloadTable(TomlTable):
             inertia if isinstance(inertia, tuple) else (inertia, 0.0, 0.0, inertia, 0.0, inertia)
         )
         tilts = inertia_count(robot.platform.inertia.kinds) > 1
-        return carrying(robot, self.mass, self.center, tensor if tilts else tensor[5])
+        return add_payload(robot, self.mass, self.center, tensor if tilts else tensor[5])
 
 
 class CycleTable(TomlTable):
@@ -141,7 +141,7 @@ class CycleTable(TomlTable):
             stretches = stretches * total / stretches.sum()
         law = polynomial("quintic")
         course = timed_path(path, stretches.tolist(), [law] * len(stretches))
-        return sampled(course.at, course.duration, course.duration / (SAMPLES - 1))
+        return sample_curve(course.at, course.duration, course.duration / (SAMPLES - 1))
 
 
 class ErrorsTable(TomlTable):

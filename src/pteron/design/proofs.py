@@ -19,7 +19,7 @@ from pteron.design.task import Task
 from pteron.kernels import Array, alike
 from pteron.workspace import Box, Proof, Region, prove
 from pteron.workspace.fit import UNKNOWN, Fit, proved_fit
-from pteron.workspace.samples import Samples, fixed_samples
+from pteron.workspace.shape_samples import Samples, fixed_samples
 
 _SHARES = (0.9999, 0.999, 0.995, 0.98, 0.95, 0.9, 0.75, 0.5, 0.25, 0.1)
 """Shares of the cube's edge that are tried in turn: at the whole edge some condition is zero, which

@@ -16,8 +16,8 @@ from pteron.design.variables import geometry_slopes, slopes_of
 from pteron.errors import ModelError
 from pteron.kernels import Array
 from pteron.kinematics.sampling import search_ball
-from pteron.workspace.exchange import POINTS, Program, improved
-from pteron.workspace.samples import Samples, fixed_samples, shape_samples
+from pteron.workspace.exchange import POINTS, Program, improve_unknowns
+from pteron.workspace.shape_samples import Samples, fixed_samples, shape_samples
 
 _EXCHANGES = 8
 """Most times that counterexamples of the result's proof join its conditions."""
@@ -73,7 +73,7 @@ def refined(task: Task, values: Sequence[float], objective: int) -> list[float]:
     )
     first, dense = (_asked_at(design, lengths, count) for count in (_FIRST, POINTS))
     for _ in range(_EXCHANGES):
-        z = improved(program, first, dense)
+        z = improve_unknowns(program, first, dense)
         found: list[float] = z[: len(start)].tolist()
         missed = counterexamples(Design(task, task.machine(found)), z[len(start) : -1], z[-1])
         if not len(missed.inside):

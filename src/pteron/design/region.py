@@ -9,7 +9,7 @@ import numpy as np
 from pteron.design.spec import WorkspaceTable
 from pteron.kernels import Array
 from pteron.workspace import Box, Cylinder, Region
-from pteron.workspace.samples import Shape
+from pteron.workspace.shape_samples import Shape
 
 _RING = 24
 """Points round a cylinder's rim."""

@@ -22,7 +22,7 @@ from pteron.design.loads import (
 )
 from pteron.design.quantities import known
 from pteron.errors import DataError, shown
-from pteron.toml import read_toml, validated
+from pteron.toml import read_toml, to_model
 
 _ABSENT = "no such file; it should describe a search for a design"
 """The end of the message for a missing file."""
@@ -302,7 +302,7 @@ def read_spec(path: str | Path) -> Spec:
         listed.
     """
     source = shown(str(path), bare=True, longest=1000)
-    spec = validated(Spec, read_toml(path, DataError, _ABSENT), source, DataError)
+    spec = to_model(Spec, read_toml(path, DataError, _ABSENT), source, DataError)
     folder = Path(path).parent
     update: dict[str, Any] = {}
     if (folder / spec.robot).is_file():

@@ -21,9 +21,9 @@ from pteron.manipulator.saving import text_of
 from pteron.maps.plan import RESULTS
 from pteron.motion import Motor, read_motors
 from pteron.motion.payload import payload_warning
-from pteron.toml import told
+from pteron.toml import joined_faults
 from pteron.workspace.conditions import conditions
-from pteron.workspace.samples import Shape, cube
+from pteron.workspace.shape_samples import Shape, cube
 from pteron.workspace.smooth_conditions import SmoothConditions, smooth_conditions
 
 _WORST = "about the worst sampled poses too, forces and speeds over all directions"
@@ -85,7 +85,7 @@ class Task:
         except DataError as error:
             faults.append(f"motors: {error}")
         if faults:
-            raise DataError(told(faults), subject=spec.source)
+            raise DataError(joined_faults(faults), subject=spec.source)
         if spec.payload is not None and (text := payload_warning(robot, spec.payload.mass)):
             warn_unlikely(text)
         return cls(spec, robot, variables, motors)

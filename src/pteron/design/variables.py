@@ -16,7 +16,7 @@ from pteron.kernels import Array
 from pteron.kinematics.unlikely_values import unlikely_length
 from pteron.manipulator import Manipulator
 from pteron.manipulator.stretched_links import with_stretched_bodies
-from pteron.toml import told
+from pteron.toml import joined_faults
 
 _STEP = 1e-6
 """Step of difference quotients of the geometry, as a share of a variable's range."""
@@ -77,7 +77,7 @@ def variables_of(robot: Manipulator, tables: Sequence[VariableTable]) -> tuple[V
                 faults.append(f"{place.path}: moved by {taken[key]} and by {variable.name}")
             taken[key] = variable.name
     if faults:
-        raise ModelError(told(faults), faults=faults)
+        raise ModelError(joined_faults(faults), faults=faults)
     return tuple(variables)
 
 

@@ -54,9 +54,9 @@ def inverse_dynamics(
     >>> forces.round(3)
     array([31.082, -1.881,  2.566,  0.685])
     """
-    values = [pose, velocity, acceleration, *([] if wrench is None else [wrench])]
+    inputs = [pose, velocity, acceleration, *([] if wrench is None else [wrench])]
     return evaluate_kernel(
-        robot, "inverse_dynamics", on_failure, *values, wrench=wrench is not None
+        robot, "inverse_dynamics", on_failure, *inputs, wrench=wrench is not None
     )
 
 
@@ -108,9 +108,9 @@ def forward_dynamics(
     >>> np.abs(pteron.forward_dynamics(robot, rest, rest, holding)).max() < 1e-12
     np.True_
     """
-    values = [pose, velocity, forces, *([] if wrench is None else [wrench])]
+    inputs = [pose, velocity, forces, *([] if wrench is None else [wrench])]
     return evaluate_kernel(
-        robot, "forward_dynamics", on_failure, *values, wrench=wrench is not None
+        robot, "forward_dynamics", on_failure, *inputs, wrench=wrench is not None
     )
 
 
@@ -169,9 +169,9 @@ def drive_forces(
     >>> (driven - pteron.inverse_dynamics(robot, *state)).round(9)
     array([ 4.,  5., -6.])
     """
-    values = [pose, velocity, acceleration, *([] if wrench is None else [wrench])]
+    inputs = [pose, velocity, acceleration, *([] if wrench is None else [wrench])]
     what = "feed_forward" if smooth else "drive_forces"
-    return evaluate_kernel(robot, what, on_failure, *values, wrench=wrench is not None)
+    return evaluate_kernel(robot, what, on_failure, *inputs, wrench=wrench is not None)
 
 
 def drive_accelerations(
@@ -225,9 +225,9 @@ def drive_accelerations(
     >>> pteron.drive_accelerations(robot, rest, rest, forces).round(9)
     array([1., 2., 3.])
     """
-    values = [pose, velocity, forces, *([] if wrench is None else [wrench])]
+    inputs = [pose, velocity, forces, *([] if wrench is None else [wrench])]
     return evaluate_kernel(
-        robot, "drive_accelerations", on_failure, *values, wrench=wrench is not None
+        robot, "drive_accelerations", on_failure, *inputs, wrench=wrench is not None
     )
 
 

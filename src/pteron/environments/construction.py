@@ -45,22 +45,22 @@ def world_of(
     """Return the world of a machine, or of several about it, after checks."""
     machine = as_manipulator(robot)
     sizes = {"period": period, "tolerance": tolerance, "spread": spread}
-    for name, value in sizes.items():
-        if value is not None and not (np.isfinite(value) and value > 0.0):
-            raise DataError(f"{name}: {value} given, a number above 0 expected")
+    for name, size in sizes.items():
+        if size is not None and not (np.isfinite(size) and size > 0.0):
+            raise DataError(f"{name}: {size} given, a number above 0 expected")
     if spread is None:
         spread = _SPREAD * max(leg.size for leg in machine.legs)
     home = _home(machine)
     least = min(_LEAST, float(pose_margins(machine, home).least) / 2.0)
     step = min(_STEP, longest_step(machine, home[None], machines) / 2.0, period)
     count = int(np.ceil(period / step - 1e-9))
-    stepping = (home, _forces(machine, home), period, period / count, count)
-    world = World(machine, *stepping, spread, tolerance or _TOLERANCE, least, motion, machines)
+    fixed = (home, _forces(machine, home), period, period / count, count)
+    world = World(machine, *fixed, spread, tolerance or _TOLERANCE, least, motion, machines)
     box = world.travel(spread)
     # As far as the machine goes: of a hexapod with strokes of millimetres far less than asked.
-    within = float(np.sqrt((world.metres(np.abs(box)) ** 2).mean()))
-    spread = min(spread, within)
-    tolerance = tolerance or min(_TOLERANCE, _SUCCESS * within)
+    typical_travel = float(np.sqrt((world.metres(np.abs(box)) ** 2).mean()))
+    spread = min(spread, typical_travel)
+    tolerance = tolerance or min(_TOLERANCE, _SUCCESS * typical_travel)
     world = replace(world, box=box, spread=spread, tolerance=tolerance)
     if motion is not None:
         if not isinstance(motion, Motion):
@@ -89,12 +89,14 @@ def _home(robot: Manipulator) -> Array:
 
 def _forces(robot: Manipulator, home: Array) -> Array:
     """Return what an action of 1 gives, (n,)."""
-    zeros = np.zeros(robot.freedom)
+    zero_rates = np.zeros(robot.freedom)
     rows = jacobian(robot, home)
     rotors = np.diag([leg.drive.inertia if leg.drive else 0.0 for leg in robot.legs])
     mass = mass_matrix(robot, home) + rows.T @ rotors @ rows
     most = np.where(robot.platform.angular, _LIVELY / LEVER, _LIVELY)
     lively = np.linalg.solve(rows.T, mass * most)
-    enough = 2.0 * np.abs(drive_forces(robot, home, zeros, zeros)) + np.abs(lively).sum(axis=1)
+    enough = 2.0 * np.abs(drive_forces(robot, home, zero_rates, zero_rates)) + np.abs(lively).sum(
+        axis=1
+    )
     limits = limits_of(robot).force
     return np.where(np.isfinite(limits), limits, enough)

@@ -28,10 +28,10 @@ class EpisodeState:
 
     def put(self, chosen: Bools, others: EpisodeState) -> EpisodeState:
         """Return these states with `others` in place of the chosen ones, a mask (B,)."""
-        arrays = [getattr(self, part.name).copy() for part in fields(self)]
-        for into, part in zip(arrays, fields(others), strict=True):
-            into[chosen] = getattr(others, part.name)
-        return EpisodeState(*arrays)
+        columns = [getattr(self, part.name).copy() for part in fields(self)]
+        for column, part in zip(columns, fields(others), strict=True):
+            column[chosen] = getattr(others, part.name)
+        return EpisodeState(*columns)
 
     def row(self, i: int) -> EpisodeState:
         """Return the state of one machine."""

@@ -74,9 +74,9 @@ class PteronVectorEnv(VectorEnv[Numbers, Numbers, Numbers]):
         render_mode: str | None = None,
         machines: Machines | None = None,
     ) -> None:
-        for name, value in {"num_envs": num_envs, "max_episode_steps": max_episode_steps}.items():
-            if value is not None and value < 1:
-                raise DataError(f"{name}: {value} given, 1 or more expected")
+        for name, number in {"num_envs": num_envs, "max_episode_steps": max_episode_steps}.items():
+            if number is not None and number < 1:
+                raise DataError(f"{name}: {number} given, 1 or more expected")
         machine = as_manipulator(robot)
         if machines is not None and (len(machines) != num_envs or machines.robot != machine):
             raise DataError(
@@ -161,8 +161,8 @@ class PteronVectorEnv(VectorEnv[Numbers, Numbers, Numbers]):
         if self._state is None:
             raise DataError("step before reset; call reset first")
         starting = self._done
-        state = self._state
-        self._state, distance, reward, ended = self.world.after(state, actions)
+        last_state = self._state
+        self._state, distance, reward, ended = self.world.after(last_state, actions)
         self._steps = self._steps + 1
         if starting.any():
             self._start(starting, None)

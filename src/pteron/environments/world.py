@@ -168,69 +168,71 @@ class World:
         DataError
             If an option is unknown, or a pose is none that the machine may have.
         """
-        fixed = {key: self._pose(key, value) for key, value in (options or {}).items()}
-        poses = self._drawn(generators, None)
-        targets = self._drawn(generators, fixed.get("pose", poses))
+        chosen = {key: self._pose(key, option) for key, option in (options or {}).items()}
+        poses = self._draw_poses(generators, None)
+        targets = self._draw_poses(generators, chosen.get("pose", poses))
         velocity, clock = np.zeros_like(poses), np.zeros(len(poses))
         if self.motion is not None:
             clock = np.array([rng.uniform(0.0, self.motion.duration) for rng in generators])
-            if "pose" not in fixed:
+            if "pose" not in chosen:
                 poses, velocity, _ = self.motion.at(self.motion.time[0] + clock)
-        begun = np.broadcast_to(fixed.get("pose", poses), poses.shape)
+        start_poses = np.broadcast_to(chosen.get("pose", poses), poses.shape)
         return EpisodeState(
-            begun,
+            start_poses,
             velocity,
-            drive_states(self.robot, begun, velocity),
-            np.broadcast_to(fixed.get("target", targets), poses.shape),
+            drive_states(self.robot, start_poses, velocity),
+            np.broadcast_to(chosen.get("target", targets), poses.shape),
             clock,
         )
 
-    def _drawn(self, generators: Sequence[np.random.Generator], others: ArrayLike | None) -> Array:
+    def _draw_poses(
+        self, generators: Sequence[np.random.Generator], others: ArrayLike | None
+    ) -> Array:
         """Return a random pose of each generator with margin enough, or home where it has none.
 
         It is apart from the other poses (m,) or (B, m). Where all draws are too far from home they
         are brought nearer.
         """
         shape = (_DRAWS, self.robot.freedom)
-        drawn = np.stack([rng.uniform(-1.0, 1.0, shape) for rng in generators])
+        draws = np.stack([rng.uniform(-1.0, 1.0, shape) for rng in generators])
         box = self.travel(self.spread) if self.box is None else self.box
-        drawn = np.where(drawn < 0.0, -drawn * box[0], drawn * box[1])
-        starts = np.tile(self.home, (len(drawn), 1))
-        missing = np.arange(len(drawn))
-        elsewhere = None if others is None else np.broadcast_to(others, starts.shape)
+        draws = np.where(draws < 0.0, -draws * box[0], draws * box[1])
+        poses_found = np.tile(self.home, (len(draws), 1))
+        missing = np.arange(len(draws))
+        other_poses = None if others is None else np.broadcast_to(others, poses_found.shape)
         for share in _SHARES:
-            poses = self.home + share * drawn[missing]
-            good: Any = self.margin_of(poses) >= self.least
-            if elsewhere is not None:
-                away = self.metres(poses - elsewhere[missing, None, :])
-                good &= away > _APART * self.tolerance
-            has = good.any(axis=-1)
-            starts[missing[has]] = poses[has, good[has].argmax(axis=-1)]
+            poses = self.home + share * draws[missing]
+            is_valid: Any = self.margin_of(poses) >= self.least
+            if other_poses is not None:
+                distances = self.metres(poses - other_poses[missing, None, :])
+                is_valid &= distances > _APART * self.tolerance
+            has = is_valid.any(axis=-1)
+            poses_found[missing[has]] = poses[has, is_valid[has].argmax(axis=-1)]
             missing = missing[~has]
             if not len(missing):
                 break
-        return starts
+        return poses_found
 
     def margin_of(self, poses: Array) -> Array:
         """Return the margin of poses, negative beyond a singularity of type II."""
-        is_beyond = numeric(self.robot, "type_ii")(poses)[0] * self._side < 0.0
+        beyond = numeric(self.robot, "type_ii")(poses)[0] * self._side < 0.0
         smallest = pose_margins(self.robot, poses).least
-        return np.where(is_beyond, -np.abs(smallest), smallest)
+        return np.where(beyond, -np.abs(smallest), smallest)
 
     @cached_property
     def _side(self) -> float:
         return float(numeric(self.robot, "type_ii")(self.home)[0])
 
-    def _pose(self, key: str, value: Any) -> Array:
+    def _pose(self, key: str, option: Any) -> Array:
         """Return a pose of the options after a check."""
         if key not in ("pose", "target"):
             raise DataError(f"options: {key!r} is unknown; the valid ones are pose, target")
         if key == "target" and self.motion is not None:
             raise DataError("options: a target given, but the target follows the motion")
-        pose = np.asarray(value, dtype=float)
+        pose = np.asarray(option, dtype=float)
         if pose.shape != (self.robot.freedom,) or not np.isfinite(pose).all():
             names = " ".join(self.robot.coordinates)
-            raise DataError(f"options: {key} is {value!r}, {names} expected, m and rad")
+            raise DataError(f"options: {key} is {option!r}, {names} expected, m and rad")
         if self.margin_of(pose[None])[0] <= ENDS:
             raise DataError(
                 f"options: {key} {pose.tolist()} is out of reach, singular, or beyond the joints' "
@@ -270,12 +272,12 @@ class World:
 
     def _action(self, action: Any, shape: tuple[int, ...]) -> Array:
         """Return an action of machines (..., n) after a check; a machine has as many drives."""
-        numbers = as_array(action, "action", ())
-        if numbers.shape != shape:
-            raise DataError(f"action: shape {numbers.shape} given, {shape} expected")
-        if not np.isfinite(numbers).all():
+        action_array = as_array(action, "action", ())
+        if action_array.shape != shape:
+            raise DataError(f"action: shape {action_array.shape} given, {shape} expected")
+        if not np.isfinite(action_array).all():
             raise DataError("action: not finite numbers given; numbers from -1 to 1 expected")
-        return numbers
+        return action_array
 
     def why(self, pose: Array, velocity: Array) -> str:
         """Return why the episode of a machine ended, in its last state (m,)."""

@@ -179,9 +179,9 @@ def _payload_program(robot: Manipulator, base: BaseParameters) -> Program:
         Port(f"loaded_{_NAME}", (base.rank,)),
         base_symbols + ca.mtimes(grouping, load_parameters.T),
     )
-    return Program.from_expressions(
+    return Program.of(
         load.name, [mass, center, inertia, base_symbols], ports, [loaded_values], [loaded]
-    ).optimise()
+    ).optimised()
 
 
 def _recombined(function: Program, matrix: Array) -> Program:
@@ -193,6 +193,4 @@ def _recombined(function: Program, matrix: Array) -> Program:
     taken = list(symbols)
     taken[place] = ca.mtimes(ca.sparsify(ca.SX(ca.DM(matrix))), symbols[place])
     results = function.function.call(taken)
-    return Program.from_expressions(
-        function.name, symbols, ports, results, function.outputs
-    ).optimise()
+    return Program.of(function.name, symbols, ports, results, function.outputs).optimised()

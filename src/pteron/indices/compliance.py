@@ -10,7 +10,14 @@ from numpy.typing import ArrayLike
 from pteron.dynamics import mass_matrix
 from pteron.errors import DataError, ModelError
 from pteron.indices.elasticity import Elasticity, Section, Springs
-from pteron.indices.internal_forces import Equations, blocks, hold, moved, on_platform, units
+from pteron.indices.internal_forces import (
+    Equations,
+    balance_loads,
+    blocks,
+    force_units,
+    platform_wrench,
+    wrench_shift,
+)
 from pteron.indices.sensitivities import tool_arm
 from pteron.kernels import Array, as_array
 from pteron.kinematics import twist
@@ -66,21 +73,21 @@ class Stiffness:
     def least(self) -> Numbers:
         """Force over the tool's displacement in the worst direction, N/m, without a moment."""
         with np.errstate(divide="ignore"):
-            return np.asarray(1.0 / self._along_axes[..., -1])
+            return np.asarray(1.0 / self._principal_compliances[..., -1])
 
     @property
     def most(self) -> Numbers:
         """The same in the best direction."""
         with np.errstate(divide="ignore"):
-            return np.asarray(1.0 / np.maximum(self._along_axes[..., 0], 0.0))
+            return np.asarray(1.0 / np.maximum(self._principal_compliances[..., 0], 0.0))
 
     @property
-    def _along_axes(self) -> Array:
+    def _principal_compliances(self) -> Array:
         k = self.lengths
         part = self.compliance[..., :k, :k]
         known = np.isfinite(part).all(axis=(-2, -1))
-        found = np.linalg.eigvalsh(np.where(known[..., None, None], part, 0.0))
-        return np.asarray(np.where(known[..., None], found, np.nan))
+        eigenvalues = np.linalg.eigvalsh(np.where(known[..., None, None], part, 0.0))
+        return np.asarray(np.where(known[..., None], eigenvalues, np.nan))
 
     def along(self, direction: ArrayLike) -> Numbers:
         """Return force over the tool's displacement along a direction (..., k), N/m.
@@ -154,7 +161,7 @@ def stiffness(
     # Errors name a state of the whole batch.
     evaluate_kernel(robot, "manipulability", on_failure, poses)
     parts = [
-        _of_block(robot, elasticity, block)
+        _block_compliance(robot, elasticity, block)
         for (block,) in blocks([poses.reshape(-1, robot.freedom)])
     ]
     compliance, frequencies = (
@@ -165,80 +172,93 @@ def stiffness(
     return Stiffness(compliance, frequencies, lengths)
 
 
-def _of_block(robot: Manipulator, elasticity: Elasticity, poses: Array) -> tuple[Array, Array]:
+def _block_compliance(
+    robot: Manipulator, elasticity: Elasticity, poses: Array
+) -> tuple[Array, Array]:
     """Return the compliance at the tool (B, m, m) and the frequencies (B, m)."""
     batch, m = poses.shape
-    rest = np.zeros(m)
-    equations: tuple[Array, ...] = evaluate_kernel(robot, "reactions", "nan", poses, rest, rest)
-    links: tuple[Array, ...] = evaluate_kernel(robot, "beams", "nan", poses)
+    zero_rates = np.zeros(m)
+    outputs: tuple[Array, ...] = evaluate_kernel(
+        robot, "reactions", "nan", poses, zero_rates, zero_rates
+    )
+    link_lines: tuple[Array, ...] = evaluate_kernel(robot, "beams", "nan", poses)
     mass: Array = mass_matrix(robot, poses, on_failure="nan")
     size = 6 if robot.platform.tilts else m
     compliance, frequencies = np.full((batch, size, size), np.nan), np.full((batch, m), np.nan)
-    good = np.asarray(np.isfinite(equations[0]).all(axis=(-2, -1)))
-    if good.any():
-        given = Equations(*(part[good] for part in equations))
-        beams = [part[good] for part in links]
-        energy = _energy(elasticity.of_legs(robot), elasticity.rod_distance, given, beams)
-        at_p = _compliance(robot, given, energy, np.zeros((len(energy), 3)))
-        compliance[good] = at_p
+    solvable = np.asarray(np.isfinite(outputs[0]).all(axis=(-2, -1)))
+    if solvable.any():
+        balance = Equations(*(array[solvable] for array in outputs))
+        beams = [array[solvable] for array in link_lines]
+        energy = _energy_matrix(elasticity.of_legs(robot), elasticity.rod_distance, balance, beams)
+        point_compliance = _compliance(robot, balance, energy, np.zeros((len(energy), 3)))
+        compliance[solvable] = point_compliance
         if robot.platform.tilts:
-            twists = twist(robot, poses[good][:, None], np.eye(m)).mT
+            twists = twist(robot, poses[solvable][:, None], np.eye(m)).mT
             size_of_legs = float(np.mean([leg.size for leg in robot.legs]))
-            at_p = np.stack([_held(*pair, size_of_legs) for pair in zip(at_p, twists, strict=True)])
-        frequencies[good] = _frequencies(at_p, mass[good])
+            point_compliance = np.stack(
+                [
+                    _constrained_compliance(*state, size_of_legs)
+                    for state in zip(point_compliance, twists, strict=True)
+                ]
+            )
+        frequencies[solvable] = _frequencies(point_compliance, mass[solvable])
         if any(robot.platform.tool):
-            arm = tool_arm(robot, poses[good])
-            compliance[good] = _compliance(robot, given, energy, arm)
+            arm = tool_arm(robot, poses[solvable])
+            compliance[solvable] = _compliance(robot, balance, energy, arm)
     return compliance, frequencies
 
 
-def _compliance(robot: Manipulator, given: Equations, energy: Array, arm: Array) -> Array:
+def _compliance(robot: Manipulator, balance: Equations, energy: Array, arm: Array) -> Array:
     """Return C (B, m, m), or (B, 6, 6), at a point whose vector from P is `arm` (B, 3)."""
-    load, applied = _unit_loads(robot, given, arm)
+    load, applied = _unit_loads(robot, balance, arm)
     batch, _, count = load.shape
-    right = np.zeros((batch, given.rows.shape[-2], count))
-    presumed = np.zeros((batch, given.presumed_rows.shape[-2], count))
+    right = np.zeros((batch, balance.rows.shape[-2], count))
+    presumed = np.zeros((batch, balance.presumed_rows.shape[-2], count))
     right[:, : robot.freedom] = -applied
     if presumed.size:  # else a joint holds what the legs do not
         presumed[:, :6] = -load
-    held = hold(robot, given, right, presumed)
-    w, free = held.forces, held.stresses
-    if free.shape[-1]:  # the self-stress of the least energy
-        values, vectors = np.linalg.eigh(free.mT @ energy @ free)
-        whole = (units(robot) ** 2 * np.diagonal(energy, axis1=-2, axis2=-1)).sum(axis=-1)
-        counts = values > _FREE * whole[:, None]
-        back = vectors @ (vectors / np.where(counts, values, np.inf)[:, None]).mT
-        w = w - free @ back @ (free.mT @ energy @ w)
-    found = w.mT @ energy @ w
-    return np.asarray(0.5 * (found + found.mT))
+    balanced = balance_loads(robot, balance, right, presumed)
+    forces, stresses = balanced.forces, balanced.stresses
+    if stresses.shape[-1]:  # the self-stress of the least energy
+        energies, directions = np.linalg.eigh(stresses.mT @ energy @ stresses)
+        energy_scale = (force_units(robot) ** 2 * np.diagonal(energy, axis1=-2, axis2=-1)).sum(
+            axis=-1
+        )
+        resisting = energies > _FREE * energy_scale[:, None]
+        energy_inverse = (
+            directions @ (directions / np.where(resisting, energies, np.inf)[:, None]).mT
+        )
+        forces = forces - stresses @ energy_inverse @ (stresses.mT @ energy @ forces)
+    compliance = forces.mT @ energy @ forces
+    return np.asarray(0.5 * (compliance + compliance.mT))
 
 
-def _unit_loads(robot: Manipulator, given: Equations, arm: Array) -> tuple[Array, Array]:
+def _unit_loads(robot: Manipulator, balance: Equations, arm: Array) -> tuple[Array, Array]:
     """Return unit loads at a point: about P (B, 6, K), and against the freedoms (B, m, K)."""
     batch, m = len(arm), robot.freedom
     if robot.platform.tilts:
-        load = moved(arm)
-        return load, given.loads @ load
+        load = wrench_shift(arm)
+        return load, balance.loads @ load
     wrench = np.broadcast_to(np.eye(m), (batch, m, m)).copy()  # a row for each unit load
-    force = on_platform(robot, wrench, np.zeros(3))[..., :3]
+    force = platform_wrench(robot, wrench, np.zeros(3))[..., :3]
     moment = np.cross(arm[:, None], force)
     if robot.platform.angles:
         axis = np.array(robot.platform.axis)
         wrench[..., robot.platform.angular] += moment @ axis[:, None]
-        # `on_platform` has the part about the axis from the wrench.
+        # `platform_wrench` has the part about the axis from the wrench.
         moment = moment - (moment @ axis)[..., None] * axis
-    return on_platform(robot, wrench, moment).mT, wrench.mT
+    return platform_wrench(robot, wrench, moment).mT, wrench.mT
 
 
-def _energy(
-    springs: Springs, rod_distance: float | None, given: Equations, links: list[Array]
+def _energy_matrix(
+    springs: Springs, rod_distance: float | None, balance: Equations, links: list[Array]
 ) -> Array:
     """Return W (B, 6 n, 6 n): twice the energy of internal forces w is w^T W w."""
     actuators, sections = springs
     starts, ways, axes, couples = links
     batch, n = couples.shape[:2]
-    rows = given.driven_rows
-    found = rows.mT @ (rows / np.array(actuators)[:, None])
+    rows = balance.driven_rows
+    energy = rows.mT @ (rows / np.array(actuators)[:, None])
     for i in range(n):
         block = np.zeros((batch, 6, 6))
         rods = bool(np.isfinite(couples[:, i]).all())
@@ -246,30 +266,32 @@ def _energy(
             if section is None or np.isnan(ways[:, i, k]).any():
                 continue
             if rods and k == 1:
-                block += _rods(section, ways[:, i, k], couples[:, i], rod_distance)
+                block += _rod_energy(section, ways[:, i, k], couples[:, i], rod_distance)
             else:
-                arms = given.ends[:, i] - starts[:, i, k]
-                block += _beam(section, arms, ways[:, i, k], axes[:, i, k])
-        found[:, 6 * i : 6 * i + 6, 6 * i : 6 * i + 6] += block
-    return np.asarray(found)
+                arms = balance.ends[:, i] - starts[:, i, k]
+                block += _beam_energy(section, arms, ways[:, i, k], axes[:, i, k])
+        energy[:, 6 * i : 6 * i + 6, 6 * i : 6 * i + 6] += block
+    return np.asarray(energy)
 
 
-def _rods(section: Section, way: Array, couple: Array, distance: float | None) -> Array:
+def _rod_energy(section: Section, way: Array, couple: Array, distance: float | None) -> Array:
     """Return the energy (B, 6, 6) of a rod, or of a pair whose couple pulls one and pushes one."""
     length = np.linalg.norm(way, axis=-1)
     n = way / length[:, None]
-    found = np.zeros((len(way), 6, 6))
-    found[:, :3, :3] = _square(n) * (length / section.axial)[:, None, None]
+    energy = np.zeros((len(way), 6, 6))
+    energy[:, :3, :3] = _square(n) * (length / section.axial)[:, None, None]
     if distance is not None and couple.any():
         # The couple is |bar x n| times their distance, times half the difference of their forces.
         size = np.linalg.norm(couple, axis=-1)
         unit = couple / size[:, None]
-        apart = distance * size / length
-        found[:, 3:, 3:] = _square(unit) * (4 * length / (section.axial * apart**2))[:, None, None]
-    return found
+        spacing = distance * size / length
+        energy[:, 3:, 3:] = (
+            _square(unit) * (4 * length / (section.axial * spacing**2))[:, None, None]
+        )
+    return energy
 
 
-def _beam(section: Section, arm: Array, way: Array, axis: Array) -> Array:
+def _beam_energy(section: Section, arm: Array, way: Array, axis: Array) -> Array:
     """Return the energy (B, 6, 6) of a beam, for the wrench at c, where `arm` leads from its start.
 
     It bends in its leg's plane about `axis`.
@@ -283,41 +305,41 @@ def _beam(section: Section, arm: Array, way: Array, axis: Array) -> Array:
     z = np.where(size > 1e-6, z, other)
     z = z / np.linalg.norm(z, axis=-1, keepdims=True)
     y = np.cross(z, x)
-    found = np.zeros((len(way), 6, 6))
+    energy = np.zeros((len(way), 6, 6))
     for share in _GAUSS:
-        at = moved(arm - share * way)
+        shift = wrench_shift(arm - share * way)
         for v, part, rigidity in (
             (x, slice(3), section.axial),
             (x, slice(3, 6), section.torsion),
             (y, slice(3, 6), section.sideways),
             (z, slice(3, 6), section.bending),
         ):
-            row = np.einsum("bi,bij->bj", v, at[:, part])
-            found += _square(row) * (0.5 * length / rigidity)[:, None, None]
-    return found
+            row = np.einsum("bi,bij->bj", v, shift[:, part])
+            energy += _square(row) * (0.5 * length / rigidity)[:, None, None]
+    return energy
 
 
 def _square(rows: Array) -> Array:
     return np.asarray(rows[:, :, None] * rows[:, None, :])
 
 
-def _held(compliance: Array, twists: Array, length: float) -> Array:
-    """Return the compliance (m, m) of a pose's coordinates while parasitic motions are held.
+def _constrained_compliance(compliance: Array, twists: Array, length: float) -> Array:
+    """Return the compliance (m, m) of a pose's coordinates with parasitic motions constrained.
 
     The platform moves by twists x' alone, `twists` (6, m), so that its stiffness is T^T C^-1 T. A
     direction in which nothing gives way (C is singular where links are rigid) allows no x' that
     moves along it; `length` balances moments and forces in the decision which those are.
     """
-    balance = np.array([1.0, 1.0, 1.0, length, length, length])
-    values, vectors = np.linalg.eigh(balance[:, None] * compliance * balance)
-    scaled = vectors.T @ (balance[:, None] * twists)
-    soft = values > _FREE * values[-1]
+    scale = np.array([1.0, 1.0, 1.0, length, length, length])
+    compliances, axes = np.linalg.eigh(scale[:, None] * compliance * scale)
+    scaled = axes.T @ (scale[:, None] * twists)
+    soft = compliances > _FREE * compliances[-1]
     sizes, rows = np.linalg.svd(scaled[~soft], full_matrices=True)[1:]
     rank = int((sizes > np.sqrt(_FREE) * np.linalg.norm(scaled)).sum())
-    free = rows[rank:].T
-    moved = scaled[soft] @ free
-    stiffness_of_free = moved.T @ (moved / values[soft, None])
-    return np.asarray(free @ np.linalg.solve(stiffness_of_free, free.T))
+    allowed = rows[rank:].T
+    soft_motions = scaled[soft] @ allowed
+    stiffness_of_free = soft_motions.T @ (soft_motions / compliances[soft, None])
+    return np.asarray(allowed @ np.linalg.solve(stiffness_of_free, allowed.T))
 
 
 def _frequencies(compliance: Array, mass: Array) -> Array:

@@ -94,10 +94,10 @@ def global_conditioning(
     if count < 1:
         raise DataError(f"count: {count} given, at least 1 expected")
     expect_to_fit("count", count, 4.0 * count / _GROUPS * robot.freedom)
-    given = finite_pose(robot, pose, "pose")
+    home = finite_pose(robot, pose, "pose")
     if box is None:
-        low, high = np.array([given, given])
-        sides = bounding_box(robot, given)
+        low, high = np.array([home, home])
+        sides = bounding_box(robot, home)
         low[: sides.shape[1]], high[: sides.shape[1]] = sides
         free = np.arange(robot.freedom) < sides.shape[1]
     else:
@@ -115,18 +115,21 @@ def global_conditioning(
         margin = numeric(robot, "reach")(poses)[0]
         inside = np.minimum(margin, distance_to_limits(robot, poses)).min(axis=-1) >= 0.0
         # At the edge of reach the index is not defined, and 1 / c is taken as 0.
-        values = np.nan_to_num(1.0 / np.asarray(evaluate(robot, name, poses[inside])))
-        sums.append((values.sum(), inside.sum()))
-    total, number = np.array(sums, dtype=float).T
-    if not number.any():
+        inverse_conditions = np.nan_to_num(1.0 / np.asarray(evaluate(robot, name, poses[inside])))
+        sums.append((inverse_conditions.sum(), inside.sum()))
+    total, inside_count = np.array(sums, dtype=float).T
+    if not inside_count.any():
         raise ModelError(
             "no pose that was tried is in reach within the joints' limits; move or widen the box, "
             "or give more samples",
             subject=robot.name,
         )
-    value = float(total.sum() / number.sum())
-    error = float(np.sqrt(_GROUPS / (_GROUPS - 1) * ((total - value * number) ** 2).sum()))
-    whole = _GROUPS << power
+    mean = float(total.sum() / inside_count.sum())
+    error = float(np.sqrt(_GROUPS / (_GROUPS - 1) * ((total - mean * inside_count) ** 2).sum()))
+    sample_count = _GROUPS << power
     return GlobalConditioning(
-        value, error / float(number.sum()), float(number.sum()) / whole, whole
+        mean,
+        error / float(inside_count.sum()),
+        float(inside_count.sum()) / sample_count,
+        sample_count,
     )

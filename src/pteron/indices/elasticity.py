@@ -12,12 +12,12 @@ from pteron.errors import ModelError
 from pteron.manipulator import Manipulator
 
 
-def _positive(name: str, value: Any) -> float:
+def _positive_number(name: str, size: Any) -> float:
     """Return a number above zero; infinite stands for rigid."""
-    found = math.inf if value == math.inf else number(value, name)
-    if not found > 0.0:
-        raise ModelError(f"{name}: {found:g} given, a number above 0 expected")
-    return found
+    checked = math.inf if size == math.inf else number(size, name)
+    if not checked > 0.0:
+        raise ModelError(f"{name}: {checked:g} given, a number above 0 expected")
+    return checked
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class Material:
 
     def __post_init__(self) -> None:
         for name in ("young", "shear"):
-            object.__setattr__(self, name, _positive(name, getattr(self, name)))
+            object.__setattr__(self, name, _positive_number(name, getattr(self, name)))
 
 
 STEEL = Material(210e9, 81e9)
@@ -72,7 +72,7 @@ class Section:
 
     def __post_init__(self) -> None:
         for name in ("axial", "bending", "sideways", "torsion"):
-            object.__setattr__(self, name, _positive(name, getattr(self, name)))
+            object.__setattr__(self, name, _positive_number(name, getattr(self, name)))
 
     @classmethod
     def tube(cls, diameter: float, wall: float, material: Material) -> Section:
@@ -99,7 +99,7 @@ class Section:
 
 def _hollow(name: str, outer: float, wall: float) -> tuple[float, float]:
     """Return the outer and the inner size of a tube."""
-    outer, wall = _positive(name, outer), _positive("wall", wall)
+    outer, wall = _positive_number(name, outer), _positive_number("wall", wall)
     if 2 * wall > outer:
         raise ModelError(f"wall: {wall:g} m given, at most half of the {name}, {outer / 2:g} m")
     return outer, outer - 2 * wall
@@ -132,32 +132,34 @@ class Elasticity:
     rod_distance: float | None = None
 
     def __post_init__(self) -> None:
-        given = self.actuators
-        several = (given,) if isinstance(given, int | float) else tuple(given)
-        found = tuple(_positive("actuators", value) for value in several)
-        object.__setattr__(self, "actuators", found if len(found) > 1 else found[0])
+        actuators = self.actuators
+        several = (actuators,) if isinstance(actuators, int | float) else tuple(actuators)
+        checked = tuple(_positive_number("actuators", stiffness) for stiffness in several)
+        object.__setattr__(self, "actuators", checked if len(checked) > 1 else checked[0])
         for name in ("upper", "lower"):
-            value = getattr(self, name)
-            if value is not None and not isinstance(value, Section):
-                object.__setattr__(self, name, tuple(value))
+            sections = getattr(self, name)
+            if sections is not None and not isinstance(sections, Section):
+                object.__setattr__(self, name, tuple(sections))
         if self.rod_distance is not None:
-            object.__setattr__(self, "rod_distance", _positive("rod_distance", self.rod_distance))
+            object.__setattr__(
+                self, "rod_distance", _positive_number("rod_distance", self.rod_distance)
+            )
 
     def of_legs(self, robot: Manipulator) -> Springs:
         """Return the actuators' stiffness and the sections of both links, for each leg."""
         actuators, upper, lower = (
-            self._each(robot, name) for name in ("actuators", "upper", "lower")
+            self._repeat_for_legs(robot, name) for name in ("actuators", "upper", "lower")
         )
         return actuators, tuple(zip(upper, lower, strict=True))
 
-    def _each(self, robot: Manipulator, name: str) -> tuple[Any, ...]:
-        given = getattr(self, name)
-        if not isinstance(given, tuple):
-            return (given,) * robot.joint_count
-        if len(given) != robot.joint_count:
+    def _repeat_for_legs(self, robot: Manipulator, name: str) -> tuple[Any, ...]:
+        setting = getattr(self, name)
+        if not isinstance(setting, tuple):
+            return (setting,) * robot.joint_count
+        if len(setting) != robot.joint_count:
             raise ModelError(
-                f"{name}: {len(given)} given, but {robot.name} has {robot.joint_count} legs; give "
-                "one for all, or one a leg",
+                f"{name}: {len(setting)} given, but {robot.name} has {robot.joint_count} legs; "
+                "give one for all, or one a leg",
                 subject=robot.name,
             )
-        return given
+        return setting

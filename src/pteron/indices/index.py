@@ -77,10 +77,10 @@ def indices_of(robot: RobotLike) -> tuple[str, ...]:
     (False, True)
     """
     robot = as_manipulator(robot)
-    return tuple(i.name for i in INDICES.values() if not _lacking(robot, i))
+    return tuple(index.name for index in INDICES.values() if not _missing_motion(robot, index))
 
 
-def _lacking(robot: Manipulator, index: Index) -> str:
+def _missing_motion(robot: Manipulator, index: Index) -> str:
     """Return the motion that an index asks for and a platform lacks, in words; or nothing."""
     if index.turning and not robot.platform.angles:
         return "turning, but this {} platform does not turn"
@@ -95,9 +95,9 @@ def expect_index(robot: RobotLike, name: str) -> Index:
     if name not in INDICES:
         raise DataError(f"index: {name!r} is not known; choose from {', '.join(INDICES)}")
     index = INDICES[name]
-    if lacking := _lacking(robot, index):
+    if missing := _missing_motion(robot, index):
         raise ModelError(
-            f"index: {name!r} is about {lacking.format(robot.platform.motion)}; choose from "
+            f"index: {name!r} is about {missing.format(robot.platform.motion)}; choose from "
             f"{', '.join(indices_of(robot))}",
             subject=robot.name,
         )

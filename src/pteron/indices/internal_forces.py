@@ -32,7 +32,7 @@ class Equations(NamedTuple):
     passed: Array
 
 
-class Held(NamedTuple):
+class BalancedLoads(NamedTuple):
     """The legs' forces and moments that balance K loads, as far as statics determines them."""
 
     forces: Array
@@ -59,39 +59,49 @@ def size_of(robot: Manipulator) -> float:
     return float(np.mean([leg.size for leg in robot.legs]))
 
 
-def units(robot: Manipulator) -> Array:
-    """Return what makes the legs' forces and moments (6 n,) comparable: 1, and the size, m."""
+def force_units(robot: Manipulator) -> Array:
+    """Return the units that make the legs' forces and moments (6 n,) comparable: 1, and m."""
     return np.tile(np.repeat([1.0, size_of(robot)], 3), robot.joint_count)
 
 
-def hold(robot: Manipulator, given: Equations, right: Array, presumed: Array) -> Held:
-    """Return what holds loads: right sides (B, R, K) and (B, S, K).
+def balance_loads(
+    robot: Manipulator, equations: Equations, right: Array, presumed: Array
+) -> BalancedLoads:
+    """Return the leg forces that balance loads, given as right sides (B, R, K) and (B, S, K).
 
-    First what must hold; of that what is nearest to what the legs are presumed to hold. Moments
-    count as forces at the machine's size, so that no rank depends on a unit.
+    The necessary equations hold exactly; among their solutions the one nearest to the presumed
+    equations is taken. Moments count as forces at the machine's size, so that no rank depends on a
+    unit.
     """
-    count, length = given.rows.shape[-1], size_of(robot)
-    size = units(robot)
-    rows, more = given.rows * size, given.presumed_rows * size
-    parts = given.rows.reshape(*given.rows.shape[:-1], -1, 6)
+    count, length = equations.rows.shape[-1], size_of(robot)
+    unit_sizes = force_units(robot)
+    rows, presumed_rows = equations.rows * unit_sizes, equations.presumed_rows * unit_sizes
+    parts = equations.rows.reshape(*equations.rows.shape[:-1], -1, 6)
     moments = (parts[..., 3:] != 0.0).any(axis=(0, -1, -2))
     moments[: robot.freedom] |= robot.platform.angular
-    each = np.where(moments, 1.0 / length, 1.0)[:, None]
-    rows, right = each * rows, each * right
-    per = np.ones(more.shape[-2])
-    per[3:] = 1.0 / length
-    more, presumed = per[:, None] * more, per[:, None] * presumed
-    back = inverse(rows)
-    w, free = back @ right, _range(np.eye(count) - back @ rows)
-    left = more @ free
-    back = inverse(left)
-    w = w + free @ back @ (presumed - more @ w)
-    stresses = _range(free @ (np.eye(free.shape[-1]) - back @ left))
-    return Held(size[:, None] * w, size[:, None] * stresses, more @ w - presumed)
+    row_scale = np.where(moments, 1.0 / length, 1.0)[:, None]
+    rows, right = row_scale * rows, row_scale * right
+    presumed_scale = np.ones(presumed_rows.shape[-2])
+    presumed_scale[3:] = 1.0 / length
+    presumed_rows, presumed = (
+        presumed_scale[:, None] * presumed_rows,
+        presumed_scale[:, None] * presumed,
+    )
+    pseudo_inverse = inverse(rows)
+    forces, null_space = pseudo_inverse @ right, _range(np.eye(count) - pseudo_inverse @ rows)
+    free_rows = presumed_rows @ null_space
+    pseudo_inverse = inverse(free_rows)
+    forces = forces + null_space @ pseudo_inverse @ (presumed - presumed_rows @ forces)
+    stresses = _range(null_space @ (np.eye(null_space.shape[-1]) - pseudo_inverse @ free_rows))
+    return BalancedLoads(
+        unit_sizes[:, None] * forces,
+        unit_sizes[:, None] * stresses,
+        presumed_rows @ forces - presumed,
+    )
 
 
 def _range(projectors: Array) -> Array:
-    """Return columns (B, n, r) at right angles that span what products of projections reach."""
+    """Return orthonormal columns (B, n, r) that span the range of products of projections."""
     columns, sizes, _ = np.linalg.svd(projectors)
     counts = sizes > 0.5  # each is 0 or 1, but for rounding
     return np.asarray(
@@ -99,35 +109,35 @@ def _range(projectors: Array) -> Array:
     )
 
 
-def on_platform(robot: Manipulator, wrench: Array, moment: Array) -> Array:
+def platform_wrench(robot: Manipulator, wrench: Array, moment: Array) -> Array:
     """Return the force and the moment at P (..., 6) of a wrench and of a moment beside it."""
     count, platform = len(robot.platform.lengths), robot.platform
     if platform.tilts:
         return np.concatenate(np.broadcast_arrays(wrench[..., :3], wrench[..., 3:] + moment), -1)
     force = wrench[..., :count] @ platform.directions
-    turning = np.zeros(3)
+    turning_moment = np.zeros(3)
     if platform.rotation_axes:
-        turning = wrench[..., platform.angular] @ np.array(platform.rotation_axes)
-    force, whole = np.broadcast_arrays(force, turning + moment)
-    return np.concatenate([force, whole], axis=-1)
+        turning_moment = wrench[..., platform.angular] @ np.array(platform.rotation_axes)
+    force, total_moment = np.broadcast_arrays(force, turning_moment + moment)
+    return np.concatenate([force, total_moment], axis=-1)
 
 
-def moved(arms: Array) -> Array:
+def wrench_shift(arms: Array) -> Array:
     """Return matrices (..., 6, 6) that move a wrench from c to points with vectors `arms` to c."""
-    found = np.zeros((*arms.shape[:-1], 6, 6))
-    found[...] = np.eye(6)
+    shifts = np.zeros((*arms.shape[:-1], 6, 6))
+    shifts[...] = np.eye(6)
     x, y, z = np.moveaxis(arms, -1, 0)
-    found[..., 3, 1], found[..., 3, 2] = -z, y
-    found[..., 4, 0], found[..., 4, 2] = z, -x
-    found[..., 5, 0], found[..., 5, 1] = -y, x
-    return found
+    shifts[..., 3, 1], shifts[..., 3, 2] = -z, y
+    shifts[..., 4, 0], shifts[..., 4, 2] = z, -x
+    shifts[..., 5, 0], shifts[..., 5, 1] = -y, x
+    return shifts
 
 
 def inverse(matrices: Array) -> Array:
-    """Return the pseudo-inverse of matrices, those of small singular values left out."""
+    """Return the pseudo-inverse of matrices, small singular values truncated."""
     return np.asarray(np.linalg.pinv(matrices, rcond=_RANK))
 
 
-def times(matrices: Array, vectors: Array) -> Array:
+def apply_matrices(matrices: Array, vectors: Array) -> Array:
     """Return products of matrices and vectors."""
     return np.asarray((matrices @ vectors[..., None])[..., 0])

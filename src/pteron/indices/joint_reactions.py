@@ -12,13 +12,13 @@ from pteron.equations.machine import Machine
 from pteron.errors import DataError
 from pteron.indices.internal_forces import (
     Equations,
+    apply_matrices,
+    balance_loads,
     blocks,
-    hold,
     inverse,
-    moved,
-    on_platform,
+    platform_wrench,
     size_of,
-    times,
+    wrench_shift,
 )
 from pteron.kernels import Array, as_array
 from pteron.kinematics.evaluate import evaluate_kernel, finite_rows
@@ -128,27 +128,34 @@ def reactions(
     (('P0', 'R1', 'R2', 'R3'), 3, array([-80.912, -80.912, 157.886]))
     """
     robot = as_manipulator(robot)
-    by = size_of(robot) if length is None else float(length)
-    if not by > 0.0:
-        raise DataError(f"length: {by:g} m given, a number above 0 expected")
-    none = {"wrench": np.zeros(len(robot.platform.wrench_columns))}
-    rest = np.zeros(robot.freedom)
-    given = {"pose": pose, "velocity": velocity, "acceleration": acceleration, "wrench": wrench}
+    norm_length = size_of(robot) if length is None else float(length)
+    if not norm_length > 0.0:
+        raise DataError(f"length: {norm_length:g} m given, a number above 0 expected")
+    zero_inputs = {"wrench": np.zeros(len(robot.platform.wrench_columns))}
+    zero_rates = np.zeros(robot.freedom)
+    quantities = {
+        "pose": pose,
+        "velocity": velocity,
+        "acceleration": acceleration,
+        "wrench": wrench,
+    }
     states = [
-        none.get(name, rest) if part is None else finite_rows(robot, part, name, on_failure)
-        for name, part in given.items()
+        zero_inputs.get(name, zero_rates)
+        if part is None
+        else finite_rows(robot, part, name, on_failure)
+        for name, part in quantities.items()
     ]
     states.append(np.zeros(3) if moment is None else as_array(moment, "moment", (3,)))
     # Errors name a state of the whole batch.
     evaluate_kernel(robot, "inverse_dynamics", on_failure, *states[:3])
-    lead = np.broadcast_shapes(*(part.shape[:-1] for part in states))
+    batch_shape = np.broadcast_shapes(*(part.shape[:-1] for part in states))
     flat = [
-        np.broadcast_to(part, (*lead, part.shape[-1])).reshape(-1, part.shape[-1])
+        np.broadcast_to(part, (*batch_shape, part.shape[-1])).reshape(-1, part.shape[-1])
         for part in states
     ]
-    parts = [_solved(robot, by, *block) for block in blocks(flat)]
+    parts = [_solve_reactions(robot, norm_length, *block) for block in blocks(flat)]
     points, passed, actuators, unheld = (
-        np.concatenate(part).reshape((*lead, *part[0].shape[1:]))
+        np.concatenate(part).reshape((*batch_shape, *part[0].shape[1:]))
         for part in list(zip(*parts, strict=True))[:4]
     )
     return Reactions(
@@ -158,12 +165,12 @@ def reactions(
         passed[..., 3:],
         actuators,
         max(part[4] for part in parts),
-        by,
+        norm_length,
         unheld,
     )
 
 
-def _solved(
+def _solve_reactions(
     robot: Manipulator,
     length: float,
     pose: Array,
@@ -172,42 +179,46 @@ def _solved(
     wrench: Array,
     moment: Array,
 ) -> tuple[Array, Array, Array, Array, int]:
-    """Return points, what the joints pass on (B, n, j, 6), actuator forces, unheld, self-stresses.
+    """Return points, joint wrenches (B, n, j, 6), actuator forces, residual, self-stress count.
 
-    Of what self-stress leaves free that of the least norm is taken.
+    Where a self-stress leaves the wrenches undetermined, the minimum-norm solution is taken.
     """
     state = pose, velocity, acceleration
-    found = Equations(*evaluate_kernel(robot, "reactions", "nan", *state))
-    batch, n, joints, _ = found.passed.shape
-    points, passed = found.points.copy(), np.full(found.passed.shape, np.nan)
+    balance = Equations(*evaluate_kernel(robot, "reactions", "nan", *state))
+    batch, n, joints, _ = balance.passed.shape
+    points, passed = balance.points.copy(), np.full(balance.passed.shape, np.nan)
     actuators, unheld = np.full((batch, n), np.nan), np.full(batch, np.nan)
-    good = np.isfinite(found.rows).all(axis=(-2, -1))
-    good &= np.isfinite(wrench).all(axis=-1) & np.isfinite(moment).all(axis=-1)
-    points[~good] = np.nan
-    if not good.any():
+    solvable = np.isfinite(balance.rows).all(axis=(-2, -1))
+    solvable &= np.isfinite(wrench).all(axis=-1) & np.isfinite(moment).all(axis=-1)
+    points[~solvable] = np.nan
+    if not solvable.any():
         return points, passed, actuators, unheld, 0
-    g = Equations(*(part[good] for part in found))
-    load = on_platform(robot, wrench, moment)
-    right, presumed = g.right.copy(), g.presumed_right.copy()
-    right[:, : robot.freedom] -= times(g.loads, wrench[good])
-    presumed[:, :6] -= load[good][:, : presumed.shape[-1]]
-    held = hold(robot, g, right[..., None], presumed[..., None])
-    w, redundancy = held.forces[..., 0], held.stresses.shape[-1]
-    there = np.isfinite(g.passed[..., 0])
-    spread = moved(g.ends[:, :, None] - g.points)
-    both = np.zeros((len(w), n, joints, 6, n, 6))
+    solvable_balance = Equations(*(part[solvable] for part in balance))
+    load = platform_wrench(robot, wrench, moment)
+    right, presumed = solvable_balance.right.copy(), solvable_balance.presumed_right.copy()
+    right[:, : robot.freedom] -= apply_matrices(solvable_balance.loads, wrench[solvable])
+    presumed[:, :6] -= load[solvable][:, : presumed.shape[-1]]
+    balanced = balance_loads(robot, solvable_balance, right[..., None], presumed[..., None])
+    forces, redundancy = balanced.forces[..., 0], balanced.stresses.shape[-1]
+    present = np.isfinite(solvable_balance.passed[..., 0])
+    spread = wrench_shift(solvable_balance.ends[:, :, None] - solvable_balance.points)
+    leg_shifts = np.zeros((len(forces), n, joints, 6, n, 6))
     for i in range(n):
-        both[:, i, :, :, i, :] = np.where(there[:, i, :, None, None], spread[:, i], 0.0)
-    passing = both.reshape(len(w), -1, 6 * n)
-    needed = np.where(there[..., None], g.passed, 0.0).reshape(len(w), -1)
+        leg_shifts[:, i, :, :, i, :] = np.where(present[:, i, :, None, None], spread[:, i], 0.0)
+    passing = leg_shifts.reshape(len(forces), -1, 6 * n)
+    offsets = np.where(present[..., None], solvable_balance.passed, 0.0).reshape(len(forces), -1)
     if redundancy:
-        per = np.tile([1.0, 1.0, 1.0, 1 / length, 1 / length, 1 / length], n * joints)
-        back = inverse(per[:, None] * (passing @ held.stresses))
-        w = w - times(held.stresses @ back, per * (times(passing, w) + needed))
-    whole = (times(passing, w) + needed).reshape(-1, n, joints, 6)
-    passed[good] = np.where(there[..., None], whole, np.nan)
-    actuators[good] = times(g.driven_rows, w) + g.driven
-    unheld[good] = np.linalg.norm(held.missed[..., 0], axis=-1)
+        scale = np.tile([1.0, 1.0, 1.0, 1 / length, 1 / length, 1 / length], n * joints)
+        stress_inverse = inverse(scale[:, None] * (passing @ balanced.stresses))
+        forces = forces - apply_matrices(
+            balanced.stresses @ stress_inverse, scale * (apply_matrices(passing, forces) + offsets)
+        )
+    joint_wrenches = (apply_matrices(passing, forces) + offsets).reshape(-1, n, joints, 6)
+    passed[solvable] = np.where(present[..., None], joint_wrenches, np.nan)
+    actuators[solvable] = (
+        apply_matrices(solvable_balance.driven_rows, forces) + solvable_balance.driven
+    )
+    unheld[solvable] = np.linalg.norm(balanced.missed[..., 0], axis=-1)
     return points, passed, actuators, unheld, redundancy
 
 

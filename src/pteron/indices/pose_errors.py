@@ -9,7 +9,7 @@ import numpy as np
 
 from pteron.arguments import checked_arguments
 from pteron.errors import DataError
-from pteron.indices.sensitivities import at_tool, geometric_sensitivities
+from pteron.indices.sensitivities import geometric_sensitivities, tool_pose_changes
 from pteron.kernels import Array
 from pteron.kinematics.evaluate import evaluate_kernel, finite_rows
 from pteron.manipulator import RobotLike, as_manipulator
@@ -108,41 +108,46 @@ def pose_error(
     """
     robot = as_manipulator(robot)
     poses = finite_rows(robot, pose, "pose", on_failure)
-    known = geometric_sensitivities(robot, poses, on_failure=on_failure)
+    sensitivities = geometric_sensitivities(robot, poses, on_failure=on_failure)
     rows: Array = evaluate_kernel(robot, "jacobian", on_failure, poses)
-    good = np.isfinite(known.matrix).all(axis=(-2, -1))
-    back = np.full(rows.shape, np.nan)
-    back[good] = np.linalg.inv(rows[good])
-    joints = _each(tolerances.joints, "joints", robot.joint_count)
-    joints = joints + 0.5 * _each(tolerances.backlash, "backlash", robot.joint_count)
-    unknown = sorted(set(tolerances.named) - set(known.names))
+    solvable = np.isfinite(sensitivities.matrix).all(axis=(-2, -1))
+    inverse_jacobian = np.full(rows.shape, np.nan)
+    inverse_jacobian[solvable] = np.linalg.inv(rows[solvable])
+    joints = _expand_tolerances(tolerances.joints, "joints", robot.joint_count)
+    joints = joints + 0.5 * _expand_tolerances(tolerances.backlash, "backlash", robot.joint_count)
+    unknown = sorted(set(tolerances.named) - set(sensitivities.names))
     if unknown:
         raise DataError(
             f"named: {robot.name} has no dimension {unknown[0]!r}; "
-            f"geometric_sensitivities(robot, pose).names has them: {known.names[0]!r}, ..."
+            f"geometric_sensitivities(robot, pose).names has them: {sensitivities.names[0]!r}, ..."
         )
     sizes = [
         tolerances.named.get(name, getattr(tolerances, role))
-        for name, role in zip(known.names, known.roles, strict=True)
+        for name, role in zip(sensitivities.names, sensitivities.roles, strict=True)
     ]
-    whole = np.concatenate([joints, _each(sizes, "tolerances", len(sizes))])
-    parts = np.concatenate([at_tool(robot, poses, back), known.tool], axis=-1) * whole
+    tolerance_sizes = np.concatenate([joints, _expand_tolerances(sizes, "tolerances", len(sizes))])
+    parts = (
+        np.concatenate(
+            [tool_pose_changes(robot, poses, inverse_jacobian), sensitivities.tool], axis=-1
+        )
+        * tolerance_sizes
+    )
     deviation = np.sqrt((parts**2).sum(axis=-1))
     lengths = len(robot.platform.lengths)
     return PoseError(
         np.abs(parts).sum(axis=-1),
         deviation,
         np.asarray(np.linalg.norm(deviation[..., :lengths], axis=-1)),
-        (*robot.joint_names, *known.names),
+        (*robot.joint_names, *sensitivities.names),
         parts,
     )
 
 
-def _each(given: float | Sequence[float], name: str, count: int) -> Array:
+def _expand_tolerances(setting: float | Sequence[float], name: str, count: int) -> Array:
     """Return numbers of zero or more, one for all or `count`."""
-    found = np.asarray(given, dtype=float)
-    if found.shape not in ((), (count,)):
-        raise DataError(f"{name}: {found.shape} given, one number or {count} expected")
-    if not (found >= 0.0).all():
-        raise DataError(f"{name}: {found.min():g} given, 0 or more expected")
-    return np.broadcast_to(found, (count,))
+    sizes = np.asarray(setting, dtype=float)
+    if sizes.shape not in ((), (count,)):
+        raise DataError(f"{name}: {sizes.shape} given, one number or {count} expected")
+    if not (sizes >= 0.0).all():
+        raise DataError(f"{name}: {sizes.min():g} given, 0 or more expected")
+    return np.broadcast_to(sizes, (count,))

@@ -94,22 +94,22 @@ def geometric_sensitivities(
     """
     robot = as_manipulator(robot)
     poses = finite_rows(robot, pose, "pose", on_failure)
-    held: Array = evaluate_kernel(robot, "manipulability", on_failure, poses)
+    manipulability: Array = evaluate_kernel(robot, "manipulability", on_failure, poses)
     rows: Array = evaluate_kernel(robot, "jacobian", on_failure, poses)
     dimensions = list(_dimensions(robot))
-    names, roles, units, ways = zip(*dimensions, strict=True)
+    names, roles, units, directions = zip(*dimensions, strict=True)
     flat = poses.reshape(-1, robot.freedom)
-    good = np.isfinite(np.reshape(held, -1))
-    found = np.full((len(flat), robot.freedom, len(names)), np.nan)
-    if good.any():
+    solvable = np.isfinite(np.reshape(manipulability, -1))
+    derivatives = np.full((len(flat), robot.freedom, len(names)), np.nan)
+    if solvable.any():
         slopes = _slopes(layout_of(robot))
-        geometry = np.tile(np.array(numbers(robot))[:, None], (1, int(good.sum())))
-        values = np.array(slopes.map(geometry.shape[1])(geometry, flat[good].T))
-        by_geometry = values.reshape(robot.joint_count, -1, len(geometry)).swapaxes(0, 1)
-        square = rows.reshape(-1, robot.joint_count, robot.freedom)[good]
-        found[good] = -np.linalg.solve(square, by_geometry @ np.array(ways).T)
-    matrix = found.reshape((*poses.shape[:-1], *found.shape[1:]))
-    return Sensitivities(names, roles, units, matrix, at_tool(robot, poses, matrix))
+        geometry = np.tile(np.array(numbers(robot))[:, None], (1, int(solvable.sum())))
+        slope_columns = np.array(slopes.map(geometry.shape[1])(geometry, flat[solvable].T))
+        geometry_slopes = slope_columns.reshape(robot.joint_count, -1, len(geometry)).swapaxes(0, 1)
+        jacobian = rows.reshape(-1, robot.joint_count, robot.freedom)[solvable]
+        derivatives[solvable] = -np.linalg.solve(jacobian, geometry_slopes @ np.array(directions).T)
+    matrix = derivatives.reshape((*poses.shape[:-1], *derivatives.shape[1:]))
+    return Sensitivities(names, roles, units, matrix, tool_pose_changes(robot, poses, matrix))
 
 
 @lru_cache(maxsize=64)
@@ -127,7 +127,7 @@ def tool_arm(robot: Manipulator, poses: Array) -> Array:
     return np.asarray(np.array(robot.platform.tool) @ axes)
 
 
-def at_tool(robot: Manipulator, poses: Array, errors: Array) -> Array:
+def tool_pose_changes(robot: Manipulator, poses: Array, errors: Array) -> Array:
     """Return changes of the pose (..., m, K) with the position of the tool's centre point."""
     if not robot.platform.angles or not any(robot.platform.tool):
         return errors
@@ -139,9 +139,9 @@ def at_tool(robot: Manipulator, poses: Array, errors: Array) -> Array:
     else:
         lever = np.cross(np.array(platform.axis), arm) @ platform.directions.T
         levers = turning[:, None] * lever[..., None, :]
-    found = errors.copy()
-    found[..., ~turning, :] += levers.mT @ errors
-    return found
+    tool_changes = errors.copy()
+    tool_changes[..., ~turning, :] += levers.mT @ errors
+    return tool_changes
 
 
 _Dimension = tuple[str, str, str, Array]
@@ -152,35 +152,40 @@ def _dimensions(robot: Manipulator) -> Iterator[_Dimension]:
     size, start = len(numbers(robot)), 0
     per_radian = "m/rad" if robot.platform.slides else "m"
     for i, leg in enumerate(robot.legs, start=1):
-        places: dict[str, int] = {}
+        starts: dict[str, int] = {}
         for quantity in leg.quantities:
-            places[quantity.name] = start
+            starts[quantity.name] = start
             start += len(quantity.value)
         for name in ("platform_point", "fixed_offset"):
-            places[name] = start
+            starts[name] = start
             start += 3
-        for name, role, changes in _of_leg(leg):
-            way = np.zeros(size)
+        for name, role, changes in _leg_dimensions(leg):
+            direction = np.zeros(size)
             for key, change in changes.items():
-                way[places[key] : places[key] + len(change)] = change
+                direction[starts[key] : starts[key] + len(change)] = change
             unit = "rad" if role == "angle" else "m"
             if name.startswith("platform_point"):
                 unit = per_radian
-            yield f"leg {i}: {name}", role, unit, way
-    yield from _of_platform(robot)
+            yield f"leg {i}: {name}", role, unit, direction
+    yield from _platform_dimensions(robot)
 
 
-def _of_platform(robot: Manipulator) -> Iterator[_Dimension]:
+def _platform_dimensions(robot: Manipulator) -> Iterator[_Dimension]:
     """Yield the same of the point and the directions about which the platform turns."""
     changes = [change for change in variations(robot) if change.leg < 0]
-    ways = slope_matrix(robot, changes, slope_terms(robot, changes), np.array(numbers(robot)))
-    for change, way in zip(changes, ways.T, strict=True):
+    directions = slope_matrix(robot, changes, slope_terms(robot, changes), np.array(numbers(robot)))
+    for change, direction in zip(changes, directions.T, strict=True):
         role = "angle" if change.group == "directions" else "point"
         joint = " about " if role == "angle" else " "
-        yield f"platform: {change.key}{joint}{'xyz'[change.axis or 0]}", role, change.unit, way
+        yield (
+            f"platform: {change.key}{joint}{'xyz'[change.axis or 0]}",
+            role,
+            change.unit,
+            direction,
+        )
 
 
-def _of_leg(leg: LegKind) -> Iterator[tuple[str, str, dict[str, tuple[float, ...]]]]:
+def _leg_dimensions(leg: LegKind) -> Iterator[tuple[str, str, dict[str, tuple[float, ...]]]]:
     """Yield name, role and unit change of the quantities, for every dimension of a leg."""
     units = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
     for quantity in leg.quantities:
@@ -200,13 +205,13 @@ def _of_leg(leg: LegKind) -> Iterator[tuple[str, str, dict[str, tuple[float, ...
     if not directions:  # a ram's pose depends on points alone
         return
     first, *others = directions
-    carried = [name for name, v in vectors.items() if abs(dot(v, vectors[first])) < _UPRIGHT]
+    tilted_along = [name for name, v in vectors.items() if abs(dot(v, vectors[first])) < _UPRIGHT]
     if leg.plane_normal is None:
-        yield from _tilts(first, [first, *carried], vectors)
+        yield from _tilts(first, [first, *tilted_along], vectors)
     for name in others:
-        if name in carried:
-            turned = cross(vectors[first], vectors[name])
-            yield f"{name} about {first}", "angle", {name: turned}
+        if name in tilted_along:
+            turn_change = cross(vectors[first], vectors[name])
+            yield f"{name} about {first}", "angle", {name: turn_change}
         else:
             yield from _tilts(name, [name], vectors)
 

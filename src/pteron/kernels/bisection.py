@@ -32,8 +32,8 @@ def bisect_condition(
 
     Examples
     --------
-    >>> from pteron.kernels.bisection import bisected
-    >>> low, high = bisected(lambda x: x * x < 2.0, 1.0, 2.0, 40)
+    >>> from pteron.kernels.bisection import bisect_condition
+    >>> low, high = bisect_condition(lambda x: x * x < 2.0, 1.0, 2.0, 40)
     >>> print(f"{low:.9f}")
     1.414213562
     """

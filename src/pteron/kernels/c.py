@@ -108,8 +108,8 @@ def module_source(
 
     The arrays of the caller are read as they lie in memory.
     """
-    values = module_values(name, graph, inputs, outputs, c_language(dtype))
-    return module_of("module.c.j2", values, dtype, block)
+    variables = module_values(name, graph, inputs, outputs, c_language(dtype))
+    return module_of("module.c.j2", variables, dtype, block)
 
 
 def module_of(template: str, values: Mapping[str, Any], dtype: str, block: int = 32) -> str:

@@ -89,4 +89,4 @@ def _build_program(layout: Manipulator) -> Program:
             point_slopes, sum(ca.mtimes(ca.skew(a), da) for a, da in pairs) / 2
         )
     inputs = {"geometry": geometry, "pose": pose}
-    return Program.from_symbols("geometry_slopes", inputs, outputs, shared=("geometry",))
+    return Program.of_named("geometry_slopes", inputs, outputs, shared=("geometry",))

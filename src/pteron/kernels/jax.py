@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from pteron.errors import DataError
-from pteron.extras import of_extra
+from pteron.extras import import_extra
 from pteron.kernels.code import PYTHON, names_of, statements
 from pteron.kernels.graph import graph_of
 from pteron.kernels.kernel import Kernel, require_unmasked
@@ -67,7 +67,7 @@ class Traced(Kernel):
 
     @cached_property
     def _jitted_function(self) -> Callable[..., Any]:
-        jax = of_extra("jax", "jax", 'target: "jax" needs JAX')
+        jax = import_extra("jax", "jax", 'target: "jax" needs JAX')
         jnp = jax.numpy
 
         def stack(*values: Any) -> Any:

@@ -259,7 +259,7 @@ def count_operations(function: ca.Function) -> int:
 
 
 def as_array(
-    raw: PoseLike,
+    value: PoseLike,
     name: str,
     shape: tuple[int, ...],
     dtype: str = "float64",
@@ -270,10 +270,10 @@ def as_array(
     Of a table they are its columns of the names `columns`.
     """
     array: Array
-    if type(raw) is np.ndarray and raw.dtype == np.dtype(dtype) and raw.flags.aligned:
-        array = raw
+    if type(value) is np.ndarray and value.dtype == np.dtype(dtype) and value.flags.aligned:
+        array = value
     else:
-        array = _convert_to_floats(pick_columns(raw, columns, name), name, dtype)
+        array = _convert_to_floats(pick_columns(value, columns, name), name, dtype)
     if len(shape) > array.ndim or array.shape[array.ndim - len(shape) :] != shape:
         expected = ", ".join(["...", *map(str, shape)])
         raise DataError(f"{name}: shape {array.shape} given, ({expected}) expected")

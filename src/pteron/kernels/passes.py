@@ -49,7 +49,7 @@ def optimise_function(function: ca.Function) -> ca.Function:
     >>> from pteron.kernels import count_operations
     >>> a, b, x, y = (ca.SX.sym(name) for name in "abxy")
     >>> plain = ca.Function("plain", [a, b, x, y], [0.04 * a * x - 0.04 * b * y])
-    >>> count_operations(plain), count_operations(optimised(plain))
+    >>> count_operations(plain), count_operations(optimise_function(plain))
     (5, 4)
     """
     original = to_term_graph(function)
@@ -170,8 +170,8 @@ def _name_pairs(graph: TermGraph, kind: str, owners: Sequence[int]) -> None:
     """Replace each pair that several of the owners hold by a node, most frequent first."""
     lists = {k: list(graph.operands[k]) for k in owners}
     holders: dict[tuple[int, int], dict[int, None]] = defaultdict(dict)
-    for k, values in lists.items():
-        for a, b in combinations(values, 2):
+    for k, operands in lists.items():
+        for a, b in combinations(operands, 2):
             holders[_pair(a, b)][k] = None
     heap = [(-len(holding), pair) for pair, holding in holders.items() if len(holding) > 1]
     heapq.heapify(heap)
@@ -203,8 +203,8 @@ def _name_pairs(graph: TermGraph, kind: str, owners: Sequence[int]) -> None:
                 if len(holding) > 1:
                     heapq.heappush(heap, (-len(holding), _pair(v, pair_value)))
             lists[k].append(pair_value)
-    for k, values in lists.items():
-        graph.replace(k, kind, *values)
+    for k, operands in lists.items():
+        graph.replace(k, kind, *operands)
 
 
 def _pair(a: int, b: int) -> tuple[int, int]:

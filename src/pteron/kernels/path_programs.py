@@ -47,9 +47,9 @@ def path_kernel(closed: Closed, start: Parts | None) -> TieredKernel:
         after, correction = advance_path(
             closed, ends[0], ends[1], PathState.from_vector(at, closed)
         )
-        return Program.from_symbols(
+        return Program.of_named(
             "path_step", inputs, {"after": after.vector(), "left": correction}
-        ).optimise()
+        ).optimised()
 
     return tiered_kernel(("path_step", *closed, start), build)
 
@@ -61,9 +61,9 @@ def rows_kernel(closed: Closed) -> TieredKernel:
     def build() -> Program:
         z, machine = ca.SX.sym("z", closed.size), ca.SX.sym("machine", closed.numbers)
         slopes, missed = rows(closed, numbers(machine), numbers(z))
-        return Program.from_symbols(
+        return Program.of_named(
             "path_rows", {"z": z, "machine": machine}, {"rows": slopes, "missed": missed}
-        ).optimise()
+        ).optimised()
 
     return tiered_kernel(("path_rows", *closed), build)
 
@@ -78,8 +78,8 @@ def _spheres(robot: Manipulator) -> TieredKernel:
     def build() -> Program:
         joints = ca.SX.sym("joints", robot.joint_count)
         centers, squares = held_spheres(Machine.numeric(robot), joints)
-        return Program.from_symbols(
+        return Program.of_named(
             "held_spheres", {"joints": joints}, {"centers": centers, "squares": squares}
-        ).optimise()
+        ).optimised()
 
     return tiered_kernel(("held_spheres", robot), build)

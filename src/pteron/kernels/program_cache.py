@@ -42,7 +42,7 @@ class Program:
     outputs: tuple[Port, ...]
 
     @classmethod
-    def from_expressions(
+    def of(
         cls,
         name: str,
         symbols: Sequence[Expression],
@@ -55,27 +55,25 @@ class Program:
         return cls(name, ca.Function(name, symbols, results, *names), (*inputs,), (*outputs,))
 
     @classmethod
-    def from_symbols(
+    def of_named(
         cls,
         name: str,
-        inputs_by_name: Mapping[str, Expression],
-        outputs_by_name: Mapping[str, Expression],
+        given: Mapping[str, Expression],
+        found: Mapping[str, Expression],
         shared: Collection[str] = (),
     ) -> Self:
         """Return the program of expressions by name; columns become vectors, matrices row-major."""
-        inputs = [
-            Port(key, element.shape[:1], key in shared) for key, element in inputs_by_name.items()
-        ]
-        outputs = [Port(key, shape_of(element)) for key, element in outputs_by_name.items()]
-        dense = ca.cse([ca.densify(element).T for element in outputs_by_name.values()])
-        return cls.from_expressions(name, list(inputs_by_name.values()), inputs, dense, outputs)
+        inputs = [Port(key, element.shape[:1], key in shared) for key, element in given.items()]
+        outputs = [Port(key, shape_of(element)) for key, element in found.items()]
+        dense = ca.cse([ca.densify(element).T for element in found.values()])
+        return cls.of(name, list(given.values()), inputs, dense, outputs)
 
     @property
     def text(self) -> str:
         """The program as it is written on disk; equal programs have equal texts."""
         return _serialise_program(self)
 
-    def optimise(self) -> Self:
+    def optimised(self) -> Self:
         """Return the program after the passes that save operations."""
         return replace(self, function=optimise_function(self.function))
 

@@ -146,20 +146,18 @@ def layout_of(robot: RobotLike) -> Manipulator:
     return ALIKE.get() or bare(robot)
 
 
-def specialised(plain_program: Program, numbers: dict[str, NDArray[np.float64]]) -> Program:
+def specialised(given: Program, values: dict[str, NDArray[np.float64]]) -> Program:
     """Return a plain program with numbers in place of some of its inputs, after the pass."""
-    symbols = plain_program.function.sx_in()
+    symbols = given.function.sx_in()
     folded = [
-        ca.SX(ca.DM(numbers[port.name])) if port.name in numbers else symbol
-        for port, symbol in zip(plain_program.inputs, symbols, strict=True)
+        ca.SX(ca.DM(values[port.name])) if port.name in values else symbol
+        for port, symbol in zip(given.inputs, symbols, strict=True)
     ]
-    pairs = zip(symbols, plain_program.inputs, strict=True)
-    remaining = [(symbol, port) for symbol, port in pairs if port.name not in numbers]
-    results = ca.cse([ca.densify(element) for element in plain_program.function.call(folded)])
+    pairs = zip(symbols, given.inputs, strict=True)
+    remaining = [(symbol, port) for symbol, port in pairs if port.name not in values]
+    results = ca.cse([ca.densify(element) for element in given.function.call(folded)])
     symbols, inputs = [symbol for symbol, _ in remaining], [port for _, port in remaining]
-    return Program.from_expressions(
-        plain_program.name, symbols, inputs, results, plain_program.outputs
-    ).optimise()
+    return Program.of(given.name, symbols, inputs, results, given.outputs).optimised()
 
 
 def bare(robot: RobotLike) -> Manipulator:

@@ -217,13 +217,13 @@ def _instantiate_kernel(
     if order != sorted(order):
         symbols, inputs = built.function.sx_in(), [built.inputs[k] for k in order]
         outputs, reordered = built.function.call(symbols), [symbols[k] for k in order]
-        built = Program.from_expressions(built.name, reordered, inputs, outputs, built.outputs)
+        built = Program.of(built.name, reordered, inputs, outputs, built.outputs)
     return kind(built.name, built.function, built.inputs, built.outputs, fixed, dtype, threads)
 
 
-def same_layout(robot: RobotLike, other: RobotLike) -> bool:
+def same_layout(one: RobotLike, other: RobotLike) -> bool:
     """Return whether two machines have the same base parameters: layout and gravity are equal."""
-    return _layout(as_manipulator(robot)) == _layout(as_manipulator(other))
+    return _layout(as_manipulator(one)) == _layout(as_manipulator(other))
 
 
 def _layout(robot: Manipulator) -> tuple[Any, ...]:

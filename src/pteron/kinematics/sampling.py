@@ -99,7 +99,7 @@ def sample_poses(
     *,
     limits: bool = True,
 ) -> Array:
-    """Return poses (count, m) in reach like `drawn_poses`, or as many (k, m) as are found."""
+    """Return poses (count, m) in reach like `draw_poses`, or as many (k, m) as are found."""
     return _search(robot, count, rng, _Conditions(type_i, 0.0, limits)).poses[:count]
 
 

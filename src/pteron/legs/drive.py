@@ -9,7 +9,7 @@ from typing import Literal
 
 from pteron.bodies.vectors import number
 from pteron.errors import ModelError, shown
-from pteron.toml import keep_checked, refuse
+from pteron.toml import keep_checked, raise_faults
 
 
 def _number_check(
@@ -225,7 +225,7 @@ class Drive:
         except ModelError as error:
             faults += error.faults
         faults += self._contradictions({fault.split(":")[0] for fault in faults})
-        refuse(faults)
+        raise_faults(faults)
 
     def _wrong_parts(self) -> list[str]:
         """Return the faults of parts of a wrong type; convert lists to tuples."""

@@ -20,7 +20,7 @@ from pteron.legs.drive import Drive
 from pteron.legs.keys import COMMON, Condition, Key, KeyRole, parameters_section, sound_fields
 from pteron.legs.leg import LegEquations, LegMotion, Passive
 from pteron.legs.reading import Reading
-from pteron.toml import refuse
+from pteron.toml import raise_faults
 
 
 @dataclass(frozen=True)
@@ -138,14 +138,14 @@ class LegKind(ABC):
 
     def __post_init__(self) -> None:
         sound, faults = self.checked({name: getattr(self, name) for name in self.every_key()})
-        refuse(faults)
+        raise_faults(faults)
         for name, field_value in sound.items():
             object.__setattr__(self, name, field_value)
 
     @classmethod
-    def checked(cls, fields: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:
+    def checked(cls, given: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:
         """Return the valid fields, converted, and the faults of the others; see `sound_fields`."""
-        return sound_fields(fields, cls.every_key(), cls.conditions, cls.branches)
+        return sound_fields(given, cls.every_key(), cls.conditions, cls.branches)
 
     @classmethod
     @cache

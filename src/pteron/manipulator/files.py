@@ -23,7 +23,7 @@ from pteron.manipulator.radii import Radii
 from pteron.manipulator.tool import Tool
 from pteron.platforms import Bar, Geared, Platform
 from pteron.platforms.kinds import TILTING
-from pteron.toml import fault_lines, parsed_toml, told, toml_bytes
+from pteron.toml import fault_lines, joined_faults, parsed_toml, toml_bytes
 
 _Built = TypeVar("_Built")
 
@@ -177,7 +177,7 @@ def _machine(document: dict[str, Any], source: str) -> Manipulator:
                 name, platform, tuple(built), machine.gravity, radii, tuple(tools), home
             )
     subject = shown(source, bare=True, longest=1000)
-    raise ModelError(told(reading.faults), subject=subject, faults=reading.faults)
+    raise ModelError(joined_faults(reading.faults), subject=subject, faults=reading.faults)
 
 
 @dataclass

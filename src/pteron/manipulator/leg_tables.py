@@ -18,7 +18,7 @@ from pteron.errors import ModelError
 from pteron.legs import LegKind
 from pteron.legs.keys import Key, KeyRole
 from pteron.manipulator.tables import PARTS, ConeTable, DriveTable, ReadingTable
-from pteron.toml import refuse
+from pteron.toml import raise_faults
 
 
 def _no_truth(sign: Any) -> Any:
@@ -168,7 +168,7 @@ def _build_part(kind: Any, table: TomlTable, key: str) -> Any:
         part = kind(**raw_fields)
     except ModelError as error:
         faults += [f"{key}.{fault}" for fault in error.faults]
-    refuse(faults)
+    raise_faults(faults)
     return part
 
 

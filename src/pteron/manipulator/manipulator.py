@@ -24,7 +24,7 @@ from pteron.manipulator.tool import Tool, tool_faults
 from pteron.platforms import Platform
 from pteron.platforms.coordinates import Unit
 from pteron.platforms.parts import HeldPoint
-from pteron.toml import refuse
+from pteron.toml import raise_faults
 
 _COINCIDENT = 1e-9
 """Distance, m, below which points count as coincident."""
@@ -89,7 +89,7 @@ class Manipulator:
 
     def __post_init__(self) -> None:
         legs = tuple(self.legs)
-        refuse(faults_of(self.name, self.platform, legs, self.tools, self.home))
+        raise_faults(faults_of(self.name, self.platform, legs, self.tools, self.home))
         legs = tuple(leg.under(self.platform.frame) for leg in legs)
         object.__setattr__(self, "legs", legs)
         object.__setattr__(self, "tools", tuple(self.tools))

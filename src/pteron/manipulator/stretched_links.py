@@ -32,7 +32,7 @@ def stretch_link(body: Any, factor: float) -> Any:
     Examples
     --------
     >>> from pteron.bodies import RodInertia
-    >>> stretched(RodInertia.of_body(1.0, [-0.5], 1.0 / 3.0), 2.0).values
+    >>> stretch_link(RodInertia.of_body(1.0, [-0.5], 1.0 / 3.0), 2.0).values
     (2.0, -2.0, 2.6666666666666665)
     """
     by_kind = dict(zip(body.kinds, body.values, strict=True))

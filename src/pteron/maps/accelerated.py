@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from pteron.extras import of_extra
+from pteron.extras import import_extra
 from pteron.kernels import Array
 from pteron.kernels.choice import kernel_with_status
 from pteron.kernels.jax import Traced
@@ -45,7 +45,7 @@ def _function(
     robot: Manipulator, names: tuple[str, ...], places: tuple[int, ...], shape: tuple[int, ...]
 ) -> Callable[..., dict[str, Any]]:
     """Return what takes a pose and the values along each axis, and returns the indices."""
-    jax = of_extra("jax", "jax", 'engine: "jax" needs JAX')
+    jax = import_extra("jax", "jax", 'engine: "jax" needs JAX')
     jnp = jax.numpy
     jax.config.update("jax_enable_x64", True)
     kernels = {

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from pteron.arguments import expect_to_fit
 from pteron.errors import DataError, OutputError
-from pteron.extras import of_extra
+from pteron.extras import import_extra
 from pteron.maps.checksums import checksum
 from pteron.maps.grid import Grid
 from pteron.maps.map import ALL, Map
@@ -285,4 +285,4 @@ def _attributes(path: Path) -> dict[str, Any]:
 
 
 def _zarr() -> Any:
-    return of_extra("cluster", "zarr", "a .zarr store needs Zarr")
+    return import_extra("cluster", "zarr", "a .zarr store needs Zarr")

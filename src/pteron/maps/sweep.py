@@ -20,7 +20,7 @@ from multiprocessing import resource_tracker
 from typing import Any, Protocol, TypeVar
 
 from pteron.errors import DataError, PteronError
-from pteron.extras import of_extra
+from pteron.extras import import_extra
 from pteron.maps.held_interrupts import held_interrupts
 from pteron.shapes import Workers
 
@@ -287,7 +287,7 @@ def _client(where: str, scheduler: str | None, workers: int | None) -> Iterator[
 
 def _distributed() -> Any:
     """Return `dask.distributed`, whose functions have no types."""
-    return of_extra("cluster", "distributed", "other processes need dask.distributed")
+    return import_extra("cluster", "distributed", "other processes need dask.distributed")
 
 
 def cores() -> int:

@@ -97,8 +97,8 @@ class Washout:
     smoothing: float = 30.0
 
     def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            expect(0.0 < value < np.inf, name, repr(value), "a number above 0")
+        for name, setting in vars(self).items():
+            expect(0.0 < setting < np.inf, name, repr(setting), "a number above 0")
 
 
 @dataclass(frozen=True, repr=False)
@@ -169,26 +169,32 @@ def cue(
     time, *columns = rows.numbers(COLUMNS).T
     if len(time) < 2 or not (np.diff(time) > 0.0).all():
         raise DataError(f"{rows.source}: t: two or more times expected that ascend, in seconds")
-    vehicle = np.array(columns).T
+    samples = np.array(columns).T
     even = _even_times(time - time[0], rows.source)
-    demand = _filtered(even, _interpolated(even, time - time[0], vehicle), washout or Washout())
+    demand = _filter_motion(
+        even, _interpolate_columns(even, time - time[0], samples), washout or Washout()
+    )
     region, proof = _box(robot, middle, np.abs(demand[0]).max(axis=0), type_ii)
     half = 0.5 * np.ptp(region.box, axis=0)
-    parts = _pressed(demand, _WITHIN * half)
+    parts = _compress(demand, _WITHIN * half)
     for _ in range(_REFINED):
         if (_control_points(even, parts) <= half).all():
             break
         even = np.linspace(0.0, even[-1], 2 * len(even) - 1)
-        demand = _filtered(even, _interpolated(even, time - time[0], vehicle), washout or Washout())
-        parts = _pressed(demand, _WITHIN * half)
+        demand = _filter_motion(
+            even, _interpolate_columns(even, time - time[0], samples), washout or Washout()
+        )
+        parts = _compress(demand, _WITHIN * half)
     else:
         raise DataError(
             f"{rows.source}: accelerations so rough that the motion leaves its box between samples "
             f"of {even[1]:.2g} s; smooth them, or lower the scale"
         )
-    took = 1.0 - np.abs(parts[0]).max(axis=0) / np.maximum(np.abs(demand[0]).max(axis=0), 1e-12)
-    moved = np.abs(demand[0]).max(axis=0) > 1e-9
-    pressed = float(np.max(took[moved], initial=0.0))
+    removed_shares = 1.0 - np.abs(parts[0]).max(axis=0) / np.maximum(
+        np.abs(demand[0]).max(axis=0), 1e-12
+    )
+    is_moved = np.abs(demand[0]).max(axis=0) > 1e-9
+    pressed = float(np.max(removed_shares[is_moved], initial=0.0))
     return Cue(even, middle + parts[0], parts[1], parts[2], region, proof, pressed)
 
 
@@ -203,7 +209,7 @@ def _even_times(time: Array, source: str) -> Array:
     return np.linspace(0.0, time[-1], count)
 
 
-def _interpolated(even: Array, time: Array, columns: Array) -> Array:
+def _interpolate_columns(even: Array, time: Array, columns: Array) -> Array:
     """Return columns (T, 6) at even times, linear between the times given."""
     return np.stack([np.interp(even, time, column) for column in columns.T], axis=-1)
 
@@ -221,54 +227,64 @@ def _control_points(time: Array, parts: Array) -> Array:
     return np.abs(points)
 
 
-def _filtered(time: Array, vehicle: Array, washout: Washout) -> Array:
+def _filter_motion(time: Array, vehicle_motion: Array, washout: Washout) -> Array:
     """Return the uncompressed motion, x y z roll pitch yaw from the middle, and two derivatives.
 
     The array is (3, T, 6), in m, rad and s.
     """
-    accelerations, rates = (washout.scale * part for part in (vehicle[:, :3], vehicle[:, 3:]))
+    accelerations, rates = (
+        washout.scale * part for part in (vehicle_motion[:, :3], vehicle_motion[:, 3:])
+    )
     w, s = washout.translation, washout.smoothing
     resonance = [1.0, 2.0 * _DAMPING * w, w * w]
     quick = np.polymul(resonance, [1.0, washout.return_speed])
-    moved = [_shown(time, a, [1.0, 0.0], quick) for a in accelerations.T]
+    translations = [_filter_signal(time, a, [1.0, 0.0], quick) for a in accelerations.T]
     # On a level platform g acts along z, on a tilted one a part of it ahead or to the side.
-    lasting = [
-        _shown(time, a, [1.0], [1 / washout.tilting**2, 2 * _DAMPING / washout.tilting, 1.0])[0]
+    tilt_accelerations = [
+        _filter_signal(
+            time, a, [1.0], [1 / washout.tilting**2, 2 * _DAMPING / washout.tilting, 1.0]
+        )[0]
         for a in (accelerations[:, 1], -accelerations[:, 0])
     ]
     w = washout.rotation
-    turned = [
-        _shown(time, r, [1.0, 0.0], np.polymul([1.0, 2.0 * _DAMPING * w, w * w], [1 / s, 1.0]))
+    turns = [
+        _filter_signal(
+            time, r, [1.0, 0.0], np.polymul([1.0, 2.0 * _DAMPING * w, w * w], [1 / s, 1.0])
+        )
         for r in rates.T
     ]
-    for angle, a in enumerate(lasting):
-        target_tilt = np.arcsin(np.clip(a / _GRAVITY, -0.9, 0.9))
+    for angle, a in enumerate(tilt_accelerations):
+        target = np.arcsin(np.clip(a / _GRAVITY, -0.9, 0.9))
         steps = washout.tilt_rate * np.diff(time)
         tilt = np.zeros(len(time))
         for k, most in enumerate(steps):
-            tilt[k + 1] = tilt[k] + np.clip(target_tilt[k + 1] - tilt[k], -most, most)
-        turned[angle] += _shown(time, tilt, [1.0], [1 / s**2, 2 / s, 1.0])
-    return np.moveaxis(np.array([*moved, *turned]), 0, -1)
+            tilt[k + 1] = tilt[k] + np.clip(target[k + 1] - tilt[k], -most, most)
+        turns[angle] += _filter_signal(time, tilt, [1.0], [1 / s**2, 2 / s, 1.0])
+    return np.moveaxis(np.array([*translations, *turns]), 0, -1)
 
 
-def _shown(time: Array, value: Array, above: Sequence[float], below: Any) -> Array:
+def _filter_signal(
+    time: Array, signal: Array, numerator: Sequence[float], denominator: Any
+) -> Array:
     """Return a filter's output and two derivatives (3, T), for an input that was 0 before."""
     return np.array(
         [
-            scipy.signal.lsim((np.polymul(above, [1.0] + [0.0] * order), below), value, time)[1]
+            scipy.signal.lsim(
+                (np.polymul(numerator, [1.0] + [0.0] * order), denominator), signal, time
+            )[1]
             for order in range(3)
         ]
     )
 
 
-def _pressed(demand: Array, half: Array) -> Array:
+def _compress(demand: Array, half: Array) -> Array:
     """Return x / (1 + (x / L)^6)^(1 / 6) of x (T, 6), which stays within L, and its derivatives."""
     x, dx, ddx = demand
     share = x / half
-    power_sum = 1.0 + share**6
-    slope = power_sum ** (-7.0 / 6.0)
-    bend = -7.0 * share**5 * slope / power_sum / half
-    return np.array([x * power_sum ** (-1.0 / 6.0), slope * dx, slope * ddx + bend * dx * dx])
+    compression = 1.0 + share**6
+    slope = compression ** (-7.0 / 6.0)
+    bend = -7.0 * share**5 * slope / compression / half
+    return np.array([x * compression ** (-1.0 / 6.0), slope * dx, slope * ddx + bend * dx * dx])
 
 
 def _box(robot: Manipulator, middle: Array, demand: Array, type_ii: float) -> tuple[Box, Proof]:

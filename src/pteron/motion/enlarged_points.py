@@ -16,15 +16,20 @@ def enlarged_points(points: JointPoints, other: JointPoints, times: float) -> Jo
 
     With 1 they are the other machine's.
     """
-    corners = np.vstack([part.corners for part in other.parts])
+    other_corners = np.vstack([part.corners for part in other.parts])
     return replace(
         points,
         links=tuple(
-            _moved(line, there, times)
+            _shift_points(line, there, times)
             for line, there in zip(points.links, other.links, strict=True)
         ),
         parts=tuple(
-            Part(part.hub, _moved(part.corners, corners, times) if len(corners) else part.corners)
+            Part(
+                part.hub,
+                _shift_points(part.corners, other_corners, times)
+                if len(other_corners)
+                else part.corners,
+            )
             for part in points.parts
         ),
         tool=points.tool + times * (other.tool - points.tool),
@@ -50,7 +55,7 @@ def greatest_difference(points: JointPoints, other: JointPoints) -> float:
     )
 
 
-def _moved(points: Array, others: Array, times: float) -> Array:
+def _shift_points(points: Array, others: Array, times: float) -> Array:
     # Joints that coincide in one machine may be two in the other: the nearest is the same one.
     if len(points) == len(others):
         nearest = others

@@ -227,15 +227,15 @@ def _parts(robot: Manipulator, poses: Array, p: Array) -> tuple[Part, ...]:
 
 def _corners(arms: Array) -> Array:
     """Return the distinct arms (k, 3) that lead away from a hub, in order round its z axis."""
-    led = _distinct(arms[np.abs(arms).max(axis=-1) > _COINCIDENT])
-    away = led - led.mean(axis=0) if len(led) else led
-    return led[np.argsort(np.arctan2(away[:, 1], away[:, 0]), kind="stable")]
+    arms_out = _distinct(arms[np.abs(arms).max(axis=-1) > _COINCIDENT])
+    offsets = arms_out - arms_out.mean(axis=0) if len(arms_out) else arms_out
+    return arms_out[np.argsort(np.arctan2(offsets[:, 1], offsets[:, 0]), kind="stable")]
 
 
 def _distinct(points: Array) -> Array:
-    """Return the points (k, 3) but for those that are where one before them is."""
-    is_apart = np.abs(points[:, None] - points).max(axis=-1) > _COINCIDENT
-    return points[[bool(is_apart[i, :i].all()) for i in range(len(points))]]
+    """Return the distinct points (k, 3), each at its first place."""
+    differs = np.abs(points[:, None] - points).max(axis=-1) > _COINCIDENT
+    return points[[bool(differs[i, :i].all()) for i in range(len(points))]]
 
 
 def joint_guides(robot: RobotLike, poses: PoseLike) -> tuple[Guide, ...]:
@@ -264,23 +264,23 @@ def joint_guides(robot: RobotLike, poses: PoseLike) -> tuple[Guide, ...]:
     array([-0.3,  0.3])
     """
     robot = as_manipulator(robot)
-    pose_rows = as_array(poses, "poses", (robot.freedom,), columns=robot.coordinates)
-    points = joint_points(robot, pose_rows.reshape(-1, robot.freedom))
+    array = as_array(poses, "poses", (robot.freedom,), columns=robot.coordinates)
+    points = joint_points(robot, array.reshape(-1, robot.freedom))
     guides = []
     for i, leg in enumerate(robot.legs):
-        used, slides = points.coordinates[:, i], "p" in leg.bodies
+        coordinates, slides = points.coordinates[:, i], "p" in leg.bodies
         axis = np.array(leg.base_axis)
         if not slides and not leg.goes_round:
             path = points.links[i][0, :1]
         elif slides:
             spare = _SPARE * leg.size
-            limits = leg.limits or (used.min() - spare, used.max() + spare)
+            limits = leg.limits or (coordinates.min() - spare, coordinates.max() + spare)
             path = np.array(leg.guide_point) + np.multiply.outer(np.array(limits), axis)
         else:
-            low, high = leg.limits or (used[0] - np.pi, used[0] + np.pi)
-            angles = np.linspace(low, high, 2 + int((high - low) / _ARC)) - used[0]
+            low, high = leg.limits or (coordinates[0] - np.pi, coordinates[0] + np.pi)
+            angles = np.linspace(low, high, 2 + int((high - low) / _ARC)) - coordinates[0]
             center, end = points.links[i][0, :2]
-            turned = scipy.spatial.transform.Rotation.from_rotvec(np.outer(angles, axis))
-            path = center + turned.apply(end - center)
+            rotations = scipy.spatial.transform.Rotation.from_rotvec(np.outer(angles, axis))
+            path = center + rotations.apply(end - center)
         guides.append(Guide(slides, axis, path))
     return tuple(guides)

@@ -108,14 +108,14 @@ class Motion:
         >>> float(abs(motion.at(0.55)[0][0] - np.sin(0.55))) < 1e-9
         True
         """
-        moments = np.asarray(time, dtype=float)
+        times = np.asarray(time, dtype=float)
         if len(self.time) == 1:
-            zeros = np.zeros((*moments.shape, self.pose.shape[-1]))
-            return zeros + self.pose[0], zeros, zeros.copy()
-        within = np.clip(moments, self.time[0], self.time[-1])
-        k = np.clip(np.searchsorted(self.time, within, side="right") - 1, 0, len(self.time) - 2)
+            zero_rates = np.zeros((*times.shape, self.pose.shape[-1]))
+            return zero_rates + self.pose[0], zero_rates, zero_rates.copy()
+        clipped = np.clip(times, self.time[0], self.time[-1])
+        k = np.clip(np.searchsorted(self.time, clipped, side="right") - 1, 0, len(self.time) - 2)
         span = (self.time[k + 1] - self.time[k])[..., None]
-        u = (within - self.time[k])[..., None] / span
+        u = (clipped - self.time[k])[..., None] / span
         p, v, a = self.pose[k], span * self.velocity[k], 0.5 * span**2 * self.acceleration[k]
         # The remainder at the next sample, for the terms of third to fifth degree.
         dp = self.pose[k + 1] - p - v - a
@@ -127,7 +127,7 @@ class Motion:
         pose = p + u * (v + u * (a + u * (c + u * (d + u * e))))
         velocity = (v + u * (2.0 * a + u * (3.0 * c + u * (4.0 * d + u * 5.0 * e)))) / span
         acceleration = (2.0 * a + u * (6.0 * c + u * (12.0 * d + u * 20.0 * e))) / span**2
-        moving = (moments == within)[..., None]
+        moving = (times == clipped)[..., None]
         return pose, np.where(moving, velocity, 0.0), np.where(moving, acceleration, 0.0)
 
     def repeated(self, count: int) -> Motion:
@@ -157,6 +157,6 @@ class Motion:
         return Motion(np.append(time, count * self.duration), *parts)
 
 
-def told_pose(pose: Array) -> str:
+def pose_text(pose: Array) -> str:
     """Return a pose in brackets for messages, five digits a number."""
-    return f"[{', '.join(f'{value:.5g}' for value in pose + 0.0)}]"
+    return f"[{', '.join(f'{coordinate:.5g}' for coordinate in pose + 0.0)}]"

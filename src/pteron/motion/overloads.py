@@ -43,8 +43,10 @@ def overloads(robot: RobotLike, forces: ArrayLike, speeds: ArrayLike) -> tuple[s
     robot = as_manipulator(robot)
     sizes = {"peak_force": ("forces", forces), "peak_speed": ("speeds", speeds)}
     needed, moments = {}, []
-    for quantity, (name, values) in sizes.items():
-        moments.append(as_array(values, name, (len(robot.legs),)).reshape(-1, len(robot.legs)))
+    for quantity, (name, rows_of_legs) in sizes.items():
+        moments.append(
+            as_array(rows_of_legs, name, (len(robot.legs),)).reshape(-1, len(robot.legs))
+        )
         # Rows that no pose serves are NaN.
         needed[quantity] = np.fmax.reduce(np.abs(moments[-1]), axis=0, initial=0.0)
     margins = drive_margins(robot, needed, *moments)

@@ -73,7 +73,7 @@ def with_tool(robot: RobotLike, name: str) -> Manipulator:
     tool = tools[name]
     bare = replace(robot, platform=replace(robot.platform, tool=tool.point), tools=())
     try:
-        return carrying(bare, tool.mass, tool.center, tool.central_inertia)
+        return add_payload(bare, tool.mass, tool.center, tool.central_inertia)
     except (DataError, ModelError) as error:
         raise ModelError(f"tool {name}: {error.message}", subject=robot.name) from None
 
@@ -128,38 +128,40 @@ def with_payload(
     1.3
     """
     machine = as_manipulator(robot)
-    loaded = carrying(machine, mass, center, inertia)
+    loaded = add_payload(machine, mass, center, inertia)
     if warning := payload_warning(machine, float(mass)):
         warn_unlikely(warning)
     return loaded
 
 
-def carrying(
+def add_payload(
     robot: Manipulator,
     mass: float,
     center: Sequence[float] | None = None,
     inertia: float | Sequence[float] = 0.0,
 ) -> Manipulator:
     """Return the machine with a body as `with_payload`, without a warning of its mass."""
-    carried = number_or_nan(mass)
-    if not (math.isfinite(carried) and carried >= 0.0):
+    payload = number_or_nan(mass)
+    if not (math.isfinite(payload) and payload >= 0.0):
         raise DataError(f"payload: {mass!r} given, a mass of 0 kg or more expected")
-    platform, body = robot.platform, robot.platform.inertia
-    at = platform.tool if center is None else vector(center, "center")
-    if platform.slides and any(at[:2]) and carried:
+    platform, inertia_before = robot.platform, robot.platform.inertia
+    center_of_mass = platform.tool if center is None else vector(center, "center")
+    if platform.slides and any(center_of_mass[:2]) and payload:
         place = "platform.tool" if center is None else "center"
         raise ModelError(
-            f"{place} is {math.hypot(*at[:2]):g} m off the axis of a platform that slides, "
-            f"where a payload cannot be modelled; give {place} [0, 0, z]",
+            f"{place} is {math.hypot(*center_of_mass[:2]):g} m off the axis of a platform that "
+            f"slides, where a payload cannot be modelled; give {place} [0, 0, z]",
             subject=robot.name,
         )
-    kind, count = type(body), inertia_count(body.kinds)
-    components = np.ravel(inertia).tolist()
-    tensor = numbers([0.0] * count if components == [0.0] else components, "inertia", count)
-    if carried == 0.0 and not any(tensor):
+    kind, count = type(inertia_before), inertia_count(inertia_before.kinds)
+    inertia_numbers = np.ravel(inertia).tolist()
+    tensor = numbers(
+        [0.0] * count if inertia_numbers == [0.0] else inertia_numbers, "inertia", count
+    )
+    if payload == 0.0 and not any(tensor):
         return robot
-    load = carried_values(kind, carried, at, tensor)
+    load = carried_values(kind, payload, center_of_mass, tensor)
     if any(tensor):
         kind.of_values(load)  # a body that is none says so
-    values = [a + b for a, b in zip(body.values, load, strict=True)]
-    return replace(robot, platform=replace(platform, inertia=kind.of_values(values)))
+    parameters = [a + b for a, b in zip(inertia_before.values, load, strict=True)]
+    return replace(robot, platform=replace(platform, inertia=kind.of_values(parameters)))

@@ -8,7 +8,7 @@ from pteron.bodies.inertia import PlanarInertia, SpatialInertia
 from pteron.bodies.vectors import Vector, interval, parallel, perpendicular, unit_vector, vector
 from pteron.errors import ModelError
 from pteron.platforms.kinds import XYZ, AngleOrder
-from pteron.toml import refuse
+from pteron.toml import raise_faults
 
 BASE_Z: Vector = (0.0, 0.0, 1.0)
 
@@ -104,5 +104,5 @@ def _joint(platform: Any) -> dict[str, Any]:
     second = checked.get("second_axis")
     if second and parallel(unit_vector(platform.axis, "axis"), second):
         faults.append("second_axis: along axis, so that both angles turn alike; turn one")
-    refuse(faults)
+    raise_faults(faults)
     return checked

@@ -26,7 +26,7 @@ from pteron.platforms.coordinates import COORDINATES, Unit, are_angles
 from pteron.platforms.kinds import TILTING, AngleOrder, Motion, equations_class
 from pteron.platforms.motion import PlatformEquations, PlatformMotion
 from pteron.platforms.parts import Bar, Geared, HeldPoint
-from pteron.toml import refuse
+from pteron.toml import raise_faults
 
 Limits = tuple[float, float]
 
@@ -92,7 +92,7 @@ class Platform:
             valid = " or ".join(f'"{m}"' for m in get_args(Motion))
             raise ModelError(f"motion: {self.motion!r} is not {valid}")
         sound, faults = checked_fields(self)
-        refuse(faults)
+        raise_faults(faults)
         for name, field_value in sound.items():
             object.__setattr__(self, name, field_value)
 

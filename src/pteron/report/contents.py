@@ -46,7 +46,7 @@ from pteron.workspace import (
     reach_volume,
 )
 from pteron.workspace.examination import examine
-from pteron.workspace.reach_slices import Plane, reached, slice_planes
+from pteron.workspace.reach_slices import Plane, reach_sides, slice_planes
 from pteron.workspace.tilts import largest_tilt
 
 _ANGLES = 361
@@ -251,7 +251,7 @@ def _measures(robot: Manipulator, home: Array, volume: ReachVolume | None) -> Me
         extent = _extent(box, plane, half.tolist())
         wide_cut = reach_slice(robot, home, plane, extent=extent, points=_FINE)
         # The box holds the whole reach: this plane may reach a small part of it.
-        cut = reach_slice(robot, home, plane, extent=reached(wide_cut), points=_FINE)
+        cut = reach_slice(robot, home, plane, extent=reach_sides(wide_cut), points=_FINE)
     type_i = numeric(robot, "reach")(cut.poses)[1].min(axis=-1)
     type_ii = _type_ii(robot, cut.poses)
     return Measures(cut, type_i, np.where(np.isnan(type_i), np.nan, type_ii))

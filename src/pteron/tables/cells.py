@@ -57,7 +57,7 @@ class Cut(NamedTuple):
         )
 
     def may_be_row(self, record: Record) -> bool:
-        """Say whether it is more like a row with a fault than like a line above the rows."""
+        """Return whether a record is more likely a faulty row than a header line."""
         cells = record.cells
         if len(cells) == self.width and self.columns:
             cells = tuple(cells[j] for j in self.columns)
@@ -74,42 +74,42 @@ def best_cut(text: Sequence[str], declared: Dialect) -> Cut | None:
     """Return the file as cut by the separator that makes most of its cells numbers."""
     separators = [declared.separator] if declared.separator else list(SEPARATORS)
     decimals = [declared.decimal] if declared.decimal else list(get_args(Decimal))
-    cut = [
+    cuts = [
         rows
         for separator in separators
         for decimal in decimals
-        if separator != decimal and (rows := _cut(text, separator, decimal)).records
+        if separator != decimal and (rows := _split_cells(text, separator, decimal)).records
     ]
 
     def sense(rows: Cut) -> tuple[float, int, int]:
         return len(rows.columns) / rows.width, len(rows.columns), rows.matched
 
-    several = [rows for rows in cut if len(rows.columns) > 1]
+    several = [rows for rows in cuts if len(rows.columns) > 1]
     if several:
         return max(several, key=sense)
     # Without rows of numbers the names alone tell the separator.
-    return max(cut, key=lambda rows: len(rows.records[0].cells), default=None)
+    return max(cuts, key=lambda rows: len(rows.records[0].cells), default=None)
 
 
-def _cut(text: Sequence[str], separator: Separator, decimal: Decimal) -> Cut:
+def _split_cells(text: Sequence[str], separator: Separator, decimal: Decimal) -> Cut:
     records = list(_records(text, separator))
-    width = Counter(len(one.cells) for one in records).most_common(1)[0][0] if records else 0
-    whole = [one.cells for one in records if len(one.cells) == width]
+    width = Counter(len(record.cells) for record in records).most_common(1)[0][0] if records else 0
+    full_rows = [record.cells for record in records if len(record.cells) == width]
     is_data = _DATA[decimal].fullmatch
-    counts = [sum(map(bool, map(is_data, column))) for column in zip(*whole, strict=True)]
-    columns = tuple(j for j, count in enumerate(counts) if count > _MOST * len(whole))
+    counts = [sum(map(bool, map(is_data, column))) for column in zip(*full_rows, strict=True)]
+    columns = tuple(j for j, count in enumerate(counts) if count > _MOST * len(full_rows))
     return Cut(separator, decimal, records, width, columns, sum(counts))
 
 
 def _records(text: Sequence[str], separator: Separator) -> Iterator[Record]:
     if separator == " ":
         text = [single_blanks(line.encode()).decode() for line in text]
-    reader, before = csv.reader(text, delimiter=separator), 0
+    reader, last_line = csv.reader(text, delimiter=separator), 0
     try:
         for cells in reader:
             stripped = tuple(cell.strip() for cell in cells)
             if any(stripped):
-                yield Record(before, reader.line_num, stripped)
-            before = reader.line_num
+                yield Record(last_line, reader.line_num, stripped)
+            last_line = reader.line_num
     except csv.Error:  # told where the rows are read
         return

@@ -75,7 +75,7 @@ class CsvFile:
         self.source, self._data, self._block = source, data, block
         self._found = dialect is not None
         self._dialect = dialect or PLAIN
-        self._encoding = self._dialect.encoding or find_encoding(self._beginning(), None, source)
+        self._encoding = self._dialect.encoding or find_encoding(self._read_head(), None, source)
         self._separator = self._dialect.separator or ","
         head = next(self._text(_HEAD), b"")
         self.units: tuple[str, ...] = ()
@@ -116,19 +116,19 @@ class CsvFile:
             If a row is ragged, or if the file is not text; the message names the row and the line.
         """
         names = [name for name in self.columns if columns is None or name in columns]
-        row, line, rest = 0, self._first_line, b""
+        row, line, carried = 0, self._first_line, b""
         for chunk, following in pairwise(chain(self._text(self._block, self._start), [None])):
             assert chunk is not None
-            whole = rest + chunk
-            if following is None and self._found and whole.rstrip().endswith(_END):
-                whole = whole[: whole.rindex(_END) + 1]
-            cut = len(whole) if following is None else _end_of_records(whole)
-            if not cut and len(whole) > self._block + _HEAD:  # a quote that is never closed
-                cut = len(whole)
-            block, rest = whole[:cut], whole[cut:]
-            frame = self._at_once(block, names)
+            text = carried + chunk
+            if following is None and self._found and text.rstrip().endswith(_END):
+                text = text[: text.rindex(_END) + 1]
+            end = len(text) if following is None else _end_of_records(text)
+            if not end and len(text) > self._block + _HEAD:  # a quote that is never closed
+                end = len(text)
+            block, carried = text[:end], text[end:]
+            frame = self._read_by_polars(block, names)
             if frame is None:
-                frame = self._by_record(block, row, line).select(names)
+                frame = self._read_by_record(block, row, line).select(names)
             if len(frame):
                 line_of = partial(self._line_of, block, line)
                 decimal = self._dialect.decimal or "."
@@ -136,7 +136,7 @@ class CsvFile:
             row += len(frame)
             line += block.count(b"\n")
 
-    def _beginning(self) -> bytes:
+    def _read_head(self) -> bytes:
         if isinstance(self._data, bytes):
             return self._data[:_HEAD]
         with self._data.open("rb") as file:
@@ -149,27 +149,29 @@ class CsvFile:
         """
         decoder = codecs.getincrementaldecoder(self._encoding)()
         decode = io.IncrementalNewlineDecoder(decoder, translate=True).decode
-        data, mark, held = self._data, "\ufeff", b""
-        with io.BytesIO(data) if isinstance(data, bytes) else data.open("rb") as file:
+        content, mark, carried = self._data, "\ufeff", b""
+        with io.BytesIO(content) if isinstance(content, bytes) else content.open("rb") as file:
             for chunk, following in pairwise(chain(iter(partial(file.read, size), b""), [b""])):
                 try:
                     text = decode(chunk, not following)
                 except UnicodeError:
                     raise self._not_text() from None
-                whole, mark = text.removeprefix(mark).encode(), ""
+                piece, mark = text.removeprefix(mark).encode(), ""
                 if self._separator == " ":
-                    whole = held + whole
-                    cut = len(whole) if not following else whole.rfind(b"\n") + 1
-                    whole, held = single_blanks(whole[:cut]), whole[cut:]
-                yield whole[start:]
-                start = max(start - len(whole), 0)
+                    piece = carried + piece
+                    end = len(piece) if not following else piece.rfind(b"\n") + 1
+                    piece, carried = single_blanks(piece[:end]), piece[end:]
+                yield piece[start:]
+                start = max(start - len(piece), 0)
 
     def _header(self, head: bytes) -> tuple[tuple[str, ...], int, int]:
         """Return the columns' names, where the rows begin, and on which line."""
         lines = io.BytesIO(head).readlines()
         records = csv.reader(map(bytes.decode, lines), strict=True)
         try:
-            names = next((tuple(c.strip() for c in cells) for cells in records if _any(cells)), ())
+            names = next(
+                (tuple(c.strip() for c in cells) for cells in records if _is_not_blank(cells)), ()
+            )
         except csv.Error as error:
             raise DataError(
                 f"{self.source}: its header is not CSV ({error}); check its quotes and line ends"
@@ -191,13 +193,13 @@ class CsvFile:
         if self._found or len(self.columns) > 1 or other is None:
             return None
         comma = re.search(rb"\d,\d", row) is not None
-        found = SEPARATORS[other] + ", with decimal commas" * comma
+        separators = SEPARATORS[other] + ", with decimal commas" * comma
         return (
-            f"its cells look separated by {found}; separate the cells with commas and decimals "
-            "with points"
+            f"its cells look separated by {separators}; separate the cells with commas and "
+            "decimals with points"
         )
 
-    def _at_once(self, block: bytes, names: Sequence[str]) -> pl.DataFrame | None:
+    def _read_by_polars(self, block: bytes, names: Sequence[str]) -> pl.DataFrame | None:
         """Return the cells as Polars reads them, or None where it might read them otherwise.
 
         Polars fills short rows and takes blank lines for rows, which separators that are not there
@@ -206,19 +208,19 @@ class CsvFile:
         separator, last = self._separator, len(self.columns) - 1
         if not last or b'"' in block:
             return None
-        wanted = [self.columns.index(name) for name in names]
+        indices = [self.columns.index(name) for name in names]
         schema = {str(j): pl.String for j in range(last + 1)}
         try:
             frame = pl.read_csv(
-                block, has_header=False, schema=schema, columns=wanted, separator=separator
+                block, has_header=False, schema=schema, columns=indices, separator=separator
             )
         except pl.exceptions.PolarsError:
             return None
         if block.count(separator.encode()) != frame.height * last:
             return None
-        return frame.rename({str(j): self.columns[j] for j in wanted})
+        return frame.rename({str(j): self.columns[j] for j in indices})
 
-    def _by_record(self, block: bytes, row: int, line: int) -> pl.DataFrame:
+    def _read_by_record(self, block: bytes, row: int, line: int) -> pl.DataFrame:
         names, rows = self.columns, list[list[str | None]]()
         try:
             for begins, cells in self._records(block, line):
@@ -242,7 +244,7 @@ class CsvFile:
         reader = csv.reader(lines, delimiter=self._separator, strict=True)
         begins = line
         for cells in reader:
-            if _any(cells):
+            if _is_not_blank(cells):
                 yield begins, cells
             begins = line + reader.line_num
 
@@ -260,7 +262,7 @@ class CsvFile:
         return DataError(message)
 
 
-def _any(cells: Sequence[str]) -> bool:
+def _is_not_blank(cells: Sequence[str]) -> bool:
     """Say whether a record is more than a blank line."""
     return len(cells) > 1 or bool(cells and cells[0].strip())
 

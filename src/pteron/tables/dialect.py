@@ -75,5 +75,5 @@ def declaration(table: str, **entries: object) -> str:
     """
     import tomlkit  # slow to load, and for messages alone
 
-    lines = [f"{key} = {tomlkit.item(value).as_string()}" for key, value in entries.items()]
+    lines = [f"{key} = {tomlkit.item(setting).as_string()}" for key, setting in entries.items()]
     return "\n" + "\n".join([f"[{table}]", *lines])

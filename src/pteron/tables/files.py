@@ -51,21 +51,21 @@ def open_table(
     """
     source = shown(str(path), bare=True, longest=_LONGEST_PATH)
     file = Path(path)
-    with _told_by_name(source):
+    with _name_in_errors(source):
         if file.is_dir():
             raise IsADirectoryError
         if file.suffix.lower() not in ENDINGS:
-            raise DataError(f"{source}: {_unknown(file, noun)}")
+            raise DataError(f"{source}: {_ending_fault(file, noun)}")
         if file.exists() and not file.is_file():
             raise DataError(
                 f"{source}: is no regular file, and a {noun} is read twice; save it as a file"
             )
         if file.suffix.lower() == ".csv":
             encoding = None if dialect is None else dialect.encoding
-            made = None if dialect is None else side_by_side(file, encoding, source)
-            if made is None:
+            plain_csv = None if dialect is None else side_by_side(file, encoding, source)
+            if plain_csv is None:
                 return CsvFile(file, source, dialect)
-            table = CsvFile(made, source)
+            table = CsvFile(plain_csv, source)
             table.found = ("variables one below another",)
             return table
         return ParquetFile(file, source)
@@ -93,7 +93,7 @@ def read_table(path: str | Path) -> Table:
     source = shown(str(path), bare=True, longest=_LONGEST_PATH)
     special = Path(path)
     file: CsvFile | ParquetFile
-    with _told_by_name(source):
+    with _name_in_errors(source):
         if str(path) == STANDARD_INPUT:
             source = "standard input"
             if sys.stdin is None:
@@ -122,15 +122,15 @@ def whole_table(file: CsvFile | ParquetFile) -> Table:
     if not tables:
         below = f" below its header; the names are {listed(file.columns)}"
         raise DataError(f"{file.source}: has no rows{below if isinstance(file, CsvFile) else ''}")
-    return _joined(tables)
+    return _join_tables(tables)
 
 
-def _joined(tables: list[Table]) -> Table:
+def _join_tables(tables: list[Table]) -> Table:
     if len(tables) == 1:
         return tables[0]
 
     def line_of(index: int) -> int:
-        table = next(one for one in reversed(tables) if one.first_row <= index)
+        table = next(table for table in reversed(tables) if table.first_row <= index)
         assert table.line_of is not None
         return table.line_of(index - table.first_row)
 
@@ -139,7 +139,7 @@ def _joined(tables: list[Table]) -> Table:
 
 
 @contextmanager
-def _told_by_name(source: str) -> Iterator[None]:
+def _name_in_errors(source: str) -> Iterator[None]:
     try:
         yield
     except FileNotFoundError:
@@ -161,7 +161,7 @@ def check_output(path: str | Path, dialect: Dialect | None = None) -> Path:
     """
     file = checked_file(path)
     if file.suffix.lower() not in ENDINGS:
-        raise OutputError(f"{path}: {_unknown(file, 'table')}")
+        raise OutputError(f"{path}: {_ending_fault(file, 'table')}")
     if dialect is not None and file.suffix.lower() != ".csv":
         raise OutputError(f"{path}: only a CSV file has a separator and a decimal sign")
     return file
@@ -208,6 +208,6 @@ ENDINGS: dict[str, Callable[[pl.DataFrame, io.BytesIO, Dialect], None]] = {
 """The endings of the files that hold tables, each with what writes one."""
 
 
-def _unknown(file: Path, noun: str) -> str:
-    given = f"unknown ending {shown(file.suffix)}" if file.suffix else "no ending"
-    return f"{given}; a {noun}'s file ends in {' or '.join(ENDINGS)}"
+def _ending_fault(file: Path, noun: str) -> str:
+    fault = f"unknown ending {shown(file.suffix)}" if file.suffix else "no ending"
+    return f"{fault}; a {noun}'s file ends in {' or '.join(ENDINGS)}"

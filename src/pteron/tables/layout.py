@@ -103,7 +103,7 @@ def find_layout(head: bytes, declared: Dialect, encoding: str, source: str) -> L
     if declared.decimal is None:
         _check_commas(rows, source)
     first = _first_row(rows, declared.header_lines)
-    above = [one for one in rows.records if one.line < first]
+    above = [record for record in rows.records if record.line < first]
     names, units, unit_line = _names(rows, above, declared.header_lines, source)
     known = replace(
         declared,
@@ -112,29 +112,29 @@ def find_layout(head: bytes, declared: Dialect, encoding: str, source: str) -> L
         encoding=encoding,
         header_lines=first,
     )
-    named, repeated = _told_apart(names)
-    found = []
+    named, repeated = _number_repeated(names)
+    differences = []
     if declared.separator is None and rows.separator != ",":
-        found.append(f"cells separated by {SEPARATORS[rows.separator]}")
+        differences.append(f"cells separated by {SEPARATORS[rows.separator]}")
     if declared.decimal is None and rows.decimal == ",":
-        found.append("decimal comma")
+        differences.append("decimal comma")
     if declared.encoding is None and encoding != "utf-8":
         guessed = " (guessed: it is not UTF-8)" if encoding == "cp1252" else ""
-        found.append(f"encoding {encoding}{guessed}")
+        differences.append(f"encoding {encoding}{guessed}")
     if declared.header_lines is None and first > 1 + above[0].line:
-        found.append(f"{first} header lines")
+        differences.append(f"{first} header lines")
     if unit_line:
-        found.append("units in a line of their own")
+        differences.append("units in a line of their own")
     header = b"".join(lines[:first])
     start = len(single_blanks(header) if rows.separator == " " else header)
-    return Layout(known, named, units, repeated, start, first + 1, tuple(found))
+    return Layout(known, named, units, repeated, start, first + 1, tuple(differences))
 
 
 def _check_commas(rows: Cut, source: str) -> None:
     """Refuse numbers whose commas may be decimal commas or thousands separators."""
     if rows.decimal != ",":
         return
-    cells = [cell for one in rows.records if rows.is_row(one) for cell in one.cells]
+    cells = [cell for record in rows.records if rows.is_row(record) for cell in record.cells]
     commas = [cell for cell in cells if _WITH_COMMA.fullmatch(cell)]
     if commas and all(map(_OF_THOUSANDS.fullmatch, commas)):
         raise DataError(
@@ -147,16 +147,16 @@ def _check_commas(rows: Cut, source: str) -> None:
 def _first_row(rows: Cut, header_lines: int | None) -> int:
     """Return the line of the first row, from 0."""
     if header_lines is not None:
-        below = [one for one in rows.records if one.line >= header_lines]
+        below = [record for record in rows.records if record.line >= header_lines]
         return below[0].after if below and _are_units(below[0]) else header_lines
-    found = next((i for i, one in enumerate(rows.records) if rows.is_row(one)), None)
-    if found is None:
+    index = next((i for i, record in enumerate(rows.records) if rows.is_row(record)), None)
+    if index is None:
         return rows.records[0].after
-    while found and rows.may_be_row(rows.records[found - 1]):
-        if rows.records[found].line > rows.records[found - 1].after:
+    while index and rows.may_be_row(rows.records[index - 1]):
+        if rows.records[index].line > rows.records[index - 1].after:
             break
-        found -= 1
-    return rows.records[found].line
+        index -= 1
+    return rows.records[index].line
 
 
 def _names(
@@ -165,18 +165,19 @@ def _names(
     """Return names and units of the columns, and whether the units have a line of their own."""
     width = rows.width
     # Rows may end in a separator where the line of names does not.
-    fitting = [one for one in above if len(one.cells) in (width, width - 1)]
-    fitting = [one for one in fitting if 2 * sum(map(bool, one.cells)) > width] or fitting[-1:]
+    fitting = [record for record in above if len(record.cells) in (width, width - 1)]
+    full = [record for record in fitting if 2 * sum(map(bool, record.cells)) > width]
+    fitting = full or fitting[-1:]
     if not rows.columns:
         fitting = list(above)
-    keyed = [one for one in fitting if one.cells[0] in _KEYS]
-    titles = [one for one in fitting if one.cells[0] == "Name" and keyed]
+    keyed = [record for record in fitting if record.cells[0] in _KEYS]
+    titles = [record for record in fitting if record.cells[0] == "Name" and keyed]
     if titles:
-        return *_of_scope(rows, titles[-1], keyed), False
-    units = [one for one in fitting[1:] if _are_units(one)][-1:]
+        return *_scope_names(rows, titles[-1], keyed), False
+    units = [record for record in fitting[1:] if _are_units(record)][-1:]
     if header_lines is not None and units and units[0].line < header_lines - 1:
         units = []
-    named = [one for one in fitting if not units or one.line < units[0].line]
+    named = [record for record in fitting if not units or record.line < units[0].line]
     if not named:
         raise _nameless(rows, above, source)
     cells = named[-1].cells
@@ -190,7 +191,7 @@ def _are_units(record: Record) -> bool:
     return len(cells) > 1 and all(map(_UNIT.fullmatch, cells))
 
 
-def _of_scope(
+def _scope_names(
     rows: Cut, title: Record, keyed: Sequence[Record]
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return names and units in an export of TwinCAT Scope: its lines begin with a key.
@@ -198,9 +199,11 @@ def _of_scope(
     Times are in milliseconds from the start, or full stamps in ticks of 100 ns; a unit is written
     like "mm (Length)" or "(None)".
     """
-    of_units = next((one.cells for one in keyed if one.cells[0] == "Unit"), ("",) * rows.width)
-    row = next(one.cells for one in rows.records if rows.is_row(one))
-    names, units = list(title.cells), [unit.partition("(")[0].strip() for unit in of_units]
+    unit_cells = next(
+        (record.cells for record in keyed if record.cells[0] == "Unit"), ("",) * rows.width
+    )
+    row = next(record.cells for record in rows.records if rows.is_row(record))
+    names, units = list(title.cells), [unit.partition("(")[0].strip() for unit in unit_cells]
     for j, name in enumerate(names):
         if name == "Name":
             ticks = float(row[j].replace(",", ".")) > _TICKS
@@ -223,17 +226,17 @@ def _nameless(rows: Cut, above: Sequence[Record], source: str) -> DataError:
     )
 
 
-def _told_apart(names: Sequence[str]) -> tuple[tuple[str, ...], dict[str, str]]:
-    """Return the names, repeated ones numbered, and the numbered ones with those in the file."""
-    apart: list[str] = []
+def _number_repeated(names: Sequence[str]) -> tuple[tuple[str, ...], dict[str, str]]:
+    """Return distinct names, repeated ones numbered, and a map from numbered to original names."""
+    numbered: list[str] = []
     repeated: dict[str, str] = {}
     seen: Counter[str] = Counter()
     for j, name in enumerate(names):
         seen[name] += 1
-        given = name or f"column {j + 1}"
-        while given in apart or (given != name and given in names):
-            given = f"{name} ({seen[name]})" if given == name else given + "'"
-        if name and given != name:
-            repeated[given] = name
-        apart.append(given)
-    return tuple(apart), repeated
+        label = name or f"column {j + 1}"
+        while label in numbered or (label != name and label in names):
+            label = f"{name} ({seen[name]})" if label == name else label + "'"
+        if name and label != name:
+            repeated[label] = name
+        numbered.append(label)
+    return tuple(numbered), repeated

@@ -15,16 +15,16 @@ from pteron.errors import DataError
 from pteron.tables.layout import find_encoding
 from pteron.tables.table import listed
 
-_VALUES = re.compile(r'^"?VarName"? *(?P<separator>[;,\t])', re.MULTILINE)
+_VALUE_HEADER = re.compile(r'^"?VarName"? *(?P<separator>[;,\t])', re.MULTILINE)
 """The header of a log of WinCC, which has a row for each value."""
 
-_BLOCKS = re.compile(r"^\d+\.Variable *(?P<separator>[;,\t])", re.MULTILINE)
+_BLOCK_HEADER = re.compile(r"^\d+\.Variable *(?P<separator>[;,\t])", re.MULTILINE)
 """The first line of a variable in a trace of CODESYS 3, whose samples stand below."""
 
 _HEAD = 1 << 12
 """Bytes from which either is recognised."""
 
-_OF_ARCHIVE = "$RT_"
+_ARCHIVE_PREFIX = "$RT_"
 """Prefix of WinCC's own marks between the values."""
 
 _SECONDS = Decimal("0.0864")
@@ -46,14 +46,14 @@ def side_by_side(file: Path, encoding: str | None, source: str) -> bytes | None:
         start = head.decode(known, errors="ignore").lstrip("\ufeff")
     except (DataError, LookupError):
         return None  # it is refused where it is read
-    values, blocks = _VALUES.search(start), _BLOCKS.search(start)
-    found = values or blocks
-    if found is None:
+    value_header, block_header = _VALUE_HEADER.search(start), _BLOCK_HEADER.search(start)
+    header = value_header or block_header
+    if header is None:
         return None
-    text = file.read_bytes().decode(known).lstrip("\ufeff")[found.start() :]
-    rows = [row for row in csv.reader(io.StringIO(text), delimiter=found["separator"]) if row]
+    text = file.read_bytes().decode(known).lstrip("\ufeff")[header.start() :]
+    rows = [row for row in csv.reader(io.StringIO(text), delimiter=header["separator"]) if row]
     rows = [[cell.strip() for cell in row] for row in rows]
-    columns = _of_values(rows, source) if values else _of_blocks(rows)
+    columns = _columns_of_values(rows, source) if value_header else _columns_of_blocks(rows)
     (first, reference), *others = columns.items()
     times = [time for time, _ in reference]
     for name, samples in others:
@@ -71,7 +71,7 @@ def side_by_side(file: Path, encoding: str | None, source: str) -> bytes | None:
     return out.getvalue().encode()
 
 
-def _of_values(rows: list[list[str]], source: str) -> _Columns:
+def _columns_of_values(rows: list[list[str]], source: str) -> _Columns:
     names = rows[0]
     needed = ["VarName", "VarValue", "Time_ms"]
     if missing := [name for name in needed if name not in names]:
@@ -79,28 +79,30 @@ def _of_values(rows: list[list[str]], source: str) -> _Columns:
             f"{source}: has a row for each value, but no column {listed(missing)} (found: "
             f"{listed(names)}); export it with {listed(needed)}"
         )
-    name, value, time = (names.index(one) for one in needed)
+    name_column, value_column, time_column = (names.index(column) for column in needed)
     columns: _Columns = {}
     begin: Decimal | None = None
     for line, row in enumerate(rows[1:], start=2):
-        if len(row) < len(names) or row[name].startswith(_OF_ARCHIVE):
+        if len(row) < len(names) or row[name_column].startswith(_ARCHIVE_PREFIX):
             continue
         try:
-            stamp = Decimal(row[time].replace(",", "."))
+            stamp = Decimal(row[time_column].replace(",", "."))
         except InvalidOperation:
             raise DataError(
-                f"{source}: line {line}: Time_ms holds {row[time]!r}, a number expected"
+                f"{source}: line {line}: Time_ms holds {row[time_column]!r}, a number expected"
             ) from None
         begin = stamp if begin is None else begin
         seconds = format(((stamp - begin) * _SECONDS).normalize(), "f")
-        columns.setdefault(row[name], []).append((seconds, row[value].replace(",", ".")))
+        columns.setdefault(row[name_column], []).append(
+            (seconds, row[value_column].replace(",", "."))
+        )
     return columns
 
 
-def _of_blocks(rows: list[list[str]]) -> _Columns:
+def _columns_of_blocks(rows: list[list[str]]) -> _Columns:
     columns: _Columns = {}
     for row in rows:
-        if _BLOCKS.match(f"{row[0]};"):
+        if _BLOCK_HEADER.match(f"{row[0]};"):
             samples = columns.setdefault(row[1], [])
         elif len(row) > 2:
             samples.append((row[1].replace(",", "."), row[2].replace(",", ".")))

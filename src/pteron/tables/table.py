@@ -83,15 +83,15 @@ class Table:
             row, the line and the column.
         """
         self._require(columns)
-        values = np.empty((len(self), len(columns)))
+        array = np.empty((len(self), len(columns)))
         for j, name in enumerate(columns):
-            values[:, j] = self._cells(name)[1].fill_null(np.nan).to_numpy()
-        missing = ~np.isfinite(values)
+            array[:, j] = self._cells(name)[1].fill_null(np.nan).to_numpy()
+        missing = ~np.isfinite(array)
         if missing.any():
-            text = np.zeros(values.shape, dtype=bool)
+            text = np.zeros(array.shape, dtype=bool)
             for j, name in enumerate(columns):
-                cells, found = self._cells(name)
-                text[:, j] = (found.is_null() & cells.is_not_null()).to_numpy()
+                cells, cell_numbers = self._cells(name)
+                text[:, j] = (cell_numbers.is_null() & cells.is_not_null()).to_numpy()
             bad = text if on_failure == "nan" else missing
             if bad.any():
                 row, j = (int(i) for i in np.argwhere(bad)[0])
@@ -99,8 +99,8 @@ class Table:
                 choice = on_failure is not None and not is_text
                 fault = self._fault(row, columns[j], is_text=is_text, choice=choice)
                 raise DataError(fault, subject=self.source)
-            values[missing] = np.nan
-        return values
+            array[missing] = np.nan
+        return array
 
     def extended(self, results: Mapping[str, ArrayLike]) -> Table:
         """Return the table with columns added behind its own; one of the same name is replaced.
@@ -108,11 +108,10 @@ class Table:
         NaN becomes an empty cell.
         """
         added = [
-            pl.Series(name, np.asarray(values), nan_to_null=True)
-            for name, values in results.items()
+            pl.Series(name, np.asarray(cells), nan_to_null=True) for name, cells in results.items()
         ]
-        kept = self.frame.drop(*results, strict=False)
-        return replace(self, frame=kept.hstack(added))
+        others = self.frame.drop(*results, strict=False)
+        return replace(self, frame=others.hstack(added))
 
     def empty(self, column: str) -> int:
         """Return how many cells of a column are empty."""
@@ -173,13 +172,13 @@ class Table:
     def _fault(self, row: int, column: str, *, is_text: bool, choice: bool) -> str:
         cell = self.frame[column][row]
         name = shown(column, bare=True)
-        given = f"the cell is empty; {name} needs a number"
+        fault = f"the cell is empty; {name} needs a number"
         if cell is not None and str(cell).strip():
             expected = "a number" if is_text else "a finite number"
             comma = " with a decimal comma" if is_text and self.decimal == "," else ""
-            given = f"{shown(str(cell).strip())} given, {expected}{comma} expected"
+            fault = f"{shown(str(cell).strip())} given, {expected}{comma} expected"
         leave = ", or leave such rows empty with --on-failure nan" if choice else ""
-        return f"{self.place_in_file(row)}, column {name}: {given}; correct the cell{leave}"
+        return f"{self.place_in_file(row)}, column {name}: {fault}; correct the cell{leave}"
 
 
 def listed(names: Sequence[str]) -> str:

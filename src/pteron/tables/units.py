@@ -38,15 +38,15 @@ def in_si(table: Table, units: Mapping[str, str]) -> Table:
         If a unit is not one of what the column holds, a column is there twice, or a cell that is to
         be converted holds text.
     """
-    frame, found = table.frame, set[str]()
+    frame, converted = table.frame, set[str]()
     for column in table.columns:
         match = _NAMED.fullmatch(column)
         if match is None or match["name"] not in units:
             continue
         name = match["name"]
-        if name in table.columns or name in found:
+        if name in table.columns or name in converted:
             raise DataError(f"{table.source}: {name} and {column} given; keep one of them")
-        factor = _factor(match["unit"], units[name])
+        factor = _si_factor(match["unit"], units[name])
         if factor is None:
             si, _, per = units[name].partition("/")
             known = ", ".join(f"{unit}/{per}" if per else unit for unit in FACTORS.get(si, (si,)))
@@ -55,16 +55,16 @@ def in_si(table: Table, units: Mapping[str, str]) -> Table:
                 f"{known}"
             )
         if factor != 1.0:
-            values = factor * table.numbers([column], "nan")[:, 0]
-            frame = frame.with_columns(pl.Series(column, values, nan_to_null=True))
+            si_values = factor * table.numbers([column], "nan")[:, 0]
+            frame = frame.with_columns(pl.Series(column, si_values, nan_to_null=True))
         frame = frame.rename({column: name})
-        found.add(name)
+        converted.add(name)
     return replace(table, frame=frame)
 
 
-def _factor(unit: str, si: str) -> float | None:
+def _si_factor(unit: str, si: str) -> float | None:
     """Return the factor from a unit to an SI unit, None if it measures something else."""
-    (own, _, per), (base, _, wanted) = unit.partition("/"), si.partition("/")
-    if re.sub("[ ^]", "", per) != re.sub("[ ^]", "", wanted):
+    (numerator, _, per), (base, _, si_per) = unit.partition("/"), si.partition("/")
+    if re.sub("[ ^]", "", per) != re.sub("[ ^]", "", si_per):
         return None
-    return FACTORS.get(base, {base: 1.0}).get(own.strip())
+    return FACTORS.get(base, {base: 1.0}).get(numerator.strip())

@@ -14,7 +14,7 @@ from pteron.kinematics import direct_kinematics, inverse_kinematics
 from pteron.manipulator import Manipulator
 from pteron.manipulator.variants import with_elbows
 from pteron.motion import Motion
-from pteron.motion.payload import carrying as loaded_robot, payload_warning
+from pteron.motion.payload import add_payload as loaded_robot, payload_warning
 from pteron.platforms.coordinates import SHOWN
 from pteron.viewer.boundary import allowed, followed, told_rest, what_stops
 from pteron.viewer.sliding import nearest

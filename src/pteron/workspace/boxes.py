@@ -9,17 +9,17 @@ import numpy as np
 from pteron.kernels import Array
 
 
-def varied(pose: Array, values: Array, where: Any = None) -> Array:
+def vary_coordinates(pose: Array, coordinates: Array, indices: Any = None) -> Array:
     """Return poses (..., m) with values (..., k) for some coordinates, the others as in a pose.
 
     `where` says for which, such as their indices (k,); by default they are the first.
     """
-    found = np.broadcast_to(pose, (*values.shape[:-1], pose.shape[-1])).copy()
-    found[..., slice(values.shape[-1]) if where is None else where] = values
-    return found
+    poses = np.broadcast_to(pose, (*coordinates.shape[:-1], pose.shape[-1])).copy()
+    poses[..., slice(coordinates.shape[-1]) if indices is None else indices] = coordinates
+    return poses
 
 
-def halved(boxes: Array, sizes: Array | float = 1.0) -> Array:
+def halve_boxes(boxes: Array, sizes: Array | float = 1.0) -> Array:
     """Return both halves of boxes (N, 2, k), one after the other, cut across their longest side.
 
     Sides are measured by sizes (k,), so that coordinates of different units are halved alike.

@@ -107,11 +107,13 @@ def clearance(
     ((15,), 0.1965, ('leg 2 rod', 'leg 3 rod'))
     """
     robot = as_manipulator(robot)
-    counted = pairs(robot)
+    body_pairs = pairs(robot)
     distances: Array = evaluate_kernel(robot, "clearances", on_failure, pose)
-    names = tuple((a.name, b.name) for a, b in counted)
-    given = _radii(robot, radii)
-    touching = [getattr(given, a.kind) + getattr(given, b.kind) for a, b in counted]
+    names = tuple((a.name, b.name) for a, b in body_pairs)
+    radii_by_kind = _to_radii(robot, radii)
+    touching = [
+        getattr(radii_by_kind, a.kind) + getattr(radii_by_kind, b.kind) for a, b in body_pairs
+    ]
     return Clearance(names, distances - np.array(touching))
 
 
@@ -144,7 +146,7 @@ def interference(robot: RobotLike, radii: Thickness | None = None) -> tuple[Cond
     True
     """
     robot = as_manipulator(robot)
-    given = _radii(robot, radii)
+    radii_by_kind = _to_radii(robot, radii)
     return tuple(
         Condition(
             0,
@@ -152,20 +154,20 @@ def interference(robot: RobotLike, radii: Thickness | None = None) -> tuple[Cond
             "least_clearances",
             "distances",
             k,
-            float(getattr(given, a) + getattr(given, b)),
+            float(getattr(radii_by_kind, a) + getattr(radii_by_kind, b)),
         )
         for k, (a, b) in enumerate(meetings(robot))
     )
 
 
-def _radii(robot: Manipulator, given: Thickness | None) -> Radii:
-    if given is None:
+def _to_radii(robot: Manipulator, thickness: Thickness | None) -> Radii:
+    if thickness is None:
         return robot.radii or Radii()
-    if isinstance(given, Radii):
-        return given
+    if isinstance(thickness, Radii):
+        return thickness
     names = [field.name for field in fields(Radii)]
-    if not isinstance(given, Mapping):
-        return Radii(*([given] * len(names)))
-    if unknown := [name for name in given if name not in names]:
+    if not isinstance(thickness, Mapping):
+        return Radii(*([thickness] * len(names)))
+    if unknown := [name for name in thickness if name not in names]:
         raise DataError(f"radii: {unknown[0]!r} is not one of {', '.join(names)}")
-    return Radii(**given)
+    return Radii(**thickness)

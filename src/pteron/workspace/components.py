@@ -94,33 +94,33 @@ def components(paving: Paving, *, smallest: float = 0.0) -> Components:
     if not len(paving.inner):
         return Components((), 0, None, 0.0)
     start, size, inside, possible = lattice(paving)
-    around = np.ones((3,) * inside.ndim)
-    labels, count = scipy.ndimage.label(inside, around)
-    groups, _ = scipy.ndimage.label(possible, around)
+    neighbours = np.ones((3,) * inside.ndim)
+    labels, count = scipy.ndimage.label(inside, neighbours)
+    groups, _ = scipy.ndimage.label(possible, neighbours)
     moving = [paving.robot.coordinates.index(axis) for axis in paving.axes]
     depth = scipy.ndimage.distance_transform_cdt(np.pad(inside, 1), metric="chessboard")
     depth = depth[(slice(1, -1),) * inside.ndim]
-    each, whole = float(np.prod(size)), paving.inner_volume
-    found = []
-    volumes = np.bincount(labels.ravel(), minlength=count + 1) * each
+    cell_volume, inner_volume = float(np.prod(size)), paving.inner_volume
+    parts = []
+    volumes = np.bincount(labels.ravel(), minlength=count + 1) * cell_volume
     for label, where in enumerate(scipy.ndimage.find_objects(labels), start=1):
-        own = labels[where] == label
-        if volumes[label] < smallest * whole:
+        in_part = labels[where] == label
+        if volumes[label] < smallest * inner_volume:
             continue
         low = np.array([part.start for part in where])
         high = np.array([part.stop for part in where])
-        cell = low + np.unravel_index((depth[where] * own).argmax(), own.shape)
+        cell = low + np.unravel_index((depth[where] * in_part).argmax(), in_part.shape)
         pose = paving.box[0].copy()
         pose[moving] = start + (cell + 0.5) * size
         group = int(groups[tuple(cell)])
         box = np.array([start + low * size, start + high * size])
-        found.append(Component(float(volumes[label]), pose, box, group))
-    found.sort(key=lambda part: -part.volume)
-    apart = len({part.group for part in found})
-    every = len(np.unique(groups[inside]))
-    connected = True if count == 1 else False if every > 1 else None
-    share = sum(part.volume for part in found) / whole
-    return Components(tuple(found), apart, connected, share)
+        parts.append(Component(float(volumes[label]), pose, box, group))
+    parts.sort(key=lambda part: -part.volume)
+    group_count = len({part.group for part in parts})
+    possible_groups = len(np.unique(groups[inside]))
+    connected = True if count == 1 else False if possible_groups > 1 else None
+    share = sum(part.volume for part in parts) / inner_volume
+    return Components(tuple(parts), group_count, connected, share)
 
 
 class Lattice(NamedTuple):
@@ -139,36 +139,39 @@ class Lattice(NamedTuple):
 def lattice(paving: Paving, most: int = _CELLS) -> Lattice:
     """Return a paving as a lattice, as fine as the smallest boxes, or as `most` cells allow."""
     moving = [paving.robot.coordinates.index(axis) for axis in paving.axes]
-    start, whole = paving.box[0, moving], (paving.box[1] - paving.box[0])[moving]
+    start, extent = paving.box[0, moving], (paving.box[1] - paving.box[0])[moving]
     sizes = [list(paving.by_size(boxes)) for boxes in (paving.inner, paving.boundary)]
     finest = np.array([depth for depth, _ in chain(*sizes)]).max(axis=0, initial=0)
-    every = np.concatenate([paving.inner, paving.boundary])
-    low, high = (every[:, 0].min(axis=0) - start) / whole, (every[:, 1].max(axis=0) - start) / whole
+    nonempty = np.concatenate([paving.inner, paving.boundary])
+    low, high = (
+        (nonempty[:, 0].min(axis=0) - start) / extent,
+        (nonempty[:, 1].max(axis=0) - start) / extent,
+    )
     while np.prod(np.ceil((high - low) * 2.0**finest) + 1.0) > most:
         finest[finest.argmax()] -= 1
     first = np.floor(low * 2.0**finest + _ROUNDING).astype(np.int64)
     shape = np.ceil(high * 2.0**finest - _ROUNDING).astype(np.int64) - first
-    inner, undecided = (_filled(boxes, finest, first, tuple(shape)) for boxes in sizes)
-    size = whole / 2.0**finest
+    inner, undecided = (_filled_shares(boxes, finest, first, tuple(shape)) for boxes in sizes)
+    size = extent / 2.0**finest
     full = inner > 1.0 - _ROUNDING
     return Lattice(start + first * size, size, full, inner + undecided > 0.0)
 
 
-def _filled(
+def _filled_shares(
     sizes: list[tuple[NDArray[np.int64], NDArray[np.int64]]],
     finest: NDArray[np.int64],
     first: NDArray[np.int64],
     shape: tuple[int, ...],
 ) -> Array:
     """Return which share of each cell boxes fill, given as by `Paving.by_size`."""
-    found = np.zeros(int(np.prod(shape)))
+    shares = np.zeros(int(np.prod(shape)))
     strides = np.cumprod(np.append(1, shape[:0:-1]))[::-1]
     for depth, places in sizes:
-        wide = 2 ** np.maximum(finest - depth, 0)
-        corner = ((places >> np.maximum(depth - finest, 0)) * wide - first) @ strides
-        within = np.array(list(np.ndindex(*wide))) @ strides
-        cells = (corner[:, None] + within).ravel()
-        found += 0.5 ** float(np.maximum(depth - finest, 0).sum()) * np.bincount(
-            cells, minlength=len(found)
+        cells_per_box = 2 ** np.maximum(finest - depth, 0)
+        corner = ((places >> np.maximum(depth - finest, 0)) * cells_per_box - first) @ strides
+        offsets = np.array(list(np.ndindex(*cells_per_box))) @ strides
+        cells = (corner[:, None] + offsets).ravel()
+        shares += 0.5 ** float(np.maximum(depth - finest, 0).sum()) * np.bincount(
+            cells, minlength=len(shares)
         )
-    return found.reshape(shape)
+    return shares.reshape(shape)

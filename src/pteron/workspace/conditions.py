@@ -110,15 +110,15 @@ def conditions(
     robot = as_manipulator(robot)
     for name, floor in (("type_i", type_i), ("type_ii", type_ii)):
         expect(0.0 <= floor < math.inf, name, repr(floor), "a floor of 0 or more")
-    found = [*_edges(layout_of(robot))]
+    required = [*_edges(layout_of(robot))]
     if type_i > 0.0:
-        found += [
+        required += [
             Condition(i + 1, "near type I", "squared_type_i", "squares", i, type_i**2)
             for i in range(len(robot.legs))
         ]
     if type_ii > 0.0:
-        found.append(Condition(0, "near type II", "type_ii", "type_ii", 0, type_ii, sized=True))
-    return tuple(found)
+        required.append(Condition(0, "near type II", "type_ii", "type_ii", 0, type_ii, sized=True))
+    return tuple(required)
 
 
 @lru_cache(maxsize=64)
@@ -131,29 +131,29 @@ def _edges(layout: Manipulator) -> tuple[Condition, ...]:
     )
 
 
-def condition_margins(robot: Manipulator, given: Sequence[Condition], poses: Array) -> Array:
+def condition_margins(robot: Manipulator, required: Sequence[Condition], poses: Array) -> Array:
     """Return the margins (..., C) to which poses keep conditions; NaN where undefined."""
-    found = []
+    margins = []
     results = {
         what: dict(zip((port.name for port in kernel.outputs), kernel(poses), strict=True))
-        for what in dict.fromkeys(condition.what for condition in given)
+        for what in dict.fromkeys(condition.what for condition in required)
         for kernel in [numeric(robot, what)]
     }
-    for condition in given:
-        value = results[condition.what][condition.output]
-        lead = poses.ndim - 1
-        if value.ndim > lead:
-            size = int(np.prod(value.shape[lead:]))
-            value = value.reshape(*value.shape[:lead], size)[..., condition.element]
+    for condition in required:
+        measure = results[condition.what][condition.output]
+        batch_axes = poses.ndim - 1
+        if measure.ndim > batch_axes:
+            size = int(np.prod(measure.shape[batch_axes:]))
+            measure = measure.reshape(*measure.shape[:batch_axes], size)[..., condition.element]
         # An infinite value is as little known as NaN.
-        value = np.where(np.isfinite(value), value, np.nan)
-        found.append((np.abs(value) if condition.sized else value) - condition.floor)
-    return np.stack(found, axis=-1)
+        measure = np.where(np.isfinite(measure), measure, np.nan)
+        margins.append((np.abs(measure) if condition.sized else measure) - condition.floor)
+    return np.stack(margins, axis=-1)
 
 
-def keeps(robot: Manipulator, given: Sequence[Condition], poses: Array) -> NDArray[np.bool_]:
+def keeps(robot: Manipulator, required: Sequence[Condition], poses: Array) -> NDArray[np.bool_]:
     """Return which poses (...) keep all conditions, by ordinary evaluation."""
-    return np.asarray((condition_margins(robot, given, poses) >= 0.0).all(axis=-1))
+    return np.asarray((condition_margins(robot, required, poses) >= 0.0).all(axis=-1))
 
 
 class IntervalTest:
@@ -162,8 +162,8 @@ class IntervalTest:
     They are 64 at most.
     """
 
-    def __init__(self, robot: Manipulator, given: Sequence[Condition]) -> None:
-        self.given = tuple(given)
+    def __init__(self, robot: Manipulator, required: Sequence[Condition]) -> None:
+        self.given = tuple(required)
         if not 0 < len(self.given) <= _MOST:
             raise DataError(f"given: {len(self.given)} conditions, 1 to {_MOST} expected")
         self.all = np.uint64((1 << len(self.given)) - 1)
@@ -193,21 +193,21 @@ class IntervalTest:
             open_[chosen[(least >= condition.floor) & (least < np.inf) & defined]] &= ~bit
         return outside, open_
 
-    def undecided(self, low: Array, high: Array) -> NDArray[np.bool_]:
+    def undecided_conditions(self, low: Array, high: Array) -> NDArray[np.bool_]:
         """Return which conditions (B, C) may fail in a part of a box where they are defined.
 
         A limit is not undefined by itself, but out of reach: it is the reach that ends there.
         """
-        found = np.empty((len(low), len(self.given)), bool)
+        may_fail = np.empty((len(low), len(self.given)), bool)
         for c, condition in enumerate(self.given):
-            found[:, c] = ~(self.bounds(c, low, high)[0] >= condition.floor)
-        return found
+            may_fail[:, c] = ~(self.bounds(c, low, high)[0] >= condition.floor)
+        return may_fail
 
     def bounds(self, c: int, low: Array, high: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
-        """Return least, greatest (B,) value of what condition c bounds, and where it is defined."""
+        """Return the least and greatest measure (B,) of condition c, and where it is defined."""
         function, row = self._rows[c]
-        found = function(low, high, [row])
-        least, most, defined = found[0][:, 0], found[1][:, 0], found[2][:, 0]
+        enclosures = function(low, high, [row])
+        least, most, defined = enclosures[0][:, 0], enclosures[1][:, 0], enclosures[2][:, 0]
         if self.given[c].sized:
             size = np.maximum(np.maximum(least, np.negative(most)), 0.0)
             least, most = size, np.maximum(np.negative(least), most)
@@ -215,6 +215,6 @@ class IntervalTest:
 
 
 @lru_cache(maxsize=64)
-def interval_test(robot: Manipulator, given: tuple[Condition, ...]) -> IntervalTest:
+def interval_test(robot: Manipulator, required: tuple[Condition, ...]) -> IntervalTest:
     """Return the interval test of a machine's poses by these conditions."""
-    return IntervalTest(robot, given)
+    return IntervalTest(robot, required)

@@ -31,32 +31,32 @@ def enclosing_box(robot: Manipulator, low: Array, high: Array, *, limits: bool =
     half = 0.5 * float((high - low)[robot.platform.angular].sum())
     points = np.array([leg.platform_point for leg in robot.legs])
     arms = robot.platform.arms(points, middle)
-    far = np.linalg.norm(points, axis=1) * half
+    slacks = np.linalg.norm(points, axis=1) * half
     normal, right, constant, square = np.zeros((size, size)), np.zeros(size), 0.0, 0.0
-    for leg, arm, slack in zip(robot.legs, arms, far, strict=True):
+    for leg, arm, slack in zip(robot.legs, arms, slacks, strict=True):
         bound = leg.held_bound if limits else leg.reach_bound
         if bound is None:
             continue
-        at = directions @ (np.array(bound.point) - np.array(leg.fixed_offset) - arm)
-        across = np.eye(size)
+        offset = directions @ (np.array(bound.point) - np.array(leg.fixed_offset) - arm)
+        projection = np.eye(size)
         if bound.line is not None:
             line = directions @ np.array(bound.line)
             if np.linalg.norm(line) > _SINGULAR:
                 line = line / np.linalg.norm(line)
-                across = across - np.outer(line, line)
-        normal += across
-        right += across @ at
-        constant += float(at @ across @ at)
+                projection = projection - np.outer(line, line)
+        normal += projection
+        right += projection @ offset
+        constant += float(offset @ projection @ offset)
         square += (bound.radius + slack) ** 2
-    values = np.linalg.eigvalsh(normal)
-    if size and values[0] <= _SINGULAR * values[-1]:
+    eigenvalues = np.linalg.eigvalsh(normal)
+    if size and eigenvalues[0] <= _SINGULAR * eigenvalues[-1]:
         raise ModelError(
             "the reach has no end that is known: the guides let the platform move along them for "
             "ever; give the legs limits, or say within which box",
             subject=robot.name,
         )
     center = np.linalg.solve(normal, right)
-    left = square - (constant - float(center @ right))
-    reach = np.sqrt(max(left, 0.0) * np.diag(np.linalg.inv(normal)))
+    remainder = square - (constant - float(center @ right))
+    reach = np.sqrt(max(remainder, 0.0) * np.diag(np.linalg.inv(normal)))
     reach = reach * (1.0 + _WIDER) + _WIDER * (1.0 + np.abs(center))
     return np.array([center - reach, center + reach])

@@ -11,7 +11,7 @@ from pteron.kernels import Array
 from pteron.kinematics.architecture import Architecture, architecture
 from pteron.manipulator import Manipulator
 from pteron.manipulator.machine_warnings import machine_warnings
-from pteron.workspace.holding import Holding, holding, holding_warnings
+from pteron.workspace.holding import Holding, holding_warnings, measure_holding
 from pteron.workspace.leg_layout import layout_warnings
 from pteron.workspace.load_warnings import load_warnings
 from pteron.workspace.mode_places import ModePlace, mode_places, mode_warnings
@@ -47,7 +47,7 @@ class Examination:
 
 def examine(robot: Manipulator, home: Array) -> Examination:
     """Return a machine's measures, working modes and warnings at its home pose (m,)."""
-    measures, layout = holding(robot, home), architecture(robot)
+    measures, layout = measure_holding(robot, home), architecture(robot)
     modes = mode_places(robot, home)
     warnings = (
         *machine_warnings(robot),

@@ -18,9 +18,9 @@ import scipy  # type: ignore[import-untyped]
 from pteron.kernels import Array
 from pteron.kernels.bisection import bisect_condition
 from pteron.kernels.one_thread import one_thread
-from pteron.workspace.boxes import varied
-from pteron.workspace.lattice_minima import failing_between
-from pteron.workspace.samples import Samples, Shape, lattice
+from pteron.workspace.boxes import vary_coordinates
+from pteron.workspace.lattice_minima import failing_places
+from pteron.workspace.shape_samples import Samples, Shape, lattice
 from pteron.workspace.smooth_conditions import SmoothConditions
 
 _PER_ROW = 3
@@ -48,7 +48,7 @@ _CUTS = 8
 """Most times that a step is shortened because points between the samples fail."""
 
 POINTS = 13
-"""Points along each edge of a shape's box at which it is looked at."""
+"""Points along each edge of a shape's box at which its conditions are tested."""
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,7 @@ class Program:
         """Return whether all rows are kept; one that is NaN, out of reach, is not."""
         return bool((self.rows(samples, z) >= -_ROUNDING).all())
 
-    def between(self, z: Array) -> Samples:
+    def failing_samples(self, z: Array) -> Samples:
         """Return points of the shape that fail between those of a lattice that do not.
 
         Known ones are among them, where the shape holds them and they still fail.
@@ -117,14 +117,14 @@ class Program:
         units, poses = [np.empty((0, len(center)))], [self.orientations[:0]]
         for fixed in self.orientations if edge > 0.0 else ():
             axes = list(center[:, None] + 0.5 * edge * lattice(self.shape, POINTS))
-            _, places = self.on_lattice(geometry, axes, fixed)
+            _, places = self.test_lattice(geometry, axes, fixed)
             at = (places - center) / (0.5 * edge)
             units.append(at[self.shape.gauge(at) <= 1.0])
-            poses.append(varied(fixed, np.zeros_like(units[-1])))
+            poses.append(vary_coordinates(fixed, np.zeros_like(units[-1])))
         every = np.concatenate(units)
         return Samples(np.concatenate(poses), every, np.ones(len(every)))
 
-    def on_lattice(
+    def test_lattice(
         self, geometry: Array, axes: Sequence[Array], fixed: Array
     ) -> tuple[Array, Array]:
         """Return the rows (n1, ..., nk, R) on a lattice, and positions (F, k) that fail.
@@ -134,21 +134,21 @@ class Program:
         count = len(axes)
 
         def slopes(places: Array) -> tuple[Array, Array]:
-            poses = varied(fixed, places)
+            poses = vary_coordinates(fixed, places)
             rows, slopes = self.conditions.slopes(geometry, poses, self.side)
             return rows, slopes[..., :count]
 
         grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
-        rows = self.conditions.rows(geometry, varied(fixed, grid), self.side)
+        rows = self.conditions.rows(geometry, vary_coordinates(fixed, grid), self.side)
         known = self.failing if self.failing is not None else self.orientations[:0]
         known = known[(known[:, count:] == fixed[count:]).all(axis=1)]
         fails = self.conditions.rows(geometry, known, self.side) > _ROUNDING
         known = known[~fails.all(axis=-1), :count]
-        return rows, np.concatenate([failing_between(slopes, axes, rows), known])
+        return rows, np.concatenate([failing_places(slopes, axes, rows), known])
 
 
 @one_thread()
-def improved(program: Program, samples: Samples, dense: Samples) -> Array:
+def improve_unknowns(program: Program, samples: Samples, dense: Samples) -> Array:
     """Return unknowns of a smaller objective, which keep the conditions at all samples.
 
     Each round goes towards the solution of a program with few conditions as far as all of them are
@@ -158,105 +158,113 @@ def improved(program: Program, samples: Samples, dense: Samples) -> Array:
     start where that does not keep the conditions itself. The same is found whatever the number of
     threads: a proof of it can be done again.
     """
-    everywhere, good = samples.joined(dense), program.start
-    if not program.keeps(everywhere, good):
-        return good
-    pairs, share = _worst(program.rows(everywhere, good)), _FIRST_STEP
+    everywhere, feasible = samples.joined(dense), program.start
+    if not program.keeps(everywhere, feasible):
+        return feasible
+    pairs, share = _worst_rows(program.rows(everywhere, feasible)), _FIRST_STEP
     for _ in range(_ROUNDS):
-        z = _solved(program, everywhere, sorted(pairs), good, share)
-        pairs |= _worst(program.rows(everywhere, z))
-        length = _feasible_step(program, everywhere, good, z)
-        missed = program.between(good + length * (z - good))
-        if len(missed.inside):
-            known = len(everywhere.inside)
-            everywhere = everywhere.joined(missed)
-            failing = program.rows(missed, good + length * (z - good)).argmin(axis=1)
-            pairs |= {(known + i, int(row)) for i, row in enumerate(failing)}
-            length = _cut_step(program, everywhere, good, z, length)
-        gain = float(program.objective @ (good - z))
-        good = good + length * (z - good)
+        z = _solve_subproblem(program, everywhere, sorted(pairs), feasible, share)
+        pairs |= _worst_rows(program.rows(everywhere, z))
+        length = _feasible_step(program, everywhere, feasible, z)
+        failing_samples = program.failing_samples(feasible + length * (z - feasible))
+        if len(failing_samples.inside):
+            sample_count = len(everywhere.inside)
+            everywhere = everywhere.joined(failing_samples)
+            failing = program.rows(failing_samples, feasible + length * (z - feasible)).argmin(
+                axis=1
+            )
+            pairs |= {(sample_count + i, int(row)) for i, row in enumerate(failing)}
+            length = _cut_step(program, everywhere, feasible, z, length)
+        gain = float(program.objective @ (feasible - z))
+        feasible = feasible + length * (z - feasible)
         share = min(2.0 * share, 1.0) if length > _FULL else 0.5 * share
-        if length > _FULL and gain < _GAIN * abs(float(program.objective @ good)):
+        if length > _FULL and gain < _GAIN * abs(float(program.objective @ feasible)):
             break
-    return good
+    return feasible
 
 
-def _feasible_step(program: Program, samples: Samples, good: Array, z: Array) -> float:
+def _feasible_step(program: Program, samples: Samples, feasible: Array, z: Array) -> float:
     """Return how far one may go from good unknowns to others, as a share of the step."""
     if program.keeps(samples, z):
         return 1.0
-    way = z - good
-    kept = bisect_condition(
-        lambda share: program.keeps(samples, good + share * way), 0.0, 1.0, _HALVINGS
+    step = z - feasible
+    shares = bisect_condition(
+        lambda share: program.keeps(samples, feasible + share * step), 0.0, 1.0, _HALVINGS
     )
-    return float(kept[0])
+    return float(shares[0])
 
 
-def _cut_step(program: Program, samples: Samples, good: Array, z: Array, length: float) -> float:
+def _cut_step(
+    program: Program, samples: Samples, feasible: Array, z: Array, length: float
+) -> float:
     """Return a shorter step, at whose end nothing fails between the samples either."""
     for _ in range(_CUTS):
         length *= 0.6
-        at = good + length * (z - good)
-        if program.keeps(samples, at) and not len(program.between(at).inside):
+        shorter = feasible + length * (z - feasible)
+        if program.keeps(samples, shorter) and not len(program.failing_samples(shorter).inside):
             return length
     return 0.0
 
 
-def _worst(values: Array) -> set[tuple[int, int]]:
+def _worst_rows(rows: Array) -> set[tuple[int, int]]:
     """Return points and rows: of each row the points where it is least."""
-    known = np.where(np.isnan(values), np.inf, values).T
-    count = min(_PER_ROW, known.shape[1])
-    last = np.partition(known, count - 1, axis=1)[:, count - 1]
-    found = set()
-    for r, (row, most) in enumerate(zip(known, last, strict=True)):
+    sortable = np.where(np.isnan(rows), np.inf, rows).T
+    count = min(_PER_ROW, sortable.shape[1])
+    last = np.partition(sortable, count - 1, axis=1)[:, count - 1]
+    worst = set()
+    for r, (row, most) in enumerate(zip(sortable, last, strict=True)):
         low = np.flatnonzero(row <= most)
         low = low[np.argsort(row[low], kind="stable")[:count]]
-        found |= {(i, r) for i in low.tolist()}
-    return found
+        worst |= {(i, r) for i in low.tolist()}
+    return worst
 
 
-def _solved(
-    program: Program, samples: Samples, pairs: Sequence[tuple[int, int]], good: Array, share: float
+def _solve_subproblem(
+    program: Program,
+    samples: Samples,
+    pairs: Sequence[tuple[int, int]],
+    feasible: Array,
+    share: float,
 ) -> Array:
     """Return the solution with conditions at some points alone, near good unknowns."""
     lengths = samples.units.shape[1]
     points, where = np.unique([i for i, _ in pairs], return_inverse=True)
     rows = np.array([r for _, r in pairs])
     chosen = Samples(samples.poses[points], samples.units[points], samples.inside[points])
-    above = np.array([row for row, _ in program.above]).reshape(-1, len(good))
+    above = np.array([row for row, _ in program.above]).reshape(-1, len(feasible))
     least = np.array([number for _, number in program.above])
 
     @lru_cache(maxsize=1)
-    def found(key: bytes) -> tuple[Array, Array]:
+    def rows_and_slopes(key: bytes) -> tuple[Array, Array]:
         z = np.frombuffer(key)
         geometry, center, edge = program.parts(z)
-        values, by_pose, *by_geometry = program.conditions.slopes(
+        row_values, by_pose, *by_geometry = program.conditions.slopes(
             geometry, chosen.at(center, edge), program.side, by_geometry=program.slopes.size > 0
         )
         by_center = by_pose[..., :lengths] * chosen.inside[:, None, None]
         by_edge = 0.5 * np.einsum("irl,il->ir", by_center, chosen.units)[..., None]
         by_variables = [part @ program.slopes for part in by_geometry]
         slopes = np.concatenate([*by_variables, by_center, by_edge], axis=-1)[where, rows]
-        values = values[where, rows]
+        row_values = row_values[where, rows]
         # A row that is NaN counts as kept: a row before it says what is wrong.
-        values = np.where(np.isfinite(values), values, 1.0)
-        return np.append(values, above @ z - least), np.vstack([slopes, above])
+        row_values = np.where(np.isfinite(row_values), row_values, 1.0)
+        return np.append(row_values, above @ z - least), np.vstack([slopes, above])
 
     low, high = program.bounds.T
     step = share * (high - low)
-    low, high = np.maximum(low, good - step), np.minimum(high, good + step)
+    low, high = np.maximum(low, feasible - step), np.minimum(high, feasible + step)
     solution = scipy.optimize.minimize(
         lambda z: float(program.objective @ z),
-        good,
+        feasible,
         jac=lambda z: program.objective,
         method="SLSQP",
         bounds=np.column_stack([low, high]),
         constraints={
             "type": "ineq",
-            "fun": lambda z: found(z.tobytes())[0],
-            "jac": lambda z: found(z.tobytes())[1],
+            "fun": lambda z: rows_and_slopes(z.tobytes())[0],
+            "jac": lambda z: rows_and_slopes(z.tobytes())[1],
         },
         options={"maxiter": 60, "ftol": 1e-10},
     )
     z = np.clip(solution.x, low, high)
-    return z if np.isfinite(z).all() else good
+    return z if np.isfinite(z).all() else feasible

@@ -9,9 +9,9 @@ import numpy as np
 import scipy  # type: ignore[import-untyped]
 
 from pteron.kernels import Array
-from pteron.workspace.exchange import POINTS, Program, improved
+from pteron.workspace.exchange import POINTS, Program, improve_unknowns
 from pteron.workspace.proofs import Proof
-from pteron.workspace.samples import Shape, shape_samples
+from pteron.workspace.shape_samples import Shape, shape_samples
 from pteron.workspace.smooth_conditions import SmoothConditions
 
 _COARSE = 25
@@ -104,24 +104,26 @@ def largest_fit(
             failing=failing,
         )
 
-    fits = [fit for side in conditions.sides for fit in _on_grid(program, ball, side, starts)]
+    fits = [fit for side in conditions.sides for fit in _fits_on_grid(program, ball, side, starts)]
     fits.sort(key=lambda fit: (fit.edge, fit.margin), reverse=True)
     samples, dense = (shape_samples(shape, orientations, n) for n in (_FIRST, POINTS))
 
-    def grown(fit: Fit) -> Fit:
+    def grow(fit: Fit) -> Fit:
         for _ in range(_SHRINKINGS):
-            one = program(fit)
-            if _least(one.rows(dense, one.start)) >= 0.0 and not len(one.between(one.start).inside):
+            attempt = program(fit)
+            if _least(attempt.rows(dense, attempt.start)) >= 0.0 and not len(
+                attempt.failing_samples(attempt.start).inside
+            ):
                 break
             fit = replace(fit, edge=0.8 * fit.edge)
         else:
-            one = program(replace(fit, edge=0.0))
-        z = improved(one, samples, dense)
-        return Fit(z[:-1], float(z[-1]), fit.side, _least(one.rows(dense, z)))
+            attempt = program(replace(fit, edge=0.0))
+        z = improve_unknowns(attempt, samples, dense)
+        return Fit(z[:-1], float(z[-1]), fit.side, _least(attempt.rows(dense, z)))
 
     if fits[0].edge == 0.0:
         return fits[0]
-    return max(map(grown, fits[:starts]), key=lambda fit: fit.edge)
+    return max(map(grow, fits[:starts]), key=lambda fit: fit.edge)
 
 
 def proved_fit(
@@ -164,13 +166,13 @@ def _least(rows: Array) -> float:
     return float(np.nan_to_num(rows, nan=-1.0).min())
 
 
-def _on_grid(
+def _fits_on_grid(
     program: Callable[[Fit], Program], ball: tuple[Array, float], side: float, most: int
 ) -> list[Fit]:
     """Return about the largest cubes: their middles are the grid's points furthest from failure."""
     low, high = ball[0] - ball[1], ball[0] + ball[1]
-    found = [Fit(ball[0], 0.0, side, -np.inf)]
-    asked = program(found[0])
+    fits = [Fit(ball[0], 0.0, side, -np.inf)]
+    tested = program(fits[0])
     for _ in range(2):
         step = float((high - low).max()) / _COARSE
         axes = [
@@ -179,31 +181,31 @@ def _on_grid(
         ]
         grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
         least = np.full(grid.shape[:-1], np.inf)
-        for fixed in asked.orientations:
-            rows, failing = asked.on_lattice(asked.geometry, axes, fixed)
+        for fixed in tested.orientations:
+            rows, failing = tested.test_lattice(tested.geometry, axes, fixed)
             # A row that is NaN fails, though not as clearly as one that says by how much.
             rows = np.where(np.isnan(rows), UNKNOWN, rows)
             least = np.minimum(least, rows.min(axis=-1))
             nearby = np.rint((failing - low) / step).astype(int)
             nearby = nearby[((nearby >= 0) & (nearby < least.shape)).all(axis=1)]
-            at = tuple(nearby.T)
-            least[at] = np.minimum(least[at], UNKNOWN)
+            index = tuple(nearby.T)
+            least[index] = np.minimum(least[index], UNKNOWN)
         inside = least >= 0.0
         if not inside.any():
             # A thin region may lie between the points: look closer where they fail by least.
-            at = np.unravel_index(int(least.argmax()), least.shape)
-            found = [Fit(grid[at], 0.0, side, float(least[at]))]
-            low, high = grid[at] - 2.0 * step, grid[at] + 2.0 * step
+            index = np.unravel_index(int(least.argmax()), least.shape)
+            fits = [Fit(grid[index], 0.0, side, float(least[index]))]
+            low, high = grid[index] - 2.0 * step, grid[index] + 2.0 * step
             continue
-        far = scipy.ndimage.distance_transform_cdt(np.pad(inside, 1), metric="chessboard")
-        far = far[(slice(1, -1),) * inside.ndim]
-        found = []
-        while len(found) < most and far.any():
-            at = np.unravel_index(int(far.argmax()), far.shape)
-            depth = int(far[at])
+        depths = scipy.ndimage.distance_transform_cdt(np.pad(inside, 1), metric="chessboard")
+        depths = depths[(slice(1, -1),) * inside.ndim]
+        fits = []
+        while len(fits) < most and depths.any():
+            index = np.unravel_index(int(depths.argmax()), depths.shape)
+            depth = int(depths[index])
             edge = max(2.0 * (depth - 1.0), 0.5) * step
-            found.append(Fit(grid[at], edge, side, float(least[at])))
-            far[tuple(slice(max(i - depth, 0), i + depth + 1) for i in at)] = 0
+            fits.append(Fit(grid[index], edge, side, float(least[index])))
+            depths[tuple(slice(max(i - depth, 0), i + depth + 1) for i in index)] = 0
         places = grid[inside]
         low, high = places.min(axis=0) - step, places.max(axis=0) + step
-    return found
+    return fits

@@ -18,13 +18,13 @@ from pteron.kernels import Array, as_array, bounds, numeric
 from pteron.kernels.bisection import bisect_condition
 from pteron.kinematics.architecture import is_singular_everywhere
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
-from pteron.workspace.boxes import halved
+from pteron.workspace.boxes import halve_boxes
 from pteron.workspace.conditions import conditions
 from pteron.workspace.regions import Box
 from pteron.workspace.smooth_conditions import smooth_conditions
 
 _SAMPLES = 4096
-"""Random poses at which the measure's sign is looked at first."""
+"""Random poses at which the measure's sign is evaluated first."""
 
 _PAIRS = 64
 """Pairs of poses of opposite sign between which a singular pose is sought."""
@@ -107,74 +107,76 @@ def free_of_singularities(
     """
     robot = as_manipulator(robot)
     corners = region.box if isinstance(region, Box) else region
-    given = as_array(corners, "region", (2, robot.freedom))
-    if given.ndim != 2 or not np.isfinite(given).all() or (given[0] > given[1]).any():
+    box = as_array(corners, "region", (2, robot.freedom))
+    if box.ndim != 2 or not np.isfinite(box).all() or (box[0] > box[1]).any():
         raise DataError(
-            f"region: {given.tolist()} given, the least and the greatest pose expected, finite"
+            f"region: {box.tolist()} given, the least and the greatest pose expected, finite"
         )
-    none = np.empty((0, 2, robot.freedom))
-    found = _sampled(robot, given)
-    if found is not None:
-        return _refuted(robot, found, 0)
-    sizes = np.where(given[1] > given[0], given[1] - given[0], np.inf)
+    no_boxes = np.empty((0, 2, robot.freedom))
+    singular_pose = _singular_between_samples(robot, box)
+    if singular_pose is not None:
+        return _refutation(robot, singular_pose, 0)
+    sizes = np.where(box[1] > box[0], box[1] - box[0], np.inf)
     if closure_of(robot).orientation is not None:
         sizes[~robot.platform.angular] = np.inf  # it depends on the angle alone
-    boxes, looked, least = given[None], 0, np.inf
+    boxes, examined, least = box[None], 0, np.inf
     nearest = max(floor, _SINGULAR)  # no float is a root of cos: an end of the region may be one
     while len(boxes):
-        looked += len(boxes)
+        examined += len(boxes)
         measure = bounds(robot, "type_ii", boxes)["type_ii"]
         size = np.where(measure.low > 0.0, measure.low, -measure.high)
-        away = (size > nearest) & (size < np.inf)  # NaN is neither
+        nonsingular = (size > nearest) & (size < np.inf)  # NaN is neither
         reach = bounds(robot, "squared_type_i", boxes)["squares"].high
-        nowhere = (reach < 0.0).any(axis=-1)
-        least = float(np.min(size[away], initial=least))
-        boxes = boxes[~(away | nowhere)]
+        unreachable = (reach < 0.0).any(axis=-1)
+        least = float(np.min(size[nonsingular], initial=least))
+        boxes = boxes[~(nonsingular | unreachable)]
         if not len(boxes):
             break
-        found = _stepped(robot, given, boxes)
-        if found is not None:
-            return _refuted(robot, found, looked)
-        if looked + 2 * len(boxes) > most:
-            return FreeRegion(None, None, 0.0, looked, boxes)
-        boxes = halved(boxes, sizes)
-    return FreeRegion(True, None, least if np.isfinite(least) else 0.0, looked, none)
+        singular_pose = _singular_by_steps(robot, box, boxes)
+        if singular_pose is not None:
+            return _refutation(robot, singular_pose, examined)
+        if examined + 2 * len(boxes) > most:
+            return FreeRegion(None, None, 0.0, examined, boxes)
+        boxes = halve_boxes(boxes, sizes)
+    return FreeRegion(True, None, least if np.isfinite(least) else 0.0, examined, no_boxes)
 
 
-def _refuted(robot: Manipulator, pose: Array, looked: int) -> FreeRegion:
+def _refutation(robot: Manipulator, pose: Array, examined: int) -> FreeRegion:
     measure = abs(float(numeric(robot, "type_ii")(pose)[0]))
-    return FreeRegion(False, pose, measure, looked, np.empty((0, 2, robot.freedom)))
+    return FreeRegion(False, pose, measure, examined, np.empty((0, 2, robot.freedom)))
 
 
-def _in_reach(robot: Manipulator, poses: Array) -> Array:
+def _reachable_measures(robot: Manipulator, poses: Array) -> Array:
     """Return the type-II measure of poses (..., m), NaN out of reach."""
-    values = numeric(robot, "type_ii")(poses)[0]
-    reached = (numeric(robot, "squared_type_i")(poses)[0] >= 0.0).all(axis=-1)
-    return np.where(reached, values, np.nan)
+    measures = numeric(robot, "type_ii")(poses)[0]
+    reachable = (numeric(robot, "squared_type_i")(poses)[0] >= 0.0).all(axis=-1)
+    return np.where(reachable, measures, np.nan)
 
 
-def _sampled(robot: Manipulator, region: Array) -> Array | None:
+def _singular_between_samples(robot: Manipulator, region: Array) -> Array | None:
     """Return a singular pose between random ones of the region, where they have either sign."""
     rng = np.random.default_rng(0)
     poses = rng.uniform(region[0], region[1], (_SAMPLES, robot.freedom))
-    values = _in_reach(robot, poses)
-    if is_singular_everywhere(robot) and (~np.isnan(values)).any():
-        return np.asarray(poses[~np.isnan(values)][0])
-    order = np.argsort(np.abs(values))
-    one, other = (poses[order[side[order]]][:_PAIRS] for side in (values < 0.0, values > 0.0))
-    count = min(len(one), len(other))
+    measures = _reachable_measures(robot, poses)
+    if is_singular_everywhere(robot) and (~np.isnan(measures)).any():
+        return np.asarray(poses[~np.isnan(measures)][0])
+    order = np.argsort(np.abs(measures))
+    negatives, positives = (
+        poses[order[side[order]]][:_PAIRS] for side in (measures < 0.0, measures > 0.0)
+    )
+    count = min(len(negatives), len(positives))
     if not count:
         return None
     negative, _ = bisect_condition(
-        lambda poses: (_in_reach(robot, poses) < 0.0)[:, None],
-        one[:count],
-        other[:count],
+        lambda poses: (_reachable_measures(robot, poses) < 0.0)[:, None],
+        negatives[:count],
+        positives[:count],
         _HALVINGS,
     )
-    return _singular(robot, negative)
+    return _least_singular(robot, negative)
 
 
-def _stepped(robot: Manipulator, region: Array, boxes: Array) -> Array | None:
+def _singular_by_steps(robot: Manipulator, region: Array, boxes: Array) -> Array | None:
     """Return a singular pose of the region to which Newton's steps lead from boxes' middles."""
     chosen = boxes[np.linspace(0, len(boxes) - 1, min(len(boxes), _STARTS)).astype(int)]
     poses = chosen.mean(axis=1)
@@ -184,15 +186,17 @@ def _stepped(robot: Manipulator, region: Array, boxes: Array) -> Array | None:
     for _ in range(_STEPS):
         slopes = np.where(free, smooth.slopes(geometry, poses, 1.0)[1][:, 0], 0.0)
         squares = (slopes * slopes).sum(axis=-1)
-        steps = _in_reach(robot, poses) / np.where(squares > 0.0, squares, np.inf)
-        moved = np.clip(poses - steps[:, None] * slopes, *region)
-        poses = np.where(np.isfinite(moved).all(axis=-1, keepdims=True), moved, poses)
-    return _singular(robot, poses)
+        steps = _reachable_measures(robot, poses) / np.where(squares > 0.0, squares, np.inf)
+        stepped_poses = np.clip(poses - steps[:, None] * slopes, *region)
+        poses = np.where(
+            np.isfinite(stepped_poses).all(axis=-1, keepdims=True), stepped_poses, poses
+        )
+    return _least_singular(robot, poses)
 
 
-def _singular(robot: Manipulator, poses: Array) -> Array | None:
+def _least_singular(robot: Manipulator, poses: Array) -> Array | None:
     """Return the pose of a batch at which the measure is least, if it vanishes there."""
-    sizes = np.abs(_in_reach(robot, poses))
+    sizes = np.abs(_reachable_measures(robot, poses))
     if np.isnan(sizes).all():
         return None
     best = int(np.nanargmin(sizes))

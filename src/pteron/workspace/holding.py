@@ -67,14 +67,16 @@ class Holding:
     force_near: float
 
 
-def holding(robot: Manipulator, home: Array) -> Holding:
+def measure_holding(robot: Manipulator, home: Array) -> Holding:
     """Return how the drives hold the platform at home (m,) and about it."""
     poses = home[None]
     length, distance, everywhere = _singular_distances(bare(robot), tuple(home.tolist()))
-    near = _about(robot, home)
+    nearby = _poses_near_home(robot, home)
     weight = _weight(robot)
-    forces = (
-        _forces(robot, np.vstack([poses, near])) / weight if weight > 0.0 else np.array([np.nan])
+    relative_forces = (
+        _holding_forces(robot, np.vstack([poses, nearby])) / weight
+        if weight > 0.0
+        else np.array([np.nan])
     )
     return Holding(
         length,
@@ -83,8 +85,8 @@ def holding(robot: Manipulator, home: Array) -> Holding:
         everywhere,
         rounding_of(length),
         weight,
-        float(forces[0]),
-        float(np.nanmax(forces)) if weight > 0.0 else np.nan,
+        float(relative_forces[0]),
+        float(np.nanmax(relative_forces)) if weight > 0.0 else np.nan,
     )
 
 
@@ -98,7 +100,7 @@ def _singular_distances(robot: Manipulator, home: tuple[float, ...]) -> tuple[fl
     return length, float(distances[0]), float(np.nanmax(distances))
 
 
-def _about(robot: Manipulator, home: Array) -> Array:
+def _poses_near_home(robot: Manipulator, home: Array) -> Array:
     """Return random poses (K, m) about home that are in reach, within limits."""
     share, radians = NEARBY
     size = share * max(leg.size for leg in robot.legs)
@@ -113,10 +115,10 @@ def _weight(robot: Manipulator) -> float:
     return float(mass * np.linalg.norm(robot.gravity))
 
 
-def _forces(robot: Manipulator, poses: Array) -> Array:
+def _holding_forces(robot: Manipulator, poses: Array) -> Array:
     """Return the greatest force (K,) of a leg at its platform point that holds the weight, N."""
-    rest = np.zeros_like(poses)
-    forces = inverse_dynamics(robot, poses, rest, rest, on_failure="nan")
+    zero_rates = np.zeros_like(poses)
+    forces = inverse_dynamics(robot, poses, zero_rates, zero_rates, on_failure="nan")
     return np.asarray(np.abs(forces * unit_rows(robot, poses).sizes).max(axis=-1))
 
 
@@ -151,34 +153,34 @@ def expect_regular(robot: Manipulator, home: Array) -> None:
 
 def holding_warnings(of: Holding) -> tuple[str, ...]:
     """Return warnings of a platform that is held badly at home, or singular within a tolerance."""
-    found = []
+    warnings = []
     if of.everywhere <= INACCURATE * of.rounding:
-        found.append(
+        warnings.append(
             f"legs: coordinates that differ by {_length(of.everywhere)} make the machine singular "
             "(type II), in whichever pose: parts of ordinary accuracy may not hold the platform"
         )
     elif of.distance <= INACCURATE * of.rounding:
-        found.append(
+        warnings.append(
             f"home: coordinates that differ by {_length(of.distance)} make this pose singular "
             "(type II)"
         )
     if of.least_singular_value < LEAST_SINGULAR_VALUE:
-        found.append(
+        warnings.append(
             f"home: least singular value {of.least_singular_value:.2g} of the unit rows (1 of "
             "three perpendicular legs): a load takes leg forces up to "
             f"{1.0 / of.least_singular_value:.2g} times as great, and errors of legs grow as much"
         )
     if of.force > HOLDING_FORCE:
-        found.append(
+        warnings.append(
             f"home: to hold the weight, {of.weight:.3g} N, a leg has to push or pull with "
             f"{of.force:.3g} times as much"
         )
     elif of.force_near > HOLDING_FORCE_NEAR:
-        found.append(
+        warnings.append(
             f"home: near it a leg has to push or pull with {of.force_near:.3g} times the weight, "
             f"{of.weight:.3g} N, to hold it: a singularity is near"
         )
-    return tuple(found)
+    return tuple(warnings)
 
 
 def _length(metres: float) -> str:

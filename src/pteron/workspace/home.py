@@ -31,8 +31,8 @@ from pteron.workspace.home_starts import (
     sides,
 )
 from pteron.workspace.margins import pose_margins
+from pteron.workspace.reach_errors import limits_error, why_unreachable
 from pteron.workspace.simplex_ascent import climb
-from pteron.workspace.unreachable import beyond_limits, nowhere
 
 _STARTS = 8
 """Best poses of each kind, on each side of the base, that are improved by a local search."""
@@ -66,7 +66,7 @@ _BRANCHED_SIDE = 0.95
 margin there, and images that differ by less, as those of sliders on level guides, none at all."""
 
 _BETWEEN = 101
-"""Poses looked at between one side of the base and the other: mirror images have a singularity, or
+"""Poses tested between one side of the base and the other: mirror images have a singularity, or
 none in reach, between them; elsewhere the platform goes from one to the other."""
 
 _ALIKE = 0.5
@@ -179,7 +179,7 @@ def home_poses(robot: RobotLike) -> HomePoses:
         expect_regular(robot, np.array(robot.home))
         return HomePoses(robot.home, None, named=True)
     # Neither bodies nor drives matter; a refusal tells the name.
-    return HomePoses(*_stored(replace(bare(robot), name=robot.name)))
+    return HomePoses(*_cached_home_poses(replace(bare(robot), name=robot.name)))
 
 
 def expect_usable(robot: Manipulator, pose: Array) -> None:
@@ -199,7 +199,7 @@ def expect_usable(robot: Manipulator, pose: Array) -> None:
 
 
 @lru_cache(maxsize=256)
-def _stored(robot: Manipulator) -> tuple[tuple[float, ...], tuple[float, ...] | None]:
+def _cached_home_poses(robot: Manipulator) -> tuple[tuple[float, ...], tuple[float, ...] | None]:
     """Return both poses, worked out before, in another process too, or now."""
     key, packages = ("home_poses", bare(robot)), ("kinematics", "workspace")
     return cached_result(key, packages, lambda: _both_sides(robot))
@@ -211,23 +211,25 @@ def _both_sides(robot: Manipulator) -> tuple[tuple[float, ...], tuple[float, ...
     try:
         best_type_ii(robot)
     except ModelError:
-        raise nowhere(robot) from None
+        raise why_unreachable(robot) from None
     candidates = _candidates(robot)
     starts = _starts(robot, candidates)
-    refined = np.concatenate([_levelled(robot, starts), _refined(robot, starts)])
+    refined = np.concatenate([_refine_level_starts(robot, starts), _refine_poses(robot, starts)])
     margins = _worth(robot, refined)
     most = float(margins.max())
     if most <= 0.0:
-        reached = ~np.isnan(inverse_kinematics(robot, refined, on_failure="nan")).any(axis=-1)
-        raise beyond_limits(robot, refined[reached]) if reached.any() else nowhere(robot)
+        reachable = ~np.isnan(inverse_kinematics(robot, refined, on_failure="nan")).any(axis=-1)
+        raise (
+            limits_error(robot, refined[reachable]) if reachable.any() else why_unreachable(robot)
+        )
     side = sides(robot, refined)
     if not _are_mirrored(robot, refined, margins, side):
         home = _simplest(robot, refined, candidates)
         expect_regular(robot, home)
         return tuple(home.tolist()), None
-    beside = sides(robot, candidates)
+    candidate_sides = sides(robot, candidates)
     pose, mirror = (
-        tuple(_simplest(robot, refined[side == sign], candidates[beside == sign]).tolist())
+        tuple(_simplest(robot, refined[side == sign], candidates[candidate_sides == sign]).tolist())
         for sign in (1.0, -1.0)
     )
     expect_regular(robot, np.array(pose))
@@ -261,8 +263,8 @@ def _candidates(robot: Manipulator) -> Array:
     """Return poses (K, m) among which the search begins, best first, closed forms before others."""
     on_axis = axis_poses(robot)
     worth = _worth(robot, on_axis)
-    led = mid_range_poses(robot, on_axis[np.argsort(-worth, kind="stable")])
-    others = np.concatenate([led, grid_poses(robot), random_box_poses(robot)])
+    mid_range = mid_range_poses(robot, on_axis[np.argsort(-worth, kind="stable")])
+    others = np.concatenate([mid_range, grid_poses(robot), random_box_poses(robot)])
     poses, worth = np.concatenate([on_axis, others]), np.append(worth, _worth(robot, others))
     candidates: Array = poses[np.argsort(-worth, kind="stable")]
     return candidates
@@ -274,12 +276,12 @@ def _starts(robot: Manipulator, candidates: Array) -> Array:
     level = ~candidates[:, robot.platform.angular].any(axis=-1)
     starts = []
     for sign, flat in product((1.0, 0.0, -1.0), (True, False)):
-        alike = candidates[(side == sign) & (level == flat)][:_NEAR]
-        starts.append(_distinct(alike, _steps(robot, *_STEPS))[:_STARTS])
+        on_side = candidates[(side == sign) & (level == flat)][:_NEAR]
+        starts.append(_distinct(on_side, _steps(robot, *_STEPS))[:_STARTS])
     return np.concatenate(starts)
 
 
-def _levelled(robot: Manipulator, starts: Array) -> Array:
+def _refine_level_starts(robot: Manipulator, starts: Array) -> Array:
     """Return level poses of locally best margins, from those starts (S, m) that are level.
 
     There are none of a platform that does not tilt: all its starts are improved as they are.
@@ -288,18 +290,18 @@ def _levelled(robot: Manipulator, starts: Array) -> Array:
     level = starts[~starts[:, robot.platform.angular].any(axis=-1)]
     if not robot.platform.tilts or not moved.any():
         return starts[:0]
-    return _refined(robot, level, moved)
+    return _refine_poses(robot, level, moved)
 
 
 def _simplest(robot: Manipulator, refined: Array, candidates: Array) -> Array:
     """Return the simplest pose (m,) of nearly the best margin, near local optima and candidates."""
     margins = _worth(robot, refined)
     most = float(margins.max())
-    level = _level(robot, refined)
+    level = _best_level_poses(robot, refined)
     worth = _worth(robot, level)
-    drawn = candidates[:_NEAR]
+    nearby = candidates[:_NEAR]
     if worth.max(initial=0.0) >= _LEVEL * most:
-        refined, drawn = level, drawn * ~robot.platform.angular
+        refined, nearby = level, nearby * ~robot.platform.angular
         margins, most = worth, float(worth.max())
     # Zero says where the joints are meant to be, where nothing else tells.
     equals = refined[margins >= _WORTH * most]
@@ -307,7 +309,7 @@ def _simplest(robot: Manipulator, refined: Array, candidates: Array) -> Array:
     middle = _distinct(equals, _steps(robot, *_STEPS)).mean(axis=0)
     if _worth(robot, middle) >= _MIDDLE * most:
         best = middle
-    on_axis = _on_axis(robot, np.concatenate([refined, drawn]))
+    on_axis = _move_onto_axis(robot, np.concatenate([refined, nearby]))
     worth = _worth(robot, on_axis)
     if worth.max(initial=0.0) >= _AXIS * most:
         best = _least_travel(robot, on_axis[worth >= _WORTH * worth.max()])
@@ -331,7 +333,7 @@ def _least_travel(robot: Manipulator, poses: Array) -> Array:
     return nearest
 
 
-def _level(robot: Manipulator, poses: Array) -> Array:
+def _best_level_poses(robot: Manipulator, poses: Array) -> Array:
     """Return locally best poses whose angles are all 0; none where the platform does not tilt."""
     moved = ~robot.platform.angular
     level = poses * moved
@@ -339,11 +341,11 @@ def _level(robot: Manipulator, poses: Array) -> Array:
         return poses[:0]
     if moved.any():
         order = np.argsort(-_worth(robot, level), kind="stable")
-        level = _refined(robot, level[order[:_LEVELLED]], moved)
+        level = _refine_poses(robot, level[order[:_LEVELLED]], moved)
     return level
 
 
-def _on_axis(robot: Manipulator, poses: Array) -> Array:
+def _move_onto_axis(robot: Manipulator, poses: Array) -> Array:
     """Return poses (K, m) moved onto the axis of the machine's symmetry; none if it has none.
 
     A symmetry is a turn about the platform's axis after which each leg stands where another stood:
@@ -354,30 +356,30 @@ def _on_axis(robot: Manipulator, poses: Array) -> Array:
     lengths, count = len(center), len(robot.legs)
     if robot.platform.tilts and poses[:, robot.platform.angular].any():
         return poses[:0]  # the turn would turn their angles too
-    beside, along = poses[:, :lengths] - center, directions @ axis
+    offsets, direction = poses[:, :lengths] - center, directions @ axis
     # Legs of a hexapod may stand in pairs, or in two halves.
     folds = [count, *(k for k in (3, 2) if k < count)] if robot.platform.tilts else [count]
     for fold in folds:
         turn = scipy.spatial.transform.Rotation.from_rotvec(2.0 * np.pi / fold * axis).as_matrix()
         images = poses.copy()
-        images[:, :lengths] = center + beside @ (directions @ turn @ directions.T).T
+        images[:, :lengths] = center + offsets @ (directions @ turn @ directions.T).T
         if np.allclose(_worth(robot, images), _worth(robot, poses), rtol=0.0, atol=_SAME):
-            images[:, :lengths] = center + np.outer(beside @ along, along)
+            images[:, :lengths] = center + np.outer(offsets @ direction, direction)
             return images
     return poses[:0]
 
 
-def _distinct(poses: Array, apart: Array) -> Array:
+def _distinct(poses: Array, spacing: Array) -> Array:
     """Return the poses (K, m) but for those that are near one before them."""
-    near = np.asarray((np.abs(poses[:, None] - poses) <= apart).all(axis=-1))
-    return poses[[not near[i, :i].any() for i in range(len(poses))]]
+    is_near = np.asarray((np.abs(poses[:, None] - poses) <= spacing).all(axis=-1))
+    return poses[[not is_near[i, :i].any() for i in range(len(poses))]]
 
 
 def _worth(robot: Manipulator, poses: Array) -> Array:
     """Return the least margin (...), which is 0 at most where the platform is turned back."""
     least = pose_margins(robot, poses).least
-    turned = np.abs(poses[..., robot.platform.angular]) / np.pi
-    worth = np.minimum(least, 1.0 - turned.max(axis=-1, initial=0.0))
+    turned_share = np.abs(poses[..., robot.platform.angular]) / np.pi
+    worth = np.minimum(least, 1.0 - turned_share.max(axis=-1, initial=0.0))
     return np.asarray(np.where(np.isfinite(worth), worth, -np.inf))
 
 
@@ -391,16 +393,20 @@ def _steps(robot: Manipulator, share: float, radians: float) -> Array:
     return np.where(robot.platform.angular, radians, share * longest_leg(robot))
 
 
-def _refined(robot: Manipulator, starts: Array, moved: NDArray[np.bool_] | None = None) -> Array:
+def _refine_poses(
+    robot: Manipulator, starts: Array, moved: NDArray[np.bool_] | None = None
+) -> Array:
     """Return poses (S, m) of locally best margins, by moving those coordinates that are marked."""
-    free = np.ones(robot.freedom, dtype=bool) if moved is None else moved
-    units = _steps(robot, 1.0, 1.0)[free]
+    movable = np.ones(robot.freedom, dtype=bool) if moved is None else moved
+    units = _steps(robot, 1.0, 1.0)[movable]
 
-    def poses(values: Array) -> Array:
+    def poses(scaled: Array) -> Array:
         # Simplices (S, ..., k), or points (4, S, k): coordinates that stay are alike, or 0.
-        whole = np.zeros((*values.shape[:-1], robot.freedom))
-        whole[..., free] = values * units
-        return whole
+        all_coordinates = np.zeros((*scaled.shape[:-1], robot.freedom))
+        all_coordinates[..., movable] = scaled * units
+        return all_coordinates
 
-    steps = _steps(robot, *_STEPS)[free] / units
-    return poses(climb(lambda values: _worth(robot, poses(values)), starts[:, free] / units, steps))
+    steps = _steps(robot, *_STEPS)[movable] / units
+    return poses(
+        climb(lambda scaled: _worth(robot, poses(scaled)), starts[:, movable] / units, steps)
+    )

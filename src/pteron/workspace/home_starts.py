@@ -50,8 +50,8 @@ def axis_poses(robot: Manipulator) -> Array:
     """
     center, radius = search_ball(robot)
     platform, count = robot.platform, len(center)
-    along = platform.directions @ np.array(platform.axis)
-    if not np.linalg.norm(along) > _ACROSS:
+    direction = platform.directions @ np.array(platform.axis)
+    if not np.linalg.norm(direction) > _ACROSS:
         return np.zeros((1, robot.freedom))
     turns = len(platform.angles) in (1, 3)
     angles = np.arange(_TURNS if turns else 1) * 2.0 * np.pi / _TURNS
@@ -61,7 +61,7 @@ def axis_poses(robot: Manipulator) -> Array:
     offsets = middle @ np.nan_to_num(platform.at(poses[:, 0])[1])
     heights = radius * np.linspace(-1.0, 1.0, _HEIGHTS)
     poses[..., :count] = (
-        center - (offsets @ platform.directions.T)[:, None] + np.outer(heights, along)
+        center - (offsets @ platform.directions.T)[:, None] + np.outer(heights, direction)
     )
     return np.concatenate([poses[0], *poses[1:, ::_COARSE]])
 
@@ -108,11 +108,11 @@ def sides(robot: Manipulator, poses: Array) -> Array:
     up = np.array(platform.axis)
     if not np.linalg.norm(platform.directions @ up) > _ACROSS:
         down = np.array(robot.gravity)
-        along = (platform.directions @ down) @ platform.directions
-        size = np.linalg.norm(along)
+        gravity_part = (platform.directions @ down) @ platform.directions
+        size = np.linalg.norm(gravity_part)
         if not size > _ACROSS * np.linalg.norm(down):
             return np.zeros(len(poses))
-        up = -along / size
+        up = -gravity_part / size
     place, axes = platform.at(poses)
     points = np.mean([leg.platform_point for leg in robot.legs], axis=0) @ axes
     points += place + np.mean([leg.fixed_offset for leg in robot.legs], axis=0)

@@ -19,7 +19,7 @@ from pteron.workspace.conditions import Condition, conditions
 from pteron.workspace.fit import Fit, largest_fit, proved_fit
 from pteron.workspace.proofs import Proof, expect_space, prove
 from pteron.workspace.regions import Box, Cylinder, Region
-from pteron.workspace.samples import Shape, cube
+from pteron.workspace.shape_samples import Shape, cube
 from pteron.workspace.smooth_conditions import smooth_conditions
 from pteron.workspace.volume import bounding_box, expect_places
 
@@ -101,15 +101,15 @@ def largest_cube(
     (0.2, True)
     """
     robot = as_manipulator(robot)
-    at = finite_pose(robot, pose, "pose")
+    reference = finite_pose(robot, pose, "pose")
     count = len(robot.platform.lengths)
 
     def region(center: Array, size: float) -> Region:
-        half = np.zeros(len(at))
+        half = np.zeros(len(reference))
         half[:count] = size
         return Box(tuple(center - half), tuple(center + half))
 
-    return _largest(robot, at, cube(count), region, tolerance, proved, given)
+    return _largest_shape(robot, reference, cube(count), region, tolerance, proved, given)
 
 
 def largest_cylinder(
@@ -150,13 +150,13 @@ def largest_cylinder(
         no share between 0 and 1.
     """
     robot = as_manipulator(robot)
-    at = finite_pose(robot, pose, "pose")
+    reference = finite_pose(robot, pose, "pose")
     expect_space(robot, "robot")
     expect(ratio > 0.0, "ratio", repr(ratio), "a number above 0")
     unit = np.array(Cylinder((0.0, 0.0, 0.0), 1.0, 1.0, axis).axis)
-    across = np.linalg.svd(unit[None])[2][1:]
+    normals = np.linalg.svd(unit[None])[2][1:]
     turns = 2.0 * np.pi * np.arange(24) / 24
-    ring = np.cos(turns)[:, None] * across[0] + np.sin(turns)[:, None] * across[1]
+    ring = np.cos(turns)[:, None] * normals[0] + np.sin(turns)[:, None] * normals[1]
     heights = ratio * np.linspace(-1.0, 1.0, 5)
     rim = np.concatenate([ring + h * unit for h in heights])
 
@@ -164,57 +164,60 @@ def largest_cylinder(
         return Cylinder(tuple(center), size, 2.0 * ratio * size, axis)
 
     def gauge(vectors: Array) -> Array:
-        along = vectors @ unit
-        away = np.linalg.norm(vectors - along[..., None] * unit, axis=-1)
-        return np.asarray(np.maximum(away, np.abs(along) / ratio))
+        heights = vectors @ unit
+        radii = np.linalg.norm(vectors - heights[..., None] * unit, axis=-1)
+        return np.asarray(np.maximum(radii, np.abs(heights) / ratio))
 
     half = np.array(region(np.zeros(3), 1.0).box[1])
-    return _largest(robot, at, Shape(half, gauge, rim), region, tolerance, proved, given)
+    return _largest_shape(
+        robot, reference, Shape(half, gauge, rim), region, tolerance, proved, given
+    )
 
 
-def _largest(
+def _largest_shape(
     robot: Manipulator,
-    at: Array,
+    reference: Array,
     shape: Shape,
     region: Callable[[Array, float], Region],
     tolerance: float,
     proved: bool,
-    given: tuple[Condition, ...] | None,
+    own_conditions: tuple[Condition, ...] | None,
 ) -> Inscribed:
     expect_places(robot, "it only turns; ask for its `largest_tilt`")
     expect_share("tolerance", tolerance)
-    asked = conditions(robot) if given is None else given
-    smooth, geometry = smooth_conditions(robot, asked), np.array(numbers(robot))
+    required = conditions(robot) if own_conditions is None else own_conditions
+    smooth, geometry = smooth_conditions(robot, required), np.array(numbers(robot))
     lengths = len(robot.platform.lengths)
 
-    def inscribed(fit: Fit, proof: Proof | None) -> Inscribed:
-        center = np.append(fit.center, at[lengths:])
+    def inscribed_shape(fit: Fit, proof: Proof | None) -> Inscribed:
+        center = np.append(fit.center, reference[lengths:])
         return Inscribed(center, 0.5 * fit.edge, region(center, 0.5 * fit.edge), proof)
 
-    def around(ball: tuple[Array, float], failing: Array) -> Fit:
-        return largest_fit(smooth, geometry, at[None], ball, failing, shape, _STARTS)
+    def fit_in_ball(ball: tuple[Array, float], failing: Array) -> Fit:
+        return largest_fit(smooth, geometry, reference[None], ball, failing, shape, _STARTS)
 
     def search(failing: Array) -> Fit:
-        fit = around(search_ball(robot), failing)
+        fit = fit_in_ball(search_ball(robot), failing)
         if fit.edge > 0.0:
             return fit
         # A grid for all orientations may miss the small part that one of them leaves.
-        low, high = bounding_box(robot, at)
-        return around((0.5 * (low + high), 0.5 * float((high - low).max())), failing)
+        low, high = bounding_box(robot, reference)
+        return fit_in_ball((0.5 * (low + high), 0.5 * float((high - low).max())), failing)
 
     def proofs(fit: Fit) -> tuple[Proof, ...]:
-        return (prove(robot, inscribed(fit, None).region, given=asked),)
+        return (prove(robot, inscribed_shape(fit, None).region, given=required),)
 
     if proved:
         shares = (1.0 - tolerance) ** np.arange(1, _SHARES + 1)
-        found = proved_fit(search, proofs, shape, shares.tolist(), len(at))
-        if found is not None:
-            return inscribed(found[0], *found[1])
+        proved_shape = proved_fit(search, proofs, shape, shares.tolist(), len(reference))
+        if proved_shape is not None:
+            return inscribed_shape(proved_shape[0], *proved_shape[1])
     else:
-        fit = search(np.empty((0, len(at))))
+        fit = search(np.empty((0, len(reference))))
         if fit.edge > 0.0:
-            return inscribed(replace(fit, edge=(1.0 - tolerance) * fit.edge), None)
+            return inscribed_shape(replace(fit, edge=(1.0 - tolerance) * fit.edge), None)
     raise ModelError(
-        f"no shape of any size is found in the workspace at the orientation of pose {at.tolist()}",
+        "no shape of any size is found in the workspace at the orientation of pose "
+        f"{reference.tolist()}",
         subject=robot.name,
     )

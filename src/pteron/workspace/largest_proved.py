@@ -17,7 +17,7 @@ from pteron.workspace.regions import Region
 
 def largest_proved(
     robot: Manipulator,
-    given: tuple[Condition, ...],
+    required: tuple[Condition, ...],
     region: Callable[[float], Region],
     poses: Callable[[float], Array],
     most: float,
@@ -31,12 +31,12 @@ def largest_proved(
     not hold where none does.
     """
     size = float(
-        bisect_condition(lambda size: keeps(robot, given, poses(size)).all(), 0.0, most, halvings)[
-            0
-        ]
+        bisect_condition(
+            lambda size: keeps(robot, required, poses(size)).all(), 0.0, most, halvings
+        )[0]
     )
     for share in shares:
-        proof = prove(robot, region(share * size), given=given)
+        proof = prove(robot, region(share * size), given=required)
         if proof.holds:
             break
     return share * size, proof

@@ -24,11 +24,11 @@ _DEPTH = 1e-5
 """A condition that fails by less is left to the proof."""
 
 _MOST = 60
-"""Points looked at for each condition, the lowest first: along a limit at the lattice's rim many
+"""Points examined for each condition, the lowest first: along a limit at the lattice's rim many
 are lower than those next to a tube."""
 
 
-def failing_between(
+def failing_places(
     slopes: Callable[[Array], tuple[Array, ...]], axes: Sequence[Array], rows: Array
 ) -> Array:
     """Return positions (H, k) between the points of a lattice where a condition's row is below 0.
@@ -38,25 +38,25 @@ def failing_between(
     points.
     """
     count = len(axes)
-    values = np.nan_to_num(rows, nan=-1.0)
+    margins = np.nan_to_num(rows, nan=-1.0)
     # Each point and its neighbours, also across corners, row by row.
-    lowest = (values == _around(values, np.minimum, count)) & (values >= -_DEPTH)
+    lowest = (margins == _neighbourhood_extremes(margins, np.minimum, count)) & (margins >= -_DEPTH)
     # A row that rises by less to the neighbours than to zero has none between them.
-    near = values < _around(values, np.maximum, count) - values
-    found = np.argwhere(lowest & near)
-    if not len(found):
+    near = margins < _neighbourhood_extremes(margins, np.maximum, count) - margins
+    minima = np.argwhere(lowest & near)
+    if not len(minima):
         return np.empty((0, count))
-    found = found[np.argsort(values[tuple(found.T)], kind="stable")]
-    found = np.concatenate([found[found[:, count] == r][:_MOST] for r in range(rows.shape[-1])])
-    at, row, each = found[:, :count], found[:, count], np.arange(len(found))
+    minima = minima[np.argsort(margins[tuple(minima.T)], kind="stable")]
+    minima = np.concatenate([minima[minima[:, count] == r][:_MOST] for r in range(rows.shape[-1])])
+    indices, row, order = minima[:, :count], minima[:, count], np.arange(len(minima))
     low, high = np.array([(a[0], a[-1]) for a in axes]).T
     cell = np.array([a[1] - a[0] for a in axes])
-    places = low + cell * at
+    places = low + cell * indices
     least, most = np.maximum(low, places - cell), np.minimum(high, places + cell)
     failing = np.zeros(len(places), dtype=bool)
     for _ in range(_STEPS):
-        value, slope = (part[each, row] for part in slopes(places))
-        failing |= ~(value >= -_DEPTH)
+        row_values, slope = (part[order, row] for part in slopes(places))
+        failing |= ~(row_values >= -_DEPTH)
         # Steps end at the box's faces.
         outward = ((places <= least) & (slope > 0.0)) | ((places >= most) & (slope < 0.0))
         slope = np.where(outward, 0.0, slope)
@@ -65,18 +65,18 @@ def failing_between(
         if not moving.any():
             break
         steep = np.where(moving, steep, 1.0)
-        step = (_BEYOND * value[:, None] / steep + _FURTHER * cell.min()) * slope / steep
+        step = (_BEYOND * row_values[:, None] / steep + _FURTHER * cell.min()) * slope / steep
         places = np.clip(places - np.where(moving, step, 0.0), least, most)
     return np.asarray(places[failing])
 
 
-def _around(values: Array, extreme: np.ufunc, count: int) -> Array:
+def _neighbourhood_extremes(array: Array, extreme: np.ufunc, count: int) -> Array:
     """Return the least or greatest value of each point and its neighbours along `count` axes."""
     for axis in range(count):
-        along = np.moveaxis(values, axis, 0)
-        found = values.copy()
-        whole = np.moveaxis(found, axis, 0)
-        extreme(whole[1:], along[:-1], out=whole[1:])
-        extreme(whole[:-1], along[1:], out=whole[:-1])
-        values = found
-    return values
+        source = np.moveaxis(array, axis, 0)
+        extremes = array.copy()
+        target = np.moveaxis(extremes, axis, 0)
+        extreme(target[1:], source[:-1], out=target[1:])
+        extreme(target[:-1], source[1:], out=target[:-1])
+        array = extremes
+    return array

@@ -28,10 +28,15 @@ _ALL = 4
 
 def layout_warnings(robot: Manipulator, home: Array) -> tuple[str, ...]:
     """Return warnings of legs that look swapped, cross at home (m,), or differ from all others."""
-    return (*_swapped(robot), *_crossed(robot, home), *_odd_places(robot), *_odd_lengths(robot))
+    return (
+        *_swap_warnings(robot),
+        *_crossing_warnings(robot, home),
+        *_place_warnings(robot),
+        *_length_warnings(robot),
+    )
 
 
-def _swapped(robot: Manipulator) -> Iterator[str]:
+def _swap_warnings(robot: Manipulator) -> Iterator[str]:
     """Yield the pairing of guide and platform points that has more symmetry than the file's."""
     count = len(robot.legs)
     if count < _FEWEST:
@@ -40,16 +45,16 @@ def _swapped(robot: Manipulator) -> Iterator[str]:
     identity = tuple(range(count))
     # Where the platform turns, points that are all shifted by one are a turn of the platform.
     reflections = not robot.platform.angles
-    own = _symmetries(base, top, identity, reflections=reflections)
+    as_filed = _symmetries(base, top, identity, reflections=reflections)
     rated = [(_symmetries(base, top, p, reflections=reflections), p) for p in _pairings(count)]
     best, order = max(rated, key=lambda pair: pair[0])
-    if best <= own or best < _FEWEST:
+    if best <= as_filed or best < _FEWEST:
         return
     moved = [i + 1 for i in identity if order[i] != i]
     yield (
         f"{legs_text(moved)}: look swapped: with their platform_points exchanged {best} turns"
         f"{' and reflections' if reflections else ''} about the axis leave the machine as it is, "
-        f"now {own}: is each joined to the right place on the platform?"
+        f"now {as_filed}: is each joined to the right place on the platform?"
     )
 
 
@@ -107,7 +112,7 @@ def _images(legs: Array, plane: Array) -> tuple[int | None, ...]:
     return tuple(int(row.argmax()) if row.any() else None for row in same)
 
 
-def _odd_places(robot: Manipulator) -> Iterator[str]:
+def _place_warnings(robot: Manipulator) -> Iterator[str]:
     """Yield the one leg that is out of place, where turns lead all others to one another's."""
     count = len(robot.legs)
     if count <= _ALL:
@@ -128,17 +133,17 @@ def _odd_places(robot: Manipulator) -> Iterator[str]:
             )
 
 
-def _crossed(robot: Manipulator, home: Array) -> Iterator[str]:
+def _crossing_warnings(robot: Manipulator, home: Array) -> Iterator[str]:
     """Yield pairs of legs whose links cross at home, of machines that move in space."""
     if robot.platform.planar:
         return
     links = [_segments(points) for points in numeric(robot, "joint_points")(home)[0]]
     for (i, first), (j, second) in combinations(enumerate(links, start=1), 2):
         distances = [_distance(*a, *b) for a in first for b in second]
-        apart = min(distances, default=np.inf)
-        if np.isfinite(apart):
+        gap = min(distances, default=np.inf)
+        if np.isfinite(gap):
             yield (
-                f"legs {i} and {j}: their links cross at home, {1e3 * apart:.2f} mm apart: are "
+                f"legs {i} and {j}: their links cross at home, {1e3 * gap:.2f} mm apart: are "
                 "they joined to the right places?"
             )
 
@@ -150,21 +155,21 @@ def _segments(points: Array) -> list[tuple[Array, Array]]:
     return [(points[k], points[k + 1]) for k in np.flatnonzero(lengths > least)]
 
 
-def _distance(start: Array, end: Array, other: Array, far: Array) -> float:
+def _distance(start: Array, end: Array, other: Array, other_end: Array) -> float:
     """Return the distance of two links that cross away from their ends, m; else infinity."""
-    along, across, between = end - start, far - other, other - start
-    system = np.array([[along @ along, -along @ across], [along @ across, -across @ across]])
-    if abs(np.linalg.det(system)) < CROSSING**2 * (along @ along) * (across @ across):
+    way, other_way, offset = end - start, other_end - other, other - start
+    system = np.array([[way @ way, -way @ other_way], [way @ other_way, -other_way @ other_way]])
+    if abs(np.linalg.det(system)) < CROSSING**2 * (way @ way) * (other_way @ other_way):
         return np.inf  # parallel
-    share, place = np.linalg.solve(system, [along @ between, across @ between])
+    share, place = np.linalg.solve(system, [way @ offset, other_way @ offset])
     if not (ENDS < share < 1.0 - ENDS and ENDS < place < 1.0 - ENDS):
         return np.inf
-    apart = float(np.linalg.norm(start + share * along - other - place * across))
-    shorter = min(np.linalg.norm(along), np.linalg.norm(across))
-    return apart if apart <= CROSSING * shorter else np.inf
+    gap = float(np.linalg.norm(start + share * way - other - place * other_way))
+    shorter = min(np.linalg.norm(way), np.linalg.norm(other_way))
+    return gap if gap <= CROSSING * shorter else np.inf
 
 
-def _odd_lengths(robot: Manipulator) -> Iterator[str]:
+def _length_warnings(robot: Manipulator) -> Iterator[str]:
     """Yield lengths of one leg that differ from those of all others, which are equal."""
     count = len(robot.legs)
     figures = _figures(robot)
@@ -175,12 +180,12 @@ def _odd_lengths(robot: Manipulator) -> Iterator[str]:
         for leg in robot.legs
     ]
     for name in sorted(set(each[0]).intersection(*each[1:])):
-        values = np.array([one[name] for one in each])
-        middle = float(np.median(values))
-        differ = np.abs(values - middle) > SAME_PLACE * abs(middle)
+        lengths = np.array([leg_lengths[name] for leg_lengths in each])
+        middle = float(np.median(lengths))
+        differ = np.abs(lengths - middle) > SAME_PLACE * abs(middle)
         if differ.sum() == 1:
             i = int(differ.argmax())
             yield (
-                f"leg {i + 1}: {name}: {values[i]:g} m, while all other legs have {middle:g} m: is "
-                "it meant?"
+                f"leg {i + 1}: {name}: {lengths[i]:g} m, while all other legs have {middle:g} m: "
+                "is it meant?"
             )

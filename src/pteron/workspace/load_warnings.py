@@ -15,11 +15,11 @@ _HEAVY = 100.0
 
 def load_warnings(robot: Manipulator, pose: Array) -> tuple[str, ...]:
     """Return warnings about the drives under their load in a pose (m,), at rest."""
-    rest = np.zeros(robot.freedom)
-    holding = np.abs(drive_forces(robot, pose, rest, rest))
+    zero_rates = np.zeros(robot.freedom)
+    holding = np.abs(drive_forces(robot, pose, zero_rates, zero_rates))
     inverse = np.linalg.inv(jacobian(robot, pose))
-    moved = np.diag(inverse.T @ mass_matrix(robot, pose) @ inverse)
-    found = []
+    moved_masses = np.diag(inverse.T @ mass_matrix(robot, pose) @ inverse)
+    warnings = []
     for i, leg in enumerate(robot.legs):
         if (drive := leg.drive) is None:
             continue
@@ -27,15 +27,15 @@ def load_warnings(robot: Manipulator, pose: Array) -> tuple[str, ...]:
         rated = drive.rated_force
         for name, limit in (("max_force", drive.max_force), ("rated_torque's force", rated)):
             if limit is not None and holding[i] > limit:
-                found.append(
+                warnings.append(
                     f"leg {i + 1}: drive: to hold the home pose takes {holding[i]:.3g} {unit}, "
                     f"more than {name}, {limit:.3g} {unit}"
                 )
                 break
-        if drive.inertia > _HEAVY * moved[i]:
-            found.append(
+        if drive.inertia > _HEAVY * moved_masses[i]:
+            warnings.append(
                 f"leg {i + 1}: drive: the rotor is {drive.inertia:.3g} {inertia} at the joint, "
-                f"{drive.inertia / moved[i]:.2g} times what the joint moves: is rotor_inertia in "
-                "kg m^2?"
+                f"{drive.inertia / moved_masses[i]:.2g} times what the joint moves: is "
+                "rotor_inertia in kg m^2?"
             )
-    return tuple(found)
+    return tuple(warnings)

@@ -86,7 +86,7 @@ def pose_margins(robot: RobotLike, pose: PoseLike) -> PoseMargins:
 
 
 def least_margin_text(robot: Manipulator, pose: Array) -> str:
-    """Return what the least margin of a pose (m,) is of, in words: "0.59 of the type-II ..."."""
+    """Return the least margin of a pose (m,) and its cause, in words: "0.59 of the type-II ..."."""
     margins = pose_margins(robot, pose)
     least = float(margins.least)
     if float(margins.type_ii) <= least:
@@ -100,9 +100,9 @@ def least_margin_text(robot: Manipulator, pose: Array) -> str:
     return f"{least:.2f} {what}"
 
 
-def _first_least(values: Array) -> int:
+def _first_least(margins: Array) -> int:
     """Return the first leg, from 1, with the least of values (n,): those of equal legs round."""
-    return int((values <= values.min() + _ROUNDING).argmax()) + 1
+    return int((margins <= margins.min() + _ROUNDING).argmax()) + 1
 
 
 @lru_cache(maxsize=64)

@@ -74,7 +74,7 @@ def mode_places(robot: Manipulator, home: Array) -> tuple[ModePlace, ...]:
 
     None of a machine that has one mode, or that gravity does not tell above from below.
     """
-    own = tuple(leg.elbow for leg in robot.legs)
+    file_elbows = tuple(leg.elbow for leg in robot.legs)
     choices = [leg.branches for leg in robot.legs]
     down, directions = np.array(robot.gravity), robot.platform.directions
     upright = _LEVEL * float(np.linalg.norm(down))
@@ -82,23 +82,30 @@ def mode_places(robot: Manipulator, home: Array) -> tuple[ModePlace, ...]:
         return ()
     modes = [tuple(leg.elbow for leg in mode.legs) for mode in working_modes(robot)]
     if len(modes) > _MOST:
-        other = tuple(-s if len(c) > 1 else s for s, c in zip(own, choices, strict=True))
-        modes = list(dict.fromkeys([own, other, modes[0], modes[-1]]))
+        other = tuple(-s if len(c) > 1 else s for s, c in zip(file_elbows, choices, strict=True))
+        modes = list(dict.fromkeys([file_elbows, other, modes[0], modes[-1]]))
     poses = np.vstack([random_poses(bare(robot), _DRAWN, type_i=0.0, type_ii=0.0), home])
     least = _UPRIGHT * max(leg.size for leg in robot.legs)
-    found = []
+    candidates = []
     for signs in modes:
         mode = with_elbows(robot, signs)
         margins = np.nan_to_num(pose_margins(mode, poses).least, nan=-1.0)
-        best = len(poses) - 1 if signs == own else int(margins.argmax())
+        best = len(poses) - 1 if signs == file_elbows else int(margins.argmax())
         depth = _depth(mode, poses[best])
         place = "below" if depth > least else "above" if depth < -least else "inside"
-        found.append((signs, place, depth, poses[best], float(margins[best])))
-    most = max(margin for *_, margin in found)
-    alike = [one for one in found if one[-1] >= _ALIKE * most]
-    hanging = [one for one in alike if one[1] == "below"] or alike
-    likely = own if own in [one[0] for one in hanging] else max(hanging, key=lambda one: one[-1])[0]
-    return tuple(ModePlace(*one, one[0] == own, one[0] == likely) for one in found)
+        candidates.append((signs, place, depth, poses[best], float(margins[best])))
+    most = max(margin for *_, margin in candidates)
+    alike = [candidate for candidate in candidates if candidate[-1] >= _ALIKE * most]
+    hanging = [candidate for candidate in alike if candidate[1] == "below"] or alike
+    likely = (
+        file_elbows
+        if file_elbows in [candidate[0] for candidate in hanging]
+        else max(hanging, key=lambda candidate: candidate[-1])[0]
+    )
+    return tuple(
+        ModePlace(*candidate, candidate[0] == file_elbows, candidate[0] == likely)
+        for candidate in candidates
+    )
 
 
 def _depth(robot: Manipulator, pose: Array) -> float:
@@ -107,8 +114,8 @@ def _depth(robot: Manipulator, pose: Array) -> float:
     for leg, q in zip(robot.legs, inverse_kinematics(robot, pose), strict=True):
         slides = leg.joint.unit == "m" and leg.joint_axis is not None
         base += np.array(leg.guide_point) + (q * np.array(leg.joint_axis) if slides else 0.0)
-    away = robot.platform.at(pose)[0] - base / len(robot.legs)
-    return float(away @ np.array(robot.gravity) / np.linalg.norm(robot.gravity))
+    offset = robot.platform.at(pose)[0] - base / len(robot.legs)
+    return float(offset @ np.array(robot.gravity) / np.linalg.norm(robot.gravity))
 
 
 def mode_warnings(modes: Sequence[ModePlace]) -> tuple[str, ...]:
@@ -122,11 +129,11 @@ def mode_warnings(modes: Sequence[ModePlace]) -> tuple[str, ...]:
     if named is None or likely is None or (named.place, likely.place) != ("above", "below"):
         return ()
     return (
-        f"elbow: the platform stands {-named.depth:.2g} m above its base at {_pose(named.pose)}; "
-        f"with elbows {likely.signs} it hangs {likely.depth:.2g} m below it at "
-        f"{_pose(likely.pose)}: is that the working mode that is meant?",
+        f"elbow: the platform stands {-named.depth:.2g} m above its base at "
+        f"{_pose_text(named.pose)}; with elbows {likely.signs} it hangs {likely.depth:.2g} m below "
+        f"it at {_pose_text(likely.pose)}: is that the working mode that is meant?",
     )
 
 
-def _pose(values: Array) -> str:
-    return f"({', '.join(f'{value:.3g}' for value in values)})"
+def _pose_text(pose: Array) -> str:
+    return f"({', '.join(f'{coordinate:.3g}' for coordinate in pose)})"

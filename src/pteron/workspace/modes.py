@@ -15,7 +15,7 @@ from pteron.kernels.bisection import bisect_condition
 from pteron.kinematics.evaluate import finite_pose
 from pteron.manipulator import RobotLike, as_manipulator, working_modes
 from pteron.shapes import PoseLike
-from pteron.workspace.boxes import halved
+from pteron.workspace.boxes import halve_boxes
 from pteron.workspace.conditions import EDGES, IntervalTest, condition_margins, interval_test
 from pteron.workspace.paving import Paving, paving
 
@@ -96,54 +96,65 @@ def mode_contacts(pavings: dict[tuple[int, ...], Paving]) -> tuple[Contact, ...]
     -------
     tuple of Contact
     """
-    found = []
-    for one, other in combinations(pavings, 2):
-        differs = [i for i, (a, b) in enumerate(zip(one, other, strict=True)) if a != b]
+    contacts = []
+    for first, second in combinations(pavings, 2):
+        differs = [i for i, (a, b) in enumerate(zip(first, second, strict=True)) if a != b]
         if len(differs) == 1:
-            found.append(_contact(pavings[one], pavings[other], (one, other), differs[0] + 1))
-    return tuple(found)
+            contacts.append(
+                _contact(pavings[first], pavings[second], (first, second), differs[0] + 1)
+            )
+    return tuple(contacts)
 
 
 def _contact(
-    one: Paving, other: Paving, elbows: tuple[tuple[int, ...], tuple[int, ...]], leg: int
+    first: Paving, second: Paving, elbows: tuple[tuple[int, ...], tuple[int, ...]], leg: int
 ) -> Contact:
-    own, theirs = (interval_test(side.robot, side.conditions) for side in (one, other))
-    edges = [k for k, c in enumerate(one.conditions) if c.leg == leg and c.cause in EDGES]
-    boxes = np.concatenate([one.inner, one.boundary])
+    first_test, second_test = (
+        interval_test(side.robot, side.conditions) for side in (first, second)
+    )
+    edges = [k for k, c in enumerate(first.conditions) if c.leg == leg and c.cause in EDGES]
+    boxes = np.concatenate([first.inner, first.boundary])
     for _ in range(_ROUNDS):
-        low, high = one.corners(boxes)
+        low, high = first.corners(boxes)
         # Where an edge may be met; not only on the boundary, since links of one length fold inside.
-        least = np.array([own.bounds(k, low, high)[0] for k in edges])
-        near = np.flatnonzero((least <= 0.0).any(axis=0))
-        for test in (own, theirs):
-            outside, _ = test(low[near], high[near], np.full(len(near), test.all))
-            near = near[~outside]
-        boxes, low, high = boxes[near], low[near], high[near]
+        least = np.array([first_test.bounds(k, low, high)[0] for k in edges])
+        candidates = np.flatnonzero((least <= 0.0).any(axis=0))
+        for test in (first_test, second_test):
+            outside, _ = test(low[candidates], high[candidates], np.full(len(candidates), test.all))
+            candidates = candidates[~outside]
+        boxes, low, high = boxes[candidates], low[candidates], high[candidates]
         if not len(boxes):
             return Contact(elbows, leg, "", None, True)
-        causes = own.undecided(low, high) | theirs.undecided(low, high)
+        causes = first_test.undecided_conditions(low, high) | second_test.undecided_conditions(
+            low, high
+        )
         for k in edges:
             alone = causes[:, k] & (causes.sum(axis=1) == 1)
-            pose = _crossing(one, own, k, low[alone], high[alone])
+            pose = _find_crossing(first, first_test, k, low[alone], high[alone])
             if pose is not None:
-                return Contact(elbows, leg, one.conditions[k].cause, pose, True)
+                return Contact(elbows, leg, first.conditions[k].cause, pose, True)
         if 2 * len(boxes) > _MOST:
             break
-        boxes = halved(boxes, boxes[0, 1] - boxes[0, 0])
+        boxes = halve_boxes(boxes, boxes[0, 1] - boxes[0, 0])
     return Contact(elbows, leg, "", None, False)
 
 
-def _crossing(one: Paving, own: IntervalTest, k: int, low: Array, high: Array) -> Array | None:
-    """Return a pose on an edge, of boxes of which a corner is proved inside it, and one beyond."""
+def _find_crossing(
+    side: Paving, test: IntervalTest, k: int, low: Array, high: Array
+) -> Array | None:
+    """Return a pose on a condition's boundary, bisected in a box.
+
+    Of the box one corner is proved inside and one outside; None where there is no such box.
+    """
     corners = np.array(list(np.ndindex(*(2,) * low.shape[1])))
     for a, b in zip(low, high, strict=True):
         poses = np.where(corners == 1, b, a)
-        least, most, _ = own.bounds(k, poses, poses)
+        least, most, _ = test.bounds(k, poses, poses)
         if not ((least > 0.0).any() and (most < 0.0).any()):
             continue
         ends = poses[least.argmax()], poses[most.argmin()]
         return bisect_condition(
-            lambda pose: condition_margins(one.robot, one.conditions, pose)[k] >= 0.0,
+            lambda pose: condition_margins(side.robot, side.conditions, pose)[k] >= 0.0,
             *ends,
             _HALVINGS,
         )[0]

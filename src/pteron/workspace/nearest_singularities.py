@@ -121,23 +121,27 @@ def nearest_singularities(
     True
     """
     robot = as_manipulator(robot)
-    at = finite_pose(robot, pose, "pose")
+    reference = finite_pose(robot, pose, "pose")
     expect(most >= 1, "most", most, "1 box at least")
     expect_regular(robot)
-    inverse_kinematics(robot, at)
-    found: list[NearestSingularity] = []
+    inverse_kinematics(robot, reference)
+    singularities: list[NearestSingularity] = []
     kinds: dict[By, tuple[str, ...]] = {
         "translation": robot.platform.lengths,
         "rotation": robot.platform.angles,
     }
     for by in (by for by, moving in kinds.items() if moving):
-        several = [
-            _result(robot, at, by, vanishing, _search(vanishing, at, by, most))
+        by_kind = [
+            _singularity_of(
+                robot, reference, by, vanishing, _search(vanishing, reference, by, most)
+            )
             for vanishing in _kinds(robot)
         ]
-        some = [one for one in several if np.isfinite(one.lower_bound)]
-        found += sorted(some, key=lambda one: (one.distance, one.lower_bound))
-    return tuple(found)
+        existing = [singularity for singularity in by_kind if np.isfinite(singularity.lower_bound)]
+        singularities += sorted(
+            existing, key=lambda singularity: (singularity.distance, singularity.lower_bound)
+        )
+    return tuple(singularities)
 
 
 def _kinds(robot: Manipulator) -> Iterator[Vanishing]:
@@ -148,42 +152,42 @@ def _kinds(robot: Manipulator) -> Iterator[Vanishing]:
         yield Vanishing(robot, "constraint")
 
 
-def _result(
-    robot: Manipulator, at: Array, by: By, vanishing: Vanishing, found: Nearest
+def _singularity_of(
+    robot: Manipulator, reference: Array, by: By, vanishing: Vanishing, nearest: Nearest
 ) -> NearestSingularity:
-    pose = np.full_like(at, np.nan) if found.pose is None else found.pose
+    pose = np.full_like(reference, np.nan) if nearest.pose is None else nearest.pose
     distance = np.inf
-    if found.pose is not None:
-        distance = float(np.linalg.norm((pose - at)[_moving(robot, by)]))
-    bound = min(found.bound, distance)
+    if nearest.pose is not None:
+        distance = float(np.linalg.norm((pose - reference)[_varying_coordinates(robot, by)]))
+    bound = min(nearest.bound, distance)
     return NearestSingularity(
-        vanishing.kind, vanishing.leg, by, distance, pose, found.measure, bound
+        vanishing.kind, vanishing.leg, by, distance, pose, nearest.measure, bound
     )
 
 
-def _moving(robot: Manipulator, by: By) -> NDArray[np.intp]:
+def _varying_coordinates(robot: Manipulator, by: By) -> NDArray[np.intp]:
     """Return the coordinates that vary."""
     return np.flatnonzero(robot.platform.angular == (by == "rotation"))
 
 
-def _search(vanishing: Vanishing, at: Array, by: By, most: int) -> Nearest:
+def _search(vanishing: Vanishing, reference: Array, by: By, most: int) -> Nearest:
     """Return the nearest pose at which a function vanishes, moved or turned alone."""
-    robot, moving = vanishing.robot, _moving(vanishing.robot, by)
+    robot, moving = vanishing.robot, _varying_coordinates(vanishing.robot, by)
     if by == "translation":
         try:
-            box, beyond = enclosing_box(robot, at, at, limits=False), np.inf
+            box, horizon = enclosing_box(robot, reference, reference, limits=False), np.inf
         except ModelError:  # the reach has no end
             center, radius = search_ball(robot)
-            beyond = float(np.linalg.norm(at[moving] - center)) + radius
-            box = at[moving] + beyond * np.array([[-1.0], [1.0]])
-        return Search(vanishing, at, moving, box).run(beyond, most)
+            horizon = float(np.linalg.norm(reference[moving] - center)) + radius
+            box = reference[moving] + horizon * np.array([[-1.0], [1.0]])
+        return Search(vanishing, reference, moving, box).run(horizon, most)
     if vanishing.kind == "II" and closure_of(robot).orientation is not None:
-        turns = singular_orientations(robot) - at[moving]
+        turns = singular_orientations(robot) - reference[moving]
         turns -= 2.0 * np.pi * np.round(turns / (2.0 * np.pi))
         turn = float(turns[np.abs(turns).argmin()])
-        pose = at.copy()
+        pose = reference.copy()
         pose[moving] += turn
         return Nearest(pose, 0.0, abs(turn) * (1.0 - SINGULAR))
-    beyond = np.pi if robot.platform.slides else np.inf
-    box = at[moving] + np.pi * np.array([[-1.0], [1.0]])
-    return Search(vanishing, at, moving, box).run(beyond, most)
+    horizon = np.pi if robot.platform.slides else np.inf
+    box = reference[moving] + np.pi * np.array([[-1.0], [1.0]])
+    return Search(vanishing, reference, moving, box).run(horizon, most)

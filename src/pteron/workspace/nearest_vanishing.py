@@ -18,7 +18,7 @@ import scipy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
 from pteron.kernels import Array
-from pteron.workspace.boxes import halved, varied
+from pteron.workspace.boxes import halve_boxes, vary_coordinates
 from pteron.workspace.vanishing import Vanishing
 
 SINGULAR = 1e-10
@@ -52,7 +52,7 @@ _BACK = 10
 """Newton's steps back into reach."""
 
 _CONVERGED = 1e-14
-"""Greatest value of what is to vanish at which Newton's steps end."""
+"""Greatest residual at which Newton's steps end."""
 
 _RETRACTIONS, _GAIN = 16, 1e-6
 """Most rounds in which a state is brought nearer, and the least gain, over the distance."""
@@ -96,51 +96,51 @@ class Search:
             others[vanishing.leg - 1] = False
         self.others = np.flatnonzero(others)
 
-    def run(self, beyond: float, most: int) -> Nearest:
-        """Return the nearest place; of what is farther than `beyond` nothing is known."""
-        boxes, away = self.box[None], self._distances(self.box[None])
-        best, nearest, looked, rounds = None, beyond, 0, 0
-        while len(boxes) and looked < most and away.min() < (1.0 - _CLOSE) * nearest:
-            order = np.argsort(away, kind="stable")
-            batch, rest = boxes[order[:_BATCH]], boxes[order[_BATCH:]]
-            looked += len(batch)
-            batch = batch[~self.vanishing.absent(self._whole(batch))]
-            tried = batch[: 0 if rounds >= _SEEKING and rounds % _SELDOM else _TRIED]
+    def run(self, horizon: float, most: int) -> Nearest:
+        """Return the nearest place within the distance `horizon`, if there is one."""
+        boxes, distances = self.box[None], self._distances(self.box[None])
+        best, nearest, examined, rounds = None, horizon, 0, 0
+        while len(boxes) and examined < most and distances.min() < (1.0 - _CLOSE) * nearest:
+            order = np.argsort(distances, kind="stable")
+            batch, others = boxes[order[:_BATCH]], boxes[order[_BATCH:]]
+            examined += len(batch)
+            batch = batch[~self.vanishing.proves_absence(self._pose_boxes(batch))]
+            sources = batch[: 0 if rounds >= _SEEKING and rounds % _SELDOM else _TRIED]
             rounds += 1
-            best, nearest = self._better(tried, best, nearest, 1)
-            boxes = np.concatenate([halved(batch), rest])
-            away = self._distances(boxes)
-            boxes, away = boxes[away < nearest], away[away < nearest]
-        if len(boxes) and away.min() < (1.0 - _CLOSE) * nearest:
-            order = np.argsort(away, kind="stable")
+            best, nearest = self._improve_nearest(sources, best, nearest, 1)
+            boxes = np.concatenate([halve_boxes(batch), others])
+            distances = self._distances(boxes)
+            boxes, distances = boxes[distances < nearest], distances[distances < nearest]
+        if len(boxes) and distances.min() < (1.0 - _CLOSE) * nearest:
+            order = np.argsort(distances, kind="stable")
             last = np.concatenate([order[:_LAST], order[:: max(1, len(order) // _LAST)]])
-            best, nearest = self._better(boxes[last], best, nearest, _HITS)
+            best, nearest = self._improve_nearest(boxes[last], best, nearest, _HITS)
             if best is not None and len(self.moving) > 1:
-                best = self._retracted(best)
+                best = self._retract(best)
                 nearest = self._length(best)
-        bound = float(away.min(initial=nearest)) * (1.0 - _ROUNDING)
+        bound = float(distances.min(initial=nearest)) * (1.0 - _ROUNDING)
         if best is None:
             return Nearest(None, np.nan, bound)
         return Nearest(self._pose(best), float(self._values(best[None])[0][0, 0]), bound)
 
-    def _better(
+    def _improve_nearest(
         self, boxes: Array, best: Array | None, nearest: float, most: int
     ) -> tuple[Array | None, float]:
         """Return the nearest singular state and its distance, after looking into boxes (B, 2, k).
 
         From the nearest of them, `most` at most and none next to another, quadratic programs go on.
         """
-        hits = self._stepped(boxes.mean(axis=1))
+        hits = self._singular_states(boxes.mean(axis=1))
         for _ in range(most):
             places = hits[:, : len(self.moving)]
-            ways = np.linalg.norm(places, axis=-1)
-            if self._sizes[0] * float(ways.min(initial=np.inf)) >= _FARTHER * nearest:
+            lengths = np.linalg.norm(places, axis=-1)
+            if self._sizes[0] * float(lengths.min(initial=np.inf)) >= _FARTHER * nearest:
                 break
-            k = int(ways.argmin())
-            found = self._nearer(hits[k])
-            if self._length(found) < nearest:
-                best, nearest = found, self._length(found)
-            hits = hits[np.linalg.norm(places - places[k], axis=-1) > _BESIDE * ways[k]]
+            k = int(lengths.argmin())
+            improved = self._descend(hits[k])
+            if self._length(improved) < nearest:
+                best, nearest = improved, self._length(improved)
+            hits = hits[np.linalg.norm(places - places[k], axis=-1) > _BESIDE * lengths[k]]
         return best, nearest
 
     # A state is a pose's coordinates that vary, and the roots, as shares of their sizes.
@@ -151,20 +151,22 @@ class Search:
         length = float(np.linalg.norm(self.box[1] - self.box[0]))
         if not self.smooth.roots:
             return length, np.empty(0)
-        whole = self._whole(self.box[None])
-        low, high, _ = self.smooth.radicands(whole[:, 0], whole[:, 1], range(self.smooth.roots))
+        pose_boxes = self._pose_boxes(self.box[None])
+        low, high, _ = self.smooth.radicands(
+            pose_boxes[:, 0], pose_boxes[:, 1], range(self.smooth.roots)
+        )
         most = np.nan_to_num(np.abs(np.concatenate([low, high])).max(axis=0), posinf=1.0)
         return length, np.sqrt(np.where(most > 0.0, most, 1.0))
 
     def _pose(self, state: Array) -> Array:
         ways = self._sizes[0] * state[..., : len(self.moving)]
-        return varied(self.at, self.at[self.moving] + ways, self.moving)
+        return vary_coordinates(self.at, self.at[self.moving] + ways, self.moving)
 
     def _length(self, state: Array) -> float:
         return self._sizes[0] * float(np.linalg.norm(state[: len(self.moving)]))
 
     def _values(self, states: Array) -> tuple[Array, Array, Array]:
-        """Return what is to vanish of states (K, k + R), what is not to be negative, both's slopes.
+        """Return equality residuals, inequality residuals and both Jacobians at states (K, k + R).
 
         The value and r^2 - g, (K, 1 + R); r and the squares of the other legs' measures, (K, R + n)
         or one less; the slopes (K, 1 + 2 R + n, k + R).
@@ -172,26 +174,28 @@ class Search:
         k, (length, sizes) = len(self.moving), self._sizes
         count, r = len(states), len(sizes)
         roots = states[:, k:] * sizes
-        values, slopes = (
+        outputs, slopes = (
             np.asarray(part) for part in self.smooth.function(self._pose(states).T, roots.T)
         )
-        slopes = slopes.reshape(len(values), count, len(self.at) + r).swapaxes(0, 1)
+        slopes = slopes.reshape(len(outputs), count, len(self.at) + r).swapaxes(0, 1)
         columns = [*self.moving, *range(len(self.at), len(self.at) + r)]
         slopes = slopes[:, :, columns] * np.concatenate([np.full(k, length), sizes])
-        values = values.T
-        under = (roots * roots - values[:, 1 : 1 + r]) / sizes**2
+        outputs = outputs.T
+        radicand_errors = (roots * roots - outputs[:, 1 : 1 + r]) / sizes**2
         slopes[:, 1 : 1 + r] /= -(sizes**2)[:, None]
         slopes[:, np.arange(r) + 1, np.arange(r) + k] += 2.0 * states[:, k:]
-        squares, bends = values[:, 1 + r :], slopes[:, 1 + r :]
-        own = np.zeros((count, r, k + r))
-        own[:, np.arange(r), np.arange(r) + k] = 1.0
+        squares, square_slopes = outputs[:, 1 + r :], slopes[:, 1 + r :]
+        root_slopes = np.zeros((count, r, k + r))
+        root_slopes[:, np.arange(r), np.arange(r) + k] = 1.0
         return (
-            np.hstack([values[:, :1], under]),
+            np.hstack([outputs[:, :1], radicand_errors]),
             np.hstack([states[:, k:], squares[:, self.others]]),
-            np.concatenate([slopes[:, : 1 + r], own, bends[:, self.others]], axis=1),
+            np.concatenate(
+                [slopes[:, : 1 + r], root_slopes, square_slopes[:, self.others]], axis=1
+            ),
         )
 
-    def _stepped(self, places: Array) -> Array:
+    def _singular_states(self, places: Array) -> Array:
         """Return singular states that Newton's steps, the shortest, lead to from places (K, k).
 
         Those that lead out of reach go on to where it ends: a sheet of singular poses may be in
@@ -203,57 +207,64 @@ class Search:
         if not len(states):
             return states
         roots = np.zeros((len(sizes), len(states)))
-        under = np.asarray(self.smooth.function(self._pose(states).T, roots)[0])[1 : 1 + len(sizes)]
-        states[:, k:] = np.sqrt(np.maximum(under.T, 0.0)) / sizes
-        states = self._solved(states, _STEPS, within=False)
-        singular = self._singular(states)
+        radicands = np.asarray(self.smooth.function(self._pose(states).T, roots)[0])[
+            1 : 1 + len(sizes)
+        ]
+        states[:, k:] = np.sqrt(np.maximum(radicands.T, 0.0)) / sizes
+        states = self._solve_by_newton(states, _STEPS, into_reach=False)
+        singular = self._is_singular(states)
         if singular.all():
             return states
-        back = self._solved(states[~singular], _BACK, within=True)
-        return np.concatenate([states[singular], back[self._singular(back)]])
+        returned = self._solve_by_newton(states[~singular], _BACK, into_reach=True)
+        return np.concatenate([states[singular], returned[self._is_singular(returned)]])
 
-    def _solved(self, states: Array, steps: int, *, within: bool) -> Array:
-        """Return where Newton's steps lead to from states (K, k + R); `within`, into reach too."""
+    def _solve_by_newton(self, states: Array, steps: int, *, into_reach: bool) -> Array:
+        """Return the states that Newton's steps reach from states (K, k + R).
+
+        With `into_reach` the quantities that must not be negative count too.
+        """
         with np.errstate(all="ignore"):
             for _ in range(steps):
-                missed, kept, slopes = self._values(states)
-                count = missed.shape[1]
-                if within:
-                    missed = np.hstack([missed, np.minimum(kept, 0.0)])
-                    slopes[:, count:][kept >= 0.0] = 0.0
-                    count = missed.shape[1]
+                residuals, nonnegative, slopes = self._values(states)
+                count = residuals.shape[1]
+                if into_reach:
+                    residuals = np.hstack([residuals, np.minimum(nonnegative, 0.0)])
+                    slopes[:, count:][nonnegative >= 0.0] = 0.0
+                    count = residuals.shape[1]
                 slopes = slopes[:, :count]
-                good = np.isfinite(missed).all(axis=-1) & np.isfinite(slopes).all(axis=(-2, -1))
-                states, missed, slopes = states[good], missed[good], slopes[good]
-                if (np.abs(missed) <= _CONVERGED).all():
+                finite = np.isfinite(residuals).all(axis=-1) & np.isfinite(slopes).all(
+                    axis=(-2, -1)
+                )
+                states, residuals, slopes = states[finite], residuals[finite], slopes[finite]
+                if (np.abs(residuals) <= _CONVERGED).all():
                     break
-                across = np.linalg.pinv(slopes, rcond=1e-12)
-                states = states - (across @ missed[..., None])[..., 0]
+                inverse_slopes = np.linalg.pinv(slopes, rcond=1e-12)
+                states = states - (inverse_slopes @ residuals[..., None])[..., 0]
         return states
 
-    def _singular(self, states: Array) -> NDArray[np.bool_]:
+    def _is_singular(self, states: Array) -> NDArray[np.bool_]:
         """Return which states (K,) are singular poses in reach."""
         if not len(states):
             return np.zeros(0, bool)
-        missed, kept, _ = self._values(states)
-        closed = (np.abs(missed) <= SINGULAR).all(axis=-1)
-        return np.asarray(closed & (kept >= -_EDGE).all(axis=-1))
+        residuals, nonnegative, _ = self._values(states)
+        vanishes = (np.abs(residuals) <= SINGULAR).all(axis=-1)
+        return np.asarray(vanishes & (nonnegative >= -_EDGE).all(axis=-1))
 
-    def _nearer(self, state: Array) -> Array:
-        """Return the nearest singular state, sought from one on."""
+    def _descend(self, state: Array) -> Array:
+        """Return the nearest singular state that a descent from one finds."""
         if len(self.moving) == 1 or self._length(state) == 0.0:
             return state
         with np.errstate(all="ignore"):
             for _ in range(_RESTARTS):
-                found = self._programmed(state)
-                if not (np.isfinite(found).all() and self._singular(found[None])[0]):
-                    return self._retracted(state)
-                before, state = state, min(state, found, key=self._length)
-                if self._length(state) > (1.0 - _EDGE) * self._length(before):
+                candidate = self._solve_programs(state)
+                if not (np.isfinite(candidate).all() and self._is_singular(candidate[None])[0]):
+                    return self._retract(state)
+                last, state = state, min(state, candidate, key=self._length)
+                if self._length(state) > (1.0 - _EDGE) * self._length(last):
                     break
         return state
 
-    def _programmed(self, state: Array) -> Array:
+    def _solve_programs(self, state: Array) -> Array:
         """Return where sequential quadratic programs lead to."""
         # Kinematics load without SciPy.
         k, count = len(self.moving), 1 + len(self._sizes[1])
@@ -264,14 +275,14 @@ class Search:
             return 0.5 * float(way @ way) / scale, way / scale
 
         @lru_cache(maxsize=1)
-        def values(x: bytes) -> list[Array]:
+        def residuals(x: bytes) -> list[Array]:
             return [part[0] for part in self._values(np.frombuffer(x)[None])]
 
         def part(i: int, rows: slice) -> dict[str, object]:
             return {
                 "type": ("eq", "ineq")[i],
-                "fun": lambda x: values(x.tobytes())[i],
-                "jac": lambda x: values(x.tobytes())[2][rows],
+                "fun": lambda x: residuals(x.tobytes())[i],
+                "jac": lambda x: residuals(x.tobytes())[2][rows],
             }
 
         run = scipy.optimize.minimize(
@@ -284,7 +295,7 @@ class Search:
         )
         return np.asarray(run.x)
 
-    def _retracted(self, state: Array) -> Array:
+    def _retract(self, state: Array) -> Array:
         """Return a nearer singular state: by Newton's steps from places that are nearer by less.
 
         Where the function touches zero it has no slope that quadratic programs could use.
@@ -292,23 +303,25 @@ class Search:
         k = len(self.moving)
         rng, shares = np.random.default_rng(0), 0.5 ** np.arange(1, _RETRACTIONS + 1)
         for _ in range(_RETRACTIONS):
-            aside = rng.normal(size=(3, _RETRACTIONS, k)) * np.array([0.0, 0.5, 1.0])[:, None, None]
+            offsets = (
+                rng.normal(size=(3, _RETRACTIONS, k)) * np.array([0.0, 0.5, 1.0])[:, None, None]
+            )
             size = float(np.linalg.norm(state[:k]))
-            places = state[:k] * (1.0 - shares[:, None]) + aside * (size * shares[:, None])
+            places = state[:k] * (1.0 - shares[:, None]) + offsets * (size * shares[:, None])
             places = self.at[self.moving] + self._sizes[0] * places.reshape(-1, k)
-            found = self._stepped(places)
-            nearest = min(found, key=self._length, default=state)
+            states = self._singular_states(places)
+            nearest = min(states, key=self._length, default=state)
             if self._length(nearest) > (1.0 - _GAIN) * self._length(state):
                 break
             state = nearest
         return state
 
-    def _whole(self, boxes: Array) -> Array:
+    def _pose_boxes(self, boxes: Array) -> Array:
         """Return boxes (B, 2, m) of poses."""
-        return varied(self.at, boxes, self.moving)
+        return vary_coordinates(self.at, boxes, self.moving)
 
     def _distances(self, boxes: Array) -> Array:
         """Return how far the nearest places of boxes (B, 2, k) are."""
         here = self.at[self.moving]
-        apart = np.maximum(np.maximum(boxes[:, 0] - here, here - boxes[:, 1]), 0.0)
-        return np.asarray(np.linalg.norm(apart, axis=-1))
+        gaps = np.maximum(np.maximum(boxes[:, 0] - here, here - boxes[:, 1]), 0.0)
+        return np.asarray(np.linalg.norm(gaps, axis=-1))

@@ -80,23 +80,23 @@ def over_angles(
     ((1, 2), 'm^2')
     """
     robot = as_manipulator(robot)
-    at = finite_pose(robot, pose, "pose")
+    reference = finite_pose(robot, pose, "pose")
     if len(robot.platform.angles) != 1:
         raise ModelError("the platform does not turn: it has one orientation", subject=robot.name)
-    given = np.asarray(angles, dtype=float)
-    if given.ndim != 1 or not len(given) or not np.isfinite(given).all():
+    angle_row = np.asarray(angles, dtype=float)
+    if angle_row.ndim != 1 or not len(angle_row) or not np.isfinite(angle_row).all():
         raise DataError("angles: a row of finite numbers expected, rad")
     machines = working_modes(robot) if modes else (robot,)
     pavings = [
         [
-            paving(machine, np.where(robot.platform.angular, angle, at), tolerance=tolerance)
-            for angle in given
+            paving(machine, np.where(robot.platform.angular, angle, reference), tolerance=tolerance)
+            for angle in angle_row
         ]
         for machine in machines
     ]
     inner, outer = (
-        np.array([[getattr(one, name) for one in row] for row in pavings])
+        np.array([[getattr(paving_of_mode, name) for paving_of_mode in row] for row in pavings])
         for name in ("inner_volume", "outer_volume")
     )
     elbows = tuple(tuple(leg.elbow for leg in machine.legs) for machine in machines)
-    return VolumesOverAngles(given, elbows, inner, outer, pavings[0][0].unit)
+    return VolumesOverAngles(angle_row, elbows, inner, outer, pavings[0][0].unit)

@@ -18,7 +18,7 @@ from pteron.kinematics.architecture import expect_regular
 from pteron.kinematics.evaluate import finite_pose
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import PoseLike
-from pteron.workspace.boxes import halved, varied
+from pteron.workspace.boxes import halve_boxes, vary_coordinates
 from pteron.workspace.conditions import Condition, IntervalTest, conditions, interval_test
 from pteron.workspace.enclosing import enclosing_box
 from pteron.workspace.volume import expect_places
@@ -84,7 +84,7 @@ class Paving:
         test, parts = interval_test(self.robot, self.conditions), []
         for start in range(0, len(self.boundary), _SLICE):
             low, high = self.corners(self.boundary[start : start + _SLICE])
-            parts.append(test.undecided(low, high))
+            parts.append(test.undecided_conditions(low, high))
         return np.concatenate([np.empty((0, len(self.conditions)), bool), *parts])
 
     def corners(self, boxes: Array) -> tuple[Array, Array]:
@@ -127,8 +127,8 @@ class Paving:
     def _cells(self) -> list[tuple[int, NDArray[np.int64], Array]]:
         """Boxes of one size: the verdict, how often each side was halved, and their keys."""
         return [
-            (value, depth, np.sort(_keys(cells, depth)))
-            for boxes, value in ((self.inner, 1), (self.boundary, 0))
+            (verdict, depth, np.sort(_keys(cells, depth)))
+            for boxes, verdict in ((self.inner, 1), (self.boundary, 0))
             for depth, cells in self.by_size(boxes)
         ]
 
@@ -137,28 +137,28 @@ class Paving:
 
         Nothing is decided of poses outside of `box`, nor of those on the faces of boxes.
         """
-        given = as_array(poses, "poses", (self.box.shape[1],))
-        flat = given.reshape(-1, self.box.shape[1])
+        array = as_array(poses, "poses", (self.box.shape[1],))
+        flat = array.reshape(-1, self.box.shape[1])
         moving = [self.robot.coordinates.index(axis) for axis in self.axes]
         start, size = self.box[0, moving], (self.box[1] - self.box[0])[moving]
         places = (flat[:, moving] - start) / size
-        found = np.full(len(flat), -1, np.int8)
+        verdicts = np.full(len(flat), -1, np.int8)
         finest = np.zeros(len(moving))
-        for value, depth, keys in self._cells:
-            asked = np.flatnonzero(found < 0)
-            wanted = _keys(np.floor(places[asked] * 2.0**depth), depth)
-            at = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
-            found[asked[keys[at] == wanted]] = value
+        for verdict, depth, keys in self._cells:
+            open_rows = np.flatnonzero(verdicts < 0)
+            cell_keys = _keys(np.floor(places[open_rows] * 2.0**depth), depth)
+            positions = np.minimum(np.searchsorted(keys, cell_keys), len(keys) - 1)
+            verdicts[open_rows[keys[positions] == cell_keys]] = verdict
             finest = np.maximum(finest, depth)
         fine = places * 2.0**finest
         on_face = (np.abs(fine - np.round(fine)) < _FACE).any(axis=1)
-        beyond = ((flat < self.box[0]) | (flat > self.box[1])).any(axis=1)
-        found[on_face | beyond] = 0
-        return found.reshape(given.shape[:-1])
+        outside = ((flat < self.box[0]) | (flat > self.box[1])).any(axis=1)
+        verdicts[on_face | outside] = 0
+        return verdicts.reshape(array.shape[:-1])
 
 
 def _keys(cells: NDArray[Any], depth: NDArray[np.int64]) -> Array:
-    """Return a number for each cell (P, k) of a lattice; what is beyond it has no cell's number."""
+    """Return a number for each cell (P, k) of a lattice; cells beyond it have no cell's number."""
     weights = np.cumprod(np.append(1.0, 2.0 ** depth[:-1] + 2.0))
     return np.asarray(np.clip(cells + 1.0, 0.0, 2.0**depth + 1.0) @ weights)
 
@@ -216,79 +216,85 @@ def paving(
     (True, True)
     """
     robot = as_manipulator(robot)
-    at = finite_pose(robot, pose, "pose")
+    reference = finite_pose(robot, pose, "pose")
     # The undecided part may be larger than what is inside: a tolerance above 1.
     expect(0.0 < tolerance < np.inf, "tolerance", repr(tolerance), "a share above 0")
     expect_regular(robot)
     if within is None:
         expect_places(robot, "say within which angles")
-    box = region_box(robot, at, within)
-    asked = conditions(robot) if given is None else given
-    inner, boundary, complete = _refined(interval_test(robot, asked), box, tolerance, most)
+    box = region_box(robot, reference, within)
+    required = conditions(robot) if given is None else given
+    inner, boundary, complete = _refine_boxes(interval_test(robot, required), box, tolerance, most)
     axes = tuple(robot.coordinates[i] for i in np.flatnonzero(box[0] < box[1]))
     volumes = [math.fsum(np.prod(b[:, 1] - b[:, 0], axis=1)) for b in (inner, boundary)]
     turning = sum(axis in robot.platform.angles for axis in axes)
     powers = (("m", len(axes) - turning), ("rad", turning))
     unit = " ".join(f"{name}^{k}" if k > 1 else name for name, k in powers if k)
     return Paving(
-        robot, asked, box, inner, boundary, axes, volumes[0], sum(volumes), unit, complete
+        robot, required, box, inner, boundary, axes, volumes[0], sum(volumes), unit, complete
     )
 
 
-def region_box(robot: Manipulator, at: Array, within: ArrayLike | None) -> Array:
-    """Return least and greatest pose (2, m) of what is looked at."""
-    box = np.array([at, at])
+def region_box(robot: Manipulator, reference: Array, within: ArrayLike | None) -> Array:
+    """Return the least and the greatest pose (2, m) of the region to be paved."""
+    box = np.array([reference, reference])
     count = len(robot.platform.lengths)
     if within is None:
-        box[:, :count] = enclosing_box(robot, at, at)
+        box[:, :count] = enclosing_box(robot, reference, reference)
         return box
-    given = np.asarray(within, dtype=float)
-    shapes = (2, count), (2, len(at))
-    if given.shape not in shapes or not (np.isfinite(given) & (given[0] <= given[1])).all():
+    limits = np.asarray(within, dtype=float)
+    shapes = (2, count), (2, len(reference))
+    if limits.shape not in shapes or not (np.isfinite(limits) & (limits[0] <= limits[1])).all():
         raise DataError(
             f"within: least and greatest position expected, finite, shape (2, {count}) or, with "
-            f"{' and '.join(robot.platform.angles) or 'all coordinates'}, (2, {len(at)})"
+            f"{' and '.join(robot.platform.angles) or 'all coordinates'}, (2, {len(reference)})"
         )
-    box[:, : given.shape[1]] = given
+    box[:, : limits.shape[1]] = limits
     return box
 
 
-def _refined(
+def _refine_boxes(
     test: IntervalTest, box: Array, tolerance: float, most: int
 ) -> tuple[Array, Array, bool]:
     """Return inner and undecided boxes, and whether the tolerance is met."""
     moving = np.flatnonzero(box[0] < box[1])
-    found: list[Array] = []
-    left, open_ = box[None][:, :, moving], np.array([test.all])
+    inner_boxes: list[Array] = []
+    boxes, open_bits = box[None][:, :, moving], np.array([test.all])
     inside, undecided = 0.0, math.inf
     first = True
-    while len(left):
-        halves = left if first else halved(left[:1])
-        each = float(np.prod(halves[0, 1] - halves[0, 0]))
-        undecided = each * len(left) * len(halves)
-        done, kept, kept_open = False, [], []
-        for start in range(0, len(left), _SLICE):
-            rest = slice(start + _SLICE, None)
-            part, still = left[start : start + _SLICE], open_[start : start + _SLICE]
+    while len(boxes):
+        halves = boxes if first else halve_boxes(boxes[:1])
+        volume = float(np.prod(halves[0, 1] - halves[0, 0]))
+        undecided = volume * len(boxes) * len(halves)
+        met, undecided_boxes, undecided_bits = False, [], []
+        for start in range(0, len(boxes), _SLICE):
+            untested = slice(start + _SLICE, None)
+            part, bits = boxes[start : start + _SLICE], open_bits[start : start + _SLICE]
             if not first:
-                part, still = halved(part), np.repeat(still, 2)
-            outside, still = test(*_corners(box, moving, part), still)
-            sure = (still == 0) & ~outside
-            found.append(part[sure])
-            kept.append(part[~sure & ~outside])
-            kept_open.append(still[~sure & ~outside])
-            inside += each * int(sure.sum())
-            undecided -= each * int((sure | outside).sum())
-            done = inside > 0.0 and undecided <= tolerance * inside
-            if done or sum(map(len, kept)) + len(left[rest]) > most:
-                return np.concatenate(found), np.concatenate([*kept, left[rest]]), done
-        left, open_ = np.concatenate(kept), np.concatenate(kept_open)
+                part, bits = halve_boxes(part), np.repeat(bits, 2)
+            outside, bits = test(*_corners(box, moving, part), bits)
+            inner = (bits == 0) & ~outside
+            inner_boxes.append(part[inner])
+            undecided_boxes.append(part[~inner & ~outside])
+            undecided_bits.append(bits[~inner & ~outside])
+            inside += volume * int(inner.sum())
+            undecided -= volume * int((inner | outside).sum())
+            met = inside > 0.0 and undecided <= tolerance * inside
+            if met or sum(map(len, undecided_boxes)) + len(boxes[untested]) > most:
+                return (
+                    np.concatenate(inner_boxes),
+                    np.concatenate([*undecided_boxes, boxes[untested]]),
+                    met,
+                )
+        boxes, open_bits = np.concatenate(undecided_boxes), np.concatenate(undecided_bits)
         first = False
-        if each < _SMALLEST:
-            return np.concatenate(found), left, False
-    return np.concatenate(found), left, True
+        if volume < _SMALLEST:
+            return np.concatenate(inner_boxes), boxes, False
+    return np.concatenate(inner_boxes), boxes, True
 
 
 def _corners(box: Array, moving: NDArray[np.intp], boxes: Array) -> tuple[Array, Array]:
     """Return the corners (B, m), each, of boxes (B, 2, k) of the coordinates that vary."""
-    return varied(box[0], boxes[:, 0], moving), varied(box[1], boxes[:, 1], moving)
+    return vary_coordinates(box[0], boxes[:, 0], moving), vary_coordinates(
+        box[1], boxes[:, 1], moving
+    )

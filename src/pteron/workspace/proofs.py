@@ -13,7 +13,7 @@ from pteron.kernels import Array, numeric
 from pteron.kinematics.architecture import expect_regular
 from pteron.kinematics.limits import limited_joints
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
-from pteron.workspace.boxes import halved
+from pteron.workspace.boxes import halve_boxes
 from pteron.workspace.conditions import (
     Condition,
     IntervalTest,
@@ -71,7 +71,7 @@ class Proof:
         assert not self.holds or self.boxes > 0, "a proof has examined something"
 
     def __str__(self) -> str:
-        told = ", ".join(map(str, self.causes))
+        causes = ", ".join(map(str, self.causes))
         if self.holds:
             count = len(self.conditions)
             return f"proved: every pose keeps all {count} conditions (boxes: {self.boxes})"
@@ -81,7 +81,9 @@ class Proof:
             )
         assert self.undecided is not None
         low, high = (corner.round(6).tolist() for corner in self.undecided)
-        return f"not decided of poses from {low} to {high}: {told}; the region may touch that edge"
+        return (
+            f"not decided of poses from {low} to {high}: {causes}; the region may touch that edge"
+        )
 
     @property
     def why(self) -> str:
@@ -90,19 +92,19 @@ class Proof:
             return ""
         margins = numeric(self.robot, "reach")(self.counterexample)[0]
         joints = {(j.leg, j.noun): j for j in limited_joints(self.robot, self.counterexample)}
-        told = []
-        left = condition_margins(self.robot, self.causes, self.counterexample)
-        for condition, room in zip(self.causes, left.tolist(), strict=True):
+        texts = []
+        remaining = condition_margins(self.robot, self.causes, self.counterexample)
+        for condition, excess in zip(self.causes, remaining.tolist(), strict=True):
             joint = joints.get((condition.leg, condition.cause.split(" at ")[0]))
             text = str(condition)
             if joint is not None:
                 text += f" ({joint.value:.4g} {joint.unit} of {joint.limits_text('{:g}'.format)})"
             elif condition.floor:
-                text += f" ({room + condition.floor:.4g}, at least {condition.floor:.4g} asked)"
+                text += f" ({excess + condition.floor:.4g}, at least {condition.floor:.4g} asked)"
             elif condition.leg and margins[condition.leg - 1] < 0.0:
                 text += f" (it misses the pose by {-margins[condition.leg - 1]:.3g} m)"
-            told.append(text)
-        return ", ".join(told)
+            texts.append(text)
+        return ", ".join(texts)
 
 
 def prove(
@@ -162,44 +164,46 @@ def prove(
     if isinstance(region, Cylinder):
         expect_space(robot, "region")
     expect_regular(robot)
-    asked = conditions(robot, type_i=type_i, type_ii=type_ii)
+    required = conditions(robot, type_i=type_i, type_ii=type_ii)
     if given is not None:
-        asked = (*given, *(c for c in asked if c.what != "room"))
-    test = interval_test(robot, asked)
-    left, open_, seen = box[None], np.array([test.all]), 0
+        required = (*given, *(c for c in required if c.what != "room"))
+    test = interval_test(robot, required)
+    boxes, open_bits, examined = box[None], np.array([test.all]), 0
     least = _THINNEST * (box[1] - box[0])
     sizes = np.where(box[0] < box[1], box[1] - box[0], 1.0)
     while True:
-        parts, still = [], []
-        for start in range(0, len(left), _SLICE):
-            part, bits = left[start : start + _SLICE], open_[start : start + _SLICE]
-            meets = ~region.misses(part[:, 0], part[:, 1])
-            part, bits = part[meets], bits[meets]
-            seen += len(part)
-            outside, bits = test(part[:, 0], part[:, 1], bits)
-            parts.append(part[outside | (bits != 0)])
-            still.append(bits[outside | (bits != 0)])
-        left, open_ = np.concatenate(parts), np.concatenate(still)
-        if not seen:
+        parts, open_parts = [], []
+        for start in range(0, len(boxes), _SLICE):
+            block, bits = boxes[start : start + _SLICE], open_bits[start : start + _SLICE]
+            meets = ~region.misses(block[:, 0], block[:, 1])
+            block, bits = block[meets], bits[meets]
+            examined += len(block)
+            outside, bits = test(block[:, 0], block[:, 1], bits)
+            parts.append(block[outside | (bits != 0)])
+            open_parts.append(bits[outside | (bits != 0)])
+        boxes, open_bits = np.concatenate(parts), np.concatenate(open_parts)
+        if not examined:
             raise DataError("region: it holds no pose, so that nothing can be proved of it")
-        if not len(left):
-            return Proof(True, robot, region, asked, boxes=seen)
-        found = _counterexample(robot, test, region, left)
-        if found is not None:
-            left_there = condition_margins(robot, asked, found)
+        if not len(boxes):
+            return Proof(True, robot, region, required, boxes=examined)
+        counterexample = _find_counterexample(robot, test, region, boxes)
+        if counterexample is not None:
+            margins = condition_margins(robot, required, counterexample)
             # Out of reach limits are undefined: the cause is the reach.
-            fails = left_there < 0.0
-            fails = fails if fails.any() else np.isnan(left_there)
-            failed = tuple(asked[c] for c in np.flatnonzero(fails))
-            return Proof(False, robot, region, asked, found, causes=failed, boxes=seen)
-        sides = left[:, 1] - left[:, 0]
-        if 2 * len(left) > most or (sides <= least).all():
-            smallest = int(np.prod(np.where(sides > 0.0, sides, 1.0), axis=1).argmin())
-            causes = tuple(c for k, c in enumerate(asked) if int(open_[smallest]) >> k & 1)
+            fails = margins < 0.0
+            fails = fails if fails.any() else np.isnan(margins)
+            failed = tuple(required[c] for c in np.flatnonzero(fails))
             return Proof(
-                None, robot, region, asked, None, left[smallest], causes=causes, boxes=seen
+                False, robot, region, required, counterexample, causes=failed, boxes=examined
             )
-        left, open_ = halved(left, sizes), np.repeat(open_, 2)
+        sides = boxes[:, 1] - boxes[:, 0]
+        if 2 * len(boxes) > most or (sides <= least).all():
+            smallest = int(np.prod(np.where(sides > 0.0, sides, 1.0), axis=1).argmin())
+            causes = tuple(c for k, c in enumerate(required) if int(open_bits[smallest]) >> k & 1)
+            return Proof(
+                None, robot, region, required, None, boxes[smallest], causes=causes, boxes=examined
+            )
+        boxes, open_bits = halve_boxes(boxes, sizes), np.repeat(open_bits, 2)
 
 
 def expect_space(robot: Manipulator, name: str) -> None:
@@ -213,19 +217,19 @@ def expect_space(robot: Manipulator, name: str) -> None:
         )
 
 
-def _counterexample(
+def _find_counterexample(
     robot: Manipulator, test: IntervalTest, region: Region, boxes: Array
 ) -> Array | None:
     """Return a pose of the region that is proved to fail: a middle or a corner of boxes."""
-    tried = boxes[:: max(len(boxes) // _TRIED, 1)]
-    varies = np.flatnonzero((tried[:, 0] < tried[:, 1]).any(axis=0))
-    poses = [0.5 * (tried[:, 0] + tried[:, 1])]
+    sample = boxes[:: max(len(boxes) // _TRIED, 1)]
+    varies = np.flatnonzero((sample[:, 0] < sample[:, 1]).any(axis=0))
+    poses = [0.5 * (sample[:, 0] + sample[:, 1])]
     for corner in np.ndindex(*(2,) * len(varies)):
-        pose = tried[:, 0].copy()
-        pose[:, varies] = tried[:, corner, varies]
+        pose = sample[:, 0].copy()
+        pose[:, varies] = sample[:, corner, varies]
         poses.append(pose)
-    every = np.concatenate(poses)
-    every = every[region.holds(every)]
-    failing = every[~(condition_margins(robot, test.given, every) >= 0.0).all(axis=-1)]
+    candidates = np.concatenate(poses)
+    candidates = candidates[region.holds(candidates)]
+    failing = candidates[~(condition_margins(robot, test.given, candidates) >= 0.0).all(axis=-1)]
     proved: NDArray[np.bool_] = test(failing, failing, np.full(len(failing), test.all))[0]
     return failing[proved.argmax()] if proved.any() else None

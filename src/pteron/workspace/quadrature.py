@@ -20,7 +20,7 @@ from pteron.workspace.conditions import Condition, conditions, keeps
 from pteron.workspace.volume import bounding_box
 
 _SAMPLES = 129
-"""Equally spaced positions on a line, asked whether they are inside."""
+"""Equally spaced positions on a line at which the conditions are tested."""
 
 _HALVINGS = 24
 """Bisections that place an end between two samples."""
@@ -81,17 +81,19 @@ def quadrature_volume(
     """
     robot = as_manipulator(robot)
     expect(lines >= 2 and not lines % 2, "lines", lines, "an even number of them")
-    at = finite_pose(robot, pose, "pose")
-    box = bounding_box(robot, at)
-    across = box.shape[1] - 1
-    expect_to_fit("lines", lines, 3.0 * float(lines) ** across * across)
-    asked = conditions(robot) if given is None else given
-    fine, coarse = (_sum(robot, asked, at, box, count) for count in (lines, lines // 2))
+    reference = finite_pose(robot, pose, "pose")
+    box = bounding_box(robot, reference)
+    line_axes = box.shape[1] - 1
+    expect_to_fit("lines", lines, 3.0 * float(lines) ** line_axes * line_axes)
+    required = conditions(robot) if given is None else given
+    fine, coarse = (
+        _integral(robot, required, reference, box, count) for count in (lines, lines // 2)
+    )
     return Quadrature(fine, abs(fine - coarse))
 
 
-def _sum(
-    robot: Manipulator, asked: tuple[Condition, ...], at: Array, box: Array, lines: int
+def _integral(
+    robot: Manipulator, required: tuple[Condition, ...], reference: Array, box: Array, lines: int
 ) -> float:
     steps = (box[1] - box[0])[1:] / lines
     sides = [
@@ -99,31 +101,35 @@ def _sum(
     ]
     places = np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(-1, len(steps))
     total = sum(
-        _lengths(robot, asked, at, box[:, 0], places[k : k + _CHUNK]).sum()
+        _inner_lengths(robot, required, reference, box[:, 0], places[k : k + _CHUNK]).sum()
         for k in range(0, len(places), _CHUNK)
     )
     return float(total * np.prod(steps))
 
 
-def _lengths(
-    robot: Manipulator, asked: tuple[Condition, ...], at: Array, ends: Array, places: Array
+def _inner_lengths(
+    robot: Manipulator,
+    required: tuple[Condition, ...],
+    reference: Array,
+    ends: Array,
+    places: Array,
 ) -> Array:
     """Return how much (L,) of lines along x between ends (2,), at places (L, k - 1), is inside."""
 
-    def inside(x: Array, row: NDArray[np.intp]) -> NDArray[np.bool_]:
-        poses = np.broadcast_to(at, (*x.shape, len(at))).copy()
+    def contains(x: Array, row: NDArray[np.intp]) -> NDArray[np.bool_]:
+        poses = np.broadcast_to(reference, (*x.shape, len(reference))).copy()
         poses[..., 0], poses[..., 1 : 1 + places.shape[1]] = x, places[row]
-        return keeps(robot, asked, poses)
+        return keeps(robot, required, poses)
 
     rows = np.arange(len(places))
     # Beyond the ends all is taken to lie outside, so that lines enter and leave in pairs.
     x = np.linspace(ends[0], ends[1], _SAMPLES)
-    seen = np.zeros((len(places), _SAMPLES + 2), bool)
-    seen[:, 1:-1] = inside(np.broadcast_to(x, (len(places), _SAMPLES)), rows[:, None])
-    line, k = np.nonzero(seen[:, 1:] != seen[:, :-1])
-    leaves = seen[line, k]
+    is_inside = np.zeros((len(places), _SAMPLES + 2), bool)
+    is_inside[:, 1:-1] = contains(np.broadcast_to(x, (len(places), _SAMPLES)), rows[:, None])
+    line, k = np.nonzero(is_inside[:, 1:] != is_inside[:, :-1])
+    leaves = is_inside[line, k]
     low, high = x[np.maximum(k - 1, 0)], x[np.minimum(k, _SAMPLES - 1)]
-    low, high = bisect_condition(lambda x: inside(x, line) == leaves, low, high, _HALVINGS)
-    found = np.zeros(len(places))
-    np.add.at(found, line, np.where(leaves, 1.0, -1.0) * 0.5 * (low + high))
-    return found
+    low, high = bisect_condition(lambda x: contains(x, line) == leaves, low, high, _HALVINGS)
+    lengths = np.zeros(len(places))
+    np.add.at(lengths, line, np.where(leaves, 1.0, -1.0) * 0.5 * (low + high))
+    return lengths

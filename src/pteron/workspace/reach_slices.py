@@ -14,7 +14,7 @@ from pteron.kernels import Array, numeric
 from pteron.kinematics.evaluate import finite_pose
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import PoseLike
-from pteron.workspace.boxes import varied
+from pteron.workspace.boxes import vary_coordinates
 from pteron.workspace.volume import bounding_box
 
 REACHABLE = 0
@@ -141,15 +141,17 @@ def reach_slice(
                 f"plane: {plane!r} given, two of {', '.join(robot.coordinates)} expected"
             )
     elif plane not in planes:
-        valid = ", ".join(f'"{one}"' for one in planes)
+        valid = ", ".join(f'"{option}"' for option in planes)
         raise DataError(f"plane: {plane!r} is not one of {valid}")
     expect(points >= 2, "points", points, "at least 2")
     expect_to_fit("points", points, 2.0 * points**2 * (robot.freedom + robot.joint_count))
     pose = finite_pose(robot, center, "center")
     i, j = (robot.coordinates.index(name) for name in names)
     if extent is None and robot.platform.angular[[i, j]].any():
-        wide = reach_slice(robot, pose, plane, extent=_wide(robot, pose, i, j), points=points)
-        extent = reached(wide)
+        wide = reach_slice(
+            robot, pose, plane, extent=_widest_sides(robot, pose, i, j), points=points
+        )
+        extent = reach_sides(wide)
     if extent is None:
         box = bounding_box(robot, pose)
         rim = _RIM * (box[1] - box[0])
@@ -164,23 +166,25 @@ def reach_slice(
 
 
 def _grid(center: Array, places: tuple[int, int], first: Array, second: Array) -> Array:
-    return varied(center, np.stack(np.meshgrid(first, second), axis=-1), list(places))
+    return vary_coordinates(center, np.stack(np.meshgrid(first, second), axis=-1), list(places))
 
 
-def reached(cut: ReachSlice) -> tuple[float, float, float, float]:
+def reach_sides(cut: ReachSlice) -> tuple[float, float, float, float]:
     """Return the sides of a rectangle about the reach in a slice, with a rim."""
     inside = cut.status == REACHABLE
     sides: list[float] = []
-    for values, axis in ((cut.first, 0), (cut.second, 1)):
-        found = values[inside.any(axis=axis)]
-        if not len(found):
-            found = values
-        rim = max(_RIM * float(np.ptp(found)), float(values[1] - values[0]))
-        sides += [float(found[0]) - rim, float(found[-1]) + rim]
+    for coordinates, axis in ((cut.first, 0), (cut.second, 1)):
+        in_reach = coordinates[inside.any(axis=axis)]
+        if not len(in_reach):
+            in_reach = coordinates
+        rim = max(_RIM * float(np.ptp(in_reach)), float(coordinates[1] - coordinates[0]))
+        sides += [float(in_reach[0]) - rim, float(in_reach[-1]) + rim]
     return sides[0], sides[1], sides[2], sides[3]
 
 
-def _wide(robot: Manipulator, pose: Array, i: int, j: int) -> tuple[float, float, float, float]:
+def _widest_sides(
+    robot: Manipulator, pose: Array, i: int, j: int
+) -> tuple[float, float, float, float]:
     """Return sides about all that a slice through a pose may hold."""
     sides: list[float] = []
     limits = robot.platform.angle_limits

@@ -50,7 +50,7 @@ class Box:
     high: tuple[float, ...]
 
     def __post_init__(self) -> None:
-        low, high = (_numbers(getattr(self, name), name) for name in ("low", "high"))
+        low, high = (_checked_numbers(getattr(self, name), name) for name in ("low", "high"))
         if len(low) != len(high) or any(a > b for a, b in zip(low, high, strict=True)):
             raise DataError(
                 f"box: low {list(low)} must have as many numbers as high {list(high)}, none greater"
@@ -66,9 +66,9 @@ class Box:
 
         With a margin (m,), or one for all coordinates, it is so much wider on each side.
         """
-        given = np.asarray(poses, dtype=float)
-        expect(given.ndim >= 1 and given.size, "poses", "none", "at least one")
-        flat = given.reshape(-1, given.shape[-1])
+        array = np.asarray(poses, dtype=float)
+        expect(array.ndim >= 1 and array.size, "poses", "none", "at least one")
+        flat = array.reshape(-1, array.shape[-1])
         return cls(tuple(flat.min(axis=0) - margin), tuple(flat.max(axis=0) + margin))
 
     @property
@@ -107,7 +107,7 @@ class Cylinder:
     axis: tuple[float, ...] = (0.0, 0.0, 1.0)
 
     def __post_init__(self) -> None:
-        center, axis = (_numbers(getattr(self, name), name) for name in ("center", "axis"))
+        center, axis = (_checked_numbers(getattr(self, name), name) for name in ("center", "axis"))
         if len(center) < 3 or len(axis) != 3 or not any(axis):
             raise DataError("cylinder: a pose with x, y and z is needed for center, and an axis")
         if not (0.0 <= self.radius < math.inf and 0.0 <= self.height < math.inf):
@@ -122,43 +122,45 @@ class Cylinder:
     @property
     def box(self) -> Array:
         """Least and greatest pose (2, m)."""
-        along = np.array(self.axis)
-        half = 0.5 * self.height * np.abs(along)
-        half = half + self.radius * np.sqrt(np.maximum(1.0 - along * along, 0.0))
+        direction = np.array(self.axis)
+        half = 0.5 * self.height * np.abs(direction)
+        half = half + self.radius * np.sqrt(np.maximum(1.0 - direction * direction, 0.0))
         half = half * (1.0 + _WIDER) + _WIDER
         box = np.array([self.center, self.center])
         box[:, :3] += np.array([-half, half])
         return box
 
-    def _places(self, poses: Array) -> tuple[Array, Array]:
+    def _axial_parts(self, poses: Array) -> tuple[Array, Array]:
         """Return positions (..., 3) from the middle: their parts along the axis and across it."""
-        away, axis = poses[..., :3] - self.center[:3], np.array(self.axis)
-        along = away @ axis
-        return along, away - along[..., None] * axis
+        offsets, axis = poses[..., :3] - self.center[:3], np.array(self.axis)
+        heights = offsets @ axis
+        return heights, offsets - heights[..., None] * axis
 
     def holds(self, poses: Array) -> NDArray[np.bool_]:
         """Return which poses (..., m) lie in it."""
-        along, across = self._places(poses)
-        inside = np.linalg.norm(across, axis=-1) <= self.radius
-        return np.asarray(inside & (np.abs(along) <= 0.5 * self.height))
+        heights, offsets = self._axial_parts(poses)
+        inside = np.linalg.norm(offsets, axis=-1) <= self.radius
+        return np.asarray(inside & (np.abs(heights) <= 0.5 * self.height))
 
     def misses(self, low: Array, high: Array) -> NDArray[np.bool_]:
         """Return which boxes with corners (B, m) surely have no pose of it."""
-        along, across = self._places(0.5 * (low + high))
+        heights, offsets = self._axial_parts(0.5 * (low + high))
         half, axis = 0.5 * (high - low)[:, :3], np.array(self.axis)
         slack = _WIDER * (1.0 + self.radius + self.height)
-        far = np.abs(along) - half @ np.abs(axis) > 0.5 * self.height + slack
+        far = np.abs(heights) - half @ np.abs(axis) > 0.5 * self.height + slack
         # Half the extent of a box across the axis, by components.
         shadow = half @ np.abs(np.eye(3) - np.outer(axis, axis))
-        nearest = np.maximum(np.abs(across) - shadow, 0.0)
+        nearest = np.maximum(np.abs(offsets) - shadow, 0.0)
         return np.asarray(far | (np.linalg.norm(nearest, axis=-1) > self.radius + slack))
 
 
-def _numbers(value: object, name: str) -> tuple[float, ...]:
+def _checked_numbers(numbers: object, name: str) -> tuple[float, ...]:
     try:
-        array = np.asarray(value, dtype=float)
+        array = np.asarray(numbers, dtype=float)
     except (TypeError, ValueError, OverflowError):
         array = np.array(np.nan)
     if array.ndim != 1 or not (np.abs(array) < _FARTHEST).all():
-        raise DataError(f"{name}: {shown(value)} given, a row of numbers of sensible size expected")
+        raise DataError(
+            f"{name}: {shown(numbers)} given, a row of numbers of sensible size expected"
+        )
     return tuple(array.tolist())

@@ -15,7 +15,7 @@ from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import PerJoint, PoseLike
 
 _POSES = 256
-"""Random poses within limits among which the greatest length is told."""
+"""Random poses within limits over which the greatest length is taken."""
 
 
 def screw_lengths(robot: RobotLike, pose: PoseLike) -> PerJoint:
@@ -47,7 +47,7 @@ def screw_lengths(robot: RobotLike, pose: PoseLike) -> PerJoint:
     """
     robot = as_manipulator(robot)
     poses = finite_rows(robot, pose, "pose")
-    found = np.zeros((*poses.shape[:-1], robot.joint_count))
+    lengths = np.zeros((*poses.shape[:-1], robot.joint_count))
     place, axes = robot.platform.at(poses)
     start = robot.platform.at(np.zeros(robot.freedom))[1]
     for i, leg in enumerate(robot.legs):
@@ -57,11 +57,11 @@ def screw_lengths(robot: RobotLike, pose: PoseLike) -> PerJoint:
         way = place + np.array(leg.platform_point) @ axes - np.array(leg.guide_point)
         way /= np.linalg.norm(way, axis=-1, keepdims=True)
         # Across the ram the joints hold the cylinder by one of these, and the piston by the other.
-        held, turned = np.cross(base, way), np.cross((start @ base) @ axes, way)
-        along = (way * np.cross(held, turned)).sum(axis=-1)
-        spin = np.arctan2(along, (held * turned).sum(axis=-1))
-        found[..., i] = leg.screw_lead * spin / (2.0 * np.pi)
-    return found
+        base_normal, piston_normal = np.cross(base, way), np.cross((start @ base) @ axes, way)
+        sine = (way * np.cross(base_normal, piston_normal)).sum(axis=-1)
+        spin = np.arctan2(sine, (base_normal * piston_normal).sum(axis=-1))
+        lengths[..., i] = leg.screw_lead * spin / (2.0 * np.pi)
+    return lengths
 
 
 def screw_warnings(robot: Manipulator) -> tuple[str, ...]:

@@ -29,31 +29,33 @@ def climb(worth: Callable[[Array], Array], starts: Array, steps: Array) -> Array
         return starts
     edges = np.vstack([np.zeros(len(steps)), np.diag(steps)])
     points = starts[:, None, :] + edges
-    values = np.asarray(worth(points))
+    heights = np.asarray(worth(points))
     moving = np.arange(len(starts))
     for _ in range(_STEPS):
-        order = np.argsort(-values[moving], axis=1, kind="stable")
+        order = np.argsort(-heights[moving], axis=1, kind="stable")
         simplex = np.take_along_axis(points[moving], order[..., None], axis=1)
-        height = np.take_along_axis(values[moving], order, axis=1)
-        points[moving], values[moving] = simplex, height
+        height = np.take_along_axis(heights[moving], order, axis=1)
+        points[moving], heights[moving] = simplex, height
         spread = np.abs(simplex[:, 1:] - simplex[:, :1]).max(axis=(1, 2), initial=0.0)
         flat = height[:, 0] - height[:, -1] <= _GAIN
         going = ~((spread <= _SIZE) & flat) & np.isfinite(height[:, 0])
         moving, simplex, height = moving[going], simplex[going], height[going]
         if not len(moving):
             break
-        points[moving], values[moving] = _stepped(worth, simplex, height)
-    best: Array = points[np.arange(len(points)), values.argmax(axis=1)]
+        points[moving], heights[moving] = _step_simplices(worth, simplex, height)
+    best: Array = points[np.arange(len(points)), heights.argmax(axis=1)]
     return best
 
 
-def _stepped(worth: Callable[[Array], Array], simplex: Array, height: Array) -> tuple[Array, Array]:
+def _step_simplices(
+    worth: Callable[[Array], Array], simplex: Array, height: Array
+) -> tuple[Array, Array]:
     """Return simplices (S, k + 1, k), best point first, after one step, and their values."""
     rows = np.arange(len(simplex))
     middle, last = simplex[:, :-1].mean(axis=1), simplex[:, -1]
-    away = middle - last
-    tried = middle + np.array([1.0, 2.0, 0.5, -0.5])[:, None, None] * away
-    reflected, expanded, outside, inside = values = np.asarray(worth(tried))
+    step = middle - last
+    candidates = middle + np.array([1.0, 2.0, 0.5, -0.5])[:, None, None] * step
+    reflected, expanded, outside, inside = worths = np.asarray(worth(candidates))
     best, second, worst = height[:, 0], height[:, -2], height[:, -1]
     choice = np.where(
         reflected > best,
@@ -62,7 +64,7 @@ def _stepped(worth: Callable[[Array], Array], simplex: Array, height: Array) -> 
     )
     shrinks = ((choice == 2) & (outside < reflected)) | ((choice == 3) & ~(inside > worst))
     simplex, height = simplex.copy(), height.copy()
-    simplex[:, -1], height[:, -1] = tried[choice, rows], values[choice, rows]
+    simplex[:, -1], height[:, -1] = candidates[choice, rows], worths[choice, rows]
     if shrinks.any():
         small = simplex[shrinks].copy()
         small[:, -1] = last[shrinks]

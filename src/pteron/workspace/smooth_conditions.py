@@ -22,24 +22,24 @@ from pteron.workspace.conditions import Condition, conditions
 class SmoothConditions:
     """The conditions as rows, for a topology: all machines that differ in their geometry alone."""
 
-    def __init__(self, robot: Manipulator, given: tuple[Condition, ...]) -> None:
-        self.sides = (1.0, -1.0) if any(condition.sized for condition in given) else (1.0,)
+    def __init__(self, robot: Manipulator, required: tuple[Condition, ...]) -> None:
+        self.sides = (1.0, -1.0) if any(condition.sized for condition in required) else (1.0,)
         """Signs that the type-II measure may have."""
         pose, side = ca.SX.sym("pose", robot.freedom), ca.SX.sym("side")
         size = general_program(robot, "squared_type_i").inputs[0].size
         self._symbols = pose, side, ca.SX.sym("geometry", size)
         rows = {}
-        if set(conditions(robot)) <= set(given):
-            floors = {c.element: c.floor for c in given if c.what == "squared_type_i"}
-            given = tuple(c for c in given if c.what not in ("room", "squared_type_i"))
-            rows = self._scaled(robot, floors)
-        for condition in given:
+        if set(conditions(robot)) <= set(required):
+            floors = {c.element: c.floor for c in required if c.what == "squared_type_i"}
+            required = tuple(c for c in required if c.what not in ("room", "squared_type_i"))
+            rows = self._scaled_rows(robot, floors)
+        for condition in required:
             row = self._output(robot, condition.what, condition.output)[condition.element]
             rows[str(condition)] = row * (side if condition.sized else 1.0) - condition.floor
         self.names = tuple(rows)
         self._rows = ca.vertcat(*rows.values())
 
-    def _scaled(self, robot: Manipulator, floors: Mapping[int, float]) -> dict[str, ca.SX]:
+    def _scaled_rows(self, robot: Manipulator, floors: Mapping[int, float]) -> dict[str, ca.SX]:
         """Return rows of reach and limits that are all about 1: a search moves better along them.
 
         Squared type-I measures stand for the edges of reach; limits are shares of half a range.
@@ -48,15 +48,15 @@ class SmoothConditions:
         joints = self._output(robot, "joint_coordinates", "joints")
         passive = self._output(robot, "passive_room", "shares")
         legs = range(1, len(robot.legs) + 1)
-        found = {f"leg {i}: type-I measure": squares[i - 1] - floors.get(i - 1, 0.0) for i in legs}
+        rows = {f"leg {i}: type-I measure": squares[i - 1] - floors.get(i - 1, 0.0) for i in legs}
         for i, leg in enumerate(robot.legs, start=1):
             if leg.limits is not None:
                 low, high = leg.limits
                 ends = {"lower": joints[i - 1] - low, "upper": high - joints[i - 1]}
                 for end, distance in ends.items():
                     name = f"leg {i}: {leg.joint.noun}'s {end} limit"
-                    found[name] = distance / ((high - low) / 2.0)
-        return found | {
+                    rows[name] = distance / ((high - low) / 2.0)
+        return rows | {
             f"leg {i}: passive joints' limits": share
             for i, share in enumerate(ca.vertsplit(passive), start=1)
             if not share.is_constant()
@@ -64,13 +64,13 @@ class SmoothConditions:
 
     def _output(self, robot: Manipulator, what: str, name: str) -> ca.SX:
         program = general_program(robot, what)
-        values = program.function.call([self._symbols[2], self._symbols[0]])
-        return ca.vec(ca.densify(values[[port.name for port in program.outputs].index(name)]))
+        outputs = program.function.call([self._symbols[2], self._symbols[0]])
+        return ca.vec(ca.densify(outputs[[port.name for port in program.outputs].index(name)]))
 
     def rows(self, geometry: Array, poses: Array, side: float) -> Array:
         """Return the rows (..., R); NaN where a leg does not reach and its joint has no place."""
-        found: Array = self._values(poses, geometry=geometry, side=np.array([side]))
-        return found
+        row_values: Array = self._values(poses, geometry=geometry, side=np.array([side]))
+        return row_values
 
     def slopes(
         self, geometry: Array, poses: Array, side: float, *, by_geometry: bool = False
@@ -98,26 +98,25 @@ class SmoothConditions:
 
     def _kernel(self, target: str, name: str, slopes: int) -> Kernel:
         pose, _, geometry = self._symbols
-        by = (pose, geometry)[:slopes]
-        outputs = [self._rows, *(ca.jacobian(self._rows, symbol) for symbol in by)]
-        dense = ca.cse([ca.densify(output).T for output in outputs])
+        variables = (pose, geometry)[:slopes]
+        outputs = [self._rows, *(ca.jacobian(self._rows, symbol) for symbol in variables)]
+        dense = ca.cse([ca.densify(row).T for row in outputs])
         ports = (
             Port("pose", pose.shape[:1]),
             Port("side", (1,), shared=True),
             Port("geometry", geometry.shape[:1], shared=True),
         )
-        found = tuple(
-            Port(f"out{k}", output.shape if k else output.shape[:1])
-            for k, output in enumerate(outputs)
+        output_ports = tuple(
+            Port(f"out{k}", row.shape if k else row.shape[:1]) for k, row in enumerate(outputs)
         )
-        fixed = {"side": np.ones(1), "geometry": np.zeros(geometry.shape[0])}
+        fixed_inputs = {"side": np.ones(1), "geometry": np.zeros(geometry.shape[0])}
         function = ca.Function(name, list(self._symbols), dense)
-        return TARGETS[target](name, function, ports, found, fixed)
+        return TARGETS[target](name, function, ports, output_ports, fixed_inputs)
 
 
-def smooth_conditions(robot: Manipulator, given: tuple[Condition, ...]) -> SmoothConditions:
+def smooth_conditions(robot: Manipulator, required: tuple[Condition, ...]) -> SmoothConditions:
     """Return the rows of conditions for all machines that have the topology of one."""
-    return _known(bare(robot), given)
+    return _cached_conditions(bare(robot), required)
 
 
-_known = lru_cache(maxsize=16)(SmoothConditions)
+_cached_conditions = lru_cache(maxsize=16)(SmoothConditions)

@@ -32,7 +32,7 @@ _SHARES = 20
 """Most times that the size is made smaller by the tolerance until it is proved, or refused."""
 
 _MOST = math.pi / 2.0
-"""Greatest tilt that is looked at, rad: beyond it the angles of a pose are singular."""
+"""Greatest tilt of the search, rad: beyond it the angles of a pose are singular."""
 
 
 @dataclass(frozen=True)
@@ -169,8 +169,8 @@ def largest_tilt(
     ModelError
         If the platform does not tilt by two angles, or the level pose does not serve.
     """
-    robot, at = _checked(robot, pose)
-    return _largest(robot, at, _MOST, tolerance, given, lambda tilt: (radius, tilt))
+    robot, reference = _expect_tilting(robot, pose)
+    return _largest_region(robot, reference, _MOST, tolerance, given, lambda tilt: (radius, tilt))
 
 
 def largest_ball(
@@ -205,13 +205,13 @@ def largest_ball(
     ModelError
         If the platform does not tilt and move, or the centre does not serve at that tilt.
     """
-    robot, at = _checked(robot, pose)
+    robot, reference = _expect_tilting(robot, pose)
     expect_places(robot, "it only turns")
-    far = sum(leg.size for leg in robot.legs)
-    return _largest(robot, at, far, tolerance, given, lambda radius: (radius, tilt))
+    reach = sum(leg.size for leg in robot.legs)
+    return _largest_region(robot, reference, reach, tolerance, given, lambda radius: (radius, tilt))
 
 
-def _checked(robot: RobotLike, pose: PoseLike) -> tuple[Manipulator, Array]:
+def _expect_tilting(robot: RobotLike, pose: PoseLike) -> tuple[Manipulator, Array]:
     machine = as_manipulator(robot)
     platform = machine.platform
     upright = not platform.second_axis or (
@@ -228,34 +228,36 @@ def _checked(robot: RobotLike, pose: PoseLike) -> tuple[Manipulator, Array]:
     return machine, finite_pose(machine, pose, "pose")
 
 
-def _largest(
+def _largest_region(
     robot: Manipulator,
-    at: Array,
+    reference: Array,
     most: float,
     tolerance: float,
-    given: tuple[Condition, ...] | None,
+    own_conditions: tuple[Condition, ...] | None,
     sizes: Callable[[float], tuple[float, float]],
 ) -> LargestTilt:
     expect_share("tolerance", tolerance)
-    asked = conditions(robot) if given is None else given
+    required = conditions(robot) if own_conditions is None else own_conditions
     angular = np.flatnonzero(robot.platform.angular)
     lengths = tuple(np.flatnonzero(~robot.platform.angular).tolist())
     angles = int(angular[0]), int(angular[1])
 
     def region(size: float) -> TiltedBall:
         radius, tilt = sizes(size)
-        return TiltedBall(tuple(at.tolist()), radius, tilt, lengths, angles)
+        return TiltedBall(tuple(reference.tolist()), radius, tilt, lengths, angles)
 
-    if not keeps(robot, asked, region(0.0).sampled()).all():
+    if not keeps(robot, required, region(0.0).sampled()).all():
         raise ModelError(
             f"not even the middle, pose {region(0.0).sampled()[-1].tolist()}, serves",
             subject=robot.name,
         )
     shares = ((1.0 - tolerance) ** k for k in range(1, _SHARES + 1))
     size, proof = largest_proved(
-        robot, asked, region, lambda size: region(size).sampled(), most, _HALVINGS, shares
+        robot, required, region, lambda size: region(size).sampled(), most, _HALVINGS, shares
     )
     if not proof.holds:
-        raise ModelError(f"nothing is proved about pose {at.tolist()}: {proof}", subject=robot.name)
+        raise ModelError(
+            f"nothing is proved about pose {reference.tolist()}: {proof}", subject=robot.name
+        )
     radius, tilt = sizes(size)
     return LargestTilt(tilt, radius, region(size), proof)

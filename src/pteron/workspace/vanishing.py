@@ -52,23 +52,23 @@ class Vanishing:
         """The function, of pose and roots."""
         return _smooth(self.robot, self.kind, self.leg)
 
-    def absent(self, boxes: Array) -> NDArray[np.bool_]:
+    def proves_absence(self, boxes: Array) -> NDArray[np.bool_]:
         """Return for which boxes (B, 2, m) intervals prove that it vanishes at no pose in reach."""
         squares = bounds(self.robot, "squared_type_i", boxes)["squares"]
-        found = np.asarray((squares.high < 0.0).any(axis=-1))
+        is_absent = np.asarray((squares.high < 0.0).any(axis=-1))
         if self.leg:
-            return found | (squares.low[:, self.leg - 1] > 0.0)
+            return is_absent | (squares.low[:, self.leg - 1] > 0.0)
         for bounds_in in (self._plain_bounds, self.smooth.bounds):
-            left = np.flatnonzero(~found)
-            if len(left):
-                low, high = bounds_in(boxes[left])
-                found[left] = (low > 0.0) | (high < 0.0) | np.isnan(low)
-        return found
+            undecided = np.flatnonzero(~is_absent)
+            if len(undecided):
+                low, high = bounds_in(boxes[undecided])
+                is_absent[undecided] = (low > 0.0) | (high < 0.0) | np.isnan(low)
+        return is_absent
 
     def _plain_bounds(self, boxes: Array) -> tuple[Array, Array]:
         """Return bounds (B,) of the function of the pose alone: narrower where it has slopes."""
-        (value,) = bounds(self.robot, _PROGRAM[self.kind], boxes).values()
-        return value.low, value.high
+        (measure,) = bounds(self.robot, _PROGRAM[self.kind], boxes).values()
+        return measure.low, measure.high
 
 
 class Smooth(NamedTuple):
@@ -107,32 +107,38 @@ def _smooth(robot: Manipulator, kind: Kind, leg: int) -> Smooth:
     graph = graph_of(bounded(robot, _PROGRAM[kind]).function)
     pose = ca.SX.sym("pose", robot.freedom)
     radicands, roots = [], []
-    values: list[ca.SX] = []
+    expressions: list[ca.SX] = []
     lifted: list[bool] = []
     for node in graph.nodes:
         if node.operation == INPUT:
-            values.append(pose[node.arguments[1]])
+            expressions.append(pose[node.arguments[1]])
             lifted.append(False)
             continue
-        parts = [values[k] for k in node.arguments]
+        parts = [expressions[k] for k in node.arguments]
         lifted.append(any(lifted[k] for k in node.arguments))
         if node.operation == "sqrt" and not lifted[-1] and not parts[0].is_constant():
             radicands.append(parts[0])
             roots.append(ca.SX.sym("root"))
-            values.append(roots[-1])
+            expressions.append(roots[-1])
             lifted[-1] = True
         else:
-            values.append(expression(node, parts))
+            expressions.append(expression(node, parts))
     top = graph.outputs[0][max(leg - 1, 0)]
-    value = values[top]
+    numerator = expressions[top]
     while graph.nodes[top].operation == "div":
         top = graph.nodes[top].arguments[0]
-    under, over = ca.vertcat(*radicands), ca.vertcat(*roots)
-    both = ca.vertcat(pose, over)
+    radicand_column, root_column = ca.vertcat(*radicands), ca.vertcat(*roots)
+    variables = ca.vertcat(pose, root_column)
     (squares,) = bounded(robot, "squared_type_i").function.call([pose])
-    whole = ca.vertcat(value, under, ca.vec(squares))
+    outputs = ca.vertcat(numerator, radicand_column, ca.vec(squares))
     return Smooth(
-        Bounded(ca.Function("radicands", [pose], [under]), (Port("radicands", (len(roots),)),)),
-        Bounded(ca.Function("dividend", [both], [values[top]]), (Port("dividend", ()),)),
-        ca.Function("smooth", [pose, over], ca.cse([whole, ca.densify(ca.jacobian(whole, both))])),
+        Bounded(
+            ca.Function("radicands", [pose], [radicand_column]), (Port("radicands", (len(roots),)),)
+        ),
+        Bounded(ca.Function("dividend", [variables], [expressions[top]]), (Port("dividend", ()),)),
+        ca.Function(
+            "smooth",
+            [pose, root_column],
+            ca.cse([outputs, ca.densify(ca.jacobian(outputs, variables))]),
+        ),
     )

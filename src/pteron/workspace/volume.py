@@ -15,7 +15,7 @@ from pteron.kinematics.evaluate import finite_pose
 from pteron.kinematics.sampling import search_ball
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import PoseLike, Seed
-from pteron.workspace.boxes import varied
+from pteron.workspace.boxes import vary_coordinates
 from pteron.workspace.margins import distance_to_limits
 
 _SAMPLES = 20_000
@@ -124,33 +124,38 @@ def bounding_box(robot: RobotLike, pose: PoseLike) -> Array:
            [ 0.3 ,  0.3 ,  0.3 ]])
     """
     robot = as_manipulator(robot)
-    given = finite_pose(robot, pose, "pose")
+    reference = finite_pose(robot, pose, "pose")
     count = len(robot.platform.lengths)
 
     def depths(p: Array) -> Array:
         """Return how far inside every bound positions are, m."""
-        at = varied(given, p)
+        at = vary_coordinates(reference, p)
         limits = distance_to_limits(robot, at)
         return np.concatenate([numeric(robot, "reach")(at)[0], np.minimum(limits, _FAR)], axis=-1)
 
     center, radius = search_ball(robot)
     rng = np.random.default_rng(0)
-    drawn = center + radius * rng.uniform(-1.0, 1.0, (_SAMPLES, count))
-    drawn = np.vstack([drawn, given[:count]])
-    inside = depths(drawn).min(axis=-1)
+    positions = center + radius * rng.uniform(-1.0, 1.0, (_SAMPLES, count))
+    positions = np.vstack([positions, reference[:count]])
+    inside = depths(positions).min(axis=-1)
     # Where next to nothing is in reach, the deepest positions are moved inside first.
-    starts = drawn[np.argsort(-inside)[:_STARTS]]
+    starts = positions[np.argsort(-inside)[:_STARTS]]
     if not (inside > _TOUCH).any():
         starts = np.array([deepest(depths, start) for start in starts])
         starts = starts[depths(starts).min(axis=-1) > _TOUCH]
         if not len(starts):
             raise ModelError(
                 "no position is in reach of all legs, within the joints' limits, at the "
-                f"orientation of pose {given.tolist()}",
+                f"orientation of pose {reference.tolist()}",
                 subject=robot.name,
             )
-    good = np.vstack([drawn[inside > _TOUCH], starts[depths(starts).min(axis=-1) > _TOUCH]])
-    if any((depths(good + way).min(axis=-1) > _TOUCH).any() for way in _far(robot, radius)):
+    inside_positions = np.vstack(
+        [positions[inside > _TOUCH], starts[depths(starts).min(axis=-1) > _TOUCH]]
+    )
+    if any(
+        (depths(inside_positions + way).min(axis=-1) > _TOUCH).any()
+        for way in _endless_translations(robot, radius)
+    ):
         raise ModelError(
             "the reach has no end: the guides let the platform move along them for ever; give the "
             "legs limits",
@@ -160,12 +165,12 @@ def bounding_box(robot: RobotLike, pose: PoseLike) -> Array:
     for axis in range(count):
         for side, sign in enumerate((1.0, -1.0)):
             objective = sign * np.eye(count)[axis]
-            front = _front(depths, good, objective, radius, rng)
+            front = _front(depths, inside_positions, objective, radius, rng)
             sides[side, axis] = sign * min(_furthest(depths, p, objective) for p in front[:_STARTS])
     return sides
 
 
-def _far(robot: Manipulator, size: float) -> Iterator[Array]:
+def _endless_translations(robot: Manipulator, size: float) -> Iterator[Array]:
     """Yield translations along the guides, far longer than the machine."""
     for leg in robot.legs:
         if leg.reach_bound is not None and leg.reach_bound.line is not None:
@@ -175,14 +180,14 @@ def _far(robot: Manipulator, size: float) -> Iterator[Array]:
 
 def deepest(depths: Callable[[Array], Array], start: Array) -> Array:
     """Return a position that is deeper inside every bound, from one that need not be inside."""
-    found = scipy.optimize.minimize(
+    solution = scipy.optimize.minimize(
         lambda v: -v[-1],
         np.append(start, float(depths(start).min())),
         method="SLSQP",
         constraints={"type": "ineq", "fun": lambda v: depths(v[:-1]) - v[-1]},
         options=_OPTIONS,
     )
-    return np.asarray(found.x[:-1])
+    return np.asarray(solution.x[:-1])
 
 
 def _front(
@@ -205,7 +210,7 @@ def _front(
 
 def _furthest(depths: Callable[[Array], Array], start: Array, objective: Array) -> float:
     """Return the least value of objective . p inside every bound, from a position inside."""
-    found = scipy.optimize.minimize(
+    solution = scipy.optimize.minimize(
         lambda p: float(objective @ p),
         start,
         jac=lambda p: objective,
@@ -213,7 +218,7 @@ def _furthest(depths: Callable[[Array], Array], start: Array, objective: Array) 
         constraints={"type": "ineq", "fun": depths},
         options=_OPTIONS,
     )
-    way = start + np.linspace(1.0, 0.0, _BACK)[:, None] * (found.x - start)
+    way = start + np.linspace(1.0, 0.0, _BACK)[:, None] * (solution.x - start)
     inside = depths(way).min(axis=-1) > -_SLACK
     # At the rim of a leg's reach its joint may have no coordinate, and so no limit.
     inside[:-1] &= inside[1:]
@@ -252,12 +257,12 @@ def reach_volume(
     robot = as_manipulator(robot)
     expect(count >= 1, "count", count, "at least 1")
     expect_to_fit("count", count, 4.0 * count * robot.freedom)
-    given = finite_pose(robot, pose, "pose")
-    box = bounding_box(robot, given)
+    reference = finite_pose(robot, pose, "pose")
+    box = bounding_box(robot, reference)
     size = (count, len(box[0]))
-    poses = varied(given, np.random.default_rng(seed).uniform(box[0], box[1], size))
+    poses = vary_coordinates(reference, np.random.default_rng(seed).uniform(box[0], box[1], size))
     margin = numeric(robot, "reach")(poses)[0]
     share = float((np.minimum(margin, distance_to_limits(robot, poses)).min(axis=-1) >= 0.0).mean())
-    whole = float(np.prod(box[1] - box[0]))
-    error = whole * float(np.sqrt(share * (1.0 - share) / count))
-    return ReachVolume(share * whole, error, f"m^{size[1]}", box, count)
+    box_volume = float(np.prod(box[1] - box[0]))
+    error = box_volume * float(np.sqrt(share * (1.0 - share) / count))
+    return ReachVolume(share * box_volume, error, f"m^{size[1]}", box, count)

@@ -29,7 +29,7 @@ from pteron.design.choosing.job_tables import (
 )
 from pteron.design.choosing.known_kinds import KINDS
 from pteron.errors import DataError, shown
-from pteron.toml import read_toml, validated
+from pteron.toml import read_toml, to_model
 
 _ABSENT = "no such file; it should describe what a machine must do"
 """The message where the file is missing."""
@@ -201,6 +201,6 @@ def read_job(path: str | Path) -> Job:
         If it cannot be read, has unknown keys or contradicts itself; all its faults are listed.
     """
     source = shown(str(path), bare=True, longest=1000)
-    job = validated(Job, read_toml(path, DataError, _ABSENT), source, DataError)
+    job = to_model(Job, read_toml(path, DataError, _ABSENT), source, DataError)
     job._folder = Path(path).parent
     return job

@@ -17,7 +17,7 @@ from pteron.kernels import Array
 from pteron.kinematics.sampling import search_ball
 from pteron.manipulator import Manipulator, Radii, load
 from pteron.manipulator.dimensions import Stock, cut_links
-from pteron.toml import told
+from pteron.toml import joined_faults
 from pteron.workspace import home_pose
 
 _POWERS = {"m": 3, "g": 4, "I": 5}
@@ -253,5 +253,5 @@ def fitting_kinds(names: Sequence[str] | None, lengths: int, turn: bool, tilt: b
     if not kinds and not faults:
         faults.append("no kind of machine in the catalog has these freedoms")
     if faults:
-        raise DataError(told(faults))
+        raise DataError(joined_faults(faults))
     return kinds

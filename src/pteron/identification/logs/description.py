@@ -23,7 +23,7 @@ from pteron.errors import DataError, shown
 from pteron.legs.kind import ActuatedJoint
 from pteron.manipulator import Manipulator
 from pteron.tables import Dialect
-from pteron.toml import fault_lines, told
+from pteron.toml import fault_lines, joined_faults
 
 TimeUnit = Literal["s", "ms", "us", "ns", "100 ns"]
 """Units of time stamps."""
@@ -102,7 +102,7 @@ def _raises_data_errors(cls: _Class) -> _Class:
         try:
             checked(self, **dict(zip(names, args, strict=False)), **named)
         except ValidationError as error:
-            raise DataError(told(fault_lines(error, cls)), subject=cls.__name__) from None
+            raise DataError(joined_faults(fault_lines(error, cls)), subject=cls.__name__) from None
 
     cls.__init__ = __init__  # type: ignore[misc]
     return cls

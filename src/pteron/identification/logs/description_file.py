@@ -14,7 +14,7 @@ from pteron.atomic import write_text
 from pteron.errors import DataError, shown
 from pteron.identification.logs.description import Description
 from pteron.legs.kind import ActuatedJoint
-from pteron.toml import read_toml, table_keys, validated
+from pteron.toml import read_toml, table_keys, to_model
 
 _ABSENT = "no such file; it should describe a log"
 """The message where there is no such file."""
@@ -87,7 +87,7 @@ def read_description(path: str | Path) -> Description:
                 flat.setdefault(table, {})[entry] = value
             else:
                 flat[f"{table}.{entry}"] = value
-    return validated(Description, flat, source, DataError)
+    return to_model(Description, flat, source, DataError)
 
 
 def write_description(description: Description, path: str | Path) -> Path:
@@ -175,7 +175,7 @@ def _with(about: Description, added: dict[str, Any]) -> Description:
             tables["csv"] = tables.get("csv", {}) | entries
         else:
             tables |= {f"{table}.{key}": value for key, value in entries.items()}
-    return validated(Description, tables, "", DataError)
+    return to_model(Description, tables, "", DataError)
 
 
 def _plain(about: Description) -> dict[str, Any]:

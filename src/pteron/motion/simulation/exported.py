@@ -73,7 +73,7 @@ class Exported:
             raise DataError(
                 f"controller: {self.controller!r} given, one of pteron.controllers expected"
             )
-        object.__setattr__(self, "_text", self._read())
+        object.__setattr__(self, "_text", self._read_code())
 
     @property
     def period(self) -> float:
@@ -82,60 +82,67 @@ class Exported:
 
     def law(self, model: RobotLike) -> ExportedLaw | ExportedCustomLaw:
         """Return its law, which runs in the loop alone."""
-        law, what = self.controller.law(model), self.controller.what
+        plain_law, what = self.controller.law(model), self.controller.what
         header, source, function = self._text  # type: ignore[attr-defined]
         tables = []
-        for port in law.program.inputs:
+        for port in plain_law.program.inputs:
             if port.shared:
                 stem = function.removesuffix(what)
                 names = (f"{function}_{port.name}", f"{stem}{port.name}")
-                matching = [n for n in names if re.search(rf"extern const double {n}\[", header)]
-                if not matching:
+                names_there = [
+                    name for name in names if re.search(rf"extern const double {name}\[", header)
+                ]
+                if not names_there:
                     raise DataError(
                         f"{self.folder}: no table {names[1]} there; export the controller without "
                         "--specialised, for this machine"
                     )
-                size = int(re.search(rf"{matching[0]}\[(\d+)\]", header)[1])  # type: ignore[index]
+                size = int(re.search(rf"{names_there[0]}\[(\d+)\]", header)[1])  # type: ignore[index]
                 if size != port.size:
                     raise DataError(
-                        f"{self.folder}: {matching[0]} has {size} numbers, {port.size} expected; "
-                        "export the controller for this machine"
+                        f"{self.folder}: {names_there[0]} has {size} numbers, {port.size} "
+                        "expected; export the controller for this machine"
                     )
-                tables.append((port.name, matching[0]))
-                self._expect_period(source, matching[0])
-        zeros, scales = reading_zeros(law.model).tolist(), reading_scales(law.model).tolist()
+                tables.append((port.name, names_there[0]))
+                self._expect_period(source, names_there[0])
+        zeros, scales = (
+            reading_zeros(plain_law.model).tolist(),
+            reading_scales(plain_law.model).tolist(),
+        )
         linked = LinkedLaw(header + source, function, tuple(tables), tuple(zeros), tuple(scales))
-        if isinstance(law, CustomLaw):
-            return ExportedCustomLaw(law.controller, law.model, linked)
-        return ExportedLaw(law.what, law.model, law.gains, law.base, linked)
+        if isinstance(plain_law, CustomLaw):
+            return ExportedCustomLaw(plain_law.controller, plain_law.model, linked)
+        return ExportedLaw(plain_law.what, plain_law.model, plain_law.gains, plain_law.base, linked)
 
     def _expect_period(self, source: str, table: str) -> None:
         """Refuse gains that are for another period."""
-        match = re.search(rf"\b{table}\[\d+\] = {{[^}}]*?([-+.\w]+),?\s*/\* period \*/", source)
-        if match and abs(float(match[1]) - self.period) > _SAME * self.period:
+        period_match = re.search(
+            rf"\b{table}\[\d+\] = {{[^}}]*?([-+.\w]+),?\s*/\* period \*/", source
+        )
+        if period_match and abs(float(period_match[1]) - self.period) > _SAME * self.period:
             raise DataError(
-                f"{self.folder}: {table} is for a period of {float(match[1]):g} s, the "
+                f"{self.folder}: {table} is for a period of {float(period_match[1]):g} s, the "
                 f"controller's is {self.period:g} s; export it again, or give the controller that "
                 "period"
             )
 
-    def _read(self) -> tuple[str, str, str]:
+    def _read_code(self) -> tuple[str, str, str]:
         """Return header and source, without the line that includes it, and the function."""
         what = self.controller.what
         for path in sorted(Path(self.folder).glob("*.h")):
             header = path.read_text(encoding="utf-8")
-            declaration = re.search(rf"\bint (\w+_{what})\((\w+ )*(double|float)", header)
-            if declaration and path.with_suffix(".c").exists():
-                if declaration[3] == "float":
+            signature = re.search(rf"\bint (\w+_{what})\((\w+ )*(double|float)", header)
+            if signature and path.with_suffix(".c").exists():
+                if signature[3] == "float":
                     raise DataError(
                         f'{path}: numbers of single precision; export with real="double"'
                     )
-                if not re.search(rf"{declaration[1]}\([^)]*\bforces\b", header):
+                if not re.search(rf"{signature[1]}\([^)]*\bforces\b", header):
                     raise DataError(
                         f'{path}: {what} gives commands of the motors; export with output="force"'
                     )
                 source = path.with_suffix(".c").read_text(encoding="utf-8")
-                return header, re.sub(r'#include "[^"]*"', "", source), declaration[1]
+                return header, re.sub(r'#include "[^"]*"', "", source), signature[1]
         raise DataError(
             f"{self.folder}: no C of {what} there; write it with pteron.export_c(robot, "
             "[controller], folder)"

@@ -15,22 +15,22 @@ from pteron.errors import DataError, shown
 from pteron.kernels import Array, Program, as_array
 from pteron.kernels.loops import Loop, loop, machine_numbers
 from pteron.manipulator import Manipulator
-from pteron.motion.motion import Motion, told_pose
+from pteron.motion.motion import Motion, pose_text
 from pteron.motion.simulation.exported import ExportedCustomLaw, ExportedLaw
-from pteron.motion.simulation.given import given_forces
+from pteron.motion.simulation.motor_forces import motor_forces
 from pteron.motion.simulation.plant import Adaptive, Method, motor_states
 from pteron.motion.simulation.sensors import (
     Sensors,
     encoder_arrays,
     encoder_noise,
-    expect_sensed,
+    expect_encoders,
 )
 from pteron.motion.simulation.simulation import Simulation
 from pteron.motion.simulation.stops import (
     first_beyond_limits,
     first_singular,
-    told_limit,
-    told_singular,
+    limit_text,
+    singularity_text,
     why_not_further,
 )
 from pteron.motion.trajectories.limits import limits_of
@@ -39,7 +39,7 @@ _WHOLE = 1e-9
 """Part of a sample, from rounding, by which a delay of whole samples may miss them."""
 
 _ASKED, _MOVED = 1.0, 2.0
-"""Why a run ended: no forces were asked for, or the machine could not go on."""
+"""Fault codes of a run: no force command, or the state could not be integrated further."""
 
 
 @runtime_checkable
@@ -98,29 +98,35 @@ class Timing:
     sensing: float = 0.0
 
     def parts(self, period: float, samples: int) -> tuple[list[float], list[int]]:
-        """Return what `pteron.kernels.loops.Loop.run` takes: times and counts, without the last."""
-        (late, late_samples), (old, behind) = (
-            divided(min(delay, period * samples), period)  # later than the end is never
+        """Return times and counts for `pteron.kernels.loops.Loop.run`, all but the last counts."""
+        (late, late_samples), (reading_age, old_samples) = (
+            split_delay(min(delay, period * samples), period)  # later than the end is never
             for delay in (self.delay, self.sensing)
         )
-        look = period - old
-        look = late if abs(look - late) < _WHOLE * period else look
-        bounds = [0.0, min(late, look), max(late, look), period]
+        reading_time = period - reading_age
+        reading_time = late if abs(reading_time - late) < _WHOLE * period else reading_time
+        bounds = [0.0, min(late, reading_time), max(late, reading_time), period]
         spans, step = np.diff(bounds), min(self.step, period)
         counts = [int(np.ceil(span / step - _WHOLE)) for span in spans]
         lengths = [float(span) / max(n, 1) for span, n in zip(spans, counts, strict=True)]
-        command_part = 0 if late == 0.0 else 2 if late > look else 1
-        return [*lengths, period], [*counts, command_part, int(look > late), late_samples, behind]
+        force_span = 0 if late == 0.0 else 2 if late > reading_time else 1
+        return [*lengths, period], [
+            *counts,
+            force_span,
+            int(reading_time > late),
+            late_samples,
+            old_samples,
+        ]
 
 
-def divided(delay: float, period: float) -> tuple[float, int]:
+def split_delay(delay: float, period: float) -> tuple[float, int]:
     """Return a delay's part of a sample, and its whole samples."""
     samples = int(delay / period + _WHOLE)
     part = max(delay - samples * period, 0.0)
     return (part if part > _WHOLE * period else 0.0), samples
 
 
-def run(
+def run_simulation(
     robot: Manipulator,
     start: tuple[Array, Array],
     reference: Motion,
@@ -135,132 +141,133 @@ def run(
 
     The source of forces is a controller's law, or forces at each sample.
     """
-    memories = [np.empty(0) if isinstance(source, np.ndarray) else source.memory(*start)]
-    ask = None
-    if isinstance(source, ControlLaw) and not isinstance(source, ProgramLaw):
-        ask = _callback(source, reference, robot.joint_count, memories)
-    arrays, samples = _run_loop(robot, start, reference, source, loads, sensors, timing, ask)
-    done = int(arrays["done"].item())
-    columns = _columns(robot, {name: array[0, :done] for name, array in samples.items()})
-    end, why = done, _fault_words(robot, arrays, columns["joints"], python=ask is not None)
-    if limits:
-        beyond, reason = _first_failure(robot, columns["pose"], columns["joints"])
-        end, why = (end, why) if beyond is None else (beyond + 1, reason)
+    time, m, n = reference.time, robot.freedom, robot.joint_count
+    count, period = len(time), float(time[1] - time[0])
+    times, counts = timing.parts(period, count)
+    linked = source.linked if isinstance(source, ExportedLaw | ExportedCustomLaw) else None
+    law = source if isinstance(source, ProgramLaw) else None
+    if law is not None:
+        expect_encoders(robot, law.program)
+    simulator = loop(robot, None if law is None else law.program, linked)
+    memory = np.empty(0) if isinstance(source, np.ndarray) else source.memory(*start)
+    arrays = loop_arrays(simulator, robot, start, reference, law, sensors, counts)
+    arrays |= {"wrench": loads.wrench[None], **encoder_noise(sensors, robot, count)}
+    if isinstance(source, np.ndarray):
+        arrays["given"] = source[None]
+    memory_size = arrays["memory"].shape[2]
+    sizes = {"states": arrays["state"].shape[2], "acceleration": m, "memories": memory_size}
+    sizes |= dict.fromkeys(("joints", "rates", "forces", "asked"), n)
+    outputs = {name: np.full((1, count, size), np.nan) for name, size in sizes.items()}
     if timing.method == "dop853":
-        columns["acceleration"] = _accelerations(
-            loads, columns["pose"], columns["velocity"], columns["forces"]
-        )
+        if linked is not None:
+            raise DataError('method: "dop853" given, but a controller\'s C runs with "rk4" alone')
+        del outputs["acceleration"]
+    ask, memories = None, [memory]
+    if isinstance(source, ControlLaw) and law is None:
+        ask = _callback(source, reference, n, memories)
+    _run_segments(simulator, arrays, outputs, loads, timing, times, counts, ask)
+    end = int(arrays["done"].item())
+    columns = _simulation_columns(robot, {name: array[0, :end] for name, array in outputs.items()})
+    why = _fault_text(robot, arrays, columns["joints"], has_callback=ask is not None)
+    if limits and (stop := _limit_stop(robot, columns["pose"], columns["joints"])) is not None:
+        end, why = stop
+    clock = float(arrays["clock"].item())
+    stopped = None if why is None else f"at {min(clock, time[end - 1]):.4g} s: {why}"
+    if timing.method == "dop853":
+        state = columns["pose"], columns["velocity"]
+        columns["acceleration"] = _accelerations(loads, *state, columns["forces"])
     columns = {name: column[:end] for name, column in columns.items()}
     if ask is not None:
         columns["memory"] = np.array(memories[1 : end + 1])
-    time, clock = reference.time, float(arrays["clock"].item())
     return Simulation(
         robot,
         time[:end],
         reference=Motion(*(getattr(reference, field.name)[:end] for field in fields(Motion))),
         payload=loads.masses[:end],
-        step=min(timing.step, float(time[1] - time[0])) if timing.method == "rk4" else np.nan,
-        stopped=None if why is None else f"at {min(clock, time[end - 1]):.4g} s: {why}",
+        step=min(timing.step, period) if timing.method == "rk4" else float("nan"),
+        stopped=stopped,
         **columns,
     )
 
 
-def _run_loop(
-    robot: Manipulator,
-    start: tuple[Array, Array],
-    reference: Motion,
-    source: ControlLaw | ProgramLaw | Array,
+def _run_segments(
+    simulator: Loop,
+    arrays: dict[str, Array],
+    outputs: dict[str, Array],
     loads: Loads,
-    sensors: Sensors,
     timing: Timing,
+    times: list[float],
+    counts: list[int],
     ask: Callable[[int, int, Array], Array] | None,
-) -> tuple[dict[str, Array], dict[str, Array]]:
-    """Return the loop's arrays when it has run, and its samples (1, T, ...) by name."""
-    count, period = len(reference.time), float(reference.time[1] - reference.time[0])
-    times, counts = timing.parts(period, count)
-    linked = source.linked if isinstance(source, ExportedLaw | ExportedCustomLaw) else None
-    law = source if isinstance(source, ProgramLaw) else None
-    if law is not None:
-        expect_sensed(robot, law.program)
-    if timing.method == "dop853" and linked is not None:
-        raise DataError('method: "dop853" given, but a controller\'s C runs with "rk4" alone')
-    control_loop = loop(robot, None if law is None else law.program, linked)
-    arrays = loop_arrays(control_loop, robot, start, reference, law, sensors, counts)
-    arrays |= {"wrench": loads.wrench[None], **encoder_noise(sensors, robot, count)}
-    if isinstance(source, np.ndarray):
-        arrays["given"] = source[None]
-    sizes = {"states": arrays["state"].shape[2], "memories": arrays["memory"].shape[2]}
-    if timing.method == "rk4":
-        sizes["acceleration"] = robot.freedom
-    sizes |= dict.fromkeys(("joints", "rates", "forces", "asked"), robot.joint_count)
-    samples = {name: np.full((1, count, size), np.nan) for name, size in sizes.items()}
-    # A stretch of samples for each mass that is carried.
+) -> None:
+    """Run the loop with the machine of each payload in turn; it fills `outputs`."""
+    count = len(loads.masses)
     changes = np.flatnonzero(np.diff(loads.masses)) + 1
     for first, stop in pairwise([0, *changes.tolist(), count]):
-        loaded = loads.machines[float(loads.masses[first])]
-        stretch = arrays | machine_numbers(loaded, control_loop.plant, "plant") | samples
-        stretch |= {
-            name: stretch[name][:, first:stop]
-            for name in (*samples, "reference", "given", "noise", "wrench")
-            if stretch[name].shape[1] > 1
+        machine = loads.machines[float(loads.masses[first])]
+        inputs = arrays | machine_numbers(machine, simulator.plant, "plant") | outputs
+        inputs |= {
+            name: inputs[name][:, first:stop]
+            for name in (*outputs, "reference", "given", "noise", "wrench")
+            if inputs[name].shape[1] > 1
         }
-        go = Adaptive(loaded, timing.tolerance).go if timing.method == "dop853" else None
-        indices = [*counts, first, int(stop == count)]
-        control_loop.run(stretch, stop - first, times, indices, ask, go=go)
+        advance_state = (
+            Adaptive(machine, timing.tolerance).go if timing.method == "dop853" else None
+        )
+        call_counts = [*counts, first, int(stop == count)]
+        simulator.run(inputs, stop - first, times, call_counts, ask, go=advance_state)
         if arrays["fault"].any():
-            break
-    return arrays, samples
+            return
 
 
-def _columns(robot: Manipulator, samples: dict[str, Array]) -> dict[str, Array]:
-    """Return samples (T, ...) as a simulation names them, motors' coordinates and forces too."""
-    kind, columns = DriveKind.from_robot(robot), dict(samples)
+def _simulation_columns(robot: Manipulator, columns: dict[str, Array]) -> dict[str, Array]:
+    """Return the columns of a `Simulation` from the outputs of a loop, a row for each sample."""
+    kind = DriveKind.from_robot(robot)
     parts = kind.parts(columns.pop("states"))
     columns |= {"pose": parts["pose"], "velocity": parts["velocity"]}
     columns |= {"memory": columns.pop("memories"), "joint_rates": columns.pop("rates")}
     for name, motor in (("joints", "motor"), ("joint_rates", "motor_rate")):
-        joints = columns[name]
+        readings = columns[name]
         columns[f"{motor}s"] = (
-            np.where(kind.elastic, parts[motor], joints) if kind.bends else joints
+            np.where(kind.elastic, parts[motor], readings) if kind.bends else readings
         )
-    columns["forces"] = given_forces(
+    columns["forces"] = motor_forces(
         robot, columns["forces"], columns["motor_rates"], parts.get("current")
     )
     return columns
 
 
-def _fault_words(
-    robot: Manipulator, arrays: dict[str, Array], joints: Array, *, python: bool
+def _fault_text(
+    robot: Manipulator, arrays: dict[str, Array], joints: Array, *, has_callback: bool
 ) -> str | None:
-    """Return why the loop ended before its time; None if it did not."""
-    fault = arrays["fault"].item()
-    if fault == _ASKED and python:
+    """Return why a loop ended before its time, None if it did not."""
+    fault, m = arrays["fault"].item(), robot.freedom
+    if fault == _ASKED and has_callback:
         return "no forces are asked for: the controller returns some that are not finite numbers"
     if fault == _ASKED:
         return (
-            f"no forces are asked for at the joints {told_pose(joints[-1])}: they have no pose "
+            f"no forces are asked for at the joints {pose_text(joints[-1])}: they have no pose "
             "near the last one, or the wanted pose is out of the controller's reach"
         )
     if fault == _MOVED:
-        m = robot.freedom
         return why_not_further(robot, *np.split(arrays["state"].ravel(), [m, 2 * m])[:2])
     return None
 
 
-def _first_failure(
-    robot: Manipulator, poses: Array, joints: Array
-) -> tuple[int | None, str | None]:
-    """Return the first sample beyond joints' limits or a singularity, and the reason."""
-    failures = {
-        first_beyond_limits(robot, poses, joints): told_limit,
-        first_singular(robot, poses): told_singular,
+def _limit_stop(robot: Manipulator, pose: Array, joints: Array) -> tuple[int, str] | None:
+    """Return the number of samples up to the first limit or singularity, and its text."""
+    ends = {
+        first_beyond_limits(robot, pose, joints): limit_text,
+        first_singular(robot, pose): singularity_text,
     }
-    first = min((k for k in failures if k is not None), default=None)
-    return first, None if first is None else failures[first](robot, poses[first])
+    end_sample = min((k for k in ends if k is not None), default=None)
+    if end_sample is None:
+        return None
+    return end_sample + 1, ends[end_sample](robot, pose[end_sample])
 
 
 def loop_arrays(
-    control_loop: Loop,
+    simulator: Loop,
     robot: Manipulator,
     start: tuple[Array, Array],
     reference: Motion,
@@ -268,7 +275,7 @@ def loop_arrays(
     sensors: Sensors,
     counts: Sequence[int],
 ) -> dict[str, Array]:
-    """Return what a loop's `run` takes of a machine under a law, or without.
+    """Return the arrays for a loop's `run` of a machine, with a control law or without.
 
     `counts` are those of `Timing.parts`.
     """
@@ -276,8 +283,8 @@ def loop_arrays(
     parts = reference.pose, reference.velocity, reference.acceleration
     state = dict(zip(("pose", "velocity"), start, strict=True))
     state |= motor_states(robot, *start, reference.acceleration[0])
-    begun = np.concatenate(list(state.values())).reshape(1, 1, -1)
-    arrays = control_loop.idle(robot, begun, *counts[-2:])
+    initial_state = np.concatenate(list(state.values())).reshape(1, 1, -1)
+    arrays = simulator.idle(robot, initial_state, *counts[-2:])
     arrays |= {
         "most": limits_of(robot).force.reshape(1, 1, -1),
         "reference": np.hstack(parts)[None],
@@ -291,7 +298,7 @@ def loop_arrays(
 def _callback(
     law: ControlLaw, reference: Motion, joints: int, memories: list[Array]
 ) -> Callable[[int, int, Array], Array]:
-    """Return what asks a controller in Python; `memories` grows by its memory."""
+    """Return the callback that evaluates a controller in Python and appends to `memories`."""
 
     def ask(_: int, sample: int, measured: Array) -> Array:
         parts = reference.pose, reference.velocity, reference.acceleration
@@ -316,8 +323,8 @@ def _callback(
 def _accelerations(loads: Loads, pose: Array, velocity: Array, forces: Array) -> Array:
     """Return the accelerations of states whose friction is smooth."""
     accelerations, masses = np.empty_like(pose), loads.masses[: len(pose)]
-    for mass, loaded in loads.machines.items():
-        at: Any = masses == mass
-        states = pose[at], velocity[at], forces[at], loads.wrench[: len(pose)][at]
-        accelerations[at] = drive_accelerations(loaded, *states, on_failure="nan")
+    for mass, machine in loads.machines.items():
+        chosen: Any = masses == mass
+        states = pose[chosen], velocity[chosen], forces[chosen], loads.wrench[: len(pose)][chosen]
+        accelerations[chosen] = drive_accelerations(machine, *states, on_failure="nan")
     return accelerations

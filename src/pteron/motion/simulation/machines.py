@@ -78,18 +78,19 @@ class Machines:
         least = np.full(array.shape[-1], 0.0 if name == "payload" else -np.inf)
         if name == "parameters":
             columns = parameter_names(self.robot)
-            positive = [data.kind in _POSITIVE for data in parameter_data(self.robot)]
+            positive = [parameter.kind in _POSITIVE for parameter in parameter_data(self.robot)]
             least[positive] = 0.0
         elif name == "drives":
             columns = drive_names(self.robot)
             least[[not column.startswith("offset_") for column in columns]] = 0.0
         wrong = ~(np.isfinite(array) & (array >= least))
         if wrong.any():
-            at = tuple(np.argwhere(wrong)[0].tolist())
-            which = f", {columns[at[1]]}" if columns else ""
-            expected = "0 or more" if least[at[-1]] == 0.0 else "a finite number"
+            position = tuple(np.argwhere(wrong)[0].tolist())
+            which = f", {columns[position[1]]}" if columns else ""
+            expected = "0 or more" if least[position[-1]] == 0.0 else "a finite number"
             raise DataError(
-                f"{name}: machine {at[0]}{which}: {array[at]:g} given, {expected} expected"
+                f"{name}: machine {position[0]}{which}: {array[position]:g} given, {expected} "
+                "expected"
             )
 
     def __len__(self) -> int:
@@ -99,8 +100,8 @@ class Machines:
     def loaded(self) -> Array:
         """Inertial parameters with the payload, (B, N)."""
         robot = self.robot
-        per_kilogram = parameters(with_payload(robot, 1.0)) - parameters(robot)
-        return self.parameters + self.payload[:, None] * per_kilogram
+        unit_payload = parameters(with_payload(robot, 1.0)) - parameters(robot)
+        return self.parameters + self.payload[:, None] * unit_payload
 
     def rows(self, chosen: slice) -> Machines:
         """Return some of them."""
@@ -112,10 +113,10 @@ class Machines:
     @property
     def numbers(self) -> dict[str, Array]:
         """Their numbers as `pteron.kernels.loops.Loop.run` takes them."""
-        arrays = {"plant_parameters": self.loaded, "plant_drives": self.drives}
+        plant_numbers = {"plant_parameters": self.loaded, "plant_drives": self.drives}
         if self.geometry is not None:
-            arrays |= dict.fromkeys(("plant_geometry", "sensed_geometry"), self.geometry)
-        return {name: np.ascontiguousarray(rows[:, None]) for name, rows in arrays.items()}
+            plant_numbers |= dict.fromkeys(("plant_geometry", "sensed_geometry"), self.geometry)
+        return {name: np.ascontiguousarray(rows[:, None]) for name, rows in plant_numbers.items()}
 
 
 def machines_about(
@@ -178,7 +179,7 @@ def machines_about(
     least, most = as_array(payload, "payload", (2,))
     if not 0.0 <= least <= most < np.inf:
         raise DataError(f"payload: {payload!r} given, least and most expected, 0 kg or more")
-    bodies = [(data.body, data.legs) for data in parameter_data(robot)]
+    bodies = [(parameter.body, parameter.legs) for parameter in parameter_data(robot)]
     place = [list(dict.fromkeys(bodies)).index(body) for body in bodies]
     names, n = Drives._fields, robot.joint_count
     sizes = {"coulomb": friction, "stribeck": friction, "viscous": friction, "inertia": rotors}
@@ -189,15 +190,17 @@ def machines_about(
     changes = variations(robot) if lengths or directions else ()
     ends = np.cumsum([total, len(names) * n, 1, len(changes)])
     every = [np.random.default_rng((seed, i)).uniform(-1.0, 1.0, ends[-1]) for i in range(count)]
-    bodies_drawn, drawn, carried, off = np.split(np.stack(every), ends[:-1], axis=1)
-    drives = drawn.reshape(count, len(names), n)[:, rows]
+    body_factors, drive_factors, payload_factors, geometry_factors = np.split(
+        np.stack(every), ends[:-1], axis=1
+    )
+    drives = drive_factors.reshape(count, len(names), n)[:, rows]
     sizes_off = np.array(
         [directions if change.group == "directions" else lengths for change in changes]
     )
     return Machines(
         robot,
-        parameters(robot) * (1.0 + masses * bodies_drawn[:, place]),
+        parameters(robot) * (1.0 + masses * body_factors[:, place]),
         drive_numbers(robot) * (1.0 + scales * drives).reshape(count, -1),
-        least + (most - least) * (0.5 + 0.5 * carried[:, 0]),
-        varied_numbers(robot, changes, sizes_off * off) if changes else None,
+        least + (most - least) * (0.5 + 0.5 * payload_factors[:, 0]),
+        varied_numbers(robot, changes, sizes_off * geometry_factors) if changes else None,
     )

@@ -17,16 +17,16 @@ from pteron.kernels.loop_code import STATE
 from pteron.kernels.loops import Loop, loop
 from pteron.kernels.samples import Evaluated
 from pteron.kinematics import inverse_kinematics
-from pteron.manipulator import RobotLike, as_manipulator
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.motion import Motion
-from pteron.motion.simulation.given import given_forces
 from pteron.motion.simulation.loop import Timing, loop_arrays
 from pteron.motion.simulation.machines import Machines
+from pteron.motion.simulation.motor_forces import motor_forces
 from pteron.motion.simulation.sensors import (
     Sensors,
     encoder_memory,
     encoder_noise,
-    expect_sensed,
+    expect_encoders,
 )
 from pteron.motion.simulation.simulate import STEP, check_delay, check_positive, reference_of
 from pteron.motion.simulation.stable_steps import allowed_step
@@ -142,126 +142,121 @@ def simulate_many(
     <Batch of 2 'tripteron': 0 ended early>
     """
     robot = machines.robot
+    _expect_own_controller(controller)
+    check_delay(delay)
+    check_positive(step=step)
+    sensors = sensors or Sensors()
+    reference = reference_of(robot, motion, None, duration, controller.period)
+    count, n = len(reference.time), robot.joint_count
+    about = reference.pose[:: max(1, count // 64)]
+    length = allowed_step(robot, about, step, usual=step == STEP, machines=machines)
+    sensing = sensors.delay + sensors.samples * controller.period
+    timing = Timing(delay, "rk4", length, 1e-10, sensing)
+    times, counts = timing.parts(controller.period, count)
+    law = controller.law(robot if model is None else as_manipulator(model))
+    expect_encoders(robot, law.program)
+    simulator = loop(robot, law.program, general=machines.geometry is not None)
+    initial_state = reference.pose[0], reference.velocity[0]
+    shared_arrays = loop_arrays(simulator, robot, initial_state, reference, law, sensors, counts)
+    folder = None if out is None else _make_empty_folder(out)
+    sizes = {"states": shared_arrays["state"].shape[2], "joints": n, "rates": n, "forces": n}
+    size, files = max(8, _ROWS // count // 8 * 8), list[Path]()
+    statistics: list[dict[str, Array]] = []
+    for start in range(0, len(machines), size):
+        group = machines.rows(slice(start, start + size))
+        noise = encoder_noise(sensors, robot, count, range(start, start + len(group)))
+        arrays = _group_arrays(simulator, group, shared_arrays | noise, controller.period)
+        samples = {name: np.full((len(group), count, k), np.nan) for name, k in sizes.items()}
+        simulator.run(arrays | samples, count, times, [*counts, 0, 1], threads=threads)
+        ended = np.arange(count) >= arrays["done"][:, 0]
+        _limit_forces(simulator, robot, samples)
+        statistics.append(_group_statistics(samples, arrays, reference.pose, ended))
+        if folder is not None:
+            table = _table(machines, start, reference.time, samples, ~ended)
+            files.append(_write_samples(folder, start, table))
+    columns = {
+        name: np.concatenate([figures[name] for figures in statistics]) for name in statistics[0]
+    }
+    return Batch(
+        machines,
+        columns["done"].astype(np.int64),
+        columns["rms"],
+        columns["most"],
+        columns["force"],
+        np.array(_WHY)[columns["fault"].astype(int)],
+        tuple(files),
+    )
+
+
+def _expect_own_controller(controller: object) -> None:
+    """Refuse a controller that is none of Pteron's, whose law is no program."""
     if not isinstance(controller, Controller | Custom):
         raise DataError(
             f"controller: {controller!r} given, one of pteron.controllers expected: `simulate` "
             "takes others"
         )
-    check_delay(delay)
-    check_positive(step=step)
-    sensors = sensors or Sensors()
-    sensing = sensors.delay + sensors.samples * controller.period
-    reference = reference_of(robot, motion, None, duration, controller.period)
-    count = len(reference.time)
-    about = reference.pose[:: max(1, count // 64)]
-    length = allowed_step(robot, about, step, usual=step == STEP, machines=machines)
-    timing = Timing(delay, "rk4", length, 1e-10, sensing)
-    law = controller.law(robot if model is None else as_manipulator(model))
-    expect_sensed(robot, law.program)
-    control_loop = loop(robot, law.program, general=machines.geometry is not None)
-    _, counts = timing.parts(controller.period, count)
-    start = reference.pose[0], reference.velocity[0]
-    arrays = loop_arrays(control_loop, robot, start, reference, law, sensors, counts)
-    course = _Course(control_loop, reference, sensors, timing, controller.period, arrays)
-    folder = None if out is None else _empty(out)
-    size, files = max(8, _ROWS // count // 8 * 8), list[Path]()
-    figures: list[dict[str, Array]] = []
-    for first in range(0, len(machines), size):
-        part = machines.rows(slice(first, first + size))
-        part_figures, samples, reached = course.simulated(part, first, threads)
-        figures.append(part_figures)
-        if folder is not None:
-            files.append(folder / f"machines-{first:08d}.parquet")
-            table = _table(machines, first, reference.time, samples, reached)
-            # Noisy floats hardly shrink: lz4 takes half the time of the usual zstd.
-            table.write_parquet(files[-1], compression="lz4")
-    every = {name: np.concatenate([part[name] for part in figures]) for name in figures[0]}
-    return Batch(
-        machines,
-        every["done"].astype(np.int64),
-        every["rms"],
-        every["most"],
-        every["force"],
-        np.array(_WHY)[every["fault"].astype(int)],
-        tuple(files),
-    )
 
 
-@dataclass(frozen=True)
-class _Course:
-    """What all machines of a batch follow, and the loop that simulates them.
-
-    `arrays` are those of a single machine.
-    """
-
-    loop: Loop
-    reference: Motion
-    sensors: Sensors
-    timing: Timing
-    period: float
-    arrays: dict[str, Array]
-
-    def simulated(
-        self, part: Machines, first: int, threads: Workers
-    ) -> tuple[dict[str, Array], dict[str, Array], NDArray[np.bool_]]:
-        """Return figures of some machines, their samples (B, T, ...), and which are reached (B, T).
-
-        `first` is the number of the first of them in the batch.
-        """
-        robot, count = part.robot, len(self.reference.time)
-        m, n = robot.freedom, robot.joint_count
-        arrays = self.arrays | part.numbers
-        arrays |= encoder_noise(self.sensors, robot, count, range(first, first + len(part)))
-        arrays |= {name: np.repeat(self.arrays[name], len(part), axis=0) for name in STATE}
-        if part.geometry is not None:
-            arrays |= _begun(self.loop, part, arrays, self.period)
-        sizes = {"states": arrays["state"].shape[2], "joints": n, "rates": n, "forces": n}
-        samples = {name: np.full((len(part), count, k), np.nan) for name, k in sizes.items()}
-        times, counts = self.timing.parts(self.period, count)
-        self.loop.run(arrays | samples, count, times, [*counts, 0, 1], threads=threads)
-        done = arrays["done"][:, 0]
-        reached = np.arange(count) < done
-        error = samples["states"][..., :m] - self.reference.pose
-        error[~reached] = np.nan
-        # Of a machine that came to nothing all are NaN.
-        came = np.where(done[:, 0] > 0.0, done[:, 0], np.nan)
-        rates, parts = samples["rates"], self.loop.kind.parts(samples["states"])
-        if self.loop.kind.bends:
-            rates = np.where(self.loop.kind.elastic, parts["motor_rate"], rates)
-        samples["forces"] = given_forces(robot, samples["forces"], rates, parts.get("current"))
-        force = np.abs(samples["forces"])
-        force[~reached] = np.nan
-        figures = {
-            "done": done[:, 0],
-            "fault": arrays["fault"][:, 0, 0],
-            "rms": np.sqrt(np.nansum(error**2, axis=1) / came[:, None]),
-            "most": np.fmax.reduce(np.abs(error), axis=1),
-            "force": np.fmax.reduce(force, axis=1),
-        }
-        return figures, samples, reached
+def _group_arrays(
+    simulator: Loop, group: Machines, shared_arrays: dict[str, Array], period: float
+) -> dict[str, Array]:
+    """Return a loop's arrays for a group of machines, from those of the nominal machine."""
+    arrays = shared_arrays | group.numbers
+    arrays |= {name: np.repeat(shared_arrays[name], len(group), axis=0) for name in STATE}
+    if group.geometry is not None:
+        arrays |= _start_arrays(simulator, group, arrays, period)
+    return arrays
 
 
-def _begun(
-    control_loop: Loop, part: Machines, arrays: dict[str, Array], period: float
+def _limit_forces(simulator: Loop, robot: Manipulator, samples: dict[str, Array]) -> None:
+    """Replace the commanded forces in samples by the motors' forces."""
+    rates, parts = samples["rates"], simulator.kind.parts(samples["states"])
+    if simulator.kind.bends:
+        rates = np.where(simulator.kind.elastic, parts["motor_rate"], rates)
+    samples["forces"] = motor_forces(robot, samples["forces"], rates, parts.get("current"))
+
+
+def _group_statistics(
+    samples: dict[str, Array], arrays: dict[str, Array], reference: Array, ended: NDArray[np.bool_]
+) -> dict[str, Array]:
+    """Return the figures of a group of machines, by name; `ended` marks samples after its end."""
+    error = samples["states"][..., : reference.shape[-1]] - reference
+    error[ended] = np.nan
+    force = np.abs(samples["forces"])
+    force[ended] = np.nan
+    done = arrays["done"][:, 0, 0]
+    # Of a machine that came to nothing all are NaN.
+    counted = np.where(done > 0.0, done, np.nan)
+    return {
+        "done": done,
+        "fault": arrays["fault"][:, 0, 0],
+        "rms": np.sqrt(np.nansum(error**2, axis=1) / counted[:, None]),
+        "most": np.fmax.reduce(np.abs(error), axis=1),
+        "force": np.fmax.reduce(force, axis=1),
+    }
+
+
+def _start_arrays(
+    simulator: Loop, group: Machines, arrays: dict[str, Array], period: float
 ) -> dict[str, Array]:
     """Return encoders and motors of machines whose joints, in one pose, are their own."""
-    robot, state = part.robot, arrays["state"].copy()
+    robot, state = group.robot, arrays["state"].copy()
     m, n = robot.freedom, robot.joint_count
     motion = {"pose": state[:, 0, :m], "velocity": state[:, 0, m : 2 * m]}
-    sensed = Evaluated("sensed", control_loop.sensed)(motion, arrays)
-    joints, rates = sensed["joints"], sensed["rates"]
-    if control_loop.kind.bends:
+    encoders = Evaluated("sensed", simulator.sensed)(motion, arrays)
+    joints, rates = encoders["joints"], encoders["rates"]
+    if simulator.kind.bends:
         # A transmission is bent as that of the machine without tolerances.
         motors = state[:, 0, 2 * m : 2 * m + n]
         motors += joints - inverse_kinematics(robot, motion["pose"])
-        soft = np.array(control_loop.kind.elastic)
+        soft = np.array(simulator.kind.elastic)
         joints = np.concatenate([joints, np.where(soft, motors, joints)], axis=1)
         rates = np.tile(rates, 2)
     memory = encoder_memory(joints, rates, arrays["steps"][0, 0], period)
     return {"encoders": memory[:, None], "state": state, "seen": state.copy()}
 
 
-def _empty(out: str | Path) -> Path:
+def _make_empty_folder(out: str | Path) -> Path:
     folder = make_folder(out)
     there = sorted(folder.glob("machines-*.parquet"))
     if there:
@@ -269,12 +264,20 @@ def _empty(out: str | Path) -> Path:
     return folder
 
 
+def _write_samples(folder: Path, start: int, table: pl.DataFrame) -> Path:
+    """Write the samples of a group of machines, the first of which has the number `start`."""
+    path = folder / f"machines-{start:08d}.parquet"
+    # Noisy floats hardly shrink: lz4 takes half the time of the usual zstd.
+    table.write_parquet(path, compression="lz4")
+    return path
+
+
 def _table(
     machines: Machines,
     start: int,
     time: Array,
     samples: dict[str, Array],
-    reached: NDArray[np.bool_],
+    is_valid: NDArray[np.bool_],
 ) -> pl.DataFrame:
     """Return the samples of some machines that each came to."""
     import polars as pl
@@ -282,16 +285,16 @@ def _table(
     robot = machines.robot
     m = robot.freedom
     names = robot.coordinates
-    numbers = np.broadcast_to(start + np.arange(len(reached))[:, None], reached.shape)
+    numbers = np.broadcast_to(start + np.arange(len(is_valid))[:, None], is_valid.shape)
     columns: dict[str, NDArray[np.generic]] = {
-        "machine": numbers[reached],
-        "t": np.broadcast_to(time, reached.shape)[reached],
+        "machine": numbers[is_valid],
+        "t": np.broadcast_to(time, is_valid.shape)[is_valid],
     }
-    for titles, values in (
+    for titles, columns_of_titles in (
         (names, samples["states"][..., :m]),
         ([f"d{name}" for name in names], samples["states"][..., m : 2 * m]),
         (robot.joint_names, samples["joints"]),
         (robot.force_names, samples["forces"]),
     ):
-        columns |= {title: values[..., k][reached] for k, title in enumerate(titles)}
+        columns |= {title: columns_of_titles[..., k][is_valid] for k, title in enumerate(titles)}
     return pl.DataFrame(columns)

@@ -98,33 +98,33 @@ def advance(
     expect(np.isfinite(span[0]), "step", shown(step), "a time in s")
     if not span[1] >= 0.0 or span[1] % 1.0:
         raise DataError(f"count: {shown(count)} given, a whole number of 0 or more expected")
-    ones = {"pose": pose, "velocity": velocity, "forces": forces}
-    sizes = dict.fromkeys(ones, robot.freedom) | {"forces": robot.joint_count}
+    inputs = {"pose": pose, "velocity": velocity, "forces": forces}
+    sizes = dict.fromkeys(inputs, robot.freedom) | {"forces": robot.joint_count}
     columns = robot.column_names
     if wrench is not None:
-        ones["wrench"] = wrench
+        inputs["wrench"] = wrench
     sizes["wrench"] = len(columns["wrench"])
     parts = {
-        name: as_array(value, name, (sizes[name],), columns=columns.get(name, ()))
-        for name, value in ones.items()
+        name: as_array(array, name, (sizes[name],), columns=columns.get(name, ()))
+        for name, array in inputs.items()
     }
     lead = broadcast_lead({name: part.shape[:-1] for name, part in parts.items()})
     batch = math.prod(lead)
-    flat = {
+    rows = {
         name: np.broadcast_to(part, (*lead, sizes[name])).reshape(batch, 1, -1)
         for name, part in parts.items()
     }
     general = machines is not None and machines.geometry is not None
-    control_loop = loop(robot, general=general)
-    count_drives = robot.joint_count * len(control_loop.kind.extra_states)
+    simulator = loop(robot, general=general)
+    count_drives = robot.joint_count * len(simulator.kind.extra_states)
     if drives is None:
-        drives = drive_states(robot, flat["pose"], flat["velocity"]).reshape(*lead, count_drives)
-    begun = as_array(drives, "drives", (count_drives,))
-    begun = np.broadcast_to(begun, (*lead, count_drives)).reshape(batch, 1, count_drives)
-    state = np.concatenate([flat["pose"], flat["velocity"], begun], axis=-1)
-    arrays = control_loop.idle(robot, state) | {"given": np.ascontiguousarray(flat["forces"])}
+        drives = drive_states(robot, rows["pose"], rows["velocity"]).reshape(*lead, count_drives)
+    drive_rows = as_array(drives, "drives", (count_drives,))
+    drive_rows = np.broadcast_to(drive_rows, (*lead, count_drives)).reshape(batch, 1, count_drives)
+    state = np.concatenate([rows["pose"], rows["velocity"], drive_rows], axis=-1)
+    arrays = simulator.idle(robot, state) | {"given": np.ascontiguousarray(rows["forces"])}
     if wrench is not None:
-        arrays["wrench"] = np.ascontiguousarray(flat["wrench"])
+        arrays["wrench"] = np.ascontiguousarray(rows["wrench"])
     if machines is not None:
         if len(machines) != batch or machines.robot != robot:
             raise DataError(
@@ -132,15 +132,15 @@ def advance(
                 f"{robot.name} expected, one for each state"
             )
         arrays |= machines.numbers
-    done, piece = 0, max(1, _PIECE // max(1, batch))
-    while batch and done < count:  # in pieces, between which Ctrl-C is seen
-        steps = min(piece, int(count) - done)
-        control_loop.run(arrays, 1, [step, 0.0, 0.0, step * steps], [steps, 0, 0, 0, 0, 0, 0, 0, 0])
-        done += steps
+    steps_done, piece = 0, max(1, _PIECE // max(1, batch))
+    while batch and steps_done < count:  # in pieces, between which Ctrl-C is seen
+        steps = min(piece, int(count) - steps_done)
+        simulator.run(arrays, 1, [step, 0.0, 0.0, step * steps], [steps, 0, 0, 0, 0, 0, 0, 0, 0])
+        steps_done += steps
     m = robot.freedom
     state = arrays["state"].reshape(*lead, 2 * m + count_drives)
-    served = (arrays["fault"] == 0.0).reshape(lead)
-    return state[..., :m], state[..., m : 2 * m], state[..., 2 * m :], served
+    succeeded = (arrays["fault"] == 0.0).reshape(lead)
+    return state[..., :m], state[..., m : 2 * m], state[..., 2 * m :], succeeded
 
 
 def drive_states(robot: Manipulator, pose: Array, velocity: Array) -> Array:
@@ -164,9 +164,11 @@ def motor_states(
             motor[..., i] += load / bends.stiffness + np.sign(load) * bends.backlash / 2.0
     states = {"motor": motor, "current": force}
     states["motor_rate"] = rates = joint_rates(robot, pose, velocity).actuated
-    slid = [leg.drive.coulomb / leg.drive.lugre.stiffness if leg.drive and leg.drive.lugre else 0.0
-            for leg in robot.legs]  # fmt: skip
-    states["bristle"] = np.sign(rates) * np.array(slid)
+    deflections = [
+        leg.drive.coulomb / leg.drive.lugre.stiffness if leg.drive and leg.drive.lugre else 0.0
+        for leg in robot.legs
+    ]
+    states["bristle"] = np.sign(rates) * np.array(deflections)
     return {name: states[name] for name, _ in kind.extra_states}
 
 
@@ -188,11 +190,11 @@ class Adaptive:
         self._tolerance = tolerance
 
     def go(
-        self, steps: int, step: float, constants: Loads, arrays: Mapping[str, Array], alive: Array
+        self, steps: int, step: float, loads_held: Loads, arrays: Mapping[str, Array], alive: Array
     ) -> None:
         """Go on by so many steps, as `pteron.kernels.samples.Plant.go` does."""
         state, clock, span = arrays["state"][0, 0], arrays["clock"][0, 0], steps * step
-        m, loads = len(state) // 2, (constants["forces"][0], constants["wrench"][0])
+        m, loads = len(state) // 2, (loads_held["forces"][0], loads_held["wrench"][0])
 
         def rates(_: float, state: Array) -> Array:
             velocity = state[m:]

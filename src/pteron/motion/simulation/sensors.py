@@ -49,19 +49,19 @@ class Sensors:
 
     def __post_init__(self) -> None:
         for name in ("encoder", "noise", "motor_encoder", "delay"):
-            setting = getattr(self, name)
-            values = as_array(
-                0.0 if setting is None and name == "motor_encoder" else setting, name, ()
+            numbers = getattr(self, name)
+            array = as_array(
+                0.0 if numbers is None and name == "motor_encoder" else numbers, name, ()
             )
-            scalar = name == "delay" and values.ndim
-            if scalar or not (np.isfinite(values).all() and (values >= 0.0).all()):
+            scalar = name == "delay" and array.ndim
+            if scalar or not (np.isfinite(array).all() and (array >= 0.0).all()):
                 expected = "0 s or more" if name == "delay" else "0 or more"
-                raise DataError(f"{name}: {setting} given, {expected} expected")
+                raise DataError(f"{name}: {numbers} given, {expected} expected")
         for name in ("seed", "samples"):
-            number: object = getattr(self, name)
-            if not isinstance(number, int) or isinstance(number, bool) or number < 0:
+            samples: object = getattr(self, name)
+            if not isinstance(samples, int) or isinstance(samples, bool) or samples < 0:
                 raise DataError(
-                    f"{name}: {shown(number)} given, a whole number of 0 or more expected"
+                    f"{name}: {shown(samples)} given, a whole number of 0 or more expected"
                 )
         cutoff = 1.0 if self.cutoff is None else as_array(self.cutoff, "cutoff", ())
         if np.ndim(cutoff) or not (np.isfinite(cutoff) and cutoff > 0.0):
@@ -71,7 +71,7 @@ class Sensors:
 def encoder_arrays(
     sensors: Sensors, robot: Manipulator, period: float, state: Mapping[str, Array]
 ) -> dict[str, Array]:
-    """Return what a control loop takes of encoders that begin in a state: numbers and memory.
+    """Return a control loop's arrays for encoders that begin in a state: numbers and memory.
 
     The angle of a crank that may go all the way round jumps by a turn: its readings go on by the
     shorter way.
@@ -81,7 +81,9 @@ def encoder_arrays(
     rates = joint_rates(robot, pose, velocity).actuated
     at_motors = sensors.encoder if sensors.motor_encoder is None else sensors.motor_encoder
     numbers = {"encoder": sensors.encoder, "noise": sensors.noise, "motor_encoder": at_motors}
-    steps, noises, fine = (_per_joint(value, key, len(joints)) for key, value in numbers.items())
+    steps, noises, fine = (
+        _joint_array(setting, key, len(joints)) for key, setting in numbers.items()
+    )
     round_ = np.array([float(leg.goes_round) for leg in robot.legs])
     if "motor" in state:
         soft = DriveKind.from_robot(robot).elastic
@@ -89,7 +91,7 @@ def encoder_arrays(
         rates = np.concatenate([rates, np.where(soft, state["motor_rate"], rates)])
         steps, noises = np.concatenate([steps, fine]), np.tile(noises, 2)
         round_ = np.concatenate([round_, np.where(soft, 0.0, round_)])
-    at = [encoder_of(leg.drive) for leg in robot.legs]
+    encoders = [encoder_of(leg.drive) for leg in robot.legs]
     arrays = {
         "encoders": encoder_memory(joints, rates, steps, period),
         "steps": steps,
@@ -97,10 +99,13 @@ def encoder_arrays(
         "round": round_,
         "share": np.array([_share(sensors, period)]),
         "at_motor": np.array(
-            [*(float(e == "motor") for e in at), *(float(e in ("motor", "both")) for e in at)]
+            [
+                *(float(e == "motor") for e in encoders),
+                *(float(e in ("motor", "both")) for e in encoders),
+            ]
         ),
     }
-    return {name: value.reshape(1, 1, -1) for name, value in arrays.items()}
+    return {name: setting.reshape(1, 1, -1) for name, setting in arrays.items()}
 
 
 def encoder_memory(joints: Array, rates: Array, steps: Array, period: float) -> Array:
@@ -108,10 +113,10 @@ def encoder_memory(joints: Array, rates: Array, steps: Array, period: float) -> 
 
     `steps` (E,) are theirs, `period` is from one sample to the next.
     """
-    last_joints = joints - period * rates
+    last_readings = joints - period * rates
     widths = np.where(steps > 0.0, steps, 1.0)
-    last_joints = np.where(steps > 0.0, steps * np.round(last_joints / widths), last_joints)
-    return np.concatenate([joints, np.zeros_like(joints), last_joints, rates], axis=-1)
+    last_readings = np.where(steps > 0.0, steps * np.round(last_readings / widths), last_readings)
+    return np.concatenate([joints, np.zeros_like(joints), last_readings, rates], axis=-1)
 
 
 def encoder_noise(
@@ -132,7 +137,7 @@ def encoder_of(drive: Drive | None) -> str:
 
 
 def rate_shares(sensors: Sensors, robot: Manipulator, period: float) -> Array:
-    """Return what a sample's difference counts in each rate that is told (n,), NaN: it is exact.
+    """Return the filter gain of each estimated rate (n,); NaN where the rate is measured.
 
     A rate is that of the differences of its encoder where this rounds or is noisy, and it is the
     motor's where the drive tells the motor's.
@@ -140,36 +145,37 @@ def rate_shares(sensors: Sensors, robot: Manipulator, period: float) -> Array:
     count = robot.joint_count
     at_motors = sensors.encoder if sensors.motor_encoder is None else sensors.motor_encoder
     settings = {"encoder": sensors.encoder, "noise": sensors.noise, "motor_encoder": at_motors}
-    steps, noises, fine = (_per_joint(value, key, count) for key, value in settings.items())
+    steps, noises, fine = (_joint_array(setting, key, count) for key, setting in settings.items())
     motors = [encoder_of(leg.drive) in ("motor", "both") for leg in robot.legs]
     rough = np.where(motors, fine, steps) + noises > 0.0
     return np.where(rough, _share(sensors, period), np.nan)
 
 
 def _share(sensors: Sensors, period: float) -> float:
-    """Return what a sample's difference counts in a rate, by the filter's cut-off."""
+    """Return the filter gain of a rate estimated from differences, by the filter's cut-off."""
     if sensors.cutoff is None:
         return 1.0
     return -float(np.expm1(-2.0 * np.pi * sensors.cutoff * period))
 
 
-def expect_sensed(robot: Manipulator, law: Program) -> None:
+def expect_encoders(robot: Manipulator, law: Program) -> None:
     """Refuse a controller that needs readings of motors where there is no encoder."""
-    readings = [port.name for port in law.inputs if port.name in ("motors", "motor_rates")]
-    without = [str(i) for i, leg in enumerate(robot.legs, 1) if encoder_of(leg.drive) == "joint"]
-    if readings and without:
+    motor_readings = [port.name for port in law.inputs if port.name in ("motors", "motor_rates")]
+    legs_without = [
+        str(i) for i, leg in enumerate(robot.legs, 1) if encoder_of(leg.drive) == "joint"
+    ]
+    if motor_readings and legs_without:
         raise DataError(
-            f"controller: needs {' and '.join(readings)}, which no sensor gives: the encoder of "
-            f"leg {', '.join(without)} of {robot.name} is at the joint; take joints and "
+            f"controller: needs {' and '.join(motor_readings)}, which no sensor gives: the encoder "
+            f"of leg {', '.join(legs_without)} of {robot.name} is at the joint; take joints and "
             'joint_rates, or give its drive.elastic encoder = "both"'
         )
 
 
-def _per_joint(value: float | tuple[float, ...], name: str, count: int) -> Array:
-    numbers = np.asarray(value, dtype=float)
-    if numbers.shape not in ((), (count,)):
+def _joint_array(setting: float | tuple[float, ...], name: str, count: int) -> Array:
+    array = np.asarray(setting, dtype=float)
+    if array.shape not in ((), (count,)):
         raise DataError(
-            f"{name}: shape {numbers.shape} given, one number or {count} expected, one for each "
-            "joint"
+            f"{name}: shape {array.shape} given, one number or {count} expected, one for each joint"
         )
-    return np.broadcast_to(numbers, (count,)).copy()
+    return np.broadcast_to(array, (count,)).copy()

@@ -17,7 +17,7 @@ from pteron.kinematics.evaluate import finite_pose, finite_rows
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.motion import Motion
 from pteron.motion.payload import with_payload
-from pteron.motion.simulation.loop import ControlLaw, Loads, Timing, run
+from pteron.motion.simulation.loop import ControlLaw, Loads, Timing, run_simulation
 from pteron.motion.simulation.plant import Method
 from pteron.motion.simulation.sensors import Sensors
 from pteron.motion.simulation.simulation import Simulation
@@ -155,11 +155,9 @@ def simulate(
     """
     robot = as_manipulator(robot)
     if controller is not None:
-        _expect_controller(controller)
+        _expect_controller(controller, forces)
     if model is not None:
         model = as_manipulator(model)
-    if controller is not None and forces is not None:
-        raise DataError("controller and forces given; give one of them")
     if motion is not None and controller is None:
         raise DataError("motion given, but no controller that follows it")
     period = period if controller is None else controller.period
@@ -171,29 +169,29 @@ def simulate(
     if start is not None:
         pose, velocity = _state(robot, start)
     masses = _masses(payload, reference.time)
-    loaded = {mass: with_payload(robot, mass) for mass in dict.fromkeys(masses.tolist())}
+    machines = {mass: with_payload(robot, mass) for mass in dict.fromkeys(masses.tolist())}
     source: ControlLaw | Array
     if controller is None:
-        source = _of_time(forces, robot, "forces", reference.time)
+        source = _sample_source(forces, robot, "forces", reference.time)
     else:
-        believed = model or (loaded[masses[0]] if len(loaded) == 1 else robot)
-        source = controller.law(believed)
-    about = np.vstack([pose, reference.pose[:: max(1, len(reference.time) // _POSES)]])
+        known_machine = model or (machines[masses[0]] if len(machines) == 1 else robot)
+        source = controller.law(known_machine)
+    sample_poses = np.vstack([pose, reference.pose[:: max(1, len(reference.time) // _POSES)]])
     sensors = sensors or Sensors()
     sensing = sensors.delay + sensors.samples * period
-    length = allowed_step(robot, about, step, usual=step == STEP)
+    length = allowed_step(robot, sample_poses, step, usual=step == STEP)
     timing = Timing(delay, method, length, tolerance, sensing)
-    loads = Loads(masses, loaded, _of_time(wrench, robot, "wrench", reference.time))
+    loads = Loads(masses, machines, _sample_source(wrench, robot, "wrench", reference.time))
 
-    def simulated(timing: Timing) -> Simulation:
-        settings = (pose, velocity), reference, source, loads, sensors, timing
-        return run(robot, *settings, limits=limits and controller is not None)
+    def run_with(timing: Timing) -> Simulation:
+        arguments = (pose, velocity), reference, source, loads, sensors, timing
+        return run_simulation(robot, *arguments, limits=limits and controller is not None)
 
-    return simulated(timing) if error is None else _within(simulated, timing, error, period)
+    return run_with(timing) if error is None else _refine_steps(run_with, timing, error, period)
 
 
-def _within(
-    simulated: Callable[[Timing], Simulation], timing: Timing, error: float, period: float
+def _refine_steps(
+    run_with: Callable[[Timing], Simulation], timing: Timing, error: float, period: float
 ) -> Simulation:
     """Return a simulation whose steps are shortened until no pose changes by more than the error.
 
@@ -204,14 +202,14 @@ def _within(
     check_positive(error=error)
     if timing.method != "rk4":
         raise DataError('error: goes with method "rk4"; the steps of "dop853" have `tolerance`')
-    coarse, changes = simulated(timing), [np.inf]
+    coarse, changes = run_with(timing), [np.inf]
     for _ in range(_HALVINGS):
         length = min(timing.step, coarse.step)
         count = round(period / length)
         timing = replace(timing, step=period / (2 * count + 1) if count else length / 2.0)
-        fine = simulated(timing)
-        both = min(len(fine.time), len(coarse.time))
-        changes.append(float(np.abs(fine.pose[:both] - coarse.pose[:both]).max()))
+        fine = run_with(timing)
+        common_length = min(len(fine.time), len(coarse.time))
+        changes.append(float(np.abs(fine.pose[:common_length] - coarse.pose[:common_length]).max()))
         if max(changes[-2:]) <= _SAFE * error and len(fine.time) == len(coarse.time):
             return fine
         coarse = fine
@@ -222,8 +220,8 @@ def _within(
     )
 
 
-def _expect_method(robot: Manipulator, method: str) -> None:
-    """Refuse a method of integration that is none, or that the machine's drives rule out."""
+def _expect_method(robot: Manipulator, method: Method) -> None:
+    """Refuse a method of integration that there is not, or that the drives do not allow."""
     expect(method in get_args(Method), "method", repr(method), '"rk4" or "dop853"')
     if method == "dop853" and not DriveKind.from_robot(robot).plain:
         raise DataError(
@@ -232,27 +230,30 @@ def _expect_method(robot: Manipulator, method: str) -> None:
         )
 
 
-def _expect_controller(controller: object) -> None:
+def _expect_controller(controller: object, forces: object) -> None:
+    """Refuse an argument that is no controller, and forces given beside one."""
     period = getattr(controller, "period", None)
     if isinstance(controller, type) or not isinstance(period, float | int):
         raise DataError(
             f"controller: {shown(controller)} given, one such as ComputedTorque() expected"
         )
+    if forces is not None:
+        raise DataError("controller and forces given; give one of them")
 
 
 def check_delay(delay: float) -> None:
-    """Refuse what is no delay."""
+    """Refuse a delay that is negative or not finite."""
     expect(_is_number(delay) and delay >= 0.0, "delay", shown(delay), "0 s or more")
 
 
-def _is_number(value: object) -> bool:
-    return isinstance(value, int | float | np.number) and bool(np.isfinite(value))
+def _is_number(number: object) -> bool:
+    return isinstance(number, int | float | np.number) and bool(np.isfinite(number))
 
 
 def check_positive(**positive: float) -> None:
-    """Refuse what is no number above 0."""
-    for name, value in positive.items():
-        expect(_is_number(value) and value > 0.0, name, shown(value), "a number above 0")
+    """Refuse a number that is not positive and finite."""
+    for name, number in positive.items():
+        expect(_is_number(number) and number > 0.0, name, shown(number), "a number above 0")
 
 
 def _state(robot: Manipulator, start: tuple[PoseLike, PoseLike]) -> tuple[Array, Array]:
@@ -269,7 +270,7 @@ def reference_of(
     duration: float | None,
     period: float,
 ) -> Motion:
-    """Return what the machine is to do, at the samples: the motion, or rest where it starts."""
+    """Return the reference motion at the samples: the given one, or rest at the start."""
     if motion is not None:
         motion.expect_ascending()
     if duration is None:
@@ -296,24 +297,22 @@ def reference_of(
 
 
 def _masses(payload: float | Sequence[tuple[float, float]], time: Array) -> Array:
-    """Return what is carried at each sample, kg."""
-    carried = as_array(payload, "payload", ())
-    if carried.ndim == 0:
-        return np.full(len(time), carried)
-    pairs = (
-        carried.ndim == 2 and carried.shape[1:] == (2,) and bool(np.isfinite(carried[:, 0]).all())
-    )
-    if not pairs or (np.diff(carried[:, 0]) < 0.0).any():
+    """Return the payload at each sample (T,), kg."""
+    array = as_array(payload, "payload", ())
+    if array.ndim == 0:
+        return np.full(len(time), array)
+    pairs = array.ndim == 2 and array.shape[1:] == (2,) and bool(np.isfinite(array[:, 0]).all())
+    if not pairs or (np.diff(array[:, 0]) < 0.0).any():
         raise DataError("payload: a mass, or pairs of time and mass in the order of time, expected")
-    if not (carried[:, 1] >= 0.0).all():
-        wrong = carried[~(carried[:, 1] >= 0.0), 1][0]
+    if not (array[:, 1] >= 0.0).all():
+        wrong = array[~(array[:, 1] >= 0.0), 1][0]
         raise DataError(f"payload: {wrong} given, a mass of 0 kg or more expected")
-    k = np.searchsorted(carried[:, 0], time + 1e-9, side="right")
-    masses: Array = np.append(0.0, carried[:, 1])[k]
+    k = np.searchsorted(array[:, 0], time + 1e-9, side="right")
+    masses: Array = np.append(0.0, array[:, 1])[k]
     return masses
 
 
-def _of_time(
+def _sample_source(
     source: PoseLike | Callable[[float], PoseLike] | None,
     robot: Manipulator,
     name: str,
@@ -323,10 +322,10 @@ def _of_time(
     columns = robot.column_names[name]
     size = len(columns)
 
-    def numbers(value: PoseLike, label: str) -> Array:
-        array = as_array(pick_columns(value, columns, label), label, (size,))
-        expect(array.ndim == 1, label, f"shape {array.shape}", f"({size},)")
-        expect(np.isfinite(array).all(), label, shown(array.tolist()), "finite numbers")
+    def numbers(row: PoseLike, title: str) -> Array:
+        array = as_array(pick_columns(row, columns, title), title, (size,))
+        expect(array.ndim == 1, title, f"shape {array.shape}", f"({size},)")
+        expect(np.isfinite(array).all(), title, shown(array.tolist()), "finite numbers")
         return array
 
     if callable(source):

@@ -12,7 +12,7 @@ from pteron.kernels import Array
 from pteron.manipulator import Manipulator
 from pteron.manipulator.readings import reading_scales, to_readings
 from pteron.motion.motion import Motion
-from pteron.motion.simulation.given import within_motors
+from pteron.motion.simulation.motor_forces import limit_to_motors
 from pteron.motion.trajectories.limits import limits_of
 
 if TYPE_CHECKING:
@@ -119,7 +119,9 @@ class Simulation:
     def saturated(self) -> Array:
         """Share of the samples, (n,), in which a drive could not give what was asked for."""
         beyond = np.abs(self.asked) > limits_of(self.robot).force
-        beyond |= np.abs(within_motors(self.robot, self.asked, self.motor_rates) - self.asked) > 0.0
+        beyond |= (
+            np.abs(limit_to_motors(self.robot, self.asked, self.motor_rates) - self.asked) > 0.0
+        )
         return np.asarray(beyond.mean(axis=0))
 
     def table(self) -> pl.DataFrame:
@@ -136,10 +138,8 @@ class Simulation:
         names, joints = self.robot.coordinates, self.robot.joint_names
         scales = reading_scales(self.robot)
         bends = [leg.drive.elastic if leg.drive else None for leg in self.robot.legs]
-        behind = [
-            transmission is not None and transmission.encoder == "motor" for transmission in bends
-        ]
-        read_joints = np.where(behind, self.motors, self.joints)
+        behind = [elastic is not None and elastic.encoder == "motor" for elastic in bends]
+        readings = np.where(behind, self.motors, self.joints)
         rates = np.where(behind, self.motor_rates, self.joint_rates)
         motors = [f"motor_{name}" for name in joints] if any(bends) else []
         blocks = (
@@ -147,13 +147,13 @@ class Simulation:
             ([f"d{name}" for name in names], self.velocity),
             ([f"dd{name}" for name in names], self.acceleration),
             ([f"{name}ref" for name in names], self.reference.pose),
-            (joints, to_readings(self.robot, read_joints)),
+            (joints, to_readings(self.robot, readings)),
             ([f"d{name}" for name in joints], rates / scales),
             (motors, to_readings(self.robot, self.motors)[:, : len(motors)]),
             ([f"d{name}" for name in motors], (self.motor_rates / scales)[:, : len(motors)]),
             (self.robot.force_names, self.forces * scales),
         )
         columns = {"t": self.time}
-        for titles, values in blocks:
-            columns |= dict(zip(titles, values.T, strict=True))
+        for titles, block in blocks:
+            columns |= dict(zip(titles, block.T, strict=True))
         return pl.DataFrame(columns | {"payload": self.payload})

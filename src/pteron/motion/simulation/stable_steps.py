@@ -36,10 +36,10 @@ def longest_step(robot: RobotLike, poses: PoseLike, machines: Machines | None = 
     may be. For several machines the step is stable for all of them, at the pose where the mass at
     the joints is least.
     """
-    return _fastest(as_manipulator(robot), poses, machines)[0]
+    return _longest_stable_step(as_manipulator(robot), poses, machines)[0]
 
 
-def _fastest(
+def _longest_stable_step(
     robot: Manipulator, poses: PoseLike, machines: Machines | None = None
 ) -> tuple[float, str]:
     """Return the longest stable step, s, and its cause as the beginning of a sentence."""
@@ -47,20 +47,20 @@ def _fastest(
     if machines is not None:
         parts = machines.drives.reshape(len(machines), len(drives), -1)
         drives = Drives(*np.moveaxis(parts, 1, 0))
-    drives = drives._replace(viscous=drives.viscous + _braking(robot))
+    drives = drives._replace(viscous=drives.viscous + _supply_damping(robot))
     longest = float("inf"), ""
     if drives.viscous.any() or kind.bends or any(kind.lugre):
         rows, mass = jacobian(robot, poses), mass_matrix(robot, poses)
         if machines is not None:
-            at = np.einsum("...ij,...ji->...", rows, np.linalg.solve(mass, rows.mT)).argmax()
-            rows = rows.reshape(-1, *rows.shape[-2:])[at]
+            index = np.einsum("...ij,...ji->...", rows, np.linalg.solve(mass, rows.mT)).argmax()
+            rows = rows.reshape(-1, *rows.shape[-2:])[index]
             places = as_array(poses, "poses", (robot.freedom,)).reshape(-1, robot.freedom)
             each = Evaluated("mass", program(robot, "mass_matrix"))(
-                {"pose": np.tile(places[at], (len(machines), 1))},
+                {"pose": np.tile(places[index], (len(machines), 1))},
                 {"mass_parameters": machines.loaded[:, None]},
             )
             mass = next(iter(each.values())).reshape(-1, *mass.shape[-2:])
-        longest = _longest(robot, rows, mass, drives)
+        longest = _step_of_drives(robot, rows, mass, drives)
     for i, leg in enumerate(robot.legs, start=1):
         lag = leg.drive and leg.drive.current_time
         if lag and _STABLE * lag < longest[0]:
@@ -68,21 +68,23 @@ def _fastest(
     return longest
 
 
-def _braking(robot: Manipulator) -> Array:
+def _supply_damping(robot: Manipulator) -> Array:
     """Return the fall (n,) of drive forces per joint rate where the supply is at its limit."""
-    slopes = np.zeros(robot.joint_count)
+    falls = np.zeros(robot.joint_count)
     for i, leg in enumerate(robot.legs):
         if leg.drive and leg.drive.winding:
             winding = leg.drive.winding
-            slopes[i] = (leg.drive.gear * winding.torque_constant) ** 2 / winding.resistance
-    return slopes
+            falls[i] = (leg.drive.gear * winding.torque_constant) ** 2 / winding.resistance
+    return falls
 
 
-def _longest(robot: Manipulator, rows: Array, mass: Array, drives: Drives) -> tuple[float, str]:
+def _step_of_drives(
+    robot: Manipulator, rows: Array, mass: Array, drives: Drives
+) -> tuple[float, str]:
     """Return the longest step and its cause, from J, M and drives of poses or of machines."""
     kind, longest = DriveKind.from_robot(robot), (float("inf"), "")
     if drives.viscous.any() or kind.bends:
-        system, bent = _linear(robot, rows, mass, drives)
+        system, bent = _linear_machine(robot, rows, mass, drives)
         if kind.bends:
             rates, vectors = np.linalg.eig(system)
         else:  # without springs the eigenvalues are those of the friction's part alone, and zeros
@@ -98,10 +100,10 @@ def _longest(robot: Manipulator, rows: Array, mass: Array, drives: Drives) -> tu
     if any(kind.lugre):
         rotors = np.where(kind.elastic, 0.0, drives.inertia)
         mass = mass + rows.mT @ (rotors[..., None] * rows)
-        moved = np.einsum("...ij,...ji->...i", rows, np.linalg.solve(mass, rows.mT))
+        mobilities = np.einsum("...ij,...ji->...i", rows, np.linalg.solve(mass, rows.mT))
         for i, leg in enumerate(robot.legs):
             if leg.drive and leg.drive.lugre:
-                ease = 1.0 / drives.inertia[..., i] if kind.elastic[i] else moved[..., i]
+                ease = 1.0 / drives.inertia[..., i] if kind.elastic[i] else mobilities[..., i]
                 # A bound on the eigenvalue of a spring with a damper.
                 bristle = leg.drive.lugre
                 rate = float(np.max(np.sqrt(bristle.stiffness * ease) + bristle.damping * ease))
@@ -149,45 +151,50 @@ def modes(robot: RobotLike, poses: PoseLike) -> tuple[Array, Array]:
     """
     robot = as_manipulator(robot)
     rows, mass = jacobian(robot, poses), mass_matrix(robot, poses)
-    system, bent = _linear(robot, rows, mass, drives_of(robot))
+    system, bent = _linear_machine(robot, rows, mass, drives_of(robot))
     rates, vectors = np.linalg.eig(system)
     soft = np.array(DriveKind.from_robot(robot).elastic)
     return rates, np.where(soft[:, None], bent @ vectors[..., : bent.shape[-1], :], 0.0)
 
 
-def _linear(robot: Manipulator, rows: Array, mass: Array, drives: Drives) -> tuple[Array, Array]:
+def _linear_machine(
+    robot: Manipulator, rows: Array, mass: Array, drives: Drives
+) -> tuple[Array, Array]:
     """Return the linear machine's matrix (..., 2 K, 2 K) and the deflections (..., n, K).
 
     The K coordinates are those of the pose, then the motors behind transmissions that bend.
     """
     bends = [leg.drive and leg.drive.elastic for leg in robot.legs]
     stiffness, damping = (
-        np.array([getattr(transmission, name) if transmission else 0.0 for transmission in bends])
+        np.array([getattr(elastic, name) if elastic else 0.0 for elastic in bends])
         for name in ("stiffness", "damping")
     )
-    soft = np.array([transmission is not None for transmission in bends])
+    soft = np.array([elastic is not None for elastic in bends])
     m, n = robot.freedom, robot.joint_count
-    every = np.eye(n)[soft]
-    bent = np.concatenate([-rows, np.broadcast_to(every.T, (*rows.shape[:-2], n, len(every)))], -1)
+    selection = np.eye(n)[soft]
+    bent = np.concatenate(
+        [-rows, np.broadcast_to(selection.T, (*rows.shape[:-2], n, len(selection)))], -1
+    )
     rigid = np.where(soft, 0.0, 1.0)
 
-    def coupled(joints: Array, motors: Array, springs: Array) -> Array:
-        moved = rows.mT @ (joints[..., None] * rows)
-        pulled = bent.mT @ (springs[:, None] * bent)
-        block = np.zeros(
-            np.broadcast_shapes(moved.shape[:-2], pulled.shape[:-2]) + pulled.shape[-2:]
+    def assemble(joints: Array, motors: Array, springs: Array) -> Array:
+        joint_part = rows.mT @ (joints[..., None] * rows)
+        spring_part = bent.mT @ (springs[:, None] * bent)
+        matrix = np.zeros(
+            np.broadcast_shapes(joint_part.shape[:-2], spring_part.shape[:-2])
+            + spring_part.shape[-2:]
         )
-        block += pulled
-        block[..., :m, :m] += moved
-        block[..., m:, m:] += motors[..., soft, None] * np.eye(len(every))
-        return block
+        matrix += spring_part
+        matrix[..., :m, :m] += joint_part
+        matrix[..., m:, m:] += motors[..., soft, None] * np.eye(len(selection))
+        return matrix
 
-    inertia = coupled(rigid * drives.inertia, drives.inertia, np.zeros(n))
+    inertia = assemble(rigid * drives.inertia, drives.inertia, np.zeros(n))
     inertia = np.broadcast_to(inertia, (*mass.shape[:-2], *inertia.shape[-2:])).copy()
     inertia[..., :m, :m] += mass
-    drag = coupled(rigid * drives.viscous, drives.viscous, damping)
-    pull = coupled(np.zeros(n), np.zeros(n), stiffness)
-    size = m + len(every)
+    drag = assemble(rigid * drives.viscous, drives.viscous, damping)
+    pull = assemble(np.zeros(n), np.zeros(n), stiffness)
+    size = m + len(selection)
     system = np.zeros((*inertia.shape[:-2], 2 * size, 2 * size))
     system[..., :size, size:] = np.eye(size)
     system[..., size:, :size] = -np.linalg.solve(inertia, pull)
@@ -203,7 +210,7 @@ def allowed_step(
     usual: bool = True,
     machines: Machines | None = None,
 ) -> float:
-    """Return a stable step, s: the given one, or the longest stable one where that is shorter.
+    """Return min(step, longest stable step), s.
 
     Raises
     ------
@@ -212,7 +219,7 @@ def allowed_step(
         or no sensible step is stable. One that is too long for viscous friction alone is shortened.
     """
     try:
-        longest, why = _fastest(robot, poses, machines)
+        longest, why = _longest_stable_step(robot, poses, machines)
     except PteronError:
         return step  # the first sample says what is wrong with the pose
     if longest < _SHORTEST:

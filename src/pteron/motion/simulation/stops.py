@@ -9,7 +9,7 @@ from pteron.kernels.functions import TYPE_II
 from pteron.kinematics.limits import limited_joints
 from pteron.kinematics.singularities import best_type_ii
 from pteron.manipulator import Manipulator
-from pteron.motion.motion import told_pose
+from pteron.motion.motion import pose_text
 from pteron.shapes import PerJoint
 from pteron.workspace.margins import joint_distances
 
@@ -31,7 +31,7 @@ def why_not_further(robot: Manipulator, pose: Array, velocity: Array) -> str:
     i = int(np.nanargmin(type_i))
     return (
         f"leg {i + 1} comes to the edge of its reach, where {robot.legs[i].singular_text} (type I; "
-        f"measure {type_i[i]:.1e}), at pose {told_pose(pose)}"
+        f"measure {type_i[i]:.1e}), at pose {pose_text(pose)}"
     )
 
 
@@ -42,15 +42,15 @@ def first_beyond_limits(robot: Manipulator, poses: Array, joints: PerJoint) -> i
     return int(beyond.argmax()) if beyond.any() else None
 
 
-def told_limit(robot: Manipulator, pose: Array) -> str:
+def limit_text(robot: Manipulator, pose: Array) -> str:
     """Return which joint is beyond its limits in a pose (m,)."""
-    at = max(
+    worst = max(
         limited_joints(robot, pose),
         key=lambda joint: max(joint.least - joint.value, joint.value - joint.most),
     )
-    where = f"leg {at.leg}: " if at.leg else ""
-    limits = at.limits_text(lambda value, _: f"{value:g}")
-    return f"{where}the {at.noun} comes to its limit, {at.value:.5g} {at.unit} of {limits}"
+    where = f"leg {worst.leg}: " if worst.leg else ""
+    limits = worst.limits_text(lambda number, _: f"{number:g}")
+    return f"{where}the {worst.noun} comes to its limit, {worst.value:.5g} {worst.unit} of {limits}"
 
 
 def first_singular(robot: Manipulator, poses: Array) -> int | None:
@@ -60,8 +60,8 @@ def first_singular(robot: Manipulator, poses: Array) -> int | None:
     return int(beyond.argmax()) if beyond.any() else None
 
 
-def told_singular(_: Manipulator, pose: Array) -> str:
+def singularity_text(_: Manipulator, pose: Array) -> str:
     """Return the sentence for a singularity of type II."""
     return (
-        f"singular (type II) at pose {told_pose(pose)}: the actuators no longer hold the platform"
+        f"singular (type II) at pose {pose_text(pose)}: the actuators no longer hold the platform"
     )

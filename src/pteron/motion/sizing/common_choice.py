@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pteron.legs import LegKind
 from pteron.manipulator import RobotLike, as_manipulator
 from pteron.motion.sizing.drive_loads import Sizing
-from pteron.motion.sizing.motor_choice import CommonFit, suited
+from pteron.motion.sizing.motor_choice import CommonFit, rank_motors
 from pteron.motion.sizing.motors import Motor
 
 _ALIKE = 1e-2
@@ -37,11 +37,11 @@ def alike_legs(robot: RobotLike) -> tuple[tuple[int, ...], ...]:
     (((1, 2, 3),), ())
     """
     robot = as_manipulator(robot)
-    leg_dimensions = [_dimensions(leg) for leg in robot.legs[: robot.joint_count]]
+    dimensions = [_dimensions(leg) for leg in robot.legs[: robot.joint_count]]
     groups: list[list[int]] = []
-    for i, leg in enumerate(leg_dimensions):
+    for i, leg in enumerate(dimensions):
         for group in groups:
-            first = leg_dimensions[group[0]]
+            first = dimensions[group[0]]
             same = robot.legs[i].type == robot.legs[group[0]].type and leg.keys() == first.keys()
             if same and all(math.isclose(leg[k], first[k], rel_tol=_ALIKE) for k in leg):
                 group.append(i)
@@ -55,8 +55,8 @@ def _dimensions(leg: LegKind) -> dict[str, float]:
     """Return a leg's lengths and other numbers, by their keys."""
     roles = ("length", "number", "count")
     keys = [name for name, key in leg.every_key().items() if key.role in roles]
-    dimensions = {name: getattr(leg, name) for name in keys}
-    return {name: float(value) for name, value in dimensions.items() if value is not None}
+    settings = {name: getattr(leg, name) for name in keys}
+    return {name: float(number) for name, number in settings.items() if number is not None}
 
 
 def choose_common(
@@ -96,4 +96,4 @@ def choose_common(
     >>> fit.legs, round(fit.ratio)
     ((1, 2, 3), 295)
     """
-    return tuple(suited(sizing, alike_legs(sizing.robot), motors, margin))
+    return tuple(rank_motors(sizing, alike_legs(sizing.robot), motors, margin))

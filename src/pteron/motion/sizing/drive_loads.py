@@ -87,18 +87,18 @@ class Sizing:
     def _repr_html_(self) -> str:
         headings = ("peak force", "rms force", "peak speed", "peak power", "mean power")
         columns = [Column("joint"), *(Column(name, "number") for name in headings)]
-        values = (
+        columns_of_numbers = (
             *(self.peak_forces, self.rms_forces, self.peak_speeds),
             *(self.peak_power, self.mean_power),
         )
         rows = []
-        for name, leg, *numbers in zip(
-            self.robot.joint_names, self.robot.legs, *values, strict=True
+        for name, leg, *row in zip(
+            self.robot.joint_names, self.robot.legs, *columns_of_numbers, strict=True
         ):
             force, speed = leg.joint.force_unit, f"{leg.joint.unit}/s"
             units = (force, force, speed, "W", "W")
-            texts = (f"{value:.4g} {unit}" for value, unit in zip(numbers, units, strict=True))
-            rows.append((name, *texts))
+            cells = (f"{number:.4g} {unit}" for number, unit in zip(row, units, strict=True))
+            rows.append((name, *cells))
         about = f"drives over a cycle of {self.duration:.6g} s"
         return html_table(self.robot.name, about, columns, rows, self.overloads)
 
@@ -109,7 +109,7 @@ class Sizing:
 
     @cached_property
     def loads(self) -> Array:
-        """Forces without the motors' inertia, in their shape: what does not depend on the ratio."""
+        """Load forces: `forces` without the motors' inertia, so independent of the ratio."""
         return self.forces - self.rotor_inertia * self.accelerations
 
     def at(self, place: int) -> Sizing:
@@ -124,28 +124,28 @@ class Sizing:
         The quantity is "peak_force", "rms_force", "peak_speed", "rms_speed", "peak_power",
         "peak_braking", "given_energy" or "braked_energy".
         """
-        return np.asarray(self._by_place[quantity].argmax(axis=0))
+        return np.asarray(self._quantities_at_places[quantity].argmax(axis=0))
 
     @cached_property
-    def _by_place(self) -> dict[str, Array]:
+    def _quantities_at_places(self) -> dict[str, Array]:
         """Each quantity at each place, (W, n); W = 1 where the cycle is done as it stands."""
         shape = len(self.time), -1, self.robot.joint_count
         forces, speeds = self.forces.reshape(shape), self.speeds.reshape(shape)
         power = forces * speeds
-        delivered, braked = np.maximum(power, 0.0), np.maximum(-power, 0.0)
+        driving, braking = np.maximum(power, 0.0), np.maximum(-power, 0.0)
         return {
             "peak_force": np.abs(forces).max(axis=0),
             "rms_force": np.sqrt(self.mean(forces**2)),
             "peak_speed": np.abs(speeds).max(axis=0),
             "rms_speed": np.sqrt(self.mean(speeds**2)),
-            "peak_power": delivered.max(axis=0),
-            "peak_braking": braked.max(axis=0),
-            "given_energy": self.integral(delivered),
-            "braked_energy": self.integral(braked),
+            "peak_power": driving.max(axis=0),
+            "peak_braking": braking.max(axis=0),
+            "given_energy": self.integral(driving),
+            "braked_energy": self.integral(braking),
         }
 
-    def _most(self, quantity: str) -> PerJoint:
-        return np.asarray(self._by_place[quantity].max(axis=0))
+    def _greatest(self, quantity: str) -> PerJoint:
+        return np.asarray(self._quantities_at_places[quantity].max(axis=0))
 
     def integral(self, values: Array) -> Array:
         """Return the integral over the cycle, by Simpson's rule, of values (K, ...) at `time`."""
@@ -160,22 +160,22 @@ class Sizing:
     @property
     def peak_forces(self) -> PerJoint:
         """Largest size of each force, N or N m."""
-        return self._most("peak_force")
+        return self._greatest("peak_force")
 
     @property
     def rms_forces(self) -> PerJoint:
         """Root mean square of each force over the cycle, N or N m: what heats a motor."""
-        return self._most("rms_force")
+        return self._greatest("rms_force")
 
     @property
     def peak_speeds(self) -> PerJoint:
         """Largest speed of each joint, m/s or rad/s."""
-        return self._most("peak_speed")
+        return self._greatest("peak_speed")
 
     @property
     def rms_speeds(self) -> PerJoint:
         """Root mean square of each speed over the cycle, m/s or rad/s."""
-        return self._most("rms_speed")
+        return self._greatest("rms_speed")
 
     @property
     def power(self) -> Array:
@@ -185,27 +185,27 @@ class Sizing:
     @property
     def peak_power(self) -> PerJoint:
         """Largest power that each drive gives, W."""
-        return self._most("peak_power")
+        return self._greatest("peak_power")
 
     @property
     def peak_braking(self) -> PerJoint:
         """Largest power that each drive takes back, W, as a positive number."""
-        return self._most("peak_braking")
+        return self._greatest("peak_braking")
 
     @property
     def given_energy(self) -> PerJoint:
         """Energy that each drive gives over the cycle while it drives, J."""
-        return self._most("given_energy")
+        return self._greatest("given_energy")
 
     @property
     def braked_energy(self) -> PerJoint:
         """Energy that each drive takes back over the cycle while it brakes, J, 0 or more."""
-        return self._most("braked_energy")
+        return self._greatest("braked_energy")
 
     @property
     def energy(self) -> PerJoint:
         """Energy that each drive gives over the cycle, less what it takes back, J."""
-        quantities = self._by_place
+        quantities = self._quantities_at_places
         return np.asarray((quantities["given_energy"] - quantities["braked_energy"]).max(axis=0))
 
     @property
@@ -214,11 +214,11 @@ class Sizing:
 
         It is what friction takes, and the motion leaves; 0 where it is none but for rounding.
         """
-        delivered, braked = (
-            self._by_place[f"{key}_energy"].sum(axis=1) for key in ("given", "braked")
+        driving, braking = (
+            self._quantities_at_places[f"{key}_energy"].sum(axis=1) for key in ("given", "braked")
         )
-        net = float((delivered - braked).max())
-        return net if abs(net) > _NONE * float(delivered.max()) else 0.0
+        net = float((driving - braking).max())
+        return net if abs(net) > _NONE * float(driving.max()) else 0.0
 
     @property
     def mean_power(self) -> PerJoint:
@@ -270,25 +270,25 @@ class Sizing:
     @cached_property
     def margins(self) -> tuple[DriveMargin, ...]:
         """The limits of the drives in the machine's file over what the cycle asks, leg by leg."""
-        needed = {name: self._most(name) for name in ("rms_force", "peak_force", "peak_speed")}
+        needed = {name: self._greatest(name) for name in ("rms_force", "peak_force", "peak_speed")}
         return drive_margins(self.robot, needed, self.forces, self.speeds)
 
     @cached_property
     def overloads(self) -> tuple[str, ...]:
         """Loads beyond the drives' limits, a line each: which leg, which limit, and by how much."""
-        beyond = [limit for limit in self.margins if limit.margin < 1.0]
-        beyond.sort(key=lambda limit: limit.quantity == "rms_force")
-        return tuple(limit.told(self.where(limit)) for limit in beyond)
+        exceeded = [margin for margin in self.margins if margin.margin < 1.0]
+        exceeded.sort(key=lambda margin: margin.quantity == "rms_force")
+        return tuple(margin.told(self.where(margin)) for margin in exceeded)
 
-    def where(self, limit: DriveMargin) -> str:
+    def where(self, one: DriveMargin) -> str:
         """Return in words at which of several places a margin is so small; else an empty text."""
         if not self.places:
             return ""
-        leg = limit.leg - 1
-        if limit.quantity == "force_at_speed":
+        leg = one.leg - 1
+        if one.quantity == "force_at_speed":
             peak = motor_peak(self.drives[leg], self.forces[..., leg], self.speeds[..., leg])
             return f" {self.places[peak.at % len(self.places)]}"
-        return f" {self.places[self.worst(limit.quantity)[leg]]}"
+        return f" {self.places[self.worst(one.quantity)[leg]]}"
 
     def table(self) -> pl.DataFrame:
         """Return a table, one row a leg: SI units, at the joint but for motor_torque.
@@ -363,20 +363,20 @@ def best_ratio(sizing: Sizing, leg: int, rotor_inertia: float) -> float:
     )
     if rotor_inertia == 0.0 or not moving.any():
         return math.inf
-    ratios = np.sqrt(np.sqrt(force[moving] / acceleration[moving]) / rotor_inertia)
-    least, most = float(ratios.min()), float(ratios.max())
+    optimal_ratios = np.sqrt(np.sqrt(force[moving] / acceleration[moving]) / rotor_inertia)
+    least, most = float(optimal_ratios.min()), float(optimal_ratios.max())
     if not moving.all():  # where it only holds, more is better
         most *= HOLDING
     if most - least <= _SAME * most:
         return most
     # The greatest of convex functions of i^2.
-    optimum = scipy.optimize.minimize_scalar(
+    solution = scipy.optimize.minimize_scalar(
         lambda log: float(mean_squares(sizing, leg, math.exp(log), rotor_inertia).max()),
         bounds=(math.log(least), math.log(most)),
         method="bounded",
         options={"xatol": _SAME},
     )
-    return math.exp(optimum.x)
+    return math.exp(solution.x)
 
 
 def mean_squares(sizing: Sizing, leg: int, ratio: float, rotor_inertia: float) -> Array:

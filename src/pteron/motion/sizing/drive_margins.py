@@ -1,4 +1,4 @@
-"""`DriveMargin`: what a drive of the machine's file can do over what a cycle asks of it."""
+"""`DriveMargin`: a limit of a drive in the machine's file over the load of a cycle."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pteron.shapes import PerJoint
 
 
 class DriveMargin(NamedTuple):
-    """A limit of a drive in the machine's file over what the cycle asks of it, at the joint."""
+    """A limit of a drive in the machine's file over the cycle's load, at the joint."""
 
     leg: int
     limit: str
@@ -75,6 +75,6 @@ def drive_margins(
         by_speed = [key for key in ("curve", "winding") if getattr(drive, key)]
         if by_speed and forces.size:
             peak = motor_peak(drive, forces[..., i], speeds[..., i])
-            limit = " and ".join(by_speed), "force_at_speed", peak.most, peak.force, force
-            margins.append(DriveMargin(i + 1, *limit))
+            speed_fields = " and ".join(by_speed), "force_at_speed", peak.most, peak.force, force
+            margins.append(DriveMargin(i + 1, *speed_fields))
     return tuple(margins)

@@ -58,10 +58,10 @@ class DutyCycle:
     @cached_property
     def course(self) -> Course:
         """The motions' paths, from their middle."""
-        return Course.of(self.robot, self.motions)
+        return Course.from_motions(self.robot, self.motions)
 
-    def thinned(self) -> DutyCycle:
-        """Return it with as many samples as are looked at in each of several places."""
+    def thin_out(self) -> DutyCycle:
+        """Return the cycle resampled to the number of samples that each place evaluates."""
         motions = []
         for motion in self.motions:
             time = np.linspace(motion.time[0], motion.time[-1], _SAMPLES)
@@ -70,7 +70,7 @@ class DutyCycle:
             )
         return replace(self, motions=tuple(motions))
 
-    def sized(self, places: Sequence[Place] = ()) -> Sizing:
+    def loads_at(self, places: Sequence[Place] = ()) -> Sizing:
         """Return the loads at places, or as it stands if none is given."""
         curves: list[Curve] = [(m.pose, m.velocity, m.acceleration) for m in self.motions]
         if places:
@@ -78,33 +78,33 @@ class DutyCycle:
             expect_to_fit("places", len(places), 10.0 * count * len(places))
             curves = list(self.course.at(places))
             try:
-                return self._sized(curves, places)
+                return self._loads_of_curves(curves, places)
             except (UnreachablePose, SingularPose) as error:
                 raise DataError(f"places: {places[error.index[-1]]}: {error}") from None
-        return self._sized(curves, places)
+        return self._loads_of_curves(curves, places)
 
-    def _sized(self, curves: Sequence[Curve], places: Sequence[Place]) -> Sizing:
+    def _loads_of_curves(self, curves: Sequence[Curve], places: Sequence[Place]) -> Sizing:
         """Return the loads over motions (T, m), or (T, W, m) of places."""
         clock, inertias = float(self.motions[0].time[0]), []
         blocks: list[tuple[Array, ...]] = []
-        for motion, curve, dwell in zip(self.motions, curves, self.rests, strict=True):
+        for motion, curve, pause in zip(self.motions, curves, self.rests, strict=True):
             middles = (motion.time[:-1] + motion.time[1:]) / 2.0
             # The samples by themselves, so that an error's index is that of the motion.
             samples = motion.time, *self._loads(*curve)
-            between = middles, *self._loads(*_between(motion.time, curve, middles))
-            time, *loads = (_interleaved(*pair) for pair in zip(samples, between, strict=True))
+            middle_loads = middles, *self._loads(*_sample_curve(motion.time, curve, middles))
+            time, *loads = (_interleave(*pair) for pair in zip(samples, middle_loads, strict=True))
             blocks.append((clock + time - time[0], *loads))
             clock += motion.duration
-            if dwell:
-                pose, zeros = (
+            if pause:
+                pose, zero_rates = (
                     np.repeat(curve[0][-1:], 3, axis=0),
                     np.zeros((3, *curve[0].shape[1:])),
                 )
-                blocks.append((clock + dwell * _HALVES, *self._loads(pose, zeros, zeros)))
-                clock += float(dwell)
+                blocks.append((clock + pause * _HALVES, *self._loads(pose, zero_rates, zero_rates)))
+                clock += float(pause)
             inertias.append(self._inertia(curve[0]))
         time, forces, speeds, accelerations = (
-            _joined(parts) for parts in zip(*blocks, strict=True)
+            _join_parts(parts) for parts in zip(*blocks, strict=True)
         )
         assumed = self._assumed_friction(forces)
         for i, drive in enumerate(self.drives):
@@ -139,20 +139,20 @@ class DutyCycle:
     def _inertia(self, poses: Array) -> tuple[Array, Array]:
         """Return the least and the greatest inertia that each joint moves (n,), the others held."""
         inverse = np.linalg.inv(jacobian(self.robot, poses))
-        felt = np.einsum(
+        joint_inertias = np.einsum(
             "...ai,...ab,...bi->...i", inverse, mass_matrix(self.robot, poses), inverse
         )
-        felt = felt.reshape(-1, self.robot.joint_count)
-        return felt.min(axis=0), felt.max(axis=0)
+        joint_inertias = joint_inertias.reshape(-1, self.robot.joint_count)
+        return joint_inertias.min(axis=0), joint_inertias.max(axis=0)
 
     def _assumed_friction(self, forces: Array) -> Array:
         """Return dry friction (n,) of the drives that have none in the file."""
         most = np.abs(forces).reshape(-1, self.robot.joint_count).max(axis=0)
-        without = [not (d.coulomb or d.viscous or d.stribeck) for d in self.drives]
-        return np.asarray(self.friction * most * without)
+        frictionless = [not (d.coulomb or d.viscous or d.stribeck) for d in self.drives]
+        return np.asarray(self.friction * most * frictionless)
 
 
-def _between(time: Array, curve: Curve, middles: Array) -> Curve:
+def _sample_curve(time: Array, curve: Curve, middles: Array) -> Curve:
     """Return a curve (T, ..., m) at other times."""
     flat = Motion(time, *(part.reshape(len(time), -1) for part in curve))
     shape = len(middles), *curve[0].shape[1:]
@@ -160,13 +160,13 @@ def _between(time: Array, curve: Curve, middles: Array) -> Curve:
     return pose, velocity, acceleration
 
 
-def _interleaved(samples: Array, middles: Array) -> Array:
-    rows = np.empty((2 * len(samples) - 1, *samples.shape[1:]))
-    rows[::2], rows[1::2] = samples, middles
-    return rows
+def _interleave(samples: Array, middles: Array) -> Array:
+    interleaved = np.empty((2 * len(samples) - 1, *samples.shape[1:]))
+    interleaved[::2], interleaved[1::2] = samples, middles
+    return interleaved
 
 
-def _joined(parts: Sequence[Array]) -> Array:
+def _join_parts(parts: Sequence[Array]) -> Array:
     """Return parts one behind the other; between two, an interval of no length keeps the pairs."""
     rows = [row for part in parts for row in (part, part[-1:])]
     return np.concatenate(rows[:-1])

@@ -30,7 +30,7 @@ class Span(NamedTuple):
         return isinstance(ratio, float) and self.least <= ratio <= self.greatest
 
     def within(self, other: Span) -> Span:
-        """Return those that are in both."""
+        """Return the intersection of both spans."""
         return Span(max(self.least, other.least), min(self.greatest, other.greatest))
 
 
@@ -75,12 +75,12 @@ def peak_span(sizing: Sizing, leg: int, rotor_inertia: float, peak_torque: float
     At each sample |f / i + J i q''| <= T holds between the roots of two parabolas, an interval.
     """
     loads, accelerations = sizing.loads[..., leg - 1], sizing.accelerations[..., leg - 1]
-    rotor_torques = rotor_inertia * accelerations
-    inside = peak_torque**2 - 4.0 * loads * rotor_torques
+    rotor_loads = rotor_inertia * accelerations
+    inside = peak_torque**2 - 4.0 * loads * rotor_loads
     if (inside < 0.0).any():
         return NONE
     root = peak_torque + np.sqrt(inside)
     least = 2.0 * np.abs(loads) / root
-    moving = np.abs(rotor_torques) > 0.0
-    greatest = root[moving] / (2.0 * np.abs(rotor_torques[moving]))
+    moving = np.abs(rotor_loads) > 0.0
+    greatest = root[moving] / (2.0 * np.abs(rotor_loads[moving]))
     return Span(float(least.max()), float(greatest.min(initial=math.inf)))

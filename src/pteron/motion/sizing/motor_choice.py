@@ -145,10 +145,10 @@ def choose(sizing: Sizing, motors: Sequence[Motor], *, margin: float = 1.0) -> t
     (True, 295, 2.1)
     """
     alone = [(leg,) for leg in range(1, sizing.robot.joint_count + 1)]
-    return tuple(fit.fits[0] for fit in suited(sizing, alone, motors, margin))
+    return tuple(fit.fits[0] for fit in rank_motors(sizing, alone, motors, margin))
 
 
-def suited(
+def rank_motors(
     sizing: Sizing, groups: Sequence[tuple[int, ...]], motors: Sequence[Motor], margin: float
 ) -> list[CommonFit]:
     """Return how each motor suits each group of legs, with one ratio for all of a group.
@@ -190,12 +190,12 @@ def serving_span(sizing: Sizing, leg: int, motor: Motor, margin: float) -> Span:
 
 def _best_ratio(sizing: Sizing, legs: tuple[int, ...], rotor_inertia: float) -> float:
     """Return the ratio at which the largest root mean square torque of all legs is least."""
-    ratios = [best_ratio(sizing, leg, rotor_inertia) for leg in legs]
-    moving = [ratio for ratio in ratios if math.isfinite(ratio)]
+    optimal_ratios = [best_ratio(sizing, leg, rotor_inertia) for leg in legs]
+    moving = [ratio for ratio in optimal_ratios if math.isfinite(ratio)]
     if not moving:
         return math.inf
     least, most = min(moving), max(moving)
-    if len(moving) < len(ratios):  # where a leg only holds, more is better
+    if len(moving) < len(optimal_ratios):  # where a leg only holds, more is better
         most *= HOLDING
     if most - least <= _SAME * most:
         return most
@@ -206,28 +206,28 @@ def _best_ratio(sizing: Sizing, legs: tuple[int, ...], rotor_inertia: float) -> 
 
     # The largest of convex functions of i^2, which all fall before these bounds and rise behind.
     bounds = math.log(least), math.log(most)
-    optimum = scipy.optimize.minimize_scalar(
+    solution = scipy.optimize.minimize_scalar(
         largest, bounds=bounds, method="bounded", options={"xatol": _SAME}
     )
-    return math.exp(optimum.x)
+    return math.exp(solution.x)
 
 
 def fit_at(sizing: Sizing, leg: int, motor: Motor, span: Span, ratio: float) -> Fit:
     """Return a motor's margins at a ratio."""
     rotor = motor.rotor_inertia
     rms, peak = torques(sizing, leg, ratio, rotor)
-    moved = float(sizing.load_inertia[1, leg - 1])
+    load_inertia = float(sizing.load_inertia[1, leg - 1])
     return Fit(
         leg,
         motor,
         span,
         ratio,
-        _over(motor.rated_torque, rms),
-        _over(motor.peak_torque, peak),
-        _over(motor.max_speed, ratio * float(sizing.peak_speeds[leg - 1])),
-        _over(moved, ratio**2 * rotor),
+        _margin(motor.rated_torque, rms),
+        _margin(motor.peak_torque, peak),
+        _margin(motor.max_speed, ratio * float(sizing.peak_speeds[leg - 1])),
+        _margin(load_inertia, ratio**2 * rotor),
     )
 
 
-def _over(can: float, load: float) -> float:
-    return can / load if load > 0.0 else np.inf
+def _margin(limit: float, needed: float) -> float:
+    return limit / needed if needed > 0.0 else np.inf

@@ -15,7 +15,7 @@ from pteron.bodies.tables import Number, TomlTable
 from pteron.errors import DataError, warn_unlikely
 from pteron.renamed import former_attribute
 from pteron.tables import read_table
-from pteron.toml import read_toml, told, validated
+from pteron.toml import joined_faults, read_toml, to_model
 
 _FASTEST = 3000.0
 """Speed, rad/s, from which on `Motor.warnings` asks whether it is in revolutions per minute: 29 000
@@ -62,17 +62,17 @@ class Motor:
     def __post_init__(self) -> None:
         faults = []
         for key in _NUMBERS:
-            value, least = getattr(self, key), key == "rotor_inertia"
-            if not (math.isfinite(value) and (value > 0.0 or (least and value == 0.0))):
+            number, least = getattr(self, key), key == "rotor_inertia"
+            if not (math.isfinite(number) and (number > 0.0 or (least and number == 0.0))):
                 expected = "0 or more" if least else "a number above 0"
-                faults.append(f"{key}: {value:g} given, {expected} expected")
+                faults.append(f"{key}: {number:g} given, {expected} expected")
         if not faults and self.peak_torque < self.rated_torque:
             faults.append(
                 f"peak_torque: {self.peak_torque:g} N m given, at least rated_torque expected, "
                 f"{self.rated_torque:g} N m"
             )
         if faults:
-            raise DataError(told(faults), subject=f"motor {self.name}")
+            raise DataError(joined_faults(faults), subject=f"motor {self.name}")
 
     doubts = former_attribute("doubts", "warnings")
 
@@ -119,7 +119,11 @@ def read_motors(path: str | Path) -> tuple[Motor, ...]:
     UnlikelyValue
         Of each of `Motor.warnings`.
     """
-    rows = _from_toml(path) if Path(path).suffix.lower() == ".toml" else _from_table(path)
+    rows = (
+        _read_toml_motors(path)
+        if Path(path).suffix.lower() == ".toml"
+        else _read_table_motors(path)
+    )
     motors, names = [], set()
     for place, row in rows:
         try:
@@ -137,9 +141,9 @@ def read_motors(path: str | Path) -> tuple[Motor, ...]:
     return tuple(motors)
 
 
-_NAMED: Any = {"name": (str, ...), **dict.fromkeys(_NUMBERS, (Number, ...))}
-_NAMED["price"] = Number | None, None  # for who chooses among them
-_MotorTable: Any = create_model("_MotorTable", __base__=TomlTable, **_NAMED)
+_MOTOR_KEYS: Any = {"name": (str, ...), **dict.fromkeys(_NUMBERS, (Number, ...))}
+_MOTOR_KEYS["price"] = Number | None, None  # for who chooses among them
+_MotorTable: Any = create_model("_MotorTable", __base__=TomlTable, **_MOTOR_KEYS)
 
 
 class _MotorsFile(TomlTable):
@@ -149,13 +153,13 @@ class _MotorsFile(TomlTable):
 _Rows = list[tuple[str, dict[str, Any]]]
 
 
-def _from_toml(path: str | Path) -> _Rows:
+def _read_toml_motors(path: str | Path) -> _Rows:
     document = read_toml(path, DataError, "no such file")
-    listed = validated(_MotorsFile, document, str(path), DataError)
-    return [(str(path), motor.model_dump(exclude={"price"})) for motor in listed.motors]
+    motor_file = to_model(_MotorsFile, document, str(path), DataError)
+    return [(str(path), motor.model_dump(exclude={"price"})) for motor in motor_file.motors]
 
 
-def _from_table(path: str | Path) -> _Rows:
+def _read_table_motors(path: str | Path) -> _Rows:
     table = read_table(path)
     numbers = table.numbers(_NUMBERS)
     if "name" in table.columns:

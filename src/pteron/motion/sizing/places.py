@@ -20,7 +20,7 @@ from pteron.arguments import checked_arguments, expect
 from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
-from pteron.motion.motion import Motion, told_pose
+from pteron.motion.motion import Motion, pose_text
 from pteron.motion.trajectories.cycle import moves
 from pteron.motion.trajectories.scaling import keeps_margin, least_margin
 from pteron.motion.trajectories.tool import Curve, pose_motion, tool_motion
@@ -62,7 +62,7 @@ class Place:
     def __str__(self) -> str:
         """Return it in words."""
         turned = f" turned {np.degrees(self.turn) % 360:.4g} deg" if self.turn else ""
-        return f"about {told_pose(np.round(self.pose, 6))}{turned}"
+        return f"about {pose_text(np.round(self.pose, 6))}{turned}"
 
 
 @dataclass(frozen=True)
@@ -91,31 +91,31 @@ class Course:
     yaw: Array
 
     @classmethod
-    def of(cls, robot: Manipulator, motions: Sequence[Motion]) -> Course:
+    def from_motions(cls, robot: Manipulator, motions: Sequence[Motion]) -> Course:
         """Return the course of motions."""
         platform = robot.platform
         curves = [tool_motion(platform, m.pose, m.velocity, m.acceleration) for m in motions]
         ends = Box.around(np.vstack([curve[0] for curve in curves])).box
         middle = ends.mean(axis=0)
         axis = _axis(robot)
-        around = tuple((c[0] - middle, *c[1:]) for c in curves)
-        return cls(robot, middle, around, axis, _yaw(robot, axis))
+        relative = tuple((c[0] - middle, *c[1:]) for c in curves)
+        return cls(robot, middle, relative, axis, _yaw(robot, axis))
 
     def at(self, places: Sequence[Place]) -> Iterator[Curve]:
         """Yield each motion's poses and their derivatives (T, W, m) at places."""
         platform = self.robot.platform
         lengths = ~platform.angular
         poses = np.array([place.pose for place in places])
-        turns = np.stack([self.turned(place.turn) for place in places])
+        turns = np.stack([self.rotation(place.turn) for place in places])
         for curve in self.curves:
             parts = []
             for part in curve:
-                moved = np.repeat(part[:, None], len(places), axis=1)
-                moved[..., lengths] = np.einsum("wij,tj->twi", turns, part[:, lengths])
-                parts.append(moved)
+                rotated = np.repeat(part[:, None], len(places), axis=1)
+                rotated[..., lengths] = np.einsum("wij,tj->twi", turns, part[:, lengths])
+                parts.append(rotated)
             yield pose_motion(platform, parts[0] + poses, parts[1], parts[2])
 
-    def turned(self, turn: float) -> Array:
+    def rotation(self, turn: float) -> Array:
         """Return the rotation of the pose's lengths (l, l)."""
         directions = self.robot.platform.directions
         if self.axis is None:
@@ -123,11 +123,11 @@ class Course:
         matrix = scipy.spatial.transform.Rotation.from_rotvec(turn * self.axis).as_matrix()
         return np.asarray(directions @ matrix @ directions.T)
 
-    def around(self, turn: float) -> Array:
+    def extent(self, turn: float) -> Array:
         """Return the least and the greatest coordinates (2, m) of the path from its middle."""
         poses = np.vstack([curve[0] for curve in self.curves])
         lengths = ~self.robot.platform.angular
-        poses[:, lengths] = poses[:, lengths] @ self.turned(turn).T
+        poses[:, lengths] = poses[:, lengths] @ self.rotation(turn).T
         return np.array([poses.min(axis=0), poses.max(axis=0)])
 
 
@@ -135,7 +135,7 @@ Fits = Callable[[Array], bool]
 """Function that says whether poses (K, m) lie in a region."""
 
 
-def within(course: Course, region: Region | None) -> tuple[Array, Fits]:
+def region_fits(course: Course, region: Region | None) -> tuple[Array, Fits]:
     """Return the box (2, m) of a region, and the function that says whether it holds poses.
 
     Without a region it is the workspace: poses that keep `least_margin` to singularities and the
@@ -145,13 +145,13 @@ def within(course: Course, region: Region | None) -> tuple[Array, Fits]:
     robot = course.robot
     if region is not None:
         box = region.box
-        return box, lambda poses: bool((region.holds(poses) | _inside(region, poses)).all())
+        return box, lambda poses: bool((region.holds(poses) | _is_in_box(region, poses)).all())
     home, platform = home_pose(robot), robot.platform
     box = np.array([home, home])
     count = len(platform.lengths)
     if count:
         box[:, :count] = bounding_box(robot, home)
-    box[:, count:] += course.around(0.0)[:, count:]
+    box[:, count:] += course.extent(0.0)[:, count:]
     if count < 2:
         box[:, count:] += [[-_TILT], [_TILT]]
     return box, partial(keeps_margin, robot, least=least_margin(robot, home))
@@ -167,7 +167,7 @@ def places_in(course: Course, box: Array, fits: Fits) -> tuple[Place, ...]:
     turns = np.linspace(0.0, 2.0 * np.pi, TURNS, endpoint=False) if course.axis is not None else [0]
     candidates = []
     for turn in map(float, turns):
-        low, high = box - course.around(turn)
+        low, high = box - course.extent(turn)
         if (low > high + _ROUNDING).any():
             continue
         varies = high - low > 2.0 * _ROUNDING
@@ -177,12 +177,12 @@ def places_in(course: Course, box: Array, fits: Fits) -> tuple[Place, ...]:
         if turn and course.yaw.any() and not (varies & (course.yaw != 0.0)).any():
             candidates += [with_platform(place, course.yaw, turn) for place in grid]
         candidates += grid
-    possible = [place for place in candidates if stays(course, place, fits)]
-    others = _spread(course, box) if len(possible) < len(candidates) else ()
-    return (*possible, *(place for place in others if stays(course, place, fits)))
+    accepted = [place for place in candidates if stays(course, place, fits)]
+    others = _quasirandom_places(course, box) if len(accepted) < len(candidates) else ()
+    return (*accepted, *(place for place in others if stays(course, place, fits)))
 
 
-def _spread(course: Course, box: Array) -> Iterator[Place]:
+def _quasirandom_places(course: Course, box: Array) -> Iterator[Place]:
     """Yield places evenly spread over a box and all turns, each other with its platform turned.
 
     They are the quasirandom sequence of M. Roberts, "The unreasonable effectiveness of quasirandom
@@ -195,7 +195,7 @@ def _spread(course: Course, box: Array) -> Iterator[Place]:
     steps = ratio ** -np.arange(1.0, count + 1.0)
     for k, (*units, part) in enumerate((0.5 + np.arange(_SPREAD)[:, None] * steps) % 1.0):
         turn = 2.0 * np.pi * part if course.axis is not None else 0.0
-        low, high = box - course.around(turn)
+        low, high = box - course.extent(turn)
         if (low <= high + _ROUNDING).all():
             place = Place(tuple(map(float, low + units * np.maximum(high - low, 0.0))), turn)
             turns = k % 2 and not (high - low > 2.0 * _ROUNDING)[course.yaw != 0.0].any()
@@ -213,7 +213,9 @@ def with_platform(place: Place, yaw: Array, turn: float) -> Place:
     return Place(tuple(map(float, pose)), place.turn)
 
 
-def near(place: Place, steps: Array, turn: float, yaw: Array, *, oblique: bool) -> Iterator[Place]:
+def neighbours(
+    place: Place, steps: Array, turn: float, yaw: Array, *, oblique: bool
+) -> Iterator[Place]:
     """Yield a place's neighbours: a step (m,) along each coordinate, and a turn, to both sides.
 
     A turn is that of the path alone, and that of the platform, too. In a region whose boundary is
@@ -221,25 +223,25 @@ def near(place: Place, steps: Array, turn: float, yaw: Array, *, oblique: bool) 
     """
     for side in (1.0, -1.0):
         if turn:
-            turned = Place(place.pose, place.turn + side * turn)
-            yield turned
+            turned_place = Place(place.pose, place.turn + side * turn)
+            yield turned_place
             if yaw.any():
-                yield with_platform(turned, yaw, side * turn)
+                yield with_platform(turned_place, yaw, side * turn)
         for i in np.flatnonzero(steps):
-            moved = list(place.pose)
-            moved[i] += side * float(steps[i])
-            yield Place(tuple(moved), place.turn)
+            coordinates = list(place.pose)
+            coordinates[i] += side * float(steps[i])
+            yield Place(tuple(coordinates), place.turn)
     moving = np.flatnonzero(steps)
     for signs in product((1.0, -1.0), repeat=len(moving)) if oblique and len(moving) < 4 else ():
         pose = np.array(place.pose)
         pose[moving] += signs * steps[moving]
         for side in (0.0, 1.0, -1.0) if turn else (0.0,):
-            moved_all = Place(tuple(map(float, pose)), place.turn + side * turn)
-            yield with_platform(moved_all, yaw, side * turn) if yaw.any() else moved_all
+            neighbour = Place(tuple(map(float, pose)), place.turn + side * turn)
+            yield with_platform(neighbour, yaw, side * turn) if yaw.any() else neighbour
 
 
 def _axis(robot: Manipulator) -> Array | None:
-    """Return what a cycle may be turned about: the vertical, or the normal of a level plane."""
+    """Return the axis a cycle may be turned about: the vertical, or the normal of a level plane."""
     platform = robot.platform
     if len(platform.lengths) < 2:
         return None
@@ -251,21 +253,21 @@ def _axis(robot: Manipulator) -> Array | None:
 
 def _yaw(robot: Manipulator, axis: Array | None) -> Array:
     """Return by how much a pose grows where the platform turns by 1 rad about an axis."""
-    platform, growth = robot.platform, np.zeros(robot.freedom)
-    last = len(growth) - 1
+    platform, rates = robot.platform, np.zeros(robot.freedom)
+    last = len(rates) - 1
     if (
         axis is None
         or not platform.angles
         or (platform.tilts and platform.coordinates[-1] != "yaw")
     ):
-        return growth
+        return rates
     about = platform.frame[2] if platform.tilts else platform.axis
     cosine = float(np.dot(about, axis))
-    growth[last] = np.sign(cosine) if abs(cosine) > 1.0 - _ROUNDING else 0.0
-    return growth
+    rates[last] = np.sign(cosine) if abs(cosine) > 1.0 - _ROUNDING else 0.0
+    return rates
 
 
-def _inside(region: Region, poses: Array) -> NDArray[np.bool_]:
+def _is_in_box(region: Region, poses: Array) -> NDArray[np.bool_]:
     """Return which poses (..., m) lie in a box but for rounding."""
     if not isinstance(region, Box):
         return np.zeros(poses.shape[:-1], dtype=bool)
@@ -273,8 +275,8 @@ def _inside(region: Region, poses: Array) -> NDArray[np.bool_]:
     return np.asarray(((poses >= low - _ROUNDING) & (poses <= high + _ROUNDING)).all(axis=-1))
 
 
-def checked(robot: Manipulator, places: Sequence[Place]) -> tuple[Place, ...]:
-    """Return places, after refusing none, and those that have not the machine's coordinates."""
+def expect_places_of(robot: Manipulator, places: Sequence[Place]) -> tuple[Place, ...]:
+    """Return the places after a check: at least one, each with the machine's coordinates."""
     expect(places, "places", "none", "at least one")
     for i, place in enumerate(places):
         if len(place.pose) != robot.freedom:
@@ -309,5 +311,5 @@ def placed(robot: RobotLike, motion: Motion, place: Place) -> Motion:
     array([ 0.1,  0. , -0.8])
     """
     robot = as_manipulator(robot)
-    (curve,) = Course.of(robot, [motion]).at(checked(robot, [place]))
+    (curve,) = Course.from_motions(robot, [motion]).at(expect_places_of(robot, [place]))
     return Motion(motion.time, *(part[:, 0] for part in curve))

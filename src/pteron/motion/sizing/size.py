@@ -18,10 +18,18 @@ from numpy.typing import ArrayLike
 from pteron.arguments import expect
 from pteron.errors import DataError
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
-from pteron.motion.motion import Motion, told_pose
+from pteron.motion.motion import Motion, pose_text
 from pteron.motion.sizing.drive_loads import Sizing
 from pteron.motion.sizing.duty import DutyCycle
-from pteron.motion.sizing.places import TURNS, Place, checked, near, places_in, stays, within
+from pteron.motion.sizing.places import (
+    TURNS,
+    Place,
+    expect_places_of,
+    neighbours,
+    places_in,
+    region_fits,
+    stays,
+)
 from pteron.workspace import Box, Region
 
 _AT_REST = 1e-6
@@ -31,7 +39,7 @@ _ROUNDING = 2e-9
 """Width of a range that is none but for rounding, m and rad."""
 
 _SOUGHT = "peak_force", "rms_force", "peak_speed"
-"""Quantities whose worst places are sought."""
+"""Quantities for which the search refines the worst places."""
 
 _NEARER = {True: (0.5,) * 5, False: (0.65,) * 8}
 """Shares by which each round about the worst places is nearer than the one before, in a box or
@@ -101,8 +109,8 @@ def size(
         raise DataError(
             f"dwell: {len(rests)} rests given, and {len(motions)} motions; give one for each motion"
         )
-    for single, pause in zip(motions, rests, strict=True):
-        _check(robot, single, float(pause))
+    for segment, pause in zip(motions, rests, strict=True):
+        _check(robot, segment, float(pause))
     expect(np.isfinite(friction) and friction >= 0.0, "friction", friction, "a share of 0 or more")
     load = None if wrench is None else np.asarray(wrench, dtype=float)
     if load is not None and load.shape != (robot.freedom,):
@@ -111,29 +119,31 @@ def size(
             "whole motion"
         )
     cycle = DutyCycle(robot, tuple(motions), rests, load, friction)
-    return cycle.sized() if places is None else _at_places(cycle, places)
+    return cycle.loads_at() if places is None else _size_at_places(cycle, places)
 
 
-def _at_places(cycle: DutyCycle, places: Region | Sequence[Place] | Literal["workspace"]) -> Sizing:
+def _size_at_places(
+    cycle: DutyCycle, places: Region | Sequence[Place] | Literal["workspace"]
+) -> Sizing:
     """Return the loads at given places, or at those of a region, and nearer about the worst."""
-    cycle = cycle.thinned()
+    cycle = cycle.thin_out()
     if not (isinstance(places, Region) or places == "workspace"):
-        return cycle.sized(checked(cycle.robot, places))
+        return cycle.loads_at(expect_places_of(cycle.robot, places))
     robot, course = cycle.robot, cycle.course
-    box, fits = within(course, places if isinstance(places, Region) else None)
+    box, fits = region_fits(course, places if isinstance(places, Region) else None)
     known = dict.fromkeys(places_in(course, box, fits))
     itself = Place(tuple(course.middle.tolist()))
     if not isinstance(places, Region) or stays(course, itself, fits):
         known[itself] = None
     if not known:
-        sizes = np.ptp(course.around(0.0), axis=0)
+        sizes = np.ptp(course.extent(0.0), axis=0)
         raise DataError(
-            f"places: the cycle fits nowhere in the region: it is {told_pose(sizes)} wide, and the "
-            f"region {told_pose(np.ptp(box, axis=0))} ({' '.join(robot.coordinates)}, m and rad)"
+            f"places: the cycle fits nowhere in the region: it is {pose_text(sizes)} wide, and the "
+            f"region {pose_text(np.ptp(box, axis=0))} ({' '.join(robot.coordinates)}, m and rad)"
         )
-    sizing = cycle.sized(tuple(known))
+    sizing = cycle.loads_at(tuple(known))
     worst: dict[tuple[str, int], tuple[float, Place]] = {}
-    free = np.ptp(box, axis=0) > np.ptp(course.around(0.0), axis=0) + _ROUNDING
+    free = np.ptp(box, axis=0) > np.ptp(course.extent(0.0), axis=0) + _ROUNDING
     steps, turn = (
         free * np.ptp(box, axis=0) / 8.0,
         np.pi / TURNS if course.axis is not None else 0.0,
@@ -144,21 +154,21 @@ def _at_places(cycle: DutyCycle, places: Region | Sequence[Place] | Literal["wor
         for quantity in _SOUGHT:
             most = getattr(sizing, f"{quantity}s")
             for leg, i in enumerate(sizing.worst(quantity)):
-                value = float(most[leg])
-                if (quantity, leg) not in worst or value > worst[quantity, leg][0]:
-                    worst[quantity, leg] = value, sizing.places[i]
-        around = (
+                greatest = float(most[leg])
+                if (quantity, leg) not in worst or greatest > worst[quantity, leg][0]:
+                    worst[quantity, leg] = greatest, sizing.places[i]
+        candidates = (
             n
             for place in {p for _, p in worst.values()}
-            for n in near(place, steps, turn, yaw, oblique=not boxed)
+            for n in neighbours(place, steps, turn, yaw, oblique=not boxed)
         )
-        new = [place for place in dict.fromkeys(around) if place not in known]
+        new = [place for place in dict.fromkeys(candidates) if place not in known]
         new = [place for place in new if stays(course, place, fits)]
         if new:
-            sizing = cycle.sized(tuple(new))
+            sizing = cycle.loads_at(tuple(new))
             known.update(dict.fromkeys(new))
         steps, turn = nearer * steps, nearer * turn
-    return cycle.sized(tuple(known))
+    return cycle.loads_at(tuple(known))
 
 
 def _check(robot: Manipulator, motion: Motion, dwell: float) -> None:

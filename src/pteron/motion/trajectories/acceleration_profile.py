@@ -21,7 +21,7 @@ class Profile(NamedTuple):
     """Acceleration between nodes, (K - 1,)."""
 
     @classmethod
-    def of(cls, grid: Array, squares: Array) -> Profile:
+    def from_squares(cls, grid: Array, squares: Array) -> Profile:
         """Return the profile with the squared speeds s'^2 (K,) on a grid of s, at rest outside."""
         rate = np.sqrt(np.maximum(squares, 0.0))
         spans = 2.0 * np.diff(grid) / (rate[1:] + rate[:-1])
@@ -33,28 +33,28 @@ class Profile(NamedTuple):
         """Duration from rest to rest, in the unit of `time`."""
         return float(self.time[-1])
 
-    def spread(self, h: float) -> Callable[[Array], tuple[Array, Array, Array]]:
+    def smooth(self, h: float) -> Callable[[Array], tuple[Array, Array, Array]]:
         """Return s averaged over h before and after, by a triangle's weights, from rest to rest.
 
         Its acceleration is continuous, and its jerk too but for steps.
         """
-        total = self.duration + 2.0 * h
+        stretched_duration = self.duration + 2.0 * h
 
         def progress(tau: Array) -> tuple[Array, Array, Array]:
-            t = np.clip(total * tau - h, -h, self.duration + h)
+            t = np.clip(stretched_duration * tau - h, -h, self.duration + h)
             s, rate = self._state(t)
-            after, behind = self._moments(t, h), self._moments(t, -h)
-            gains, rates, parts = ((a + b) / h**2 for a, b in zip(after, behind, strict=True))
-            return s + parts, (rate + rates) * total, gains * total**2
+            ahead, behind = self._moments(t, h), self._moments(t, -h)
+            gains, rates, parts = ((a + b) / h**2 for a, b in zip(ahead, behind, strict=True))
+            return s + parts, (rate + rates) * stretched_duration, gains * stretched_duration**2
 
         return progress
 
     def _state(self, t: Array) -> tuple[Array, Array]:
         """Return s and s' (T,) at times (T,)."""
-        within = np.clip(t, 0.0, self.duration)
-        k = np.clip(np.searchsorted(self.time, within, side="right") - 1, 0, len(self.gain) - 1)
-        d = within - self.time[k]
-        inside = within == t
+        clipped = np.clip(t, 0.0, self.duration)
+        k = np.clip(np.searchsorted(self.time, clipped, side="right") - 1, 0, len(self.gain) - 1)
+        d = clipped - self.time[k]
+        inside = clipped == t
         return (
             self.s[k] + d * (self.rate[k] + d * self.gain[k] / 2.0),
             np.where(inside, self.rate[k] + d * self.gain[k], 0.0),
@@ -70,12 +70,12 @@ class Profile(NamedTuple):
         gain = np.concatenate([[0.0], self.gain, [0.0]])
         ahead = int(h > 0.0)
         k = np.searchsorted(self.time, t, side="right" if ahead else "left")
-        done, sums = np.zeros_like(t), [np.zeros_like(t) for _ in range(3)]
-        while (done != h).any():
-            to = edges[np.clip(k + ahead, 0, len(edges) - 1)] - t
-            to = np.minimum(to, h) if ahead else np.maximum(to, h)
+        start, sums = np.zeros_like(t), [np.zeros_like(t) for _ in range(3)]
+        while (start != h).any():
+            end = edges[np.clip(k + ahead, 0, len(edges) - 1)] - t
+            end = np.minimum(end, h) if ahead else np.maximum(end, h)
             u = gain[np.clip(k, 0, len(gain) - 1)]
             for order, total in enumerate(sums, start=2):
-                total += u * ((h - done) ** order - (h - to) ** order) / math.factorial(order)
-            done, k = to, k + (1 if ahead else -1)
+                total += u * ((h - start) ** order - (h - end) ** order) / math.factorial(order)
+            start, k = end, k + (1 if ahead else -1)
         return sums[0], sums[1], sums[2]

@@ -18,13 +18,13 @@ from pteron.kernels.functions import TYPE_I, TYPE_II
 from pteron.kinematics.architecture import expect_regular
 from pteron.kinematics.limits import limited_joints
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
-from pteron.motion.motion import Motion, told_pose
+from pteron.motion.motion import Motion, pose_text
 from pteron.motion.trajectories.minima import first_below, least_along
 from pteron.motion.trajectories.path import Path, poses_of
 from pteron.workspace.margins import joint_distances
 
 _SAMPLES = 1001
-"""Poses of a path, about, that are looked at before its margins are followed between them."""
+"""Number of poses of a path evaluated before its margins are refined between them."""
 
 _ROUNDING = 1e-9
 """Distance beyond a limit, or out of reach, that counts as rounding, m or rad."""
@@ -92,8 +92,8 @@ def check_motion(
         )
     even = np.linspace(float(motion.time[0]), float(motion.time[-1]), _SAMPLES)
     marks = np.unique(np.concatenate([motion.time, even]))
-    place_words = place or (lambda at: f"the motion, at {at:.4g} s")
-    check_curve(robot, lambda at: motion.at(at)[0], marks, place_words)
+    place_of = place or (lambda at: f"the motion, at {at:.4g} s")
+    check_curve(robot, lambda at: motion.at(at)[0], marks, place_of)
 
 
 def check_curve(
@@ -106,16 +106,16 @@ def check_curve(
     expect_regular(robot)
     curve = _Curve(robot, poses, place)
     # Beyond the reach nothing else is measured.
-    failures = [_failed_reach(curve, marks)]
+    failures = [_reach_failure(curve, marks)]
     if failures[0] is not None:
-        within = marks < failures[0].at
-        marks = np.append(marks[within], failures[0].at)
+        before_failure = marks < failures[0].at
+        marks = np.append(marks[before_failure], failures[0].at)
     if len(marks) > 1:
-        failures += [_failed_limit(curve, marks), _failed_passive(curve, marks)]
-        failures.append(_failed_type_ii(curve, marks))
-    present = [failure for failure in failures if failure is not None]
-    if present:
-        raise min(present, key=lambda failure: failure.at).error
+        failures += [_joint_failure(curve, marks), _passive_failure(curve, marks)]
+        failures.append(_type_ii_failure(curve, marks))
+    raised = [failure for failure in failures if failure is not None]
+    if raised:
+        raise min(raised, key=lambda failure: failure.at).error
 
 
 class _Curve(NamedTuple):
@@ -125,13 +125,13 @@ class _Curve(NamedTuple):
     poses: Callable[[Array], Array]
     place: Callable[[float], str]
 
-    def value(self, what: str, at: Array, output: int = 0) -> Array:
+    def value(self, what: str, at: Array, index: int = 0) -> Array:
         """Return an output of a function of the pose at parameters (K,)."""
-        return np.asarray(numeric(self.robot, what)(self.poses(at))[output])
+        return np.asarray(numeric(self.robot, what)(self.poses(at))[index])
 
-    def told(self, at: float) -> str:
+    def place_text(self, at: float) -> str:
         """Return where that is, and the pose."""
-        return f"{self.place(at)}, pose {told_pose(self.poses(np.array([at]))[0])}"
+        return f"{self.place(at)}, pose {pose_text(self.poses(np.array([at]))[0])}"
 
 
 class _Failure(NamedTuple):
@@ -141,21 +141,21 @@ class _Failure(NamedTuple):
     error: PteronError
 
 
-def _failed_reach(curve: _Curve, marks: Array) -> _Failure | None:
+def _reach_failure(curve: _Curve, marks: Array) -> _Failure | None:
     def squares(at: Array) -> Array:
         return np.nan_to_num(curve.value("squared_type_i", at), nan=-1.0)
 
-    crossing = first_below(squares, marks, TYPE_I**2)
-    if crossing is None:
+    first = first_below(squares, marks, TYPE_I**2)
+    if first is None:
         return None
-    at, i, square = crossing
+    at, i, square = first
     fine = np.linspace(marks[0], marks[-1], _SAMPLES)
-    missed = -float(np.nanmin(curve.value("reach", fine)[:, i]))
+    shortfall = -float(np.nanmin(curve.value("reach", fine)[:, i]))
     leg = curve.robot.legs[i]
     error: PteronError
-    if missed <= _ROUNDING:
+    if shortfall <= _ROUNDING:
         error = SingularPose(
-            f"{curve.told(at)}: singular for leg {i + 1}: {leg.singular_text} (type I); take "
+            f"{curve.place_text(at)}: singular for leg {i + 1}: {leg.singular_text} (type I); take "
             "another path",
             kind="I",
             measure=float(np.sqrt(max(square, 0.0))),
@@ -163,76 +163,76 @@ def _failed_reach(curve: _Curve, marks: Array) -> _Failure | None:
             leg=i + 1,
         )
         return _Failure(at, error)
-    millimetres = missed > _MILLIMETRES * leg.size
+    millimetres = shortfall > _MILLIMETRES * leg.size
     verb = "is out of the reach" if at == marks[0] else "leaves the reach"
     error = UnreachablePose(
-        f"{curve.told(at)}: {verb} of leg {i + 1}, which misses the path by up to {missed:.3g} m: "
-        f"{leg.reach_text}; "
+        f"{curve.place_text(at)}: {verb} of leg {i + 1}, which misses the path by up to "
+        f"{shortfall:.3g} m: {leg.reach_text}; "
         f"{'is it in millimetres? lengths are in metres' if millimetres else 'take another path'}",
         leg=i + 1,
-        shortfall=missed,
+        shortfall=shortfall,
         index=(),
         millimetres=millimetres,
     )
     return _Failure(at, error)
 
 
-def _failed_limit(curve: _Curve, marks: Array) -> _Failure | None:
+def _joint_failure(curve: _Curve, marks: Array) -> _Failure | None:
     def margin(at: Array) -> Array:
         return joint_distances(curve.robot, curve.value("joint_coordinates", at))
 
-    crossing = first_below(margin, marks, -_ROUNDING)
-    if crossing is None:
+    first = first_below(margin, marks, -_ROUNDING)
+    if first is None:
         return None
-    at, i, _ = crossing
+    at, i, _ = first
     leg = curve.robot.legs[i]
     assert leg.limits is not None
-    beyond = -float(least_along(margin, marks, -_ROUNDING)[1][i])
+    excess = -float(least_along(margin, marks, -_ROUNDING)[1][i])
     unit, (low, high) = leg.joint.unit, leg.limits
-    words = (
+    fault = (
         f"leg {i + 1}: its {leg.joint.noun} passes its limits, {low:g} to {high:g} {unit}, by up "
     )
-    return _beyond(curve, at, i + 1, f"{words}to {beyond:.3g} {unit}", beyond * leg.lever)
+    return _limit_failure(curve, at, i + 1, f"{fault}to {excess:.3g} {unit}", excess * leg.lever)
 
 
-def _failed_passive(curve: _Curve, marks: Array) -> _Failure | None:
+def _passive_failure(curve: _Curve, marks: Array) -> _Failure | None:
     def margin(at: Array) -> Array:
         return curve.value("passive_room", at, 1)
 
-    crossing = first_below(margin, marks, -_ROUNDING)
-    if crossing is None:
+    first = first_below(margin, marks, -_ROUNDING)
+    if first is None:
         return None
-    at, i, _ = crossing
+    at, i, _ = first
     places, least = least_along(margin, marks, -_ROUNDING)
     worst = curve.poses(places[i : i + 1])[0]
-    leg, words = i + 1, f"leg {i + 1} passes a passive joint's limits"
+    leg, fault = i + 1, f"leg {i + 1} passes a passive joint's limits"
     for joint in limited_joints(curve.robot, worst):
-        belongs = not joint.actuated and joint.leg in (0, i + 1)
-        if belongs and not joint.least <= joint.value <= joint.most:
+        may_fail = not joint.actuated and joint.leg in (0, i + 1)
+        if may_fail and not joint.least <= joint.value <= joint.most:
             leg, whose = joint.leg, f"leg {i + 1}: its " if joint.leg else ""
-            words = f"{whose}{joint.noun} comes to {joint.value:.4g} {joint.unit}, its limits are "
-            words += joint.limits_text("{:g}".format)
+            fault = f"{whose}{joint.noun} comes to {joint.value:.4g} {joint.unit}, its limits are "
+            fault += joint.limits_text("{:g}".format)
             break
-    return _beyond(curve, at, leg, words, -float(least[i]))
+    return _limit_failure(curve, at, leg, fault, -float(least[i]))
 
 
-def _beyond(curve: _Curve, at: float, leg: int, words: str, metres: float) -> _Failure:
-    text = f"{curve.told(at)}: {words}; take another path"
+def _limit_failure(curve: _Curve, at: float, leg: int, fault: str, metres: float) -> _Failure:
+    text = f"{curve.place_text(at)}: {fault}; take another path"
     return _Failure(at, UnreachablePose(text, leg=leg, shortfall=metres, index=()))
 
 
-def _failed_type_ii(curve: _Curve, marks: Array) -> _Failure | None:
+def _type_ii_failure(curve: _Curve, marks: Array) -> _Failure | None:
     if closure_of(curve.robot).vanishes() is False and not curve.robot.platform.angles:
         return None
     # Its sign is that of the beginning, as far as the actuators hold the platform.
     side = 1.0 if float(curve.value("type_ii", marks[:1])[0]) > 0.0 else -1.0
-    crossing = first_below(lambda at: side * curve.value("type_ii", at)[:, None], marks, TYPE_II)
-    if crossing is None:
+    first = first_below(lambda at: side * curve.value("type_ii", at)[:, None], marks, TYPE_II)
+    if first is None:
         return None
-    at = crossing[0]
+    at = first[0]
     error = SingularPose(
-        f"{curve.told(at)}: comes to a singularity (type II), where the actuators no longer hold "
-        "the platform; take another path, or go round it",
+        f"{curve.place_text(at)}: comes to a singularity (type II), where the actuators no longer "
+        "hold the platform; take another path, or go round it",
         kind="II",
         measure=float(np.abs(curve.value("type_ii", np.array([at])))[0]),
         index=(),

@@ -111,24 +111,26 @@ class Cycle:
             turn = self.scale * self.turn * np.array([1.0, -1.0, 0.5])[: angular.sum()]
             lift = np.roll(turn, 1)
             states = []
-            for moved, a, b in zip((place, velocity, acceleration), *_shares(tau), strict=True):
-                state = np.empty((len(moved), len(angular)))
-                state[:, ~angular] = moved
+            for lengths, a, b in zip((place, velocity, acceleration), *_shares(tau), strict=True):
+                state = np.empty((len(lengths), len(angular)))
+                state[:, ~angular] = lengths
                 state[:, angular] = np.multiply.outer(a, turn) + np.multiply.outer(b, lift)
                 states.append(state)
             return self.around + states[0], states[1], states[2]
         place = self.around[~angular] + place
         if not self.platform.angles:
             return place, velocity, acceleration
-        turned, rate, growth = (
-            self.scale * self.turn * (s[:, None] * self._across + h[:, None] * self._lifted)
+        angle_changes, rate, growth = (
+            self.scale * self.turn * (s[:, None] * self._turns_across + h[:, None] * self._turns_up)
             for s, h in zip(*_shares(tau), strict=True)
         )
-        angle = self.around[angular] + turned
+        angle = self.around[angular] + angle_changes
         if carries(self.platform):
             # The middle is given as a pose of P, the path as that of the tool.
-            zeros = np.zeros_like(self.around[angular])
-            place = place + arm_motion(self.platform, self.around[angular], zeros, zeros)[0]
+            zero_rates = np.zeros_like(self.around[angular])
+            place = (
+                place + arm_motion(self.platform, self.around[angular], zero_rates, zero_rates)[0]
+            )
         return pose_motion(
             self.platform,
             np.hstack([place, angle]),
@@ -137,15 +139,15 @@ class Cycle:
         )
 
     @property
-    def _across(self) -> NDArray[np.bool_]:
+    def _turns_across(self) -> NDArray[np.bool_]:
         """Whether each angle turns on the way across: the last one."""
         count = len(self.platform.angles)
         return np.asarray(np.arange(count) == count - 1)
 
     @property
-    def _lifted(self) -> NDArray[np.bool_]:
+    def _turns_up(self) -> NDArray[np.bool_]:
         """Whether each angle rises and sinks: the others, where no lengths go across."""
-        return np.asarray(~self._across & (len(self.platform.lengths) < 2))
+        return np.asarray(~self._turns_across & (len(self.platform.lengths) < 2))
 
     def acceleration(self, tau: Array, radius: float) -> Array:
         """Return the tool's acceleration (T, k) by tau, whatever moves it.
@@ -169,10 +171,10 @@ def _shares(tau: Array) -> tuple[_Shares, _Shares]:
     """
     way = np.where(tau <= 0.5, 2.0 * tau, 2.0 - 2.0 * tau)
     rate = np.where(tau <= 0.5, 2.0, -2.0)
-    transfer = quintic(way, _ACROSS_BEGINS, 1.0 - _ACROSS_BEGINS)
+    level_move = quintic(way, _ACROSS_BEGINS, 1.0 - _ACROSS_BEGINS)
     rise, sink = quintic(way, 0.0, _LIFT_ENDS), quintic(way, 1.0 - _LIFT_ENDS, 1.0)
     lift = [up - down for up, down in zip(rise, sink, strict=True)]
-    centred = [(s - 0.5, rate * ds, 4.0 * dds) for s, ds, dds in (transfer, lift)]
+    centred = [(s - 0.5, rate * ds, 4.0 * dds) for s, ds, dds in (level_move, lift)]
     return centred[0], centred[1]
 
 

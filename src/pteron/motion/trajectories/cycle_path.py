@@ -32,7 +32,7 @@ class CyclePath:
         speeds = self._speed((tau[:-1, None] + 0.5 * span * (nodes + 1.0)).ravel())
         pieces = 0.5 * span * (speeds.reshape(-1, 5) @ shares)
         # Before and after them the path is straight and starts from rest: speed grows as tau^2.
-        edges = self._weighted(np.array([0.0, self._ends[0], self._ends[1], 0.5]))
+        edges = self._weighted_pose(np.array([0.0, self._ends[0], self._ends[1], 0.5]))
         first, last = (float(np.linalg.norm(edges[k + 1] - edges[k])) for k in (0, 2))
         self._tau, self._s = tau, first + np.concatenate([[0.0], np.cumsum(pieces)])
         self.length = float(self._s[-1]) + last
@@ -42,7 +42,7 @@ class CyclePath:
         platform = self._cycle.platform
         return tool_motion(platform, *self._cycle.at(tau))
 
-    def _weighted(self, tau: Array) -> Array:
+    def _weighted_pose(self, tau: Array) -> Array:
         return self._curve(tau)[0] * self._weights
 
     def _speed(self, tau: Array) -> Array:
@@ -51,16 +51,16 @@ class CyclePath:
     def at(self, s: Array) -> Curve:
         """Return poses (T, m) at s (T,), and two derivatives by s."""
         s = np.clip(np.asarray(s, dtype=float), 0.0, self.length)
-        within = np.clip(s, self._s[0], self._s[-1])
-        tau = self._times(within)
+        clipped = np.clip(s, self._s[0], self._s[-1])
+        tau = self._times(clipped)
         place, rate, bend = self._curve(tau)
         speed = np.linalg.norm(rate * self._weights, axis=-1)[:, None]
         first = rate / speed
-        tangential = np.sum(bend * first * self._weights**2, axis=-1)[:, None]
-        second = (bend - tangential * first) / speed**2
-        beyond = (s - within)[:, None]
-        second = np.where(beyond == 0.0, second, 0.0)
-        return pose_motion(self._cycle.platform, place + beyond * first, first, second)
+        projection = np.sum(bend * first * self._weights**2, axis=-1)[:, None]
+        second = (bend - projection * first) / speed**2
+        excess = (s - clipped)[:, None]
+        second = np.where(excess == 0.0, second, 0.0)
+        return pose_motion(self._cycle.platform, place + excess * first, first, second)
 
     def _times(self, s: Array) -> Array:
         """Return tau (T,) at s (T,): Newton's steps on the length between nodes, by quadrature."""
@@ -70,9 +70,9 @@ class CyclePath:
         tau = low + (high - low) * (s - self._s[k]) / (self._s[k + 1] - self._s[k])
         for _ in range(4):
             span = tau - low
-            at = low[:, None] + 0.5 * span[:, None] * (nodes + 1.0)
-            gone = 0.5 * span * (self._speed(at.ravel()).reshape(-1, 5) @ shares)
-            tau = np.clip(tau - (self._s[k] + gone - s) / self._speed(tau), low, high)
+            nodes_of_span = low[:, None] + 0.5 * span[:, None] * (nodes + 1.0)
+            covered = 0.5 * span * (self._speed(nodes_of_span.ravel()).reshape(-1, 5) @ shares)
+            tau = np.clip(tau - (self._s[k] + covered - s) / self._speed(tau), low, high)
         return tau
 
     def place(self, s: float) -> str:

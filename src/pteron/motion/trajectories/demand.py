@@ -21,7 +21,7 @@ from pteron.kinematics.evaluate import evaluate_unchecked
 from pteron.legs import Drive
 from pteron.legs.motor_limits import motor_peak
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
-from pteron.motion.motion import told_pose
+from pteron.motion.motion import pose_text
 from pteron.motion.trajectories.limits import MotionLimits
 from pteron.motion.trajectories.tool import Curve, tool_path
 
@@ -51,7 +51,7 @@ class Demand(NamedTuple):
     first: Array
     """dq/dp and d2q/dp2 of the joints."""
     second: Array
-    still: Array
+    static: Array
     """c: forces at rest, the offset included."""
     growth: Array
     """a, of p''; the motors' inertia included."""
@@ -70,7 +70,7 @@ class Demand(NamedTuple):
         What the drives give is between the two.
         """
         moving = np.sign(self.first * rate[:, None])
-        rigid = self.still + self.growth * gain[:, None] + self.square * rate[:, None] ** 2
+        rigid = self.static + self.growth * gain[:, None] + self.square * rate[:, None] ** 2
         return np.asarray(
             rigid + self.viscous * self.first * rate[:, None] + self.dry[:, None] * moving
         )
@@ -78,20 +78,20 @@ class Demand(NamedTuple):
 
 def demand(robot: Manipulator, pose: Array, first: Array, second: Array) -> Demand:
     """Return the demand of poses (K, m) on a curve with these derivatives by p."""
-    zeros = np.zeros_like(pose)
-    weight = evaluate_unchecked(robot, "inverse_dynamics", pose, zeros, zeros)
+    zero_rates = np.zeros_like(pose)
+    weight = evaluate_unchecked(robot, "inverse_dynamics", pose, zero_rates, zero_rates)
     rates = evaluate_unchecked(robot, "joint_rates", pose, first)[0]
     bends = evaluate_unchecked(robot, "joint_accelerations", pose, first, second)[0]
     drives = drives_of(robot)
-    pushed = evaluate_unchecked(robot, "inverse_dynamics", pose, zeros, first)
-    swept = evaluate_unchecked(robot, "inverse_dynamics", pose, first, second)
+    accelerated_forces = evaluate_unchecked(robot, "inverse_dynamics", pose, zero_rates, first)
+    moving_forces = evaluate_unchecked(robot, "inverse_dynamics", pose, first, second)
     _, speed, bend = tool_path(robot.platform, pose, first, second)
     return Demand(
         rates,
         bends,
         weight + drives.offset,
-        pushed - weight + drives.inertia * rates,
-        swept - weight + drives.inertia * bends,
+        accelerated_forces - weight + drives.inertia * rates,
+        moving_forces - weight + drives.inertia * bends,
         np.array([drives.coulomb, drives.coulomb + drives.stribeck]),
         np.asarray(drives.viscous),
         (speed, bend),
@@ -107,14 +107,14 @@ def demand_between(
     friction changes its sign, and a force jumps: that place is there twice, moving either way.
     """
     turns, joints = _reversals(robot, states, at)
-    every = np.concatenate([at, turns, turns])
-    order = np.argsort(every, kind="stable")
-    pose, first, second = states(every[order])
-    path_demand = demand(robot, pose, first, second)
-    rates = path_demand.first.copy()
+    all_places = np.concatenate([at, turns, turns])
+    order = np.argsort(all_places, kind="stable")
+    pose, first, second = states(all_places[order])
+    needs = demand(robot, pose, first, second)
+    rates = needs.first.copy()
     rows = np.argsort(order)[len(at) :]
     rates[rows, np.tile(joints, 2)] = np.repeat([_CREEP, -_CREEP], len(turns))
-    return every[order], path_demand._replace(first=rates), pose
+    return all_places[order], needs._replace(first=rates), pose
 
 
 def _reversals(
@@ -133,8 +133,8 @@ def _reversals(
         low, _ = bisect_condition(
             lambda places: (rates(places)[each, joints] > 0.0) == ahead, low, high, _HALVINGS
         )
-    touching, touching_joints = np.nonzero((known[1:-1] == 0.0) & (known[2:] * known[:-2] < 0.0))
-    return np.concatenate([low, at[touching + 1]]), np.concatenate([joints, touching_joints])
+    stop_rows, stop_joints = np.nonzero((known[1:-1] == 0.0) & (known[2:] * known[:-2] < 0.0))
+    return np.concatenate([low, at[stop_rows + 1]]), np.concatenate([joints, stop_joints])
 
 
 def curve_rate(
@@ -145,11 +145,7 @@ def curve_rate(
 
 
 def most_rate(
-    robot: Manipulator,
-    path_demand: Demand,
-    limits: MotionLimits,
-    poses: Array,
-    most: float = np.inf,
+    robot: Manipulator, needs: Demand, limits: MotionLimits, poses: Array, most: float = np.inf
 ) -> float:
     """Return the largest constant p', `most` at most, at which a curve keeps the limits.
 
@@ -157,23 +153,23 @@ def most_rate(
     """
     with np.errstate(divide="ignore", invalid="ignore"):
         rates = [
-            limits.speed / np.abs(path_demand.first),
-            np.sqrt(limits.acceleration / np.abs(path_demand.second)),
-            limits.tool_speed / np.linalg.norm(path_demand.tool[0], axis=-1),
-            np.sqrt(limits.tool_acceleration / np.linalg.norm(path_demand.tool[1], axis=-1)),
+            limits.speed / np.abs(needs.first),
+            np.sqrt(limits.acceleration / np.abs(needs.second)),
+            limits.tool_speed / np.linalg.norm(needs.tool[0], axis=-1),
+            np.sqrt(limits.tool_acceleration / np.linalg.norm(needs.tool[1], axis=-1)),
         ]
         least = min(float(np.nanmin(rate, initial=most)) for rate in rates)
     joints, force, fall, back = limits.force_lines
     if not len(joints):
         return least
     # The margin on each side of a drive's force: square p'^2 + root p' <= margin.
-    rows, first = [], path_demand.first[:, joints]
-    for dry in path_demand.dry:
-        static = path_demand.still + dry * np.sign(path_demand.first)
-        _expect_strength(robot, static, limits, poses)
+    rows, first = [], needs.first[:, joints]
+    for dry in needs.dry:
+        static_forces = needs.static + dry * np.sign(needs.first)
+        _expect_strength(robot, static_forces, limits, poses)
         for side in (1.0, -1.0):
-            parts = force - side * static[:, joints], side * path_demand.square[:, joints]
-            root = side * (path_demand.viscous[joints] + back) * first + fall * np.abs(first)
+            parts = force - side * static_forces[:, joints], side * needs.square[:, joints]
+            root = side * (needs.viscous[joints] + back) * first + fall * np.abs(first)
             rows.append([*parts, root])
     margin, square, root = (np.concatenate([row[k].ravel() for row in rows]) for k in range(3))
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -193,21 +189,23 @@ def most_rate(
     return least
 
 
-def _expect_strength(robot: Manipulator, static: Array, limits: MotionLimits, poses: Array) -> None:
+def _expect_strength(
+    robot: Manipulator, static_forces: Array, limits: MotionLimits, poses: Array
+) -> None:
     """Refuse a curve on which a drive cannot even creep."""
     joints, force, _, _ = limits.force_lines
-    strength = np.full(static.shape[-1], np.inf)
+    strength = np.full(static_forces.shape[-1], np.inf)
     np.minimum.at(strength, joints, force)
-    over = np.abs(static) - strength
+    over = np.abs(static_forces) - strength
     if not (over >= 0.0).any():
         return
     k, i = np.unravel_index(int(np.nanargmax(over)), over.shape)
     joint = robot.legs[i].joint
     raise ModelError(
         f"leg {i + 1}: its drive gives {strength[i]:.4g} {joint.force_unit}, but the machine's "
-        f"weight and dry friction alone take {abs(static[k, i]):.4g} {joint.force_unit} at pose "
-        f"{told_pose(poses[k])}: no motion is slow enough; take another path, a lighter load or a "
-        "stronger drive",
+        f"weight and dry friction alone take {abs(static_forces[k, i]):.4g} {joint.force_unit} at "
+        f"pose {pose_text(poses[k])}: no motion is slow enough; take another path, a lighter load "
+        "or a stronger drive",
         subject=robot.name,
     )
 
@@ -263,14 +261,14 @@ def peaks(
     tuple of Peak
     """
     robot = as_manipulator(robot)
-    path_demand = demand(robot, pose, velocity, acceleration)
+    needs = demand(robot, pose, velocity, acceleration)
     ones = np.ones(len(pose))
-    drive_forces = path_demand.drive_forces(ones, 0.0 * ones)
+    drive_forces = needs.drive_forces(ones, 0.0 * ones)
     force = np.abs(drive_forces).max(axis=0)
     largest = []
     for name, sizes in (
-        ("speed", np.abs(path_demand.first)),
-        ("acceleration", np.abs(path_demand.second)),
+        ("speed", np.abs(needs.first)),
+        ("acceleration", np.abs(needs.second)),
         ("force", force),
     ):
         for i, leg in enumerate(robot.legs):
@@ -281,12 +279,10 @@ def peaks(
     for i, leg in enumerate(robot.legs):
         if not any(limits.lines[i : i + 1]):
             continue
-        size, most, at = motor_peak(
-            leg.drive or Drive(), drive_forces[..., i], path_demand.first[:, i]
-        )
-        limit_of_drive = leg.joint.force_unit, most, at % len(pose)
-        largest.append(Peak("force_at_speed", i + 1, size, *limit_of_drive))
-    for name, part in zip(("tool_speed", "tool_acceleration"), path_demand.tool, strict=True):
+        size, most, at = motor_peak(leg.drive or Drive(), drive_forces[..., i], needs.first[:, i])
+        limit_fields = leg.joint.force_unit, most, at % len(pose)
+        largest.append(Peak("force_at_speed", i + 1, size, *limit_fields))
+    for name, part in zip(("tool_speed", "tool_acceleration"), needs.tool, strict=True):
         sizes = np.linalg.norm(part, axis=-1)
         at = int(np.argmax(sizes))
         limit = float(getattr(limits, name))

@@ -14,7 +14,7 @@ from pteron.kernels import Array
 from pteron.manipulator import RobotLike, as_manipulator
 from pteron.motion.motion import Motion
 from pteron.motion.trajectories.checks import check_motion
-from pteron.motion.trajectories.time_law import STEP, sampled
+from pteron.motion.trajectories.time_law import STEP, sample_curve
 from pteron.motion.trajectories.tool import Curve
 
 _BLOCK = 1 << 14
@@ -64,7 +64,7 @@ class FourierSeries:
             )
         if not (np.isfinite(self.period) and self.period > 0.0):
             raise DataError(f"period: {self.period} s given, a number above 0 expected")
-        object.__setattr__(self, "center", tuple(float(value) for value in self.center))
+        object.__setattr__(self, "center", tuple(float(number) for number in self.center))
         for name in ("cosines", "sines"):
             rows = np.asarray(getattr(self, name), dtype=float).tolist()
             object.__setattr__(self, name, tuple(tuple(row) for row in rows))
@@ -91,8 +91,8 @@ def fourier_curve(coefficients: Array, period: float, times: Array) -> Curve:
         [basis @ coefficients for basis in fourier_bases(times[rows], harmonics, period)]
         for rows in row_blocks(len(times))
     ]
-    value, first, second = (np.concatenate(parts) for parts in zip(*blocks, strict=True))
-    return value, first, second
+    series, first, second = (np.concatenate(parts) for parts in zip(*blocks, strict=True))
+    return series, first, second
 
 
 def fourier_basis(times: Array, harmonics: int, period: float) -> Array:
@@ -151,6 +151,6 @@ def fourier_motion(robot: RobotLike, series: FourierSeries, step: float = STEP) 
     6.0
     """
     robot = as_manipulator(robot)
-    motion = sampled(series.at, series.period, step)
+    motion = sample_curve(series.at, series.period, step)
     check_motion(robot, motion)
     return motion

@@ -11,21 +11,21 @@ from typing import Any
 import numpy as np
 
 from pteron.errors import DataError, PteronError, UnreachablePose
-from pteron.extras import of_extra
+from pteron.extras import import_extra
 from pteron.kernels import Array
 from pteron.kinematics import follow, inverse_kinematics
 from pteron.kinematics.evaluate import evaluate_unchecked, finite_pose
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.motion import Motion
 from pteron.motion.trajectories.checks import check_motion
-from pteron.motion.trajectories.limits import MotionLimits, PerJointLimit, limits_of, per_joint
-from pteron.motion.trajectories.time_law import STEP, kept_motion, sampled
+from pteron.motion.trajectories.limits import MotionLimits, PerJointLimit, limit_array, limits_of
+from pteron.motion.trajectories.time_law import STEP, limit_motion, sample_curve
 from pteron.motion.trajectories.timed_path import Timed
 from pteron.motion.trajectories.tool import Curve
 from pteron.shapes import PoseLike
 
 _NEAR = 1e-6
-"""Distance, m or rad, from the pose asked for at which the motion may end."""
+"""Tolerance, m or rad, of the motion's last pose about the target pose."""
 
 _FAST = 1e6
 """Limit that Ruckig gets for a joint without one, m/s or rad/s."""
@@ -90,21 +90,21 @@ def jerk_limited(
     """
     robot = as_manipulator(robot)
     ends = [finite_pose(robot, start, "start"), finite_pose(robot, end, "end")]
-    bounds = limits_of(robot) if limits is None else limits
-    jerks = per_joint(robot, "jerk", jerk, [None] * robot.joint_count)
-    if not np.isfinite([*bounds.acceleration, *jerks]).all():
+    motion_limits = limits_of(robot) if limits is None else limits
+    jerks = limit_array(robot, "jerk", jerk, [None] * robot.joint_count)
+    if not np.isfinite([*motion_limits.acceleration, *jerks]).all():
         raise DataError(
             "a motion with limited jerk needs jerk and acceleration of every joint; give both"
         )
     first, last = (
-        _joints(robot, name, pose) for name, pose in zip(("start", "end"), ends, strict=True)
+        _end_joints(robot, name, pose) for name, pose in zip(("start", "end"), ends, strict=True)
     )
     # The shorter way round, where the limits of a crank leave one.
     free = [leg.goes_round and leg.limits is None for leg in robot.legs]
-    last = np.where(free, first + _within_half_a_turn(last - first), last)
+    last = np.where(free, first + _wrap_half_turn(last - first), last)
     if np.abs(last - first).max() <= _NEAR:
         raise DataError("end: the joints are at start's already; give another pose")
-    planned = _planned(first, last, bounds, jerks)
+    planned = _plan_trajectory(first, last, motion_limits, jerks)
 
     def curve(tau: Array) -> Curve:
         joints, rates, gains = (
@@ -112,10 +112,10 @@ def jerk_limited(
             for part in zip(*map(planned.at_time, tau * planned.duration), strict=True)
         )
         poses = follow(robot, joints, ends[0], on_failure="nan")
-        lost = np.isnan(poses).any(axis=-1)
-        if lost.any():
-            k = int(lost.argmax())
-            raise _lost(
+        is_lost = np.isnan(poses).any(axis=-1)
+        if is_lost.any():
+            k = int(is_lost.argmax())
+            raise _lost_error(
                 f"the motion, at {tau[k] * planned.duration:.4g} s: the platform does not follow "
                 f"to the joint coordinates {[round(float(q), 6) for q in joints[k]]}: its "
                 "assembly mode ends before; go there by way of another pose"
@@ -124,61 +124,57 @@ def jerk_limited(
         return poses, planned.duration * velocity, planned.duration**2 * acceleration
 
     course = Timed(curve, planned.duration)
-    rough = sampled(course.at, course.duration, min(step, course.duration / 100.0))
+    rough = sample_curve(course.at, course.duration, min(step, course.duration / 100.0))
     check_motion(robot, rough)
     _expect_modes(robot, rough, planned, ends[1])
-    return kept_motion(robot, course, bounds, step)
+    return limit_motion(robot, course, motion_limits, step)
 
 
-def _within_half_a_turn(angles: Array) -> Array:
+def _wrap_half_turn(angles: Array) -> Array:
     """Return angles, rad, less whole turns: from -pi to pi."""
     return (angles + np.pi) % (2.0 * np.pi) - np.pi
 
 
-def _joints(robot: Manipulator, name: str, pose: Array) -> Array:
+def _end_joints(robot: Manipulator, name: str, pose: Array) -> Array:
     try:
         return inverse_kinematics(robot, pose)
     except UnreachablePose as error:
-        reason = f"{name} {error}"
+        text = f"{name} {error}"
         raise UnreachablePose(
-            reason,
-            leg=error.leg,
-            shortfall=error.shortfall,
-            index=(),
-            millimetres=error.millimetres,
+            text, leg=error.leg, shortfall=error.shortfall, index=(), millimetres=error.millimetres
         ) from None
 
 
 def _expect_modes(robot: Manipulator, motion: Motion, planned: Any, end: Array) -> None:
     """Refuse a motion that leaves the machine's working mode, or ends in another pose."""
-    off = motion.pose[-1] - end
-    off = np.where(robot.wraps, _within_half_a_turn(off), off)
+    end_error = motion.pose[-1] - end
+    end_error = np.where(robot.wraps, _wrap_half_turn(end_error), end_error)
     joints = np.array([planned.at_time(t)[0] for t in motion.time])
-    away = joints - inverse_kinematics(robot, motion.pose)
-    away = np.where(
-        [leg.joint.unit == "rad" for leg in robot.legs], _within_half_a_turn(away), away
+    joint_errors = joints - inverse_kinematics(robot, motion.pose)
+    joint_errors = np.where(
+        [leg.joint.unit == "rad" for leg in robot.legs], _wrap_half_turn(joint_errors), joint_errors
     )
-    if max(np.abs(off).max(), np.abs(away).max()) > _NEAR:
-        raise _lost(
+    if max(np.abs(end_error).max(), np.abs(joint_errors).max()) > _NEAR:
+        raise _lost_error(
             "end: the joints' path leads to another assembly or working mode there; go by way of "
             "another pose"
         )
 
 
-def _lost(text: str) -> UnreachablePose:
+def _lost_error(text: str) -> UnreachablePose:
     return UnreachablePose(text, leg=0, shortfall=float("nan"), index=())
 
 
-def _planned(first: Array, last: Array, limits: MotionLimits, jerks: Array) -> Any:
+def _plan_trajectory(first: Array, last: Array, limits: MotionLimits, jerks: Array) -> Any:
     """Return Ruckig's trajectory between joint coordinates (n,)."""
-    ruckig = of_extra("motion", "ruckig", "motion with limited jerk needs ruckig", PteronError)
+    ruckig = import_extra("motion", "ruckig", "motion with limited jerk needs ruckig", PteronError)
     count = len(first)
     parameters = ruckig.InputParameter(count)
     parameters.current_position, parameters.target_position = first.tolist(), last.tolist()
     parameters.max_velocity = np.minimum(limits.speed, _FAST).tolist()
     parameters.max_acceleration, parameters.max_jerk = limits.acceleration.tolist(), jerks.tolist()
     planned = ruckig.Trajectory(count)
-    result = ruckig.Ruckig(count).calculate(parameters, planned)
-    if result not in (ruckig.Result.Working, ruckig.Result.Finished):
-        raise DataError(f"limits: Ruckig finds no motion within them ({result}); give others")
+    outcome = ruckig.Ruckig(count).calculate(parameters, planned)
+    if outcome not in (ruckig.Result.Working, ruckig.Result.Finished):
+        raise DataError(f"limits: Ruckig finds no motion within them ({outcome}); give others")
     return planned

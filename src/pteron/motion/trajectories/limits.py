@@ -56,7 +56,7 @@ class MotionLimits:
     def force_lines(self) -> tuple[NDArray[np.int64], Array, Array, Array]:
         """All limits of forces, as lines: joint, force, fall and back, (R,) each."""
         flat = [(i, (force, 0.0, 0.0)) for i, force in enumerate(self.force) if force < math.inf]
-        every = [*flat, *((i, numbers) for i, lines in enumerate(self.lines) for numbers in lines)]
+        every = [*flat, *((i, line) for i, lines in enumerate(self.lines) for line in lines)]
         joints = np.array([i for i, _ in every], dtype=np.int64)
         force, fall, back = np.array([line for _, line in every]).reshape(-1, 3).T
         return joints, force, fall, back
@@ -107,36 +107,36 @@ def limits_of(
     robot = as_manipulator(robot)
     drives = [leg.drive or Drive() for leg in robot.legs]
     return MotionLimits(
-        per_joint(robot, "speed", speed, [drive.max_speed for drive in drives]),
-        per_joint(robot, "acceleration", acceleration, [None] * len(drives)),
-        per_joint(robot, "force", force, [drive.max_force for drive in drives]),
-        math.inf if tool_speed is None else _positive("tool_speed", tool_speed),
+        limit_array(robot, "speed", speed, [drive.max_speed for drive in drives]),
+        limit_array(robot, "acceleration", acceleration, [None] * len(drives)),
+        limit_array(robot, "force", force, [drive.max_force for drive in drives]),
+        math.inf if tool_speed is None else _positive_number("tool_speed", tool_speed),
         math.inf
         if tool_acceleration is None
-        else _positive("tool_acceleration", tool_acceleration),
+        else _positive_number("tool_acceleration", tool_acceleration),
         tuple(map(speed_lines, drives)),
     )
 
 
-def per_joint(
-    robot: Manipulator, name: str, limit: PerJointLimit, defaults: Sequence[float | None]
+def limit_array(
+    robot: Manipulator, name: str, setting: PerJointLimit, defaults: Sequence[float | None]
 ) -> Array:
     """Return a limit of each joint (n,), by default its own, infinite where it has none."""
-    if limit is None:
-        return np.array([math.inf if value is None else value for value in defaults])
-    several = list(limit) if isinstance(limit, Sequence | np.ndarray) else [limit]
-    values = [_positive(name, value) for value in several]
-    if len(values) not in (1, robot.joint_count):
+    if setting is None:
+        return np.array([math.inf if limit is None else limit for limit in defaults])
+    several = list(setting) if isinstance(setting, Sequence | np.ndarray) else [setting]
+    checked = [_positive_number(name, limit) for limit in several]
+    if len(checked) not in (1, robot.joint_count):
         raise DataError(
-            f"{name}: {len(values)} numbers given, one expected or {robot.joint_count}, one for "
+            f"{name}: {len(checked)} numbers given, one expected or {robot.joint_count}, one for "
             f"each joint of {robot.name}"
         )
-    return np.broadcast_to(np.array(values), (robot.joint_count,)).copy()
+    return np.broadcast_to(np.array(checked), (robot.joint_count,)).copy()
 
 
-def _positive(name: str, value: object) -> float:
-    number = number_or_nan(value)
+def _positive_number(name: str, setting: object) -> float:
+    number = number_or_nan(setting)
     if not number > 0.0:
-        text = value if isinstance(value, float) else shown(value)
+        text = setting if isinstance(setting, float) else shown(setting)
         raise DataError(f"{name}: {text} given, a number above 0 expected")
     return number

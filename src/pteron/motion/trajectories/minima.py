@@ -30,10 +30,10 @@ def least_along(
     Its lowest valleys among the marks are looked into, finer and finer, if it may go below
     `enough` there: between two marks it changes by no more than twice what it does elsewhere.
     """
-    values = measure(marks)
-    places, least = marks[values.argmin(axis=0)], values.min(axis=0)
-    for j in range(values.shape[1]):
-        column = values[:, j]
+    samples = measure(marks)
+    places, least = marks[samples.argmin(axis=0)], samples.min(axis=0)
+    for j in range(samples.shape[1]):
+        column = samples[:, j]
         if not np.isfinite(column).all() or least[j] - enough > 2.0 * np.abs(np.diff(column)).max():
             continue
         padded = np.concatenate([[np.inf], column, [np.inf]])
@@ -42,11 +42,11 @@ def least_along(
             low, high = marks[max(k - 1, 0)], marks[min(k + 1, len(marks) - 1)]
             for _ in range(_ZOOMS):
                 fine = np.linspace(low, high, _FINER)
-                fine_values = measure(fine)[:, j]
-                best = int(fine_values.argmin())
+                refined = measure(fine)[:, j]
+                best = int(refined.argmin())
                 low, high = fine[max(best - 1, 0)], fine[min(best + 1, _FINER - 1)]
-            if fine_values[best] < least[j]:
-                places[j], least[j] = fine[best], fine_values[best]
+            if refined[best] < least[j]:
+                places[j], least[j] = fine[best], refined[best]
     return places, least
 
 

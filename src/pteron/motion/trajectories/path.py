@@ -148,21 +148,21 @@ def line_path(robot: RobotLike, poses: ArrayLike, corner: float = 0.0) -> LinePa
     (0.0, 0.2)
     """
     robot = as_manipulator(robot)
-    corners = finite_rows(robot, poses, "poses")
-    if corners.ndim != 2 or len(corners) < 2:
+    pose_rows = finite_rows(robot, poses, "poses")
+    if pose_rows.ndim != 2 or len(pose_rows) < 2:
         raise DataError(
-            f"poses: shape {corners.shape} given, (K, {robot.freedom}) expected, K at least 2"
+            f"poses: shape {pose_rows.shape} given, (K, {robot.freedom}) expected, K at least 2"
         )
     expect(np.isfinite(corner) and corner >= 0.0, "corner", corner, "0 m or more")
     places, _, _ = tool_motion(
-        robot.platform, corners, np.zeros_like(corners), np.zeros_like(corners)
+        robot.platform, pose_rows, np.zeros_like(pose_rows), np.zeros_like(pose_rows)
     )
     directions = np.diff(places, axis=0)
     sizes = np.linalg.norm(directions * path_weights(robot.platform), axis=-1)
     if (sizes <= _SAME).any():
         k = int(np.argmax(sizes <= _SAME))
         raise DataError(f"poses: {k + 2} is the same as {k + 1}; leave one of them out")
-    return _rounded(robot.platform, places, directions / sizes[:, None], sizes, corner)
+    return _round_corners(robot.platform, places, directions / sizes[:, None], sizes, corner)
 
 
 def path_weights(platform: Platform) -> Array:
@@ -170,7 +170,7 @@ def path_weights(platform: Platform) -> Array:
     return np.where(platform.angular, TURN, 1.0)
 
 
-def _rounded(
+def _round_corners(
     platform: Platform, places: Array, directions: Array, sizes: Array, corner: float
 ) -> LinePath:
     """Return the path through places (K, m), its lines having these directions and lengths."""

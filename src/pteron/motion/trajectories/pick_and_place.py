@@ -24,7 +24,7 @@ PEAK_ACCELERATION = 10.0
 """Largest acceleration of the tool's centre point where no duration is given, m/s^2."""
 
 _ZOOMS = 4
-"""Grids in which the greatest acceleration is sought, each a 500th as wide as the one before."""
+"""Grid refinements of the search for the peak acceleration, each 1/500 as wide as the last."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -116,9 +116,9 @@ def pick_and_place(
     (array([0.  , 0.25, 0.5 , 0.75, 1.  ]), True)
     """
     robot = as_manipulator(robot)
-    for name, value in {"scale": scale, "duration": duration, "peak": peak}.items():
-        if value is not None and not (np.isfinite(value) and value > 0.0):
-            raise DataError(f"{name}: {value} given, a number above 0 expected")
+    for name, number in {"scale": scale, "duration": duration, "peak": peak}.items():
+        if number is not None and not (np.isfinite(number) and number > 0.0):
+            raise DataError(f"{name}: {number} given, a number above 0 expected")
     expect(samples >= 2, "samples", samples, "at least 2")
     expect_to_fit("samples", samples, 10.0 * samples * robot.freedom)
     middle = home_pose(robot) if around is None else finite_pose(robot, around, "around")
@@ -147,7 +147,7 @@ def pick_and_place(
     )
 
 
-def cycle_path(motion: PickAndPlace) -> BackPath:
+def cycle_path(found: PickAndPlace) -> BackPath:
     """Return the path of a pick-and-place cycle, out and back, without its time.
 
     Parameters
@@ -168,7 +168,7 @@ def cycle_path(motion: PickAndPlace) -> BackPath:
     >>> len(path.rests)
     3
     """
-    return BackPath(CyclePath(motion.cycle))
+    return BackPath(CyclePath(found.cycle))
 
 
 def farthest_point(robot: Manipulator) -> float:

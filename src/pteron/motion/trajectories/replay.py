@@ -77,16 +77,16 @@ def replay(
     has = set(rows.columns)
     m = robot.freedom
     if has.issuperset(motion_columns):
-        time, values = _read(rows, motion_columns)
-        values[:, :m] = _turned_on(robot, values[:, :m])
-        motion = Motion(time, values[:, :m], values[:, m : 2 * m], values[:, 2 * m :])
+        time, columns = _read_columns(rows, motion_columns)
+        columns[:, :m] = _unwrap_angles(robot, columns[:, :m])
+        motion = Motion(time, columns[:, :m], columns[:, m : 2 * m], columns[:, 2 * m :])
     elif has.issuperset(joints) and not has.issuperset(poses):
-        time, values = _read(rows, joints)
-        motion = _followed(robot, time, values, start)
+        time, columns = _read_columns(rows, joints)
+        motion = _follow_joints(robot, time, columns, start)
     else:
-        time, values = _read(rows, poses)
-        values = _turned_on(robot, values)
-        motion = Motion(time, *_spline(time, values))
+        time, columns = _read_columns(rows, poses)
+        columns = _unwrap_angles(robot, columns)
+        motion = Motion(time, *_spline(time, columns))
     check_motion(robot, motion, lambda at: _place(rows, motion, at))
     return motion
 
@@ -115,37 +115,39 @@ def rows_of(source: str | File | Table | Columns, useful: Sequence[str]) -> Tabl
     return Table("table", frame)
 
 
-def _read(rows: Table, columns: Sequence[str]) -> tuple[Array, Array]:
+def _read_columns(rows: Table, columns: Sequence[str]) -> tuple[Array, Array]:
     """Return times (T,), from 0, and columns (T, K)."""
-    values = rows.numbers([TIME, *columns])
-    time = values[:, 0]
+    numbers = rows.numbers([TIME, *columns])
+    time = numbers[:, 0]
     expect(len(time) >= 2, rows.source, "one row", "at least two")
-    back = np.flatnonzero(np.diff(time) <= 0.0)
-    if len(back):
-        k = int(back[0]) + 1
+    not_ascending = np.flatnonzero(np.diff(time) <= 0.0)
+    if len(not_ascending):
+        k = int(not_ascending[0]) + 1
         raise DataError(
             f"{rows.place(k)}, column {TIME}: {time[k]:g} s after {time[k - 1]:g} s; times must "
             "ascend"
         )
-    return time - time[0], values[:, 1:]
+    return time - time[0], numbers[:, 1:]
 
 
-def _turned_on(robot: Manipulator, poses: Array) -> Array:
+def _unwrap_angles(robot: Manipulator, poses: Array) -> Array:
     """Return poses (T, m) whose angles are continuous where, in a table, they jump by a turn."""
     return np.where(robot.platform.angular, np.unwrap(poses, axis=0), poses)
 
 
-def _spline(time: Array, values: Array) -> tuple[Array, Array, Array]:
+def _spline(time: Array, samples: Array) -> tuple[Array, Array, Array]:
     """Return values (T, K) and two derivatives, of the spline through them."""
     degree = min(_DEGREE, len(time) - 1)
-    spline = scipy.interpolate.make_interp_spline(time, values, k=degree)
+    spline = scipy.interpolate.make_interp_spline(time, samples, k=degree)
     orders = (
-        np.asarray(spline.derivative(k)(time)) if k <= degree else 0.0 * values for k in (1, 2)
+        np.asarray(spline.derivative(k)(time)) if k <= degree else 0.0 * samples for k in (1, 2)
     )
-    return (values, *orders)  # type: ignore[return-value]
+    return (samples, *orders)  # type: ignore[return-value]
 
 
-def _followed(robot: Manipulator, time: Array, joints: Array, start: PoseLike | None) -> Motion:
+def _follow_joints(
+    robot: Manipulator, time: Array, joints: Array, start: PoseLike | None
+) -> Motion:
     """Return the platform's motion as its joints move so, (T, n)."""
     if start is None:
         raise DataError(

@@ -125,7 +125,7 @@ def scaled_to_reach(
     scale, best = 0, None
     for across, up in moves(robot, direction, _DIRECTIONS):
         cycle = Cycle(robot.platform, middle, across, up, turn, 1.0)
-        larger = _largest(robot, cycle, least, int(_WORTH * scale) + 1)
+        larger = _largest_scale(robot, cycle, least, int(_WORTH * scale) + 1)
         if larger:
             scale, best = larger, across
     if best is None:
@@ -138,18 +138,18 @@ def scaled_to_reach(
     return scale / _STEPS, best
 
 
-def _largest(robot: Manipulator, cycle: Cycle, least: float, least_scale: int) -> int:
+def _largest_scale(robot: Manipulator, cycle: Cycle, least: float, minimum: int) -> int:
     """Return the largest scale that fits, in thousandths; 0 if it is less than is wanted."""
     way = np.linspace(0.0, 0.5, _SAMPLES)
 
     def fits(thousandths: int) -> bool:
         return keeps_margin(robot, replace(cycle, scale=thousandths / _STEPS).at(way)[0], least)
 
-    if least_scale > _STEPS or not fits(least_scale):
+    if minimum > _STEPS or not fits(minimum):
         return 0
     if fits(_STEPS):
         return _STEPS
-    most = range(_STEPS - least_scale)
+    most = range(_STEPS - minimum)
     return _STEPS - bisect_left(most, True, lo=1, key=lambda less: fits(_STEPS - less))
 
 

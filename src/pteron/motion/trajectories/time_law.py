@@ -70,11 +70,11 @@ def shortest(
     robot = as_manipulator(robot)
     rate = curve_rate(robot, curve(np.linspace(0.0, 1.0, _LOOK)), limits)
     if not np.isfinite(rate):
-        raise _unlimited()
-    return kept_motion(robot, Timed(curve, 1.0 / rate), limits, step)
+        raise _no_limit_error()
+    return limit_motion(robot, Timed(curve, 1.0 / rate), limits, step)
 
 
-def in_time(
+def time_curve(
     robot: Manipulator,
     curve: Callable[[Array], Curve],
     duration: float | None,
@@ -86,10 +86,10 @@ def in_time(
         return shortest(robot, curve, limits, step)
     course = Timed(curve, _expect_time("duration", duration))
     _expect_kept(robot, course, limits)
-    return sampled(course.at, duration, step)
+    return sample_curve(course.at, duration, step)
 
 
-def _unlimited() -> DataError:
+def _no_limit_error() -> DataError:
     return DataError(
         "neither a duration nor a limit that the motion meets is given, and the machine's drives "
         "have none; give a duration, or limits such as speed and acceleration of the joints"
@@ -148,23 +148,23 @@ def along(
     """
     robot = as_manipulator(robot)
     check_path(robot, path)
-    bounds = limits_of(robot) if limits is None else limits
+    motion_limits = limits_of(robot) if limits is None else limits
     laws = (polynomial(law),) * (len(path.rests) - 1)
     sizes = np.diff(path.rests)
     # Where nothing limits a motion the stretches have the same peak acceleration.
     shares: Sequence[float] = [float(np.sqrt(size)) for size in sizes]
-    if bounds.any:
-        shares = stretch_times(robot, path, laws[0], bounds)
+    if motion_limits.any:
+        shares = stretch_times(robot, path, laws[0], motion_limits)
     elif duration is None:
-        raise _unlimited()
+        raise _no_limit_error()
     course = timed_path(path, shares, laws)
     if duration is None:
-        return kept_motion(robot, course, bounds, step)
+        return limit_motion(robot, course, motion_limits, step)
     _expect_time("duration", duration)
-    slowed = course.slowed(duration / course.duration)
-    if bounds.any:
-        _expect_kept(robot, slowed, bounds, course.duration)
-    return sampled(slowed.at, duration, step)
+    slowed_course = course.slow_down(duration / course.duration)
+    if motion_limits.any:
+        _expect_kept(robot, slowed_course, motion_limits, course.duration)
+    return sample_curve(slowed_course.at, duration, step)
 
 
 def stretch_times(
@@ -181,7 +181,7 @@ def stretch_times(
         second = bend * (size * rate[:, None]) ** 2 + by_s * size * gain[:, None]
         most = curve_rate(robot, (pose, first, second), limits)
         if not np.isfinite(most):
-            raise _unlimited()
+            raise _no_limit_error()
         durations.append(1.0 / most)
     return durations
 
@@ -203,7 +203,7 @@ def _expect_kept(
     )
 
 
-def kept_motion(robot: Manipulator, course: Timed, limits: MotionLimits, step: float) -> Motion:
+def limit_motion(robot: Manipulator, course: Timed, limits: MotionLimits, step: float) -> Motion:
     """Return a course as a motion that keeps the limits at ten times its samples too.
 
     And where a joint reverses between them.
@@ -212,20 +212,20 @@ def kept_motion(robot: Manipulator, course: Timed, limits: MotionLimits, step: f
     """
     for _ in range(_TRIES):
         count = max(1, int(np.ceil(course.duration / _expect_time("step", step) - 1e-9)))
-        course = course.slowed(count * step / course.duration)
-        motion = sampled(course.at, count * step, step)
+        course = course.slow_down(count * step / course.duration)
+        motion = sample_curve(course.at, count * step, step)
         fine = np.linspace(0.0, motion.duration, _FINER * count + 1)
-        _, path_demand, poses = demand_between(robot, motion.at, fine)
-        rate = most_rate(robot, path_demand, limits, poses, 1.0)
+        _, needs, poses = demand_between(robot, motion.at, fine)
+        rate = most_rate(robot, needs, limits, poses, 1.0)
         if rate * KEPT >= 1.0:
             return motion
-        course = course.slowed(1.0 / rate)
+        course = course.slow_down(1.0 / rate)
     raise DataError(
         f"step: {step:g} s suits no motion of {course.duration:.3g} s; give a hundredth of it"
     )
 
 
-def sampled(states: Callable[[Array], Curve], duration: float, step: float = STEP) -> Motion:
+def sample_curve(states: Callable[[Array], Curve], duration: float, step: float = STEP) -> Motion:
     """Return a motion's samples from its beginning to its end, evenly and at most a step apart.
 
     `states` takes times (T,), s, and returns pose, velocity and acceleration, (T, m) each.
@@ -240,6 +240,6 @@ def sampled(states: Callable[[Array], Curve], duration: float, step: float = STE
     return Motion(time, *states(time))
 
 
-def _expect_time(name: str, value: float) -> float:
-    expect(np.isfinite(value) and value > 0.0, name, value, "a time above 0 s")
-    return value
+def _expect_time(name: str, seconds: float) -> float:
+    expect(np.isfinite(seconds) and seconds > 0.0, name, seconds, "a time above 0 s")
+    return seconds

@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pteron.errors import DataError, ModelError, PteronError
-from pteron.extras import of_extra
+from pteron.extras import import_extra
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.motion import Motion
@@ -31,7 +31,7 @@ from pteron.motion.trajectories.demand import demand, demand_between
 from pteron.motion.trajectories.limit_rows import LimitRows, limit_rows
 from pteron.motion.trajectories.limits import MotionLimits, limits_of
 from pteron.motion.trajectories.path import Path
-from pteron.motion.trajectories.time_law import STEP, kept_motion, stretch_times
+from pteron.motion.trajectories.time_law import STEP, limit_motion, stretch_times
 from pteron.motion.trajectories.time_polynomials import Progress, polynomial
 from pteron.motion.trajectories.timed_path import timed_path
 from pteron.motion.trajectories.tool import Curve
@@ -136,20 +136,24 @@ def time_optimal(
     True
     """
     robot = as_manipulator(robot)
-    bounds = limits_of(robot) if limits is None else limits
-    if not bounds.bounds_acceleration:
+    motion_limits = limits_of(robot) if limits is None else limits
+    if not motion_limits.bounds_acceleration:
         raise DataError(
             "nothing limits the acceleration: neither a limit given nor the drives' max_force; "
             "give a limit of force or of acceleration"
         )
-    toppra = of_extra("motion", "toppra", "time-optimal motion needs toppra", PteronError)
+    toppra = import_extra("motion", "toppra", "time-optimal motion needs toppra", PteronError)
     check_path(robot, path)
-    slow = stretch_times(robot, path, polynomial("quintic"), bounds)
-    stretches = [_fastest(robot, path, j, bounds, slow[j], step, toppra) for j in range(len(slow))]
+    slow = stretch_times(robot, path, polynomial("quintic"), motion_limits)
+    stretches = [
+        _fastest_law(robot, path, j, motion_limits, slow[j], step, toppra) for j in range(len(slow))
+    ]
     course = timed_path(
-        path, [law.duration for law in stretches], [law.progress for law in stretches]
+        path,
+        [stretch.duration for stretch in stretches],
+        [stretch.progress for stretch in stretches],
     )
-    motion = kept_motion(robot, course, bounds, step)
+    motion = limit_motion(robot, course, motion_limits, step)
     parts = motion.time, motion.pose, motion.velocity, motion.acceleration
     return TimeOptimal(*parts, sum(stretch.bound for stretch in stretches), sum(slow))
 
@@ -164,7 +168,7 @@ class _Stretch(NamedTuple):
     """Factor by which it must be slowed to keep its limits; 1 where it does."""
 
 
-def _fastest(
+def _fastest_law(
     robot: Manipulator,
     path: Path,
     j: int,
@@ -184,49 +188,51 @@ def _fastest(
         return pose, (end - begin) * first, (end - begin) ** 2 * second
 
     rows = limit_rows(demand(robot, *states(grid)), limits, unit)
-    squares = _first(toppra, rows, grid)
-    bound = Profile.of(grid, squares).duration
-    laws: list[_Stretch] = []
+    squares = _first_pass(toppra, rows, grid)
+    bound = Profile.from_squares(grid, squares).duration
+    attempts: list[_Stretch] = []
     margin, most = np.full_like(rows.c, 1.0 - _SPARE), rows.most
     for _ in range(_PASSES):
         tighter = rows._replace(c=rows.c + 1.0 - margin, most=most)
-        squares = _solved(toppra, tighter, grid, squares, _AHEAD[-1])
-        profile = Profile.of(grid, squares)
+        squares = _solve_pass(toppra, tighter, grid, squares, _AHEAD[-1])
+        profile = Profile.from_squares(grid, squares)
         spread = min(_SPREAD * step / unit, _SHARE * profile.duration)
-        progress = profile.spread(spread)
+        progress = profile.smooth(spread)
         # Limits are tightened by what the spread motion exceeds them.
 
         def at_times(tau: Array, progress: Progress = progress) -> Curve:
             return states(progress(tau)[0])
 
-        tau, path_demand, _ = demand_between(robot, at_times, np.linspace(0.0, 1.0, _LOOK))
+        tau, needs, _ = demand_between(robot, at_times, np.linspace(0.0, 1.0, _LOOK))
         _, rate, gain = progress(tau)
-        total = profile.duration + 2.0 * spread
-        x, u = (rate / total) ** 2, gain / total**2
-        there = limit_rows(path_demand, limits, unit)
-        used = there.used(u, x)
-        fast = x / there.most
-        slower = max(1.0, float(used.max(initial=0.0)) ** 0.5, float(fast.max()) ** 0.5)
-        laws.append(_Stretch(progress, total * unit, bound * unit, slower))
+        stretched_duration = profile.duration + 2.0 * spread
+        x, u = (rate / stretched_duration) ** 2, gain / stretched_duration**2
+        local_rows = limit_rows(needs, limits, unit)
+        usage = local_rows.usage(u, x)
+        speed_usage = x / local_rows.most
+        slower = max(1.0, float(usage.max(initial=0.0)) ** 0.5, float(speed_usage.max()) ** 0.5)
+        attempts.append(_Stretch(progress, stretched_duration * unit, bound * unit, slower))
         if slower <= 1.0:
             break
-        near = _near(tau * total - spread, profile.time, 2.0 * spread)
-        margin = np.minimum(margin, margin - 1.05 * np.maximum(_most_of(near, used - 1.0), 0.0))
-        most = most / np.maximum(_most_of(near, fast[:, None])[:, 0], 1.0)
-    return min(laws, key=lambda law: law.duration * law.slower)
+        ranges = _ranges_near(tau * stretched_duration - spread, profile.time, 2.0 * spread)
+        margin = np.minimum(
+            margin, margin - 1.05 * np.maximum(_largest_in_ranges(ranges, usage - 1.0), 0.0)
+        )
+        most = most / np.maximum(_largest_in_ranges(ranges, speed_usage[:, None])[:, 0], 1.0)
+    return min(attempts, key=lambda attempt: attempt.duration * attempt.slower)
 
 
-def _first(toppra: Any, rows: LimitRows, grid: Array) -> Array:
+def _first_pass(toppra: Any, rows: LimitRows, grid: Array) -> Array:
     """Return x = s'^2 on the grid by first passes that start from the quintic's speeds."""
     share, rate, _ = polynomial("quintic")(np.linspace(0.0, 1.0, _LOOK))
     quintic = np.interp(grid, share, rate) ** 2
     if not rows.v.any():
-        return _solved(toppra, rows, grid, quintic, math.inf)
+        return _solve_pass(toppra, rows, grid, quintic, math.inf)
     for slower in _SLOWER:
         squares = slower**2 * quintic
         try:
             for ahead in _AHEAD:
-                squares = _solved(toppra, rows, grid, squares, ahead)
+                squares = _solve_pass(toppra, rows, grid, squares, ahead)
         except ModelError:
             if slower == _SLOWER[-1]:
                 raise
@@ -235,7 +241,7 @@ def _first(toppra: Any, rows: LimitRows, grid: Array) -> Array:
     return squares
 
 
-def _near(times: Array, nodes: Array, span: float) -> Array:
+def _ranges_near(times: Array, nodes: Array, span: float) -> Array:
     """Return the range of the times (T,) near each node: first and last + 1, (2, K)."""
     first = np.searchsorted(times, nodes - span)
     last = np.searchsorted(times, nodes + span)
@@ -245,12 +251,14 @@ def _near(times: Array, nodes: Array, span: float) -> Array:
     return np.array([np.minimum(first, len(times) - 1), np.maximum(last, first + 1)])
 
 
-def _most_of(near: Array, values: Array) -> Array:
+def _largest_in_ranges(ranges: Array, quantities: Array) -> Array:
     """Return the largest of the values (T, R) near each node, (K, R)."""
-    return np.array([values[a:b].max(axis=0) for a, b in near.T])
+    return np.array([quantities[a:b].max(axis=0) for a, b in ranges.T])
 
 
-def _solved(toppra: Any, rows: LimitRows, grid: Array, last_squares: Array, ahead: float) -> Array:
+def _solve_pass(
+    toppra: Any, rows: LimitRows, grid: Array, last_squares: Array, ahead: float
+) -> Array:
     """Return x = s'^2 on the grid, by TOPP-RA, from that of the pass before.
 
     With viscous friction it is at most `ahead` times as large: there the chord ends.
@@ -258,13 +266,13 @@ def _solved(toppra: Any, rows: LimitRows, grid: Array, last_squares: Array, ahea
     most = np.minimum(rows.most, _FASTEST)
     a, b, c = rows.a.copy(), rows.b.copy(), rows.c.copy()
     if rows.v.any():
-        at = np.maximum(last_squares, _SLOWEST * last_squares.max())[:, None]
-        most = np.minimum(most, ahead * at[:, 0])
+        chord = np.maximum(last_squares, _SLOWEST * last_squares.max())[:, None]
+        most = np.minimum(most, ahead * chord[:, 0])
         # sqrt(x) <= sqrt(at) / 2 + x / (2 sqrt(at)), and for x <= top: sqrt(x) >= x / sqrt(top).
         against = rows.v > 0.0
         top = most[:, None]
-        b += np.where(against, rows.v / (2.0 * np.sqrt(at)), rows.v / np.sqrt(top))
-        c += np.where(against, rows.v * np.sqrt(at) / 2.0, 0.0)
+        b += np.where(against, rows.v / (2.0 * np.sqrt(chord)), rows.v / np.sqrt(top))
+        c += np.where(against, rows.v * np.sqrt(chord) / 2.0, 0.0)
     for part in (a, b):
         part[np.abs(part) < _NOTHING] = 0.0
     limit = toppra.constraint.LinearConstraint()

@@ -28,7 +28,7 @@ class Timed:
     curve: Callable[[Array], Curve]
     duration: float
 
-    def slowed(self, factor: float) -> Timed:
+    def slow_down(self, factor: float) -> Timed:
         """Return the same curve with its duration multiplied by a factor."""
         return Timed(self.curve, factor * self.duration)
 
@@ -40,21 +40,21 @@ class Timed:
 
 def timed_path(path: Path, durations: Sequence[float], laws: Sequence[Progress]) -> Timed:
     """Return a path traversed from rest to rest, a duration (s) and a time law for each stretch."""
-    total = float(sum(durations))
-    starts = np.concatenate([[0.0], np.cumsum(durations)]) / total
+    duration = float(sum(durations))
+    starts = np.concatenate([[0.0], np.cumsum(durations)]) / duration
 
     def curve(tau: Array) -> Curve:
         k = np.clip(np.searchsorted(starts, tau, side="right") - 1, 0, len(laws) - 1)
         s, rate, gain = np.zeros((3, len(tau)))
         for j, law in enumerate(laws):
-            is_within, span = k == j, starts[j + 1] - starts[j]
+            in_stretch, span = k == j, starts[j + 1] - starts[j]
             begin, end = path.rests[j : j + 2]
-            share, first, second = law((tau[is_within] - starts[j]) / span)
-            s[is_within] = begin + (end - begin) * share
-            rate[is_within] = (end - begin) * first / span
-            gain[is_within] = (end - begin) * second / span**2
+            share, first, second = law((tau[in_stretch] - starts[j]) / span)
+            s[in_stretch] = begin + (end - begin) * share
+            rate[in_stretch] = (end - begin) * first / span
+            gain[in_stretch] = (end - begin) * second / span**2
         pose, by_s, bend = path.at(s)
         rate, gain = rate[:, None], gain[:, None]
         return pose, by_s * rate, bend * rate**2 + by_s * gain
 
-    return Timed(curve, total)
+    return Timed(curve, duration)

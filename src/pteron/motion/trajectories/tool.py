@@ -18,12 +18,12 @@ def tool_motion(platform: Platform, pose: Array, first: Array, second: Array) ->
     axis is left out. A platform whose lengths cannot move the tool to any place, such as a
     tripod's, keeps its pose.
     """
-    return _moved(platform, (pose, first, second), 1.0)
+    return _shift_curve(platform, (pose, first, second), 1.0)
 
 
 def pose_motion(platform: Platform, place: Array, first: Array, second: Array) -> Curve:
     """Return the poses from the motion of the tool: the inverse of `tool_motion`."""
-    return _moved(platform, (place, first, second), -1.0)
+    return _shift_curve(platform, (place, first, second), -1.0)
 
 
 def tool_path(platform: Platform, pose: Array, first: Array, second: Array) -> Curve:
@@ -38,15 +38,15 @@ def tool_path(platform: Platform, pose: Array, first: Array, second: Array) -> C
     return place[..., lengths], velocity[..., lengths], acceleration[..., lengths]
 
 
-def _moved(platform: Platform, curve: Curve, side: float) -> Curve:
+def _shift_curve(platform: Platform, curve: Curve, side: float) -> Curve:
     if not carries(platform) or not any(platform.tool if platform.tilts else platform.tool[:2]):
         return curve
     angular = platform.angular
-    moved = tuple(part.copy() for part in curve)
+    shifted = tuple(part.copy() for part in curve)
     angles = tuple(part[..., angular] for part in curve)
-    for part, arm in zip(moved, arm_motion(platform, *angles), strict=True):
+    for part, arm in zip(shifted, arm_motion(platform, *angles), strict=True):
         part[..., ~angular] += side * arm
-    return moved[0], moved[1], moved[2]
+    return shifted[0], shifted[1], shifted[2]
 
 
 def carries(platform: Platform) -> bool:
@@ -61,7 +61,7 @@ def arm_motion(platform: Platform, angles: Array, rates: Array, growths: Array) 
     derivatives, are (..., j). The platform is one that `carries` its tool.
     """
     if platform.tilts:
-        state = (_without_lengths(platform, part) for part in (angles, rates, growths))
+        state = (_pose_of_angles(platform, part) for part in (angles, rates, growths))
         return platform.tool_motion(*state)
     x, y = (platform.directions @ axis for axis in platform.frame[:2])
     a, b = (
@@ -73,7 +73,7 @@ def arm_motion(platform: Platform, angles: Array, rates: Array, growths: Array) 
     return arm, rates * lever, growths * lever - rates**2 * arm
 
 
-def _without_lengths(platform: Platform, angles: Array) -> Array:
-    poses = np.zeros((*angles.shape[:-1], len(platform.coordinates)))
-    poses[..., platform.angular] = angles
-    return poses
+def _pose_of_angles(platform: Platform, angles: Array) -> Array:
+    pose = np.zeros((*angles.shape[:-1], len(platform.coordinates)))
+    pose[..., platform.angular] = angles
+    return pose

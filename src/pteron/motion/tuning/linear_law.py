@@ -44,9 +44,11 @@ def linearised_law(law: Law, pose: Array, velocity: Array, acceleration: Array) 
     memory = law.memory(pose, velocity)
     memory[2 * size :] = _ASIDE * law.gains[-1] / np.sqrt(max(len(memory) - 2 * size, 1))
     if law.what != "pd_gravity":
-        reference_part = slice(0, size) if law.what == "feed_forward_pd" else slice(size, 2 * size)
-        memory[reference_part] = acceleration
-    values = {
+        acceleration_slots = (
+            slice(0, size) if law.what == "feed_forward_pd" else slice(size, 2 * size)
+        )
+        memory[acceleration_slots] = acceleration
+    inputs = {
         "pose": pose,
         "velocity": velocity,
         "acceleration": acceleration,
@@ -59,7 +61,7 @@ def linearised_law(law: Law, pose: Array, velocity: Array, acceleration: Array) 
     }
     columns = None if law.base is None else columns_of(law.base)
     function = _derivatives(bare(model), law.what, columns)
-    derivatives = function(*(values[name] for name in function.name_in()))
+    derivatives = function(*(inputs[name] for name in function.name_in()))
     by_memory, by_joints = (np.asarray(part, dtype=float) for part in derivatives)
     n = model.joint_count
     return LinearLaw(by_memory[n:], by_joints[n:], by_memory[:n], by_joints[:n])
@@ -67,11 +69,13 @@ def linearised_law(law: Law, pose: Array, velocity: Array, acceleration: Array) 
 
 @lru_cache(maxsize=16)
 def _derivatives(robot: Manipulator, what: str, columns: Columns | None) -> ca.Function:
-    """Return the derivatives of (forces, next memory) by the memory, and by what is measured."""
-    law = program(robot, what, columns, plain=True)
-    names = [port.name for port in law.inputs]
-    symbols = dict(zip(names, law.function.sx_in(), strict=True))
-    results = ca.vertcat(*(ca.vec(part) for part in law.function.call(list(symbols.values()))))
+    """Return the Jacobians of (forces, next memory) by the memory, and by the measurements."""
+    law_program = program(robot, what, columns, plain=True)
+    names = [port.name for port in law_program.inputs]
+    symbols = dict(zip(names, law_program.function.sx_in(), strict=True))
+    results = ca.vertcat(
+        *(ca.vec(part) for part in law_program.function.call(list(symbols.values())))
+    )
     measured = ca.vertcat(symbols["joints"], symbols["joint_rates"])
     parts = [ca.cse(ca.jacobian(results, by)) for by in (symbols["memory"], measured)]
     return ca.Function("derivatives", list(symbols.values()), parts, names, ["m", "q"])

@@ -61,9 +61,9 @@ class LinearPlant:
     def held(self, span: float) -> tuple[Array, Array]:
         """Return exp(A t) and the integral of exp(A s) B over the span: forces held, exactly."""
         size, count = self.inputs.shape
-        both = np.zeros((size + count, size + count))
-        both[:size] = np.hstack([self.matrix, self.inputs]) * span
-        exponential = scipy.linalg.expm(both)[:size]
+        block = np.zeros((size + count, size + count))
+        block[:size] = np.hstack([self.matrix, self.inputs]) * span
+        exponential = scipy.linalg.expm(block)[:size]
         return exponential[:, :size], exponential[:, size:]
 
 
@@ -109,17 +109,17 @@ def linearised(
     ((6, 6), (6, 3))
     """
     robot = as_manipulator(robot)
-    zeros = np.zeros(robot.freedom)
-    motion = (pose, velocity, acceleration)
+    zero_rates = np.zeros(robot.freedom)
+    quantities = (pose, velocity, acceleration)
     names = ("pose", "velocity", "acceleration")
     state = [
-        finite_pose(robot, zeros if value is None else value, name)
-        for value, name in zip(motion, names, strict=True)
+        finite_pose(robot, zero_rates if quantity is None else quantity, name)
+        for quantity, name in zip(quantities, names, strict=True)
     ]
     smooth = with_linear_drives(robot)
     kind, n = DriveKind.from_robot(smooth), robot.joint_count
     motors = motor_states(smooth, *state)
-    values = {
+    inputs = {
         **dict(zip(("pose", "velocity"), state, strict=False)),
         **{name: motors[name] for name, _ in kind.extra_states},
         "forces": drive_forces(smooth, *state),
@@ -129,28 +129,28 @@ def linearised(
         "actuators": actuator_numbers(smooth),
     }
     function = _derivatives(bare(robot), kind)
-    derivatives = function(*(values[name] for name in function.name_in()))
+    derivatives = function(*(inputs[name] for name in function.name_in()))
     system, driven, turned = (np.asarray(part, dtype=float) for part in derivatives)
     rows, m = jacobian(robot, state[0]), robot.freedom
     # A motor that moves with its joint, and a current that does not lag, are no states.
     is_state = [kind.lag if name == "current" else kind.elastic for name, _ in kind.extra_states]
-    states = np.flatnonzero([*[True] * (2 * m), *np.ravel(is_state)])
-    system, driven = system[np.ix_(states, states)], driven[states]
+    state_indices = np.flatnonzero([*[True] * (2 * m), *np.ravel(is_state)])
+    system, driven = system[np.ix_(state_indices, state_indices)], driven[state_indices]
     # From the platform's (x, x') to the joints' (q, q'): q' = J x' changes with x too.
-    change = np.eye(len(states) + 2 * (n - m), len(states), 2 * (m - n))
+    change = np.eye(len(state_indices) + 2 * (n - m), len(state_indices), 2 * (m - n))
     change[: 2 * n, : 2 * m] = np.block([[rows, np.zeros((n, m))], [turned, rows]])
     matrix = np.linalg.solve(change.T, (change @ system).T).T
     outputs = np.eye(2 * n, len(matrix))
     differenced = outputs[:n].copy()
     bends = np.flatnonzero(kind.elastic)
     for k, i in enumerate(bends):
-        at = encoder_of(smooth.legs[i].drive)
-        for rows_of, place, there in (
-            (outputs[i], 2 * n + k, at == "motor"),
-            (outputs[i + n], 2 * n + k + len(bends), at != "joint"),
-            (differenced[i], 2 * n + k, at != "joint"),
+        encoder = encoder_of(smooth.legs[i].drive)
+        for rows_of, place, is_read in (
+            (outputs[i], 2 * n + k, encoder == "motor"),
+            (outputs[i + n], 2 * n + k + len(bends), encoder != "joint"),
+            (differenced[i], 2 * n + k, encoder != "joint"),
         ):
-            if there:
+            if is_read:
                 rows_of[:] = 0.0
                 rows_of[place] = 1.0
     return LinearPlant(robot, state[0], matrix, change @ driven, outputs, differenced)
@@ -177,15 +177,15 @@ def with_linear_drives(robot: Manipulator) -> Manipulator:
 @lru_cache(maxsize=16)
 def _derivatives(robot: Manipulator, kind: DriveKind) -> ca.Function:
     """Return derivatives of the state's rates by state and forces, and those of J x' by x."""
-    plant = motion_program(robot, kind)
-    names, symbols = [port.name for port in plant.inputs], plant.function.sx_in()
+    plant_program = motion_program(robot, kind)
+    names, symbols = [port.name for port in plant_program.inputs], plant_program.function.sx_in()
     by_name = dict(zip(names, symbols, strict=True))
-    vectors = (ca.vec(part) for part in plant.function.call(symbols))
-    results = zip((port.name for port in plant.outputs), vectors, strict=True)
-    every = by_name | dict(results)
+    columns = (ca.vec(part) for part in plant_program.function.call(symbols))
+    results = zip((port.name for port in plant_program.outputs), columns, strict=True)
+    symbols_by_name = by_name | dict(results)
     state = ca.vertcat(*(by_name[name] for name in ("pose", "velocity", *dict(kind.extra_states))))
-    moved = ("velocity", "acceleration", *dict(kind.extra_states).values())
-    rates = ca.vertcat(*(every[name] for name in moved))
+    rate_names = ("velocity", "acceleration", *dict(kind.extra_states).values())
+    rates = ca.vertcat(*(symbols_by_name[name] for name in rate_names))
     pose, velocity = by_name["pose"], by_name["velocity"]
     joint_rates = ca.mtimes(program(robot, "jacobian", plain=True).function(pose).T, velocity)
     parts = [(rates, state), (rates, by_name["forces"]), (joint_rates, pose)]

@@ -27,7 +27,7 @@ _STEPS = 0.5, 0.1
 looked for: a loop that is stable again beyond a shorter range than this could be missed."""
 
 _MOST = 60.0, 1000.0
-"""Greatest delay, in periods, and gain that are looked at; beyond them a margin is infinite."""
+"""Greatest delay, in periods, and gain of the search; beyond them a margin is infinite."""
 
 
 @dataclass(frozen=True)
@@ -58,37 +58,37 @@ class Margins:
     @cached_property
     def gain(self) -> Array:
         """The factor on the drive's force above 1, (n,)."""
-        return np.asarray(self._each[0])
+        return np.asarray(self._single_margins[0])
 
     @cached_property
     def phase(self) -> Array:
         """The phase that it may lose, or gain, rad, (n,)."""
-        return np.asarray(self._each[1])
+        return np.asarray(self._single_margins[1])
 
     @cached_property
     def delay(self) -> Array:
         """The further delay of its force, s, (n,)."""
-        return np.asarray(self._each[2])
+        return np.asarray(self._single_margins[2])
 
     @cached_property
     def crossover(self) -> Array:
         """The highest frequency at which its loop has the gain 1, rad/s, (n,)."""
-        return np.asarray(self._each[3])
+        return np.asarray(self._single_margins[3])
 
     @cached_property
     def common_gain(self) -> float:
         """The smallest factor above 1 on all forces for which a pole reaches the unit circle."""
-        matrix, inputs, outputs = self.loop.opened()
-        fed_back = inputs @ outputs
-        return self._stable and 1.0 + _first(
-            lambda increase: radius(matrix + (1.0 + increase) * fed_back), 1.0, 1
+        matrix, inputs, force_rows = self.loop.opened()
+        fed_back = inputs @ force_rows
+        return self._stable and 1.0 + _smallest_change(
+            lambda added: radius(matrix + (1.0 + added) * fed_back), 1.0, 1
         )
 
     @cached_property
     def common_delay(self) -> float:
         """The smallest further delay of all forces for which one does, s."""
-        return self._stable and _first(
-            lambda delay: radius(self.loop.closed(delay)), self.loop.period, 0
+        return self._stable and _smallest_change(
+            lambda added: radius(self.loop.closed(added)), self.loop.period, 0
         )
 
     @cached_property
@@ -140,11 +140,11 @@ class Margins:
         return self.loop.response(self.frequencies)
 
     @cached_property
-    def _each(self) -> Array:
+    def _single_margins(self) -> Array:
         n = self.loop.plant.inputs.shape[1]
         if not self._stable:
             return np.array([0.0, 0.0, 0.0, np.nan])[:, None] * np.ones(n)
-        margins = [_classical(self.frequencies, response) for response in self.drive_loops.T]
+        margins = [_classical(self.frequencies, drive_loop) for drive_loop in self.drive_loops.T]
         return np.array(margins).T
 
 
@@ -154,7 +154,7 @@ def radius(matrix: Array) -> float:
     return float(np.abs(poles[np.abs(poles - 1.0) > _AT_ONE]).max(initial=0.0))
 
 
-def _first(radius_of: Callable[[float], float], unit: float, which: int) -> float:
+def _smallest_change(radius_of: Callable[[float], float], unit: float, which: int) -> float:
     """Return the smallest amount for which the greatest pole is on the unit circle, or inf."""
     step, below = _STEPS[which] * unit, 0.0
     while below < _MOST[which] * unit:
@@ -174,12 +174,12 @@ def _classical(omega: Array, loop: Array) -> tuple[float, float, float, float]:
     turns = (
         2.0 * np.pi * np.arange(np.floor(lead.min() / (2 * np.pi)), lead.max() / (2 * np.pi) + 1)
     )
-    sizes = [np.exp(-_at_zeros(lead - turn, size)) for turn in turns]
+    sizes = [np.exp(-_values_at_zeros(lead - turn, size)) for turn in turns]
     # At half the sample rate L is real: the last crossing that there is.
     last = [1.0 / abs(loop[-1])] if loop[-1].real < 0.0 else []
     gains = np.concatenate([*sizes, last])
-    crossings = np.exp(_at_zeros(size, np.log(omega)))
-    leads = _at_zeros(size, lead)
+    crossings = np.exp(_values_at_zeros(size, np.log(omega)))
+    leads = _values_at_zeros(size, lead)
     ahead = np.mod(leads, 2.0 * np.pi)
     return (
         float(gains[gains > 1.0].min(initial=np.inf)),
@@ -189,8 +189,8 @@ def _classical(omega: Array, loop: Array) -> tuple[float, float, float, float]:
     )
 
 
-def _at_zeros(values: Array, others: Array) -> Array:
+def _values_at_zeros(signal: Array, others: Array) -> Array:
     """Return other values where values (W,) change their sign, by straight lines between."""
-    k = np.flatnonzero(np.signbit(values[1:]) != np.signbit(values[:-1]))
-    share = values[k] / (values[k] - values[k + 1])
+    k = np.flatnonzero(np.signbit(signal[1:]) != np.signbit(signal[:-1]))
+    share = signal[k] / (signal[k] - signal[k + 1])
     return others[k] + share * (others[k + 1] - others[k])

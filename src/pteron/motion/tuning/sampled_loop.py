@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from pteron.kernels import Array
-from pteron.motion.simulation.loop import divided
+from pteron.motion.simulation.loop import split_delay
 from pteron.motion.tuning.linear_law import LinearLaw
 from pteron.motion.tuning.linear_plant import LinearPlant
 
@@ -49,51 +49,59 @@ class SampledLoop:
         asked for that still wait; u are forces asked for, `more` is a delay, s, beyond the loop's.
         """
         period, law, n = self.period, self.law, self.plant.inputs.shape[1]
-        late, samples = divided(self.delay + more, period)
-        moved, after = self.plant.held(period - late)
-        early, first_part = self.plant.held(late)
-        free, first_part = moved @ early, moved @ first_part
+        late, delay_samples = split_delay(self.delay + more, period)
+        late_transition, late_inputs = self.plant.held(period - late)
+        early_transition, early_inputs = self.plant.held(late)
+        transition, early_inputs = (
+            late_transition @ early_transition,
+            late_transition @ early_inputs,
+        )
         shares = np.broadcast_to(np.nan if self.share is None else self.share, n)
-        rough = np.isfinite(shares)
-        differenced = bool(rough.any())
-        sizes = [len(free), 2 * n * differenced, len(law.matrix), *[n] * (samples + 1)]
+        is_differenced = np.isfinite(shares)
+        has_differences = bool(is_differenced.any())
+        sizes = [
+            len(transition),
+            2 * n * has_differences,
+            len(law.matrix),
+            *[n] * (delay_samples + 1),
+        ]
         places = np.split(np.arange(sum(sizes)), np.cumsum(sizes)[:-1])
         state, last, memory, *waiting = places
         size = sum(sizes)
         # What the controller is told, of the whole state.
         measured = np.zeros((2 * n, size))
         measured[:, state] = self.plant.outputs
-        if differenced:
-            share = np.diag(np.where(rough, shares, 1.0))
-            measured[n:][rough] = 0.0
+        if has_differences:
+            share = np.diag(np.where(is_differenced, shares, 1.0))
+            measured[n:][is_differenced] = 0.0
             differences = np.zeros((n, size))
             differences[:, state] = share @ self.plant.differenced / period
             differences[:, last] = np.hstack([-share / period, np.eye(n) - share])
-            measured[n:][rough] = differences[rough]
-        commands = law.feedthrough @ measured
-        commands[:, memory] += law.outputs
+            measured[n:][is_differenced] = differences[is_differenced]
+        force_rows = law.feedthrough @ measured
+        force_rows[:, memory] += law.outputs
         matrix, inputs = np.zeros((size, size)), np.zeros((size, n))
-        matrix[np.ix_(state, state)] = free
-        if differenced:
+        matrix[np.ix_(state, state)] = transition
+        if has_differences:
             matrix[np.ix_(last[:n], state)] = self.plant.differenced
             matrix[last[n:]] = measured[n:]
         matrix[memory] = law.inputs @ measured
         matrix[np.ix_(memory, memory)] += law.matrix
         # waiting[k] was asked for k + 1 samples ago.
-        matrix[np.ix_(state, waiting[samples])] = first_part
-        if samples:
-            matrix[np.ix_(state, waiting[samples - 1])] = after
+        matrix[np.ix_(state, waiting[delay_samples])] = early_inputs
+        if delay_samples:
+            matrix[np.ix_(state, waiting[delay_samples - 1])] = late_inputs
         else:
-            inputs[state] = after
+            inputs[state] = late_inputs
         for newer, older in pairwise(waiting):
             matrix[np.ix_(older, newer)] = np.eye(n)
         inputs[waiting[0]] = np.eye(n)
-        return matrix, inputs, commands
+        return matrix, inputs, force_rows
 
     def closed(self, more: float = 0.0) -> Array:
         """Return the closed loop's matrix, all forces delayed more, s."""
-        matrix, inputs, commands = self.opened(more)
-        return matrix + inputs @ commands
+        matrix, inputs, force_rows = self.opened(more)
+        return matrix + inputs @ force_rows
 
     @cached_property
     def poles(self) -> Array:
@@ -106,6 +114,6 @@ class SampledLoop:
         Opened at all drives; I + L is singular where the closed loop has a pole. In rad/s, at most
         pi / period.
         """
-        matrix, inputs, commands = self.opened()
+        matrix, inputs, force_rows = self.opened()
         z = np.exp(1j * frequencies * self.period)[:, None, None]
-        return -commands @ np.linalg.solve(z * np.eye(len(matrix)) - matrix, inputs + 0j * z)
+        return -force_rows @ np.linalg.solve(z * np.eye(len(matrix)) - matrix, inputs + 0j * z)

@@ -95,7 +95,7 @@ def trial(
     if simulation.stopped:
         return Trial(*_UNKNOWN, simulation.stopped)
     moving = simulation.time <= motion.duration
-    off = _tool(robot, simulation.pose) - _tool(robot, simulation.reference.pose)
+    off = _tool_places(robot, simulation.pose) - _tool_places(robot, simulation.reference.pose)
     errors = np.linalg.norm(off, axis=-1)
     most = limits_of(robot).force
     shares = simulation.forces / np.where(np.isfinite(most), most, 1.0)
@@ -103,7 +103,7 @@ def trial(
     return Trial(
         float(errors[moving].max()),
         float(np.sqrt((errors[moving] ** 2).mean())),
-        *_end(simulation, motion, off, moving),
+        *_settling_figures(simulation, motion, off, moving),
         float(np.abs(shares).max()),
         float(np.sqrt((shares**2).mean(axis=0)).max()),
         float(np.trapezoid(power, simulation.time)),
@@ -168,7 +168,7 @@ def trials(
         )
     usual: dict[str, Any] = {"robot": robot, "motion": motion, "model": model}
     usual |= {"controller": controller, "sensors": sensors, "delay": delay}
-    changes: list[tuple[str, float, dict[str, Any]]] = [
+    variations: list[tuple[str, float, dict[str, Any]]] = [
         *(
             ("bandwidth", b, {"controller": replace(controller, bandwidth=b, **plain)})
             for b in bandwidths
@@ -178,12 +178,12 @@ def trials(
         *(("stiffness", k, {"robot": _stiffer(robot, k)}) for k in stiffnesses),
     ]
     rows = []
-    for changed, value, other in changes:
+    for changed, setting, other in variations:
         try:
             figures = trial(**usual | other)
         except PteronError as error:
             figures = Trial(*_UNKNOWN, str(error))
-        rows.append({"changed": changed, "value": float(value), **asdict(figures)})
+        rows.append({"changed": changed, "value": float(setting), **asdict(figures)})
     return pl.DataFrame(rows)
 
 
@@ -196,39 +196,43 @@ def _stiffer(robot: Manipulator, factor: float) -> Manipulator:
     """Return the machine with all its transmissions so much stiffer."""
     expect(0.0 < factor < np.inf, "stiffnesses", f"{factor:g}", "factors above 0")
 
-    def changed(drive: Drive | None) -> Drive | None:
+    def stiffen(drive: Drive | None) -> Drive | None:
         if drive is None or drive.elastic is None:
             return drive
         stiffness = factor * drive.elastic.stiffness
         return replace(drive, elastic=replace(drive.elastic, stiffness=stiffness))
 
-    legs = tuple(replace(leg, drive=changed(leg.drive)) for leg in robot.legs)
+    legs = tuple(replace(leg, drive=stiffen(leg.drive)) for leg in robot.legs)
     return replace(robot, legs=legs)
 
 
-def _tool(robot: Manipulator, poses: Array) -> Array:
-    zeros = np.zeros_like(poses)
-    place = tool_path(robot.platform, poses, zeros, zeros)[0]
+def _tool_places(robot: Manipulator, poses: Array) -> Array:
+    zero_rates = np.zeros_like(poses)
+    place = tool_path(robot.platform, poses, zero_rates, zero_rates)[0]
     return place if place.shape[-1] else poses
 
 
-def _end(
-    simulation: Simulation, motion: Motion, off: Array, moving: NDArray[np.bool_]
+def _settling_figures(
+    simulation: Simulation, motion: Motion, errors: Array, moving: NDArray[np.bool_]
 ) -> tuple[float, float]:
     """Return settling time and overshoot after the motion's end; NaN where it does not end."""
-    after = off[~moving]
+    after = errors[~moving]
     if not len(after) or np.abs(motion.velocity[-1]).max() > 1e-6:
         return float("nan"), float("nan")
-    band = max(_SETTLED * float(np.linalg.norm(off[moving], axis=-1).max()), _LEAST)
+    band = max(_SETTLED * float(np.linalg.norm(errors[moving], axis=-1).max()), _LEAST)
     outside = np.flatnonzero(np.linalg.norm(after - after[-1], axis=-1) > band)
     settled = (
         float(simulation.time[~moving][outside[-1]] - motion.duration) if len(outside) else 0.0
     )
     if len(outside) and outside[-1] >= len(after) - 2:
         settled = float("nan")
-    places = _tool(simulation.robot, motion.pose)
-    gone = places[-1] - places
-    lengths = np.linalg.norm(gone, axis=-1)
-    last = gone[np.flatnonzero(lengths > 0.01 * lengths.max())[-1]] if lengths.max() else after[0]
+    places = _tool_places(simulation.robot, motion.pose)
+    displacements = places[-1] - places
+    lengths = np.linalg.norm(displacements, axis=-1)
+    last = (
+        displacements[np.flatnonzero(lengths > 0.01 * lengths.max())[-1]]
+        if lengths.max()
+        else after[0]
+    )
     direction = last / (np.linalg.norm(last) or 1.0)
     return settled, max(float((after @ direction).max()), 0.0)

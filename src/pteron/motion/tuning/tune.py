@@ -17,7 +17,7 @@ from pteron.kernels import Array
 from pteron.kinematics import inverse_kinematics
 from pteron.kinematics.evaluate import finite_rows
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
-from pteron.motion.motion import Motion, told_pose
+from pteron.motion.motion import Motion, pose_text
 from pteron.motion.payload import with_payload
 from pteron.motion.simulation import Sensors
 from pteron.motion.simulation.sensors import rate_shares
@@ -67,16 +67,13 @@ class Required:
             )
         expect(0.0 <= self.delay < np.inf, "delay margin", shown(self.delay), "0 s or more")
 
-    def share(self, margins: Margins) -> float:
+    def share(self, found: Margins) -> float:
         """Return the least of margin over required margin; a loop serves from 1 on."""
-        each = (
-            self._share(margins.gain.min(), margins.delay.min()),
-            margins.phase.min() / self.phase,
-        )
+        each = self._share(found.gain.min(), found.delay.min()), found.phase.min() / self.phase
         if min(each) < 1.0:  # those of all drives at once take longer to compute
             return float(min(each))
-        delay = margins.common_delay if self.delay else 0.0
-        return float(min(*each, self._share(margins.common_gain, delay)))
+        delay = found.common_delay if self.delay else 0.0
+        return float(min(*each, self._share(found.common_gain, delay)))
 
     def _share(self, gain: float, delay: float) -> float:
         factor = np.log(max(gain, 1.0)) / np.log(self.gain)
@@ -143,7 +140,7 @@ class Tuning:
         columns |= dict(zip(self.robot.coordinates, self.states[:, 0].T, strict=True))
         for name in ("gain", "phase", "delay", "crossover"):
             each = np.array([getattr(margins, name) for margins in self.margins]).T
-            columns |= {f"{name}_{i}": values for i, values in enumerate(each, start=1)}
+            columns |= {f"{name}_{i}": column for i, column in enumerate(each, start=1)}
         for name in ("common_gain", "common_delay", "disk", "slowest"):
             columns[name] = [getattr(margins, name) for margins in self.margins]
         return pl.DataFrame(columns)
@@ -225,7 +222,7 @@ def tune(
         [linearised(robot, *state) for state in states],
         {"delay": late, "share": rate_shares(sensors, robot, controller.period)},
     )
-    chosen = search.chosen()
+    chosen = search.choose_controller()
     every = range(len(states))
     loops = tuple(search.loop(chosen, i) for i in every)
     margins = tuple(Margins(loop) for loop in loops)
@@ -239,8 +236,8 @@ def _states(robot: Manipulator, motion: Motion | None, poses: Array | None) -> t
         within = (joint_distances(robot, inverse_kinematics(robot, poses)) >= 0.0).all(axis=-1)
         poses = poses[within][:_PLACES]
     poses = finite_rows(robot, poses, "poses").reshape(-1, robot.freedom)
-    zeros = np.zeros_like(poses)
-    states, times = np.stack([poses, zeros, zeros], axis=1), np.full(len(poses), np.nan)
+    zero_rates = np.zeros_like(poses)
+    states, times = np.stack([poses, zero_rates, zero_rates], axis=1), np.full(len(poses), np.nan)
     if motion is not None:
         motion.expect_ascending()
         moments = np.linspace(motion.time[0], motion.time[-1], _MOMENTS)
@@ -269,11 +266,11 @@ class _Search:
         """Return the least share of the required margins at some states, and the state."""
         return min((self.required.share(Margins(self.loop(controller, i))), i) for i in which)
 
-    def chosen(self) -> Controller:
+    def choose_controller(self) -> Controller:
         """Return the controller with the greatest bandwidth that serves at all states."""
         controller, every = self.controller, range(len(self.states))
         most = np.pi / controller.period
-        is_fixed = (
+        has_gains = (
             controller.bandwidth is not None
             or getattr(controller, "proportional", None) is not None
         )
@@ -282,27 +279,27 @@ class _Search:
                 f"bandwidth: {np.max(controller.bandwidth):g} rad/s given, below {most:.4g} rad/s "
                 f"expected: half the sample rate of {1.0 / controller.period:g} Hz"
             )
-        if is_fixed:
+        if has_gains:
             share, at = self.share(controller, every)
             if share < 1.0:
-                raise DataError(f"{self._told(controller, at)}; lower the gains, or ask for less")
+                raise DataError(
+                    f"{self._margins_text(controller, at)}; lower the gains, or ask for less"
+                )
             return controller
         tried: list[tuple[float, Controller]] = []
         few = [0]
-        for damping_factor in _DAMPINGS if isinstance(controller, Feedback) else (1.0,):
+        for factor in _DAMPINGS if isinstance(controller, Feedback) else (1.0,):
             trial = controller
-            if isinstance(controller, Feedback) and damping_factor > 1.0:
-                trial = replace(
-                    controller, damping=float(damping_factor * np.max(controller.damping))
-                )
-            widest = self._greatest(trial, most * (1.0 - 1e-9), few, tried)
-            if widest is not None:
-                return widest
-        best = max(tried, key=lambda pair: pair[0])[1]
+            if isinstance(controller, Feedback) and factor > 1.0:
+                trial = replace(controller, damping=float(factor * np.max(controller.damping)))
+            greatest = self._greatest(trial, most * (1.0 - 1e-9), few, tried)
+            if greatest is not None:
+                return greatest
+        best = max(tried, key=lambda trial_share: trial_share[0])[1]
         _, at = self.share(best, every)
         raise DataError(
-            f"no bandwidth has the margins asked for; best {self._told(best, at)}; ask for less, "
-            "sample faster, or shorten the delay"
+            f"no bandwidth has the margins asked for; best {self._margins_text(best, at)}; ask for "
+            "less, sample faster, or shorten the delay"
         )
 
     def _greatest(
@@ -318,8 +315,8 @@ class _Search:
         """
 
         def share(bandwidth: float) -> float:
-            candidate = replace(controller, bandwidth=bandwidth)
-            tried.append((self.share(candidate, few)[0], candidate))
+            attempt = replace(controller, bandwidth=bandwidth)
+            tried.append((self.share(attempt, few)[0], attempt))
             return tried[-1][0]
 
         while True:  # bisect at few states; add the one that serves least at what is found
@@ -331,21 +328,21 @@ class _Search:
             while high - low > _EXACT * low:
                 middle = float(np.sqrt(low * high))
                 low, high = (middle, high) if share(middle) >= 1.0 else (low, middle)
-            widest = replace(controller, bandwidth=low)
-            least, at = self.share(widest, range(len(self.states)))
+            best = replace(controller, bandwidth=low)
+            least, at = self.share(best, range(len(self.states)))
             if least >= 1.0:
-                return widest
+                return best
             few.append(at)
             high = low
 
-    def _told(self, controller: Controller, i: int) -> str:
+    def _margins_text(self, controller: Controller, i: int) -> str:
         least, required = Margins(self.loop(controller, i)).least, self.required
-        delay_words = f", {1e3 * required.delay:.3g} ms" if required.delay else ""
+        delay_text = f", {1e3 * required.delay:.3g} ms" if required.delay else ""
         rate = controller.bandwidth
         with_ = f"with {np.max(rate):.4g} rad/s" if rate is not None else "with these gains"
         return (
-            f"{with_}, at pose {told_pose(self.states[i][0])} the margins are a gain of "
+            f"{with_}, at pose {pose_text(self.states[i][0])} the margins are a gain of "
             f"{least['gain']:.3g}, {np.degrees(least['phase']):.3g} degrees and "
             f"{1e3 * least['delay']:.3g} ms; "
-            f"{required.gain:.3g}, {np.degrees(required.phase):.3g} degrees{delay_words} asked for"
+            f"{required.gain:.3g}, {np.degrees(required.phase):.3g} degrees{delay_text} asked for"
         )

@@ -23,7 +23,7 @@ _TOUCH = 1e-6
 """Depth of a pose in all legs' reach, over the longest leg, up to which it is out of reach."""
 
 
-def nowhere(robot: Manipulator) -> ModelError:
+def why_unreachable(robot: Manipulator) -> ModelError:
     """Return the error for a machine that reaches no pose, or none within its joints' limits."""
     if not np.isfinite(robot.platform.at(np.zeros(robot.freedom))[0]).all():
         return ModelError(
@@ -31,20 +31,20 @@ def nowhere(robot: Manipulator) -> ModelError:
             "platform; turn directions, or move guide points nearer to its axis",
             subject=robot.name,
         )
-    pose, drawn = _deepest(robot)
+    pose, random_poses = _deepest(robot)
     margin = numeric(robot, "reach")(pose)[0]
     touch = _TOUCH * max(leg.size for leg in robot.legs)
     if float(margin.min()) > touch:
-        reached = drawn[(numeric(robot, "reach")(drawn)[0] > touch).all(axis=-1)]
-        return beyond_limits(robot, np.array([pose, *reached]))
-    missed: dict[str, list[int]] = {}
+        within_reach = random_poses[(numeric(robot, "reach")(random_poses)[0] > touch).all(axis=-1)]
+        return limits_error(robot, np.array([pose, *within_reach]))
+    legs_by_miss: dict[str, list[int]] = {}
     for i, m in enumerate(margin, start=1):
         if m < touch:
-            missed.setdefault(f"{max(-m, 0.0):.3g} m", []).append(i)
+            legs_by_miss.setdefault(f"{max(-m, 0.0):.3g} m", []).append(i)
     return ModelError(
         "no pose is in reach of all legs: at the best one they miss by "
-        f"{', '.join(f'{way} ({legs_text(legs)})' for way, legs in missed.items())}; bring the "
-        "guide points nearer or lengthen the links",
+        f"{', '.join(f'{way} ({legs_text(legs)})' for way, legs in legs_by_miss.items())}; bring "
+        "the guide points nearer or lengthen the links",
         subject=robot.name,
     )
 
@@ -53,27 +53,27 @@ def _deepest(robot: Manipulator) -> tuple[Array, Array]:
     """Return the pose whose least margin over the legs is greatest, and the random poses drawn."""
     center, radius = search_ball(robot)
     lengths = len(center)
-    drawn = np.random.default_rng(0).uniform(-1.0, 1.0, (_DRAWN, robot.freedom))
-    drawn[:, :lengths] = center + radius * drawn[:, :lengths]
-    drawn[:, lengths:] *= np.pi
+    random_poses = np.random.default_rng(0).uniform(-1.0, 1.0, (_DRAWN, robot.freedom))
+    random_poses[:, :lengths] = center + radius * random_poses[:, :lengths]
+    random_poses[:, lengths:] *= np.pi
 
     def margins(pose: Array) -> Array:
         return np.asarray(numeric(robot, "reach")(pose)[0])
 
-    starts = drawn[np.argsort(-margins(drawn).min(axis=-1))[:_STARTS]]
+    starts = random_poses[np.argsort(-margins(random_poses).min(axis=-1))[:_STARTS]]
     best = np.array([*starts, *(deepest(margins, start) for start in starts)])
-    return best[np.nanargmax(margins(best).min(axis=-1))], drawn
+    return best[np.nanargmax(margins(best).min(axis=-1))], random_poses
 
 
-def beyond_limits(robot: Manipulator, poses: Array) -> ModelError:
-    """Return what is said of a machine that at the best of poses, in reach, passes limits."""
+def limits_error(robot: Manipulator, poses: Array) -> ModelError:
+    """Return the error for a machine that passes joint limits at the best of poses in reach."""
     pose = poses[distance_to_limits(robot, poses).min(axis=-1).argmax()]
-    passed: dict[tuple[str, str], list[LimitedJoint]] = {}
-    for at in limited_joints(robot, pose):
-        if not at.least < at.value < at.most:
-            passed.setdefault((at.noun, at.limits_text("{:g}".format)), []).append(at)
-    told = [f"{_values(own)} of {limits}" for (_, limits), own in passed.items()]
-    nearest = f"; nearest to it is one with {'; '.join(told)}" if told else ""
+    exceeded: dict[tuple[str, str], list[LimitedJoint]] = {}
+    for joint in limited_joints(robot, pose):
+        if not joint.least < joint.value < joint.most:
+            exceeded.setdefault((joint.noun, joint.limits_text("{:g}".format)), []).append(joint)
+    texts = [f"{_coordinates_text(joints)} of {limits}" for (_, limits), joints in exceeded.items()]
+    nearest = f"; nearest to it is one with {'; '.join(texts)}" if texts else ""
     return ModelError(
         f"no pose in reach of all legs keeps the joints' limits{nearest}; widen limits or move the "
         "guide points",
@@ -81,9 +81,9 @@ def beyond_limits(robot: Manipulator, poses: Array) -> ModelError:
     )
 
 
-def _values(joints: list[LimitedJoint]) -> str:
-    """Say at what values joints of one noun are."""
-    first, values = joints[0], [at.value for at in joints]
-    low, high = (f"{value:.4g}" for value in (min(values), max(values)))
-    legs = f"{legs_text([at.leg for at in joints])}: " if first.leg else ""
+def _coordinates_text(joints: list[LimitedJoint]) -> str:
+    """Return the coordinates of joints of one noun in words."""
+    first, coordinates = joints[0], [joint.value for joint in joints]
+    low, high = (f"{end:.4g}" for end in (min(coordinates), max(coordinates)))
+    legs = f"{legs_text([joint.leg for joint in joints])}: " if first.leg else ""
     return f"{legs}{first.noun} at {low if low == high else f'{low} to {high}'} {first.unit}"

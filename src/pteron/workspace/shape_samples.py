@@ -50,10 +50,10 @@ class Samples:
 
     def at(self, center: Array, edge: float) -> Array:
         """Return the poses (N, m) for a shape."""
-        found = self.poses.copy()
+        poses = self.poses.copy()
         lengths = self.units.shape[1]
-        found[:, :lengths] += self.inside[:, None] * (center + 0.5 * edge * self.units)
-        return found
+        poses[:, :lengths] += self.inside[:, None] * (center + 0.5 * edge * self.units)
+        return poses
 
     def joined(self, other: Samples) -> Samples:
         """Return both, one after the other."""
