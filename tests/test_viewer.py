@@ -26,7 +26,7 @@ from pteron.kinematics.jacobian_at import jacobian_at
 from pteron.legs import Reading
 from pteron.motion import simulate
 from pteron.report.quantities import readable
-from pteron.report.typeset import fixed
+from pteron.report.typeset import format_fixed
 from pteron.viewer import view
 from pteron.viewer.boundary import allowed
 from pteron.viewer.guard import is_here
@@ -74,7 +74,7 @@ def test_a_pose_out_of_reach_slides_along_the_boundary_and_names_what_stops_it(h
         assert allowed(robot, found.pose)
         assert re.match(r"(?:Leg|The \w+ of leg) \d (?:reaches|is at its limit)", found.message)
         rest = float(np.linalg.norm((target - found.pose)[lengths]))
-        assert f"is {fixed(1e3 * rest)} mm" in found.message
+        assert f"is {format_fixed(1e3 * rest)} mm" in found.message
         # Nothing allowed beside it is nearer, but for what is kept to a leg's end and rounding.
         beside = found.pose + 0.01 * rng.normal(size=(300, robot.freedom)) * (way != 0.0)
         beside = beside[allowed(robot, beside)]
@@ -201,7 +201,7 @@ def test_the_numbers_are_the_librarys(homes, name):
     assert found.type_ii == at.type_ii
     page = readout(state, found)
     for leg, force, joint in zip(robot.legs, forces, found.joints, strict=True):
-        assert f"<td>{fixed(force, 2)} {leg.joint.force_unit}</td>" in page
+        assert f"<td>{format_fixed(force, 2)} {leg.joint.force_unit}</td>" in page
         assert f"<td>{readable(joint, leg.joint.unit)}</td>" in page
 
 
@@ -664,7 +664,7 @@ def test_a_slider_moves_the_robot_and_the_forces_are_the_librarys(page, viewer):
         page,
         "wanted => [...document.querySelectorAll('table.legs td:nth-child(3)')]"
         ".every((cell, i) => cell.innerText === wanted[i] + ' N')",
-        [fixed(force, 2) for force in forces],
+        [format_fixed(force, 2) for force in forces],
     )
     assert page.locator("#view").screenshot() != before
     page.keyboard.press("Tab")
@@ -791,7 +791,7 @@ def test_while_the_panel_is_folded_pose_and_limit_stand_over_the_picture(browser
             viewer.move_to([x, 0.0, 0.0, 0.0])
             assert viewer.wait(10.0)
         said(tab, "mm from the pose asked for")
-        x = fixed(1e3 * viewer.state.pose[0])
+        x = format_fixed(1e3 * viewer.state.pose[0])
         assert tab.inner_text("#where") == f"x {x} y 0.0 z 0.0 mm, phi 0.0°"
         status = tab.get_by_role("status")
         assert status.is_visible()
@@ -1060,7 +1060,7 @@ def test_a_drives_readings_stand_beside_its_joint_coordinates():
     shown = np.degrees([found.joints[0], (found.joints[1] - 0.02) / 2.0])
     table = readout(state, found).replace("</td><td>", " ")
     for joint, reads in zip(np.degrees(found.joints), shown, strict=True):
-        assert f"{fixed(joint, 1)}° {fixed(reads, 1)}° " in table
+        assert f"{format_fixed(joint, 1)}° {format_fixed(reads, 1)}° " in table
     assert "<th>reads</th>" in table
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from pteron.errors import DataError, PteronError
 from pteron.manipulator import Manipulator
-from pteron.report.motion_frames import seen
+from pteron.report.motion_frames import picture_points
 from pteron.report.typeset import resource, template
 from pteron.viewer import panel
 from pteron.viewer.picture import Picture
@@ -266,7 +266,7 @@ class Live:
                     "power": _finite(numbers.power),
                 },
                 "legend": self._picture.legend(self._scale),
-                "spring": spring and [seen(state.robot, end) for end in spring],
+                "spring": spring and [picture_points(state.robot, end) for end in spring],
             },
         )
         if settled:
@@ -292,7 +292,9 @@ class Live:
         map_, parts = "", []
         if isinstance(plane, str):
             for color, rings in slice_parts(*robot_and_pose, plane, span):
-                parts.append({"color": color, "rings": [seen(state.robot, r) for r in rings]})
+                parts.append(
+                    {"color": color, "rings": [picture_points(state.robot, r) for r in rings]}
+                )
         elif plane is not None:
             map_ = slice_map(*robot_and_pose, plane, span)
         self._send("slice", {"parts": parts, "map": map_})

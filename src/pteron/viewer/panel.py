@@ -16,7 +16,7 @@ from pteron.kernels import Array
 from pteron.manipulator import Manipulator
 from pteron.platforms.coordinates import SHOWN
 from pteron.report.motion_frames import view_frame
-from pteron.report.typeset import fixed
+from pteron.report.typeset import format_fixed
 from pteron.viewer.pushing import DRIVES
 from pteron.viewer.session import SPEEDS, STANDARD, Session
 from pteron.viewer.slices import BEYOND, SERVES, choices
@@ -32,7 +32,7 @@ _NO_MODE = "none of them"
 def controls(session: Session) -> dict[str, Any]:
     """Return what there is to move, choose and type; lengths in mm, angles in degrees."""
     robot, factors = session.state.robot, pose_factors(session.state.robot)
-    home = " ".join(fixed(x, 0).replace("\u2212", "-") for x in factors * session.home)
+    home = " ".join(format_fixed(x, 0).replace("\u2212", "-") for x in factors * session.home)
     units = [leg.joint.unit for leg in robot.legs]
     names = [f"{leg.joint.noun} {i}" for i, leg in enumerate(robot.legs, start=1)]
     return {
@@ -92,7 +92,7 @@ def _where(robot: Manipulator, pose: Array) -> str:
     values, units = pose_factors(robot) * pose, (SHOWN[unit][0] for unit in robot.units)
     named = zip(robot.coordinates, values, units, strict=True)
     groups = groupby(
-        ((f"{name} {fixed(x)}", unit) for name, x, unit in named), lambda pair: pair[1]
+        ((f"{name} {format_fixed(x)}", unit) for name, x, unit in named), lambda pair: pair[1]
     )
     parts = ((" ".join(text for text, _ in group), unit) for unit, group in groups)
     return ", ".join(f"{text}{unit if unit == '°' else f' {unit}'}" for text, unit in parts)
@@ -101,7 +101,7 @@ def _where(robot: Manipulator, pose: Array) -> str:
 def _label(robot: Manipulator, pose: Array) -> str:
     """Return a pose (m,) as the list of assembly modes has it."""
     parts = zip(pose_factors(robot) * pose, robot.platform.angular, strict=True)
-    return " ".join(fixed(x) + "°" * bool(angle) for x, angle in parts)
+    return " ".join(format_fixed(x) + "°" * bool(angle) for x, angle in parts)
 
 
 def shown_joints(robot: Manipulator, joints: Array) -> list[float]:
