@@ -14,7 +14,7 @@ from pteron.motion import JointPoints, joint_guides, joint_points
 from pteron.motion.enlarged_points import enlarged_points
 from pteron.report.motion_frames import moving_parts, picture_points, still_parts
 from pteron.report.typeset import significant
-from pteron.viewer.boundary import allowed
+from pteron.viewer.boundary import is_allowed
 from pteron.viewer.state import ViewerState
 
 _SCREW, _FORCE = 0.09, 0.3
@@ -57,7 +57,7 @@ class Picture:
         self._guides = joint_guides(robot, poses)
         home = joint_points(robot, poses[0])
         near = poses[0] + _NEAR * (poses[:: max(1, len(poses) // _POSES)] - poses[0])
-        around = joint_points(robot, near[allowed(robot, near)])
+        around = joint_points(robot, near[is_allowed(robot, near)])
         lines = [line.reshape(-1, 3) for line in (*around.links, around.reference, around.tool)]
         cloud = np.vstack(lines)
         paths = np.vstack([*home.links, *(guide.path for guide in self._guides)])
