@@ -46,7 +46,8 @@ def is_allowed(robot: Manipulator, poses: Array) -> NDArray[np.bool_]:
 def farthest(robot: Manipulator, start: Array, target: Array) -> tuple[Array, Array | None]:
     """Return the last pose that the platform reaches on the straight path to another.
 
-    A target that is allowed is always reached. With the pose comes a pose next to it that is not allowed; None where nothing stops the platform.
+    A target that is allowed is always reached. With the pose comes one next to it that is not
+    allowed; None where nothing stops the platform.
     """
     if bool(is_allowed(robot, target)):
         return target, None

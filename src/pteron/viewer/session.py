@@ -68,7 +68,7 @@ _FRAME = 1.0 / 60.0
 
 
 class Session:
-    """A machine, what it does, and what people do to it.
+    """State of a viewer session: pose, playback, pushes, and the actions on them.
 
     Attributes
     ----------
