@@ -1,4 +1,4 @@
-"""Measurements from the files of Klipper, RepRapFirmware, Marlin and LinuxCNC, told by contents.
+"""Measurements from the files of Klipper, RepRapFirmware, Marlin and LinuxCNC, by content.
 
 Klipper's printer.cfg has stable positions, steps from the end stops, which are joint readings. The
 others log tool positions, computed by the controller from the geometry as drawn: the readings there
@@ -80,7 +80,7 @@ def read_controller_log(
     """
     file, source = Path(path), shown(str(path), bare=True, longest=1000)
     if file.suffix.lower() == ".parquet" or not file.is_file():
-        return None  # told where tables are opened
+        return None  # reported where tables are opened
     with file.open("rb") as opened:
         data = opened.read(_LARGEST if file.suffix.lower() != ".csv" else 1 << 20)
     text = data.decode("utf-8-sig", "replace")

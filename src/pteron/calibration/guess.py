@@ -1,6 +1,6 @@
 """A calibration's unknowns and a guess of their values: machine, zeros, scales, marks, frame, ...
 
-`Guess.moved` takes a step in the unknowns; `Block` groups those that are moved together.
+`Guess.apply_step` takes a step in the unknowns; `Block` groups those that are moved together.
 """
 
 from __future__ import annotations
@@ -112,7 +112,7 @@ class Guess:
 
 @dataclass(frozen=True)
 class Block:
-    """Unknowns that belong together, and where they stand among all of them."""
+    """Unknowns of one kind, and their slice of the vector of all unknowns."""
 
     kind: str
     """"geometry", "zeros", "scales", "mark", "plane", "anchor" or "frame"."""

@@ -56,7 +56,7 @@ def read_measurements(robot: RobotLike, *paths: str | Path) -> Measurements:
     DataError
         If a column is missing or a cell no number; if a row measures a distance from nowhere; if a
         mark, plane or anchor is named that the TOML file does not describe. All faults of a log are
-        told at once, each with its line and column.
+        reported at once, each with its line and column.
 
     Warns
     -----
@@ -106,7 +106,7 @@ class _Opened(NamedTuple):
 
 
 def _open_table(robot: Manipulator, path: str | Path, dialect: Dialect | None) -> _Opened:
-    """Open a log in its dialect: plain where its first line names the joints, else found."""
+    """Return a log's table: plain if line 1 names the joints, else in a detected dialect."""
     units = {**dict.fromkeys(("t",), "s"), **dict.fromkeys((*_POSITION, "height", "distance"), "m")}
     units |= dict(zip(robot.coordinates, robot.units, strict=True))
     units |= {name: leg.joint.unit for name, leg in zip(robot.joint_names, robot.legs, strict=True)}
@@ -226,7 +226,7 @@ def _numbers(table: Table, column: str, faults: list[str]) -> Array:
 
 
 def _first_line(table: Table) -> int | None:
-    """Return the line of the first row where all are lines that follow each other, else None."""
+    """Return the first row's line number if rows are on consecutive lines, else None."""
     if table.line_of is None:
         return None
     first, last = table.line_of(0), table.line_of(len(table) - 1)

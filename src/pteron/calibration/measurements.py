@@ -90,7 +90,7 @@ class Setup:
 
 
 def evenly(count: int, most: int) -> NDArray[np.int64]:
-    """Return the numbers of at most so many rows, evenly spread."""
+    """Return the numbers of at most `most` of `count` rows, evenly spread."""
     return np.unique(np.linspace(0, count - 1, min(count, most)).astype(int))
 
 

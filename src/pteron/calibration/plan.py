@@ -302,7 +302,7 @@ def _proved_level(robot: Manipulator, center: Array) -> Box | Cylinder:
 
 
 def _widen_box(robot: Manipulator, box: Box, sides: Array, floors: tuple[float, float]) -> Box:
-    """Return a proved box whose sides grew one after the other, as far as they may."""
+    """Return a proved box, each side in turn widened while the box stays proved."""
     for k in np.flatnonzero(sides):
         for _ in range(_WIDENINGS):
             low, high = box.box

@@ -1,7 +1,7 @@
 """The mistake in a whole log, found before the fit: units, order, signs, zeros, scales, frame.
 
 Measurements should lie within noise and tolerances of what the machine as drawn would give; where
-they do not, each likely mistake is undone on trial, and told where they then do.
+they do not, each likely mistake is undone on trial, and reported where they then do.
 """
 
 from __future__ import annotations
@@ -120,7 +120,7 @@ def _size_text(error: float, kind: str) -> str:
 
 
 def _drawing_errors(measurements: Measurements, guess: Guess) -> dict[str, float]:
-    """Return the bound of nine in ten residuals by kind on the drawn machine, m and rad."""
+    """Return the 90 % quantile of absolute residuals by kind on the drawn machine, m and rad."""
     rows = _some_rows(measurements)
     try:
         residuals, measured = _drawing_residuals(guess, rows)
@@ -229,7 +229,7 @@ def _best_mistake(
 
 
 def _cost_together(measurements: Measurements, blocks: Sequence[Block], guess: Guess) -> float:
-    """Return the squared residuals after a fit of rows together, and its tolerances, in variances.
+    """Return the cost of a fit of all rows: squared residuals and tolerances, in variances.
 
     inf where the rows have no poses.
     """

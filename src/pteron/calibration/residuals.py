@@ -263,7 +263,7 @@ class MachineSlopes:
     # What `exact_rank` does otherwise, in integers modulo a prime
 
     def _outputs(self, guess: Guess, poses: Array) -> list[Array]:
-        """Return what the kernel gives at poses."""
+        """Return the kernel's outputs at poses: joint coordinates, Jacobians, slopes, frames."""
         return [*self._kernel(np.array(numbers(guess.robot)), poses)]
 
     def _matrix(self, guess: Guess) -> Array:

@@ -120,7 +120,7 @@ def read_setup_file(log: str | Path) -> MeasuredLog:
     Raises
     ------
     DataError
-        If it is not TOML, has unknown keys or values that cannot be; all faults are told at once.
+        If it is not TOML, has unknown keys or impossible values; all faults are reported at once.
     """
     path = Path(log).with_suffix(".toml")
     if not path.is_file():

@@ -89,7 +89,7 @@ def starting_poses(guess: Guess, measurements: Measurements, *, modes: bool = Tr
 def _measured_poses(
     guess: Guess, measurements: Measurements, home: Array
 ) -> tuple[Array, NDArray[np.bool_]]:
-    """Return the poses (N, m) as measured, home where they are not, and which are whole (N,)."""
+    """Return the measured poses (N, m), home where not measured, and which are complete."""
     robot = guess.robot
     begin = np.tile(home, (len(measurements), 1))
     seen = ~np.isnan(measurements.angles)
@@ -124,7 +124,7 @@ def _height_residuals(
 
 
 def place_surroundings(guess: Guess, measurements: Measurements, poses: Array) -> Guess:
-    """Return the guess with frames and planes that are not known where the drawing puts them."""
+    """Return the guess with unknown frames and planes fitted at poses of the drawn machine."""
     points = guess.points(measurements.marks, poses)
     seen = ~np.isnan(measurements.positions).any(axis=-1)
     if not measurements.setup.frame_known and seen.sum() >= _FEW:

@@ -30,7 +30,7 @@ _INSIDE = 1e-5
 def unseen_combinations(
     start: Guess, blocks: Sequence[Block], axes: Array, tolerances: Array
 ) -> tuple[str, ...]:
-    """Return the combinations that the rows of `axes` span, in words.
+    """Return the combinations that the rows of `axes` span, as texts.
 
     Known combinations, such as a motion of the whole machine, come first, with their number; then
     a basis of the rest.
@@ -77,7 +77,7 @@ def unseen_combinations(
 
 
 def combination_text(vector: Array, names: Sequence[str]) -> str:
-    """Return a combination in words: its greatest terms, scaled so that the first is 1."""
+    """Return a combination as text: its greatest terms, scaled so that the first is 1."""
     parts = vector / vector[np.abs(vector).argmax()]
     order = np.argsort(-np.abs(parts), kind="stable")
     named = [k for k in order if abs(parts[k]) >= _PART]
@@ -176,7 +176,7 @@ def _rigid_motions(
 
 
 def _uniform_growth(start: Guess, blocks: Sequence[Block]) -> Array:
-    """Return the vector (p,) of a growth of all lengths by one factor."""
+    """Return the vector (p,) of a uniform scaling of all lengths."""
     legs = start.robot.legs
     lengths = [
         unknown.unit == "m" or (block.kind == "scales" and legs[block.legs[k]].joint.unit == "m")
