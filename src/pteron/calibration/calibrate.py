@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pteron.arguments import expect
 from pteron.calibration.fit import Fit, Fitter
 from pteron.calibration.guess import Block, Guess, tolerances_of
-from pteron.calibration.measurements import Measurements, evenly
+from pteron.calibration.measurements import Measurements, spread_rows
 from pteron.calibration.observability import observability_of
 from pteron.calibration.raw_faults import describe_mistake, hidden_order, raw_mistake
 from pteron.calibration.residual_faults import hidden_tilt, residual_faults, zero_faults
@@ -259,7 +259,7 @@ def _held_out_errors(
 def _scaled_slopes(fitter: Fitter, fit: Fit) -> Array:
     """Return slopes (K, p) on the machine as drawn, scaled by noise and tolerance."""
     slopes, start, measurements = fitter.slopes, fitter.begin, fitter.measurements
-    chosen = evenly(len(measurements), _RANK_ROWS)
+    chosen = spread_rows(len(measurements), _RANK_ROWS)
     poses = slopes.poses(start, start.joints(measurements.readings), fit.poses)
     reached: NDArray[np.bool_] = np.asarray(np.isfinite(poses).all(axis=1))
     reached &= (measurements.origins < 0) | reached[measurements.origins]

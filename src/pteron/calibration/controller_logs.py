@@ -226,13 +226,13 @@ def _read_klipper_log(text: str, source: str) -> Iterator[_Touch]:
         earlier_offsets = [value for at, value in offsets if at < match.start()]
         # It says where the probe touched, the tool above it, or where the tool would.
         height = earlier_offsets[-1] if earlier_offsets and word.startswith("is") else 0.0
-        yield _Touch(_line(text, match, source), _xyz(float(x), float(y), float(z)), height)
+        yield _Touch(_match_place(text, match, source), _xyz(float(x), float(y), float(z)), height)
 
 
 def _read_marlin(text: str, source: str) -> Iterator[_Touch]:
     """Yield the points of Marlin's G29 and G30."""
     for match in _MARLIN.finditer(text):
-        yield _Touch(_line(text, match, source), _xyz(*map(float, match.groups())), 0.0)
+        yield _Touch(_match_place(text, match, source), _xyz(*map(float, match.groups())), 0.0)
 
 
 def _read_g33(text: str, source: str, radius: float | None) -> Iterator[_Touch]:
@@ -260,7 +260,7 @@ def _read_g33(text: str, source: str, radius: float | None) -> Iterator[_Touch]:
             f"{source}: G33 from P{_G33_MEANS} on reports means of neighbouring points, which are "
             "up to 7 % smaller than at the points themselves; P3 reports these"
         )
-    place = _line(text, report, source)
+    place = _match_place(text, report, source)
     for name, z in heights.items():
         x, y = 0.0, 0.0
         if name != "c":
@@ -295,7 +295,7 @@ def _xyz(x: float, y: float, z: float) -> dict[str, float]:
     return {"X": x, "Y": y, "Z": z}
 
 
-def _line(text: str, match: re.Match[str], source: str) -> str:
+def _match_place(text: str, match: re.Match[str], source: str) -> str:
     return f"{source}, line {text.count(chr(10), 0, match.start()) + 1}"
 
 

@@ -55,7 +55,7 @@ def exact_rank(
     """
     geometry = exact_geometry(start.robot)
     count = blocks[-1].where.stop
-    levels = _kinds(measurements)
+    levels = _row_kinds(measurements)
     rng = random.Random(seed)
     primes = primes_of(geometry, rng)
     best, used, row_count = 0, [], 0
@@ -78,7 +78,7 @@ def exact_rank(
     return best, tuple(used), row_count
 
 
-def _kinds(measurements: Measurements) -> dict[int, float | None]:
+def _row_kinds(measurements: Measurements) -> dict[int, float | None]:
     """Return a row of each kind, by its number, with the height at which such rows always are."""
     measured = ~np.isnan(np.column_stack([*measurements.parts.values()]))
     over, origins, planes = measured[:, -2], measurements.origins, np.array(measurements.planes)

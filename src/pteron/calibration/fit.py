@@ -15,7 +15,7 @@ import scipy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
 from pteron.calibration.guess import Block, Guess, tolerances_of
-from pteron.calibration.measurements import KINDS, Measurements, evenly
+from pteron.calibration.measurements import KINDS, Measurements, spread_rows
 from pteron.calibration.residuals import MachineSlopes, Rows
 from pteron.errors import DataError
 from pteron.kinematics import direct_kinematics
@@ -195,7 +195,7 @@ class Fitter:
         for _ in range(_ROUNDS):
             at = self._recover_poses(self._minimise_cost(at))
             noise = at.noise | self._estimate_noise(at, sought)
-            distances = self._distances_of_left_out(at)
+            distances = self._prediction_distances(at)
             scaled = distances * (at.noise[sought[0]] / noise[sought[0]] if sought else 1.0)
             limits = scipy.stats.chi2.isf(
                 _OUTLYING / len(fitted_rows), np.maximum(at.measured.sum(axis=1), 1)
@@ -212,8 +212,8 @@ class Fitter:
                 return replace(at, settled=False, shared=self._shared_information(at))
         return replace(at, shared=self._shared_information(at))
 
-    def _distances_of_left_out(self, at: Fit) -> Array:
-        """Return the rows' distances (N,); of those left out with the fit's own uncertainty there.
+    def _prediction_distances(self, at: Fit) -> Array:
+        """Return the distances (N,) of rows; left-out rows with the fit's uncertainty added.
 
         Next to a singularity a fit without a row is less sure of its pose than an instrument.
         """
@@ -391,7 +391,7 @@ class Fitter:
         rows = np.flatnonzero(usable)
         if not len(rows):
             return {}
-        some = rows[evenly(len(rows), _CHUNK)]
+        some = rows[spread_rows(len(rows), _CHUNK)]
         at = self.slopes.rows(fit.guess, self.measurements, fit.poses, some)
         noise = {}
         for kind in sought:

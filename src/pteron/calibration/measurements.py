@@ -89,7 +89,7 @@ class Setup:
     frame_known: bool = True
 
 
-def evenly(count: int, most: int) -> NDArray[np.int64]:
+def spread_rows(count: int, most: int) -> NDArray[np.int64]:
     """Return the numbers of at most `most` of `count` rows, evenly spread."""
     return np.unique(np.linspace(0, count - 1, min(count, most)).astype(int))
 

@@ -85,7 +85,7 @@ def raw_mistake(
     """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UnlikelyValue)  # what is tried may well be unlikely
-        misfit = _misfit(_some_rows(measurements), blocks, robot_guess)
+        misfit = _misfit(_sample_rows(measurements), blocks, robot_guess)
         if fitted == (misfit >= _FAR):  # what is far was searched before the fit
             return None
         return _best_mistake(measurements, blocks, robot_guess, min(_NEAR, _FALLEN * misfit))
@@ -121,7 +121,7 @@ def _size_text(error: float, kind: str) -> str:
 
 def _drawing_errors(measurements: Measurements, guess: Guess) -> dict[str, float]:
     """Return the 90 % quantile of absolute residuals by kind on the drawn machine, m and rad."""
-    rows = _some_rows(measurements)
+    rows = _sample_rows(measurements)
     try:
         residuals, measured = _drawing_residuals(guess, rows)
     except DataError:
@@ -154,11 +154,11 @@ def hidden_order(
     """
     if not set(measurements.kinds) <= {"height", "distance"}:
         return None
-    misfit = _misfit(_some_rows(measurements), blocks, robot_guess)
+    misfit = _misfit(_sample_rows(measurements), blocks, robot_guess)
     legs: set[int] = set()
     error = 0.0
     for order in leg_orders(robot_guess):
-        rows = _some_rows(reorder_readings(measurements, order))
+        rows = _sample_rows(reorder_readings(measurements, order))
         if _misfit(rows, blocks, robot_guess) < max(_CLEAR, 1.5 * misfit):
             legs |= {i + 1 for i, k in enumerate(order) if i != k}
             error = max(error, _change_by_order(measurements, robot_guess, fit, order))
@@ -191,7 +191,7 @@ def _change_by_order(
     return float(np.linalg.norm(fitted_swapped[good] - image, axis=1).max())
 
 
-def _some_rows(measurements: Measurements) -> Measurements:
+def _sample_rows(measurements: Measurements) -> Measurements:
     # At random: rows at even steps might all be of one mark.
     return measurements.rows(np.random.default_rng(0).permutation(len(measurements)) < _ROWS)
 
@@ -205,10 +205,10 @@ def _best_mistake(
     that clearly has it ends the search.
     """
     tried: list[tuple[float, int, Mistake]] = []
-    for mistakes in likely_mistakes(_some_rows(measurements), guess):
+    for mistakes in likely_mistakes(_sample_rows(measurements), guess):
         clear = False
         for mistake in mistakes:
-            misfit = _quick_misfit(_some_rows(mistake.undo(measurements)), blocks, guess, most)
+            misfit = _quick_misfit(_sample_rows(mistake.undo(measurements)), blocks, guess, most)
             tried.append((misfit, len(tried), mistake))
             clear |= misfit < min(_CLEAR, most)
         if clear:

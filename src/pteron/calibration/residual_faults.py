@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from pteron.calibration.fit import BEYOND, FLOOR, Fit, Fitter
 from pteron.calibration.guess import Block, Unknown, number_unknowns
-from pteron.calibration.measurements import Measurements, evenly
+from pteron.calibration.measurements import Measurements, spread_rows
 from pteron.calibration.mistakes import order_mistakes
 from pteron.calibration.residuals import MachineSlopes
 from pteron.calibration.result import Finding
@@ -164,7 +164,9 @@ class _ScoreTest:
         self.extra_blocks = _extra_blocks(blocks, measurements, len(start.robot.legs))
         self.frame = [block for block in blocks if block.kind == "frame"]
         fitter = Fitter(measurements, (*blocks, *self.extra_blocks), start, fit.poses)
-        self.rows = np.union1d(evenly(len(measurements), _ROWS), np.flatnonzero(~fit.kept)[:_ROWS])
+        self.rows = np.union1d(
+            spread_rows(len(measurements), _ROWS), np.flatnonzero(~fit.kept)[:_ROWS]
+        )
         at = fitter.slopes.rows(fit.guess, measurements, fit.poses, self.rows)
         r, slopes, _ = fitter.whiten_rows(at, fit.guess, fit.noise)
         joints = fitter.whiten_rows(at._replace(slopes=at.by_reading), fit.guess, fit.noise)[1]
@@ -459,7 +461,7 @@ def _bad_leg(fitter: Fitter, fit: Fit) -> Iterator[Finding]:
         return  # noise that was found explains everything
     names = fitter.begin.robot.joint_names
     fitted_rows = np.flatnonzero(fit.kept)
-    chosen = fitted_rows[evenly(len(fitted_rows), _ROWS)]
+    chosen = fitted_rows[spread_rows(len(fitted_rows), _ROWS)]
     at = fitter.slopes.rows(fit.guess, fitter.measurements, fit.poses, chosen)
     sizes = np.array([fit.noise[kind] for kind in fitter.kind_of])
     r, columns = at.residuals / sizes, at.by_reading[..., : len(names)] / sizes[:, None]

@@ -15,9 +15,9 @@ from pteron.calibration.guess import Block, Guess, Unknown, tolerances_of, varia
 from pteron.calibration.measurements import (
     TOOL,
     Measurements,
-    evenly,
     length_columns,
     position_axes,
+    spread_rows,
 )
 from pteron.calibration.observability import Observability
 from pteron.calibration.residuals import MachineSlopes
@@ -244,7 +244,7 @@ def open_errors(measurements: Measurements, fit: Fit, blocks: Sequence[Block]) -
     """Return the possible error (95 %) of each coordinate at the measured poses, m and rad."""
     robot = fit.guess.robot
     slopes = MachineSlopes(robot, blocks)
-    rows = evenly(len(measurements), _OPEN_ROWS)
+    rows = spread_rows(len(measurements), _OPEN_ROWS)
     tools = Measurements.of(robot, measurements.readings[rows])
     covariance = _contradicted_covariance(fit, blocks)
     poses, moved = slopes.pose_slopes(fit.guess, tools, fit.poses[rows])

@@ -99,23 +99,25 @@ def blocks_of(
             blocks.append(Block(kind, "", tuple(unknowns[i] for i in at), legs=at))
     if "tool" in names_free and TOOL in measured.marks:
         tolerance = float(tolerances.get("tool", TOLERANCES["tool"]))
-        blocks.append(Block("mark", TOOL, _three("tool", tolerance, "tool")))
-    blocks += _surroundings(measured)
+        blocks.append(Block("mark", TOOL, _point_unknowns("tool", tolerance, "tool")))
+    blocks += _surrounding_blocks(measured)
     if not blocks:
         raise DataError("free: nothing is free; name a group")
     return number_unknowns(blocks)
 
 
-def _three(name: str, tolerance: float = _WIDE, group: str = "setup") -> tuple[Unknown, ...]:
+def _point_unknowns(
+    name: str, tolerance: float = _WIDE, group: str = "setup"
+) -> tuple[Unknown, ...]:
     return tuple(Unknown(f"{name}.{axis}", group, "m", tolerance) for axis in "xyz")
 
 
-def _surroundings(measured: Measurements) -> Iterator[Block]:
+def _surrounding_blocks(measured: Measurements) -> Iterator[Block]:
     """Yield the blocks of what measurements refer to and nobody knows."""
     setup = measured.setup
     for name, mark in setup.marks.items():
         if not mark.known and name in measured.marks:
-            yield Block("mark", name, _three(f"marks.{name}"))
+            yield Block("mark", name, _point_unknowns(f"marks.{name}"))
     for name, plane in setup.planes.items():
         if not plane.known and name in measured.planes:
             label = f"planes.{name or 'plane'}"
@@ -124,7 +126,7 @@ def _surroundings(measured: Measurements) -> Iterator[Block]:
             yield Block("plane", name, (*tilts, offset))
     for name, anchor in setup.anchors.items():
         if not anchor.known and name in measured.anchors:
-            yield Block("anchor", name, _three(f"anchors.{name}"))
+            yield Block("anchor", name, _point_unknowns(f"anchors.{name}"))
     if not setup.frame_known:
         turns = [Unknown(f"instrument about {a}", "setup", "rad", _WIDE) for a in "xyz"]
-        yield Block("frame", "", (*_three("instrument"), *turns))
+        yield Block("frame", "", (*_point_unknowns("instrument"), *turns))

@@ -123,7 +123,7 @@ def is_closed(motion: Motion) -> bool:
     )
 
 
-def few(count: int) -> slice:
+def line_samples(count: int) -> slice:
     """Return the slice of so many samples that a line in a picture needs."""
     return slice(None, None, max(1, count // _DRAWN))
 

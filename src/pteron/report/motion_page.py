@@ -16,7 +16,7 @@ from pteron.motion.trajectories.tool import tool_path
 from pteron.playback import Playback
 from pteron.plots import forces_figure, power_figure, robot_figure
 from pteron.plots.machine_figures import gravity_of
-from pteron.report.motion_frames import Frames, few, frames
+from pteron.report.motion_frames import Frames, frames, line_samples
 from pteron.report.moving_picture import stage
 from pteron.report.quantities import JointQuantity, angles_text, coordinate, force, nouns, speed
 from pteron.report.typeset import template
@@ -132,7 +132,7 @@ def _figures(motion_shown: ShownMotion) -> dict[str, Figure]:
         path=at.points.tool,
     )
     joints = [leg.joint for leg in robot.legs]
-    some = few(len(motion.time))
+    some = line_samples(len(motion.time))
     time = motion.time[some] - motion.time[0]
     return {
         "robot": machine,

@@ -34,7 +34,7 @@ from pteron.reduction.expressions import html_symbol
 from pteron.report.contents import Report
 from pteron.report.costs import PAPER_CLAIM
 from pteron.report.drive_figures import force_speed, power
-from pteron.report.motion_frames import few
+from pteron.report.motion_frames import line_samples
 from pteron.report.moving_picture import stage
 from pteron.report.quantities import SYMBOLS, angles_text, force, nouns, readable, speed
 from pteron.report.typeset import compact, format_fixed, template, triple
@@ -235,7 +235,7 @@ def _figures(report: Report) -> dict[str, Any]:
     whose = "drive" if report.has_drives else "actuator"
     label = f"{whose} {force([leg.joint for leg in robot.legs]).axis}"
     half = cycle.duration / 2.0 if standard else None
-    some = few(len(cycle.time))
+    some = line_samples(len(cycle.time))
     forces = forces_figure(cycle.time[some], report.forces[some], turning_point=half, ylabel=label)
     figures: dict[str, Any] = {
         "robot": machine,
