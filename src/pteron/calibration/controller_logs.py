@@ -130,16 +130,14 @@ def _read_stable_positions(robot: Manipulator, text: str, source: str) -> Measur
     faults: list[str] = []
 
     def position(key: str) -> list[float]:
-        cell_text = config.get("delta_calibrate", key, fallback=None)
-        cells = [] if cell_text is None else cell_text.split(",")
+        words = config.get("delta_calibrate", key, fallback=None)
+        cells = [] if words is None else words.split(",")
         try:
             counts = [float(cell) for cell in cells]
             if len(counts) != 3 or not np.isfinite(counts).all():
                 raise ValueError
         except ValueError:
-            faults.append(
-                f"[delta_calibrate] {key}: {shown(cell_text)} given, steps a,b,c expected"
-            )
+            faults.append(f"[delta_calibrate] {key}: {shown(words)} given, steps a,b,c expected")
             return [0.0] * 3
         return counts
 

@@ -195,16 +195,14 @@ def plan(
     chosen, covariance = _choose_poses(seen[:, used], tool, tolerances, count, criterion)
     order = _order_by_distance(poses[chosen], home, robot)
     picked = poses[chosen][order]
-    drawn_error, calibrated_error = (
+    drawn_error, fitted_error = (
         float(np.sqrt(variances(tool, known).max()))
         for known in (np.diag(tolerances**2), covariance)
     )
     readings = start.readings(slopes.joints(start, picked))
     checked = rows_for_check(measurements, blocks)
     plane = next(iter(setup.planes.values())) if measure == "heights" else None
-    return Plan(
-        robot, measure, picked, readings, region, plane, drawn_error, calibrated_error, checked
-    )
+    return Plan(robot, measure, picked, readings, region, plane, drawn_error, fitted_error, checked)
 
 
 def _candidates(robot: Manipulator, region: Box | Cylinder, rng: np.random.Generator) -> Array:
