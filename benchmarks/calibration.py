@@ -48,7 +48,7 @@ class Twin:
         tolerances = np.array([u.tolerance for block in self.blocks for u in block.unknowns])
         self.steps = tolerances * self.rng.standard_normal(len(tolerances))
         self.drawn = Guess.drawn(robot, empty)
-        self.truth = self.drawn.moved(self.blocks, self.steps)
+        self.truth = self.drawn.apply_step(self.blocks, self.steps)
         slopes = MachineSlopes(robot, self.blocks)
         poses = pteron.random_poses(robot, 3 * count, seed=seed)
         joints = pteron.inverse_kinematics(self.truth.robot, poses, on_failure="nan")

@@ -26,7 +26,7 @@ from measuring.as_they_are import as_they_are
 
 import pteron
 from pteron.viewer import Viewer, view
-from pteron.viewer.boundary import allowed
+from pteron.viewer.boundary import is_allowed
 from pteron.viewer.pushing import DRIVES, Push
 from pteron.workspace import home_pose
 
@@ -173,7 +173,7 @@ def _drags(count: int) -> None:
                 _drag(page, viewer, (rng.uniform(10, 900), rng.uniform(60, 790)))
                 after = viewer.state
                 moved += not np.array_equal(before, after.pose)
-                outside += not bool(allowed(after.robot, after.pose))
+                outside += not bool(is_allowed(after.robot, after.pose))
                 if after.message:
                     stopped += 1
                     home = viewer.home

@@ -55,7 +55,7 @@ def off_drawing(robot, seed=0, count=60):
     tolerances = np.array([u.tolerance for block in blocks for u in block.unknowns])
     steps = tolerances * rng.standard_normal(len(tolerances))
     drawn = Guess.drawn(robot, empty)
-    truth = drawn.moved(blocks, steps)
+    truth = drawn.apply_step(blocks, steps)
     poses = pteron.random_poses(robot, 3 * count, seed=seed)
     joints = pteron.inverse_kinematics(truth.robot, poses, on_failure="nan")
     slopes = MachineSlopes(robot, blocks)

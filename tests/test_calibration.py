@@ -180,7 +180,7 @@ def test_slopes_are_those_of_differences(robot, frame_known):
         for sign in (step, -step):
             change = np.zeros(blocks[-1].where.stop)
             change[k] = sign
-            moved = guess.moved(blocks, change)
+            moved = guess.apply_step(blocks, change)
             there = slopes.poses(moved, moved.joints(readings), poses)
             ends.append(slopes.rows(moved, given, there, chosen).residuals)
         difference = (ends[0] - ends[1]) / (2.0 * step)

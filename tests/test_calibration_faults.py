@@ -16,7 +16,7 @@ from mechanisms import CATALOG, CLIENTS
 import pteron
 from pteron.calibration import Measurements, Place, Setup, calibrate
 from pteron.calibration.guess import Guess
-from pteron.calibration.mistakes import reordered
+from pteron.calibration.mistakes import reorder_readings
 from pteron.calibration.residuals import MachineSlopes
 from pteron.errors import DataError
 from pteron.report.calibration import write_calibration
@@ -220,7 +220,7 @@ def test_a_mark_away_from_the_middle_shows_rods_that_differ():
 @pytest.mark.parametrize("order", [(2, 1, 0), (0, 2, 1), (1, 2, 0)])
 def test_an_order_of_the_legs_that_heights_do_not_show_is_within_the_stated_error(order):
     sample = trial("cranks by heights", "none", seed=501)
-    given = reordered(sample.given, order)
+    given = reorder_readings(sample.given, order)
     result = calibrate(sample.robot, given)
     assert result.hidden_order.legs == (1, 2, 3)
     stated = [max(result.open_errors[k] + result.hidden_order.error, FINE) for k in "xyz"]

@@ -20,7 +20,7 @@ import pteron
 from pteron.export import export_mjcf, export_pinocchio, export_sdf, export_urdf, pinocchio_model
 from pteron.export.engines import coordinates, mjcf, tree
 from pteron.export.engines.links import roll_pitch_yaw
-from pteron.export.engines.parts import at_zero, moved_point, place
+from pteron.export.engines.parts import bodies_at_zero, moved_point, place
 
 COUNT = 20
 RANDOM = ["PPP", "SSS", "PRSU", "PRSSI", "RRRR", "CL", "CCU", "CPR"]
@@ -261,7 +261,7 @@ def test_coordinates_close_the_loops(case):
     homes = [joint.home for joint in opened.joints]
     np.testing.assert_allclose(coordinates(opened, pose[0]), homes, rtol=0, atol=1e-13)
     # Back at zero and then home again is where they were.
-    there = replace(opened, bodies=at_zero(opened))
+    there = replace(opened, bodies=bodies_at_zero(opened))
     moved = place(there, dict(zip(names, homes, strict=True)))
     for motion, zero, body in zip(moved, there.bodies, opened.bodies, strict=True):
         np.testing.assert_allclose(moved_point(motion, zero.center), body.center, atol=1e-14)
@@ -422,10 +422,10 @@ def test_roll_pitch_yaw_also_where_pitch_is_upright():
 @EVERY
 def test_the_looks_join_up(case):
     """A leg is seen as one line: each body's looks begin where those of the one before end."""
-    from pteron.export.engines.shapes import dressed
+    from pteron.export.engines.shapes import add_shapes
 
     robot, _, home = case
-    opened = dressed(tree(robot, home))
+    opened = add_shapes(tree(robot, home))
     for body in opened.bodies:
         assert body.shapes, body.name
         for shape in body.shapes:

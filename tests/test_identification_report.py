@@ -23,7 +23,7 @@ from pteron.report.identification import (
     parameter_rows,
     write_identification,
 )
-from pteron.report.identification.contents import contents, short_sources, shortened
+from pteron.report.identification.contents import contents, short_sources, shorten_sources
 from pteron.report.identification.page import page
 from pteron.report.identification.values import html_expressions, html_names
 from pteron.report.typeset import significant
@@ -283,7 +283,7 @@ def test_names_as_people_read_them():
     assert first.startswith("<i>m</i><sub>p1</sub> + <i>m</i><sub>u1</sub> + 20.11\u202f<i>I</i>")
     assert "<i>J</i><sub>m2</sub>" in html_expressions(model)[1], "a rotor joins its slider"
     names = short_sources(result("hostile"))
-    assert shortened(["x/1.csv: row 7, log.csv"], names) == ("x/1.csv: row 7, log.csv",)
+    assert shorten_sources(["x/1.csv: row 7, log.csv"], names) == ("x/1.csv: row 7, log.csv",)
     assert short_sources(result("quadrupteron")) == {"/home/someone/logs/a.csv": "a.csv"}
     assert measured(1234.5, 678.9) == ("1234", "679")
     assert measured(2.5, 0.0) == ("2.50000", "0")

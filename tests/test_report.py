@@ -21,8 +21,8 @@ from pteron.reduction import FORMS
 from pteron.report import write_report
 from pteron.report.contents import contents
 from pteron.report.costs import PAPER_CLAIM, dense_operations
-from pteron.report.page import bodies, geometry, in_symbols, lettered, page
-from pteron.report.typeset import fixed, significant, triple
+from pteron.report.page import bodies, geometry, page, symbolic_sums, typeset_account
+from pteron.report.typeset import format_fixed, significant, triple
 from pteron.report.write import checked_folder, numbers
 from pteron.workspace import REACHABLE, pose_margins
 
@@ -444,7 +444,7 @@ def test_the_measures_show_what_is_reached():
 @CLIENTS
 def test_symbols_stand_for_their_numbers():
     for base in (report("quadrupteron").base, report("delta").base):
-        found = in_symbols(base)
+        found = symbolic_sums(base)
         names = [re.sub("<[^>]*>", "", line) for line, _ in found["lengths"]]
         values = {n: v for n, (_, v) in zip(names, found["lengths"], strict=True)}
         for line, expected in zip(found["sums"], base.expressions(digits=12), strict=True):
@@ -456,7 +456,7 @@ def test_symbols_stand_for_their_numbers():
             np.testing.assert_allclose(np.abs([g for g in given if g != 1.0]), sizes)
     assert "In symbols of the geometry" in read("quadrupteron").text
     numerical = pteron.base_parameters(CATALOG["tripteron"], "svd")
-    assert in_symbols(numerical) is None
+    assert symbolic_sums(numerical) is None
     text = Reader(page(replace(report("hostile"), base=numerical))).text
     assert "In symbols of the geometry" not in text
 
@@ -494,12 +494,12 @@ def test_numbers_as_people_read_them():
     assert significant(999.6) == "1000"
     assert significant(0.00099999, 3) == "0.00100"
     assert significant(float("inf")) == "∞"
-    assert fixed(-0.04) == "0.0"
+    assert format_fixed(-0.04) == "0.0"
     assert triple((1 / 3, -1e-17, 2.0)) == "(0.3333, 0, 2)"
     last = report("quadrupteron").base.expressions("html")[-1]
     assert last == "<i>m</i><sub>e</sub> \u2212 625\u202f<i>I</i><sub>e</sub>"
     account = "its point s0 is p - r . d, rho"
-    assert lettered(account) == (
+    assert typeset_account(account) == (
         "its point <b>s</b><sub>0</sub> is <b>p</b> \u2212 <b>r</b> \u00b7 <b>d</b>, \u03c1"
     )
 

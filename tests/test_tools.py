@@ -79,7 +79,7 @@ def test_a_tool_with_a_mistake_is_told_by_its_number(tmp_path, keys, words):
 
 
 def test_the_command_carries_what_python_does(tmp_path):
-    path = pteron.save(equipped("five-bar"), tmp_path / "robot.toml")
+    path = pteron.save(equipped("five-bar", GRIPPER), tmp_path / "robot.toml")
     options = "--payload 0.4@0.01,-0.02,0@3e-4 --tool gripper --within here --friction 0 --json"
     data = json.loads(done(f"size {path} {options}"))
     mounted = with_tool(path, "gripper")
@@ -99,7 +99,10 @@ def test_the_command_carries_what_python_does(tmp_path):
 
 
 def test_a_simulation_carries_a_payload_at_its_centre(tmp_path):
-    path, table = pteron.save(equipped("five-bar"), tmp_path / "robot.toml"), tmp_path / "run.csv"
+    path, table = (
+        pteron.save(equipped("five-bar", GRIPPER), tmp_path / "robot.toml"),
+        tmp_path / "run.csv",
+    )
     options = "--tool gripper --payload 0.4@0,0,-0.08 --duration 0.4 --step 5e-4"
     data = json.loads(done(f"simulate {path} {options} --out {table} --json"))
     assert (pl.read_csv(table)["payload"] == 0.4).all()

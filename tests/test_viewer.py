@@ -26,12 +26,12 @@ from pteron.kinematics.jacobian_at import jacobian_at
 from pteron.legs import Reading
 from pteron.motion import simulate
 from pteron.report.quantities import readable
-from pteron.report.typeset import fixed
+from pteron.report.typeset import format_fixed
 from pteron.viewer import view
-from pteron.viewer.boundary import allowed
+from pteron.viewer.boundary import is_allowed
 from pteron.viewer.guard import is_here
 from pteron.viewer.motion_files import motion_of_file
-from pteron.viewer.panel import action, doing, values
+from pteron.viewer.panel import action, activity_text, values
 from pteron.viewer.picture import Picture
 from pteron.viewer.pushing import DRIVES
 from pteron.viewer.readings import readings
@@ -41,14 +41,14 @@ from pteron.viewer.session import Session
 from pteron.viewer.slices import choices, slice_map, slice_parts
 from pteron.viewer.sliding import nearest
 from pteron.viewer.state import (
-    assembled,
     assembly_poses,
-    at_rest,
-    carrying,
     current_assembly,
-    in_working_mode,
-    joint_moved,
-    moved,
+    load_payload,
+    move_joint,
+    move_platform,
+    state_at_rest,
+    switch_assembly,
+    switch_working_mode,
     typed_pose,
 )
 
@@ -58,7 +58,7 @@ QUICK = ["quadrupteron", "delta", "five-bar", "3-rrr"]
 @pytest.fixture(scope="module")
 def homes():
     """At rest at home, by name."""
-    return {name: at_rest(pteron.load(name)) for name in QUICK}
+    return {name: state_at_rest(pteron.load(name)) for name in QUICK}
 
 
 @pytest.mark.parametrize("name", QUICK)
@@ -70,27 +70,27 @@ def test_a_pose_out_of_reach_slides_along_the_boundary_and_names_what_stops_it(h
     for way in rng.normal(size=(4, robot.freedom)):
         way[lengths.stop :] = 0.0
         target = home.pose + 1.5 * way / np.linalg.norm(way)
-        found = moved(home, target)
-        assert allowed(robot, found.pose)
+        found = move_platform(home, target)
+        assert is_allowed(robot, found.pose)
         assert re.match(r"(?:Leg|The \w+ of leg) \d (?:reaches|is at its limit)", found.message)
         rest = float(np.linalg.norm((target - found.pose)[lengths]))
-        assert f"is {fixed(1e3 * rest)} mm" in found.message
+        assert f"is {format_fixed(1e3 * rest)} mm" in found.message
         # Nothing allowed beside it is nearer, but for what is kept to a leg's end and rounding.
         beside = found.pose + 0.01 * rng.normal(size=(300, robot.freedom)) * (way != 0.0)
-        beside = beside[allowed(robot, beside)]
+        beside = beside[is_allowed(robot, beside)]
         assert (np.linalg.norm((target - beside)[:, lengths], axis=-1) > rest - 1e-3).all()
         # From there it goes on along the boundary, and inwards.
         sideways = nearest(robot, found.pose, found.pose + 0.05 * rng.normal(size=robot.freedom))[0]
         assert not np.array_equal(sideways, found.pose)
-        inwards = moved(found, home.pose)
+        inwards = move_platform(found, home.pose)
         assert np.array_equal(inwards.pose, home.pose)
 
 
 def test_a_pose_in_reach_is_come_to_and_the_next_action_clears_the_message(homes):
     home = homes["quadrupteron"]
-    far = moved(home, np.array([9.0, 0.0, 0.0, 0.0]))
+    far = move_platform(home, np.array([9.0, 0.0, 0.0, 0.0]))
     assert far.message
-    near = moved(far, np.array([0.01, 0.02, 0.0, 0.1]))
+    near = move_platform(far, np.array([0.01, 0.02, 0.0, 0.1]))
     assert not near.message
     assert near.pose.tolist() == [0.01, 0.02, 0.0, 0.1]
 
@@ -99,26 +99,26 @@ def test_a_pose_in_reach_is_come_to_and_the_next_action_clears_the_message(homes
 def test_a_joint_moves_the_platform_in_its_assembly_mode(homes, name):
     home = homes[name]
     for i in range(home.robot.freedom):
-        found = joint_moved(home, i, home.joints[i] + 0.02)
+        found = move_joint(home, i, home.joints[i] + 0.02)
         assert not found.message
         wanted = home.joints
         wanted[i] += 0.02
         assert np.allclose(found.joints, wanted, atol=1e-9)
-        stopped = joint_moved(home, i, home.joints[i] + 3.0)
+        stopped = move_joint(home, i, home.joints[i] + 3.0)
         assert f"of leg {i + 1} stops there" in stopped.message
-        assert allowed(home.robot, stopped.pose)
+        assert is_allowed(home.robot, stopped.pose)
 
 
 def test_assembly_modes_are_those_of_direct_kinematics(homes):
-    state = moved(homes["3-rrr"], homes["3-rrr"].pose + np.array([0.01, 0.0, 0.1]))
+    state = move_platform(homes["3-rrr"], homes["3-rrr"].pose + np.array([0.01, 0.0, 0.1]))
     poses = assembly_poses(state)
     all_of_them = pteron.direct_kinematics(state.robot, state.joints)
     assert np.array_equal(poses, all_of_them[~np.isnan(all_of_them).any(axis=-1)])
     now = current_assembly(state, poses)
     assert np.allclose(poses[now], state.pose, atol=1e-9)
     other = poses[1 - now]
-    there = assembled(state, other)
-    if allowed(state.robot, other):
+    there = switch_assembly(state, other)
+    if is_allowed(state.robot, other):
         assert np.array_equal(there.pose, other)
     else:
         assert "not possible" in there.message
@@ -127,19 +127,19 @@ def test_assembly_modes_are_those_of_direct_kinematics(homes):
 
 def test_a_working_mode_keeps_the_pose_or_goes_home(homes):
     home = homes["quadrupteron"]
-    kept = in_working_mode(home, [-1, 1, 1, 1])
+    kept = switch_working_mode(home, [-1, 1, 1, 1])
     assert np.array_equal(kept.pose, home.pose)
     assert not kept.message
     assert [leg.elbow for leg in kept.robot.legs] == [-1, 1, 1, 1]
-    delta = in_working_mode(homes["delta"], [-1, -1, -1])
+    delta = switch_working_mode(homes["delta"], [-1, -1, -1])
     assert "its home" in delta.message
-    assert allowed(delta.robot, delta.pose)
+    assert is_allowed(delta.robot, delta.pose)
 
 
 @pytest.mark.parametrize("text", ["-0.5", "half", "0,5", "", "nan", "1e999", "5 kg"])
 def test_a_payload_that_cannot_be_changes_nothing(homes, text):
-    carries = carrying(homes["delta"], "0.25")
-    found = carrying(carries, text)
+    carries = load_payload(homes["delta"], "0.25")
+    found = load_payload(carries, text)
     assert found.payload == 0.25
     assert found.message.startswith("payload: ")
     assert found.message.endswith("The payload stays 0.25 kg.")
@@ -187,7 +187,7 @@ def test_a_typed_pose_is_in_mm_and_degrees(homes):
 @pytest.mark.parametrize("name", QUICK)
 def test_the_numbers_are_the_librarys(homes, name):
     robot = homes[name].robot
-    state = carrying(homes[name], "0.3")
+    state = load_payload(homes[name], "0.3")
     rng = np.random.default_rng(1)
     velocity, acceleration = rng.normal(size=(2, robot.freedom))
     state = replace(state, velocity=velocity, acceleration=acceleration)
@@ -201,7 +201,7 @@ def test_the_numbers_are_the_librarys(homes, name):
     assert found.type_ii == at.type_ii
     page = readout(state, found)
     for leg, force, joint in zip(robot.legs, forces, found.joints, strict=True):
-        assert f"<td>{fixed(force, 2)} {leg.joint.force_unit}</td>" in page
+        assert f"<td>{format_fixed(force, 2)} {leg.joint.force_unit}</td>" in page
         assert f"<td>{readable(joint, leg.joint.unit)}</td>" in page
 
 
@@ -225,7 +225,7 @@ def test_a_torques_arrow_goes_round_its_axis_from_the_crank_on(homes):
 
 def test_where_the_forces_are_not_determined_the_page_says_why():
     robot = pteron.load("quadrupteron")
-    state = at_rest(robot, np.array([0.0, 0.0, 0.0, np.pi / 2.0]))
+    state = state_at_rest(robot, np.array([0.0, 0.0, 0.0, np.pi / 2.0]))
     found = readings(state)
     assert np.isnan(found.forces).all()
     page = readout(state, found)
@@ -246,7 +246,7 @@ def test_every_machine_is_pushed_by_a_spring_and_stays_where_it_may_be(name):
         push.pull(push.spring[0] if push.spring else place, place + rng.normal(size=3))
         for _ in range(4):
             session.advance(1.0 / 30.0)
-            assert allowed(robot, session.state.pose)
+            assert is_allowed(robot, session.state.pose)
     assert not np.allclose(session.state.pose, session.home, atol=1e-4)
     session.end_push()
     assert not session.state.velocity.any()
@@ -281,7 +281,7 @@ def test_a_spring_lifts_a_small_machine_that_has_fallen():
     session.begin_push("off: no force")
     for _ in range(20):
         session.advance(1.0 / 30.0)
-    assert doing(session) == "Drives off: it falls. Pull at its platform."
+    assert activity_text(session) == "Drives off: it falls. Pull at its platform."
     fallen = session.state.pose[0]
     assert fallen < session.home[0] - 0.02
     place, _ = session.state.robot.platform.at(session.state.pose)
@@ -296,7 +296,7 @@ def test_drives_hold_what_is_left_to_itself_unless_they_are_off():
     session.begin_push(next(iter(DRIVES)))
     for _ in range(10):
         session.advance(1.0 / 30.0)
-    assert doing(session) == "The drives hold its pose. Pull at its platform."
+    assert activity_text(session) == "The drives hold its pose. Pull at its platform."
     np.testing.assert_allclose(session.state.pose, session.home, atol=1e-6)
 
 
@@ -319,7 +319,7 @@ def test_a_slice_goes_round_what_serves_and_what_only_a_limit_forbids(homes, nam
         return sum((path.contains_points(poses[:, [i, j]]) for path in paths), np.zeros(4000)) % 2
 
     reached = np.isfinite(inverse_kinematics(robot, poses, on_failure="nan")).all(axis=-1)
-    served = reached & allowed(robot, poses)
+    served = reached & is_allowed(robot, poses)
     assert served.mean() > 0.05
     assert (within(serves) == served).mean() > 0.997
     assert (within(limited) == (reached & ~served)).mean() > 0.997
@@ -430,7 +430,7 @@ def test_what_was_done_is_undone_and_spans_end_where_the_machine_stops(homes):
     for i, (low, high) in enumerate(poses.T):
         ends = np.tile(session.home, (2, 1))
         ends[:, i] = low, high
-        assert allowed(session.state.robot, ends).all()
+        assert is_allowed(session.state.robot, ends).all()
         assert low < session.home[i] < high
     assert (joints[0] < session.state.joints).all()
 
@@ -664,7 +664,7 @@ def test_a_slider_moves_the_robot_and_the_forces_are_the_librarys(page, viewer):
         page,
         "wanted => [...document.querySelectorAll('table.legs td:nth-child(3)')]"
         ".every((cell, i) => cell.innerText === wanted[i] + ' N')",
-        [fixed(force, 2) for force in forces],
+        [format_fixed(force, 2) for force in forces],
     )
     assert page.locator("#view").screenshot() != before
     page.keyboard.press("Tab")
@@ -679,7 +679,7 @@ def test_a_drag_out_of_reach_slides_and_a_slider_at_its_end_blocks_no_other(page
     slide(page, "y (mm)", ["PageUp"])
     wait_for(page, "() => Number(document.getElementById('pose1').value) > 5")
     assert viewer.wait(10.0)
-    assert allowed(viewer.state.robot, viewer.state.pose)
+    assert is_allowed(viewer.state.robot, viewer.state.pose)
     assert viewer.state.pose[1] > 0.005
     assert viewer.state.pose[0] > 0.05
     page.wait_for_timeout(600)
@@ -791,7 +791,7 @@ def test_while_the_panel_is_folded_pose_and_limit_stand_over_the_picture(browser
             viewer.move_to([x, 0.0, 0.0, 0.0])
             assert viewer.wait(10.0)
         said(tab, "mm from the pose asked for")
-        x = fixed(1e3 * viewer.state.pose[0])
+        x = format_fixed(1e3 * viewer.state.pose[0])
         assert tab.inner_text("#where") == f"x {x} y 0.0 z 0.0 mm, phi 0.0°"
         status = tab.get_by_role("status")
         assert status.is_visible()
@@ -1060,7 +1060,7 @@ def test_a_drives_readings_stand_beside_its_joint_coordinates():
     shown = np.degrees([found.joints[0], (found.joints[1] - 0.02) / 2.0])
     table = readout(state, found).replace("</td><td>", " ")
     for joint, reads in zip(np.degrees(found.joints), shown, strict=True):
-        assert f"{fixed(joint, 1)}° {fixed(reads, 1)}° " in table
+        assert f"{format_fixed(joint, 1)}° {format_fixed(reads, 1)}° " in table
     assert "<th>reads</th>" in table
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pteron.arguments import expect
 from pteron.calibration.fit import Fit, Fitter
 from pteron.calibration.guess import Block, Guess, tolerances_of
-from pteron.calibration.measurements import Measurements, evenly
+from pteron.calibration.measurements import Measurements, spread_rows
 from pteron.calibration.observability import observability_of
 from pteron.calibration.raw_faults import describe_mistake, hidden_order, raw_mistake
 from pteron.calibration.residual_faults import hidden_tilt, residual_faults, zero_faults
@@ -18,12 +18,12 @@ from pteron.calibration.result import (
     Calibration,
     Finding,
     HeldOut,
-    calibrated,
+    calibrated_robot,
     open_errors,
     values_of,
 )
 from pteron.calibration.set_aside import rows_set_aside
-from pteron.calibration.start import placed, starting_poses
+from pteron.calibration.start import place_surroundings, starting_poses
 from pteron.calibration.thresholds import FEW_LEFT_OUT, ordinary_error
 from pteron.calibration.unknowns import blocks_of
 from pteron.calibration.verdict import EVERY, Evidence, fitted_errors, rows_for_check, verdict_of
@@ -107,14 +107,14 @@ def calibrate(
     array([-0.001,  0.   ,  0.   ])
     """
     robot = as_manipulator(robot)
-    _check(robot.joint_count, measurements)
+    _check_readings(robot.joint_count, measurements)
     blocks = blocks_of(robot, measurements, free, prior)
     start = Guess.drawn(robot, measurements)
     mistake = raw_mistake(measurements, blocks, start)
     if mistake is None:
         result = _calibrate(robot, measurements, blocks, held_out, seed)
         explained = any(finding.kind in _IN_TIME for finding in result.findings)
-        if explained or not _far_off(result.fit, measurements):
+        if explained or not _exceeds_ordinary_error(result.fit, measurements):
             return result
         mistake = raw_mistake(measurements, blocks, start, fitted=True)
         if mistake is None:
@@ -136,24 +136,28 @@ def _calibrate(
     seed: int,
     mistakes: Sequence[Finding] = (),
 ) -> Calibration:
-    """Return the calibration of a log without a mistake, or in which these are undone."""
+    """Return the calibration of a log that has no mistakes, or with `mistakes` undone."""
     start = Guess.drawn(robot, measurements)
     poses = starting_poses(start, measurements)
-    start = placed(start, measurements, poses)
+    start = place_surroundings(start, measurements, poses)
     checked = rows_for_check(measurements, blocks)
-    kept = np.ones(len(measurements), dtype=bool)
+    fitted_rows = np.ones(len(measurements), dtype=bool)
     if held_out is None and len(measurements) >= checked:
-        kept[EVERY // 2 :: EVERY] = False
+        fitted_rows[EVERY // 2 :: EVERY] = False
     partial = None
-    if held_out is not None or not kept.all():
-        partial = _partial_fit(start, measurements, blocks, kept)
+    if held_out is not None or not fitted_rows.all():
+        partial = _partial_fit(start, measurements, blocks, fitted_rows)
     aside = rows_set_aside(start, measurements, blocks, poses)
     fitter = Fitter(measurements, blocks, start, poses, aside.aside, aside.barred)
     fit = fitter.run(partial)
     judged = None
     if partial is not None:
-        other = held_out if held_out is not None else _fitting(measurements, fit, ~kept)
-        judged = _held_out(start, partial, blocks, other)
+        other = (
+            held_out
+            if held_out is not None
+            else _select_fitting_rows(measurements, fit, ~fitted_rows)
+        )
+        judged = _held_out_errors(start, partial, blocks, other)
     shown = observability_of(start, measurements, blocks, _scaled_slopes(fitter, fit), seed)
     findings = (
         *mistakes,
@@ -168,7 +172,7 @@ def _calibrate(
     )
     return Calibration(
         robot,
-        calibrated(fit.guess),
+        calibrated_robot(fit.guess),
         values_of(start, fit, blocks),
         {kind: value for kind, value in fit.noise.items() if kind in measurements.kinds},
         shown,
@@ -185,76 +189,85 @@ def _calibrate(
 
 
 def _partial_fit(
-    start: Guess, given: Measurements, blocks: tuple[Block, ...], kept: NDArray[np.bool_]
+    start: Guess,
+    measurements: Measurements,
+    blocks: tuple[Block, ...],
+    fitted_rows: NDArray[np.bool_],
 ) -> Fit:
-    """Return the fit of rows that are kept, by which held-out rows are judged."""
-    fitted = np.zeros_like(kept)
-    fitted[np.flatnonzero(kept)[:: -(-int(kept.sum()) // _TRIED_ROWS)]] = True
-    rows = given.rows(fitted)
+    """Return a fit of at most `_TRIED_ROWS` of the fitted rows, to predict held-out rows."""
+    sampled_rows = np.zeros_like(fitted_rows)
+    sampled_rows[np.flatnonzero(fitted_rows)[:: -(-int(fitted_rows.sum()) // _TRIED_ROWS)]] = True
+    rows = measurements.rows(sampled_rows)
     poses = starting_poses(start, rows)
     aside = rows_set_aside(start, rows, blocks, poses)
     return Fitter(rows, blocks, start, poses, aside.aside, aside.barred).run()
 
 
-def _far_off(fit: Fit, given: Measurements) -> bool:
-    """Return whether a fit leaves more than ordinary tolerances do, in a kind of measurement."""
-    stated = given.setup.noise
+def _exceeds_ordinary_error(fit: Fit, measurements: Measurements) -> bool:
+    """Return whether the error of some kind of measurement exceeds ordinary tolerances."""
+    stated = measurements.setup.noise
     return not fit.settled or any(
         error > ordinary_error(kind, stated.get(kind))
-        for kind, error in fitted_errors(fit, given).items()
+        for kind, error in fitted_errors(fit, measurements).items()
     )
 
 
-def _fitting(given: Measurements, fit: Fit, chosen: NDArray[np.bool_]) -> Measurements:
-    """Return chosen rows, but for the few that a fit of all rows leaves out and findings name."""
+def _select_fitting_rows(
+    measurements: Measurements, fit: Fit, chosen: NDArray[np.bool_]
+) -> Measurements:
+    """Return chosen rows without outliers of the fit of all rows, where these are few."""
     few = (~fit.kept).sum() <= FEW_LEFT_OUT * len(fit.kept)
     some = chosen & fit.kept if few else chosen
-    return given.rows(some if some.any() else chosen)
+    return measurements.rows(some if some.any() else chosen)
 
 
-def _check(joints: int, given: Measurements) -> None:
-    shape = given.readings.shape
+def _check_readings(joints: int, measurements: Measurements) -> None:
+    shape = measurements.readings.shape
     expect(len(shape) == 2 and shape[1] == joints, "readings", f"shape {shape}", f"(N, {joints})")
-    if not np.isfinite(given.readings).all():
-        row = int(np.argwhere(~np.isfinite(given.readings))[0, 0])
-        raise DataError(f"{given.places[row]}: a reading is missing or not finite")
-    if not given.kinds:
+    if not np.isfinite(measurements.readings).all():
+        row = int(np.argwhere(~np.isfinite(measurements.readings))[0, 0])
+        raise DataError(f"{measurements.places[row]}: a reading is missing or not finite")
+    if not measurements.kinds:
         raise DataError("measurements: nothing was measured; give a position, an angle, a height")
 
 
-def _held_out(start: Guess, fit: Fit, blocks: tuple[Block, ...], other: Measurements) -> HeldOut:
-    """Return the errors at rows that a fit did not see."""
-    before = Fitter(other, blocks, start, starting_poses(start, other))
-    poses = before.slopes.poses(start, start.joints(other.readings), before.begin_poses)
-    moved = before.slopes.poses(fit.guess, fit.guess.joints(other.readings), poses)
-    moved = np.where(np.isnan(moved), poses, moved)
+def _held_out_errors(
+    start: Guess, fit: Fit, blocks: tuple[Block, ...], other: Measurements
+) -> HeldOut:
+    """Return RMS errors by kind at held-out rows, with the drawn and the fitted machine."""
+    fitter = Fitter(other, blocks, start, starting_poses(start, other))
+    poses = fitter.slopes.poses(start, start.joints(other.readings), fitter.begin_poses)
+    fitted_poses = fitter.slopes.poses(fit.guess, fit.guess.joints(other.readings), poses)
+    fitted_poses = np.where(np.isnan(fitted_poses), poses, fitted_poses)
     chosen = np.arange(len(other))
-    old = before.slopes.rows(start, other, poses, chosen)
-    new = before.slopes.rows(fit.guess, other, moved, chosen)
-    spread = np.einsum("nkp,pq,nkq->nk", new.slopes, fit.covariance, new.slopes, optimize=True)
+    drawn = fitter.slopes.rows(start, other, poses, chosen)
+    fitted = fitter.slopes.rows(fit.guess, other, fitted_poses, chosen)
+    spread = np.einsum(
+        "nkp,pq,nkq->nk", fitted.slopes, fit.covariance, fitted.slopes, optimize=True
+    )
     noise = np.array([fit.noise[kind] for kind in other.kind_of])
-    seen = new.measured & np.isfinite(spread) & np.isfinite(old.residuals + new.residuals)
-    kinds = {kind: seen & (other.kind_of == kind) for kind in fit.noise}
+    usable = fitted.measured & np.isfinite(spread) & np.isfinite(drawn.residuals + fitted.residuals)
+    kinds = {kind: usable & (other.kind_of == kind) for kind in fit.noise}
 
     def rms(squares: Array) -> dict[str, float]:
         return {k: float(np.sqrt(squares[here].mean())) for k, here in kinds.items() if here.any()}
 
-    each = map(rms, (old.residuals**2, new.residuals**2, spread + noise**2))
-    return HeldOut(int(new.measured.any(axis=1).sum()), *each)
+    errors = map(rms, (drawn.residuals**2, fitted.residuals**2, spread + noise**2))
+    return HeldOut(int(fitted.measured.any(axis=1).sum()), *errors)
 
 
 def _scaled_slopes(fitter: Fitter, fit: Fit) -> Array:
-    """Return slopes at the measured poses on the machine as drawn, by noise and tolerance."""
-    slopes, start, given = fitter.slopes, fitter.begin, fitter.given
-    chosen = evenly(len(given), _RANK_ROWS)
-    poses = slopes.poses(start, start.joints(given.readings), fit.poses)
+    """Return slopes (K, p) on the machine as drawn, scaled by noise and tolerance."""
+    slopes, start, measurements = fitter.slopes, fitter.begin, fitter.measurements
+    chosen = spread_rows(len(measurements), _RANK_ROWS)
+    poses = slopes.poses(start, start.joints(measurements.readings), fit.poses)
     reached: NDArray[np.bool_] = np.asarray(np.isfinite(poses).all(axis=1))
-    reached &= (given.origins < 0) | reached[given.origins]
+    reached &= (measurements.origins < 0) | reached[measurements.origins]
     chosen = chosen[reached[chosen]]
-    at = slopes.rows(start, given, poses, chosen)
-    sizes = np.array([fit.noise[kind] for kind in given.kind_of])
+    rows = slopes.rows(start, measurements, poses, chosen)
+    sizes = np.array([fit.noise[kind] for kind in measurements.kind_of])
     tolerances = tolerances_of(fitter.blocks)
     tolerances[~np.isfinite(tolerances)] = 1.0
-    more = np.sqrt(len(given) / max(len(chosen), 1))
-    flat = (more * at.slopes / sizes[:, None] * tolerances).reshape(-1, len(tolerances))
-    return np.asarray(flat[at.measured.reshape(-1)])
+    row_weight = np.sqrt(len(measurements) / max(len(chosen), 1))
+    flat = (row_weight * rows.slopes / sizes[:, None] * tolerances).reshape(-1, len(tolerances))
+    return np.asarray(flat[rows.measured.reshape(-1)])

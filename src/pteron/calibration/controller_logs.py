@@ -1,4 +1,4 @@
-"""Measurements from the files of Klipper, RepRapFirmware, Marlin and LinuxCNC, told by contents.
+"""Measurements from the files of Klipper, RepRapFirmware, Marlin and LinuxCNC, by content.
 
 Klipper's printer.cfg has stable positions, steps from the end stops, which are joint readings. The
 others log tool positions, computed by the controller from the geometry as drawn: the readings there
@@ -48,7 +48,7 @@ _G33_MEANS = 4
 _MAP = "RepRapFirmware height map"
 
 
-class _Touched(NamedTuple):
+class _Touch(NamedTuple):
     """A place where the tool touched, as the controller logs it."""
 
     place: str
@@ -80,7 +80,7 @@ def read_controller_log(
     """
     file, source = Path(path), shown(str(path), bare=True, longest=1000)
     if file.suffix.lower() == ".parquet" or not file.is_file():
-        return None  # told where tables are opened
+        return None  # reported where tables are opened
     with file.open("rb") as opened:
         data = opened.read(_LARGEST if file.suffix.lower() != ".csv" else 1 << 20)
     text = data.decode("utf-8-sig", "replace")
@@ -88,10 +88,10 @@ def read_controller_log(
         return None
     try:
         if re.search(r"^(?:#\*# )?\[delta_calibrate\]", text, re.MULTILINE):
-            return _stable(robot, text, file.name)
-        for find in (*_READERS, partial(_g33, radius=g33_radius), _linuxcnc):
+            return _read_stable_positions(robot, text, file.name)
+        for find in (*_READERS, partial(_read_g33, radius=g33_radius), _read_linuxcnc):
             if touched := list(find(text, file.name)):
-                return _where_touched(robot, touched)
+                return _touched_heights(robot, touched)
     except DataError as error:
         raise DataError(error.message, subject=source) from None
     if file.suffix.lower() in _TABLES:
@@ -103,7 +103,7 @@ def read_controller_log(
     )
 
 
-def _stable(robot: Manipulator, text: str, source: str) -> Measurements:
+def _read_stable_positions(robot: Manipulator, text: str, source: str) -> Measurements:
     """Return the stable positions of a printer.cfg as readings."""
     config = printer_cfg(text, source)
     steps = [way_a_step(config, tower) for tower in "abc"]
@@ -130,14 +130,14 @@ def _stable(robot: Manipulator, text: str, source: str) -> Measurements:
     faults: list[str] = []
 
     def position(key: str) -> list[float]:
-        given = config.get("delta_calibrate", key, fallback=None)
-        cells = [] if given is None else given.split(",")
+        words = config.get("delta_calibrate", key, fallback=None)
+        cells = [] if words is None else words.split(",")
         try:
             counts = [float(cell) for cell in cells]
             if len(counts) != 3 or not np.isfinite(counts).all():
                 raise ValueError
         except ValueError:
-            faults.append(f"[delta_calibrate] {key}: {shown(given)} given, steps a,b,c expected")
+            faults.append(f"[delta_calibrate] {key}: {shown(words)} given, steps a,b,c expected")
             return [0.0] * 3
         return counts
 
@@ -166,23 +166,23 @@ def _stable(robot: Manipulator, text: str, source: str) -> Measurements:
     )
 
 
-def _map(text: str, source: str) -> Iterator[_Touched]:
+def _read_height_map(text: str, source: str) -> Iterator[_Touch]:
     """Yield the points of RepRapFirmware's height map: z where the probe touched."""
     if not text.startswith(_MAP):
         return
     lines = text.splitlines()
     names = [cell.strip() for cell in lines[1].split(",")]
     values = [cell.strip() for cell in lines[2].split(",")]
-    given = dict(zip(names, values, strict=False))
+    header = dict(zip(names, values, strict=False))
     axes = (("xmin", "xspacing"), ("ymin", "yspacing"))
-    if "spacing" in given:  # of version 1, before 2.0
+    if "spacing" in header:  # of version 1, before 2.0
         axes = (("xmin", "spacing"), ("ymin", "spacing"))
-    if "axis0" in given:  # since 3.4
-        if (given["axis0"], given.get("axis1")) != ("X", "Y"):
+    if "axis0" in header:  # since 3.4
+        if (header["axis0"], header.get("axis1")) != ("X", "Y"):
             raise DataError("a height map over X and Y is read, and this one has other axes")
         axes = (("min0", "spacing0"), ("min1", "spacing1"))
     try:
-        (x, dx), (y, dy) = ([float(given[key]) for key in pair] for pair in axes)
+        (x, dx), (y, dy) = ([float(header[key]) for key in pair] for pair in axes)
     except (KeyError, ValueError):
         raise DataError(
             f"line 3: {shown(lines[2])} given, the grid of a height map expected"
@@ -196,44 +196,44 @@ def _map(text: str, source: str) -> Iterator[_Touched]:
                 z = float(cell)
             except ValueError:
                 raise DataError(f"line {j + 4}: {shown(cell)} given, a height expected") from None
-            yield _Touched(
+            yield _Touch(
                 f"{source}, line {j + 4}, column {i + 1}", _xyz(x + i * dx, y + j * dy, z), 0.0
             )
 
 
-def _g30(text: str, source: str) -> Iterator[_Touched]:
+def _read_g30(text: str, source: str) -> Iterator[_Touch]:
     """Yield the points of G30 P.. X.. Y.. with the heights that RepRapFirmware's G32 answers."""
-    found = list(_HEIGHTS.finditer(text))
-    if not found:
+    reports = list(_HEIGHTS.finditer(text))
+    if not reports:
         return
     points = {int(p): (float(x), float(y)) for p, x, y in _G30.findall(text)}
-    heights = [float(z) for z in re.findall(_NUMBER, found[-1][1])]
+    heights = [float(z) for z in re.findall(_NUMBER, reports[-1][1])]
     if sorted(points) != list(range(len(heights))):
         raise DataError(
             f"{len(heights)} bed probe heights, and {len(points)} points G30 P.. X.. Y..; put the "
             "lines of bed.g into the log, P from 0"
         )
     for p, z in enumerate(heights):
-        yield _Touched(f"{source}, G30 P{p}", _xyz(*points[p], z), 0.0)
+        yield _Touch(f"{source}, G30 P{p}", _xyz(*points[p], z), 0.0)
 
 
-def _klippy(text: str, source: str) -> Iterator[_Touched]:
+def _read_klipper_log(text: str, source: str) -> Iterator[_Touch]:
     offsets = [(m.start(), float(m[1])) for m in _OFFSET.finditer(text)]
     for match in _KLIPPER.finditer(text):
         x, y, word, z = match.groups()
-        before = [value for at, value in offsets if at < match.start()]
+        earlier_offsets = [value for at, value in offsets if at < match.start()]
         # It says where the probe touched, the tool above it, or where the tool would.
-        height = before[-1] if before and word.startswith("is") else 0.0
-        yield _Touched(_line(text, match, source), _xyz(float(x), float(y), float(z)), height)
+        height = earlier_offsets[-1] if earlier_offsets and word.startswith("is") else 0.0
+        yield _Touch(_match_place(text, match, source), _xyz(float(x), float(y), float(z)), height)
 
 
-def _marlin(text: str, source: str) -> Iterator[_Touched]:
+def _read_marlin(text: str, source: str) -> Iterator[_Touch]:
     """Yield the points of Marlin's G29 and G30."""
     for match in _MARLIN.finditer(text):
-        yield _Touched(_line(text, match, source), _xyz(*map(float, match.groups())), 0.0)
+        yield _Touch(_match_place(text, match, source), _xyz(*map(float, match.groups())), 0.0)
 
 
-def _g33(text: str, source: str, radius: float | None) -> Iterator[_Touched]:
+def _read_g33(text: str, source: str, radius: float | None) -> Iterator[_Touch]:
     """Yield the points of Marlin's G33: the middle, beneath the towers, and opposite to them.
 
     The last report is that of the settings that the log ends with. Of P4 to P10 a point on the
@@ -258,16 +258,16 @@ def _g33(text: str, source: str, radius: float | None) -> Iterator[_Touched]:
             f"{source}: G33 from P{_G33_MEANS} on reports means of neighbouring points, which are "
             "up to 7 % smaller than at the points themselves; P3 reports these"
         )
-    place = _line(text, report, source)
+    place = _match_place(text, report, source)
     for name, z in heights.items():
         x, y = 0.0, 0.0
         if name != "c":
             angle = np.radians(_G33_ANGLES[name])
             x, y = 1e3 * radius * np.cos(angle), 1e3 * radius * np.sin(angle)
-        yield _Touched(f"{place}, {name}", _xyz(x, y, z), 0.0)
+        yield _Touch(f"{place}, {name}", _xyz(x, y, z), 0.0)
 
 
-def _linuxcnc(text: str, source: str) -> Iterator[_Touched]:
+def _read_linuxcnc(text: str, source: str) -> Iterator[_Touch]:
     """Yield the lines of LinuxCNC's probe log."""
     lines = [(k, line) for k, line in enumerate(text.splitlines(), start=1) if line.strip()]
     faults = []
@@ -283,25 +283,25 @@ def _linuxcnc(text: str, source: str) -> Iterator[_Touched]:
     if faults:
         raise DataError(joined_faults(faults))
     for k, row in rows:
-        yield _Touched(f"{source}, line {k}", dict(zip("XYZABCUVW", row, strict=False)), 0.0)
+        yield _Touch(f"{source}, line {k}", dict(zip("XYZABCUVW", row, strict=False)), 0.0)
 
 
-_READERS = (_map, _g30, _klippy, _marlin)
+_READERS = (_read_height_map, _read_g30, _read_klipper_log, _read_marlin)
 
 
 def _xyz(x: float, y: float, z: float) -> dict[str, float]:
     return {"X": x, "Y": y, "Z": z}
 
 
-def _line(text: str, match: re.Match[str], source: str) -> str:
+def _match_place(text: str, match: re.Match[str], source: str) -> str:
     return f"{source}, line {text.count(chr(10), 0, match.start()) + 1}"
 
 
-def _where_touched(robot: Manipulator, touched: Sequence[_Touched]) -> Measurements:
+def _touched_heights(robot: Manipulator, touched: Sequence[_Touch]) -> Measurements:
     """Return heights at readings that follow from the machine as drawn."""
     platform, axes = robot.platform, linuxcnc_axes(robot)
     poses = np.array(
-        [[one.at.get(axis.letter, 0.0) / axis.scale for axis in axes] for one in touched]
+        [[touch.at.get(axis.letter, 0.0) / axis.scale for axis in axes] for touch in touched]
     )
     tool = np.einsum("i,nij->nj", np.array(platform.tool), platform.at(poses)[1])
     poses[:, ~platform.angular] -= tool @ platform.directions.T
@@ -309,18 +309,18 @@ def _where_touched(robot: Manipulator, touched: Sequence[_Touched]) -> Measureme
     lost = np.isnan(joints).any(axis=-1)
     if lost.any():
         faults = [
-            f"{one.place}: the machine as drawn does not reach "
-            f"{' '.join(f'{a.letter}{one.at.get(a.letter, 0.0):g}' for a in axes)}; is z = 0 the "
+            f"{touch.place}: the machine as drawn does not reach "
+            f"{' '.join(f'{a.letter}{touch.at.get(a.letter, 0.0):g}' for a in axes)}; is z = 0 the "
             "bed in its file?"
-            for one, bad in zip(touched, lost, strict=True)
+            for touch, bad in zip(touched, lost, strict=True)
             if bad
         ]
         if 2 * lost.sum() > len(lost):
             raise DataError(joined_faults(faults))
-        more = f" and {len(faults) - 1} more" if len(faults) > 1 else ""
-        warn_unlikely(f"{faults[0]} It is left out{more}.")
-        touched = [one for one, bad in zip(touched, lost, strict=True) if not bad]
+        others = f" and {len(faults) - 1} more" if len(faults) > 1 else ""
+        warn_unlikely(f"{faults[0]} It is left out{others}.")
+        touched = [touch for touch, bad in zip(touched, lost, strict=True) if not bad]
         joints = joints[~lost]
-    heights = 1e-3 * np.array([one.height for one in touched])
-    found = Measurements.of(robot, to_readings(robot, joints), heights=heights)
-    return replace(found, places=tuple(one.place for one in touched))
+    heights = 1e-3 * np.array([touch.height for touch in touched])
+    measurements = Measurements.of(robot, to_readings(robot, joints), heights=heights)
+    return replace(measurements, places=tuple(touch.place for touch in touched))

@@ -47,7 +47,7 @@ _FINE = 10**6
 
 
 def exact_rank(
-    start: Guess, blocks: Sequence[Block], given: Measurements, seed: int
+    start: Guess, blocks: Sequence[Block], measurements: Measurements, seed: int
 ) -> tuple[int | None, tuple[int, ...], int]:
     """Return rank, primes and number of rows; None for a rank where something has no exact form.
 
@@ -55,49 +55,49 @@ def exact_rank(
     """
     geometry = exact_geometry(start.robot)
     count = blocks[-1].where.stop
-    levels = _kinds(given)
+    levels = _row_kinds(measurements)
     rng = random.Random(seed)
     primes = primes_of(geometry, rng)
-    best, used, rows = 0, [], 0
+    best, used, row_count = 0, [], 0
     for _ in range(_PRIMES):
-        drawn = _ModularSlopes(start, blocks, given, next(primes), rng)
-        found: list[list[int]] = []
+        drawn = _ModularSlopes(start, blocks, measurements, next(primes), rng)
+        rows: list[list[int]] = []
         rank, grows = 0, True
         try:
             while grows:  # a leg may need more poses than all rows together
-                wanted = max(count, len(found)) + _SPARE * len(levels)
-                while len(found) < wanted:
+                row_target = max(count, len(rows)) + _SPARE * len(levels)
+                while len(rows) < row_target:
                     for i, level in levels.items():
-                        found += drawn.at_random(i, level)
-                before, rank = rank, len(dependencies(found, range(count), drawn.prime)[0])
-                grows = before < rank < count
+                        rows += drawn.random_rows(i, level)
+                previous_rank, rank = rank, len(dependencies(rows, range(count), drawn.prime)[0])
+                grows = previous_rank < rank < count
         except ZeroDivisionError:
             return None, (), 0
-        best, rows = max(best, rank), len(found)
+        best, row_count = max(best, rank), len(rows)
         used.append(drawn.prime)
-    return best, tuple(used), rows
+    return best, tuple(used), row_count
 
 
-def _kinds(given: Measurements) -> dict[int, float | None]:
+def _row_kinds(measurements: Measurements) -> dict[int, float | None]:
     """Return a row of each kind, by its number, with the height at which such rows always are."""
-    measured = ~np.isnan(np.column_stack([*given.parts.values()]))
-    over, origins, planes = measured[:, -2], given.origins, np.array(given.planes)
+    measured = ~np.isnan(np.column_stack([*measurements.parts.values()]))
+    over, origins, planes = measured[:, -2], measurements.origins, np.array(measurements.planes)
     kinds = {
         (
             *measured[i].tolist(),
-            given.marks[i],
-            given.planes[i] if over[i] else "",
-            given.anchors[i] if origins[i] < 0 else None,
-            given.marks[origins[i]] if origins[i] >= 0 else "",
+            measurements.marks[i],
+            measurements.planes[i] if over[i] else "",
+            measurements.anchors[i] if origins[i] < 0 else None,
+            measurements.marks[origins[i]] if origins[i] >= 0 else "",
         ): i
-        for i in reversed(range(len(given)))
+        for i in reversed(range(len(measurements)))
     }
-    found: dict[int, float | None] = {}
+    levels: dict[int, float | None] = {}
     for _, i in sorted(kinds.items(), key=repr):
-        heights = given.heights[planes == planes[i]]
+        heights = measurements.heights[planes == planes[i]]
         level = over[i] and (heights == heights[0]).all()
-        found[i] = float(heights[0]) if level else None
-    return found
+        levels[i] = float(heights[0]) if level else None
+    return levels
 
 
 class _ModularSlopes(MachineSlopes):
@@ -107,7 +107,7 @@ class _ModularSlopes(MachineSlopes):
         self,
         start: Guess,
         blocks: Sequence[Block],
-        given: Measurements,
+        measurements: Measurements,
         prime: int,
         rng: random.Random,
     ) -> None:
@@ -121,9 +121,9 @@ class _ModularSlopes(MachineSlopes):
         deltas = general_program(bare(robot), "discriminants").function
         self.deltas = Evaluation(deltas, self.field, [self.vector])
         self.turning_joints = [leg.joint.unit == "rad" for leg in robot.legs]
-        whole = slopes_program(robot).function
-        symbols = whole.sx_in()
-        outputs = whole.call(symbols)
+        full_program = slopes_program(robot).function
+        symbols = full_program.sx_in()
+        outputs = full_program.call(symbols)
         joints = [
             ca.SX(0) if turns else q
             for q, turns in zip(ca.horzsplit(outputs[0]), self.turning_joints, strict=True)
@@ -134,38 +134,38 @@ class _ModularSlopes(MachineSlopes):
         radial = [self._radial(np.array(leg.guide_point)) for leg in robot.legs]
         steps = slope_matrix(robot, self._changes, self._terms, vector, radial) % prime
         self.steps: Residues = np.asarray(steps, dtype=object)
-        self.given = given
-        self.places: Residues = np.empty((len(given), robot.freedom), dtype=object)
+        self.measurements = measurements
+        self.places: Residues = np.empty((len(measurements), robot.freedom), dtype=object)
         self.known: dict[tuple[int, ...], list[Residues]] = {}
 
-    def at_random(self, i: int, level: float | None) -> list[list[int]]:
-        """Return the slopes (p,) of all that a row measures, at a random pose, or at a level."""
-        given, origin = self.given, self.given.origins[i]
-        measured = ~np.isnan(np.hstack([part[[i]] for part in given.parts.values()]))
+    def random_rows(self, i: int, level: float | None) -> list[list[int]]:
+        """Return a row's slopes (K, p) modulo the prime, at a random pose or one at a level."""
+        measurements, origin = self.measurements, self.measurements.origins[i]
+        measured = ~np.isnan(np.hstack([part[[i]] for part in measurements.parts.values()]))
         self.known.clear()
-        self.places[i] = self._drawn(i, level)
+        self.places[i] = self._draw_pose(i, level)
         if measured[0, -1] and origin >= 0:
-            self.places[origin] = self._drawn(origin, None)
-        slopes = self.slopes(self.start, given, self.places, np.array([i]), measured)[2]
-        found: list[list[int]] = (slopes[0, measured[0], : self.count] % self.prime).tolist()
-        return found
+            self.places[origin] = self._draw_pose(origin, None)
+        slopes = self.slopes(self.start, measurements, self.places, np.array([i]), measured)[2]
+        rows: list[list[int]] = (slopes[0, measured[0], : self.count] % self.prime).tolist()
+        return rows
 
-    def _drawn(self, i: int, level: float | None) -> list[int]:
+    def _draw_pose(self, i: int, level: float | None) -> list[int]:
         """Return a pose at which the square roots exist."""
         p, rng = self.prime, self.rng
         for _ in range(_ATTEMPTS):
             pose = [rng.randrange(p) for _ in range(self.start.robot.freedom)]
             try:
                 if level is not None:
-                    pose = self._levelled(pose, i, level)
+                    pose = self._move_to_height(pose, i, level)
                 if all(is_square(delta, p) for delta in self.deltas.elements(pose)):
-                    self.known[tuple(pose)] = self._values(pose)
+                    self.known[tuple(pose)] = self._evaluate(pose)
                     return pose
             except (NoSquareRoot, ZeroDivisionError):
                 continue
         raise ZeroDivisionError
 
-    def _values(self, pose: list[int]) -> list[Residues]:
+    def _evaluate(self, pose: list[int]) -> list[Residues]:
         """Return the program's outputs at a pose."""
         robot = self.start.robot
         values = self.program(pose)
@@ -174,22 +174,22 @@ class _ModularSlopes(MachineSlopes):
         both = zip(values, shapes, strict=False)
         return [np.array(value, dtype=object).reshape(shape) for value, shape in both]
 
-    def _levelled(self, pose: list[int], i: int, level: float) -> list[int]:
+    def _move_to_height(self, pose: list[int], i: int, level: float) -> list[int]:
         """Return a pose moved along one of its lengths to a height."""
         robot, p = self.start.robot, self.prime
-        plane = self.start.planes[self.given.planes[i]]
+        plane = self.start.planes[self.measurements.planes[i]]
         lengths = robot.platform.directions @ plane[:3]
         if not len(lengths):
             return pose
         at = int(np.abs(lengths).argmax())
-        along = self._numbers(lengths)[at]
-        place, turned = self._values(pose)[4:6]
-        arm = turned @ self._numbers(self.start.marks[self.given.marks[i]])
-        height = self._in_base(plane[:3]) @ (place + arm)
-        (wanted,) = self._numbers(np.array([plane[3] + level]))
+        slope = self._numbers(lengths)[at]
+        place, turned = self._evaluate(pose)[4:6]
+        arm = turned @ self._numbers(self.start.marks[self.measurements.marks[i]])
+        height = self._base_vectors(plane[:3]) @ (place + arm)
+        (target,) = self._numbers(np.array([plane[3] + level]))
         moved = list(pose)
         number = [k for k, name in enumerate(robot.coordinates) if name in "xyz"][at]
-        moved[number] = (pose[number] + (wanted - height) * pow(along, -1, p)) % p
+        moved[number] = (pose[number] + (target - height) * pow(slope, -1, p)) % p
         return moved
 
     def _radial(self, point: Array) -> tuple[Residues, Residues]:
@@ -207,8 +207,8 @@ class _ModularSlopes(MachineSlopes):
         return u, np.cross(k, u)
 
     def _outputs(self, guess: Guess, poses: Residues) -> list[Residues]:
-        found = zip(*(self.known[tuple(pose)] for pose in poses), strict=True)
-        return [np.stack(values) for values in found]
+        columns = zip(*(self.known[tuple(pose)] for pose in poses), strict=True)
+        return [np.stack(values) for values in columns]
 
     def _matrix(self, guess: Guess) -> Residues:
         return self.steps
@@ -217,28 +217,28 @@ class _ModularSlopes(MachineSlopes):
         random_ = [self.rng.randrange(self.prime) if turns else 0 for turns in self.turning_joints]
         return np.where(self.turning_joints, np.array(random_, dtype=object), joints)
 
-    def _in_base(self, vectors: Array) -> Residues:
+    def _base_vectors(self, vectors: Array) -> Residues:
         return self._numbers(vectors @ self.own.T)
 
     def _numbers(self, values: Array) -> Residues:
-        found = [self.field.number(Fraction(v).limit_denominator(_FINE)) for v in values.flat]
-        return np.array(found, dtype=object).reshape(values.shape)
+        residues = [self.field.number(Fraction(v).limit_denominator(_FINE)) for v in values.flat]
+        return np.array(residues, dtype=object).reshape(values.shape)
 
-    def _unit(self, apart: Residues) -> Residues:
-        return apart  # a row's length does not matter to a rank
+    def _unit(self, vectors: Residues) -> Residues:
+        return vectors  # a row's length does not matter to a rank
 
-    def _solved(self, matrix: Residues, right: Residues) -> Residues:
+    def _solve_stack(self, matrix: Residues, right: Residues) -> Residues:
         return np.stack([_solve(*pair, self.prime) for pair in zip(matrix, right, strict=True)])
 
 
 def _solve(square: Residues, right: Residues, prime: int) -> Residues:
     """Return square^-1 right modulo a prime; ZeroDivisionError where it is singular."""
-    n, whole = len(square), np.hstack([square, right])
-    kept, given = dependencies(whole.tolist(), range(whole.shape[1]), prime)
-    if kept != list(range(n)):
+    n, augmented = len(square), np.hstack([square, right])
+    pivots, combinations = dependencies(augmented.tolist(), range(augmented.shape[1]), prime)
+    if pivots != list(range(n)):
         raise ZeroDivisionError
-    found = np.zeros(right.shape, dtype=object)
-    for column, parts in given.items():
+    solution = np.zeros(right.shape, dtype=object)
+    for column, parts in combinations.items():
         for k, value in parts.items():
-            found[k, column - n] = value
-    return found
+            solution[k, column - n] = value
+    return solution

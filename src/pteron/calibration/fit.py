@@ -15,7 +15,7 @@ import scipy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
 from pteron.calibration.guess import Block, Guess, tolerances_of
-from pteron.calibration.measurements import KINDS, Measurements, evenly
+from pteron.calibration.measurements import KINDS, Measurements, spread_rows
 from pteron.calibration.residuals import MachineSlopes, Rows
 from pteron.errors import DataError
 from pteron.kinematics import direct_kinematics
@@ -132,7 +132,7 @@ class Fitter:
 
     Parameters
     ----------
-    given : Measurements
+    measurements : Measurements
         What was measured.
     blocks : tuple of Block
         What is sought.
@@ -148,17 +148,17 @@ class Fitter:
 
     def __init__(
         self,
-        given: Measurements,
+        measurements: Measurements,
         blocks: tuple[Block, ...],
         guess: Guess,
         poses: Array,
         aside: NDArray[np.bool_] | None = None,
         barred: NDArray[np.bool_] | None = None,
     ) -> None:
-        self.given, self.blocks, self.begin = given, blocks, guess
+        self.measurements, self.blocks, self.begin = measurements, blocks, guess
         self.slopes = MachineSlopes(guess.robot, blocks)
         self.prior = 1.0 / tolerances_of(blocks) ** 2
-        none = np.zeros(len(given), dtype=bool)
+        none = np.zeros(len(measurements), dtype=bool)
         self.barred = none if barred is None else barred
         lost: NDArray[np.bool_] = np.asarray(np.isnan(poses).any(axis=1))
         self.aside = lost | self.barred | (none if aside is None else aside)
@@ -166,82 +166,82 @@ class Fitter:
         self.begin_poses = poses
         if lost.any() and not lost.all():
             self.begin_poses = np.where(lost[:, None], np.median(poses[~lost], axis=0), poses)
-        self.kind_of = given.kind_of
-        self.readings_noise = given.setup.noise.get("readings", 0.0)
+        self.kind_of = measurements.kind_of
+        self.readings_noise = measurements.setup.noise.get("readings", 0.0)
 
-    def run(self, before: Fit | None = None) -> Fit:
-        """Return what is found; another fit, as of some of the rows, may tell where to begin.
+    def run(self, initial: Fit | None = None) -> Fit:
+        """Return the most probable fit; the search begins at `initial`, such as a fit of some rows.
 
         Raises
         ------
         DataError
             If most readings lead to no pose, or the measurements leave open what has no tolerance.
         """
-        setup = self.given.setup.noise
-        sought = [kind for kind in self.given.kinds if kind not in setup]
+        setup = self.measurements.setup.noise
+        sought = [kind for kind in self.measurements.kinds if kind not in setup]
         guess, total = self.begin, np.zeros(len(self.prior))
         noise = {kind: max(setup.get(kind, _START), FLOOR) for kind in KINDS}
-        if before is not None:
-            guess, total, noise = before.guess, before.total, before.noise
-        kept, none = ~self.aside, np.empty(0)
-        begin = guess, total, noise, kept, self.begin_poses, self.prior
+        if initial is not None:
+            guess, total, noise = initial.guess, initial.total, initial.noise
+        fitted_rows, none = ~self.aside, np.empty(0)
+        begin = guess, total, noise, fitted_rows, self.begin_poses, self.prior
         try:
-            at = self._at(Fit(*begin, none, none > 0.0, none, none, none))
+            at = self._evaluate(Fit(*begin, none, none > 0.0, none, none, none))
         except ValueError:
             raise DataError(
                 "most readings lead to no pose of the machine as drawn; check their units, zeros "
                 "and order"
             ) from None
         for _ in range(_ROUNDS):
-            at = self._found_again(self._settled(at))
-            noise = at.noise | self._noise(at, sought)
-            distances = self._distances_of_left_out(at)
+            at = self._recover_poses(self._minimise_cost(at))
+            noise = at.noise | self._estimate_noise(at, sought)
+            distances = self._prediction_distances(at)
             scaled = distances * (at.noise[sought[0]] / noise[sought[0]] if sought else 1.0)
             limits = scipy.stats.chi2.isf(
-                _OUTLYING / len(kept), np.maximum(at.measured.sum(axis=1), 1)
+                _OUTLYING / len(fitted_rows), np.maximum(at.measured.sum(axis=1), 1)
             )
-            kept = (scaled**2 <= limits) & ~self.barred
-            if 2 * kept.sum() < len(kept):  # no rows are the faultless ones
-                kept = (at.distances != BEYOND) & ~self.barred
+            fitted_rows = (scaled**2 <= limits) & ~self.barred
+            if 2 * fitted_rows.sum() < len(fitted_rows):  # no rows are the faultless ones
+                fitted_rows = (at.distances != BEYOND) & ~self.barred
             alike = all(abs(noise[k] / at.noise[k] - 1.0) < 0.01 for k in sought)
-            if alike and (kept == at.kept).all():
+            if alike and (fitted_rows == at.kept).all():
                 break
             try:
-                at = self._at(at, noise=noise, kept=kept)
+                at = self._evaluate(at, noise=noise, kept=fitted_rows)
             except ValueError:  # of the rows that fit, most lead to no pose
-                return replace(at, settled=False, shared=self._shared(at))
-        return replace(at, shared=self._shared(at))
+                return replace(at, settled=False, shared=self._shared_information(at))
+        return replace(at, shared=self._shared_information(at))
 
-    def _distances_of_left_out(self, at: Fit) -> Array:
-        """Return the rows' distances (N,); of those left out with the fit's own uncertainty there.
+    def _prediction_distances(self, at: Fit) -> Array:
+        """Return the distances (N,) of rows; left-out rows with the fit's uncertainty added.
 
         Next to a singularity a fit without a row is less sure of its pose than an instrument.
         """
         distances = at.distances.copy()
         rows = np.flatnonzero(~at.kept & ~self.barred & (at.distances != BEYOND))[:_CHUNK]
         if len(rows):
-            there = self.slopes.rows(at.guess, self.given, at.poses, rows)
-            r, slopes, _ = self.whitened(there, at.guess, at.noise)
+            there = self.slopes.rows(at.guess, self.measurements, at.poses, rows)
+            r, slopes, _ = self.whiten_rows(there, at.guess, at.noise)
             spread = np.einsum("nkp,pq,nlq->nkl", slopes, at.covariance, slopes, optimize=True)
             solved = np.linalg.solve(np.eye(r.shape[1]) + spread, r[..., None])[..., 0]
             distances[rows] = np.sqrt(np.maximum(np.einsum("nk,nk->n", r, solved), 0.0))
         return distances
 
-    def _found_again(self, at: Fit) -> Fit:
-        """Return the fit with the poses of rows that Newton's steps lost on their way."""
+    def _recover_poses(self, at: Fit) -> Fit:
+        """Return the fit with the poses of rows recovered at which Newton's method diverged."""
         lost = np.flatnonzero(at.distances == BEYOND)
         if not len(lost):
             return at
-        joints, poses = at.guess.joints(self.given.readings)[lost], at.poses.copy()
+        joints, poses = at.guess.joints(self.measurements.readings)[lost], at.poses.copy()
         for i, modes in zip(lost, direct_kinematics(at.guess.robot, joints), strict=True):
             off = np.abs(modes - self.begin_poses[i]).max(axis=-1)
             if np.isfinite(off).any():
                 poses[i] = modes[np.nanargmin(off)]
-        return self._at(at, poses=poses)
+        return self._evaluate(at, poses=poses)
 
-    def _settled(self, begin: Fit) -> Fit:
-        """Return the most probable values for a noise and rows that are kept."""
-        at, kept = begin, begin.kept
+    def _minimise_cost(self, begin: Fit) -> Fit:
+        """Return the fit of least cost at fixed noise and rows, by damped Gauss-Newton steps."""
+        at, fitted_rows = begin, begin.kept
         for taken in range(1, _STEPS + 1):  # noqa: B007 (told in the result)
             step = -at.covariance @ (at.gradient + at.prior * at.total)
             small = np.abs(step) / np.sqrt(np.diag(at.covariance))
@@ -251,13 +251,13 @@ class Fitter:
             while True:
                 try:
                     part = share * step
-                    moved, total = at.guess.moved(self.blocks, part), at.total + part
-                    after = self._at(at, guess=moved, total=total, kept=kept)
+                    moved, total = at.guess.apply_step(self.blocks, part), at.total + part
+                    after = self._evaluate(at, guess=moved, total=total, kept=fitted_rows)
                     fell = after.cost <= at.cost * (1.0 + 1e-9) + 1e-12
                     if not fell and share == 1.0:
-                        strays = self._strays(at, after, kept)
+                        strays = self._find_strays(at, after, fitted_rows)
                         if strays is not None:
-                            kept, fell = kept & ~strays, True
+                            fitted_rows, fell = fitted_rows & ~strays, True
                 except ValueError:  # no such machine, or out of its reach
                     fell = False
                 if fell:
@@ -273,74 +273,79 @@ class Fitter:
             at = after
         return replace(at, kept=begin.kept, steps=begin.steps + taken)
 
-    def _strays(self, before: Fit, after: Fit, kept: NDArray[np.bool_]) -> NDArray[np.bool_] | None:
-        """Return the few rows without which a step is a great one; None where there are none.
+    def _find_strays(
+        self, old_fit: Fit, new_fit: Fit, fitted_rows: NDArray[np.bool_]
+    ) -> NDArray[np.bool_] | None:
+        """Return the few rows (N,) without which a step lowers the cost tenfold; None for none.
 
         The pose of a row next to a singularity jumps where the geometry moves by little.
         """
-        strays = kept & (after.distances > _STRAY)
-        if not 0 < strays.sum() <= max(1.0, _FEW * kept.sum()):
+        strays = fitted_rows & (new_fit.distances > _STRAY)
+        if not 0 < strays.sum() <= max(1.0, _FEW * fitted_rows.sum()):
             return None
-        others = kept & ~strays
-        squares = [float((fit.distances[others] ** 2).sum()) for fit in (before, after)]
+        others = fitted_rows & ~strays
+        squares = [float((fit.distances[others] ** 2).sum()) for fit in (old_fit, new_fit)]
         return strays if squares[1] < 0.1 * squares[0] else None
 
     def cost(self, guess: Guess, total: Array, fit: Fit) -> float:
-        """Return the squared residuals, in variances, and tolerances of a guess; inf: no pose."""
+        """Return the cost of a guess: squared residuals and tolerances, in variances; inf: lost."""
         try:
-            return self._at(fit, guess=guess, total=total).cost
+            return self._evaluate(fit, guess=guess, total=total).cost
         except ValueError:
             return float(np.inf)
 
-    def _at(self, fit: Fit, **changed: Any) -> Fit:
-        """Return a fit with other values, and its residuals and normal equations there.
+    def _evaluate(self, fit: Fit, **changed: Any) -> Fit:
+        """Return a fit with changed values, its residuals and normal equations evaluated there.
 
         ValueError where they have no poses.
         """
         fit = replace(fit, **changed)
-        guess, kept, poses = fit.guess, fit.kept, fit.poses
-        count, rows = len(self.prior), len(self.given)
+        guess, fitted_rows, poses = fit.guess, fit.kept, fit.poses
+        count, rows = len(self.prior), len(self.measurements)
         width = len(self.kind_of)
         matrix, right, cost = np.zeros((count, count)), np.zeros(count), 0.0
-        joints = guess.joints(self.given.readings)
-        found = self.slopes.poses(guess, joints, poses)
-        lost: NDArray[np.bool_] = np.asarray(np.isnan(found).any(axis=1))
-        lost |= (self.given.origins >= 0) & lost[self.given.origins]
-        if 2 * lost[kept].sum() > kept.sum():
+        joints = guess.joints(self.measurements.readings)
+        new_poses = self.slopes.poses(guess, joints, poses)
+        lost: NDArray[np.bool_] = np.asarray(np.isnan(new_poses).any(axis=1))
+        lost |= (self.measurements.origins >= 0) & lost[self.measurements.origins]
+        if 2 * lost[fitted_rows].sum() > fitted_rows.sum():
             raise ValueError
-        found = np.where(np.isnan(found), poses, found)  # out of reach by little; it may come back
+        # A pose out of reach by little may come back.
+        new_poses = np.where(np.isnan(new_poses), poses, new_poses)
         residuals = np.zeros((rows, width))
         measured = np.zeros((rows, width), dtype=bool)
         distances = np.zeros(rows)
         for start in range(0, rows, _CHUNK):
             chosen = np.arange(start, min(start + _CHUNK, rows))
-            at = self.slopes.rows(guess, self.given, found, chosen)
+            at = self.slopes.rows(guess, self.measurements, new_poses, chosen)
             residuals[chosen], measured[chosen] = at.residuals, at.measured
             lost[chosen] |= ~np.isfinite(at.by_reading).all(axis=(1, 2))
-            r, slopes, _ = self.whitened(at, guess, fit.noise)
+            r, slopes, _ = self.whiten_rows(at, guess, fit.noise)
             r[lost[chosen]], slopes[lost[chosen]] = 0.0, 0.0
             squares = np.einsum("nk,nk->n", r, r)
             distances[chosen] = np.sqrt(squares)
             limit = np.sqrt(scipy.stats.chi2.ppf(_DOUBTED, np.maximum(at.measured.sum(axis=1), 1)))
             far = np.maximum(distances[chosen], limit)
-            weights = np.where(kept[chosen], limit / far, 0.0)
+            weights = np.where(fitted_rows[chosen], limit / far, 0.0)
             cost += float(
-                (kept[chosen] * np.where(far > limit, 2 * limit * far - limit**2, squares)).sum()
+                (
+                    fitted_rows[chosen] * np.where(far > limit, 2 * limit * far - limit**2, squares)
+                ).sum()
             )
             used = at.measured.any(axis=0)
             heavy = np.sqrt(weights)[:, None] * at.measured[:, used]
             flat = (heavy[..., None] * slopes[:, used]).reshape(-1, count)
             matrix += flat.T @ flat
             right += flat.T @ (heavy * r[:, used]).reshape(-1)
-        cost += float(self.prior @ fit.total**2) + _LOST * float((lost & kept).sum())
+        cost += float(self.prior @ fit.total**2) + _LOST * float((lost & fitted_rows).sum())
         if not np.isfinite(cost):
             raise ValueError
         distances[lost] = BEYOND
-        values = guess, fit.total, fit.noise, kept, found, self.prior
+        values = guess, fit.total, fit.noise, fitted_rows, new_poses, self.prior
         ends = matrix, right, cost, fit.steps, 0.0, fit.settled
         return Fit(*values, residuals, measured, distances, *ends)
 
-    def whitened(
+    def whiten_rows(
         self, at: Rows, guess: Guess, noise: dict[str, float]
     ) -> tuple[Array, Array, Array]:
         """Return residuals and slopes in standard deviations, independent within a row.
@@ -358,14 +363,14 @@ class Fitter:
         count = at.slopes.shape[-1]
         return white[..., 0], white[..., 1 : 1 + count], white[..., 1 + count :]
 
-    def _shared(self, fit: Fit) -> Array | float:
-        """Return a fit's `shared`."""
-        origins = self.given.origins
+    def _shared_information(self, fit: Fit) -> Array | float:
+        """Return a fit's `shared` (p, p), or 0 where no distances share a row's readings."""
+        origins = self.measurements.origins
         ends = np.unique(origins[origins >= 0])
         if not self.readings_noise or not len(ends):
             return 0.0
-        at = self.slopes.rows(fit.guess, self.given, fit.poses, np.arange(len(origins)))
-        _, slopes, pushed = self.whitened(at, fit.guess, fit.noise)
+        at = self.slopes.rows(fit.guess, self.measurements, fit.poses, np.arange(len(origins)))
+        _, slopes, pushed = self.whiten_rows(at, fit.guess, fit.noise)
         pulls = np.einsum("nkp,nkj->njp", slopes * fit.kept[:, None, None], pushed)
         pulls[~np.isfinite(pulls)] = 0.0  # of rows that are out of reach
         legs = pulls.shape[1] // 2
@@ -378,28 +383,28 @@ class Fitter:
         both, each = (part.reshape(-1, pulls.shape[-1]) for part in (sums, parts))
         return np.asarray(both.T @ both - each.T @ each)
 
-    def _noise(self, fit: Fit, sought: list[str]) -> dict[str, float]:
-        """Return the noise by kind that the residuals show, less what the unknowns took of it."""
+    def _estimate_noise(self, fit: Fit, sought: list[str]) -> dict[str, float]:
+        """Return the noise by kind, from the residuals over their degrees of freedom."""
         if not sought:
             return {}
-        kept = fit.kept & (fit.distances != BEYOND)
-        rows = np.flatnonzero(kept)
+        usable = fit.kept & (fit.distances != BEYOND)
+        rows = np.flatnonzero(usable)
         if not len(rows):
             return {}
-        some = rows[evenly(len(rows), _CHUNK)]
-        at = self.slopes.rows(fit.guess, self.given, fit.poses, some)
-        found = {}
+        some = rows[spread_rows(len(rows), _CHUNK)]
+        at = self.slopes.rows(fit.guess, self.measurements, fit.poses, some)
+        noise = {}
         for kind in sought:
-            own = (self.kind_of == kind) & fit.measured & kept[:, None]
-            count = int(own.sum())
+            entries = (self.kind_of == kind) & fit.measured & usable[:, None]
+            count = int(entries.sum())
             if not count:
                 continue
             part = at.slopes[:, self.kind_of == kind].reshape(-1, len(fit.total))
             took = np.einsum("ij,jk,ik->", part, fit.covariance, part, optimize=True)
-            left = count - took * len(rows) / len(some) / fit.noise[kind] ** 2
+            freedom = count - took * len(rows) / len(some) / fit.noise[kind] ** 2
             # Half the middle of their sizes serves where a few rows are far off.
-            values = np.abs(fit.residuals[own])
-            rms = float(np.sqrt((values**2).sum() / max(left, 1.0)))
-            middle = float(np.median(values)) / 0.6745 * np.sqrt(count / max(left, 1.0))
-            found[kind] = max(middle if rms > 2.0 * middle and count > 20 else rms, FLOOR)
-        return found
+            values = np.abs(fit.residuals[entries])
+            rms = float(np.sqrt((values**2).sum() / max(freedom, 1.0)))
+            middle = float(np.median(values)) / 0.6745 * np.sqrt(count / max(freedom, 1.0))
+            noise[kind] = max(middle if rms > 2.0 * middle and count > 20 else rms, FLOOR)
+        return noise

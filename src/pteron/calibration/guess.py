@@ -1,6 +1,6 @@
 """A calibration's unknowns and a guess of their values: machine, zeros, scales, marks, frame, ...
 
-`Guess.moved` takes a step in the unknowns; `Block` groups those that are moved together.
+`Guess.apply_step` takes a step in the unknowns; `Block` groups those that are moved together.
 """
 
 from __future__ import annotations
@@ -92,7 +92,7 @@ class Guess:
         """Return the readings (N, n) at joint coordinates."""
         return (joints - self.zeros) / self.scales
 
-    def marked(self, names: Iterable[str]) -> Array:
+    def mark_points(self, names: Iterable[str]) -> Array:
         """Return the points (N, 3) of marks, in the platform's frame, m."""
         order = {name: k for k, name in enumerate(self.marks)}
         return np.stack([*self.marks.values()])[[order[name] for name in names]]
@@ -100,9 +100,9 @@ class Guess:
     def points(self, marks: Sequence[str], poses: Array) -> Array:
         """Return where each row's mark is (N, 3) at its pose, in the base frame, m."""
         place, axes = self.robot.platform.at(poses)
-        return np.asarray(place + np.einsum("nij,ni->nj", axes, self.marked(marks)))
+        return np.asarray(place + np.einsum("nij,ni->nj", axes, self.mark_points(marks)))
 
-    def moved(self, blocks: Sequence[Block], step: Array) -> Guess:
+    def apply_step(self, blocks: Sequence[Block], step: Array) -> Guess:
         """Return the guess after a step in all unknowns."""
         guess = self
         for block in blocks:
@@ -112,7 +112,7 @@ class Guess:
 
 @dataclass(frozen=True)
 class Block:
-    """Unknowns that belong together, and where they stand among all of them."""
+    """Unknowns of one kind, and their slice of the vector of all unknowns."""
 
     kind: str
     """"geometry", "zeros", "scales", "mark", "plane", "anchor" or "frame"."""
@@ -136,7 +136,7 @@ class Block:
             return replace(guess, **{f"{self.kind}s": moved})
         if self.kind == "plane":
             normal, offset = guess.planes[self.name][:3], guess.planes[self.name][3]
-            tilted = normal + across(normal) @ step[:2]
+            tilted = normal + plane_axes(normal) @ step[:2]
             plane = np.append(tilted / np.linalg.norm(tilted), offset + step[2])
             return replace(guess, planes={**guess.planes, self.name: plane})
         turn = scipy.spatial.transform.Rotation.from_rotvec(step[3:]).as_matrix() @ guess.turn
@@ -155,14 +155,14 @@ class Block:
         return np.array([change.value(guess.robot) for change in self.changes])
 
 
-def numbered(blocks: Iterable[Block], start: int = 0) -> tuple[Block, ...]:
-    """Return blocks with places one after the other, from `start` on."""
-    found = []
+def number_unknowns(blocks: Iterable[Block], start: int = 0) -> tuple[Block, ...]:
+    """Return blocks with consecutive slices of the unknowns, from `start` on."""
+    placed_blocks = []
     for block in blocks:
         stop = start + len(block.unknowns)
-        found.append(replace(block, where=slice(start, stop)))
+        placed_blocks.append(replace(block, where=slice(start, stop)))
         start = stop
-    return tuple(found)
+    return tuple(placed_blocks)
 
 
 def tolerances_of(blocks: Sequence[Block]) -> Array:
@@ -175,7 +175,7 @@ def variances(slopes: Array, covariance: Array) -> Array:
     return np.asarray(np.einsum("nip,pq,niq->n", slopes, covariance, slopes, optimize=True))
 
 
-def across(normal: Array) -> Array:
+def plane_axes(normal: Array) -> Array:
     """Return two unit vectors (3, 2) at right angles to a normal, nearest to the base's axes."""
     least = np.argsort(np.abs(normal), kind="stable")[:2]
     first = np.eye(3)[min(least)] - normal[min(least)] * normal

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from pteron.calibration.controller_logs import read_controller_log
 from pteron.calibration.measurements import TEXTS, TOOL, VALUES, Measurements, Setup
-from pteron.calibration.setup_file import joined as joined_setups, read_setup_file
+from pteron.calibration.setup_file import join_setups, read_setup_file
 from pteron.errors import DataError, shown, warn_unlikely
 from pteron.kinematics.unlikely_values import unlikely_length, unlikely_values
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
@@ -56,7 +56,7 @@ def read_measurements(robot: RobotLike, *paths: str | Path) -> Measurements:
     DataError
         If a column is missing or a cell no number; if a row measures a distance from nowhere; if a
         mark, plane or anchor is named that the TOML file does not describe. All faults of a log are
-        told at once, each with its line and column.
+        reported at once, each with its line and column.
 
     Warns
     -----
@@ -80,22 +80,22 @@ def read_measurements(robot: RobotLike, *paths: str | Path) -> Measurements:
     robot = as_manipulator(robot)
     if not paths:
         raise DataError("paths: none given; at least one log of measurements is needed")
-    return _joined([_read(robot, path) for path in paths], [str(path) for path in paths])
+    return _join_logs([_read(robot, path) for path in paths], [str(path) for path in paths])
 
 
 def _read(robot: Manipulator, path: str | Path) -> Measurements:
-    about = read_setup_file(path)
-    found = read_controller_log(path, robot, about.g33.radius)
-    if found is None:
-        found = _of_table(robot, _opened(robot, path, about.csv), Path(path).name)
-    found = replace(found, setup=about.setup())
+    setup_file = read_setup_file(path)
+    measurements = read_controller_log(path, robot, setup_file.g33.radius)
+    if measurements is None:
+        measurements = _read_rows(robot, _open_table(robot, path, setup_file.csv), Path(path).name)
+    measurements = replace(measurements, setup=setup_file.setup())
     source = shown(str(path), bare=True, longest=1000)
-    faults = [*_undescribed(found)]
+    faults = [*_missing_descriptions(measurements)]
     if faults:
         raise DataError(joined_faults(faults), subject=source)
-    for text in _unlikely(robot, found, source):
+    for text in _unlikely_readings(robot, measurements, source):
         warn_unlikely(text)
-    return found
+    return measurements
 
 
 class _Opened(NamedTuple):
@@ -105,8 +105,8 @@ class _Opened(NamedTuple):
     columns: dict[str, tuple[str, float]]
 
 
-def _opened(robot: Manipulator, path: str | Path, dialect: Dialect | None) -> _Opened:
-    """Open a log in its dialect: plain where its first line names the joints, else found."""
+def _open_table(robot: Manipulator, path: str | Path, dialect: Dialect | None) -> _Opened:
+    """Return a log's table: plain if line 1 names the joints, else in a detected dialect."""
     units = {**dict.fromkeys(("t",), "s"), **dict.fromkeys((*_POSITION, "height", "distance"), "m")}
     units |= dict(zip(robot.coordinates, robot.units, strict=True))
     units |= {name: leg.joint.unit for name, leg in zip(robot.joint_names, robot.legs, strict=True)}
@@ -155,7 +155,7 @@ def _name_and_unit(column: str) -> tuple[str, str]:
     return (match[1] or match[3] or "").strip().lower(), (match[2] or match[4] or "").strip()
 
 
-def _of_table(robot: Manipulator, opened: _Opened, source: str) -> Measurements:
+def _read_rows(robot: Manipulator, opened: _Opened, source: str) -> Measurements:
     table, columns = opened
     faults: list[str] = []
     n = len(table)
@@ -163,8 +163,8 @@ def _of_table(robot: Manipulator, opened: _Opened, source: str) -> Measurements:
     def column(name: str) -> Array:
         if name not in columns:
             return np.full(n, np.nan)
-        given, factor = columns[name]
-        return factor * _numbers(table, given, faults)
+        header, factor = columns[name]
+        return factor * _numbers(table, header, faults)
 
     def texts(name: str) -> tuple[str, ...]:
         if name not in columns:
@@ -186,21 +186,21 @@ def _of_table(robot: Manipulator, opened: _Opened, source: str) -> Measurements:
     for i in () if times is None else np.flatnonzero(np.isnan(times)):
         fault(i, ", column t: no number; give each row its time, or none")
     values = several(_POSITION), several(robot.platform.angles), column("height")
-    distances, given, anchors = column("distance"), column("from"), texts("anchor")
+    distances, start_rows, anchors = column("distance"), column("from"), texts("anchor")
     origins = np.full(n, -1)
-    for i in np.flatnonzero(~np.isnan(given)):
-        row = given[i]
+    for i in np.flatnonzero(~np.isnan(start_rows)):
+        row = start_rows[i]
         if row != int(row) or not 1 <= row <= n or row == i + 1:
             fault(i, f", column from: {row:g} given, another row from 1 to {n} expected")
         else:
             origins[i] = int(row) - 1
-    apart = ~np.isnan(distances)
-    starts = (~np.isnan(given)).astype(int) + [bool(name) for name in anchors]
-    for i in np.flatnonzero(apart & (starts != 1)):
+    has_distance = ~np.isnan(distances)
+    starts = (~np.isnan(start_rows)).astype(int) + [bool(name) for name in anchors]
+    for i in np.flatnonzero(has_distance & (starts != 1)):
         both = "both" if starts[i] else "neither"
         which = "give one, the row or the point that it is measured from"
         fault(i, f": a distance with {both} from and anchor; {which}")
-    for i in np.flatnonzero(~apart & (starts > 0)):
+    for i in np.flatnonzero(~has_distance & (starts > 0)):
         fault(i, ": from or anchor, but no distance; give all, or none")
     if faults:
         raise DataError(joined_faults(list(dict.fromkeys(faults))), subject=table.source)
@@ -209,7 +209,7 @@ def _of_table(robot: Manipulator, opened: _Opened, source: str) -> Measurements:
 
 
 def _numbers(table: Table, column: str, faults: list[str]) -> Array:
-    """Return a column (N,), NaN where it is empty; what is no number is a fault each."""
+    """Return a column (N,), NaN where empty; each cell that is no number adds a fault."""
     try:
         return np.asarray(table.numbers([column], "nan")[:, 0])
     except DataError as error:
@@ -226,7 +226,7 @@ def _numbers(table: Table, column: str, faults: list[str]) -> Array:
 
 
 def _first_line(table: Table) -> int | None:
-    """Return the line of the first row where all are lines that follow each other, else None."""
+    """Return the first row's line number if rows are on consecutive lines, else None."""
     if table.line_of is None:
         return None
     first, last = table.line_of(0), table.line_of(len(table) - 1)
@@ -234,75 +234,80 @@ def _first_line(table: Table) -> int | None:
 
 
 def _places(table: Table, source: str) -> tuple[str, ...]:
-    """Return where each row stands, for messages: its line, or its number where that is slow."""
+    """Return each row's place for messages: its line, or its number where lines are slow."""
     first = _first_line(table)
     word, start = ("row", 1) if first is None else ("line", first)
     return tuple(f"{source}, {word} {start + i}" for i in range(len(table)))
 
 
-def _undescribed(found: Measurements) -> Iterator[str]:
+def _missing_descriptions(measurements: Measurements) -> Iterator[str]:
     """Yield the marks, planes and anchors that rows name and the TOML file does not describe."""
     for part in ("marks", "planes", "anchors"):
-        described = getattr(found.setup, part)
-        for name in sorted({*getattr(found, part)} - {TOOL, *described}):
-            row = getattr(found, part).index(name)
+        described = getattr(measurements.setup, part)
+        for name in sorted({*getattr(measurements, part)} - {TOOL, *described}):
+            row = getattr(measurements, part).index(name)
             yield (
-                f"{found.places[row]}: {part[:-1]} {shown(name)} is not described; give "
+                f"{measurements.places[row]}: {part[:-1]} {shown(name)} is not described; give "
                 f"[{part}.{name}] in the TOML file beside it"
             )
 
 
-def _unlikely(robot: Manipulator, found: Measurements, source: str) -> Iterator[str]:
+def _unlikely_readings(
+    robot: Manipulator, measurements: Measurements, source: str
+) -> Iterator[str]:
+    places = measurements.places
     size = 0.1 * unlikely_length(robot)
-    measured = np.concatenate([found.positions, found.angles], axis=-1)
+    measured = np.concatenate([measurements.positions, measurements.angles], axis=-1)
     names = (*robot.joint_names, *_POSITION, *robot.platform.angles)
-    values = np.concatenate([found.readings, measured], axis=-1)
+    values = np.concatenate([measurements.readings, measured], axis=-1)
     for text in unlikely_values(robot, names, values):
         yield f"{source}: {text}"
-    joints = from_readings(robot, found.readings)
+    joints = from_readings(robot, measurements.readings)
     for j, leg in enumerate(robot.legs):
         low, high = leg.limits or (-np.inf, np.inf)
         beyond = np.maximum(low - joints[:, j], joints[:, j] - high)
         row = int(np.argmax(beyond))
         if beyond[row] > high - low:
             yield (
-                f"{found.places[row]}: {robot.joint_names[j]} = {joints[row, j]:g} is far beyond "
+                f"{places[row]}: {robot.joint_names[j]} = {joints[row, j]:g} is far beyond "
                 f"its limits {low:g} to {high:g} {leg.joint.unit}: is it in another unit?"
             )
     for name, lengths, most in (
-        ("height", found.heights, size),
-        ("distance", found.distances, 10.0 * size),  # an anchor may stand far away
+        ("height", measurements.heights, size),
+        ("distance", measurements.distances, 10.0 * size),  # an anchor may stand far away
     ):
         sizes = np.nan_to_num(np.abs(lengths))
         if (sizes > most).any():
             row = int(np.argmax(sizes))
             yield (
-                f"{found.places[row]}: {name} {lengths[row]:g} is more than the machine's size, "
+                f"{places[row]}: {name} {lengths[row]:g} is more than the machine's size, "
                 f"{size:.3g} m: is it in mm? m are expected"
             )
-    if len(none := np.flatnonzero(found.distances == 0.0)):
-        yield f"{listed([found.places[row] for row in none])}: a distance of 0: was it measured?"
-    seen = ~np.isnan(np.column_stack([measured, found.heights, found.distances])).all(axis=1)
-    seen[found.origins[found.origins >= 0]] = True
+    if len(none := np.flatnonzero(measurements.distances == 0.0)):
+        yield f"{listed([places[row] for row in none])}: a distance of 0: was it measured?"
+    seen = ~np.isnan(np.column_stack([measured, measurements.heights, measurements.distances])).all(
+        axis=1
+    )
+    seen[measurements.origins[measurements.origins >= 0]] = True
     if not seen.all() and robot.joint_count == robot.freedom:
-        rows = [found.places[row] for row in np.flatnonzero(~seen)]
+        rows = [places[row] for row in np.flatnonzero(~seen)]
         yield f"{listed(rows)}: nothing is measured there"
 
 
-def _joined(parts: Sequence[Measurements], sources: Sequence[str]) -> Measurements:
-    setup: Setup = joined_setups([part.setup for part in parts], sources)
+def _join_logs(parts: Sequence[Measurements], sources: Sequence[str]) -> Measurements:
+    setup: Setup = join_setups([part.setup for part in parts], sources)
     if len(parts) == 1:
         return parts[0]
     starts = np.cumsum([0, *map(len, parts)])
-    whole: dict[str, Any] = {
+    fields: dict[str, Any] = {
         name: np.concatenate([getattr(part, name) for part in parts])
         for name in ("readings", *VALUES)
     }
-    whole |= {name: sum((getattr(part, name) for part in parts), ()) for name in TEXTS}
+    fields |= {name: sum((getattr(part, name) for part in parts), ()) for name in TEXTS}
     if all(part.times is not None for part in parts):
-        whole["times"] = np.concatenate([part.times for part in parts if part.times is not None])
+        fields["times"] = np.concatenate([part.times for part in parts if part.times is not None])
     moved = [
         np.where(part.origins < 0, -1, part.origins + start)
         for part, start in zip(parts, starts, strict=False)
     ]
-    return Measurements(**whole, origins=np.concatenate(moved), setup=setup)
+    return Measurements(**fields, origins=np.concatenate(moved), setup=setup)

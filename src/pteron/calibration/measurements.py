@@ -89,8 +89,8 @@ class Setup:
     frame_known: bool = True
 
 
-def evenly(count: int, most: int) -> NDArray[np.int64]:
-    """Return the numbers of at most so many rows, evenly spread."""
+def spread_rows(count: int, most: int) -> NDArray[np.int64]:
+    """Return the numbers of at most `most` of `count` rows, evenly spread."""
     return np.unique(np.linspace(0, count - 1, min(count, most)).astype(int))
 
 
@@ -101,8 +101,8 @@ def length_columns(robot: Manipulator) -> list[int]:
 
 def position_axes(robot: Manipulator) -> Array:
     """Return the axes (3, 3), in rows, along which positions are measured, in the base frame."""
-    whole = len(length_columns(robot)) in (0, 3)
-    return np.eye(3) if whole else np.array(robot.platform.frame)
+    cartesian = len(length_columns(robot)) in (0, 3)
+    return np.eye(3) if cartesian else np.array(robot.platform.frame)
 
 
 def _rows_of(values: PoseLike | None, name: str, rows: int, columns: Sequence[str] = ()) -> Array:
@@ -200,16 +200,16 @@ class Measurements:
         read = as_array(readings, "readings", (robot.joint_count,), columns=robot.joint_names)
         read = read.reshape(-1, robot.joint_count)
         n, angular = len(read), robot.platform.angular
-        given = _rows_of(poses, "poses", n, robot.coordinates)
+        coordinates = _rows_of(poses, "poses", n, robot.coordinates)
         at = np.full((n, 3), np.nan)
-        at[:, length_columns(robot)] = given[:, ~angular]
+        at[:, length_columns(robot)] = coordinates[:, ~angular]
         if positions is not None:
             at = _rows_of(positions, "positions", n, ("x", "y", "z"))
         unnamed = (TOOL,) * n
         return cls(
             readings=read,
             positions=at,
-            angles=given[:, angular],
+            angles=coordinates[:, angular],
             heights=_rows_of(heights, "heights", n),
             distances=np.full(n, np.nan),
             origins=np.full(n, -1),
@@ -241,16 +241,16 @@ class Measurements:
 
     def rows(self, chosen: NDArray[np.bool_]) -> Measurements:
         """Return rows chosen by a mask, and those that a distance of theirs is measured from."""
-        kept = chosen.copy()
-        kept[self.origins[chosen & (self.origins >= 0)]] = True
-        number = np.cumsum(kept) - 1
-        origins = np.where(self.origins[kept] >= 0, number[self.origins[kept]], -1)
+        selected = chosen.copy()
+        selected[self.origins[chosen & (self.origins >= 0)]] = True
+        number = np.cumsum(selected) - 1
+        origins = np.where(self.origins[selected] >= 0, number[self.origins[selected]], -1)
         changed: dict[str, Any] = {
-            name: tuple(np.array(getattr(self, name), dtype=object)[kept]) for name in TEXTS
+            name: tuple(np.array(getattr(self, name), dtype=object)[selected]) for name in TEXTS
         }
         for name in VALUES:
-            changed[name] = getattr(self, name)[kept]
-            changed[name][~chosen[kept]] = np.nan
-        times = None if self.times is None else self.times[kept]
-        readings = self.readings[kept]
+            changed[name] = getattr(self, name)[selected]
+            changed[name][~chosen[selected]] = np.nan
+        times = None if self.times is None else self.times[selected]
+        readings = self.readings[selected]
         return replace(self, readings=readings, origins=origins, times=times, **changed)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pteron.calibration.fit import Fitter
-from pteron.calibration.guess import Block, Guess, Unknown, numbered
+from pteron.calibration.guess import Block, Guess, Unknown, number_unknowns
 from pteron.calibration.measurements import VALUES, Measurements
 from pteron.calibration.start import starting_poses
 from pteron.calibration.thresholds import OFF_TOLERANCES
@@ -69,24 +69,24 @@ class Mistake(NamedTuple):
     """Number of values that were fitted to name it."""
 
 
-def likely_mistakes(given: Measurements, guess: Guess) -> Iterator[list[Mistake]]:
+def likely_mistakes(measurements: Measurements, guess: Guess) -> Iterator[list[Mistake]]:
     """Yield groups of likely mistakes, the likeliest first; zeros and scales are fitted to rows."""
     kinds = (
-        *(_units, _signs, _marks, _frames, _orders),
-        *(_reversed, _mirrored_frames, _shifted_rows),
+        *(_wrong_units, _downward_heights, _swapped_marks, _turned_frames, _swapped_legs),
+        *(_reversed_joints, _mirrored_frames, _shifted_rows),
     )
     for kind in kinds:
-        yield list(kind(given, guess))
-    yield [*_scaled(given, guess), *_fitted(given, guess)]
+        yield list(kind(measurements, guess))
+    yield [*_wrong_steps(measurements, guess), *_wrong_zeros_and_scales(measurements, guess)]
 
 
-def order_mistakes(given: Measurements, guess: Guess) -> Iterator[Mistake]:
+def order_mistakes(measurements: Measurements, guess: Guess) -> Iterator[Mistake]:
     """Yield mistakes in the order of rows and the sign of heights.
 
     Of small residuals they make other small ones, which may look like noise.
     """
-    for kind in (_signs, _shifted_rows):
-        yield from kind(given, guess)
+    for kind in (_downward_heights, _shifted_rows):
+        yield from kind(measurements, guess)
 
 
 def leg_orders(guess: Guess) -> Iterator[tuple[int, ...]]:
@@ -103,38 +103,42 @@ def leg_orders(guess: Guess) -> Iterator[tuple[int, ...]]:
         yield from ((1, 2, 0), (2, 0, 1))
 
 
-def reordered(given: Measurements, order: Sequence[int]) -> Measurements:
+def reorder_readings(measurements: Measurements, order: Sequence[int]) -> Measurements:
     """Return measurements whose readings of leg i are those of leg order[i]."""
-    return replace(given, readings=given.readings[:, list(order)])
+    return replace(measurements, readings=measurements.readings[:, list(order)])
 
 
-def _of_parts(factors: Mapping[str, ArrayLike]) -> Callable[[Measurements], Measurements]:
+def _multiply_fields(factors: Mapping[str, ArrayLike]) -> Callable[[Measurements], Measurements]:
     """Return the change that multiplies fields of measurements by factors."""
 
-    def undo(given: Measurements) -> Measurements:
-        changed: Any = {name: getattr(given, name) * factor for name, factor in factors.items()}
-        return replace(given, **changed)
+    def undo(measurements: Measurements) -> Measurements:
+        changed: Any = {
+            name: getattr(measurements, name) * factor for name, factor in factors.items()
+        }
+        return replace(measurements, **changed)
 
     return undo
 
 
-def _of_joints(
+def _transform_joints(
     guess: Guess, offsets: Array, factors: Array
 ) -> Callable[[Measurements], Measurements]:
     """Return the change of readings that takes joint coordinates q to offset + factor q."""
 
-    def undo(given: Measurements) -> Measurements:
-        joints = offsets + factors * guess.joints(given.readings)
-        return replace(given, readings=guess.readings(joints))
+    def undo(measurements: Measurements) -> Measurements:
+        joints = offsets + factors * guess.joints(measurements.readings)
+        return replace(measurements, readings=guess.readings(joints))
 
     return undo
 
 
-def _units(given: Measurements, guess: Guess) -> Iterator[Mistake]:
+def _wrong_units(measurements: Measurements, guess: Guess) -> Iterator[Mistake]:
     """Yield units that were perhaps meant: smaller ones where values vary beyond the machine."""
     linear = np.array([leg.joint.unit == "m" for leg in guess.robot.legs])
-    lengths = [f"{name}s" for name in ("position", "height", "distance") if name in given.kinds]
-    large = _large_lengths(given, guess, lengths)
+    lengths = [
+        f"{name}s" for name in ("position", "height", "distance") if name in measurements.kinds
+    ]
+    large = _large_lengths(measurements, guess, lengths)
     for factor, text in (
         (1e-3, "in millimetres"),
         (25.4e-3, "in inches"),
@@ -147,26 +151,26 @@ def _units(given: Measurements, guess: Guess) -> Iterator[Mistake]:
             factors = {name: factors[name] for name in factors if name in large}
         advice = f"are {text}: give them in metres"
         for name in factors:
-            yield Mistake(f"the {name} {advice}", _of_parts({name: factors[name]}))
+            yield Mistake(f"the {name} {advice}", _multiply_fields({name: factors[name]}))
         if len(factors) > 1:
-            yield Mistake(f"all lengths {advice}", _of_parts(factors))
+            yield Mistake(f"all lengths {advice}", _multiply_fields(factors))
     if not linear.all():
         turned = np.where(linear, 1.0, np.pi / 180.0)
         text = "the readings are in degrees: give them in radians"
-        yield Mistake(text, _of_parts({"readings": turned}))
-    if "angle" in given.kinds:
+        yield Mistake(text, _multiply_fields({"readings": turned}))
+    if "angle" in measurements.kinds:
         text = "the measured angles are in degrees: give them in radians"
-        yield Mistake(text, _of_parts({"angles": np.pi / 180.0}))
+        yield Mistake(text, _multiply_fields({"angles": np.pi / 180.0}))
 
 
-def _signs(given: Measurements, guess: Guess) -> Iterator[Mistake]:
+def _downward_heights(measurements: Measurements, guess: Guess) -> Iterator[Mistake]:
     """Yield heights that perhaps count downwards."""
-    if "height" in given.kinds:
+    if "height" in measurements.kinds:
         text = "the heights count downwards: reverse their signs"
-        yield Mistake(text, _of_parts({"heights": -1.0}))
+        yield Mistake(text, _multiply_fields({"heights": -1.0}))
 
 
-def _large_lengths(given: Measurements, guess: Guess, lengths: Sequence[str]) -> set[str]:
+def _large_lengths(measurements: Measurements, guess: Guess, lengths: Sequence[str]) -> set[str]:
     """Return the fields of lengths that vary by more than the machine's size.
 
     Divided by 1000, distances would lie within tolerances of anything. Heights vary by less.
@@ -174,8 +178,8 @@ def _large_lengths(given: Measurements, guess: Guess, lengths: Sequence[str]) ->
     legs = guess.robot.legs
     size = max(leg.size for leg in legs)
     linear = [leg.joint.unit == "m" for leg in legs]
-    values = {name: getattr(given, name) for name in lengths}
-    values["readings"] = given.readings[:, linear]
+    values = {name: getattr(measurements, name) for name in lengths}
+    values["readings"] = measurements.readings[:, linear]
     large = set()
     for name, columns in values.items():
         seen = columns[np.isfinite(columns)]
@@ -185,9 +189,9 @@ def _large_lengths(given: Measurements, guess: Guess, lengths: Sequence[str]) ->
     return large
 
 
-def _marks(given: Measurements, guess: Guess) -> Iterator[Mistake]:
+def _swapped_marks(measurements: Measurements, guess: Guess) -> Iterator[Mistake]:
     """Yield marks that were perhaps swapped."""
-    for a, b in combinations(sorted(set(given.marks)), 2):
+    for a, b in combinations(sorted(set(measurements.marks)), 2):
 
         def undo(rows: Measurements, a: str = a, b: str = b) -> Measurements:
             other = {a: b, b: a}
@@ -198,34 +202,34 @@ def _marks(given: Measurements, guess: Guess) -> Iterator[Mistake]:
         )
 
 
-def _frames(given: Measurements, guess: Guess) -> Iterator[Mistake]:
+def _turned_frames(measurements: Measurements, guess: Guess) -> Iterator[Mistake]:
     """Yield quarter turns of the instrument."""
-    if not _whole_positions(given):
+    if not _whole_positions(measurements):
         return
     for turn in _signed_axes(1.0):
         text = (
             f"the instrument's frame is turned: its {_described_axes(turn)} of the base; turn the "
             'positions, or say [instrument] frame = "unknown"'
         )
-        yield Mistake(text, _of_axes(turn))
+        yield Mistake(text, _rotate_positions(turn))
 
 
-def _mirrored_frames(given: Measurements, guess: Guess) -> Iterator[Mistake]:
+def _mirrored_frames(measurements: Measurements, guess: Guess) -> Iterator[Mistake]:
     """Yield columns of positions that were perhaps exchanged or reversed: axes of a left hand."""
-    if _whole_positions(given):
+    if _whole_positions(measurements):
         for turn in _signed_axes(-1.0):
             text = (
                 f"the positions' columns are exchanged or reversed: {_described_axes(turn)} of the "
                 "base; exchange the columns or reverse their signs"
             )
-            yield Mistake(text, _of_axes(turn))
+            yield Mistake(text, _rotate_positions(turn))
 
 
-def _whole_positions(given: Measurements) -> bool:
+def _whole_positions(measurements: Measurements) -> bool:
     """Return whether positions are measured in the base frame, all three coordinates each."""
-    seen = ~np.isnan(given.positions)
-    whole = bool((seen.all(axis=1) == seen.any(axis=1)).all())
-    return given.setup.frame_known and whole and bool(seen.any())
+    seen = ~np.isnan(measurements.positions)
+    complete = bool((seen.all(axis=1) == seen.any(axis=1)).all())
+    return measurements.setup.frame_known and complete and bool(seen.any())
 
 
 def _signed_axes(determinant: float) -> list[Array]:
@@ -247,12 +251,12 @@ def _described_axes(turn: Array) -> str:
     )
 
 
-def _of_axes(turn: Array) -> Callable[[Measurements], Measurements]:
+def _rotate_positions(turn: Array) -> Callable[[Measurements], Measurements]:
     """Return the change that takes positions from axes, in rows, to the base's."""
-    return lambda given: replace(given, positions=given.positions @ turn)
+    return lambda measurements: replace(measurements, positions=measurements.positions @ turn)
 
 
-def _orders(given: Measurements, guess: Guess) -> Iterator[Mistake]:
+def _swapped_legs(measurements: Measurements, guess: Guess) -> Iterator[Mistake]:
     """Yield orders of the legs in which the readings perhaps stand."""
     names = guess.robot.joint_names
     for order in leg_orders(guess):
@@ -268,12 +272,12 @@ def _orders(given: Measurements, guess: Guess) -> Iterator[Mistake]:
             text = f"the readings stand in another order of the legs ({where}): rename the columns"
 
         def undo(rows: Measurements, order: tuple[int, ...] = order) -> Measurements:
-            return reordered(rows, order)
+            return reorder_readings(rows, order)
 
         yield Mistake(text, undo)
 
 
-def _reversed(given: Measurements, guess: Guess) -> Iterator[Mistake]:
+def _reversed_joints(measurements: Measurements, guess: Guess) -> Iterator[Mistake]:
     """Yield joints whose readings perhaps count the other way.
 
     About zero, or between the ends of their travel.
@@ -290,13 +294,13 @@ def _reversed(given: Measurements, guess: Guess) -> Iterator[Mistake]:
             turned = np.isin(np.arange(count), joints)
             yield Mistake(
                 f"the readings of {_listed_joints(joints, names)} are reversed: {advice}",
-                _of_joints(guess, np.where(turned, ends, 0.0), np.where(turned, -1.0, 1.0)),
+                _transform_joints(guess, np.where(turned, ends, 0.0), np.where(turned, -1.0, 1.0)),
             )
 
 
-def _shifted_rows(given: Measurements, guess: Guess) -> Iterator[Mistake]:
+def _shifted_rows(measurements: Measurements, guess: Guess) -> Iterator[Mistake]:
     """Yield measurements that perhaps stand a row or two beside their readings."""
-    if "distance" in given.kinds:  # rows name each other
+    if "distance" in measurements.kinds:  # rows name each other
         return
     for shift in (1, -1, 2, -2):
 
@@ -316,7 +320,7 @@ def _shifted_rows(given: Measurements, guess: Guess) -> Iterator[Mistake]:
         yield Mistake(text, undo)
 
 
-def _scaled(given: Measurements, guess: Guess) -> Iterator[Mistake]:
+def _wrong_steps(measurements: Measurements, guess: Guess) -> Iterator[Mistake]:
     """Yield joints whose readings are perhaps in wrong steps, from zero or an end of the travel."""
     names, legs = guess.robot.joint_names, guess.robot.legs
     count = len(names)
@@ -331,21 +335,23 @@ def _scaled(given: Measurements, guess: Guess) -> Iterator[Mistake]:
                 yield Mistake(
                     f"the readings of {_listed_joints(joints, names)}{where} are {size} as large "
                     f"as they should be, {cause}: give steps, lead or gear ratio as they are",
-                    _of_joints(guess, (1.0 - factors) * end, factors),
+                    _transform_joints(guess, (1.0 - factors) * end, factors),
                 )
 
 
-def _fitted(given: Measurements, guess: Guess) -> Iterator[Mistake]:
+def _wrong_zeros_and_scales(measurements: Measurements, guess: Guess) -> Iterator[Mistake]:
     """Yield zeros and scales that rows together show to be off, of few joints and of all."""
     for kinds in (("zeros",), ("scales",), ("scales", "zeros")):
         everything = range(len(guess.robot.legs))
-        fitted = _fit_readings(given, guess, dict.fromkeys(kinds, everything))
+        fitted = _fit_readings(measurements, guess, dict.fromkeys(kinds, everything))
         if fitted is None:
             continue
         far = {kind: _far_joints(guess, fitted, kind) for kind in kinds}
         count = sum(map(len, far.values()))
         if 0 < count < len(kinds) * len(everything):
-            few = _fit_readings(given, guess, {kind: far[kind] for kind in kinds if far[kind]})
+            few = _fit_readings(
+                measurements, guess, {kind: far[kind] for kind in kinds if far[kind]}
+            )
             if few is not None:
                 yield from _name_readings(guess, few, count)
         if kinds == ("scales",):
@@ -354,13 +360,13 @@ def _fitted(given: Measurements, guess: Guess) -> Iterator[Mistake]:
 
 
 def _fit_readings(
-    given: Measurements, guess: Guess, joints: Mapping[str, Iterable[int]]
+    measurements: Measurements, guess: Guess, joints: Mapping[str, Iterable[int]]
 ) -> Guess | None:
     """Return the guess with zeros and scales of some joints as rows show them; None: no fit."""
     legs = guess.robot.legs
     travel = [_WIDE_ZERO * leg.size if leg.joint.unit == "m" else _WIDE_ANGLE for leg in legs]
     widths = {"zeros": travel, "scales": [_WIDE_SCALE] * len(legs)}
-    blocks = numbered(
+    blocks = number_unknowns(
         Block(
             kind,
             "",
@@ -371,8 +377,8 @@ def _fit_readings(
         for kind, chosen in joints.items()
     )
     try:
-        poses = starting_poses(guess, given, modes=guess.robot.freedom <= QUICK_MODES)
-        return Fitter(given, blocks, guess, poses).run().guess
+        poses = starting_poses(guess, measurements, modes=guess.robot.freedom <= QUICK_MODES)
+        return Fitter(measurements, blocks, guess, poses).run().guess
     except DataError:
         return None
 
@@ -399,7 +405,7 @@ def _common_scale(guess: Guess, fitted: Guess) -> Iterator[Mistake]:
             f"the readings of all joints are about {1.0 / factor:.3g} times as large as they "
             "should be: give steps, lead or gear ratio as they are"
         )
-        yield Mistake(text, _of_joints(guess, np.zeros(count), np.full(count, factor)), 1)
+        yield Mistake(text, _transform_joints(guess, np.zeros(count), np.full(count, factor)), 1)
 
 
 def _name_readings(guess: Guess, fitted: Guess, freedom: int) -> Iterator[Mistake]:
@@ -419,8 +425,8 @@ def _name_readings(guess: Guess, fitted: Guess, freedom: int) -> Iterator[Mistak
     if not texts:
         return
 
-    def undo(given: Measurements) -> Measurements:
-        return replace(given, readings=guess.readings(fitted.joints(given.readings)))
+    def undo(measurements: Measurements) -> Measurements:
+        return replace(measurements, readings=guess.readings(fitted.joints(measurements.readings)))
 
     yield Mistake(
         f"{', '.join(texts)}: home the machine again or mend its step units, or give the legs "

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pteron.calibration.exact_rank import exact_rank
 from pteron.calibration.guess import Block, Guess, tolerances_of
 from pteron.calibration.measurements import Measurements
-from pteron.calibration.unseen import told, unseen_combinations
+from pteron.calibration.unseen import combination_text, unseen_combinations
 
 Array = NDArray[np.float64]
 
@@ -83,7 +83,7 @@ class Observability:
 
 
 def observability_of(
-    start: Guess, given: Measurements, blocks: Sequence[Block], slopes: Array, seed: int = 0
+    start: Guess, measurements: Measurements, blocks: Sequence[Block], slopes: Array, seed: int = 0
 ) -> Observability:
     """Return the combinations of values that measurements show.
 
@@ -91,7 +91,7 @@ def observability_of(
     ----------
     start : Guess
         The machine.
-    given : Measurements
+    measurements : Measurements
         The measurements.
     blocks : sequence of Block
         The unknowns.
@@ -105,19 +105,20 @@ def observability_of(
     sizes, axes = _spectrum(slopes, count)
     relative = sizes / max(float(sizes[0]), 1e-300)
     here = int((relative > _ROUNDING).sum())
-    rank, primes, rows = exact_rank(start, blocks, given, seed)
+    rank, primes, rows = exact_rank(start, blocks, measurements, seed)
     tolerances = tolerances_of(blocks)
     tolerances[~np.isfinite(tolerances)] = 1.0
     names = [unknown.name for block in blocks for unknown in block.unknowns]
     weak = [
-        f"{told(axes[k] * tolerances, names)} (the tolerance says {1.0 / sizes[k]:.2g} times more)"
+        f"{combination_text(axes[k] * tolerances, names)} (the tolerance says "
+        f"{1.0 / sizes[k]:.2g} times more)"
         for k in reversed(range(here))
         if sizes[k] < 1.0
     ]
-    kept, dropped = np.append(0.0, relative)[here], np.append(relative, 0.0)[here]
+    last_shown, first_dropped = np.append(0.0, relative)[here], np.append(relative, 0.0)[here]
     exact = here if rank is None else rank, count, primes, rows
     unseen = unseen_combinations(start, blocks, axes[here:], tolerances)
-    sizes_beside = here, float(kept), float(dropped)
+    sizes_beside = here, float(last_shown), float(first_dropped)
     return Observability(*exact, *sizes_beside, unseen, tuple(weak[:_NAMED]))
 
 

@@ -169,7 +169,7 @@ def plan(
     drawn = Guess.drawn(robot, Measurements.of(robot, np.zeros((1, robot.joint_count))))
     region: Box | Cylinder
     if measure == "heights":
-        home, setup, region = _on_plane(drawn, home, setup)
+        home, setup, region = _lower_onto_plane(drawn, home, setup)
     else:
         region = proved_box(robot, home)
     poses = _candidates(robot, region, np.random.default_rng(seed))
@@ -179,30 +179,30 @@ def plan(
     if measure == "distances" and not setup.anchors:
         place = robot.platform.at(home[None])[0][0] - [0.0, 0.0, robot.legs[0].size]
         setup = replace(setup, anchors={TOOL: Place(tuple(place.tolist()), known=False)})
-    given = _imagined(drawn, poses, measure, setup)
-    blocks = blocks_of(robot, given, free, prior)
-    start = Guess.drawn(robot, given)
+    measurements = _ideal_measurements(drawn, poses, measure, setup)
+    blocks = blocks_of(robot, measurements, free, prior)
+    start = Guess.drawn(robot, measurements)
     slopes = MachineSlopes(robot, blocks)
-    rows = slopes.rows(start, given, poses, np.arange(len(poses)))
+    rows = slopes.rows(start, measurements, poses, np.arange(len(poses)))
     noise = {**_NOISE, **setup.noise}
-    seen = rows.slopes / np.array([noise[kind] for kind in given.kind_of])[:, None]
+    seen = rows.slopes / np.array([noise[kind] for kind in measurements.kind_of])[:, None]
     used = rows.measured.any(axis=0)
     # Of a machine that turns only, the angles are what goes wrong.
-    tool = slopes.pose_slopes(start, given, poses)[bool(robot.platform.lengths)]
+    tool = slopes.pose_slopes(start, measurements, poses)[bool(robot.platform.lengths)]
     tolerances = tolerances_of(blocks)
     if not np.isfinite(tolerances).all():
         raise DataError("prior: a plan needs finite tolerances; give no inf")
-    chosen, covariance = _chosen(seen[:, used], tool, tolerances, count, criterion)
-    order = _in_order(poses[chosen], home, robot)
+    chosen, covariance = _choose_poses(seen[:, used], tool, tolerances, count, criterion)
+    order = _order_by_distance(poses[chosen], home, robot)
     picked = poses[chosen][order]
-    before, after = (
+    drawn_error, fitted_error = (
         float(np.sqrt(variances(tool, known).max()))
         for known in (np.diag(tolerances**2), covariance)
     )
     readings = start.readings(slopes.joints(start, picked))
-    checked = rows_for_check(given, blocks)
+    checked = rows_for_check(measurements, blocks)
     plane = next(iter(setup.planes.values())) if measure == "heights" else None
-    return Plan(robot, measure, picked, readings, region, plane, before, after, checked)
+    return Plan(robot, measure, picked, readings, region, plane, drawn_error, fitted_error, checked)
 
 
 def _candidates(robot: Manipulator, region: Box | Cylinder, rng: np.random.Generator) -> Array:
@@ -240,17 +240,17 @@ def proved_box(robot: Manipulator, center: Array, flat: bool = False) -> Box:
         sides[robot.platform.angular] = 0.0
         thin[_upright(robot)] = _ABOVE
     least, most = 0.0, 1.0
-    found: Box | None = None
+    proved: Box | None = None
     for _ in range(_HALVINGS):
         share = 0.5 * (least + most)
         box = Box(tuple(center - share * sides), tuple(center + share * sides + thin))
         if prove(robot, box, type_i=floors[0], type_ii=floors[1], most=_MOST).holds:
-            least, found = share, box
+            least, proved = share, box
         else:
             most = share
-    if found is None:
+    if proved is None:
         raise _no_region(robot, center)
-    return _widened(robot, found, sides, floors)
+    return _widen_box(robot, proved, sides, floors)
 
 
 def _floors(robot: Manipulator, center: Array) -> tuple[float, float]:
@@ -299,15 +299,15 @@ def _proved_level(robot: Manipulator, center: Array) -> Box | Cylinder:
     return Cylinder(tuple(middle), least, height) if larger else box
 
 
-def _widened(robot: Manipulator, box: Box, sides: Array, floors: tuple[float, float]) -> Box:
-    """Return a proved box whose sides grew one after the other, as far as they may."""
+def _widen_box(robot: Manipulator, box: Box, sides: Array, floors: tuple[float, float]) -> Box:
+    """Return a proved box, each side in turn widened while the box stays proved."""
     for k in np.flatnonzero(sides):
         for _ in range(_WIDENINGS):
             low, high = box.box
-            more = 0.5 * (high[k] - low[k])
+            growth = 0.5 * (high[k] - low[k])
             if high[k] - low[k] >= 2.0 * sides[k]:
                 break
-            low[k], high[k] = low[k] - 0.5 * more, high[k] + 0.5 * more
+            low[k], high[k] = low[k] - 0.5 * growth, high[k] + 0.5 * growth
             wider = Box(tuple(low), tuple(high))
             type_i, type_ii = floors
             if not prove(robot, wider, type_i=type_i, type_ii=type_ii, most=_MOST // 4).holds:
@@ -322,7 +322,9 @@ def _upright(robot: Manipulator) -> int:
     return int(lengths[np.abs(robot.platform.directions[:, 2]).argmax()])
 
 
-def _on_plane(drawn: Guess, home: Array, setup: Setup) -> tuple[Array, Setup, Box | Cylinder]:
+def _lower_onto_plane(
+    drawn: Guess, home: Array, setup: Setup
+) -> tuple[Array, Setup, Box | Cylinder]:
     """Return home with the tool on the setup's plane, the setup and the proved region there.
 
     Without a plane it is z = 0, the bed, where that serves, else an unknown one below home.
@@ -333,11 +335,11 @@ def _on_plane(drawn: Guess, home: Array, setup: Setup) -> tuple[Array, Setup, Bo
     at = _upright(robot)
     point = drawn.points([TOOL], home[None])[0]
     if setup.planes:
-        moved = _lowered(home, at, point, next(iter(setup.planes.values())))
+        moved = _lower_home(home, at, point, next(iter(setup.planes.values())))
         return moved, setup, _proved_level(robot, moved)
     if point[2] > 0.0:
         bed = Plane()
-        moved = _lowered(home, at, point, bed)
+        moved = _lower_home(home, at, point, bed)
         try:
             return moved, replace(setup, planes={TOOL: bed}), _proved_level(robot, moved)
         except ModelError:
@@ -349,34 +351,38 @@ def _on_plane(drawn: Guess, home: Array, setup: Setup) -> tuple[Array, Setup, Bo
     return moved, replace(setup, planes={TOOL: plane}), _proved_level(robot, moved)
 
 
-def _lowered(home: Array, at: int, point: Array, plane: Plane) -> Array:
-    """Return home with the tool, which is at a point (3,), moved to a plane along a coordinate."""
+def _lower_home(home: Array, at: int, point: Array, plane: Plane) -> Array:
+    """Return home moved along a coordinate so that the tool, at a point (3,), is on a plane."""
     normal = np.array(plane.normal)
     moved = home.copy()
     moved[at] += (plane.offset - normal @ point) / normal[2]
     return moved
 
 
-def _imagined(drawn: Guess, poses: Array, measure: Measure, setup: Setup) -> Measurements:
+def _ideal_measurements(drawn: Guess, poses: Array, measure: Measure, setup: Setup) -> Measurements:
     """Return the measurements that a faultless machine would give at poses."""
     robot, n = drawn.robot, len(poses)
     readings = drawn.readings(MachineSlopes(robot, ()).joints(drawn, poses))
-    given = Measurements.of(robot, readings, setup=setup)
+    measurements = Measurements.of(robot, readings, setup=setup)
     if measure == "positions":
-        return replace(given, positions=np.zeros((n, 3)))
+        return replace(measurements, positions=np.zeros((n, 3)))
     if measure == "poses":
         known = [0.0 if axis in robot.coordinates else np.nan for axis in "xyz"]
         angles = poses[:, robot.platform.angular]
-        return replace(given, positions=np.tile(known, (n, 1)), angles=angles)
+        return replace(measurements, positions=np.tile(known, (n, 1)), angles=angles)
     if measure == "heights":
-        return replace(given, heights=np.zeros(n), planes=(next(iter(setup.planes), TOOL),) * n)
-    return replace(given, distances=np.ones(n), anchors=(next(iter(setup.anchors), TOOL),) * n)
+        return replace(
+            measurements, heights=np.zeros(n), planes=(next(iter(setup.planes), TOOL),) * n
+        )
+    return replace(
+        measurements, distances=np.ones(n), anchors=(next(iter(setup.anchors), TOOL),) * n
+    )
 
 
-def _chosen(
+def _choose_poses(
     seen: Array, tool: Array, tolerances: Array, count: int, criterion: Criterion
 ) -> tuple[list[int], Array]:
-    """Return the poses that say most, one after the other, and the covariance after them.
+    """Return the most informative poses (indices), greedily, and the covariance after them.
 
     Each lowers the determinant of the covariance most, by det(1 + J C J'); or is where the tool's
     place is least known.
@@ -396,12 +402,12 @@ def _chosen(
     return chosen, covariance
 
 
-def _in_order(poses: Array, home: Array, robot: Manipulator) -> list[int]:
-    left, at, order = list(range(len(poses))), home, []
+def _order_by_distance(poses: Array, home: Array, robot: Manipulator) -> list[int]:
+    remaining, at, order = list(range(len(poses))), home, []
     size = np.where(robot.platform.angular, 1.0 / max(leg.size for leg in robot.legs), 1.0)
-    while left:
-        next_ = min(left, key=lambda i: float(np.linalg.norm((poses[i] - at) / size)))
+    while remaining:
+        next_ = min(remaining, key=lambda i: float(np.linalg.norm((poses[i] - at) / size)))
         order.append(next_)
-        left.remove(next_)
+        remaining.remove(next_)
         at = poses[next_]
     return order

@@ -1,7 +1,7 @@
 """The mistake in a whole log, found before the fit: units, order, signs, zeros, scales, frame.
 
 Measurements should lie within noise and tolerances of what the machine as drawn would give; where
-they do not, each likely mistake is undone on trial, and told where they then do.
+they do not, each likely mistake is undone on trial, and reported where they then do.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from pteron.calibration.mistakes import (
     Mistake,
     leg_orders,
     likely_mistakes,
-    reordered,
+    reorder_readings,
 )
 from pteron.calibration.residuals import MachineSlopes
 from pteron.calibration.result import Finding, HiddenOrder
-from pteron.calibration.start import placed, starting_poses
+from pteron.calibration.start import place_surroundings, starting_poses
 from pteron.errors import DataError, UnlikelyValue
 
 Array = NDArray[np.float64]
@@ -77,7 +77,7 @@ _NOISE = 1e-4
 
 
 def raw_mistake(
-    given: Measurements, blocks: Sequence[Block], robot_guess: Guess, *, fitted: bool = False
+    measurements: Measurements, blocks: Sequence[Block], robot_guess: Guess, *, fitted: bool = False
 ) -> Mistake | None:
     """Return the mistake that explains measurements far from the drawing; else None.
 
@@ -85,21 +85,27 @@ def raw_mistake(
     """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UnlikelyValue)  # what is tried may well be unlikely
-        misfit = _misfit(_some_rows(given), blocks, robot_guess)
+        misfit = _misfit(_sample_rows(measurements), blocks, robot_guess)
         if fitted == (misfit >= _FAR):  # what is far was searched before the fit
             return None
-        return _best_mistake(given, blocks, robot_guess, min(_NEAR, _FALLEN * misfit))
+        return _best_mistake(measurements, blocks, robot_guess, min(_NEAR, _FALLEN * misfit))
 
 
-def describe_mistake(mistake: Mistake, given: Measurements, guess: Guess) -> Finding:
+def describe_mistake(mistake: Mistake, measurements: Measurements, guess: Guess) -> Finding:
     """Return the finding of a mistake: its cause, what to do, and its size on the drawn machine."""
-    before, after = (_drawing_errors(rows, guess) for rows in (given, mistake.undo(given)))
+    logged_errors, errors = (
+        _drawing_errors(rows, guess) for rows in (measurements, mistake.undo(measurements))
+    )
     text = f"{mistake.text[0].upper()}{mistake.text[1:]}."
     sizes = []
-    for kind, error in after.items():
-        logged = f" (as logged within {_sized(before[kind], kind)})" if kind in before else ""
-        sizes.append(f"nine in ten {kind}s are within {_sized(error, kind)}{logged}")
-    none = "" if before else "; as logged, most readings lead to no pose"
+    for kind, error in errors.items():
+        logged = (
+            f" (as logged within {_size_text(logged_errors[kind], kind)})"
+            if kind in logged_errors
+            else ""
+        )
+        sizes.append(f"nine in ten {kind}s are within {_size_text(error, kind)}{logged}")
+    none = "" if logged_errors else "; as logged, most readings lead to no pose"
     text += (
         f" With this undone, as in what follows, {' and '.join(sizes)} of the machine as "
         f"drawn{none}."
@@ -107,20 +113,20 @@ def describe_mistake(mistake: Mistake, given: Measurements, guess: Guess) -> Fin
     return Finding("mistake", text, effect=float("inf"))
 
 
-def _sized(error: float, kind: str) -> str:
+def _size_text(error: float, kind: str) -> str:
     if kind == "angle":
         return f"{1e3 * error:.3g} mrad"
     return f"{1e3 * error:.3g} mm" if error < 1.0 else f"{error:.4g} m"
 
 
-def _drawing_errors(given: Measurements, guess: Guess) -> dict[str, float]:
-    """Return the bound of nine in ten residuals by kind on the drawn machine, m and rad."""
-    rows = _some_rows(given)
+def _drawing_errors(measurements: Measurements, guess: Guess) -> dict[str, float]:
+    """Return the 90 % quantile of absolute residuals by kind on the drawn machine, m and rad."""
+    rows = _sample_rows(measurements)
     try:
         residuals, measured = _drawing_residuals(guess, rows)
     except DataError:
         return {}
-    kinds = {kind: measured & (given.kind_of == kind) for kind in given.kinds}
+    kinds = {kind: measured & (measurements.kind_of == kind) for kind in measurements.kinds}
     return {
         kind: float(np.quantile(np.abs(residuals[here]), 0.9))
         for kind, here in kinds.items()
@@ -133,74 +139,76 @@ def _drawing_residuals(guess: Guess, rows: Measurements) -> tuple[Array, NDArray
     poses = _trial_poses(guess, rows)
     lost: NDArray[np.bool_] = np.asarray(np.isnan(poses).any(axis=1))
     filled = np.where(lost[:, None], np.median(poses[~lost], axis=0), poses)
-    start = placed(guess, rows, filled)
+    start = place_surroundings(guess, rows, filled)
     at = MachineSlopes(guess.robot, ()).rows(start, rows, filled, np.arange(len(rows)))
     lost |= (rows.origins >= 0) & lost[rows.origins]
     return at.residuals, at.measured & ~lost[:, None]
 
 
 def hidden_order(
-    given: Measurements, blocks: Sequence[Block], robot_guess: Guess, fit: Fit
+    measurements: Measurements, blocks: Sequence[Block], robot_guess: Guess, fit: Fit
 ) -> HiddenOrder | None:
     """Return the legs whose readings could be exchanged and nothing would show; None for none.
 
     Heights over the bed of a symmetric machine are those of its mirror image.
     """
-    if not set(given.kinds) <= {"height", "distance"}:
+    if not set(measurements.kinds) <= {"height", "distance"}:
         return None
-    misfit = _misfit(_some_rows(given), blocks, robot_guess)
+    misfit = _misfit(_sample_rows(measurements), blocks, robot_guess)
     legs: set[int] = set()
     error = 0.0
     for order in leg_orders(robot_guess):
-        rows = _some_rows(reordered(given, order))
+        rows = _sample_rows(reorder_readings(measurements, order))
         if _misfit(rows, blocks, robot_guess) < max(_CLEAR, 1.5 * misfit):
             legs |= {i + 1 for i, k in enumerate(order) if i != k}
-            error = max(error, _change_by_order(given, robot_guess, fit, order))
+            error = max(error, _change_by_order(measurements, robot_guess, fit, order))
     return HiddenOrder(tuple(sorted(legs)), error) if legs else None
 
 
-def _change_by_order(given: Measurements, start: Guess, fit: Fit, order: tuple[int, ...]) -> float:
+def _change_by_order(
+    measurements: Measurements, start: Guess, fit: Fit, order: tuple[int, ...]
+) -> float:
     """Return the greatest change of the tool's place in another order of the readings, m.
 
     It is that of the calibrated machine beyond the mirror image that the drawn one has.
     """
     slopes = MachineSlopes(start.robot, ())
-    middle = np.tile(np.median(fit.poses[fit.kept], axis=0), (len(given), 1))
+    middle = np.tile(np.median(fit.poses[fit.kept], axis=0), (len(measurements), 1))
 
     def places(guess: Guess, readings: Array) -> Array:
         poses = slopes.poses(guess, guess.joints(readings), middle)
-        return guess.points(given.marks, poses)
+        return guess.points(measurements.marks, poses)
 
-    swapped = reordered(given, order).readings
-    drawn, drawn_swapped = places(start, given.readings), places(start, swapped)
-    found, found_swapped = places(fit.guess, given.readings), places(fit.guess, swapped)
-    good = fit.kept & np.isfinite(drawn + drawn_swapped + found + found_swapped).all(axis=1)
+    swapped = reorder_readings(measurements, order).readings
+    drawn, drawn_swapped = places(start, measurements.readings), places(start, swapped)
+    fitted, fitted_swapped = places(fit.guess, measurements.readings), places(fit.guess, swapped)
+    good = fit.kept & np.isfinite(drawn + drawn_swapped + fitted + fitted_swapped).all(axis=1)
     if not good.any():
         return float("inf")
     around = np.column_stack([drawn[good], np.ones(good.sum())])
     mirror = np.linalg.lstsq(around, drawn_swapped[good], rcond=1e-6)[0]
-    image = np.column_stack([found[good], np.ones(good.sum())]) @ mirror
-    return float(np.linalg.norm(found_swapped[good] - image, axis=1).max())
+    image = np.column_stack([fitted[good], np.ones(good.sum())]) @ mirror
+    return float(np.linalg.norm(fitted_swapped[good] - image, axis=1).max())
 
 
-def _some_rows(given: Measurements) -> Measurements:
+def _sample_rows(measurements: Measurements) -> Measurements:
     # At random: rows at even steps might all be of one mark.
-    return given.rows(np.random.default_rng(0).permutation(len(given)) < _ROWS)
+    return measurements.rows(np.random.default_rng(0).permutation(len(measurements)) < _ROWS)
 
 
 def _best_mistake(
-    given: Measurements, blocks: Sequence[Block], guess: Guess, most: float
+    measurements: Measurements, blocks: Sequence[Block], guess: Guess, most: float
 ) -> Mistake | None:
-    """Return the mistake that, undone, leaves least; of those that leave about as little the first.
+    """Return the mistake of least cost once undone; among those about as good, the likeliest.
 
     Rows one by one choose some, and all rows together, in a fit, among these. A group of mistakes
     that clearly has it ends the search.
     """
     tried: list[tuple[float, int, Mistake]] = []
-    for mistakes in likely_mistakes(_some_rows(given), guess):
+    for mistakes in likely_mistakes(_sample_rows(measurements), guess):
         clear = False
         for mistake in mistakes:
-            misfit = _quick_misfit(_some_rows(mistake.undo(given)), blocks, guess, most)
+            misfit = _quick_misfit(_sample_rows(mistake.undo(measurements)), blocks, guess, most)
             tried.append((misfit, len(tried), mistake))
             clear |= misfit < min(_CLEAR, most)
         if clear:
@@ -208,27 +216,31 @@ def _best_mistake(
     near = sorted((t for t in tried if t[0] < most), key=lambda t: t[:2])[:_FINALISTS]
     finalists = [mistake for *_, mistake in sorted(near, key=lambda t: t[1])]
     costs = [
-        _cost_together(mistake.undo(given), blocks, guess) + _ALIKE * mistake.freedom
+        _cost_together(mistake.undo(measurements), blocks, guess) + _ALIKE * mistake.freedom
         for mistake in finalists
     ]
     least = min(costs, default=np.inf)
-    if not least < np.inf or not least < _LEFT_TOGETHER * _cost_together(given, blocks, guess):
+    if not least < np.inf or not least < _LEFT_TOGETHER * _cost_together(
+        measurements, blocks, guess
+    ):
         return None
     pairs = zip(finalists, costs, strict=True)
     return next(mistake for mistake, cost in pairs if cost <= least + _ALIKE)
 
 
-def _cost_together(given: Measurements, blocks: Sequence[Block], guess: Guess) -> float:
-    """Return the squared residuals after a fit of rows together, and its tolerances, in variances.
+def _cost_together(measurements: Measurements, blocks: Sequence[Block], guess: Guess) -> float:
+    """Return the cost of a fit of all rows: squared residuals and tolerances, in variances.
 
     inf where the rows have no poses.
     """
-    chosen = np.random.default_rng(0).permutation(len(given)) < _ROWS_TOGETHER
-    noise = {kind: max(given.setup.noise.get(kind, 0.0), _NOISE) for kind in given.kinds}
-    rows = replace(given.rows(chosen), setup=replace(given.setup, noise=noise))
+    chosen = np.random.default_rng(0).permutation(len(measurements)) < _ROWS_TOGETHER
+    noise = {
+        kind: max(measurements.setup.noise.get(kind, 0.0), _NOISE) for kind in measurements.kinds
+    }
+    rows = replace(measurements.rows(chosen), setup=replace(measurements.setup, noise=noise))
     try:
         poses = _trial_poses(guess, rows)
-        fit = Fitter(rows, tuple(blocks), placed(guess, rows, poses), poses).run()
+        fit = Fitter(rows, tuple(blocks), place_surroundings(guess, rows, poses), poses).run()
     except DataError:
         return np.inf
     squares = np.minimum(fit.distances**2, _MOST_OF_ROW)
@@ -282,7 +294,7 @@ def row_misfits(guess: Guess, rows: Measurements, blocks: Sequence[Block], poses
     if lost.all():
         return np.full(len(rows), np.inf)
     poses = np.where(np.isnan(poses), np.median(poses[~np.isnan(poses).any(axis=1)], axis=0), poses)
-    start = placed(guess, rows, poses)
+    start = place_surroundings(guess, rows, poses)
     slopes = MachineSlopes(guess.robot, blocks)
     tolerances = np.minimum(tolerances_of(blocks), 1.0)
     for block in blocks:

@@ -15,8 +15,8 @@ import scipy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
 from pteron.calibration.fit import BEYOND, FLOOR, Fit, Fitter
-from pteron.calibration.guess import Block, Unknown, numbered
-from pteron.calibration.measurements import Measurements, evenly
+from pteron.calibration.guess import Block, Unknown, number_unknowns
+from pteron.calibration.measurements import Measurements, spread_rows
 from pteron.calibration.mistakes import order_mistakes
 from pteron.calibration.residuals import MachineSlopes
 from pteron.calibration.result import Finding
@@ -60,7 +60,7 @@ _LISTED = 8
 
 
 class Trial(NamedTuple):
-    """A fault that was tried: what it is and moves, and by how much squared residuals fall."""
+    """A candidate fault: its text, its shift of the residuals, and the fall of their squares."""
 
     kind: str
     text: str
@@ -77,9 +77,9 @@ def residual_faults(
 
     `reasons` say by row why it was set aside before the fit.
     """
-    found, explained = _shown(fitter, fit)
-    found = found or tuple(_bad_leg(fitter, fit))
-    return *found, *_outliers(fit, fitter.given, ~fit.kept & ~explained, reasons or {})
+    findings, explained = _find_fault(fitter, fit)
+    findings = findings or tuple(_bad_leg(fitter, fit))
+    return *findings, *_outliers(fit, fitter.measurements, ~fit.kept & ~explained, reasons or {})
 
 
 def zero_faults(fitter: Fitter, fit: Fit) -> tuple[Finding, ...]:
@@ -87,9 +87,11 @@ def zero_faults(fitter: Fitter, fit: Fit) -> tuple[Finding, ...]:
 
     A size is the median difference of joint coordinates, as a guide point takes part of a zero.
     """
-    start, given = fitter.begin, fitter.given
+    start, measurements = fitter.begin, fitter.measurements
     rows = np.flatnonzero(fit.kept)
-    joints = fitter.slopes.joints(start, fit.poses[rows]) - start.joints(given.readings[rows])
+    joints = fitter.slopes.joints(start, fit.poses[rows]) - start.joints(
+        measurements.readings[rows]
+    )
     far = {
         leg
         for block in fitter.blocks
@@ -111,41 +113,43 @@ def zero_faults(fitter: Fitter, fit: Fit) -> tuple[Finding, ...]:
 
 
 def _outliers(
-    fit: Fit, given: Measurements, out: NDArray[np.bool_], reasons: Mapping[int, str]
+    fit: Fit, measurements: Measurements, out: NDArray[np.bool_], reasons: Mapping[int, str]
 ) -> tuple[Finding, ...]:
     rows = np.flatnonzero(out)
     if not len(rows):
         return ()
     worst = rows[np.argsort(-fit.distances[rows])][:_LISTED]
-    named = ", ".join(f"{given.places[i]} ({reasons.get(int(i)) or _size(fit, i)})" for i in worst)
-    more = f" and {len(rows) - len(worst)} more" if len(rows) > len(worst) else ""
-    text = f"Left out, as {'they do' if len(rows) > 1 else 'it does'} not fit: {named}{more}."
+    named = ", ".join(
+        f"{measurements.places[i]} ({reasons.get(int(i)) or _residual_text(fit, i)})" for i in worst
+    )
+    others = f" and {len(rows) - len(worst)} more" if len(rows) > len(worst) else ""
+    text = f"Left out, as {'they do' if len(rows) > 1 else 'it does'} not fit: {named}{others}."
     return (Finding("outlier", text, float((fit.distances[rows] ** 2).sum())),)
 
 
-def _size(fit: Fit, row: int) -> str:
+def _residual_text(fit: Fit, row: int) -> str:
     if fit.distances[row] == BEYOND:
         return "its readings lead to no pose"
-    left = fit.residuals[row]
-    k = int(np.abs(left).argmax())
-    angle = 3 <= k < len(left) - 2
-    return f"off by {1e3 * abs(left[k]):.3g} {'mrad' if angle else 'mm'}"
+    residuals = fit.residuals[row]
+    k = int(np.abs(residuals).argmax())
+    angle = 3 <= k < len(residuals) - 2
+    return f"off by {1e3 * abs(residuals[k]):.3g} {'mrad' if angle else 'mm'}"
 
 
 class _ScoreTest:
-    """Rows in standard deviations, and how far one more unknown would lower their squares.
+    """Score test: how far a further unknown would lower the rows' squared whitened residuals.
 
     Attributes
     ----------
     rows : array of int, shape (N,)
         Those that are examined.
     slopes : array, shape (N, K, p)
-        Against the unknowns of the fit and, behind them, those of `more`.
-    more : tuple of Block
+        Against the unknowns of the fit and, behind them, those of `extra_blocks`.
+    extra_blocks : tuple of Block
         Every joint's zero, each mark, and the instrument's frame, where it is not sought.
     weights : array, shape (N,)
         Less than 1 of rows that are far off.
-    left : array, shape (N, K)
+    residuals : array, shape (N, K)
         Residuals after the fit.
     variance : float
         Of these, as a middle row shows it.
@@ -154,16 +158,18 @@ class _ScoreTest:
     """
 
     def __init__(self, fitter: Fitter, fit: Fit) -> None:
-        start, blocks, given = fitter.begin, fitter.blocks, fitter.given
-        self.start, self.given, self.fit = start, given, fit
+        start, blocks, measurements = fitter.begin, fitter.blocks, fitter.measurements
+        self.start, self.measurements, self.fit = start, measurements, fit
         count = blocks[-1].where.stop
-        self.more = _extended(blocks, given, len(start.robot.legs))
+        self.extra_blocks = _extra_blocks(blocks, measurements, len(start.robot.legs))
         self.frame = [block for block in blocks if block.kind == "frame"]
-        fitter = Fitter(given, (*blocks, *self.more), start, fit.poses)
-        self.rows = np.union1d(evenly(len(given), _ROWS), np.flatnonzero(~fit.kept)[:_ROWS])
-        at = fitter.slopes.rows(fit.guess, given, fit.poses, self.rows)
-        r, slopes, _ = fitter.whitened(at, fit.guess, fit.noise)
-        joints = fitter.whitened(at._replace(slopes=at.by_reading), fit.guess, fit.noise)[1]
+        fitter = Fitter(measurements, (*blocks, *self.extra_blocks), start, fit.poses)
+        self.rows = np.union1d(
+            spread_rows(len(measurements), _ROWS), np.flatnonzero(~fit.kept)[:_ROWS]
+        )
+        at = fitter.slopes.rows(fit.guess, measurements, fit.poses, self.rows)
+        r, slopes, _ = fitter.whiten_rows(at, fit.guess, fit.noise)
+        joints = fitter.whiten_rows(at._replace(slopes=at.by_reading), fit.guess, fit.noise)[1]
         off = np.sqrt(np.einsum("nk,nk->n", r, r) / np.maximum(at.measured.sum(axis=1), 1))
         weights = np.minimum(1.0, _HEAVIEST * np.median(off) / np.maximum(off, 1e-12))
         weights[~np.isfinite(slopes).all(axis=(1, 2))] = 0.0  # no pose
@@ -175,26 +181,28 @@ class _ScoreTest:
         self._flat = self._fitted.reshape(-1, count)
         square = self._flat.T @ self._flat
         self._covariance = np.linalg.inv(square + np.diag(fitter.prior[:count]))
-        self.left = self.remaining(r)
+        self.residuals = self.refit_residuals(r)
         # Noise that was found has the fault in it: a middle row's is nearer the truth.
         numbers = at.measured.sum(axis=1)
-        self.squares = np.einsum("nk,nk->n", self.left, self.left) / np.maximum(numbers, 1)
-        self.least = min(FLOOR / fit.noise[kind] for kind in given.kinds) ** 2
+        self.squares = np.einsum("nk,nk->n", self.residuals, self.residuals) / np.maximum(
+            numbers, 1
+        )
+        self.least = min(FLOOR / fit.noise[kind] for kind in measurements.kinds) ** 2
         taken = float(np.trace(self._covariance @ square)) / at.measured.sum()  # by the fit
         self.free = float(at.measured.sum()) * (1.0 - taken)
         self.variance = max(float(np.median(self.squares)) / (0.6 * (1.0 - taken)), self.least)
 
-    def remaining(self, moved: Array) -> Array:
-        """Return what is left of residuals (N, K) where the fit's unknowns follow."""
+    def refit_residuals(self, moved: Array) -> Array:
+        """Return residuals (N, K) after the fit's unknowns are fitted to them again."""
         change = self._covariance @ (self._flat.T @ moved.reshape(-1))
         return np.asarray(moved - self._fitted @ change)
 
     def score(self, columns: Array) -> tuple[float, Array]:
-        """Return how the squared residuals fall with columns (N, K, c), and their amounts."""
+        """Return the fall of the squared residuals with columns (N, K, c), and amounts (c,)."""
         wide = columns.reshape(-1, columns.shape[-1])
-        across = self._flat.T @ wide
-        square = wide.T @ wide - across.T @ self._covariance @ across
-        right = wide.T @ self.left.reshape(-1)
+        cross_products = self._flat.T @ wide
+        square = wide.T @ wide - cross_products.T @ self._covariance @ cross_products
+        right = wide.T @ self.residuals.reshape(-1)
         size = np.sqrt(np.maximum(np.diag(wide.T @ wide), 1e-300))
         scaled = square / np.outer(size, size)
         inverse = np.linalg.pinv(scaled, rcond=1e-6, hermitian=True)
@@ -207,18 +215,18 @@ class _ScoreTest:
         A distance between two rows follows the steps of both.
         """
         count = values.shape[1]
-        origins = self.given.origins[self.rows]
+        origins = self.measurements.origins[self.rows]
         columns: Array = self._joints[..., :count] * values[self.rows][:, None]
         between = origins >= 0
         columns[between] += self._joints[between, :, count:] * values[origins[between]][:, None]
         return columns
 
     def chance(self, trial: Trial) -> float:
-        """Return the probability that a faultless log seems to have a fault as much."""
+        """Return the p-value of a trial: the probability of its fall in a faultless log."""
         chance = float(scipy.stats.chi2.sf(trial.fall, trial.freedom))
-        if not set(self.given.kinds) <= set(self.given.setup.noise):
+        if not set(self.measurements.kinds) <= set(self.measurements.setup.noise):
             # The noise that was found has the fault in it: an F test leaves it out.
-            total = float(np.einsum("nk,nk->", self.left, self.left))
+            total = float(np.einsum("nk,nk->", self.residuals, self.residuals))
             fall = trial.fall * self.variance
             free = max(self.free - trial.freedom, 1.0)
             ratio = (fall / trial.freedom) / max((total - fall) / free, self.least)
@@ -226,8 +234,8 @@ class _ScoreTest:
         return chance
 
 
-def _shown(fitter: Fitter, fit: Fit) -> tuple[tuple[Finding, ...], NDArray[np.bool_]]:
-    """Return the fault, if any, that best explains what noise does not, and the rows (N,) so."""
+def _find_fault(fitter: Fitter, fit: Fit) -> tuple[tuple[Finding, ...], NDArray[np.bool_]]:
+    """Return the best-explaining fault, if significant, and the rows (N,) it explains."""
     test = _ScoreTest(fitter, fit)
     tried, best, gain = 0, None, -np.inf
     trials = (_trials, _scale_trials, _rod_trials, _tilt_trials, _order_trials)
@@ -236,16 +244,16 @@ def _shown(fitter: Fitter, fit: Fit) -> tuple[tuple[Finding, ...], NDArray[np.bo
         more_than_chance = trial.fall - float(scipy.stats.chi2.isf(0.5, trial.freedom))
         if more_than_chance > gain:
             best, gain = trial, more_than_chance
-    explained = np.zeros(len(fitter.given), dtype=bool)
+    explained = np.zeros(len(fitter.measurements), dtype=bool)
     share = _SHARE * float(test.squares.sum()) / test.variance
     if best is None or best.fall <= share or test.chance(best) >= _CHANCE / tried:
         return (), explained
-    after = np.linalg.norm(test.left + test.remaining(best.moved), axis=-1)
-    explained[test.rows] = after < _EXPLAINED * np.linalg.norm(test.left, axis=-1)
+    after = np.linalg.norm(test.residuals + test.refit_residuals(best.moved), axis=-1)
+    explained[test.rows] = after < _EXPLAINED * np.linalg.norm(test.residuals, axis=-1)
     # Rods that differ, and a tilt, the geometry takes; what it does not take of them is left.
     follows = best.kind in ("unequal rods", "tilted platform")
-    moved = test.remaining(best.moved) if follows else best.moved
-    kinds = [str(kind) for kind in fitter.given.kind_of]
+    moved = test.refit_residuals(best.moved) if follows else best.moved
+    kinds = [str(kind) for kind in fitter.measurements.kind_of]
     limits = np.array([ORDINARY_ERROR[kind] / fit.noise[kind] for kind in kinds])
     effect = float((np.abs(moved) / limits)[fit.kept[test.rows]].max(initial=0.0))
     return (Finding(best.kind, best.text, gain, effect),), explained
@@ -253,16 +261,16 @@ def _shown(fitter: Fitter, fit: Fit) -> tuple[tuple[Finding, ...], NDArray[np.bo
 
 def _trials(test: _ScoreTest) -> Iterator[Trial]:
     """Try zeros that slipped, backlash, drift, and marks or instruments that moved."""
-    given, rows = test.given, test.rows
-    places = [given.places[i] for i in rows]
+    measurements, rows = test.measurements, test.rows
+    places = [measurements.places[i] for i in rows]
 
     def beginnings(most: int) -> range:
         return range(3, len(rows) - 3, max(1, len(rows) // most))
 
     legs = test.start.robot.legs
-    steps = np.ones((len(given), len(legs)))
+    steps = np.ones((len(measurements), len(legs)))
     for t in beginnings(200):
-        later = np.arange(len(given)) >= rows[t]
+        later = np.arange(len(measurements)) >= rows[t]
         columns = test.joint_columns(steps * later[:, None])
         for i, (leg, name) in enumerate(zip(legs, test.start.robot.joint_names, strict=True)):
             unit = "mrad" if leg.joint.unit == "rad" else "mm"
@@ -273,7 +281,7 @@ def _trials(test: _ScoreTest) -> Iterator[Trial]:
                 f"before {places[t]}: home it again, and measure anew from there."
             )
             yield Trial("slipped zero", text, 1, fall, column @ amounts)
-    approach = np.sign(np.diff(given.readings, axis=0, prepend=given.readings[:1]))
+    approach = np.sign(np.diff(measurements.readings, axis=0, prepend=measurements.readings[:1]))
     columns = test.joint_columns(approach)
     for i, (leg, name) in enumerate(zip(legs, test.start.robot.joint_names, strict=True)):
         unit = "mrad" if leg.joint.unit == "rad" else "mm"
@@ -284,7 +292,11 @@ def _trials(test: _ScoreTest) -> Iterator[Trial]:
             "direction of approach: approach poses from one side, or take up its play."
         )
         yield Trial("backlash", text, 1, fall, column @ amounts)
-    times = given.times if given.times is not None else np.arange(float(len(given)))
+    times = (
+        measurements.times
+        if measurements.times is not None
+        else np.arange(float(len(measurements)))
+    )
     if span := np.ptp(times):
         columns = test.joint_columns(steps * ((times - times.mean()) / span)[:, None])
         fall, amounts = test.score(columns)
@@ -294,7 +306,7 @@ def _trials(test: _ScoreTest) -> Iterator[Trial]:
             "it warm up, and measure quickly."
         )
         yield Trial("drift", text, len(amounts), fall, columns @ amounts)
-    for block in (*test.more[1:], *test.frame):
+    for block in (*test.extra_blocks[1:], *test.frame):
         what, alike = "instrument", ""
         if block.kind == "mark":
             what = f"mark {block.name or 'tool'}"
@@ -311,7 +323,7 @@ def _trials(test: _ScoreTest) -> Iterator[Trial]:
 
 def _scale_trials(test: _ScoreTest) -> Iterator[Trial]:
     """Try a scale of each joint, and one of all."""
-    scales = test.joint_columns(test.given.readings)
+    scales = test.joint_columns(test.measurements.readings)
     for i, name in enumerate(test.start.robot.joint_names):
         fall, amounts = test.score(column := scales[..., i : i + 1])
         text = (
@@ -329,14 +341,14 @@ def _scale_trials(test: _ScoreTest) -> Iterator[Trial]:
 
 def _order_trials(test: _ScoreTest) -> Iterator[Trial]:
     """Try measurements that stand beside their readings, and heights of the other sign."""
-    given, noise = test.given, test.fit.noise
-    sizes = np.array([noise[str(kind)] for kind in given.kind_of])
-    logged = np.hstack([*given.parts.values()])
-    for mistake in order_mistakes(given, test.start):
-        change = logged - np.hstack([*mistake.undo(given).parts.values()])
+    measurements, noise = test.measurements, test.fit.noise
+    sizes = np.array([noise[str(kind)] for kind in measurements.kind_of])
+    logged = np.hstack([*measurements.parts.values()])
+    for mistake in order_mistakes(measurements, test.start):
+        change = logged - np.hstack([*mistake.undo(measurements).parts.values()])
         moved = test.weights[:, None] * np.nan_to_num(change / sizes)[test.rows]
-        after = test.left + test.remaining(moved)
-        fall = float((test.left**2).sum() - (after**2).sum()) / test.variance
+        after = test.residuals + test.refit_residuals(moved)
+        fall = float((test.residuals**2).sum() - (after**2).sum()) / test.variance
         yield Trial("order", f"{mistake.text[0].upper()}{mistake.text[1:]}.", 1, fall, moved)
 
 
@@ -353,7 +365,7 @@ def hidden_tilt(fitter: Fitter, fit: Fit) -> float | None:
     least = float(scipy.stats.chi2.isf(_CHANCE / _TRIED, 1))
     tilts = []
     for column, turns in columns:
-        fall = float((test.remaining(column[..., 0]) ** 2).sum()) / test.variance
+        fall = float((test.refit_residuals(column[..., 0]) ** 2).sum()) / test.variance
         tilts.append(float(np.sqrt(least / max(fall, 1e-300))) * turns)
     return max(tilts)
 
@@ -406,7 +418,7 @@ def _tilt_trials(test: _ScoreTest) -> Iterator[Trial]:
     """Try a platform that is held by pairs of rods and stands tilted against the drawing."""
     if not _rod_columns(test):
         return
-    turns = [np.broadcast_to(axis, (len(test.given), 3)) for axis in np.eye(3)]
+    turns = [np.broadcast_to(axis, (len(test.measurements), 3)) for axis in np.eye(3)]
     columns = np.stack([_turned_column(test, turn) for turn in turns], axis=-1)
     fall, amounts = test.score(columns)
     if np.abs(amounts).max() > _GREATEST_TILT:
@@ -423,7 +435,7 @@ def _tilt_trials(test: _ScoreTest) -> Iterator[Trial]:
 
 def _turned_column(test: _ScoreTest, turn: Array) -> Array:
     """Return the column (N, K) of a platform that stands turned by vectors (M, 3) in all rows."""
-    given, guess, poses = test.given, test.fit.guess, test.fit.poses
+    measurements, guess, poses = test.measurements, test.fit.guess, test.fit.poses
     robot = guess.robot
     frame = np.array(robot.platform.frame)
     arms = np.array([leg.platform_point for leg in robot.legs]) @ frame
@@ -433,28 +445,28 @@ def _turned_column(test: _ScoreTest, turn: Array) -> Array:
     steps = np.nan_to_num(np.einsum("njx,njx->nj", against, shifts))
     column: Array = -test.joint_columns(steps).sum(axis=-1)
     # A mark's slopes are along the platform's frame.
-    moved = (np.cross(turn, guess.marked(given.marks) @ frame) @ frame.T)[test.rows]
-    alone = given.origins[test.rows] < 0
-    for block in test.more:
+    moved = (np.cross(turn, guess.mark_points(measurements.marks) @ frame) @ frame.T)[test.rows]
+    alone = measurements.origins[test.rows] < 0
+    for block in test.extra_blocks:
         if block.kind == "mark":
-            mine = alone & np.array([given.marks[k] == block.name for k in test.rows])
+            mine = alone & np.array([measurements.marks[k] == block.name for k in test.rows])
             slopes = test.slopes[..., block.where]
             column += mine[:, None] * np.einsum("nkx,nx->nk", slopes, moved)
     return column
 
 
 def _bad_leg(fitter: Fitter, fit: Fit) -> Iterator[Finding]:
-    """Yield the leg whose coordinate alone explains residuals that are not noise."""
-    if not set(fitter.given.setup.noise) - {"readings"}:
+    """Yield a finding for the leg whose coordinate alone explains residuals beyond noise."""
+    if not set(fitter.measurements.setup.noise) - {"readings"}:
         return  # noise that was found explains everything
     names = fitter.begin.robot.joint_names
-    kept = np.flatnonzero(fit.kept)
-    chosen = kept[evenly(len(kept), _ROWS)]
-    at = fitter.slopes.rows(fit.guess, fitter.given, fit.poses, chosen)
+    fitted_rows = np.flatnonzero(fit.kept)
+    chosen = fitted_rows[spread_rows(len(fitted_rows), _ROWS)]
+    at = fitter.slopes.rows(fit.guess, fitter.measurements, fit.poses, chosen)
     sizes = np.array([fit.noise[kind] for kind in fitter.kind_of])
     r, columns = at.residuals / sizes, at.by_reading[..., : len(names)] / sizes[:, None]
-    along = np.einsum("nki,nk->ni", columns, r)
-    squares = along**2 / np.maximum(np.einsum("nki,nki->ni", columns, columns), 1e-300)
+    projections = np.einsum("nki,nk->ni", columns, r)
+    squares = projections**2 / np.maximum(np.einsum("nki,nki->ni", columns, columns), 1e-300)
     mean = squares.mean(axis=0)
     first, second = np.argsort(-mean)[:2]
     if mean[first] > _NOISY and mean[first] > 2.0 * mean[second]:
@@ -466,11 +478,15 @@ def _bad_leg(fitter: Fitter, fit: Fit) -> Iterator[Finding]:
         yield Finding("wrong model", text, float(squares[:, first].sum()))
 
 
-def _extended(blocks: tuple[Block, ...], given: Measurements, joints: int) -> tuple[Block, ...]:
-    """Return blocks behind others: every joint's zero, each mark, and the instrument's frame."""
-    one = Unknown("", "", "", np.inf)
-    more = [Block("zeros", "", (one,) * joints, legs=tuple(range(joints)))]
-    more += [Block("mark", name, (one,) * 3) for name in sorted(set(given.marks))]
+def _extra_blocks(
+    blocks: tuple[Block, ...], measurements: Measurements, joints: int
+) -> tuple[Block, ...]:
+    """Return further blocks: every joint's zero, each mark, and the instrument's frame."""
+    unknown = Unknown("", "", "", np.inf)
+    extra_blocks = [Block("zeros", "", (unknown,) * joints, legs=tuple(range(joints)))]
+    extra_blocks += [
+        Block("mark", name, (unknown,) * 3) for name in sorted(set(measurements.marks))
+    ]
     if not any(block.kind == "frame" for block in blocks):
-        more.append(Block("frame", "", (one,) * 6))
-    return numbered(more, blocks[-1].where.stop)
+        extra_blocks.append(Block("frame", "", (unknown,) * 6))
+    return number_unknowns(extra_blocks, blocks[-1].where.stop)

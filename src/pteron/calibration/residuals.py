@@ -14,7 +14,7 @@ import numpy as np
 import scipy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
-from pteron.calibration.guess import Block, Guess, across
+from pteron.calibration.guess import Block, Guess, plane_axes
 from pteron.calibration.measurements import Measurements, length_columns, position_axes
 from pteron.equations.machine import numbers
 from pteron.equations.variations import slope_matrix, slope_terms
@@ -76,17 +76,17 @@ class MachineSlopes:
     def poses(self, guess: Guess, joints: Array, start: Array) -> Array:
         """Return the poses (N, m) of joint coordinates by Newton's steps; NaN where they fail."""
         geometry, poses = np.array(numbers(guess.robot)), np.array(start)
-        left = np.arange(len(poses))
+        open_rows = np.arange(len(poses))
         for _ in range(_STEPS):
-            found, jacobian, *_ = self._kernel(geometry, poses[left])
-            missed = self._wrapped(joints[left] - found)
-            step = _solved(jacobian, missed[..., None])[..., 0]
-            poses[left] += step
-            going = np.abs(step).max(axis=-1, initial=0.0) > _CLOSED * max(self.size, 1.0)
-            left = left[going | np.isnan(step).any(axis=-1)]
-            if not len(left) or np.isnan(poses[left]).any(axis=-1).all():
+            joints_at, jacobian, *_ = self._kernel(geometry, poses[open_rows])
+            residuals = self._wrap_angles(joints[open_rows] - joints_at)
+            step = _solve_stack(jacobian, residuals[..., None])[..., 0]
+            poses[open_rows] += step
+            unconverged = np.abs(step).max(axis=-1, initial=0.0) > _CLOSED * max(self.size, 1.0)
+            open_rows = open_rows[unconverged | np.isnan(step).any(axis=-1)]
+            if not len(open_rows) or np.isnan(poses[open_rows]).any(axis=-1).all():
                 break
-        poses[left] = np.nan
+        poses[open_rows] = np.nan
         return poses
 
     def joints(self, guess: Guess, poses: Array) -> Array:
@@ -97,40 +97,42 @@ class MachineSlopes:
         """Return the joints' slopes (N, n, m) against the pose."""
         return self._outputs(guess, poses)[1]
 
-    def pose_slopes(self, guess: Guess, given: Measurements, poses: Array) -> tuple[Array, Array]:
+    def pose_slopes(
+        self, guess: Guess, measurements: Measurements, poses: Array
+    ) -> tuple[Array, Array]:
         """Return the slopes of poses at given joints (N, m, p), and of their marks (N, 3, p)."""
-        _, moved, slopes = self._marks(guess, given, poses, np.arange(len(poses)))
+        _, mark_slopes, slopes = self._marks(guess, measurements, poses, np.arange(len(poses)))
         lengths = self._axes[self._lengths] @ slopes[:, :3]
-        whole = np.concatenate([lengths, slopes[:, 6:]], axis=1)
-        return whole[..., : self.count], moved[..., : self.count]
+        pose_slopes = np.concatenate([lengths, slopes[:, 6:]], axis=1)
+        return pose_slopes[..., : self.count], mark_slopes[..., : self.count]
 
-    def _wrapped(self, missed: Array) -> Array:
+    def _wrap_angles(self, missed: Array) -> Array:
         turned = (missed + np.pi) % (2.0 * np.pi) - np.pi
         return np.where(self._round, turned, missed)
 
-    def rows(self, guess: Guess, given: Measurements, poses: Array, chosen: Numbers) -> Rows:
+    def rows(self, guess: Guess, measurements: Measurements, poses: Array, chosen: Numbers) -> Rows:
         """Return the residuals of chosen rows (by number) at their poses (N, m), of all rows."""
-        measured = ~np.isnan(np.hstack([part[chosen] for part in given.parts.values()]))
-        point, apart, slopes = self.slopes(guess, given, poses, chosen, measured)
+        measured = ~np.isnan(np.hstack([part[chosen] for part in measurements.parts.values()]))
+        point, separations, slopes = self.slopes(guess, measurements, poses, chosen, measured)
         residuals = np.zeros(measured.shape)
         if measured[:, :3].any():
-            full = np.where(measured[:, :3], given.positions[chosen], 0.0) @ self._axes
+            full = np.where(measured[:, :3], measurements.positions[chosen], 0.0) @ self._axes
             residuals[:, :3] = ((point - guess.shift) @ guess.turn - full) @ self._axes.T
         if measured[:, 3:-2].any():
-            residuals[:, 3:-2] = self._angles(guess, poses[chosen], given.angles[chosen])
+            residuals[:, 3:-2] = self._angles(guess, poses[chosen], measurements.angles[chosen])
         if measured[:, -2].any():
-            planes = np.stack([guess.planes[given.planes[i]] for i in chosen])
+            planes = np.stack([guess.planes[measurements.planes[i]] for i in chosen])
             over = np.einsum("ni,ni->n", planes[:, :3], point) - planes[:, 3]
-            residuals[:, -2] = over - given.heights[chosen]
+            residuals[:, -2] = over - measurements.heights[chosen]
         if measured[:, -1].any():
-            residuals[:, -1] = np.linalg.norm(apart, axis=-1) - given.distances[chosen]
+            residuals[:, -1] = np.linalg.norm(separations, axis=-1) - measurements.distances[chosen]
         residuals[~measured], slopes[~measured] = 0.0, 0.0
         return Rows(residuals, slopes[..., : self.count], slopes[..., self.count :], measured)
 
     def slopes(
         self,
         guess: Guess,
-        given: Measurements,
+        measurements: Measurements,
         poses: Array,
         chosen: Numbers,
         measured: NDArray[np.bool_],
@@ -141,9 +143,9 @@ class MachineSlopes:
         coordinates, of two rows.
         """
         legs, frame = len(guess.robot.legs), self._frame
-        point, moved, moves = self._marks(guess, given, poses, chosen)
+        point, moved, moves = self._marks(guess, measurements, poses, chosen)
         slopes = np.zeros((*measured.shape, self.count + 2 * legs), dtype=point.dtype)
-        own = slopes[..., : self.count + legs]
+        row_slopes = slopes[..., : self.count + legs]
         if measured[:, :3].any():
             # In the instrument's frame: turn' (p - shift).
             turn = self._numbers(guess.turn)
@@ -152,91 +154,91 @@ class MachineSlopes:
                 arms = point - self._numbers(guess.shift)
                 local[:, :, frame.start : frame.start + 3] -= turn.T
                 local[:, :, frame.start + 3 : frame.stop] += turn.T @ _skew(arms)
-            own[:, :3] = self._in_base(self._axes) @ local
+            row_slopes[:, :3] = self._base_vectors(self._axes) @ local
         if measured[:, 3:-2].any():
-            own[:, 3:-2] = moves[:, 6:]
+            row_slopes[:, 3:-2] = moves[:, 6:]
             if frame is not None:
                 rates = self._rates(guess, poses[chosen])
                 slopes[:, 3:-2, frame.start + 3 : frame.stop] -= rates
         if measured[:, -2].any():
-            normals = np.stack([guess.planes[given.planes[i]][:3] for i in chosen])
-            own[:, -2] = np.einsum("ni,nik->nk", self._in_base(normals), moved)
+            normals = np.stack([guess.planes[measurements.planes[i]][:3] for i in chosen])
+            row_slopes[:, -2] = np.einsum("ni,nik->nk", self._base_vectors(normals), moved)
             for block in self.blocks:
                 if block.kind == "plane":
-                    here = np.array([given.planes[i] == block.name for i in chosen])
-                    tilt = self._in_base(across(guess.planes[block.name][:3]).T).T
+                    here = np.array([measurements.planes[i] == block.name for i in chosen])
+                    tilt = self._base_vectors(plane_axes(guess.planes[block.name][:3]).T).T
                     slopes[here, -2, block.where] += np.column_stack(
                         [point[here] @ tilt, -np.ones(here.sum(), dtype=point.dtype)]
                     )
-        apart = point.copy()
+        separations = point.copy()
         if measured[:, -1].any():
             drifted = np.zeros((*moved.shape[:2], moved.shape[2] + legs), dtype=point.dtype)
             drifted[..., : moved.shape[2]] = moved
-            origins = given.origins[chosen]
+            origins = measurements.origins[chosen]
             between = measured[:, -1] & (origins >= 0)
             if between.any():
-                end, shifted, _ = self._marks(guess, given, poses, origins[between])
-                apart[between] -= end
+                end, shifted, _ = self._marks(guess, measurements, poses, origins[between])
+                separations[between] -= end
                 drifted[between, :, : self.count] -= shifted[..., : self.count]
                 drifted[between, :, -legs:] -= shifted[..., -legs:]
             for i in np.flatnonzero(measured[:, -1] & ~between):
-                name = given.anchors[chosen[i]]
-                apart[i] -= self._in_base(guess.anchors[name])
+                name = measurements.anchors[chosen[i]]
+                separations[i] -= self._base_vectors(guess.anchors[name])
                 for block in self.blocks:
                     if block.kind == "anchor" and block.name == name:
                         drifted[i, :, block.where] -= np.eye(3, dtype=point.dtype)
-            slopes[:, -1] = np.einsum("ni,nik->nk", self._unit(apart), drifted)
-        return point, apart, slopes
+            slopes[:, -1] = np.einsum("ni,nik->nk", self._unit(separations), drifted)
+        return point, separations, slopes
 
     def _marks(
-        self, guess: Guess, given: Measurements, poses: Array, chosen: Numbers
+        self, guess: Guess, measurements: Measurements, poses: Array, chosen: Numbers
     ) -> tuple[Array, Array, Array]:
         """Return the rows' marks (N, 3) in the base frame, and slopes against all unknowns.
 
         Behind these against the joint coordinates: the marks' (N, 3, p + n), and those of the
         platform's twist and of the pose's angles (N, 6 + k, p + n).
         """
-        at = self._outputs(guess, poses[chosen])
-        joints, jacobian, raw, twists, place, turned, *shifts = at
+        outputs = self._outputs(guess, poses[chosen])
+        joints, jacobian, raw, twists, place, turned, *shifts = outputs
         rates = np.eye(len(guess.robot.coordinates), dtype=twists.dtype)[self._angular]
-        more = np.broadcast_to(rates, (len(chosen), *rates.shape))
-        moves = np.concatenate([twists, more], axis=1)
+        angle_rates = np.broadcast_to(rates, (len(chosen), *rates.shape))
+        moves = np.concatenate([twists, angle_rates], axis=1)
         by_joint = np.swapaxes(
-            self._solved(np.swapaxes(jacobian, -1, -2), np.swapaxes(moves, -1, -2)), -1, -2
+            self._solve_stack(np.swapaxes(jacobian, -1, -2), np.swapaxes(moves, -1, -2)), -1, -2
         )
         slopes = np.zeros((*moves.shape[:2], self.count), dtype=moves.dtype)
         for block in self.blocks:
             if block.kind == "geometry":
-                slopes[:, :, block.where] = self._by_geometry(guess, by_joint, raw, shifts)
+                slopes[:, :, block.where] = self._geometry_slopes(guess, by_joint, raw, shifts)
             elif block.kind in ("zeros", "scales"):
-                found = by_joint[:, :, list(block.legs)]
+                joint_slopes = by_joint[:, :, list(block.legs)]
                 if block.kind == "scales":
-                    read = self._readings(given.readings[chosen], joints)
-                    found = found * read[:, None, list(block.legs)]
-                slopes[:, :, block.where] = found
+                    read = self._readings(measurements.readings[chosen], joints)
+                    joint_slopes = joint_slopes * read[:, None, list(block.legs)]
+                slopes[:, :, block.where] = joint_slopes
         slopes = np.concatenate([slopes, by_joint], axis=-1)
-        marks = self._numbers(guess.marked(given.marks[i] for i in chosen.tolist()))
+        marks = self._numbers(guess.mark_points(measurements.marks[i] for i in chosen.tolist()))
         arms = np.einsum("nij,nj->ni", turned, marks)
         moved = slopes[:, :3] - _skew(arms) @ slopes[:, 3:6]
         for block in self.blocks:
             if block.kind == "mark":
-                here = np.array([given.marks[i] == block.name for i in chosen])
+                here = np.array([measurements.marks[i] == block.name for i in chosen])
                 moved[here, :, block.where] += turned[here]
         return place + arms, moved, slopes
 
-    def _by_geometry(
+    def _geometry_slopes(
         self, guess: Guess, by_joint: Array, raw: Array, shifts: Sequence[Array]
     ) -> Array:
         """Return slopes (N, 6 + k, v) against the variations of the geometry."""
         matrix, several = self._matrix(guess), bool(shifts) or bool((self._owner < 0).any())
-        found = np.zeros((*by_joint.shape[:2], len(self._owner)), dtype=by_joint.dtype)
+        slopes = np.zeros((*by_joint.shape[:2], len(self._owner)), dtype=by_joint.dtype)
         for i, part in enumerate(self._columns):
             mine = np.full(len(self._owner), fill_value=True) if several else self._owner == i
             against = raw[:, i] @ matrix[part][:, mine]
-            found[:, :, mine] -= by_joint[:, :, i, None] * against[:, None]
+            slopes[:, :, mine] -= by_joint[:, :, i, None] * against[:, None]
         for shift in shifts:
-            found[:, :6] += shift @ matrix[self._columns[0]]
-        return found
+            slopes[:, :6] += shift @ matrix[self._columns[0]]
+        return slopes
 
     def _angles(self, guess: Guess, at: Array, measured: Array) -> Array:
         """Return the residuals (N, k) of the angles measured at poses (N, m)."""
@@ -244,24 +246,24 @@ class MachineSlopes:
         read = np.where(np.isnan(measured), at[:, angular], measured)
         if self._frame is None:
             return np.asarray((at[:, angular] - read + np.pi) % (2.0 * np.pi) - np.pi)
-        whole = at.copy()
-        whole[:, angular] = read
-        told, now = (np.swapaxes(platform.at(x)[1], -1, -2) for x in (whole, at))
-        off = scipy.spatial.transform.Rotation.from_matrix(
-            now @ np.swapaxes(guess.turn @ told, -1, -2)
+        measured_poses = at.copy()
+        measured_poses[:, angular] = read
+        measured_turn, turn = (np.swapaxes(platform.at(x)[1], -1, -2) for x in (measured_poses, at))
+        rotations = scipy.spatial.transform.Rotation.from_matrix(
+            turn @ np.swapaxes(guess.turn @ measured_turn, -1, -2)
         ).as_rotvec()
-        return np.asarray(np.einsum("nij,nj->ni", self._rates(guess, at), off))
+        return np.asarray(np.einsum("nij,nj->ni", self._rates(guess, at), rotations))
 
     def _rates(self, guess: Guess, poses: Array) -> Array:
         """Return the matrix (N, k, 3) that takes an angular velocity to the angles' rates."""
         turning = self._outputs(guess, poses)[3][:, 3:, self._angular]
         transposed = np.swapaxes(turning, -1, -2)
-        return self._solved(transposed @ turning, transposed)
+        return self._solve_stack(transposed @ turning, transposed)
 
     # What `exact_rank` does otherwise, in integers modulo a prime
 
     def _outputs(self, guess: Guess, poses: Array) -> list[Array]:
-        """Return what the kernel gives at poses."""
+        """Return the kernel's outputs at poses: joint coordinates, Jacobians, slopes, frames."""
         return [*self._kernel(np.array(numbers(guess.robot)), poses)]
 
     def _matrix(self, guess: Guess) -> Array:
@@ -272,22 +274,22 @@ class MachineSlopes:
     def _readings(self, readings: Array, joints: Array) -> Array:
         return readings
 
-    def _in_base(self, vectors: Array) -> Array:
+    def _base_vectors(self, vectors: Array) -> Array:
         """Return vectors of the base frame (..., 3)."""
         return vectors
 
     def _numbers(self, values: Array) -> Array:
         return values
 
-    def _unit(self, apart: Array) -> Array:
-        length = np.linalg.norm(apart, axis=-1)
-        return np.asarray(apart / np.where(length > 0.0, length, 1.0)[:, None])
+    def _unit(self, vectors: Array) -> Array:
+        length = np.linalg.norm(vectors, axis=-1)
+        return np.asarray(vectors / np.where(length > 0.0, length, 1.0)[:, None])
 
-    def _solved(self, matrix: Array, right: Array) -> Array:
-        return _solved(matrix, right)
+    def _solve_stack(self, matrix: Array, right: Array) -> Array:
+        return _solve_stack(matrix, right)
 
 
-def _solved(matrix: Array, right: Array) -> Array:
+def _solve_stack(matrix: Array, right: Array) -> Array:
     """Return matrix^-1 right of a stack; NaN where a matrix is singular."""
     with np.errstate(invalid="ignore"):  # of poses that are lost
         singular = np.linalg.det(matrix) == 0.0

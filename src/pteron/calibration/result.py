@@ -15,9 +15,9 @@ from pteron.calibration.guess import Block, Guess, Unknown, tolerances_of, varia
 from pteron.calibration.measurements import (
     TOOL,
     Measurements,
-    evenly,
     length_columns,
     position_axes,
+    spread_rows,
 )
 from pteron.calibration.observability import Observability
 from pteron.calibration.residuals import MachineSlopes
@@ -188,20 +188,22 @@ class Calibration:
             Standard deviation of the tool's place, m, or of the angles, rad, when driven as
             calibrated.
         """
-        asked = np.atleast_2d(np.asarray(poses, dtype=float))
+        desired = np.atleast_2d(np.asarray(poses, dtype=float))
         slopes = MachineSlopes(self.drawn, self.blocks)
-        rest = Measurements.of(self.drawn, np.zeros((len(asked), len(self.drawn.legs))))
-        readings = self.start.readings(slopes.joints(self.start, asked))
-        rest = replace(rest, readings=readings)
-        found = self.fit.guess
-        gone = slopes.poses(found, found.joints(readings), asked)
-        tools = (TOOL,) * len(asked)
+        measurements = Measurements.of(self.drawn, np.zeros((len(desired), len(self.drawn.legs))))
+        readings = self.start.readings(slopes.joints(self.start, desired))
+        measurements = replace(measurements, readings=readings)
+        fitted = self.fit.guess
+        actual = slopes.poses(fitted, fitted.joints(readings), desired)
+        tools = (TOOL,) * len(desired)
         moves = bool(self.drawn.platform.lengths)
-        before = gone - asked
+        errors = actual - desired
         if moves:
-            before = found.points(tools, gone) - self.start.points(tools, asked)
-        moved = slopes.pose_slopes(found, rest, np.where(np.isfinite(gone), gone, asked))[moves]
-        return before, np.sqrt(np.maximum(variances(moved, self.fit.covariance), 0.0))
+            errors = fitted.points(tools, actual) - self.start.points(tools, desired)
+        slopes_at_poses = slopes.pose_slopes(
+            fitted, measurements, np.where(np.isfinite(actual), actual, desired)
+        )[moves]
+        return errors, np.sqrt(np.maximum(variances(slopes_at_poses, self.fit.covariance), 0.0))
 
     def misfit(self, other: Guess | Sequence[float]) -> float:
         """Return the growth of the sum of squared residuals, tolerances included, at other values.
@@ -214,7 +216,7 @@ class Calibration:
 
         steps = np.asarray(other, dtype=float)
         fitter = Fitter(self.measurements, self.blocks, self.start, self.fit.poses)
-        there = self.start.moved(self.blocks, steps)
+        there = self.start.apply_step(self.blocks, steps)
         return fitter.cost(there, steps, self.fit) - fitter.cost(
             self.fit.guess, self.fit.total, self.fit
         )
@@ -238,16 +240,16 @@ class Calibration:
         }
 
 
-def open_errors(given: Measurements, fit: Fit, blocks: Sequence[Block]) -> dict[str, float]:
+def open_errors(measurements: Measurements, fit: Fit, blocks: Sequence[Block]) -> dict[str, float]:
     """Return the possible error (95 %) of each coordinate at the measured poses, m and rad."""
     robot = fit.guess.robot
     slopes = MachineSlopes(robot, blocks)
-    rows = evenly(len(given), _OPEN_ROWS)
-    tools = Measurements.of(robot, given.readings[rows])
+    rows = spread_rows(len(measurements), _OPEN_ROWS)
+    tools = Measurements.of(robot, measurements.readings[rows])
     covariance = _contradicted_covariance(fit, blocks)
     poses, moved = slopes.pose_slopes(fit.guess, tools, fit.poses[rows])
-    along = position_axes(robot)[length_columns(robot)] @ moved
-    of_each = np.concatenate([along, poses[:, along.shape[1] :]], axis=1)
+    length_slopes = position_axes(robot)[length_columns(robot)] @ moved
+    of_each = np.concatenate([length_slopes, poses[:, length_slopes.shape[1] :]], axis=1)
     of_each = of_each[np.isfinite(of_each).all(axis=(1, 2)) & fit.kept[rows]]
     lengths = [name for name in robot.coordinates if name in "xyz"]
     names = [*lengths, *(name for name in robot.coordinates if name not in lengths)]
@@ -283,30 +285,30 @@ def values_of(start: Guess, fit: Fit, blocks: Sequence[Block]) -> tuple[Value, .
     """Return all values of a fit."""
     drawn = np.concatenate([block.values(start) for block in blocks])
     deviations = np.sqrt(np.diag(fit.covariance))
-    left = deviations / tolerances_of(blocks)
+    shares = deviations / tolerances_of(blocks)
     unknowns = [unknown for block in blocks for unknown in block.unknowns]
-    numbers = np.stack([drawn, drawn + fit.total, deviations, left], axis=-1).tolist()
+    numbers = np.stack([drawn, drawn + fit.total, deviations, shares], axis=-1).tolist()
     return tuple(
-        Value(u.name, u.group, u.unit, before, found, deviation, _origin(share, u))
-        for u, (before, found, deviation, share) in zip(unknowns, numbers, strict=True)
+        Value(u.name, u.group, u.unit, old, new, deviation, _origin(share, u))
+        for u, (old, new, deviation, share) in zip(unknowns, numbers, strict=True)
     )
 
 
-def _origin(left: float, unknown: Unknown) -> Origin:
-    if left <= _BY_DATA or unknown.group == "setup":
+def _origin(share: float, unknown: Unknown) -> Origin:
+    if share <= _BY_DATA or unknown.group == "setup":
         return "data"
-    return "tolerance" if left >= _BY_TOLERANCE else "both"
+    return "tolerance" if share >= _BY_TOLERANCE else "both"
 
 
-def calibrated(guess: Guess) -> Manipulator:
+def calibrated_robot(guess: Guess) -> Manipulator:
     """Return the machine of a guess, with zeros of readings moved into the geometry if possible."""
     legs = []
     each = zip(guess.robot.legs, guess.zeros.tolist(), guess.scales.tolist(), strict=True)
     for leg, zero, scale in each:
-        taken = leg.with_zero(zero)
-        left = zero if taken is None else 0.0
-        reading = Reading(left, scale) if left or scale != 1.0 else None
-        legs.append(replace(taken or leg, reading=reading, limits=leg.limits))
+        absorbed = leg.with_zero(zero)
+        remaining_zero = zero if absorbed is None else 0.0
+        reading = Reading(remaining_zero, scale) if remaining_zero or scale != 1.0 else None
+        legs.append(replace(absorbed or leg, reading=reading, limits=leg.limits))
     robot = replace(guess.robot, legs=tuple(legs))
     tool = tuple(guess.marks[TOOL].tolist())
     if any(tool) or robot.platform.tool:

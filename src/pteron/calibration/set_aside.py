@@ -53,23 +53,23 @@ class SetAside(NamedTuple):
 
 
 def rows_set_aside(
-    start: Guess, given: Measurements, blocks: Sequence[Block], poses: Array
+    start: Guess, measurements: Measurements, blocks: Sequence[Block], poses: Array
 ) -> SetAside:
     """Return the rows that the drawn machine does not reach, that lie beyond limits, or far off."""
     reasons: dict[int, str] = {}
     lost: Mask = np.asarray(np.isnan(poses).any(axis=1))
-    depths = _depths_under_planes(start, given, poses)
+    depths = _depths_under_planes(start, measurements, poses)
     barred = depths > thresholds.UNDER_PLANE
-    squares = row_misfits(start, given, blocks, poses)
+    squares = row_misfits(start, measurements, blocks, poses)
     finite = np.isfinite(squares)
     middle = float(np.median(squares[finite])) if finite.any() else 0.0
     far = finite & (squares > thresholds.FAR_ROW**2 * max(1.0, middle))
-    if far.sum() > thresholds.FEW_LEFT_OUT * len(given):  # no rows, but the log, is far off
+    if far.sum() > thresholds.FEW_LEFT_OUT * len(measurements):  # no rows, but the log, is far off
         far[:] = False
-    beyond = dict(_beyond_limits(start, given))
-    if len(beyond) > thresholds.MANY_LEFT_OUT * len(given):  # the limits are wrong
+    beyond = dict(_limit_excesses(start, measurements))
+    if len(beyond) > thresholds.MANY_LEFT_OUT * len(measurements):  # the limits are wrong
         beyond = {}
-    factors = _Factors(start, given, blocks, poses, squares)
+    factors = _Factors(start, measurements, blocks, poses, squares)
     for i in np.flatnonzero(lost | barred | far):
         k = int(i)
         reason = beyond.get(k, "its readings lead to no pose as drawn")
@@ -77,36 +77,38 @@ def rows_set_aside(
             reason = f"{1e3 * depths[k]:.3g} mm under the plane that other rows touch"
         elif far[k]:
             reason = beyond.get(k, "far off on the machine as drawn")
-        reasons[k] = reason + factors.told(k)
+        reasons[k] = reason + factors.factor_clause(k)
     for k, reason in beyond.items():
         reasons.setdefault(k, reason)
     aside = lost | barred | far
     aside[list(beyond)] = True
-    from_barred = given.origins >= 0
-    from_barred &= barred[given.origins] | lost[given.origins]
-    return SetAside(aside | from_barred, barred | (from_barred & barred[given.origins]), reasons)
+    from_barred = measurements.origins >= 0
+    from_barred &= barred[measurements.origins] | lost[measurements.origins]
+    return SetAside(
+        aside | from_barred, barred | (from_barred & barred[measurements.origins]), reasons
+    )
 
 
-def _depths_under_planes(start: Guess, given: Measurements, poses: Array) -> Array:
+def _depths_under_planes(start: Guess, measurements: Measurements, poses: Array) -> Array:
     """Return how deep rows without a height lie under a known plane that other rows touch (N,)."""
-    depths = np.zeros(len(given))
-    names = np.array(given.planes, dtype=object)
-    heights = np.abs(given.heights)
-    points = start.points(given.marks, np.nan_to_num(poses))
+    depths = np.zeros(len(measurements))
+    names = np.array(measurements.planes, dtype=object)
+    heights = np.abs(measurements.heights)
+    points = start.points(measurements.marks, np.nan_to_num(poses))
     for name, (*normal, offset) in start.planes.items():
-        plane = given.setup.planes.get(name)
+        plane = measurements.setup.planes.get(name)
         touched = (names == name) & (heights < thresholds.UNDER_PLANE)
         if (plane is not None and not plane.known) or not touched.any():
             continue
         under = offset - points @ np.array(normal)
-        depths = np.where(np.isnan(given.heights), np.maximum(depths, under), depths)
+        depths = np.where(np.isnan(measurements.heights), np.maximum(depths, under), depths)
     depths[np.isnan(poses).any(axis=1)] = 0.0
     return depths
 
 
-def _beyond_limits(start: Guess, given: Measurements) -> Iterator[tuple[int, str]]:
+def _limit_excesses(start: Guess, measurements: Measurements) -> Iterator[tuple[int, str]]:
     """Yield rows whose readings are beyond a joint's limits, and by how much."""
-    joints = start.joints(given.readings)
+    joints = start.joints(measurements.readings)
     for j, (leg, name) in enumerate(zip(start.robot.legs, start.robot.joint_names, strict=True)):
         if leg.limits is None:
             continue
@@ -118,26 +120,26 @@ def _beyond_limits(start: Guess, given: Measurements) -> Iterator[tuple[int, str
 
 
 class _Factors:
-    """A search for the factor of a row's readings that puts it where it belongs."""
+    """A search for the factor of a row's readings that explains its outlying measurement."""
 
     def __init__(
         self,
         start: Guess,
-        given: Measurements,
+        measurements: Measurements,
         blocks: Sequence[Block],
         poses: Array,
         squares: Array,
     ) -> None:
-        self.start, self.given, self.blocks = start, given, blocks
+        self.start, self.measurements, self.blocks = start, measurements, blocks
         good = ~np.isnan(poses).any(axis=1)
         self.middle = np.median(poses[good], axis=0)
         self.slopes = MachineSlopes(start.robot, ())
         self.squares = squares
         self.poses = poses
 
-    def told(self, row: int) -> str:
-        """Return a clause with the factor that puts a row where it belongs; "" for none."""
-        joints = self.start.joints(self.given.readings[row])
+    def factor_clause(self, row: int) -> str:
+        """Return a clause naming the factor of readings that explains a row; "" for none."""
+        joints = self.start.joints(self.measurements.readings[row])
         legs = self.start.robot.legs
         ends = [("", np.zeros(len(joints)))]
         if all(leg.limits is not None for leg in legs):
@@ -149,7 +151,7 @@ class _Factors:
                 tried = end + factor * (joints - end)
                 pose = self.slopes.poses(self.start, tried[None], self.middle[None])
                 if np.isfinite(pose).all():
-                    off = self._off(row, tried, pose)
+                    off = self._error_at(row, tried, pose)
                     if off is not None:
                         candidates.append((*off, factor, words + " its way" + origin))
         if not candidates:
@@ -157,24 +159,25 @@ class _Factors:
         _, where, factor, words = min(candidates)
         return f"; {words}, factor {factor:.3g}, would put it {where}"
 
-    def _off(self, row: int, joints: Array, pose: Array) -> tuple[float, str] | None:
-        """Return how far a row is off at other joint coordinates, in words; None where far."""
-        one = np.arange(len(self.given)) == row
+    def _error_at(self, row: int, joints: Array, pose: Array) -> tuple[float, str] | None:
+        """Return a row's error at other joint coordinates, and words for it; None where large."""
+        is_row = np.arange(len(self.measurements)) == row
         poses = self.poses.copy()
-        poses[one] = pose
-        depth, before = (
-            _heights_over_planes(self.start, self.given, row, at) for at in (pose, self.poses[one])
+        poses[is_row] = pose
+        depth, old_depth = (
+            _heights_over_planes(self.start, self.measurements, row, at)
+            for at in (pose, self.poses[is_row])
         )
-        if np.isnan(self.given.heights[row]) and depth is not None and before is not None:
+        if np.isnan(self.measurements.heights[row]) and depth is not None and old_depth is not None:
             # Nothing says where it was, but that it is on the plane.
-            if abs(depth) < _PUT_BACK * abs(before):
+            if abs(depth) < _PUT_BACK * abs(old_depth):
                 return abs(depth), f"{1e3 * abs(depth):.2g} mm from it"
             return None
-        readings = self.given.readings.copy()
+        readings = self.measurements.readings.copy()
         readings[row] = self.start.readings(joints)
-        measured = self.given.rows(one)
-        told = np.isfinite(np.hstack([*measured.parts.values()])).sum()
-        if len(measured) > 1 or told < _TELLING:
+        measured = self.measurements.rows(is_row)
+        numbers = np.isfinite(np.hstack([*measured.parts.values()])).sum()
+        if len(measured) > 1 or numbers < _TELLING:
             return None
         square = row_misfits(self.start, measured, self.blocks, pose)[0]
         limit = thresholds.FAR_ROW**2
@@ -183,13 +186,15 @@ class _Factors:
         return None
 
 
-def _heights_over_planes(start: Guess, given: Measurements, row: int, pose: Array) -> float | None:
+def _heights_over_planes(
+    start: Guess, measurements: Measurements, row: int, pose: Array
+) -> float | None:
     """Return a row's height over its known plane at a pose (1, m), m; None where there is none."""
-    name = given.planes[row]
-    plane = given.setup.planes.get(name)
+    name = measurements.planes[row]
+    plane = measurements.setup.planes.get(name)
     if (plane is not None and not plane.known) or name not in start.planes:
         return None
     if not np.isfinite(pose).all():
         return None
     *normal, offset = start.planes[name]
-    return float((start.points([given.marks[row]], pose) @ np.array(normal))[0] - offset)
+    return float((start.points([measurements.marks[row]], pose) @ np.array(normal))[0] - offset)

@@ -22,9 +22,9 @@ _OF_A_MANIPULATOR = {"platform", "legs"}
 """Keys by which a file is known to describe a machine."""
 
 
-def _named(given: Any) -> Any:
-    """Return one noise as that of all that was measured."""
-    return given if isinstance(given, dict) else dict.fromkeys(KINDS, given)
+def _noise_by_kind(noise: Any) -> Any:
+    """Return a mapping of noise by kind; a single number is the noise of every kind."""
+    return noise if isinstance(noise, dict) else dict.fromkeys(KINDS, noise)
 
 
 Noise = Annotated[Number, Field(gt=0.0)]
@@ -43,7 +43,7 @@ class NoiseTable(TomlTable):
 class MeasuredTable(TomlTable):
     """`[measured]`: how exactly."""
 
-    noise: Annotated[NoiseTable, BeforeValidator(_named)] = Field(
+    noise: Annotated[NoiseTable, BeforeValidator(_noise_by_kind)] = Field(
         default_factory=NoiseTable,
         description="standard deviation: one number for all that was measured, or one by kind",
     )
@@ -102,8 +102,8 @@ class MeasuredLog(TomlTable):
     def setup(self) -> Setup:
         """Return what the measurements refer to."""
 
-        def places(given: dict[str, PlaceTable]) -> dict[str, Place]:
-            return {name: Place(one.at, not one.free) for name, one in given.items()}
+        def places(tables: dict[str, PlaceTable]) -> dict[str, Place]:
+            return {name: Place(table.at, not table.free) for name, table in tables.items()}
 
         return Setup(
             self.measured.noise.model_dump(exclude_none=True),
@@ -120,7 +120,7 @@ def read_setup_file(log: str | Path) -> MeasuredLog:
     Raises
     ------
     DataError
-        If it is not TOML, has unknown keys or values that cannot be; all faults are told at once.
+        If it is not TOML, has unknown keys or impossible values; all faults are reported at once.
     """
     path = Path(log).with_suffix(".toml")
     if not path.is_file():
@@ -131,7 +131,7 @@ def read_setup_file(log: str | Path) -> MeasuredLog:
     return to_model(MeasuredLog, document, shown(str(path), bare=True, longest=1000), DataError)
 
 
-def joined(setups: Sequence[Setup], sources: Sequence[str]) -> Setup:
+def join_setups(setups: Sequence[Setup], sources: Sequence[str]) -> Setup:
     """Return what the measurements of several logs refer to.
 
     Raises
@@ -139,12 +139,12 @@ def joined(setups: Sequence[Setup], sources: Sequence[str]) -> Setup:
     DataError
         If one name, or the frame, means different things in two of them.
     """
-    whole, *others = setups
-    for setup, source in zip(others, sources[1:], strict=True):
-        if setup.frame_known != whole.frame_known:
+    setup, *others = setups
+    for other, source in zip(others, sources[1:], strict=True):
+        if other.frame_known != setup.frame_known:
             raise DataError(f"{source}: another instrument.frame than in {sources[0]}; give one")
         for part in ("noise", "marks", "planes", "anchors"):
-            old, new = getattr(whole, part), getattr(setup, part)
+            old, new = getattr(setup, part), getattr(other, part)
             for name in old.keys() & new.keys():
                 if old[name] != new[name]:
                     raise DataError(
@@ -152,5 +152,5 @@ def joined(setups: Sequence[Setup], sources: Sequence[str]) -> Setup:
                         "log; make them one, or rename one"
                     )
             changed: dict[str, Any] = {part: {**old, **new}}
-            whole = replace(whole, **changed)
-    return whole
+            setup = replace(setup, **changed)
+    return setup

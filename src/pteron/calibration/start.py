@@ -34,7 +34,7 @@ _PLANE = 3
 """Least heights that fix a plane's normal."""
 
 
-def starting_poses(guess: Guess, given: Measurements, *, modes: bool = True) -> Array:
+def starting_poses(guess: Guess, measurements: Measurements, *, modes: bool = True) -> Array:
     """Return the pose (N, m) of each row on a guess of the machine; NaN where it has none.
 
     Newton's method finds it from the measured pose, or from the home pose. Where that leads far
@@ -47,18 +47,18 @@ def starting_poses(guess: Guess, given: Measurements, *, modes: bool = True) -> 
     DataError
         If the readings of more than half of the rows lead to no pose.
     """
-    robot, joints = guess.robot, guess.joints(given.readings)
+    robot, joints = guess.robot, guess.joints(measurements.readings)
     home = home_pose(robot)
     slopes = MachineSlopes(robot, ())
     side = np.sign(np.linalg.det(slopes.jacobian(guess, home[None])))
-    begin, whole = _measured_poses(guess, given, home)
+    begin, fully_measured = _measured_poses(guess, measurements, home)
     poses = slopes.poses(guess, joints, begin)
     with np.errstate(invalid="ignore"):  # of a pose that was not found
         sides = np.sign(np.linalg.det(slopes.jacobian(guess, poses)))
     far = np.abs(poses - begin) > np.where(robot.platform.angular, _TURNED, 0.2 * slopes.size)
     other = np.isnan(poses).any(axis=-1)
-    other |= np.where(whole, far.any(axis=-1), sides != side)
-    off = np.abs(_height_residuals(guess, given, poses, np.arange(len(given))))
+    other |= np.where(fully_measured, far.any(axis=-1), sides != side)
+    off = np.abs(_height_residuals(guess, measurements, poses, np.arange(len(measurements))))
     other |= ~(off <= _OTHER_MODE * slopes.size)
     if not modes:
         poses[other] = np.nan
@@ -69,84 +69,90 @@ def starting_poses(guess: Guess, given: Measurements, *, modes: bool = True) -> 
             poses[i] = np.nan
             continue
         # Of a row without a height all residuals are 0.
-        off = np.abs(_height_residuals(guess, given, several, np.full(len(several), i)))
+        off = np.abs(_height_residuals(guess, measurements, several, np.full(len(several), i)))
         several = several[off <= off.min() + _OTHER_MODE * slopes.size]
         same = np.sign(np.linalg.det(slopes.jacobian(guess, several))) == side
-        several = several[same] if same.any() and not whole[i] else several
+        several = several[same] if same.any() and not fully_measured[i] else several
         poses[i] = several[np.abs(several - begin[i]).max(axis=-1).argmin()]
     lost: NDArray[np.bool_] = np.asarray(np.isnan(poses).any(axis=-1))
     if 2 * lost.sum() > len(lost):
         first = int(np.argmax(lost))
-        reading = np.round(given.readings[first], 6).tolist()
+        reading = np.round(measurements.readings[first], 6).tolist()
         raise DataError(
-            f"{given.places[first]}: the readings {reading} lead to no pose of {robot.name} as "
-            f"drawn, nor do those of {lost.sum()} of {len(lost)} rows; check their units, zeros, "
-            "signs and order"
+            f"{measurements.places[first]}: the readings {reading} lead to no pose of {robot.name} "
+            f"as drawn, nor do those of {lost.sum()} of {len(lost)} rows; check their units, "
+            "zeros, signs and order"
         )
     return poses
 
 
 def _measured_poses(
-    guess: Guess, given: Measurements, home: Array
+    guess: Guess, measurements: Measurements, home: Array
 ) -> tuple[Array, NDArray[np.bool_]]:
-    """Return the poses (N, m) as measured, home where they are not, and which are whole (N,)."""
+    """Return the measured poses (N, m), home where not measured, and which are complete."""
     robot = guess.robot
-    begin = np.tile(home, (len(given), 1))
-    seen = ~np.isnan(given.angles)
+    begin = np.tile(home, (len(measurements), 1))
+    seen = ~np.isnan(measurements.angles)
     begin[:, robot.platform.angular] = np.where(
-        seen, given.angles, begin[:, robot.platform.angular]
+        seen, measurements.angles, begin[:, robot.platform.angular]
     )
     lengths = length_columns(robot)
-    arms = guess.points(given.marks, begin) - robot.platform.at(begin)[0]
-    places = (given.positions - arms @ position_axes(robot).T)[:, lengths]
-    if not given.setup.frame_known:
-        return begin, np.zeros(len(given), dtype=bool)
+    arms = guess.points(measurements.marks, begin) - robot.platform.at(begin)[0]
+    places = (measurements.positions - arms @ position_axes(robot).T)[:, lengths]
+    if not measurements.setup.frame_known:
+        return begin, np.zeros(len(measurements), dtype=bool)
     at = np.flatnonzero(~robot.platform.angular)
     begin[:, at] = np.where(np.isnan(places), begin[:, at], places)
-    whole = seen.all(axis=-1) & ~np.isnan(places).any(axis=-1)
-    return begin, np.asarray(whole)
+    fully_measured = seen.all(axis=-1) & ~np.isnan(places).any(axis=-1)
+    return begin, np.asarray(fully_measured)
 
 
-def _height_residuals(guess: Guess, given: Measurements, poses: Array, rows: Numbers) -> Array:
+def _height_residuals(
+    guess: Guess, measurements: Measurements, poses: Array, rows: Numbers
+) -> Array:
     """Return computed minus measured heights (K,) of rows at poses; 0 over no known plane."""
-    names = [given.planes[i] for i in rows]
-    unknown = {name for name, plane in given.setup.planes.items() if not plane.known}
-    over = ~np.isnan(given.heights[rows]) & np.array([name not in unknown for name in names])
+    names = [measurements.planes[i] for i in rows]
+    unknown = {name for name, plane in measurements.setup.planes.items() if not plane.known}
+    over = ~np.isnan(measurements.heights[rows]) & np.array([name not in unknown for name in names])
     residuals = np.zeros(len(rows))
     if over.any():
         planes = np.stack([guess.planes[name] for name in names])
-        points = guess.points([given.marks[i] for i in rows], poses)
+        points = guess.points([measurements.marks[i] for i in rows], poses)
         heights = np.einsum("ni,ni->n", planes[:, :3], points) - planes[:, 3]
-        residuals[over] = (heights - given.heights[rows])[over]
+        residuals[over] = (heights - measurements.heights[rows])[over]
     return residuals
 
 
-def placed(guess: Guess, given: Measurements, poses: Array) -> Guess:
-    """Return the guess with frames and planes that are not known where the drawing puts them."""
-    points = guess.points(given.marks, poses)
-    seen = ~np.isnan(given.positions).any(axis=-1)
-    if not given.setup.frame_known and seen.sum() >= _FEW:
-        free = {name for name, mark in given.setup.marks.items() if not mark.known}
-        fixed = np.array([name not in free for name in given.marks])[seen]
+def place_surroundings(guess: Guess, measurements: Measurements, poses: Array) -> Guess:
+    """Return the guess with unknown frames and planes fitted at poses of the drawn machine."""
+    points = guess.points(measurements.marks, poses)
+    seen = ~np.isnan(measurements.positions).any(axis=-1)
+    if not measurements.setup.frame_known and seen.sum() >= _FEW:
+        free = {name for name, mark in measurements.setup.marks.items() if not mark.known}
+        fixed = np.array([name not in free for name in measurements.marks])[seen]
         used = np.flatnonzero(seen)[fixed] if fixed.sum() >= _FEW else np.flatnonzero(seen)
-        p, y = points[used], given.positions[used]
+        p, y = points[used], measurements.positions[used]
         turn, _ = scipy.spatial.transform.Rotation.align_vectors(
             p - p.mean(axis=0), y - y.mean(axis=0)
         )
         matrix = turn.as_matrix()
         guess = replace(guess, turn=matrix, shift=p.mean(axis=0) - matrix @ y.mean(axis=0))
     planes = dict(guess.planes)
-    over = ~np.isnan(given.heights)
-    for name, plane in given.setup.planes.items():
-        here = over & np.array([which == name for which in given.planes])
+    over = ~np.isnan(measurements.heights)
+    for name, plane in measurements.setup.planes.items():
+        here = over & np.array([which == name for which in measurements.planes])
         if plane.known or not here.any():
             continue
         # n . p - d = h, as near to the described normal as three heights allow.
         normal = np.array(plane.normal)
         rows = np.column_stack([points[here], -np.ones(here.sum())])
         if here.sum() >= _PLANE and np.linalg.matrix_rank(rows - rows.mean(axis=0), 1e-3) >= 2:
-            step = np.linalg.lstsq(rows, given.heights[here] - points[here] @ normal, rcond=1e-3)
+            step = np.linalg.lstsq(
+                rows, measurements.heights[here] - points[here] @ normal, rcond=1e-3
+            )
             normal = normal + step[0][:3]
             normal = normal / np.linalg.norm(normal)
-        planes[name] = np.append(normal, np.median(points[here] @ normal - given.heights[here]))
+        planes[name] = np.append(
+            normal, np.median(points[here] @ normal - measurements.heights[here])
+        )
     return replace(guess, planes=planes)

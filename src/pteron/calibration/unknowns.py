@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import get_args
 
-from pteron.calibration.guess import Block, Unknown, numbered
+from pteron.calibration.guess import Block, Unknown, number_unknowns
 from pteron.calibration.measurements import TOOL, Measurements
 from pteron.equations.variations import AXIAL, Group, axial_variations, variations
 from pteron.errors import DataError
@@ -58,17 +58,21 @@ def blocks_of(
     DataError
         If a name is none of the machine's.
     """
-    given = dict(prior or {})
+    tolerances = dict(prior or {})
     placed = {"position", "height"} & set(measured.kinds)
-    asked = [g for g in GROUPS if g != "tool" or placed] if free is None else list(free)
+    names_free = [g for g in GROUPS if g != "tool" or placed] if free is None else list(free)
 
     def unknown(name: str, group: str, unit: str) -> Unknown:
         where = f"{group}, rad" if group == "zeros" and unit == "rad" else group
-        tolerance = given.get(name, given.get(where, given.get(group, TOLERANCES[where])))
+        tolerance = tolerances.get(
+            name, tolerances.get(where, tolerances.get(group, TOLERANCES[where]))
+        )
         return Unknown(name, group, unit, float(tolerance))
 
-    def chosen(unknowns: Sequence[Unknown]) -> tuple[int, ...]:
-        return tuple(i for i, u in enumerate(unknowns) if u.group in asked or u.name in asked)
+    def free_indices(unknowns: Sequence[Unknown]) -> tuple[int, ...]:
+        return tuple(
+            i for i, u in enumerate(unknowns) if u.group in names_free or u.name in names_free
+        )
 
     varying = (*variations(robot), *axial_variations(robot))
     geometry = [unknown(v.name, v.group, v.unit) for v in varying]
@@ -77,50 +81,52 @@ def blocks_of(
     scales = [unknown(f"scales[{i}]", "scales", "") for i, _ in joints]
     names = {u.name for u in (*geometry, *zeros, *scales)}
     known = {*GROUPS, *AXIAL, *names, "zeros, rad"}
-    wrong = [name for name in (*asked, *given) if name not in known]
+    wrong = [name for name in (*names_free, *tolerances) if name not in known]
     if wrong:
         raise DataError(
             f"free, prior: {', '.join(map(repr, wrong))}: no group or value of this machine; "
             f"groups are {', '.join((*GROUPS, *AXIAL))}, values like {varying[0].name}"
         )
-    for name, value in given.items():
+    for name, value in tolerances.items():
         if not value > 0.0:
             raise DataError(f"prior: {name} = {value:g}: a standard deviation above 0 expected")
-    found: list[Block] = []
-    if at := chosen(geometry):
-        own = tuple(geometry[i] for i in at)
-        found.append(Block("geometry", "", own, changes=tuple(varying[i] for i in at)))
+    blocks: list[Block] = []
+    if at := free_indices(geometry):
+        free_geometry = tuple(geometry[i] for i in at)
+        blocks.append(Block("geometry", "", free_geometry, changes=tuple(varying[i] for i in at)))
     for kind, unknowns in (("zeros", zeros), ("scales", scales)):
-        if at := chosen(unknowns):
-            found.append(Block(kind, "", tuple(unknowns[i] for i in at), legs=at))
-    if "tool" in asked and TOOL in measured.marks:
-        tolerance = float(given.get("tool", TOLERANCES["tool"]))
-        found.append(Block("mark", TOOL, _three("tool", tolerance, "tool")))
-    found += _surroundings(measured)
-    if not found:
+        if at := free_indices(unknowns):
+            blocks.append(Block(kind, "", tuple(unknowns[i] for i in at), legs=at))
+    if "tool" in names_free and TOOL in measured.marks:
+        tolerance = float(tolerances.get("tool", TOLERANCES["tool"]))
+        blocks.append(Block("mark", TOOL, _point_unknowns("tool", tolerance, "tool")))
+    blocks += _surrounding_blocks(measured)
+    if not blocks:
         raise DataError("free: nothing is free; name a group")
-    return numbered(found)
+    return number_unknowns(blocks)
 
 
-def _three(name: str, tolerance: float = _WIDE, group: str = "setup") -> tuple[Unknown, ...]:
+def _point_unknowns(
+    name: str, tolerance: float = _WIDE, group: str = "setup"
+) -> tuple[Unknown, ...]:
     return tuple(Unknown(f"{name}.{axis}", group, "m", tolerance) for axis in "xyz")
 
 
-def _surroundings(measured: Measurements) -> Iterator[Block]:
+def _surrounding_blocks(measured: Measurements) -> Iterator[Block]:
     """Yield the blocks of what measurements refer to and nobody knows."""
     setup = measured.setup
     for name, mark in setup.marks.items():
         if not mark.known and name in measured.marks:
-            yield Block("mark", name, _three(f"marks.{name}"))
+            yield Block("mark", name, _point_unknowns(f"marks.{name}"))
     for name, plane in setup.planes.items():
         if not plane.known and name in measured.planes:
-            told = f"planes.{name or 'plane'}"
-            tilts = [Unknown(f"{told}.tilt {k}", "setup", "rad", _WIDE) for k in (1, 2)]
-            offset = Unknown(f"{told}.offset", "setup", "m", _WIDE)
+            label = f"planes.{name or 'plane'}"
+            tilts = [Unknown(f"{label}.tilt {k}", "setup", "rad", _WIDE) for k in (1, 2)]
+            offset = Unknown(f"{label}.offset", "setup", "m", _WIDE)
             yield Block("plane", name, (*tilts, offset))
     for name, anchor in setup.anchors.items():
         if not anchor.known and name in measured.anchors:
-            yield Block("anchor", name, _three(f"anchors.{name}"))
+            yield Block("anchor", name, _point_unknowns(f"anchors.{name}"))
     if not setup.frame_known:
         turns = [Unknown(f"instrument about {a}", "setup", "rad", _WIDE) for a in "xyz"]
-        yield Block("frame", "", (*_three("instrument"), *turns))
+        yield Block("frame", "", (*_point_unknowns("instrument"), *turns))

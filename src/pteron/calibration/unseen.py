@@ -30,7 +30,7 @@ _INSIDE = 1e-5
 def unseen_combinations(
     start: Guess, blocks: Sequence[Block], axes: Array, tolerances: Array
 ) -> tuple[str, ...]:
-    """Return the combinations that the rows of `axes` span, in words.
+    """Return the combinations that the rows of `axes` span, as texts.
 
     Known combinations, such as a motion of the whole machine, come first, with their number; then
     a basis of the rest.
@@ -47,37 +47,37 @@ def unseen_combinations(
         The tolerances of the p unknowns, SI units.
     """
     lines: dict[str, list[str]] = {}
-    left = axes
-    for text, whose, vector in _known(start, blocks):
+    remaining = axes
+    for text, whose, vector in _named_combinations(start, blocks):
         scaled = vector / tolerances
         size = np.linalg.norm(scaled)
-        if not len(left) or not size > 0.0:
+        if not len(remaining) or not size > 0.0:
             continue
         scaled = scaled / size
         if np.linalg.norm(scaled - axes.T @ (axes @ scaled)) > _INSIDE:
             continue
         # The rest of the space is orthogonal to the named combinations.
-        along = left @ scaled
-        if np.linalg.norm(along) < _INSIDE:
+        projection = remaining @ scaled
+        if np.linalg.norm(projection) < _INSIDE:
             continue
-        _, _, rest = np.linalg.svd(along[None])
-        left = rest[1:] @ left
+        _, _, right_vectors = np.linalg.svd(projection[None])
+        remaining = right_vectors[1:] @ remaining
         lines.setdefault(text, []).append(whose)
-    told_lines = []
+    sentences = []
     for text, all_of in lines.items():
         owners = list(dict.fromkeys(filter(None, all_of)))
         of = f", of {', '.join(owners)}" if owners else ""
-        told_lines.append(f"{text}{of} ({len(all_of)})")
+        sentences.append(f"{text}{of} ({len(all_of)})")
     names = [unknown.name for block in blocks for unknown in block.unknowns]
-    others = [told(row * tolerances, names) for row in _sparse(left)]
-    more = len(others) - _NAMED
-    if more > 1:
-        others[_NAMED:] = [f"and {more} more combinations of many values"]
-    return (*told_lines, *others)
+    others = [combination_text(row * tolerances, names) for row in _sparsify_rows(remaining)]
+    excess = len(others) - _NAMED
+    if excess > 1:
+        others[_NAMED:] = [f"and {excess} more combinations of many values"]
+    return (*sentences, *others)
 
 
-def told(vector: Array, names: Sequence[str]) -> str:
-    """Return a combination in words: its greatest terms, scaled so that the first is 1."""
+def combination_text(vector: Array, names: Sequence[str]) -> str:
+    """Return a combination as text: its greatest terms, scaled so that the first is 1."""
     parts = vector / vector[np.abs(vector).argmax()]
     order = np.argsort(-np.abs(parts), kind="stable")
     named = [k for k in order if abs(parts[k]) >= _PART]
@@ -87,33 +87,35 @@ def told(vector: Array, names: Sequence[str]) -> str:
         sign = "" if not text else " - " if parts[k] < 0.0 else " + "
         size = "" if abs(parts[k]) > _WHOLE else f"{abs(parts[k]):.2g} "
         text += f"{sign}{size}{names[k]}"
-    more = len(named) - _NAMED
-    return text + (f" and {more} more" if more > 0 else "")
+    excess = len(named) - _NAMED
+    return text + (f" and {excess} more" if excess > 0 else "")
 
 
-def _known(start: Guess, blocks: Sequence[Block]) -> Iterator[tuple[str, str, Array]]:
+def _named_combinations(start: Guess, blocks: Sequence[Block]) -> Iterator[tuple[str, str, Array]]:
     """Yield the combinations that have a name: its text, its owner, and the vector (p,)."""
     robot = start.robot
     names = [unknown.name for block in blocks for unknown in block.unknowns]
     place = {name: k for k, name in enumerate(names)}
 
     def vector(**parts: float) -> Array:
-        found = np.zeros(len(names))
+        combination = np.zeros(len(names))
         for name, value in parts.items():
             if value:
-                found[place[name]] = value
-        return found
+                combination[place[name]] = value
+        return combination
 
     for name, k in place.items():
         yield "never shows", name, np.eye(len(names))[k]
     frame = np.array(robot.platform.frame)
     for i, leg in enumerate(robot.legs, start=1):
-        base, own = f"legs[{i}].guide_point", f"legs[{i}].platform_point"
-        if not all(f"{key}.{a}" in place for key in (base, own) for a in "xyz"):
+        base, platform = f"legs[{i}].guide_point", f"legs[{i}].platform_point"
+        if not all(f"{key}.{a}" in place for key in (base, platform) for a in "xyz"):
             continue
         for axis in range(3):
             parts = {f"{base}.{'xyz'[axis]}": 1.0}
-            parts |= {f"{own}.{a}": float(v) for a, v in zip("xyz", frame[:, axis], strict=True)}
+            parts |= {
+                f"{platform}.{a}": float(v) for a, v in zip("xyz", frame[:, axis], strict=True)
+            }
             yield (
                 "guide_point and platform_point show as their difference only",
                 f"leg {i}",
@@ -129,30 +131,32 @@ def _known(start: Guess, blocks: Sequence[Block]) -> Iterator[tuple[str, str, Ar
             )
     for letter in "xyz":
         parts = {f"legs[{i + 1}].platform_point.{letter}": 1.0 for i in range(len(robot.legs))}
-        parts |= {name: 1.0 for name in place if name.endswith(f".{letter}") and _on_platform(name)}
+        parts |= {
+            name: 1.0 for name in place if name.endswith(f".{letter}") and _is_on_platform(name)
+        }
         if all(name in place for name in parts):
             text = "tool and platform points show against each other only, as P is none of them"
             yield text, "", vector(**parts)
     for block in blocks:
         if block.kind == "frame":
-            yield from _rigid(start, blocks, names)
-    yield "the size of all: a measured length gives it", "", _size(start, blocks)
+            yield from _rigid_motions(start, blocks, names)
+    yield "the size of all: a measured length gives it", "", _uniform_growth(start, blocks)
 
 
-def _on_platform(name: str) -> bool:
+def _is_on_platform(name: str) -> bool:
     return name.startswith(("tool.", "marks."))
 
 
-def _rigid(
+def _rigid_motions(
     start: Guess, blocks: Sequence[Block], names: Sequence[str]
 ) -> Iterator[tuple[str, str, Array]]:
     """Yield motions of the whole machine against an instrument whose frame is not known."""
     text = "where the machine's own frame stands in the base"
     for turn, axis in ((turn, axis) for turn in (False, True) for axis in range(3)):
-        along = np.eye(3)[axis]
-        found = np.zeros(len(names))
+        direction = np.eye(3)[axis]
+        combination = np.zeros(len(names))
         for block in blocks:
-            part = found[block.where]
+            part = combination[block.where]
             if block.kind == "geometry":
                 for k, change in enumerate(block.changes):
                     if change.group in AXIAL:
@@ -160,19 +164,19 @@ def _rigid(
                     if change.key in ("guide_point", "center"):
                         owners = (*start.robot.legs, start.robot.platform)
                         point = getattr(owners[change.leg], change.key)
-                        moved = np.cross(along, point) if turn else along
+                        moved = np.cross(direction, point) if turn else direction
                         part[k] = moved[change.axis or 0]
                     elif change.group == "directions" and turn:
                         part[k] = np.array(start.robot.platform.frame)[change.axis or 0][axis]
             elif block.kind == "frame":
-                moved = np.cross(along, start.shift) if turn else along
+                moved = np.cross(direction, start.shift) if turn else direction
                 part[:3] = moved
-                part[3:] = along if turn else 0.0
-        yield text, "", found
+                part[3:] = direction if turn else 0.0
+        yield text, "", combination
 
 
-def _size(start: Guess, blocks: Sequence[Block]) -> Array:
-    """Return the vector (p,) of a growth of all lengths by one factor."""
+def _uniform_growth(start: Guess, blocks: Sequence[Block]) -> Array:
+    """Return the vector (p,) of a uniform scaling of all lengths."""
     legs = start.robot.legs
     lengths = [
         unknown.unit == "m" or (block.kind == "scales" and legs[block.legs[k]].joint.unit == "m")
@@ -182,8 +186,8 @@ def _size(start: Guess, blocks: Sequence[Block]) -> Array:
     return np.where(lengths, np.concatenate([block.values(start) for block in blocks]), 0.0)
 
 
-def _sparse(rows: Array) -> Array:
-    """Return rows that span the same space, made sparse by elimination."""
+def _sparsify_rows(rows: Array) -> Array:
+    """Return sparse rows of the same span, by elimination."""
     order = np.argsort(-np.abs(rows).max(axis=0, initial=0.0), kind="stable").tolist()
     taken = independent(rows, order, len(rows), least=1e-6)[0]
     work = np.asarray(np.linalg.solve(rows[:, taken], rows), dtype=float)

@@ -64,16 +64,18 @@ class _Reason(NamedTuple):
     grade: Grade = "trustworthy"
 
 
-def rows_for_check(given: Measurements, blocks: Sequence[Block]) -> int:
-    """Return from how many rows on, like those given, some are held out of the fit."""
-    counted = sum(int((~np.isnan(values)).sum()) for values in given.parts.values())
-    least = _PER_VALUE[set(given.kinds) <= set(given.setup.noise)] * blocks[-1].where.stop
-    return max(2 * EVERY, int(np.ceil(least * len(given) / counted)))
+def rows_for_check(measurements: Measurements, blocks: Sequence[Block]) -> int:
+    """Return the least number of such rows from which some are held out of the fit."""
+    counted = sum(int((~np.isnan(values)).sum()) for values in measurements.parts.values())
+    least = (
+        _PER_VALUE[set(measurements.kinds) <= set(measurements.setup.noise)] * blocks[-1].where.stop
+    )
+    return max(2 * EVERY, int(np.ceil(least * len(measurements) / counted)))
 
 
 def verdict_of(evidence: Evidence) -> Verdict:
     """Return the verdict: its first reason is the cause of a bad grade, or what stays open."""
-    errors = [*_errors(evidence), *_left_out(evidence.fit)]
+    errors = [*_error_reasons(evidence), *_outlier_reasons(evidence.fit)]
     findings = [
         _Reason(f.text, "", "not trustworthy" if f.effect > 1.0 else "usable with care")
         for f in evidence.findings
@@ -81,17 +83,17 @@ def verdict_of(evidence: Evidence) -> Verdict:
     bad = any(reason.grade == "not trustworthy" for reason in (*errors, *findings))
     first = findings or ([_Reason(_UNEXPLAINED)] if bad else [])
     reasons = [
-        *_open_errors(evidence),
+        *_open_error_reasons(evidence),
         *findings,
         *errors,
-        *_far_values(evidence),
-        *_hidden_rods(evidence),
+        *_far_value_reasons(evidence),
+        *_hidden_rod_reasons(evidence),
     ]
     if bad:
-        said = [*first, *_open_errors(evidence)]  # that errors remain needs no other words
+        said = [*first, *_open_error_reasons(evidence)]  # that errors remain needs no other words
         reasons = [*first, *(reason for reason in reasons if reason not in said)]
     opinion = Opinion()
-    for text, step, grade in (*reasons, *_unseen(evidence.observability)):
+    for text, step, grade in (*reasons, *_unseen_reasons(evidence.observability)):
         opinion.add(text, step, grade=grade)
     if "position" not in evidence.measurements.kinds and any(
         leg.bar for leg in evidence.fit.guess.robot.legs
@@ -100,8 +102,8 @@ def verdict_of(evidence: Evidence) -> Verdict:
     return opinion.verdict()
 
 
-def _errors(evidence: Evidence) -> Iterator[_Reason]:
-    """Yield what the errors after the fit say, at held-out rows or, without them, at all rows."""
+def _error_reasons(evidence: Evidence) -> Iterator[_Reason]:
+    """Yield reasons from the errors after the fit, at held-out rows or, without them, all rows."""
     held_out, stated = evidence.held_out, evidence.measurements.setup.noise
     if not evidence.fit.settled:
         yield _Reason(
@@ -119,37 +121,36 @@ def _errors(evidence: Evidence) -> Iterator[_Reason]:
         )
         for kind, error in fitted_errors(evidence.fit, evidence.measurements).items():
             if error > thresholds.ordinary_error(kind, stated.get(kind)):
-                text = (
-                    f"Even at the rows that were fitted the {kind} error is {_sized(error, kind)}"
-                )
+                size = _size_text(error, kind)
+                text = f"Even at the rows that were fitted the {kind} error is {size}"
                 yield _Reason(f"{text}, more than ordinary tolerances.", "", "not trustworthy")
         return
-    for kind, after in held_out.after.items():
-        expected, before = held_out.expected[kind], held_out.before[kind]
+    for kind, fitted in held_out.after.items():
+        expected, drawn = held_out.expected[kind], held_out.before[kind]
         text = (
             f"At {held_out.rows} rows that the fit did not see the {kind} error is "
-            f"{_sized(after, kind)}, {_sized(before, kind)[: -len(_unit(kind)) - 1]} before"
+            f"{_size_text(fitted, kind)}, {_size_text(drawn, kind)[: -len(_unit(kind)) - 1]} before"
         )
         most = thresholds.ordinary_error(kind, stated.get(kind))
-        fine = after <= thresholds.FINE_SHARE * most
-        if after > most:
+        fine = fitted <= thresholds.FINE_SHARE * most
+        if fitted > most:
             yield _Reason(
-                f"{text}: more than {_sized(most, kind)}, which ordinary tolerances leave.",
+                f"{text}: more than {_size_text(most, kind)}, which ordinary tolerances leave.",
                 "",
                 "not trustworthy",
             )
             continue
-        if not fine and after > thresholds.FALLEN_SHARE * before:
+        if not fine and fitted > thresholds.FALLEN_SHARE * drawn:
             yield _Reason(f"{text}: it did not fall.", "", "not trustworthy")
             continue
         # The error of few rows strays further by chance.
         chance = np.sqrt(scipy.stats.chi2.ppf(thresholds.SURE, held_out.rows) / held_out.rows)
-        ratio = after / expected
+        ratio = fitted / expected
         if ratio <= max(thresholds.AT_THE_NOISE, chance):
             grade: Grade = "trustworthy" if fine else "usable with care"
             yield _Reason(f"{text}: as noise and intervals expect.", "", grade)
             continue
-        lost = ratio > _FAR and after > thresholds.FALLEN_SHARE * before
+        lost = ratio > _FAR and fitted > thresholds.FALLEN_SHARE * drawn
         yield _Reason(
             f"{text}: {ratio:.2g} times what noise and intervals expect.",
             "",
@@ -157,10 +158,10 @@ def _errors(evidence: Evidence) -> Iterator[_Reason]:
         )
 
 
-def fitted_errors(fit: Fit, given: Measurements) -> dict[str, float]:
-    """Return the root mean square residual of each kind, m and rad, at the rows that are kept."""
+def fitted_errors(fit: Fit, measurements: Measurements) -> dict[str, float]:
+    """Return the root mean square residual of each kind, m and rad, at the fitted rows."""
     counted = fit.measured & (fit.kept & (fit.distances != BEYOND))[:, None]
-    kinds = {kind: counted & (given.kind_of == kind) for kind in given.kinds}
+    kinds = {kind: counted & (measurements.kind_of == kind) for kind in measurements.kinds}
     return {
         kind: float(np.sqrt(np.mean(fit.residuals[here] ** 2)))
         for kind, here in kinds.items()
@@ -168,10 +169,10 @@ def fitted_errors(fit: Fit, given: Measurements) -> dict[str, float]:
     }
 
 
-def _open_errors(evidence: Evidence) -> Iterator[_Reason]:
-    """Yield the possible errors of coordinates that the measurements do not show."""
-    given, fit = evidence.measurements, evidence.fit
-    kinds = [k for k, v in given.parts.items() if np.isfinite(v[fit.kept]).any()]
+def _open_error_reasons(evidence: Evidence) -> Iterator[_Reason]:
+    """Yield a reason for each kind of coordinate with a large possible error."""
+    measurements, fit = evidence.measurements, evidence.fit
+    kinds = [k for k, v in measurements.parts.items() if np.isfinite(v[fit.kept]).any()]
     linear = [name for name in evidence.open_errors if name in "xyz"]
     for names, kind in (
         (linear, "position"),
@@ -182,48 +183,49 @@ def _open_errors(evidence: Evidence) -> Iterator[_Reason]:
         if far:
             most = max(evidence.open_errors[name] for name in far)
             measured = " and ".join(f"{name}s" for name in kinds)
-            where = "" if given.setup.frame_known else " in an unknown frame"
+            where = "" if measurements.setup.frame_known else " in an unknown frame"
             them = "it" if len(far) == 1 else "them"
             order = ""
             hidden = evidence.hidden_order
             if hidden and kind == "position":
+                size = _size_text(hidden.error, "position")
                 order = (
-                    f", nor the order of the legs {_listed([*map(str, hidden.legs)])}: if it is "
-                    f"another, {_listed(far)} may be off by {_sized(hidden.error, 'position')} more"
+                    f", nor the order of the legs {_join([*map(str, hidden.legs)])}: if it is "
+                    f"another, {_join(far)} may be off by {size} more"
                 )
             rods = ""
-            if kind == "position" and "position" not in kinds and _rods_hidden(evidence):
-                rods = f", nor rods of one pair that differ and {_tilted(evidence)}"
+            if kind == "position" and "position" not in kinds and _hides_rod_tilt(evidence):
+                rods = f", nor rods of one pair that differ and {_tilt_text(evidence)}"
             yield _Reason(
-                f"{_listed(far)} may be off by {_sized(most, kind)} (95 %): "
+                f"{_join(far)} may be off by {_size_text(most, kind)} (95 %): "
                 f"{measured}{where} do not show {them}{rods}{order}.",
-                f"Measure {_listed(far)} too: positions, or distances across the work space.",
+                f"Measure {_join(far)} too: positions, or distances across the work space.",
             )
 
 
-def _rods_hidden(evidence: Evidence) -> bool:
+def _hides_rod_tilt(evidence: Evidence) -> bool:
     """Return whether rods of a pair may tilt the platform by more than ordinary tolerances."""
     tilt = evidence.hidden_tilt
     return tilt is not None and tilt > thresholds.ORDINARY_ERROR["angle"]
 
 
-def _tilted(evidence: Evidence) -> str:
+def _tilt_text(evidence: Evidence) -> str:
     tilt = evidence.hidden_tilt or 0.0
-    size = f" by up to {_sized(tilt, 'angle')}" if tilt < _GREAT_TILT else ""
+    size = f" by up to {_size_text(tilt, 'angle')}" if tilt < _GREAT_TILT else ""
     return f"tilt the platform{size}"
 
 
-def _hidden_rods(evidence: Evidence) -> Iterator[_Reason]:
-    """Yield the tilt by unequal rods that positions do not show."""
-    if "position" in evidence.measurements.kinds and _rods_hidden(evidence):
+def _hidden_rod_reasons(evidence: Evidence) -> Iterator[_Reason]:
+    """Yield a reason if unequal rods may tilt the platform and positions do not show it."""
+    if "position" in evidence.measurements.kinds and _hides_rod_tilt(evidence):
         yield _Reason(
-            f"Rods of one pair that differ and {_tilted(evidence)} would not show in these "
+            f"Rods of one pair that differ and {_tilt_text(evidence)} would not show in these "
             "positions.",
             "Measure both rods of each pair, or positions of a mark away from the tool.",
         )
 
 
-def _far_values(evidence: Evidence) -> Iterator[_Reason]:
+def _far_value_reasons(evidence: Evidence) -> Iterator[_Reason]:
     unknowns = [u for block in evidence.blocks for u in block.unknowns]
     far = [
         u.name
@@ -239,7 +241,7 @@ def _far_values(evidence: Evidence) -> Iterator[_Reason]:
         )
 
 
-def _left_out(fit: Fit) -> Iterator[_Reason]:
+def _outlier_reasons(fit: Fit) -> Iterator[_Reason]:
     out, count = int((~fit.kept).sum()), len(fit.kept)
     if out > thresholds.FEW_LEFT_OUT * count:
         many = out > thresholds.MANY_LEFT_OUT * count
@@ -250,13 +252,13 @@ def _left_out(fit: Fit) -> Iterator[_Reason]:
         )
 
 
-def _unseen(shown: Observability) -> Iterator[_Reason]:
+def _unseen_reasons(shown: Observability) -> Iterator[_Reason]:
     open_values = shown.columns - shown.shown
     if open_values:
-        more = f"; at more poses {shown.rank} would" if shown.rank > shown.shown else ""
+        potential = f"; at more poses {shown.rank} would" if shown.rank > shown.shown else ""
         yield _Reason(
             f"{shown.shown} of {shown.columns} combinations show in these measurements, the other "
-            f"{open_values} are kept at the drawing{more}."
+            f"{open_values} are kept at the drawing{potential}."
         )
 
 
@@ -264,9 +266,9 @@ def _unit(kind: str) -> str:
     return "mrad" if kind == "angle" else "mm"
 
 
-def _sized(error: float, kind: str) -> str:
+def _size_text(error: float, kind: str) -> str:
     return f"{1e3 * error:.3g} {_unit(kind)}"
 
 
-def _listed(names: Sequence[str]) -> str:
+def _join(names: Sequence[str]) -> str:
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

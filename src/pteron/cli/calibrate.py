@@ -86,12 +86,12 @@ def calibrate(
     with spinner("Reading the measurements"):
         from pteron.calibration import calibrate as calibrated, read_measurements
         from pteron.report.calibration import firmware_fit, numbers, write_calibration
-        from pteron.report.write import checked_apart, checked_folder
+        from pteron.report.write import checked_folder, checked_output
 
         read = [*(log or ()), *(held_out or ())]
         given_files = (*read, robot, *([prior] if prior else ()))
         sources = [path for path in given_files if Path(path).is_file()]
-        checked_apart(checked_folder(out) / "robot.toml", sources)
+        checked_output(checked_folder(out) / "robot.toml", sources)
         tolerances = None if prior is None else _prior(prior)
         measurements = read_measurements(machine, *(log or ()))
         check = read_measurements(machine, *held_out) if held_out else None

@@ -253,14 +253,14 @@ class CPrinter:
             for i in placed
             for j in range(item.inputs[i].size)
         ]
-        failures = [(f"!({_all(known)})", "UNREACHABLE")] if known else []
+        failures = [(f"!({_join_conditions(known)})", "UNREACHABLE")] if known else []
         if item.several:
             failures.append((self._no_pose(item), "UNREACHABLE"))
             return lines, failures
         reached = [f"(isgreaterequal({name}, {self.number(0.0)}) != 0)" for name in radicands]
-        failures += [(f"!({_all(reached)})", "UNREACHABLE")] if reached else []
+        failures += [(f"!({_join_conditions(reached)})", "UNREACHABLE")] if reached else []
         if finite:
-            regular = _all(f"({test} != 0)" for test in finite)
+            regular = _join_conditions(f"({test} != 0)" for test in finite)
             failures.append((f"!({regular})", "NOT_FINITE"))
         return lines, failures
 
@@ -270,8 +270,8 @@ class CPrinter:
         rows, columns = port.shape
         tests = [f"({self.prefix}_finite({port.name}[{j}]) != 0)" for j in range(port.size)]
         poses = [tests[i * columns : (i + 1) * columns] for i in range(rows)]
-        return _all(f"!({' && '.join(pose)})" for pose in poses)
+        return _join_conditions(f"!({' && '.join(pose)})" for pose in poses)
 
 
-def _all(tests: Iterable[str]) -> str:
+def _join_conditions(tests: Iterable[str]) -> str:
     return "\n        && ".join(tests)

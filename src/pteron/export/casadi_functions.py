@@ -86,7 +86,7 @@ def casadi_functions(robot: RobotLike) -> dict[str, ca.Function]:
     functions = {
         name: _plain(robot, name, what) for name, what in _NAMES.items() if name != missing
     }
-    functions |= {function.name(): function for function in _driven(robot)}
+    functions |= {function.name(): function for function in _drive_functions(robot)}
     return functions
 
 
@@ -104,7 +104,7 @@ def _plain(robot: Manipulator, name: str, what: str) -> ca.Function:
     return ca.Function(name, symbols, results, *names)
 
 
-def _driven(robot: Manipulator) -> Iterator[ca.Function]:
+def _drive_functions(robot: Manipulator) -> Iterator[ca.Function]:
     """Yield the functions of the drives, whose tanh CasADi can differentiate at rest too.
 
     The form that controllers have, by an exponential and a sign, has derivative zero there.

@@ -63,7 +63,7 @@ _HINTS = {
 }
 
 
-def in_units(function: Program, robot: Manipulator, output: Output) -> Program:
+def convert_forces(function: Program, robot: Manipulator, output: Output) -> Program:
     """Return a program whose forces are in the units of the drives' commands."""
     if output == "force":
         return function
@@ -84,13 +84,13 @@ _PER_READING = {
 """Outputs and inputs that the scale of a joint's reading multiplies, with its power."""
 
 
-def at_readings(function: Program, robot: Manipulator) -> Program:
+def convert_joints(function: Program, robot: Manipulator) -> Program:
     """Return a program whose joints, rates and forces are as the drives count them."""
     if not has_readings(robot):
         return function
     zeros, scales = ca.DM(reading_zeros(robot)), ca.DM(reading_scales(robot))
 
-    def per_joint(value: Expression, power: int) -> Expression:
+    def scale_joints(value: Expression, power: int) -> Expression:
         """Return a vector by joints, or a matrix whose columns are joints, with scales in it."""
         if value.shape[1] == len(robot.legs) and value.shape[0] > 1:
             return ca.mtimes(value, ca.diag(scales**power))
@@ -101,26 +101,26 @@ def at_readings(function: Program, robot: Manipulator) -> Program:
         place = port.name in ("joints", "motors")
         power = 1 if place else -_PER_READING.get(port.name, 0)
         zero = ca.reshape(zeros, *symbol.shape) if place else 0.0
-        taken.append(zero + per_joint(symbol, power) if power else symbol)
+        taken.append(zero + scale_joints(symbol, power) if power else symbol)
     for port, result in zip(function.outputs, function.function.call(taken), strict=True):
         if port.name == "joints":
-            results.append(per_joint(result - ca.reshape(zeros, *result.shape), -1))
+            results.append(scale_joints(result - ca.reshape(zeros, *result.shape), -1))
         else:
             power = _PER_READING.get(port.name, 0)
-            results.append(per_joint(result, power) if power else result)
+            results.append(scale_joints(result, power) if power else result)
     ports = function.inputs, results, function.outputs
     return Program.of(function.name, symbols, *ports)
 
 
-def told_meaning(robot: Manipulator, output: Output) -> str:
+def command_meaning(robot: Manipulator, output: Output) -> str:
     """Return the meaning of the drives' commands, with unit and origin."""
     drives = [leg.drive or Drive() for leg in robot.legs]
-    ratios = _listed([drive.gear for drive in drives])
+    ratios = _join_values([drive.gear for drive in drives])
     if output == "torque":
         return f"torques of the motors, N m: forces at the joints over the ratios {ratios}"
-    rated = _listed([drive.rated_torque or 0.0 for drive in drives])
+    rated = _join_values([drive.rated_torque or 0.0 for drive in drives])
     return f"per cent of the motors' rated torques, {rated} N m, by the ratios {ratios}"
 
 
-def _listed(values: list[float]) -> str:
+def _join_values(values: list[float]) -> str:
     return f"{values[0]:g}" if len(set(values)) == 1 else ", ".join(f"{v:g}" for v in values)

@@ -8,7 +8,7 @@ from importlib.resources import files
 from tomllib import loads
 
 from pteron.equations.control import MEMORY
-from pteron.export.command_units import NAMES, Output, told_meaning
+from pteron.export.command_units import NAMES, Output, command_meaning
 from pteron.kernels import Port
 from pteron.manipulator import Manipulator
 from pteron.manipulator.readings import has_readings
@@ -33,7 +33,7 @@ def banner(robot: Manipulator, language: str) -> list[str]:
     ]
 
 
-def meaning(robot: Manipulator, port: Port, output: Output) -> str:
+def port_meaning(robot: Manipulator, port: Port, output: Output) -> str:
     """Return the meaning of an input or an output, with its unit."""
     platform = robot.platform
     units = [leg.joint.unit for leg in robot.legs]
@@ -61,17 +61,17 @@ def meaning(robot: Manipulator, port: Port, output: Output) -> str:
         "rates": rates,
         "accelerations": seconds,
         "told": joints_words,
-        "joints": _by_leg(units),
-        "joint_rates": _by_leg([f"{unit}/s" for unit in units]),
-        "joint_accelerations": _by_leg([f"{unit}/s^2" for unit in units]),
-        "forces": _by_leg([leg.joint.force_unit for leg in robot.legs]),
+        "joints": _join_units(units),
+        "joint_rates": _join_units([f"{unit}/s" for unit in units]),
+        "joint_accelerations": _join_units([f"{unit}/s^2" for unit in units]),
+        "forces": _join_units([leg.joint.force_unit for leg in robot.legs]),
         "wrench": wrench,
         "center": center,
         "inertia": inertia,
     }
     name = port.name.removesuffix("_out")
     if name == NAMES[output] != "forces":
-        return told_meaning(robot, output)
+        return command_meaning(robot, output)
     return TEXTS["ports"].get(name, "").format(**words)
 
 
@@ -83,5 +83,5 @@ def law_meanings(what: str, meanings: Mapping[str, str]) -> dict[str, str]:
     return {name: text.format(**words) for name, text in TEXTS["law"].items()}
 
 
-def _by_leg(units: Sequence[str]) -> str:
+def _join_units(units: Sequence[str]) -> str:
     return units[0] if len(set(units)) == 1 else f"{', '.join(units)} (leg by leg)"

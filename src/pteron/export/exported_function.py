@@ -14,8 +14,8 @@ from pteron.controllers import Controller, Custom
 from pteron.equations.drives import drive_names, drive_numbers
 from pteron.equations.machine import Machine
 from pteron.errors import ModelError
-from pteron.export.command_units import DRIVEN, Output, at_readings, in_units
-from pteron.export.descriptions import TEXTS, law_meanings, meaning
+from pteron.export.command_units import DRIVEN, Output, convert_forces, convert_joints
+from pteron.export.descriptions import TEXTS, law_meanings, port_meaning
 from pteron.export.identified_parameters import Identified, base_program
 from pteron.export.node_names import node_names
 from pteron.export.tools import tool_tables
@@ -169,9 +169,9 @@ class ExportRequest:
                 f"parameters do not tell; {other}, or export the model file that pteron identify "
                 "wrote"
             )
-        function = at_readings(function, self.robot)
+        function = convert_joints(function, self.robot)
         if self.is_custom or self.what in DRIVEN:
-            function = in_units(function, self.robot, self.output)
+            function = convert_forces(function, self.robot, self.output)
         return function
 
     def _library_program(self) -> Program:
@@ -181,7 +181,7 @@ class ExportRequest:
         if base:
             return base_program(self.what, base, wrench=loaded, folded=self.specialised)
         if self.controller:
-            return _without_status(self.controller.law(self.robot).program)
+            return _drop_status(self.controller.law(self.robot).program)
         return program(self.robot, self.what, wrench=loaded, named=True)
 
 
@@ -218,7 +218,7 @@ def exported_function(request: ExportRequest) -> Exported:
         outputs,
         _meanings(request, (*function.inputs, *outputs), shared, taken),
         tables,
-        tuple(_evaluated(function, graph, state) for state in states[1:]),
+        tuple(_example_at(function, graph, state) for state in states[1:]),
         compares=request.is_custom,
     )
 
@@ -246,9 +246,9 @@ def _meanings(
 ) -> dict[str, str]:
     """Return the meanings of inputs and outputs, with their units."""
     robot, what, output = request.robot, request.what, request.output
-    meanings: dict[str, str] = {port.name: meaning(robot, port, output) for port in ports}
+    meanings: dict[str, str] = {port.name: port_meaning(robot, port, output) for port in ports}
     if request.is_custom:
-        readings = {name: meaning(robot, Port(name, (1,)), output) for name in TEXTS["law"]}
+        readings = {name: port_meaning(robot, Port(name, (1,)), output) for name in TEXTS["law"]}
         own_tables = {name: f"see the table {what}_{name}" for name in shared}
         meanings = {**readings, **meanings} | own_tables
     if not request.tables:
@@ -264,7 +264,7 @@ def _meanings(
     return meanings
 
 
-def _without_status(law: Program) -> Program:
+def _drop_status(law: Program) -> Program:
     """Return a program without its last output, all others the same to the bit."""
     symbols = law.function.sx_in()
     results = law.function.call(symbols)[:-1]
@@ -320,7 +320,7 @@ def _states(
     return [*states, beyond]
 
 
-def _evaluated(function: Program, graph: Graph, inputs: list[Array]) -> Example:
+def _example_at(function: Program, graph: Graph, inputs: list[Array]) -> Example:
     values = function.function.call([np.reshape(value, (-1, 1)) for value in inputs])
     results = tuple(np.array(value).ravel("F") for value in values)
     if function.name == "direct_kinematics":  # of several poses one will do

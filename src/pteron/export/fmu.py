@@ -109,7 +109,7 @@ def export_fmu(
     robot = as_manipulator(robot)
     refuse_readings(robot, "an FMU")
     prefix = prefix_of(robot)
-    start = start_pose(robot) if pose is None else _expected(robot, pose)
+    start = start_pose(robot) if pose is None else _checked_pose(robot, pose)
     zeros = np.zeros(robot.freedom)
     forces = drive_forces(robot, start, zeros, zeros)
     exported = exported_functions(
@@ -150,7 +150,7 @@ def export_fmu(
     for name in parts:
         parts[name] = render_template("pteron.export", f"{name}.j2", token=digest[:32], **values)
     sources = texts | {"fmu.c": parts["fmu.c"]}
-    binary, place = _compiled(prefix, sources)
+    binary, place = _compile_library(prefix, sources)
     build = render_template("pteron.export", "buildDescription.xml.j2", prefix=prefix)
     members = {
         "modelDescription.xml": parts["modelDescription.xml"].encode(),
@@ -158,10 +158,10 @@ def export_fmu(
         **{f"sources/{name}": text.encode() for name, text in sources.items()},
         place: binary,
     }
-    return write_files({make_folder(folder) / f"{prefix}.fmu": _zipped(members)})
+    return write_files({make_folder(folder) / f"{prefix}.fmu": _zip_files(members)})
 
 
-def _expected(robot: Manipulator, pose: ArrayLike) -> Array:
+def _checked_pose(robot: Manipulator, pose: ArrayLike) -> Array:
     """Return the pose to start from, after a check that the machine can be there."""
     start = as_array(pose, "pose", np.shape(pose))
     if start.shape != (robot.freedom,):
@@ -171,7 +171,7 @@ def _expected(robot: Manipulator, pose: ArrayLike) -> Array:
     return start
 
 
-def _compiled(prefix: str, sources: Mapping[str, str]) -> tuple[bytes, str]:
+def _compile_library(prefix: str, sources: Mapping[str, str]) -> tuple[bytes, str]:
     """Return the shared library and its place in the FMU.
 
     Raises
@@ -202,7 +202,7 @@ def _platform() -> tuple[str, str]:
     return f"{machine}-{system}", suffix
 
 
-def _zipped(members: Mapping[str, bytes]) -> bytes:
+def _zip_files(members: Mapping[str, bytes]) -> bytes:
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, data in members.items():

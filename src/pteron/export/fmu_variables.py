@@ -102,8 +102,8 @@ class FmuVariables:
                 yield {name: value for name, value in attributes.items() if value is not None}
 
     @property
-    def known(self) -> dict[int, tuple[int, ...]]:
-        """For each variable that is computed, or is a state, the variables that it depends on."""
+    def dependencies(self) -> dict[int, tuple[int, ...]]:
+        """Value references that each computed variable or state depends on, by its own."""
         dependencies = {}
         for block in self.blocks:
             every = sum((self[name] for name in block.depends), ())
@@ -123,8 +123,8 @@ class FmuVariables:
         return sum((block.references for block in self.blocks if block.rate_of), ())
 
     @property
-    def computed(self) -> tuple[int, ...]:
-        """The value references of what is computed from the start values."""
+    def computed_references(self) -> tuple[int, ...]:
+        """The value references of the variables computed from the start values."""
         references = {*self.outputs, *self.derivatives} - {*self["pose"], *self["velocity"]}
         return tuple(sorted(references))
 
@@ -161,7 +161,12 @@ def _words(robot: Manipulator, pose: Array, forces: Array) -> dict[str, list[_Wo
         "machine": [{}],
         "coordinates": [{"name": name, "unit": unit, "at": at} for name, unit, at in coordinates],
         "legs": [
-            {"i": i, **vars(leg.joint), "force_unit": _dotted(leg.joint.force_unit), "held": force}
+            {
+                "i": i,
+                **vars(leg.joint),
+                "force_unit": _fmi_unit(leg.joint.force_unit),
+                "held": force,
+            }
             for i, (leg, force) in legs
         ],
         "wrench": list(_wrench(platform)),
@@ -174,7 +179,7 @@ def _words(robot: Manipulator, pose: Array, forces: Array) -> dict[str, list[_Wo
     }
 
 
-def _dotted(unit: str) -> str:
+def _fmi_unit(unit: str) -> str:
     return unit.replace(" ", ".")
 
 

@@ -54,7 +54,7 @@ _GUARDS = {
 that is false there."""
 
 
-def _of_sum(sizes: Sequence[float]) -> float:
+def _sum_bound(sizes: Sequence[float]) -> float:
     most = max(sizes)
     if most == -math.inf:
         return most
@@ -62,7 +62,7 @@ def _of_sum(sizes: Sequence[float]) -> float:
 
 
 _BOUNDS: dict[str, Callable[[Sequence[float]], float]] = {
-    **dict.fromkeys(("add", "sub"), _of_sum),
+    **dict.fromkeys(("add", "sub"), _sum_bound),
     "mul": sum,
     "sqrt": lambda sizes: max(sizes[0] / 2, 0.0),
     "exp": lambda _: _FACTOR,

@@ -72,7 +72,7 @@ def read_identified(robot: Manipulator, path: str | Path) -> Identified:
         known, drives, kinds = data[_NAME], data["drives"], data["kinds"]
         names, expressions = known["names"], known["expressions"]
         values = np.array(known["values"], dtype=float)
-        legs = [_driven(leg, entry) for leg, entry in zip(robot.legs, drives, strict=False)]
+        legs = [_with_friction(leg, entry) for leg, entry in zip(robot.legs, drives, strict=False)]
         all_names, texts = data["estimate"]["names"], [str(entry) for entry in data["expressions"]]
         if not (np.isfinite(values).all() and len(texts) >= len(values)):
             raise ValueError("values are missing")
@@ -118,8 +118,8 @@ def _object(path: str | Path) -> dict[str, Any]:
     return data if isinstance(data, dict) else {}
 
 
-def _driven(leg: LegKind, friction: dict[str, Any]) -> LegKind:
-    """Return a leg with the friction and the rotor's inertia that were found for its joint."""
+def _with_friction(leg: LegKind, friction: dict[str, Any]) -> LegKind:
+    """Return a leg with its joint's identified friction and rotor inertia."""
     drive, law = leg.drive or Drive(), friction["stribeck"]
     return replace(
         leg,
@@ -142,13 +142,13 @@ def _comments(base: BaseParameters, expressions: Sequence[str]) -> tuple[str, ..
     return tuple(f"{text}, {unit}" for text, unit in zip(safe, units, strict=False))
 
 
-def base_program(what: str, given: Identified, *, wrench: bool, folded: bool) -> Program:
+def base_program(what: str, identified: Identified, *, wrench: bool, folded: bool) -> Program:
     """Return a function of base parameters; with `folded`, of their values.
 
     Of the machine's base set and of the one that costs least, it computes with the one that needs
     fewer operations in all.
     """
-    robot, base = given.robot, given.base
+    robot, base = identified.robot, identified.base
     if what == "set_payload":
         return _payload_program(robot, base)
     cheapest = cheapest_parameters(robot)
@@ -158,11 +158,11 @@ def base_program(what: str, given: Identified, *, wrench: bool, folded: bool) ->
     )
     # Forces of base parameters b are those of the inertial parameters selection b.
     matrix = cheapest.grouping @ base.selection
-    forms = [direct, _recombined(other, matrix)]
+    forms = [direct, _substitute_parameters(other, matrix)]
     if folded:
         forms = [
-            with_values(direct, {_NAME: given.values}),
-            with_values(other, {_NAME: matrix @ given.values}),
+            with_values(direct, {_NAME: identified.values}),
+            with_values(other, {_NAME: matrix @ identified.values}),
         ]
     return min(forms, key=lambda form: count_operations(form.function))
 
@@ -184,8 +184,8 @@ def _payload_program(robot: Manipulator, base: BaseParameters) -> Program:
     ).optimised()
 
 
-def _recombined(function: Program, matrix: Array) -> Program:
-    """Return a program of the base parameters b that one of matrix @ b makes."""
+def _substitute_parameters(function: Program, matrix: Array) -> Program:
+    """Return a program of base parameters b from one of matrix @ b, by substitution."""
     place = next(k for k, port in enumerate(function.inputs) if port.name == _NAME)
     symbols, ports = function.function.sx_in(), list(function.inputs)
     symbols[place] = ca.SX.sym(_NAME, matrix.shape[1])

@@ -19,7 +19,7 @@ from pteron.equations.machine import Machine, closure_of
 from pteron.export.c import c_texts
 from pteron.export.descriptions import banner
 from pteron.export.functions import exported_functions
-from pteron.export.names import marked, prefix_of
+from pteron.export.names import add_checksum, prefix_of
 from pteron.export.start_pose import start_pose
 from pteron.kernels import Array
 from pteron.kernels.code import render_template
@@ -236,7 +236,7 @@ def export_linuxcnc(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
 def _component(prefix: str) -> str:
     """Return a module name that LinuxCNC can load and does not use itself."""
     if prefix in _THEIRS or len(prefix) > _LONGEST:
-        prefix = marked(prefix, prefix, _LONGEST)
+        prefix = add_checksum(prefix, prefix, _LONGEST)
     return f"{prefix}kins"
 
 

@@ -49,11 +49,11 @@ def safe_name(name: str, separator: str) -> str:
     return (
         identifier
         if plain and len(identifier) <= _LONGEST
-        else marked(identifier, name, _LONGEST, separator)
+        else add_checksum(identifier, name, _LONGEST, separator)
     )
 
 
-def marked(stem: str, name: str, longest: int, separator: str = "_") -> str:
+def add_checksum(stem: str, name: str, longest: int, separator: str = "_") -> str:
     """Return a stem with a name's checksum, cut to a length."""
     digest = hashlib.sha256(name.encode()).hexdigest()[:_DIGITS]
     shortened = stem[: longest - _DIGITS - 1].rstrip(separator) or "robot"

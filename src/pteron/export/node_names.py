@@ -53,7 +53,7 @@ def node_names(
     both = ca.Function("both", symbols, [ca.vertcat(*nodes), ca.vertcat(*scalars)])
     computed = [[np.array(part) for part in both(*state)] for state in states]
     values, quantities = (np.hstack(parts) for parts in zip(*computed, strict=True))
-    return _named(graph, _matches(values, quantities), names, legs)
+    return _name_nodes(graph, _matches(values, quantities), names, legs)
 
 
 def _quantities(machine: Machine, inputs: dict[str, Expression]) -> Iterator[NamedQuantity]:
@@ -117,7 +117,7 @@ def _matches(values: Array, quantities: Array) -> dict[int, int]:
     return places
 
 
-def _named(
+def _name_nodes(
     graph: Graph, known: dict[int, int], names: list[str], legs: list[int]
 ) -> dict[int, str]:
     """Return a name for every node: known ones, those of one leg, and the rest."""

@@ -179,11 +179,11 @@ def function_block(
         "block.st.j2",
         name=name,
         comment=_comment(name, comments, flags),
-        inputs=_declared(inputs, said),
-        outputs=_declared(outputs, said),
-        variables=_listed(flags, "BOOL") + _listed(body.temporaries, "LREAL"),
+        inputs=_declare_ports(inputs, said),
+        outputs=_declare_ports(outputs, said),
+        variables=_declare_variables(flags, "BOOL") + _declare_variables(body.temporaries, "LREAL"),
         flags=flags,
-        usable=_wrapped(f"Usable := {' AND '.join(tests)};") if tests else [],
+        usable=_wrap_text(f"Usable := {' AND '.join(tests)};") if tests else [],
         statements=body.lines,
         results=[
             f"{element(port, j)} := {body.number(k)};"
@@ -211,7 +211,7 @@ def _comment(name: str, comments: Sequence[str], flags: Collection[str]) -> list
         *(text for flag, text in reasons.items() if flag in flags),
         "0 elsewhere, and there alone Valid is TRUE.",
     ]
-    return [part for line in lines for part in _wrapped(_harmless(line), "") or [""]]
+    return [part for line in lines for part in _wrap_text(_harmless(line), "") or [""]]
 
 
 def _harmless(text: str) -> str:
@@ -219,7 +219,7 @@ def _harmless(text: str) -> str:
     return text.replace("(*", "( *").replace("*)", "* )")
 
 
-def _declared(ports: Sequence[Port], descriptions: Mapping[str, str]) -> list[str]:
+def _declare_ports(ports: Sequence[Port], descriptions: Mapping[str, str]) -> list[str]:
     lines = []
     for port in ports:
         ranges = ", ".join(f"0..{count - 1}" for count in port.shape)
@@ -227,16 +227,16 @@ def _declared(ports: Sequence[Port], descriptions: Mapping[str, str]) -> list[st
         text = f"{port.name} : {kind};"
         if descriptions.get(port.name):
             text += f" (* {_harmless(descriptions[port.name])} *)"
-        lines += _wrapped(text)
+        lines += _wrap_text(text)
     return lines
 
 
-def _listed(names: Sequence[str], kind: str) -> list[str]:
+def _declare_variables(names: Sequence[str], kind: str) -> list[str]:
     """Return the declaration of variables of one type."""
-    return _wrapped(f"{', '.join(names)} : {kind};") if names else []
+    return _wrap_text(f"{', '.join(names)} : {kind};") if names else []
 
 
-def _wrapped(text: str, indent: str = "    ") -> list[str]:
+def _wrap_text(text: str, indent: str = "    ") -> list[str]:
     """Return a text in as few lines as hold it, the later ones indented."""
     return textwrap.wrap(
         text, _WIDTH, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False

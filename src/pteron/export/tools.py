@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from pteron.bodies.inertia import inertia_count
-from pteron.export.names import marked, safe_name
+from pteron.export.names import add_checksum, safe_name
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator, Tool
 
@@ -22,13 +22,13 @@ def tool_tables(robot: Manipulator) -> Iterator[tuple[str, str, tuple[str, ...],
     taken: set[str] = set()
     for tool in robot.tools:
         stem = f"tool_{safe_name(tool.name, '_')}"
-        stem = marked(stem, tool.name, len(stem) + 7) if stem in taken else stem
+        stem = add_checksum(stem, tool.name, len(stem) + 7) if stem in taken else stem
         taken.add(stem)
         for name, values in _arguments(robot, tool).items():
             units = {"mass": ("kg",), "center": ("x, m", "y, m", "z, m")}.get(name)
             kinds = _TENSOR.split() if len(values) > 1 else ["I"]
             units = units or tuple(f"{kind}, kg m^2" for kind in kinds)
-            yield f"{stem}_{name}", f"{_told(tool)}: {name} of set_payload.", units, values
+            yield f"{stem}_{name}", f"{_tool_text(tool)}: {name} of set_payload.", units, values
 
 
 def tool_lines(robot: Manipulator) -> list[str]:
@@ -39,7 +39,7 @@ def tool_lines(robot: Manipulator) -> list[str]:
             f"{name} := [{', '.join(map(repr, values.tolist()))}]"
             for name, values in _arguments(robot, tool).items()
         )
-        lines.append(f"{_told(tool)}: {', '.join(arguments)}.")
+        lines.append(f"{_tool_text(tool)}: {', '.join(arguments)}.")
     return lines
 
 
@@ -49,7 +49,7 @@ def _arguments(robot: Manipulator, tool: Tool) -> dict[str, Array]:
     return {"mass": np.array([tool.mass]), "center": np.array(tool.center), "inertia": inertia}
 
 
-def _told(tool: Tool) -> str:
+def _tool_text(tool: Tool) -> str:
     """Return a tool's name and point for a comment, which the name cannot end."""
     name = "".join(c if " " <= c <= "~" and c not in "*()" else "?" for c in tool.name)
     return f"Tool {name}, its centre point at {' '.join(f'{x:g}' for x in tool.point)} m"

@@ -99,7 +99,7 @@ def differences_figure(
     moved = enlarged_points(points, there, times)
     scene = scene_of(points, guides, gravity_of(machine))
     far = scene_of(moved, enlarged_guides(guides, joint_guides(other, shown), times), None)
-    sheet = _in_grey(scene, points, f"differences {times:g} times enlarged")
+    sheet = _draw_in_grey(scene, points, f"differences {times:g} times enlarged")
     for color, guide in zip(LEG_COLORS, far.guides, strict=False):
         sheet.line(guide.path, color, 1.6, raised=-0.2)
     draw_machine(sheet, far, moved)
@@ -134,7 +134,7 @@ def tool_errors_figure(
     greatest = float(np.linalg.norm(errors[known], axis=-1).max(initial=0.0))
     times = enlargement(greatest, scene.size) if enlarge is None else enlarge
     remark = f"errors {times:g} times enlarged, the greatest {1e3 * greatest:.3g} mm"
-    sheet = _in_grey(scene, points, remark)
+    sheet = _draw_in_grey(scene, points, remark)
     for place, error in zip(places[known], errors[known], strict=True):
         sheet.line(np.array([place, place + times * error]), WARNING, 1.3, raised=2.0)
         sheet.mark(place, WARNING, PAPER, 3.2, raised=2.1)
@@ -204,7 +204,7 @@ def expect_alike(robot: Manipulator, other: Manipulator) -> None:
         )
 
 
-def _in_grey(scene: Scene, points: JointPoints, title: str) -> MachineAxes:
+def _draw_in_grey(scene: Scene, points: JointPoints, title: str) -> MachineAxes:
     """Return axes of a new figure with a machine in grey, below a title."""
     sheet = machine_figure(scene, title)
     draw_surroundings(sheet, scene)

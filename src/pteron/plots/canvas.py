@@ -326,7 +326,7 @@ def all_of_time(axes: Axes, time: Array) -> None:
     axes.set_xlim(first - room, last + room)
 
 
-def numbered(count: int) -> list[str]:
+def leg_numbers(count: int) -> list[str]:
     """Return the names of legs in a legend, behind the noun "leg"."""
     return [str(i) for i in range(1, count + 1)]
 
@@ -355,9 +355,9 @@ def nice_step(least: float) -> float:
     return float(power * min(factor for factor in (1.0, 2.0, 5.0, 10.0) if factor * power >= least))
 
 
-def spot(axes: Axes, x: float, y: float, face: str, edge: str, size: float, **more: Any) -> None:
+def spot(axes: Axes, x: float, y: float, face: str, edge: str, size: float, **options: Any) -> None:
     """Draw one round mark."""
-    style = {"marker": "o", "linestyle": "none", "markersize": size, **more}
+    style = {"marker": "o", "linestyle": "none", "markersize": size, **options}
     axes.plot([x], [y], markerfacecolor=face, markeredgecolor=edge, **style)
 
 

@@ -22,14 +22,14 @@ from pteron.plots.canvas import (
     blank,
     groups_of,
     leg_curves,
+    leg_numbers,
     leg_style,
     legend,
-    numbered,
     plain_axes,
     spot,
     zero_line,
 )
-from pteron.plots.joint_columns import joints_of, named, rows
+from pteron.plots.joint_columns import joints_of, pick_machine_columns, rows
 
 _ROOM = 1.15
 """Half width of the axes over the largest value."""
@@ -74,8 +74,8 @@ def force_speed_figure(
         Says units and abilities where they are not given; without it all are sliders.
     """
     joints = joints_of(robot, forces)
-    speeds = np.asarray(named(robot, speeds, "joint_rates"), dtype=float)
-    forces = np.asarray(named(robot, forces, "forces"), dtype=float)
+    speeds = np.asarray(pick_machine_columns(robot, speeds, "joint_rates"), dtype=float)
+    forces = np.asarray(pick_machine_columns(robot, forces, "forces"), dtype=float)
     units = units or [(f"{joint.unit}/s", joint.force_unit) for joint in joints]
     abilities = abilities or _abilities(robot) or [Ability(None, None, None)] * len(units)
     if rms is None:
@@ -137,6 +137,6 @@ def power_figure(time: ArrayLike, power: ArrayLike) -> Figure:
     zero_line(axes)
     axes.plot(time, power.sum(axis=1), label="all", color=INK, linewidth=2.0)
     count = power.shape[1]
-    leg_curves(axes, time, power, range(count), 1.4, numbered(count), "leg")
+    leg_curves(axes, time, power, range(count), 1.4, leg_numbers(count), "leg")
     legend(figure, count + 1)
     return figure

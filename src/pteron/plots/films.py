@@ -179,7 +179,9 @@ def film(
             f"{steps + 1} frames of {sides[0]}x{sides[1]} pixels are too much for a GIF; give an "
             ".mp4, a smaller size, a higher speed or fewer frames a second"
         )
-    pictures = frames(robot, motion, times, sides, turns=turns, forces=drawn, corner=_told(speed))
+    pictures = frames(
+        robot, motion, times, sides, turns=turns, forces=drawn, corner=_speed_text(speed)
+    )
     write_film(target, pictures, len(times), sides, rate, progress)
     return Film(target, len(times), rate, speed, sides)
 
@@ -213,7 +215,7 @@ def checked_film(path: str | Path) -> Path:
     return target
 
 
-def _told(speed: float) -> str:
+def _speed_text(speed: float) -> str:
     return "real time" if speed == 1.0 else f"{speed:.3g} \u00d7 real time"
 
 

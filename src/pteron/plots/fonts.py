@@ -26,9 +26,9 @@ def take_fonts(figure: Figure) -> str:
         if letters.isascii():
             continue
         usual = font_manager.findfont(text.get_fontproperties())
-        lacking = _lacking(usual, frozenset(c for c in letters if not c.isspace()))
+        lacking = _missing_letters(usual, frozenset(c for c in letters if not c.isspace()))
         if lacking:
-            families, missing = _others(lacking)
+            families, missing = _fallback_families(lacking)
             first_families = [name for name in text.get_fontfamily() if name not in families]
             text.set_fontfamily([*first_families, *families])
             absent |= missing
@@ -55,11 +55,11 @@ def no_word_of_glyphs() -> Iterator[None]:
 
 
 @lru_cache(maxsize=64)
-def _others(letters: frozenset[str]) -> tuple[list[str], frozenset[str]]:
-    """Return families that have letters, and the letters that none of this machine has."""
+def _fallback_families(letters: frozenset[str]) -> tuple[list[str], frozenset[str]]:
+    """Return fallback font families for letters, and the letters that no installed family has."""
     families: list[str] = []
-    for name, path in _upright().items():
-        unprinted = _lacking(path, letters)
+    for name, path in _font_files().items():
+        unprinted = _missing_letters(path, letters)
         if unprinted < letters:
             families, letters = [*families, name], unprinted
         if not letters:
@@ -68,7 +68,7 @@ def _others(letters: frozenset[str]) -> tuple[list[str], frozenset[str]]:
 
 
 @lru_cache(maxsize=1)
-def _upright() -> dict[str, str]:
+def _font_files() -> dict[str, str]:
     """Return one file of each family, upright where there is one, of those that have letters."""
     listed = sorted(font_manager.fontManager.ttflist, key=lambda font: font.style == "normal")
     files = {font.name: font.fname for font in listed if not font.name.startswith(_NO_LETTERS)}
@@ -76,8 +76,8 @@ def _upright() -> dict[str, str]:
 
 
 @lru_cache(maxsize=1024)
-def _lacking(path: str, letters: frozenset[str]) -> frozenset[str]:
-    """Return the letters that a font has not."""
+def _missing_letters(path: str, letters: frozenset[str]) -> frozenset[str]:
+    """Return the letters that a font file lacks."""
     try:
         known = font_manager.get_font(path).get_charmap()
     except (OSError, RuntimeError):  # a file that is gone, or no font that matplotlib draws

@@ -13,13 +13,13 @@ from pteron.plots.canvas import (
     blank,
     groups_of,
     leg_curves,
+    leg_numbers,
     legend,
-    numbered,
     remark,
     stack,
     zero_line,
 )
-from pteron.plots.joint_columns import joints_of, named, rows
+from pteron.plots.joint_columns import joints_of, pick_machine_columns, rows
 
 
 def forces_figure(
@@ -37,14 +37,14 @@ def forces_figure(
     another `ylabel`.
     """
     joints = joints_of(robot, forces)
-    time, forces = rows(time, named(robot, forces, "forces"), "forces", len(joints))
+    time, forces = rows(time, pick_machine_columns(robot, forces, "forces"), "forces", len(joints))
     words = [ylabel or f"actuator {joint.force} ({joint.force_unit})" for joint in joints]
     groups = groups_of(words)
     figure = blank(5.4, 3.3 if len(groups) == 1 else 1.2 + 1.6 * len(groups))
     panels = stack(figure, "time (s)", list(groups))
     for axes, legs in zip(panels, groups.values(), strict=True):
         zero_line(axes)
-        leg_curves(axes, time, forces, legs, 1.8, numbered(len(joints)), "leg")
+        leg_curves(axes, time, forces, legs, 1.8, leg_numbers(len(joints)), "leg")
         if turning_point is not None:
             axes.axvline(turning_point, color=MUTED, linewidth=0.8, linestyle=(0, (4, 3)))
     if turning_point is not None:

@@ -153,7 +153,7 @@ def map_panels(
     grid = GridSpec(len(heights), columns, figure=figure, height_ratios=heights)
     for k, (plane, name) in enumerate(panels):
         labels = [axis_label(axis.name) for axis in plane.grid.axes]
-        upright = labels[1] if len(labels) > 1 else _named(name)
+        upright = labels[1] if len(labels) > 1 else _index_label(name)
         axes = plain_axes(figure, labels[0], upright, grid[divmod(k, columns)])
         axes.set_title(_title(plane), fontsize=FONT_SIZE, color=INK, loc="left")
         if len(labels) == 1:
@@ -179,7 +179,7 @@ def _plane(
 ) -> None:
     """Draw an index over two coordinates."""
     axes.grid(visible=False)
-    first, second = (_shown(axis) for axis in plane.grid.axes)
+    first, second = (_axis_values(axis) for axis in plane.grid.axes)
     factor = shown_unit(ALL[name].unit)[0]
     values = factor * np.ma.masked_invalid(plane.values[name].T)
     drawn = np.ma.masked_where(plane.status.T != REACHABLE, values)
@@ -193,19 +193,21 @@ def _plane(
         shading="nearest",
         rasterized=True,
     )
-    handles = _hatched(axes, plane, name, causes)
+    handles = _hatch_unreachable(axes, plane, name, causes)
     if drawn.count():
-        _best(axes, plane, name, handles)
-    bar = figure.colorbar(mesh, ax=axes, fraction=0.05, pad=0.02, extend=_extended(drawn, scale))
+        _mark_best(axes, plane, name, handles)
+    bar = figure.colorbar(
+        mesh, ax=axes, fraction=0.05, pad=0.02, extend=_colorbar_extension(drawn, scale)
+    )
     direction = "bright is better"
-    if drawn.count() and _alike(summary := plane.summary(name)):
+    if drawn.count() and _is_constant(summary := plane.summary(name)):
         bar.set_ticks([factor * summary.best], labels=[f"{factor * summary.best:.4g}"])
         direction = "the same everywhere here"
     elif isinstance(scale, LogNorm):
         bar.ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         bar.ax.yaxis.set_major_formatter("{x:g}")
         bar.ax.yaxis.set_minor_formatter(NullFormatter())
-    bar.set_label(f"{_named(name)}\n{direction}", fontsize=FONT_SIZE, color=INK)
+    bar.set_label(f"{_index_label(name)}\n{direction}", fontsize=FONT_SIZE, color=INK)
     bar.ax.tick_params(labelsize=FONT_SIZE - 1.0, colors=INK, color=MUTED)
     outline: Any = bar.outline
     outline.set_visible(False)
@@ -225,7 +227,7 @@ def _plane(
         )
 
 
-def _extended(drawn: Any, scale: Normalize) -> str:
+def _colorbar_extension(drawn: Any, scale: Normalize) -> str:
     """Return the ends of a scale that a picture's values exceed, as matplotlib names them."""
     low, high = float(scale.vmin or 0.0), float(scale.vmax or 0.0)
     slack = _ALIKE * (high - low)
@@ -234,9 +236,9 @@ def _extended(drawn: Any, scale: Normalize) -> str:
     return ("both" if over else "min") if under else ("max" if over else "neither")
 
 
-def _hatched(axes: Axes, plane: Map, name: str, causes: Mapping[str, Any]) -> list[Any]:
+def _hatch_unreachable(axes: Axes, plane: Map, name: str, causes: Mapping[str, Any]) -> list[Any]:
     """Hatch the poses that do not serve, and return the entries of the legend."""
-    first, second = (_shown(axis) for axis in plane.grid.axes)
+    first, second = (_axis_values(axis) for axis in plane.grid.axes)
     status, by_cause = plane.status.T, name == MARGIN.name
     handles: dict[str, Any] = {}
     for code in (BEYOND_LIMITS, *range(1, len(_HATCHES))):
@@ -267,10 +269,10 @@ def _hatched(axes: Axes, plane: Map, name: str, causes: Mapping[str, Any]) -> li
     return list(handles.values())
 
 
-def _best(axes: Axes, plane: Map, name: str, handles: list[Any]) -> None:
-    """Mark the best pose of a plane, unless all are alike."""
+def _mark_best(axes: Axes, plane: Map, name: str, handles: list[Any]) -> None:
+    """Mark the best pose of a plane, unless the index is constant."""
     summary = plane.summary(name)
-    if _alike(summary):
+    if _is_constant(summary):
         return
     factor = shown_unit(summary.unit)[0]
     at = [
@@ -282,13 +284,13 @@ def _best(axes: Axes, plane: Map, name: str, handles: list[Any]) -> None:
     handles.append(axes.lines[-1])
 
 
-def _alike(summary: Summary) -> bool:
+def _is_constant(summary: Summary) -> bool:
     return abs(summary.best - summary.worst) <= _ALIKE * abs(summary.best)
 
 
 def _curve(axes: Axes, curve: Map, name: str) -> None:
     """Draw an index over one coordinate."""
-    place = _shown(curve.grid.axes[0])
+    place = _axis_values(curve.grid.axes[0])
     factor = shown_unit(ALL[name].unit)[0]
     serves = curve.reachable
     axes.plot(place, np.where(serves, factor * curve.values[name], np.nan), color=INK)
@@ -314,11 +316,11 @@ def _light(color: str) -> str:
     return to_hex((red, green, blue))
 
 
-def _shown(axis: Axis) -> Array:
+def _axis_values(axis: Axis) -> Array:
     return coordinate(axis.name).shown_factor * axis.values
 
 
-def _named(name: str) -> str:
+def _index_label(name: str) -> str:
     unit = _unit(name)
     return f"{ALL[name].title} ({unit})" if unit else ALL[name].title
 

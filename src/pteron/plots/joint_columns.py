@@ -21,8 +21,8 @@ def joints_of(robot: RobotLike | None, values: ArrayLike) -> list[ActuatedJoint]
     return [SLIDER] * np.shape(values)[-1]
 
 
-def named(robot: RobotLike | None, values: ArrayLike, what: str) -> ArrayLike:
-    """Return a table's columns of a machine, such as its "forces"; an array as it is."""
+def pick_machine_columns(robot: RobotLike | None, values: ArrayLike, what: str) -> ArrayLike:
+    """Return the columns of a table that a machine names, such as "forces"; an array unchanged."""
     if robot is None:
         return values
     columns: ArrayLike = pick_columns(values, as_manipulator(robot).column_names[what], what)

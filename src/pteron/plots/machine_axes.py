@@ -41,7 +41,7 @@ class MachineAxes(ABC):
         self._drawn: list[Array] = []
 
     @abstractmethod
-    def _placed(self, points: Array, *, held: bool = True) -> Array:
+    def _to_axes(self, points: Array, *, held: bool = True) -> Array:
         """Return points (..., 3) in the base frame as the axes have them; `fill` holds them."""
 
     @abstractmethod
@@ -53,7 +53,7 @@ class MachineAxes(ABC):
         """Add polygons with corners as the axes have them."""
 
     @abstractmethod
-    def beside(self, away: Array, along: Array) -> Array:
+    def side_direction(self, away: Array, line_direction: Array) -> Array:
         """Return the unit vector in the picture's plane, across a line, nearest to `away`."""
 
     @abstractmethod
@@ -80,7 +80,7 @@ class MachineAxes(ABC):
         self, points: Array, color: str, width: float, *, raised: float = 0.0, style: Style = "-"
     ) -> None:
         """Draw a line through points (K, 3)."""
-        p = self._placed(points)
+        p = self._to_axes(points)
         if self.measures:
             return
         look: dict[str, Any] = {"color": color, "linewidth": self._weight * width}
@@ -89,7 +89,7 @@ class MachineAxes(ABC):
 
     def mark(self, point: Array, face: str, edge: str, size: float, raised: float = 0.03) -> None:
         """Draw a ring at a point."""
-        p = self._placed(point[None], held=False)
+        p = self._to_axes(point[None], held=False)
         if self.measures:
             return
         look: dict[str, Any] = {"marker": "o", "markersize": self._weight * size}
@@ -103,7 +103,7 @@ class MachineAxes(ABC):
 
     def faces(self, faces: list[Array], color: str, alpha: float, raised: float = 0.0) -> None:
         """Draw polygons, all in one place of the order."""
-        placed = [self._placed(face, held=False) for face in faces]
+        placed = [self._to_axes(face, held=False) for face in faces]
         if self.measures:
             return
         look: dict[str, Any] = {"facecolors": color, "edgecolors": PAPER, "linewidths": 0.6}
@@ -114,7 +114,7 @@ class MachineAxes(ABC):
         """Write beside a point, over everything."""
         look: dict[str, Any] = {"fontsize": self._font, "fontweight": "bold" if bold else "normal"}
         look |= {"ha": "center", "va": "center", "zorder": 30.0}
-        p = self._placed(point[None])[0]
+        p = self._to_axes(point[None])[0]
         if self.measures:
             return
         self.things.append(self.axes.text(*p, text, color=color, **look))

@@ -86,7 +86,7 @@ class Scene:
 
 def scene_of(points: JointPoints, guides: Sequence[Guide], gravity: Array | None) -> Scene:
     """Return the scene of a machine that has its joints at points, in one pose or in several."""
-    everything = _everything(points, guides)
+    everything = _all_points(points, guides)
     vertical = np.zeros(3)
     if points.plane is None:
         upwards = points.axes.reshape(-1, 3, 3)[0, 2]
@@ -126,12 +126,12 @@ def draw_directions(sheet: MachineAxes, scene: Scene) -> None:
     if isinstance(sheet, SpaceAxes):
         # At the near corner of the ground, in the upright frame: beside the machine, not in it.
         near = low + size * np.array([-0.09, -0.17, 0.0])
-        corner = sheet.beside_eye(near, (low + high) / 2.0)
+        corner = sheet.turn_with_eye(near, (low + high) / 2.0)
         for axis, name in zip(np.eye(3), "xyz", strict=True):
             sheet.line(np.array([corner, corner + 0.13 * size * axis]), INK, 1.6, raised=1.0)
             sheet.text(corner + 0.17 * size * axis, name, INK)
         start = near + size * np.array([-0.16, -0.02, 0.30])
-        start = sheet.beside_eye(start, (low + high) / 2.0)
+        start = sheet.turn_with_eye(start, (low + high) / 2.0)
     else:
         start = np.array([low[0] - 0.06 * size, high[1]]) @ scene.plane
     if scene.gravity is not None:
@@ -155,15 +155,15 @@ def draw_path(sheet: MachineAxes, path: Array) -> None:
     sheet.line(path, INK, 1.2, raised=1.0, style=(0, (1.5, 1.2)))
 
 
-def _everything(points: JointPoints, guides: Sequence[Guide]) -> Array:
-    """Return the points (K, 3) that a picture must hold."""
+def _all_points(points: JointPoints, guides: Sequence[Guide]) -> Array:
+    """Return the points (K, 3) that a picture must show."""
     lines = (line.reshape(-1, 3) for line in points.links)
     return np.vstack([*lines, *(guide.path for guide in guides)])
 
 
 def grid_step(points: JointPoints, guides: Sequence[Guide]) -> float:
     """Return the side of the squares, m, behind a picture of a machine, in one pose or several."""
-    everything = _everything(points, guides)
+    everything = _all_points(points, guides)
     if points.plane is not None:
         everything = everything @ points.plane.T
     return nice_step(float(np.ptp(everything, axis=0).max()) / _SQUARES)
@@ -214,7 +214,7 @@ def _draw_leg(sheet: MachineAxes, points: JointPoints, guide: Guide, i: int, siz
     for joint in line[::2] if points.rams[i] else line:
         sheet.mark(joint, PAPER, color, 5.0)
     direction = guide.axis if guide.slides else line[1] - line[0]
-    away = sheet.beside(line[0] - points.reference, direction)
+    away = sheet.side_direction(line[0] - points.reference, direction)
     sheet.text(line[0] + 0.075 * size * away, str(i + 1), color, bold=True)
 
 
@@ -258,7 +258,7 @@ def _draw_gravity(sheet: MachineAxes, start: Array, gravity: Array, size: float)
     down = gravity / np.linalg.norm(gravity)
     tip = start + 0.2 * size * down
     sheet.line(np.array([start, tip]), MUTED, 1.6, raised=1.0)
-    side = 0.03 * size * sheet.beside(np.ones(3), down)
+    side = 0.03 * size * sheet.side_direction(np.ones(3), down)
     for sign in (-1.0, 1.0):
         barb = tip - 0.05 * size * down + sign * side
         sheet.line(np.array([tip, barb]), MUTED, 1.6, raised=1.0)

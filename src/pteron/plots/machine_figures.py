@@ -217,7 +217,9 @@ def poses_figure(
         )
     ]
     rails = [joint_guides(machine, shown) for machine in machines] * (count // len(machines))
-    scenes = _alike([scene_of(*pair, gravity_of(first)) for pair in zip(every, rails, strict=True)])
+    scenes = _share_size(
+        [scene_of(*pair, gravity_of(first)) for pair in zip(every, rails, strict=True)]
+    )
     columns = columns or _columns(count)
     rows = -(-count // columns)
     tall = _PANEL * (_SQUARE if scenes[0].plane is None else min(max(scenes[0].aspect, 0.4), 1.2))
@@ -248,7 +250,7 @@ def poses_figure(
     return figure
 
 
-def _alike(scenes: list[Scene]) -> list[Scene]:
+def _share_size(scenes: list[Scene]) -> list[Scene]:
     """Return the scenes, each extended to the size of the largest one."""
     low = np.min([scene.low for scene in scenes], axis=0)
     high = np.max([scene.high for scene in scenes], axis=0)

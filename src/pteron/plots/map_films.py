@@ -71,7 +71,7 @@ def map_film(
 
     values = last.values.tolist()
     figure = drawn(values[0])
-    size = _even(figure)
+    size = _make_even(figure)
     figure.draw_without_rendering()
     places = [axes.get_position() for axes in figure.axes]
     pictures = (_pixels(drawn(value), size, places) for value in values)
@@ -79,8 +79,8 @@ def map_film(
     return Film(target, last.count, rate, 1.0, size)
 
 
-def _even(figure: Figure) -> tuple[int, int]:
-    """Return a figure's width and height, pixels, made even, as films want them."""
+def _make_even(figure: Figure) -> tuple[int, int]:
+    """Set a figure's width and height to even numbers of pixels, which films need; return them."""
     width, height = (2 * round(_DPI * float(side) / 2.0) for side in figure.get_size_inches())
     figure.set_dpi(_DPI)
     figure.set_size_inches(width / _DPI, height / _DPI)

@@ -63,7 +63,7 @@ class PlaneAxes(MachineAxes):
                 spine.set_visible(False)
         self._small, self._step, self.plane = small, step, plane
 
-    def _placed(self, points: Array, *, held: bool = True) -> Array:
+    def _to_axes(self, points: Array, *, held: bool = True) -> Array:
         flat = np.asarray(1e3 * points @ self.plane.T)
         self._drawn.append(flat)
         return flat
@@ -75,9 +75,9 @@ class PlaneAxes(MachineAxes):
         polygons: Artist = self.axes.add_collection(PolyCollection(faces, **look))
         return polygons
 
-    def beside(self, away: Array, along: Array) -> Array:
+    def side_direction(self, away: Array, line_direction: Array) -> Array:
         """Return the unit vector in the plane, across a line, nearest to `away`."""
-        x, y = self.plane @ along
+        x, y = self.plane @ line_direction
         normal = np.array([-y, x]) / max(float(np.hypot(x, y)), 1e-12)
         return np.asarray(np.copysign(1.0, normal @ self.plane @ away) * normal @ self.plane)
 

@@ -111,10 +111,10 @@ def resized(figure: Figure, width: Width | float) -> Figure:
     for scale in (scale for axes in figure.axes for scale in (axes.xaxis, axes.yaxis)):
         for label in scale.get_ticklabels()[:1]:
             scale.set_tick_params(labelsize=label.get_fontsize())  # also of those to come
-    return _narrowed(figure, inches)
+    return _set_width(figure, inches)
 
 
-def _narrowed(figure: Figure, inches: float) -> Figure:
+def _set_width(figure: Figure, inches: float) -> Figure:
     """Change a figure's width; its legend and the numbers along x find room."""
     wide, tall = (float(side) for side in figure.get_size_inches())
     shaped = any(axes.name == "3d" or axes.get_aspect() != "auto" for axes in figure.axes)
@@ -215,7 +215,7 @@ def svg(figure: Figure, *, name: str, title: str, widest: float = _ON_PAGE) -> M
     its letters as they are, so that they can be read in a column and on a phone.
     """
     if figure.get_size_inches()[0] > widest:
-        _narrowed(figure, widest)
+        _set_width(figure, widest)
     text = _drawn(figure, facecolor="none")
     text = text[text.index("<svg") :].rstrip()
     text = re.sub(r"\s*<metadata>.*?</metadata>", "", text, flags=re.DOTALL)

@@ -78,11 +78,11 @@ def parameters_figure(
     >>> [axes.get_xlabel() for axes in figure.axes]
     ['kg m', 'kg m^2', 'kg']
     """
-    numbers = _fitting(names, values, "values")
+    numbers = _checked_values(names, values, "values")
     wide = np.full(len(names), np.nan)
     if intervals is not None:
-        wide = _fitting(names, intervals, "intervals")
-    known = None if reference is None else _fitting(names, reference, "reference")
+        wide = _checked_values(names, intervals, "intervals")
+    known = None if reference is None else _checked_values(names, reference, "reference")
     if units and len(units) != len(names):
         raise DataError(f"units: {len(units)} given, {len(names)} expected, one for each name")
     groups = groups_of(units or ["value"] * len(names))
@@ -130,7 +130,7 @@ def operations_figure(names: Sequence[str], counts: ArrayLike) -> Figure:
     >>> kernel = pteron.compile(robot, "inverse_dynamics", "vm")
     >>> figure = pteron.plots.operations_figure(["delta"], [kernel.operations])
     """
-    numbers = _fitting(names, counts, "counts")
+    numbers = _checked_values(names, counts, "counts")
     figure = blank(_WIDE, 0.6 + 0.3 * len(names))
     axes = row_axes(figure, names, "operations")
     rows = np.arange(len(names))[::-1]
@@ -153,7 +153,7 @@ def row_axes(figure: Figure, names: Sequence[str], xlabel: str, place: Any = Non
     return axes
 
 
-def _fitting(names: Sequence[str], values: ArrayLike, what: str) -> Array:
+def _checked_values(names: Sequence[str], values: ArrayLike, what: str) -> Array:
     array = np.asarray(values, dtype=float)
     expect(array.shape == (len(names),), what, f"shape {array.shape}", f"({len(names)},)")
     return array

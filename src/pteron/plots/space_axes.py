@@ -73,7 +73,7 @@ class SpaceAxes(MachineAxes):
             [level * np.cos(azimuth), level * np.sin(azimuth), np.sin(elevation)]
         )
 
-    def _placed(self, points: Array, *, held: bool = True) -> Array:
+    def _to_axes(self, points: Array, *, held: bool = True) -> Array:
         placed = np.asarray(points @ self.rotation.T)
         if held:
             self._drawn.append(placed)
@@ -87,14 +87,14 @@ class SpaceAxes(MachineAxes):
         self.axes.add_collection3d(polygons)
         return polygons
 
-    def beside(self, away: Array, along: Array) -> Array:
+    def side_direction(self, away: Array, line_direction: Array) -> Array:
         """Return the unit vector in the picture's plane, across a line, nearest to `away`."""
-        normal = np.cross(along, self.rotation.T @ self._towards_eye)
+        normal = np.cross(line_direction, self.rotation.T @ self._towards_eye)
         normal = normal / max(float(np.linalg.norm(normal)), 1e-12)
         return np.asarray(np.copysign(1.0, normal @ away) * normal)
 
-    def beside_eye(self, point: Array, center: Array) -> Array:
-        """Return a point of the upright frame, in the base frame, gone round with the eye."""
+    def turn_with_eye(self, point: Array, center: Array) -> Array:
+        """Return a point of the upright frame, turned with the eye, in the base frame."""
         x, y, _ = point - center
         cos, sin = np.cos(self.angle), np.sin(self.angle)
         moved = np.array([cos * x - sin * y - x, sin * x + cos * y - y, 0.0])
@@ -112,7 +112,7 @@ class SpaceAxes(MachineAxes):
         self.figure.set_layout_engine("none")
         self.axes.set_position((0.0, 0.0, 1.0, 1.0))
         self.axes.apply_aspect()
-        corners = np.array([self._seen(drawn, angle) for angle in angles])
+        corners = np.array([self._figure_corners(drawn, angle) for angle in angles])
         self.turn(angles[0])
         first, last = corners[:, 0].min(axis=0), corners[:, 1].max(axis=0)
         start, room = np.array(self._box[:2]), np.array(self._box[2:])
@@ -120,8 +120,8 @@ class SpaceAxes(MachineAxes):
         corner = start + room / 2.0 - scale * (first + last) / 2.0
         self.axes.set_position((corner[0], corner[1], scale, scale))
 
-    def _seen(self, points: Array, angle: float) -> tuple[Array, Array]:
-        """Return the corners of what points (K, 3) take of the figure, seen from an angle."""
+    def _figure_corners(self, points: Array, angle: float) -> tuple[Array, Array]:
+        """Return the bounding corners in the figure of points (K, 3), seen from an angle."""
         self.turn(angle)
         x, y, _ = proj_transform(*points.T, self.axes.get_proj())
         seen = self.figure.transFigure.inverted().transform(

@@ -13,7 +13,7 @@ from pteron.errors import DataError
 from pteron.kernels import Array, as_array
 from pteron.manipulator import RobotLike
 from pteron.platforms.coordinates import coordinate
-from pteron.plots.canvas import blank, groups_of, leg_curves, legend, numbered, panels, zero_line
+from pteron.plots.canvas import blank, groups_of, leg_curves, leg_numbers, legend, panels, zero_line
 from pteron.plots.joint_columns import joints_of
 
 _ORDERS = ("", "/s", "/s²", "/s³", "/s⁴")
@@ -103,7 +103,7 @@ def joints_figure(time: ArrayLike, *courses: ArrayLike, robot: RobotLike | None 
     known = courses and np.ndim(courses[0]) == 2
     units = [joint.unit for joint in joints_of(robot, courses[0] if known else np.empty((0, 0)))]
     groups = groups_of(units)
-    return _courses_figure(time, courses, numbered(len(units)), groups, _OF_JOINTS, "leg")
+    return _courses_figure(time, courses, leg_numbers(len(units)), groups, _OF_JOINTS, "leg")
 
 
 def _courses_figure(

@@ -103,7 +103,7 @@ class Report:
     `cycle` is the standard one, which keeps the margin `least`, or a given motion, from the file
     `source`; `shown` are the instants of it in the moving picture. `sizing` has the loads of the
     drives in it: forces, in N or N m, include friction and the motors' inertia where the machine's
-    file has these (`driven`).
+    file has these (`has_drives`).
     The slices go through the home pose; those over two lengths are all of one width. `volume` is
     None where the pose has fewer than two lengths. `tilt` is the angle, rad, by which the platform
     is proved to tilt to every side at the home position; None where it does not tilt from the
@@ -138,12 +138,12 @@ class Report:
         return self.cycle if isinstance(self.cycle, PickAndPlace) else None
 
     @property
-    def driven(self) -> bool:
+    def has_drives(self) -> bool:
         """Whether the machine's file has drives."""
         return any(leg.drive is not None for leg in self.robot.legs)
 
     @property
-    def limited(self) -> bool:
+    def shows_joint_limits(self) -> bool:
         """Whether a slice shows poses that only the joints' limits forbid."""
         return any(bool((cut.status == BEYOND_LIMITS).any()) for cut in self.slices)
 
@@ -153,13 +153,13 @@ class Report:
         return self.sizing.forces[::2]
 
     @property
-    def limited_drives(self) -> bool:
+    def has_drive_limits(self) -> bool:
         """Whether the machine's file has a limit of a drive."""
         drives = self.sizing.drives
         return any(drive.max_force or drive.max_speed or drive.rated_force for drive in drives)
 
     @property
-    def geared(self) -> bool:
+    def has_rotor_inertia(self) -> bool:
         """Whether the machine's file has a motor's inertia."""
         return any(drive.rotor_inertia > 0.0 for drive in self.sizing.drives)
 

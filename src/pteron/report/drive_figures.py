@@ -6,13 +6,13 @@ from matplotlib.figure import Figure
 
 from pteron.motion import Sizing
 from pteron.plots import Ability, force_speed_figure, power_figure
-from pteron.report.motion_frames import few
+from pteron.report.motion_frames import line_samples
 
 
 def force_speed(sizing: Sizing) -> Figure:
     """Return force over speed of each drive, within what the machine's file says that it can do."""
     joints = [leg.joint for leg in sizing.robot.legs]
-    some = few(len(sizing.time))
+    some = line_samples(len(sizing.time))
     return force_speed_figure(
         sizing.speeds[some],
         sizing.forces[some],
@@ -26,5 +26,5 @@ def force_speed(sizing: Sizing) -> Figure:
 
 def power(sizing: Sizing) -> Figure:
     """Return the power of each drive over time, and their sum."""
-    some = few(len(sizing.time))
+    some = line_samples(len(sizing.time))
     return power_figure(sizing.time[some], sizing.power[some])

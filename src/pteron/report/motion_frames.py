@@ -71,9 +71,9 @@ class Frames:
 
 
 def frames(
-    robot: Manipulator, motion: Motion, forces: Array | None = None, still: Array | None = None
+    robot: Manipulator, motion: Motion, forces: Array | None = None, still_pose: Array | None = None
 ) -> Frames:
-    """Return a motion as the moments that are drawn: about sixty a second, but not too many.
+    """Return the animation frames of a motion: about sixty a second, 240 to 2400 in all.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ def frames(
         One that it can do, with T samples.
     forces : array, shape (T, n), optional
         N or N m; those that the drives must give, with smooth friction, where they are left out.
-    still : array, shape (m,), optional
+    still_pose : array, shape (m,), optional
         The pose of the picture that does not move; where the motion begins if it is left out.
 
     Returns
@@ -104,11 +104,11 @@ def frames(
         )
     else:
         time = even[: len(even) - int(closed)]
-        frame_forces = None if forces is None else _between(motion.time, forces, time)
+        frame_forces = None if forces is None else _interpolate(motion.time, forces, time)
         pose, velocity, acceleration = motion.at(time)
     if frame_forces is None:
         frame_forces = drive_forces(robot, pose, velocity, acceleration, smooth=True)
-    still_points = joint_points(robot, motion.pose[0] if still is None else still)
+    still_points = joint_points(robot, motion.pose[0] if still_pose is None else still_pose)
     moments = time - motion.time[0], pose, joint_points(robot, pose), frame_forces
     return Frames(*moments, motion.duration, closed, still_points, joint_guides(robot, pose))
 
@@ -123,24 +123,24 @@ def is_closed(motion: Motion) -> bool:
     )
 
 
-def few(count: int) -> slice:
+def line_samples(count: int) -> slice:
     """Return the slice of so many samples that a line in a picture needs."""
     return slice(None, None, max(1, count // _DRAWN))
 
 
-def _between(time: Array, values: Array, at: Array) -> Array:
+def _interpolate(time: Array, values: Array, at: Array) -> Array:
     return np.column_stack([np.interp(at, time, column) for column in values.T])
 
 
 def scene(robot: Manipulator, shown: Frames) -> dict[str, Any]:
     """Return the machine and the frames of its motion as plain lists.
 
-    Everything is in m, rad, s, N and N m; points are seen as `still` says.
+    Everything is in m, rad, s, N and N m; points are given as by `still_parts`.
     """
     quantity = coordinate([leg.joint for leg in robot.legs])
     return {
-        **still(robot, shown.guides, shown.still),
-        **moving(robot, shown.points),
+        **still_parts(robot, shown.guides, shown.still),
+        **moving_parts(robot, shown.points),
         "duration": round(shown.duration, _DECIMALS),
         "closed": shown.closed,
         "time": _plain(shown.time),
@@ -153,8 +153,8 @@ def scene(robot: Manipulator, shown: Frames) -> dict[str, Any]:
     }
 
 
-def still(robot: Manipulator, guides: Sequence[Guide], home: JointPoints) -> dict[str, Any]:
-    """Return what does not move in pictures of a machine, as plain lists.
+def still_parts(robot: Manipulator, guides: Sequence[Guide], home: JointPoints) -> dict[str, Any]:
+    """Return the fixed parts of pictures of a machine, as plain lists.
 
     Points are in the base frame, m; of a planar machine along its pose's x and y and the plane's
     normal, in the plane. A `guide` is the path of a slider or of a crank's end, `bars` are what
@@ -168,35 +168,35 @@ def still(robot: Manipulator, guides: Sequence[Guide], home: JointPoints) -> dic
     return {
         "planar": planar,
         "up": [0.0, 0.0, 1.0] if planar else _plain(up),
-        "gravity": seen(robot, gravity / strength),
+        "gravity": picture_points(robot, gravity / strength),
         "grid": grid_step(home, guides),
-        "guides": [seen(robot, guide.path) for guide in guides],
+        "guides": [picture_points(robot, guide.path) for guide in guides],
         "slides": [guide.slides for guide in guides],
         "directions": _plain(np.array([guide.axis for guide in guides]) @ view_frame(robot).T),
-        "bars": [None if bar is None else seen(robot, APART * bar) for bar in home.bars],
+        "bars": [None if bar is None else picture_points(robot, APART * bar) for bar in home.bars],
         "rams": home.rams,
-        "base": seen(robot, base_outline(home, guides)),
+        "base": picture_points(robot, base_outline(home, guides)),
         "radii": None if robot.radii is None else asdict(robot.radii),
     }
 
 
-def moving(robot: Manipulator, points: JointPoints) -> dict[str, Any]:
-    """Return what moves in pictures of a machine in F poses, or one, as plain lists; see `still`.
+def moving_parts(robot: Manipulator, points: JointPoints) -> dict[str, Any]:
+    """Return the moving parts of pictures of a machine in F poses, or one, as plain lists.
 
     A leg's `chains` in a frame are the points of its line.
     """
-    lines = [seen(robot, line) for line in points.links]
+    lines = [picture_points(robot, line) for line in points.links]
     return {
         "parts": [
             {
-                "hub": seen(robot, part.hub),
-                "corners": seen(robot, part.corners),
+                "hub": picture_points(robot, part.hub),
+                "corners": picture_points(robot, part.corners),
                 "triangles": None if part.triangles is None else part.triangles.tolist(),
             }
             for part in points.parts
         ],
-        "position": seen(robot, points.reference),
-        "tool": seen(robot, points.tool) if any(robot.platform.tool) else None,
+        "position": picture_points(robot, points.reference),
+        "tool": picture_points(robot, points.tool) if any(robot.platform.tool) else None,
         "axes": _plain(points.axes @ view_frame(robot).T),
         "chains": [list(legs) for legs in zip(*lines, strict=True)]
         if points.reference.ndim > 1
@@ -204,7 +204,7 @@ def moving(robot: Manipulator, points: JointPoints) -> dict[str, Any]:
     }
 
 
-def seen(robot: Manipulator, points: Array) -> Any:
+def picture_points(robot: Manipulator, points: Array) -> Any:
     """Return points (..., 3) of the base frame as pictures have them, as plain lists."""
     flat = [1.0, 1.0, 0.0] if robot.platform.planar else 1.0
     return _plain(points @ view_frame(robot).T * flat)

@@ -16,7 +16,7 @@ from pteron.motion.trajectories.tool import tool_path
 from pteron.playback import Playback
 from pteron.plots import forces_figure, power_figure, robot_figure
 from pteron.plots.machine_figures import gravity_of
-from pteron.report.motion_frames import Frames, few, frames
+from pteron.report.motion_frames import Frames, frames, line_samples
 from pteron.report.moving_picture import stage
 from pteron.report.quantities import JointQuantity, angles_text, coordinate, force, nouns, speed
 from pteron.report.typeset import template
@@ -27,8 +27,9 @@ from pteron.workspace import JointRanges, joint_ranges
 class ShownMotion:
     """The contents of the page of a motion with T samples.
 
-    Forces (T, n), N or N m, are those that came with the motion (`given`), or what the drives must
-    give for it; rates (T, n) are those of the joints, and `tool_speed` (T,), m/s, is the tool's.
+    Forces (T, n), N or N m, are the motion's own (`has_given_forces`), or those that the drives
+    must give for it; rates (T, n) are those of the joints, and `tool_speed` (T,), m/s, is the
+    tool's.
     """
 
     robot: Manipulator
@@ -41,17 +42,17 @@ class ShownMotion:
     overloads: tuple[str, ...]
 
     @property
-    def given(self) -> bool:
+    def has_given_forces(self) -> bool:
         """Whether the forces came with the motion."""
         return self.playback.forces is not None
 
     @property
-    def driven(self) -> bool:
-        """Whether the machine's file tells of the drives."""
+    def has_drives(self) -> bool:
+        """Whether the machine's file has drives."""
         return any(leg.drive is not None for leg in self.robot.legs)
 
 
-def shown(robot: Manipulator, recorded: Playback) -> ShownMotion:
+def motion_contents(robot: Manipulator, recorded: Playback) -> ShownMotion:
     """Return the contents of the page of a motion that the machine can do."""
     motion = recorded.motion
     forces = recorded.forces
@@ -74,9 +75,9 @@ def shown(robot: Manipulator, recorded: Playback) -> ShownMotion:
 
 def motion_page(robot: Manipulator, recorded: Playback) -> str:
     """Return the page of a motion, as HTML without any reference to another file or address."""
-    motion_shown = shown(robot, recorded)
+    motion_shown = motion_contents(robot, recorded)
     joints = [leg.joint for leg in robot.legs]
-    whose, origin = _forces_told(motion_shown)
+    whose, origin = _force_origin(motion_shown)
     name = f" of {recorded.source}" if recorded.source else ""
     time = recorded.motion.time
     turned = angles_text(robot, recorded.motion.pose[0])
@@ -91,13 +92,13 @@ def motion_page(robot: Manipulator, recorded: Playback) -> str:
             picture_title=f"{robot.name} where the motion begins",
             force_title=f"{whose} {force(joints).name}",
         ),
-        found=motion_shown,
+        contents=motion_shown,
         playback=recorded,
         motion=recorded.motion,
         speed=speed(joints),
         joint=nouns(joints),
         figures=_figures(motion_shown),
-        told=origin,
+        force_origin=origin,
         tooled=any(robot.platform.tool),
         loads={
             "peak": np.abs(motion_shown.forces).max(axis=0),
@@ -110,13 +111,13 @@ def motion_page(robot: Manipulator, recorded: Playback) -> str:
     )
 
 
-def _forces_told(motion_shown: ShownMotion) -> tuple[str, str]:
+def _force_origin(motion_shown: ShownMotion) -> tuple[str, str]:
     """Return the origin of the forces on the page: in a word, and in a clause."""
-    if motion_shown.given and motion_shown.playback.log:
+    if motion_shown.has_given_forces and motion_shown.playback.log:
         return "Measured", "as they were measured."
-    if motion_shown.given:
+    if motion_shown.has_given_forces:
         return "Given", "those of the table."
-    if motion_shown.driven:
+    if motion_shown.has_drives:
         return "Drive", "what the drives must give, friction and motors included."
     return "Actuator", "what the bodies take; friction is left out."
 
@@ -131,16 +132,16 @@ def _figures(motion_shown: ShownMotion) -> dict[str, Figure]:
         path=at.points.tool,
     )
     joints = [leg.joint for leg in robot.legs]
-    some = few(len(motion.time))
+    some = line_samples(len(motion.time))
     time = motion.time[some] - motion.time[0]
     return {
         "robot": machine,
         "forces": forces_figure(time, motion_shown.forces[some], ylabel=force(joints).axis),
-        "joints": _over_time(at.time, at.points.coordinates, coordinate(joints)),
+        "joints": _joint_figure(at.time, at.points.coordinates, coordinate(joints)),
         "power": power_figure(time, motion_shown.forces[some] * motion_shown.rates[some]),
-        "rates": _over_time(time, motion_shown.rates[some], speed(joints)),
+        "rates": _joint_figure(time, motion_shown.rates[some], speed(joints)),
     }
 
 
-def _over_time(time: Array, values: Array, quantity: JointQuantity) -> Figure:
+def _joint_figure(time: Array, values: Array, quantity: JointQuantity) -> Figure:
     return forces_figure(time, values * np.array(quantity.factors), ylabel=quantity.axis)

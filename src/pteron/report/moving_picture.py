@@ -9,7 +9,7 @@ import numpy as np
 from pteron.manipulator import Manipulator
 from pteron.report.motion_frames import Frames, scene
 from pteron.report.quantities import coordinate, force
-from pteron.report.typeset import embedded, resource
+from pteron.report.typeset import embed_json, resource
 
 _SHORT = 3.0
 """Duration, s, below which a motion is slowed down for the eye."""
@@ -46,7 +46,7 @@ def stage(robot: Manipulator, shown: Frames, **words: str) -> dict[str, Any]:
         "paces": [(pace, text) for least, pace, text in _PACES if shown.duration >= least],
         "pace": 0.4 if shown.duration < _SHORT else 1.0,
         "script": resource("picture.js") + resource("play.js"),
-        "scene": embedded(drawn),
+        "scene": embed_json(drawn),
         **words,
     }
 

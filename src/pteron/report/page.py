@@ -34,10 +34,10 @@ from pteron.reduction.expressions import html_symbol
 from pteron.report.contents import Report
 from pteron.report.costs import PAPER_CLAIM
 from pteron.report.drive_figures import force_speed, power
-from pteron.report.motion_frames import few
+from pteron.report.motion_frames import line_samples
 from pteron.report.moving_picture import stage
 from pteron.report.quantities import SYMBOLS, angles_text, force, nouns, readable, speed
-from pteron.report.typeset import compact, fixed, template, triple
+from pteron.report.typeset import compact, format_fixed, template, triple
 
 _LONGEST = 200
 """Most characters of a sum that is shown; those of an oblique Quadrupteron have thousands."""
@@ -49,8 +49,8 @@ def page(report: Report) -> str:
     joints, standard = [leg.joint for leg in robot.legs], report.standard
     document = template(
         "page.html.j2",
-        degrees=lambda angle, places=1: fixed(float(np.degrees(angle)), places),
-        lettered=lettered,
+        degrees=lambda angle, places=1: format_fixed(float(np.degrees(angle)), places),
+        typeset_account=typeset_account,
         readable=readable,
         signed=lambda text: re.sub(r"(?<![\w.-])-(?=\d)", "\u2212", text),
         typeset=lambda text: escape(text).replace("J^-T", Markup("<b>J</b><sup>\u2212T</sup>")),
@@ -67,7 +67,7 @@ def page(report: Report) -> str:
             doing="on its pick-and-place cycle" if standard else "in motion",
             still=f"The {home}, with the way of {point} on the {way}.",
             picture_title=f"{robot.name} in its home pose",
-            force_title=f"{'Drive' if report.driven else 'Actuator'} {force(joints).name}",
+            force_title=f"{'Drive' if report.has_drives else 'Actuator'} {force(joints).name}",
         ),
         report=report,
         paper_claim=PAPER_CLAIM,
@@ -82,7 +82,7 @@ def page(report: Report) -> str:
         bodies=bodies(robot),
         letters=_letters(robot),
         reasons=_reasons(robot),
-        weighed=_weighed(report),
+        angle_measures=_angle_measures(report),
         speed=speed(joints),
         joint=nouns(joints),
         joint_units=dict.fromkeys(joint.unit for joint in joints),
@@ -93,13 +93,13 @@ def page(report: Report) -> str:
         motors=report.sizing.table().to_dicts(),
         total=report.sizing.power.sum(axis=1),
         units=[report.base.parameters[k].unit for k in report.base.kept],
-        values=_without_rounding(report.base),
+        values=_zero_rounding(report.base),
         sums=[Markup(line) for line in report.base.expressions("html")],
-        symbols=in_symbols(report.base),
+        symbols=symbolic_sums(report.base),
     )
 
 
-def lettered(text: str) -> Markup:
+def typeset_account(text: str) -> Markup:
     """Return an account of a leg with its vectors bold and its Greek letters Greek."""
     safe = str(escape(text)).replace(" . ", " \u00b7 ").replace(" - ", " \u2212 ")
     greek = {name: letters.symbol for name, letters in COORDINATES.items()} | SYMBOLS
@@ -141,7 +141,7 @@ def geometry(robot: Manipulator) -> list[tuple[str, list[str]]]:
             if value is None:
                 texts.append("\u2013")
             elif role in ("length", "number"):
-                texts.append(fixed(1e3 * value) if role == "length" else compact(value))
+                texts.append(format_fixed(1e3 * value) if role == "length" else compact(value))
             elif role == "count":
                 texts.append(str(value))
             else:
@@ -196,8 +196,8 @@ def _reasons(robot: Manipulator) -> list[str]:
     return list(dict.fromkeys(reason.format("") for reason in (*transfers, *rides, *unturned)))
 
 
-def _weighed(report: Report) -> list[str]:
-    """Return the measures of angles, as lengths, in the condition number of the Jacobian."""
+def _angle_measures(report: Report) -> list[str]:
+    """Return how angles are scaled to lengths in the condition number of the Jacobian."""
     legs, radius = report.robot.legs, report.jacobian.radius
     followers = [legs[i].joint.noun for i in _followers(report.robot)]
     measures = []
@@ -205,9 +205,9 @@ def _weighed(report: Report) -> list[str]:
         measures.append("a crank's angle measured as the way of its end")
     if radius is not None:
         whose = "P" if report.robot.platform.tilts else "its axis"
-        way = f"a point {fixed(1e3 * radius)} mm from {whose} (the root mean square distance"
+        way = f"a point {format_fixed(1e3 * radius)} mm from {whose} (the root mean square distance"
         if report.robot.platform.slides:
-            way = f"what slides, {fixed(1e3 * radius)} mm/rad (the root mean square"
+            way = f"what slides, {format_fixed(1e3 * radius)} mm/rad (the root mean square"
         angle = "angles" if report.robot.platform.tilts else "angle \u03c6"
         measures.append(f"the platform's {angle} as the way of {way} of the platform points)")
     measures += [f"the {noun}'s angle as \u03c6, whatever its ratio" for noun in followers]
@@ -232,10 +232,10 @@ def _figures(report: Report) -> dict[str, Any]:
         gravity=gravity_of(robot),
         path=shown.points.tool[out],
     )
-    whose = "drive" if report.driven else "actuator"
+    whose = "drive" if report.has_drives else "actuator"
     label = f"{whose} {force([leg.joint for leg in robot.legs]).axis}"
     half = cycle.duration / 2.0 if standard else None
-    some = few(len(cycle.time))
+    some = line_samples(len(cycle.time))
     forces = forces_figure(cycle.time[some], report.forces[some], turning_point=half, ylabel=label)
     figures: dict[str, Any] = {
         "robot": machine,
@@ -258,19 +258,19 @@ def _figures(report: Report) -> dict[str, Any]:
     return figures
 
 
-def _without_rounding(base: BaseParameters) -> Array:
-    """Return the base parameters' values, with zero for what rounding alone has left of them."""
+def _zero_rounding(base: BaseParameters) -> Array:
+    """Return the base parameters' values, those within rounding of zero set to zero."""
     values = base.values()
     units = np.array([base.parameters[k].unit for k in base.kept])
     largest = [np.abs(values[units == unit]).max() for unit in units]
     return np.where(np.abs(values) > 1e-12 * np.array(largest), values, 0.0)
 
 
-def in_symbols(base: BaseParameters) -> dict[str, list[Any]] | None:
+def symbolic_sums(base: BaseParameters) -> dict[str, list[Any]] | None:
     """Return the sums in symbols and the symbols' values in m; None if none, or too long."""
     key = base.robot, base.parameters, base.kept, base.certificate.method, version("sympy")
     packages = "kinematics", "reduction", "report", "short_numbers"
-    texts = cached_result(("symbols", *key), packages, partial(_in_symbols, base))
+    texts = cached_result(("symbols", *key), packages, partial(_symbolic_texts, base))
     if texts is None:
         return None
     sums, lengths = texts
@@ -280,7 +280,7 @@ def in_symbols(base: BaseParameters) -> dict[str, list[Any]] | None:
     }
 
 
-def _in_symbols(base: BaseParameters) -> tuple[list[str], list[tuple[str, float]]] | None:
+def _symbolic_texts(base: BaseParameters) -> tuple[list[str], list[tuple[str, float]]] | None:
     try:
         lines = base.expressions(symbols=True)
     except ModelError:

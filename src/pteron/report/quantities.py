@@ -9,7 +9,7 @@ from pteron.kernels import Array
 from pteron.legs.kind import ActuatedJoint
 from pteron.manipulator import Manipulator
 from pteron.platforms.coordinates import SHOWN, coordinate as pose_coordinate
-from pteron.report.typeset import fixed
+from pteron.report.typeset import format_fixed
 
 _NARROW = "\u202f"
 """The narrow space within a unit."""
@@ -27,14 +27,14 @@ class JointQuantity:
     factors: tuple[float, ...]
 
     @property
-    def shared(self) -> str:
+    def common_unit(self) -> str:
         """The unit, if all have the same."""
         return self.units[0] if len(set(self.units)) == 1 else ""
 
     @property
     def heading(self) -> str:
         """The name, with the unit if all have the same."""
-        unit = self.shared.replace(" ", _NARROW)
+        unit = self.common_unit.replace(" ", _NARROW)
         return f"{self.name} ({unit})" if unit else self.name
 
     @property
@@ -42,9 +42,9 @@ class JointQuantity:
         """The name with all units, for the axis of a figure."""
         return f"{self.name} ({', '.join(dict.fromkeys(self.units))})"
 
-    def own(self, i: int) -> str:
+    def unit_suffix(self, i: int) -> str:
         """Return the unit of leg i, from 0, if the heading does not have it."""
-        return "" if self.shared else f" {self.units[i]}"
+        return "" if self.common_unit else f" {self.units[i]}"
 
 
 def coordinate(joints: Sequence[ActuatedJoint]) -> JointQuantity:
@@ -84,7 +84,7 @@ def readable(value: float, unit: str, places: int = 1) -> str:
     ('28.6°', '120.0 mm')
     """
     shown, factor = SHOWN[unit]
-    return f"{fixed(factor * float(value), places)}{shown if shown == '°' else ' ' + shown}"
+    return f"{format_fixed(factor * float(value), places)}{shown if shown == '°' else ' ' + shown}"
 
 
 def angles_text(robot: Manipulator, pose: Array) -> str:

@@ -63,11 +63,11 @@ def significant(value: float, digits: int = 3) -> str:
     if not _TINY <= abs(rounded) < _HUGE:
         mantissa, _, power = text.partition("e")
         return f"{mantissa.replace('-', _MINUS)}{_SPACE}\u00d7{_SPACE}{power_of_ten(int(power))}"
-    return fixed(value, max(digits - 1 - floor(log10(abs(rounded))), 0))
+    return format_fixed(value, max(digits - 1 - floor(log10(abs(rounded))), 0))
 
 
 def percent(value: float, digits: int = 3) -> str:
-    r"""Return a percentage; one that is nothing to speak of has no digits.
+    r"""Return a percentage; one below the least that is shown is "< least %".
 
     Examples
     --------
@@ -79,12 +79,12 @@ def percent(value: float, digits: int = 3) -> str:
     return f"{significant(value, digits)}\u00a0%"
 
 
-def fixed(value: float, places: int = 1) -> str:
-    """Return a number with so many decimal places, a true minus and no negative zero.
+def format_fixed(value: float, places: int = 1) -> str:
+    """Return a number with `places` decimals, a true minus sign and no negative zero.
 
     Examples
     --------
-    >>> fixed(-12.34), fixed(-0.001)
+    >>> format_fixed(-12.34), format_fixed(-0.001)
     ('−12.3', '0.0')
     """
     text = f"{value:.{places}f}"
@@ -94,7 +94,7 @@ def fixed(value: float, places: int = 1) -> str:
 
 
 def measured(value: float, half: float) -> tuple[str, str]:
-    """Return a value and half its interval, to the second digit of the latter, but not to a ninth.
+    """Return a value and half its interval as texts, both rounded to two digits of the half.
 
     Examples
     --------
@@ -106,11 +106,11 @@ def measured(value: float, half: float) -> tuple[str, str]:
         return significant(value, digits), significant(half, 2)
     # 0.0996 is 0.10 in two digits: the size counts after rounding.
     places = max(1 - floor(log10(float(f"{half:.1e}"))), 0)
-    return fixed(value, places), fixed(half, places)
+    return format_fixed(value, places), format_fixed(half, places)
 
 
 def _millimetres(metres: float, places: int = 1) -> str:
-    return fixed(1e3 * float(metres), places)
+    return format_fixed(1e3 * float(metres), places)
 
 
 def compact(value: float, digits: int = 4) -> str:
@@ -136,8 +136,8 @@ def resource(name: str, folder: str = "report") -> Markup:
     return Markup((files("pteron") / folder / name).read_text(encoding="utf-8"))
 
 
-def embedded(data: Any) -> Markup:
-    """Return data as JSON that may stand in a page's script element, which it cannot end."""
+def embed_json(data: Any) -> Markup:
+    """Return data as JSON for a page's script element, "<" escaped."""
     text = json.dumps(data, separators=(",", ":"), allow_nan=False)
     return Markup(text.replace("<", "\\u003c"))
 
@@ -153,7 +153,7 @@ def template(name: str, folder: str = "report", **filters: Callable[..., Any]) -
     """Return a page's template, with the style and filters of all pages and some of its own."""
     shared: dict[str, Callable[..., Any]] = {
         "compact": compact,
-        "fixed": fixed,
+        "fixed": format_fixed,
         "mm": _millimetres,
         "percent": percent,
         "prose": prose,

@@ -155,8 +155,8 @@ def checked_folder(path: str | Path) -> Path:
         raise OutputError(f"{target}: cannot be written to as a folder ({reason})") from None
 
 
-def checked_apart(path: Path, sources: Iterable[str | Path]) -> Path:
-    """Return the path of a model file: no file that is read, and no description of a log.
+def checked_output(path: Path, sources: Iterable[str | Path]) -> Path:
+    """Return the path of a model file, checked to replace no input and no description of a log.
 
     Raises
     ------
@@ -173,7 +173,7 @@ def checked_apart(path: Path, sources: Iterable[str | Path]) -> Path:
     return path
 
 
-def commented(lines: Iterable[str]) -> str:
+def comment_lines(lines: Iterable[str]) -> str:
     """Return lines as comments at the head of a TOML file, which forbids control characters."""
     clean = ("".join(c if c.isprintable() else " " for c in line) for line in lines)
     return "".join(f"# {' '.join(line.split())}\n" for line in clean) + "#\n"
@@ -211,7 +211,7 @@ def numbers(report: Report) -> dict[str, Any]:
             "duration": cycle.duration,
             **(picked(standard, _WAY) if standard else dict.fromkeys(_WAY.split())),
             **picked(cycle, "time pose velocity acceleration"),
-            **picked(report, "forces with_drives=driven"),
+            **picked(report, "forces with_drives=has_drives"),
             **picked(sizing, "overloads peak_forces rms_forces peak_speeds"),
             "joints": picked(report.joints, "least greatest limits within"),
         },

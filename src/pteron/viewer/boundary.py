@@ -36,7 +36,7 @@ _SAME_JOINT = 1e-6
 """Difference of a joint's coordinate from the one asked for, m or rad, up to which it is met."""
 
 
-def allowed(robot: Manipulator, poses: Array) -> NDArray[np.bool_]:
+def is_allowed(robot: Manipulator, poses: Array) -> NDArray[np.bool_]:
     """Return whether poses (..., m) are in reach of all legs and within all limits, (...)."""
     measure = numeric(robot, "reach")(poses)[1]
     bent = (measure >= LEAST_TYPE_I).all(axis=-1)
@@ -46,21 +46,20 @@ def allowed(robot: Manipulator, poses: Array) -> NDArray[np.bool_]:
 def farthest(robot: Manipulator, start: Array, target: Array) -> tuple[Array, Array | None]:
     """Return the last pose that the platform reaches on the straight path to another.
 
-    A target that is allowed is always come to.
-
-    With it comes a pose next to it that is not allowed; None where nothing stops the platform.
+    A target that is allowed is always reached. With the pose comes one next to it that is not
+    allowed; None where nothing stops the platform.
     """
-    if bool(allowed(robot, target)):
+    if bool(is_allowed(robot, target)):
         return target, None
 
-    def tried(shares: Array) -> tuple[Array, NDArray[np.bool_]]:
+    def try_shares(shares: Array) -> tuple[Array, NDArray[np.bool_]]:
         poses = start + shares[:, None] * (target - start)
-        return poses, allowed(robot, poses)
+        return poses, is_allowed(robot, poses)
 
-    return _narrowed(tried, start, _PIECES)
+    return _last_good_pose(try_shares, start, _PIECES)
 
 
-def followed(
+def follow_joints(
     robot: Manipulator, pose: Array, joints: Array, target: Array
 ) -> tuple[Array, Array | None]:
     """Return the last pose in which the platform follows its joints on their straight path.
@@ -71,25 +70,25 @@ def followed(
     rounds = np.array([leg.goes_round for leg in robot.legs])
     turn = 2.0 * np.pi
 
-    def tried(shares: Array) -> tuple[Array, NDArray[np.bool_]]:
+    def try_shares(shares: Array) -> tuple[Array, NDArray[np.bool_]]:
         way = joints + shares[:, None] * (target - joints)
         poses = follow(robot, way, pose, on_failure="nan")
         differences = np.abs(inverse_kinematics(robot, poses, on_failure="nan") - way)
         differences = np.where(rounds, np.abs((differences + np.pi) % turn - np.pi), differences)
-        return poses, allowed(robot, poses) & (differences <= _SAME_JOINT).all(axis=-1)
+        return poses, is_allowed(robot, poses) & (differences <= _SAME_JOINT).all(axis=-1)
 
-    return _narrowed(tried, pose, _STEPS)
+    return _last_good_pose(try_shares, pose, _STEPS)
 
 
-def _narrowed(
-    tried: Callable[[Array], tuple[Array, NDArray[np.bool_]]], start: Array, pieces: int
+def _last_good_pose(
+    try_shares: Callable[[Array], tuple[Array, NDArray[np.bool_]]], start: Array, pieces: int
 ) -> tuple[Array, Array | None]:
-    """Return the last pose before the first that fails, and that one, by ever finer pieces."""
+    """Return the last pose that is allowed and the first that is not, by repeated subdivision."""
     low, high, last = 0.0, 1.0, start
     beyond: Array | None = None
     for _ in range(_ROUNDS):
         shares = np.linspace(low, high, pieces + 1)[1:]
-        poses, good = tried(shares)
+        poses, good = try_shares(shares)
         if good.all():
             return poses[-1], beyond
         k = int(good.argmin())
@@ -125,8 +124,8 @@ def what_stops(robot: Manipulator, beyond: Array) -> str:
     return "The assembly mode ends here (singular, type II)"
 
 
-def told_rest(robot: Manipulator, last: Array, target: Array) -> str:
-    """Return the distance of a pose (m,) from the one that was asked for, in words."""
+def distance_text(robot: Manipulator, last: Array, target: Array) -> str:
+    """Return the distance of a pose (m,) from its target as text, in mm and degrees."""
     way = float(np.linalg.norm((target - last)[~robot.platform.angular]))
     angles = np.abs((target - last)[robot.platform.angular]).tolist()
     parts = [readable(way, "m")] * (way > 0.0)

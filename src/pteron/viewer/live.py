@@ -15,7 +15,7 @@ import numpy as np
 
 from pteron.errors import DataError, PteronError
 from pteron.manipulator import Manipulator
-from pteron.report.motion_frames import seen
+from pteron.report.motion_frames import picture_points
 from pteron.report.typeset import resource, template
 from pteron.viewer import panel
 from pteron.viewer.picture import Picture
@@ -24,7 +24,7 @@ from pteron.viewer.readout import readout
 from pteron.viewer.server import Tab
 from pteron.viewer.session import Session
 from pteron.viewer.slices import choices, slice_map, slice_parts
-from pteron.viewer.state import stopped
+from pteron.viewer.state import stop_motion
 
 _FRAME = 1.0 / 30.0
 """Time between two pictures of a motion, s."""
@@ -104,20 +104,20 @@ class Live:
             name=self.name, script=script, style=style, controls=panel.controls(self.session)
         )
 
-    def entered(self, tab: Tab) -> None:
+    def open_tab(self, tab: Tab) -> None:
         """Send a new tab its contents."""
         with self._wake:
             self._tabs.add(tab)
             for kind, message in self._kept.items():
                 tab.send(kind, message)
 
-    def left(self, tab: Tab) -> None:
+    def close_tab(self, tab: Tab) -> None:
         """Forget a tab that is closed."""
         with self._wake:
             self._tabs.discard(tab)
             self._files.pop(tab, None)
 
-    def told(self, tab: Tab, message: str | bytes) -> None:
+    def handle_message(self, tab: Tab, message: str | bytes) -> None:
         """Handle a message of a tab; a file comes after its name."""
         session = self.session
         if isinstance(message, bytes):
@@ -146,7 +146,7 @@ class Live:
         def prepare() -> None:
             session.playing, session.preparing = False, True
             if session.push is None:
-                session.state = stopped(session.state)
+                session.state = stop_motion(session.state)
 
         def begin() -> None:
             session.preparing = False
@@ -162,7 +162,7 @@ class Live:
 
     def _tell(self, text: str) -> None:
         self.session.playing = False
-        self.session.state = stopped(self.session.state, _sentence(text))
+        self.session.state = stop_motion(self.session.state, _sentence(text))
 
     def _send(self, kind: str, data: dict[str, Any]) -> None:
         text = json.dumps({kind: data}, allow_nan=False)
@@ -182,12 +182,12 @@ class Live:
                 if not self._actions:
                     self.idle.set()
                 if not self._actions and not self._closed:
-                    self._wake.wait(self._until(last, changed, settled))
+                    self._wake.wait(self._waiting_time(last, changed, settled))
                 if self._closed:
                     return
                 actions, self._actions = self._actions, {}
             for name, act in actions.items():
-                self._guard(lambda: self._acted(name, act))  # noqa: B023
+                self._guard(lambda: self._run_action(name, act))  # noqa: B023
             now = monotonic()
             if actions:
                 changed, settled = now, False
@@ -205,15 +205,15 @@ class Live:
                 changed = now
                 self._guard(lambda: self._show(settled=True))
 
-    def _until(self, last: float, changed: float, settled: bool) -> float | None:
-        """Return the time until the next picture, s; None where it waits for an action."""
+    def _waiting_time(self, last: float, changed: float, settled: bool) -> float | None:
+        """Return the time until the next picture, s; None without motion: wait for an action."""
         now = monotonic()
         moves = self.session.playing or self.session.push is not None
         times = [last + _FRAME - now] if moves else []
         times += [] if settled else [changed + _SETTLED - now]
         return max(0.0, min(times)) if times else None
 
-    def _acted(self, name: str, act: Callable[[], object]) -> None:
+    def _run_action(self, name: str, act: Callable[[], object]) -> None:
         last_act, now = self._last, monotonic()
         if name.startswith(_UNDONE):
             if last_act[0] != name or now - last_act[1] > _ONE:
@@ -257,7 +257,7 @@ class Live:
             | moment
             | {
                 "clock": monotonic(),
-                "message": state.message or panel.doing(session),
+                "message": state.message or panel.activity_text(session),
                 "warns": bool(state.message),
                 "readout": readout(state, numbers),
                 "plotted": {
@@ -266,7 +266,7 @@ class Live:
                     "power": _finite(numbers.power),
                 },
                 "legend": self._picture.legend(self._scale),
-                "spring": spring and [seen(state.robot, end) for end in spring],
+                "spring": spring and [picture_points(state.robot, end) for end in spring],
             },
         )
         if settled:
@@ -292,7 +292,9 @@ class Live:
         map_, parts = "", []
         if isinstance(plane, str):
             for color, rings in slice_parts(*robot_and_pose, plane, span):
-                parts.append({"color": color, "rings": [seen(state.robot, r) for r in rings]})
+                parts.append(
+                    {"color": color, "rings": [picture_points(state.robot, r) for r in rings]}
+                )
         elif plane is not None:
             map_ = slice_map(*robot_and_pose, plane, span)
         self._send("slice", {"parts": parts, "map": map_})

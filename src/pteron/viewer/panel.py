@@ -16,7 +16,7 @@ from pteron.kernels import Array
 from pteron.manipulator import Manipulator
 from pteron.platforms.coordinates import SHOWN
 from pteron.report.motion_frames import view_frame
-from pteron.report.typeset import fixed
+from pteron.report.typeset import format_fixed
 from pteron.viewer.pushing import DRIVES
 from pteron.viewer.session import SPEEDS, STANDARD, Session
 from pteron.viewer.slices import BEYOND, SERVES, choices
@@ -30,9 +30,9 @@ _NO_MODE = "none of them"
 
 
 def controls(session: Session) -> dict[str, Any]:
-    """Return what there is to move, choose and type; lengths in mm, angles in degrees."""
+    """Return the controls of the page as plain data; lengths in mm, angles in degrees."""
     robot, factors = session.state.robot, pose_factors(session.state.robot)
-    home = " ".join(fixed(x, 0).replace("\u2212", "-") for x in factors * session.home)
+    home = " ".join(format_fixed(x, 0).replace("\u2212", "-") for x in factors * session.home)
     units = [leg.joint.unit for leg in robot.legs]
     names = [f"{leg.joint.noun} {i}" for i, leg in enumerate(robot.legs, start=1)]
     return {
@@ -63,10 +63,10 @@ def _sliders(names: Sequence[str], units: Sequence[str], ranges: Array) -> list[
 
 
 def values(session: Session, joints: Array) -> dict[str, Any]:
-    """Return where the controls stand."""
+    """Return the values of the controls, in mm and degrees."""
     state, motion = session.state, session.motion
     return {
-        "where": _where(state.robot, state.pose),
+        "where": _pose_text(state.robot, state.pose),
         "label": _label(state.robot, state.pose),
         "pose": _tenths(pose_factors(state.robot) * state.pose),
         "joints": _tenths(np.array(shown_joints(state.robot, joints))),
@@ -79,7 +79,7 @@ def values(session: Session, joints: Array) -> dict[str, Any]:
         "playing": session.playing,
         "pushing": session.push is not None,
         "preparing": session.preparing,
-        "pushed": _pushed(session),
+        "pushed": _push_text(session),
         "stiffness": session.push.stiffness if session.push else None,
         "time": session.time,
         "duration": motion.duration if motion else None,
@@ -87,12 +87,12 @@ def values(session: Session, joints: Array) -> dict[str, Any]:
     }
 
 
-def _where(robot: Manipulator, pose: Array) -> str:
+def _pose_text(robot: Manipulator, pose: Array) -> str:
     """Return a pose (m,) in a line, each unit once."""
     values, units = pose_factors(robot) * pose, (SHOWN[unit][0] for unit in robot.units)
     named = zip(robot.coordinates, values, units, strict=True)
     groups = groupby(
-        ((f"{name} {fixed(x)}", unit) for name, x, unit in named), lambda pair: pair[1]
+        ((f"{name} {format_fixed(x)}", unit) for name, x, unit in named), lambda pair: pair[1]
     )
     parts = ((" ".join(text for text, _ in group), unit) for unit, group in groups)
     return ", ".join(f"{text}{unit if unit == '°' else f' {unit}'}" for text, unit in parts)
@@ -101,7 +101,7 @@ def _where(robot: Manipulator, pose: Array) -> str:
 def _label(robot: Manipulator, pose: Array) -> str:
     """Return a pose (m,) as the list of assembly modes has it."""
     parts = zip(pose_factors(robot) * pose, robot.platform.angular, strict=True)
-    return " ".join(fixed(x) + "°" * bool(angle) for x, angle in parts)
+    return " ".join(format_fixed(x) + "°" * bool(angle) for x, angle in parts)
 
 
 def shown_joints(robot: Manipulator, joints: Array) -> list[float]:
@@ -111,7 +111,7 @@ def shown_joints(robot: Manipulator, joints: Array) -> list[float]:
 
 
 def settled_values(session: Session, busy: Callable[[], bool]) -> dict[str, Any] | None:
-    """Return what takes longer: assembly modes, and how far each slider may go from here.
+    """Return the slow values: assembly modes, and the span of each slider from this pose.
 
     None if somebody acts meanwhile.
     """
@@ -131,10 +131,10 @@ def settled_values(session: Session, busy: Callable[[], bool]) -> dict[str, Any]
     }
 
 
-def doing(session: Session) -> str:
-    """Return what the machine does, in words."""
+def activity_text(session: Session) -> str:
+    """Return what the machine does as a sentence."""
     name, state = session.state.robot.name, session.state
-    if words := _pushed(session):
+    if words := _push_text(session):
         return words
     if session.playing:
         return f"{name} moves: forces are those of the motion"
@@ -142,7 +142,7 @@ def doing(session: Session) -> str:
     return f"{name} {'at a moment of its motion' if moving else 'at rest'}"
 
 
-def _pushed(session: Session) -> str:
+def _push_text(session: Session) -> str:
     """Return what the machine does by itself, or is about to; empty where it does nothing."""
     if session.push is not None:
         return f"{session.push.does}. Pull at its platform."
@@ -152,7 +152,7 @@ def _pushed(session: Session) -> str:
 
 
 def action(session: Session, text: str) -> _Action:
-    """Return the name of what a page asks for, JSON, and the action itself.
+    """Return the action that a page's request, JSON, asks for, with its name.
 
     Raises
     ------

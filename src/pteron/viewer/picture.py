@@ -12,9 +12,9 @@ from pteron.kinematics import joint_screws
 from pteron.manipulator import Manipulator
 from pteron.motion import JointPoints, joint_guides, joint_points
 from pteron.motion.enlarged_points import enlarged_points
-from pteron.report.motion_frames import moving, seen, still
+from pteron.report.motion_frames import moving_parts, picture_points, still_parts
 from pteron.report.typeset import significant
-from pteron.viewer.boundary import allowed
+from pteron.viewer.boundary import is_allowed
 from pteron.viewer.state import ViewerState
 
 _SCREW, _FORCE = 0.09, 0.3
@@ -57,13 +57,13 @@ class Picture:
         self._guides = joint_guides(robot, poses)
         home = joint_points(robot, poses[0])
         near = poses[0] + _NEAR * (poses[:: max(1, len(poses) // _POSES)] - poses[0])
-        around = joint_points(robot, near[allowed(robot, near)])
+        around = joint_points(robot, near[is_allowed(robot, near)])
         lines = [line.reshape(-1, 3) for line in (*around.links, around.reference, around.tool)]
         cloud = np.vstack(lines)
         paths = np.vstack([*home.links, *(guide.path for guide in self._guides)])
         self.size = float(np.ptp(paths, axis=0).max())
-        self.still = still(robot, self._guides, home)
-        self.cloud = seen(robot, cloud)
+        self.still = still_parts(robot, self._guides, home)
+        self.cloud = picture_points(robot, cloud)
 
     def moment(
         self, state: ViewerState, forces: Array, scale: Array, *, screws: bool
@@ -71,11 +71,11 @@ class Picture:
         """Return the machine in a state; its arrows are as long as forces (n,) over a scale."""
         points = joint_points(state.robot, state.pose)
         return {
-            "now": moving(self._robot, points),
+            "now": moving_parts(self._robot, points),
             "ghost": self._ghost(points, state.pose),
             "forces": self._forces(points, forces, scale),
             "arrows": self._screws(state, points) if screws else [],
-            "tip": seen(self._robot, points.tool),
+            "tip": picture_points(self._robot, points.tool),
         }
 
     def _ghost(self, points: JointPoints, pose: Array) -> dict[str, Any] | None:
@@ -87,7 +87,7 @@ class Picture:
             moved = enlarged_points(points, joint_points(robot, pose), times)
         except PteronError:
             return None
-        return moving(self._robot, moved)
+        return moving_parts(self._robot, moved)
 
     def legend(self, scale: Array) -> str:
         """Return what the arrows of forces (n,) with a scale (n,) say."""
@@ -104,7 +104,7 @@ class Picture:
         return f"arrows: what each drive gives{bent}; {', '.join(scales)}"
 
     def _arrow(self, points: Array, color: str | int, radius: float) -> Arrow:
-        return seen(self._robot, points), color, radius
+        return picture_points(self._robot, points), color, radius
 
     def _screws(self, state: ViewerState, points: JointPoints) -> list[Arrow]:
         """Return the axes of all joints; those of sliding joints are thicker, in another colour."""

@@ -11,7 +11,7 @@ from pteron.kinematics import inverse_kinematics, joint_rates
 from pteron.manipulator import Manipulator
 from pteron.motion.simulation.plant import advance, drive_states
 from pteron.motion.simulation.stable_steps import allowed_step
-from pteron.viewer.boundary import allowed, what_stops
+from pteron.viewer.boundary import is_allowed, what_stops
 from pteron.viewer.sliding import nearest
 
 _NO_PULL = 1e-6
@@ -111,7 +111,7 @@ class Push:
             last_pose, rates = self.pose, self.velocity
             self._control()
             succeeded = self._move(_PERIOD)
-            if succeeded and allowed(robot, self.pose):
+            if succeeded and is_allowed(robot, self.pose):
                 continue
             # A limit is handled once for the rest of the span: a slide takes milliseconds.
             succeeded = succeeded and self._move((periods - 1) * _PERIOD)

@@ -72,7 +72,7 @@ def readings(state: ViewerState, forces: Array | None = None) -> Readings:
     if forces is None:
         try:
             moves = state.velocity, state.acceleration
-            forces = drive_forces(state.loaded, state.pose, *moves)
+            forces = drive_forces(state.robot_with_payload, state.pose, *moves)
         except PteronError as error:
             forces, fault = np.full(robot.joint_count, np.nan), str(error)
     try:

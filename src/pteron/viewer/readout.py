@@ -11,7 +11,7 @@ from jinja2 import Template
 from pteron.manipulator.readings import has_readings, to_readings
 from pteron.plots.canvas import LEG_COLORS
 from pteron.report.quantities import nouns, readable
-from pteron.report.typeset import fixed, template
+from pteron.report.typeset import format_fixed, template
 from pteron.viewer.readings import Level, Readings, level
 from pteron.viewer.state import ViewerState
 
@@ -33,7 +33,7 @@ def readout(state: ViewerState, numbers: Readings) -> str:
     """Return the numbers of a state as HTML."""
     legs, leg, joint = state.robot.legs, numbers.type_i.argmin(), numbers.clearances.argmin()
     forces = (
-        "\u2013" if np.isnan(force) else f"{fixed(force, PLACES)} {leg.joint.force_unit}"
+        "\u2013" if np.isnan(force) else f"{format_fixed(force, PLACES)} {leg.joint.force_unit}"
         for leg, force in zip(legs, numbers.forces, strict=True)
     )
     units = [leg.joint.unit for leg in legs]

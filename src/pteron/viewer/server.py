@@ -44,19 +44,19 @@ _GONE = 2.0
 """Time, s, for which closing waits for a tab that does not answer."""
 
 
-class Room(Protocol):
+class PageHandler(Protocol):
     """A page with a socket, through which messages go both ways."""
 
     def page(self) -> str:
         """Return the page, HTML."""
 
-    def entered(self, tab: Tab) -> None:
+    def open_tab(self, tab: Tab) -> None:
         """Send a new tab its contents."""
 
-    def left(self, tab: Tab) -> None:
+    def close_tab(self, tab: Tab) -> None:
         """Forget a tab that is closed."""
 
-    def told(self, tab: Tab, message: str | bytes) -> None:
+    def handle_message(self, tab: Tab, message: str | bytes) -> None:
         """Handle a message from a tab."""
 
 
@@ -103,11 +103,13 @@ class Tab:
 class Server:
     """A running server of pages by their paths; `port` is its port."""
 
-    def __init__(self, host: str, port: int, rooms: Mapping[str, Room | Callable[[], str]]) -> None:
+    def __init__(
+        self, host: str, port: int, handlers: Mapping[str, PageHandler | Callable[[], str]]
+    ) -> None:
         """Start the server on the first free port from `port` on, or if it is 0 on any."""
         from websockets.sync.server import serve
 
-        self._rooms, self._host, self._here = rooms, host, is_here(host)
+        self._handlers, self._host, self._here = handlers, host, is_here(host)
         logger = logging.getLogger("pteron.viewer.server")
         logger.addFilter(_worth_telling)
         free = free_port(host, port)
@@ -147,13 +149,15 @@ class Server:
             response.headers["Allow"] = "GET"
             return response
         path = request.path.partition("?")[0]
-        room = self._rooms.get(path)
-        if room is None:
-            hint = f"No page here; try {next(iter(self._rooms))}\n"
+        handler = self._handlers.get(path)
+        if handler is None:
+            hint = f"No page here; try {next(iter(self._handlers))}\n"
             return connection.respond(http.HTTPStatus.NOT_FOUND, hint)
         if "Upgrade" in request.headers:
             return None
-        response = connection.respond(http.HTTPStatus.OK, room() if callable(room) else room.page())
+        response = connection.respond(
+            http.HTTPStatus.OK, handler() if callable(handler) else handler.page()
+        )
         del response.headers["Content-Type"]
         response.headers["Content-Type"] = "text/html; charset=utf-8"
         response.headers["Cache-Control"] = "no-store"
@@ -164,19 +168,19 @@ class Server:
         from websockets.exceptions import ConnectionClosed
 
         assert connection.request is not None
-        room = self._rooms[connection.request.path.partition("?")[0]]
-        if callable(room):
+        handler = self._handlers[connection.request.path.partition("?")[0]]
+        if callable(handler):
             return
         self._tabs.add(connection)
         tab = Tab(connection)
-        room.entered(tab)
+        handler.open_tab(tab)
         try:
             for message in connection:
-                room.told(tab, message)
+                handler.handle_message(tab, message)
         except ConnectionClosed:
             pass
         finally:
-            room.left(tab)
+            handler.close_tab(tab)
             tab.close()
             self._tabs.discard(connection)
 

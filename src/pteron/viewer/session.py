@@ -20,24 +20,24 @@ from pteron.motion import Motion, pick_and_place
 from pteron.motion.payload import payload_warning
 from pteron.motion.trajectories.checks import check_motion
 from pteron.platforms.nearest_pose import pose_nearest_frame
-from pteron.viewer.boundary import allowed, followed
+from pteron.viewer.boundary import follow_joints, is_allowed
 from pteron.viewer.motion_files import motion_of_file
 from pteron.viewer.pushing import DRIVES, Push
 from pteron.viewer.slices import NONE
 from pteron.viewer.state import (
     ViewerState,
-    along,
-    assembled,
     assembly_poses,
-    at_home,
-    at_rest,
-    carrying,
     current_assembly,
-    in_working_mode,
-    joint_moved,
+    load_payload,
     metres_hint,
-    moved,
-    stopped,
+    move_home,
+    move_joint,
+    move_platform,
+    state_at_rest,
+    state_in_motion,
+    stop_motion,
+    switch_assembly,
+    switch_working_mode,
     typed_pose,
 )
 from pteron.workspace import bounding_box
@@ -68,7 +68,7 @@ _FRAME = 1.0 / 60.0
 
 
 class Session:
-    """A machine, what it does, and what people do to it.
+    """State of a viewer session: pose, playback, pushes, and the actions on them.
 
     Attributes
     ----------
@@ -91,9 +91,9 @@ class Session:
 
     def __init__(self, robot: Manipulator, payload: float = 0.0) -> None:
         self._first = robot
-        self.state = at_rest(robot)
+        self.state = state_at_rest(robot)
         if payload:
-            self.state = carrying(self.state, repr(payload))
+            self.state = load_payload(self.state, repr(payload))
             if self.state.message:
                 raise DataError(f"payload: {payload!r} given, a mass of 0 kg or more expected")
             if self.state.payload_doubt:
@@ -152,14 +152,14 @@ class Session:
     def undo(self) -> None:
         """Go back to the state before the last action."""
         if not self._before:
-            self.state = stopped(self.state, "There is nothing to undo.")
+            self.state = stop_motion(self.state, "There is nothing to undo.")
             return
-        self._rest()
+        self._end_motion()
         was = self._before.pop()
         if was.robot != self.state.robot:
-            self.state = at_home(was)
+            self.state = move_home(was)
             self._set_ranges()
-        self.state = stopped(was)
+        self.state = stop_motion(was)
 
     def set_coordinate(self, i: int, value: float) -> None:
         """Move the platform along one of its pose's coordinates, from 0, to a value in m or rad."""
@@ -169,8 +169,8 @@ class Session:
 
     def set_pose(self, target: Array) -> None:
         """Move the platform to a pose (m,), or as near to it as it goes."""
-        self._rest()
-        self.state = moved(self.state, target)
+        self._end_motion()
+        self.state = move_platform(self.state, target)
 
     def drag(self, axis: int | None, point: Array) -> None:
         """Move P to a point (3,), m, or turn the platform so that one of its axes leads there."""
@@ -197,17 +197,17 @@ class Session:
 
     def set_joint(self, i: int, value: float) -> None:
         """Move one joint, from 0, to a value in m or rad."""
-        self._rest()
-        self.state = joint_moved(self.state, i, value)
+        self._end_motion()
+        self.state = move_joint(self.state, i, value)
 
     def set_payload(self, text: str) -> None:
         """Carry what is typed, kg."""
-        self.state = carrying(self.state, text)
+        self.state = load_payload(self.state, text)
 
     def go_home(self) -> None:
         """Move the platform to its home pose."""
-        self._rest()
-        self.state = at_home(self.state)
+        self._end_motion()
+        self.state = move_home(self.state)
 
     def modes(self) -> list[tuple[int, ...]]:
         """Return the sides of the elbows of every working mode."""
@@ -216,20 +216,20 @@ class Session:
     def set_working_mode(self, elbows: Sequence[int]) -> bool:
         """Put the elbows on given sides; say whether the machine is another one now."""
         last_robot = self.state.robot
-        self._rest()
-        self.state = in_working_mode(self.state, elbows)
+        self._end_motion()
+        self.state = switch_working_mode(self.state, elbows)
         if self.state.robot == last_robot:
             return False
         state, dropped = self.state, self.motion is not None
         self.motion, self.title, self.time = None, "", 0.0
         # Ranges are those about the mode's home.
-        home = at_home(state)
+        home = move_home(state)
         self.state = home
         self._set_ranges()
         message = state.message
         if dropped:
             message = f"{message} The motion was of another working mode; load it again.".strip()
-        self.state = stopped(state, message)
+        self.state = stop_motion(state, message)
         return True
 
     def assemblies(self) -> tuple[Array, int | None]:
@@ -239,10 +239,10 @@ class Session:
 
     def set_assembly(self, pose: Array) -> None:
         """Take another of the poses that the joints have."""
-        self._rest()
-        self.state = assembled(self.state, pose)
+        self._end_motion()
+        self.state = switch_assembly(self.state, pose)
 
-    def _rest(self) -> None:
+    def _end_motion(self) -> None:
         """End what plays, and what is pushed."""
         self.playing, self.push = False, None
 
@@ -252,17 +252,17 @@ class Session:
         """Return the machine as a spring may pull at it; the first time takes some seconds."""
         if drives not in DRIVES:
             raise DataError(f"drives: {drives!r} given, one of {', '.join(DRIVES)} expected")
-        return Push(self.state.loaded, self.state.pose, drives)
+        return Push(self.state.robot_with_payload, self.state.pose, drives)
 
     def begin_push(self, drives: str) -> None:
         """Let the machine move by itself from where it is."""
         self.playing, self.push = False, self.prepare_push(drives)
-        self.state = stopped(self.state)
+        self.state = stop_motion(self.state)
 
     def end_push(self) -> None:
         """Bring the machine to rest where it is."""
         self.push = None
-        self.state = stopped(self.state)
+        self.state = stop_motion(self.state)
 
     def load(self, name: str, data: bytes) -> None:
         """Take a motion from a file's name and content; it plays from its beginning."""
@@ -284,7 +284,7 @@ class Session:
     def play(self, *, on: bool) -> None:
         """Start or stop the motion."""
         if self.motion is None:
-            self.state = stopped(self.state, "There is no motion to play: load one first.")
+            self.state = stop_motion(self.state, "There is no motion to play: load one first.")
             return
         self.push, self.playing = None, on
 
@@ -297,7 +297,7 @@ class Session:
         """Go to a time of the motion, s."""
         if self.motion is not None:
             self.time = min(max(time, 0.0), self.motion.duration)
-            self.state = along(self.state, self.motion, self.time)
+            self.state = state_in_motion(self.state, self.motion, self.time)
 
     def advance(self, elapsed: float) -> None:
         """Let time go on for so many seconds of the clock; a motion begins again at its end."""
@@ -322,7 +322,7 @@ class Session:
             for row, end in enumerate((low, high)):
                 line = np.tile(pose, (_ALONG, 1))
                 line[:, i] = np.linspace(pose[i], end, _ALONG)
-                free = allowed(robot, line)
+                free = is_allowed(robot, line)
                 ends[row, i] = line[-1 if free.all() else max(0, int(free.argmin()) - 1), i]
         joints = self.state.joints
         joint_ends = np.array([joints, joints])
@@ -332,7 +332,7 @@ class Session:
                     return None
                 target = joints.copy()
                 target[i] = self.joint_range[row, i]
-                last = followed(robot, pose, joints, target)[0]
+                last = follow_joints(robot, pose, joints, target)[0]
                 joint_ends[row, i] = inverse_kinematics(robot, last)[i]
         return ends, joint_ends
 
@@ -341,7 +341,7 @@ class Session:
 
         The largest of the motion, or at rest in the home pose; legs of one unit share a scale.
         """
-        loaded = self.state.loaded
+        loaded = self.state.robot_with_payload
         zeros = np.zeros_like(self.home)
         states = [(self.home, zeros, zeros)]
         if self.motion is not None:

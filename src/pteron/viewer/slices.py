@@ -57,7 +57,7 @@ def slice_parts(
     parts = []
     for field, color in ((cut.margin, SERVES), (np.minimum(legs, -cut.margin), BEYOND)):
         rings = _rings(cut.first, cut.second, field)
-        parts.append((color, [_in_space(robot, pose, i, j, ring) for ring in rings]))
+        parts.append((color, [_base_points(robot, pose, i, j, ring) for ring in rings]))
     return parts
 
 
@@ -102,7 +102,7 @@ def _rings(first: Array, second: Array, field: Array) -> list[Array]:
     return [np.asarray(ring) for path in drawn.get_paths() for ring in path.to_polygons()]
 
 
-def _in_space(robot: Manipulator, pose: Array, i: int, j: int, flat: Array) -> Array:
+def _base_points(robot: Manipulator, pose: Array, i: int, j: int, flat: Array) -> Array:
     """Return points (..., 2) of a slice in the base frame, (..., 3)."""
     lengths = np.zeros((*flat.shape[:-1], len(robot.platform.lengths)))
     lengths[:] = pose[~robot.platform.angular]

@@ -1,4 +1,4 @@
-"""The reachable pose nearest to one that is asked for, come to by sliding along what stops it."""
+"""The reachable pose nearest to a target, found by sliding along the boundary."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import scipy  # type: ignore[import-untyped]
 
 from pteron.kernels import Array, numeric
 from pteron.manipulator import Manipulator
-from pteron.viewer.boundary import allowed, farthest
+from pteron.viewer.boundary import farthest, is_allowed
 from pteron.workspace.margins import distance_to_limits
 
 _ROUNDS = 40
@@ -33,7 +33,7 @@ _BACK = 3
 
 
 def nearest(robot: Manipulator, start: Array, target: Array) -> tuple[Array, Array | None]:
-    """Return the pose near to a target (m,) that the platform comes to from a start (m,).
+    """Return the reachable pose near a target (m,), from a start (m,), by sliding.
 
     It goes straight as far as it can, then along the boundary while it comes nearer: a step is the
     one next to the target that keeps all margins, taken as linear. Angles count with the arm of
@@ -45,10 +45,10 @@ def nearest(robot: Manipulator, start: Array, target: Array) -> tuple[Array, Arr
         return pose, None
     weights = _weights(robot)
 
-    def missing(there: Array) -> float:
+    def distance_to_target(there: Array) -> float:
         return float(np.linalg.norm(weights * (target - there)))
 
-    distance = missing(start)
+    distance = distance_to_target(start)
     radius = max(min(0.25 * distance, _STRIDE * max(leg.size for leg in robot.legs)), 1e-9)
     for _ in range(_ROUNDS):
         step = _step(robot, pose, target - pose, weights)
@@ -56,12 +56,12 @@ def nearest(robot: Manipulator, start: Array, target: Array) -> tuple[Array, Arr
         turn = float(np.abs(step[robot.platform.angular]).max(initial=0.0))
         trial = pose + step * min(1.0, radius / (length or radius), _TURN / (turn or _TURN))
         for _ in range(_BACK):
-            if allowed(robot, trial):
+            if is_allowed(robot, trial):
                 break
             trial = trial + _step(robot, trial, np.zeros_like(trial), weights)
-        if not allowed(robot, trial):
+        if not is_allowed(robot, trial):
             trial = farthest(robot, pose, trial)[0]
-        if missing(trial) < missing(pose) - _LEAST * distance:
+        if distance_to_target(trial) < distance_to_target(pose) - _LEAST * distance:
             pose = trial
         else:
             radius *= 0.25

@@ -16,7 +16,7 @@ from pteron.manipulator.variants import with_elbows
 from pteron.motion import Motion
 from pteron.motion.payload import add_payload as loaded_robot, payload_warning
 from pteron.platforms.coordinates import SHOWN
-from pteron.viewer.boundary import allowed, followed, told_rest, what_stops
+from pteron.viewer.boundary import distance_text, follow_joints, is_allowed, what_stops
 from pteron.viewer.sliding import nearest
 from pteron.workspace import home_pose
 
@@ -57,7 +57,7 @@ class ViewerState:
         return coordinates
 
     @property
-    def loaded(self) -> Manipulator:
+    def robot_with_payload(self) -> Manipulator:
         """The machine with its payload."""
         return loaded_robot(self.robot, self.payload)
 
@@ -68,25 +68,25 @@ class ViewerState:
         return f"{doubt[:1].upper()}{doubt[1:]}"
 
 
-def at_rest(robot: Manipulator, pose: Array | None = None) -> ViewerState:
+def state_at_rest(robot: Manipulator, pose: Array | None = None) -> ViewerState:
     """Return a machine at rest in a pose, by default its home pose."""
     rest_pose = home_pose(robot) if pose is None else pose
     return ViewerState(robot, rest_pose, np.zeros_like(rest_pose), np.zeros_like(rest_pose))
 
 
-def moved(state: ViewerState, target: Array) -> ViewerState:
+def move_platform(state: ViewerState, target: Array) -> ViewerState:
     """Return the machine at rest in another pose (m,), or as near to it as it slides."""
     if not np.isfinite(target).all():
         return replace(state, message="The pose is to have finite numbers.")
     last, beyond = nearest(state.robot, state.pose, target)
     if beyond is None:
-        return _rest(state, target)
-    distance = told_rest(state.robot, last, target)
+        return _stop_at(state, target)
+    distance = distance_text(state.robot, last, target)
     why = what_stops(state.robot, beyond)
-    return _rest(state, last, f"{why}. The platform is {distance} from the pose asked for.")
+    return _stop_at(state, last, f"{why}. The platform is {distance} from the pose asked for.")
 
 
-def joint_moved(state: ViewerState, i: int, value: float) -> ViewerState:
+def move_joint(state: ViewerState, i: int, value: float) -> ViewerState:
     """Return the machine with one joint, from 0, elsewhere; the platform keeps its assembly mode.
 
     It stops where a leg, a limit or the end of the assembly mode stops it.
@@ -94,12 +94,12 @@ def joint_moved(state: ViewerState, i: int, value: float) -> ViewerState:
     joints = state.joints
     target = joints.copy()
     target[i] = value
-    last, beyond = followed(state.robot, state.pose, joints, target)
+    last, beyond = follow_joints(state.robot, state.pose, joints, target)
     if beyond is None:
-        return _rest(state, last)
+        return _stop_at(state, last)
     leg = state.robot.legs[i]
     why = what_stops(state.robot, beyond if np.isfinite(beyond).all() else last)
-    return _rest(state, last, f"{why}. The {leg.joint.noun} of leg {i + 1} stops there.")
+    return _stop_at(state, last, f"{why}. The {leg.joint.noun} of leg {i + 1} stops there.")
 
 
 def assembly_poses(state: ViewerState) -> Array:
@@ -120,33 +120,33 @@ def current_assembly(state: ViewerState, poses: Array) -> int | None:
     return int(near[0]) if len(near) else None
 
 
-def assembled(state: ViewerState, pose: Array) -> ViewerState:
+def switch_assembly(state: ViewerState, pose: Array) -> ViewerState:
     """Return the machine in another assembly mode, that of a pose with the same joints."""
-    if not allowed(state.robot, pose):
+    if not is_allowed(state.robot, pose):
         why = what_stops(state.robot, pose)
         return replace(state, message=f"This assembly mode is not possible. {why}.")
-    return _rest(state, pose)
+    return _stop_at(state, pose)
 
 
-def in_working_mode(state: ViewerState, elbows: Sequence[int]) -> ViewerState:
+def switch_working_mode(state: ViewerState, elbows: Sequence[int]) -> ViewerState:
     """Return the machine with its elbows on given sides, in its pose or, failing that, at home."""
     robot = with_elbows(state.robot, elbows)
     other = replace(state, robot=robot)
-    if allowed(robot, state.pose):
-        return _rest(other, state.pose)
+    if is_allowed(robot, state.pose):
+        return _stop_at(other, state.pose)
     try:
         home = home_pose(robot)
     except PteronError as error:
         return replace(state, message=f"This working mode is not possible: {error}")
-    return _rest(other, home, "The pose is out of reach in this working mode: here is its home.")
+    return _stop_at(other, home, "The pose is out of reach in this working mode: here is its home.")
 
 
-def at_home(state: ViewerState) -> ViewerState:
+def move_home(state: ViewerState) -> ViewerState:
     """Return the machine at rest in its home pose."""
-    return _rest(state, home_pose(state.robot))
+    return _stop_at(state, home_pose(state.robot))
 
 
-def carrying(state: ViewerState, text: str) -> ViewerState:
+def load_payload(state: ViewerState, text: str) -> ViewerState:
     """Return the machine with a payload that is typed in kg; one that cannot be changes nothing."""
     try:
         mass = _number(text, "payload", "a mass of 0 kg or more")
@@ -189,7 +189,7 @@ def metres_hint(robot: Manipulator, pose: Array) -> str:
     lengths = ~robot.platform.angular
     typed = 1e3 * pose[lengths]
     meant = np.where(lengths, 1e3 * pose, pose)
-    if not 0.0 < np.abs(typed).max(initial=0.0) < _METRES or not allowed(robot, meant):
+    if not 0.0 < np.abs(typed).max(initial=0.0) < _METRES or not is_allowed(robot, meant):
         return ""
     metres, millimetres = (" ".join(f"{x:g}" for x in np.round(v, 9)) for v in (typed, 1e3 * typed))
     return f"Lengths are typed in mm: is {metres} in m? That is {millimetres} here."
@@ -217,17 +217,17 @@ def _number(text: str, name: str, expected: str) -> float:
     return value
 
 
-def along(state: ViewerState, motion: Motion, time: float) -> ViewerState:
+def state_in_motion(state: ViewerState, motion: Motion, time: float) -> ViewerState:
     """Return the machine as it is at a time of a motion, s from its beginning."""
     pose, velocity, acceleration = motion.at(motion.time[0] + time)
     return replace(state, pose=pose, velocity=velocity, acceleration=acceleration, message="")
 
 
-def stopped(state: ViewerState, message: str = "") -> ViewerState:
+def stop_motion(state: ViewerState, message: str = "") -> ViewerState:
     """Return the machine at rest where it is."""
-    return _rest(state, state.pose, message)
+    return _stop_at(state, state.pose, message)
 
 
-def _rest(state: ViewerState, pose: Array, message: str = "") -> ViewerState:
+def _stop_at(state: ViewerState, pose: Array, message: str = "") -> ViewerState:
     zeros = np.zeros_like(pose)
     return replace(state, pose=pose, velocity=zeros, acceleration=zeros, message=message)

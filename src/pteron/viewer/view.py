@@ -43,23 +43,24 @@ class Viewer:
 
     def __init__(self, live: Live, host: str, port: int, beside: Sequence[Live] = ()) -> None:
         self._live = live
-        rooms: dict[str, Any] = {"/": live}
+        handlers: dict[str, Any] = {"/": live}
         if beside:
             every = (live, *beside)
-            rooms = {"/": lambda: _side_by_side([page.name for page in every])}
-            rooms |= {f"/{k}": page for k, page in enumerate(every, start=1)}
-        self._server: Server | None = Server(host, port, rooms)
+            handlers = {"/": lambda: _side_by_side([page.name for page in every])}
+            handlers |= {f"/{k}": page for k, page in enumerate(every, start=1)}
+        self._server: Server | None = Server(host, port, handlers)
         self.port = self._server.port
         shown = "127.0.0.1" if host in ("0.0.0.0", "::", "") else host
         self.url = f"http://{f'[{shown}]' if ':' in shown else shown}:{self.port}"
         self.beside: tuple[Viewer, ...] = tuple(
-            self._of(page, f"{self.url}/{k}", self.port) for k, page in enumerate(beside, start=2)
+            self._served_viewer(page, f"{self.url}/{k}", self.port)
+            for k, page in enumerate(beside, start=2)
         )
         for page in (live, *beside):
             page.start()
 
     @classmethod
-    def _of(cls, live: Live, url: str, port: int) -> Viewer:
+    def _served_viewer(cls, live: Live, url: str, port: int) -> Viewer:
         """Return the viewer of a machine whose page another one serves."""
         viewer = cls.__new__(cls)
         viewer._live, viewer._server, viewer.beside = live, None, ()
@@ -190,7 +191,7 @@ def view(
     'http://127.0.0.1:'
     """
     session = _session(robot, payload, motion)
-    live = Live(session, _compared(session, compare, enlarge))
+    live = Live(session, _comparison(session, compare, enlarge))
     others = [Live(_session(machine, payload, motion), None) for machine in beside]
     return Viewer(live, host, port, others)
 
@@ -208,7 +209,7 @@ def _session(
     return session
 
 
-def _compared(
+def _comparison(
     session: Session, compare: RobotLike | None, enlarge: float | None
 ) -> tuple[Manipulator, float] | None:
     if compare is None:

@@ -73,8 +73,8 @@ def inverse(motion: Array) -> Array:
     return inverted
 
 
-def within(body: TreeBody, points: Array) -> Array:
-    """Return points (..., 3) of the base frame at the home pose in a body's own frame."""
+def body_frame_points(body: TreeBody, points: Array) -> Array:
+    """Return points (..., 3), given in the base frame at home, in a body's own frame."""
     return np.asarray((points - body.origin) @ body.axes)
 
 
@@ -90,10 +90,10 @@ def material(body: TreeBody) -> str:
     return f"leg{body.color}" if body.color else "platform"
 
 
-def left_out(opened: Tree, written: Sequence[str]) -> list[str]:
+def omission_notes(opened: Tree, written: Sequence[str]) -> list[str]:
     """Return a note on numbers of drives and passive joints that a file leaves out.
 
-    `kept` are the keys of a drive that the file has.
+    `written` are the keys of a drive that the file has.
     """
     omitted = [
         words
@@ -137,7 +137,7 @@ FORMATS: dict[str, Any] = {
     "small": small,
     "row": row,
     "look": look,
-    "within": within,
+    "body_frame_points": body_frame_points,
     "material": material,
     "colors": COLORS,
     "platform_color": PLATFORM_COLOR,

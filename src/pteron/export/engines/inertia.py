@@ -39,8 +39,8 @@ SHARE = 1e-10
 """Share of a body's mass and moments that a link between its joints has."""
 
 
-def about_center(inertia: Inertia) -> tuple[float, Array, float]:
-    """Return a body's mass, its centre of mass (2,) in its own axes and the moment about that."""
+def central_inertia(inertia: Inertia) -> tuple[float, Array, float]:
+    """Return a body's mass, its centre of mass (2,) in body axes and the central moment."""
     values = dict(zip(inertia.kinds, inertia.values, strict=True))
     mass = values["m"]
     center = np.array([values.get(kind, 0.0) for kind in ("mgx", "mgy")]) / mass
@@ -72,7 +72,7 @@ def cube_moments(mass: float, side: float) -> Array:
     return np.full(3, max(mass * side**2 / 6.0, _TINY))
 
 
-def between_joints(mass: float, moments: Array) -> tuple[float, Array]:
+def massless_inertia(mass: float, moments: Array) -> tuple[float, Array]:
     """Return the mass and the moments (3,) of a link between the joints of a body.
 
     It has none; but an engine takes 1 kg where a file says nothing, or refuses it.

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pteron.export.engines.formatting import look, row
-from pteron.export.engines.inertia import between_joints
+from pteron.export.engines.inertia import massless_inertia
 from pteron.export.engines.parts import BASE, BodyShape, Tree, TreeBody, TreeJoint
 from pteron.kernels import Array
 
@@ -47,7 +47,7 @@ def links_of(bodies: Sequence[TreeBody]) -> list[Link]:
             name = body.name if last else f"{joint.name}_link"
             inertia = body.mass, body.moments, body.products
             if not last:
-                inertia = *between_joints(body.mass, body.moments), np.zeros(3)
+                inertia = *massless_inertia(body.mass, body.moments), np.zeros(3)
             links.append(Link(name, parent, body, joint, first, last, *inertia))
             parent = name
     return links
@@ -114,6 +114,6 @@ def roll_pitch_yaw(turn: Array) -> Array:
     return np.array([roll, pitch, yaw])
 
 
-def placed(motion: Array) -> tuple[str, str]:
+def frame_texts(motion: Array) -> tuple[str, str]:
     """Return a frame's place and its turn by roll, pitch and yaw, as texts."""
     return row(motion[:3, 3]), row(roll_pitch_yaw(motion[:3, :3]))

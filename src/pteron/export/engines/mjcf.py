@@ -12,15 +12,15 @@ from pteron.atomic import write_texts
 from pteron.dynamics import inverse_dynamics
 from pteron.export.engines.formatting import (
     FORMATS,
+    body_frame_points,
     from_parent,
     head,
-    left_out,
+    omission_notes,
     row,
     small,
-    within,
 )
 from pteron.export.engines.parts import BASE, BodyShape, Tree, TreeBody
-from pteron.export.engines.shapes import dressed
+from pteron.export.engines.shapes import add_shapes
 from pteron.export.engines.tree import tree
 from pteron.export.names import identifier
 from pteron.kernels import Array
@@ -84,7 +84,7 @@ def export_mjcf(
 
 def mjcf(opened: Tree, *, step: float = STEP) -> str:
     """Return a machine as MJCF, for an integration by this step, s."""
-    opened = dressed(opened)
+    opened = add_shapes(opened)
     children: list[list[int]] = [[] for _ in opened.bodies]
     roots: list[int] = []
     for k, body in enumerate(opened.bodies):
@@ -105,11 +105,11 @@ def mjcf(opened: Tree, *, step: float = STEP) -> str:
         motors={joint.name: None for joint in opened.joints}
         | {motor.joint: motor for motor in opened.motors},
         hold=_hold(opened),
-        local=lambda body, points: points if body is None else within(body, points),
+        local=lambda body, points: points if body is None else body_frame_points(body, points),
         same=lambda shape: np.ptp(shape.ends, axis=0).max() < _SAME,
         half=lambda shape: float(np.linalg.norm(shape.ends[1] - shape.ends[0])) / 2.0,
         moments=_moments,
-        placed=lambda body: _placed(opened, body),
+        frame_texts=lambda body: _frame_texts(opened, body),
         **_scene(opened),
     )
 
@@ -122,10 +122,10 @@ def _notes(opened: Tree) -> list[str]:
         for motor in opened.motors
         if motor.name != motor.joint
     ]
-    return [*said, *left_out(opened, written)]
+    return [*said, *omission_notes(opened, written)]
 
 
-def _placed(opened: Tree, body: TreeBody) -> tuple[str, str]:
+def _frame_texts(opened: Tree, body: TreeBody) -> tuple[str, str]:
     """Return where a body is in the frame of the one before, and how it is turned there."""
     there = from_parent(opened.bodies, body)
     x, y, z, w = scipy.spatial.transform.Rotation.from_matrix(there[:3, :3]).as_quat(canonical=True)

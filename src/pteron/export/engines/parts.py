@@ -1,7 +1,7 @@
 """The parts of a `Tree`, a machine with its loops cut open: bodies, joints, drives, loop closings.
 
 Engines' files are written from it. Everything is in the base frame with the machine at its home
-pose, where all loops are closed; `at_zero` takes the joints back to zero.
+pose, where all loops are closed; `bodies_at_zero` takes the joints back to zero.
 """
 
 from __future__ import annotations
@@ -213,8 +213,8 @@ def place(tree: Tree, coordinates: Mapping[str, float]) -> list[Array]:
     return displacements
 
 
-def at_zero(tree: Tree) -> tuple[TreeBody, ...]:
-    """Return the bodies where all joint coordinates are zero: each chain for itself, loops open."""
+def bodies_at_zero(tree: Tree) -> tuple[TreeBody, ...]:
+    """Return the bodies at zero joint coordinates: each chain for itself, loops open."""
     bodies: list[TreeBody] = []
     moved: list[Array] = []
     for body in tree.bodies:

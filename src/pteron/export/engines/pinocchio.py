@@ -15,8 +15,8 @@ import numpy as np
 
 from pteron.atomic import write_texts
 from pteron.errors import ModelError
-from pteron.export.engines.formatting import FORMATS, from_parent, head, left_out, number
-from pteron.export.engines.parts import Tree, TreeBody, at_zero
+from pteron.export.engines.formatting import FORMATS, from_parent, head, number, omission_notes
+from pteron.export.engines.parts import Tree, TreeBody, bodies_at_zero
 from pteron.export.engines.tree import tree
 from pteron.export.names import identifier
 from pteron.extras import install_command
@@ -123,9 +123,9 @@ def pinocchio_source(opened: Tree) -> str:
             "constrained dynamics have none; export it as MJCF, SDF or URDF",
             subject=robot.name,
         )
-    every = at_zero(opened)
+    every = bodies_at_zero(opened)
     armature = {motor.joint: motor.ratio**2 * motor.drive.inertia for motor in opened.motors}
-    notes = left_out(opened, ("inertia",))
+    notes = omission_notes(opened, ("inertia",))
     if coupled:
         notes.append(
             "What gears turn is in the platform's inertia: the square of its ratio times its own."
@@ -138,7 +138,7 @@ def pinocchio_source(opened: Tree) -> str:
         notes=notes,
         name=identifier(robot),
         opened=opened,
-        bodies=_without_gears(every),
+        bodies=_merge_gears(every),
         armature=armature,
         joints={joint.name: joint for joint in opened.joints},
         place_of=lambda body: from_parent(every, body)[:3],
@@ -148,7 +148,7 @@ def pinocchio_source(opened: Tree) -> str:
     )
 
 
-def _without_gears(bodies: Sequence[TreeBody]) -> list[TreeBody]:
+def _merge_gears(bodies: Sequence[TreeBody]) -> list[TreeBody]:
     """Return the bodies without geared ones, whose inertia is added to that of their parents."""
     links = []
     for k, body in enumerate(bodies):

@@ -14,7 +14,7 @@ import numpy as np
 from pteron.bodies.inertia import PlanarInertia, SpatialInertia
 from pteron.bodies.vectors import cross
 from pteron.export.engines.inertia import (
-    about_center,
+    central_inertia,
     cube_moments,
     plane_moments,
     shared_masses,
@@ -43,18 +43,18 @@ def platform_bodies(robot: Manipulator, pose: Array) -> Pieces:
     """
     platform = robot.platform
     if platform.slides:
-        return _sliding(robot, pose)
+        return _sliding_platform(robot, pose)
     if platform.turns:
-        return _turning(robot, pose)
+        return _turning_platform(robot, pose)
     joints = _joints(platform, pose)
     if isinstance(platform.joined, SpatialInertia):
         body = _tilting_body(platform, pose, joints, platform.joined)
     else:
-        body = _plane_body(platform, pose, joints, *about_center(platform.joined))
+        body = _plane_body(platform, pose, joints, *central_inertia(platform.joined))
     return [body], [0] * len(robot.legs), []
 
 
-def _turning(robot: Manipulator, pose: Array) -> Pieces:
+def _turning_platform(robot: Manipulator, pose: Array) -> Pieces:
     """Return a platform that turns, its gears, and the parts that hang on its hinges."""
     platform = robot.platform
     p, axes = platform.at(pose)
@@ -63,7 +63,7 @@ def _turning(robot: Manipulator, pose: Array) -> Pieces:
     hung = [bool(np.abs(offset).max() > _COINCIDENT) for offset in offsets]
     points = [np.array(leg.platform_point) for leg in robot.legs]
     hinges = _distinct([point for point, hangs in zip(points, hung, strict=True) if hangs])
-    masses, shares, remainder = _shared(platform, hinges, len(platform.geared))
+    masses, shares, remainder = _part_masses(platform, hinges, len(platform.geared))
     bodies = [_plane_body(platform, pose, _joints(platform, pose), *remainder)]
     bodies += _gears(platform, pose, shares, 1.0)
     first, closings = len(bodies), []
@@ -76,13 +76,13 @@ def _turning(robot: Manipulator, pose: Array) -> Pieces:
         closings.append(Closing(f"bar{j}", len(bodies), 0, at))
         bodies.append(_still_body(platform, f"bar{j}", BASE, moves, at, mass))
     carried = [
-        first + _which(hinges, point) if hangs else 0
+        first + _axis_index(hinges, point) if hangs else 0
         for point, hangs in zip(points, hung, strict=True)
     ]
     return bodies, carried, closings
 
 
-def _sliding(robot: Manipulator, pose: Array) -> Pieces:
+def _sliding_platform(robot: Manipulator, pose: Array) -> Pieces:
     """Return a platform whose halves slide by its angle: a carrier, a tool that turns, and slides.
 
     The first moment of the whole per radian, h, is that of its mass m sliding by h / m; what of I
@@ -94,7 +94,7 @@ def _sliding(robot: Manipulator, pose: Array) -> Pieces:
     frame = np.array(platform.frame)
     points = [np.array(leg.platform_point) for leg in robot.legs]
     halves = _distinct([point for point in points if np.abs(point).max() > _COINCIDENT])
-    masses, shares, remainder = _shared(platform, halves, 2 + len(platform.geared))
+    masses, shares, remainder = _part_masses(platform, halves, 2 + len(platform.geared))
     mass, center, about = remainder
     *moves, turn = _joints(platform, pose)
     carrier = _still_body(platform, "platform", BASE, moves, p, float(shares[0]))
@@ -116,20 +116,19 @@ def _sliding(robot: Manipulator, pose: Array) -> Pieces:
         bodies.append(_still_body(platform, name, 0, [joint], at, part_mass))
     slide = [np.abs(point).max() > _COINCIDENT for point in points]
     carried = [
-        first + _which(halves, point) if away else 0
+        first + _axis_index(halves, point) if away else 0
         for point, away in zip(points, slide, strict=True)
     ]
     return bodies, carried, []
 
 
-def _shared(
+def _part_masses(
     platform: Platform, places: Sequence[Array], others: int
 ) -> tuple[list[float], Array, tuple[float, Array, float]]:
-    """Return the masses of parts at places, of so many others at P, and what the platform keeps.
+    """Return the masses of parts at places and of others at P, and the platform's remainder.
 
-    A part has the mass of the bars at its place, or a share of the platform's. What the platform
-    keeps is its mass, the centre (2,) of it and the moment about that; a bar at which no part is
-    counts as a point of it.
+    A part has the mass of the bars at its place, or a share of the platform's. The remainder is
+    a mass, its centre (2,) and central moment; a bar without a part there is a point of it.
     """
     body = platform.inertia
     assert isinstance(body, PlanarInertia)  # what tilts has no parts
@@ -137,7 +136,7 @@ def _shared(
     masses = [0.0] * len(places)
     for bar in platform.bars:
         hinge = np.array(bar.hinge)
-        near = [k for k, place in enumerate(places) if _same(place, hinge)]
+        near = [k for k, place in enumerate(places) if _share_axis(place, hinge)]
         if near:
             masses[near[0]] += bar.mass
         else:
@@ -223,7 +222,7 @@ def _gears(platform: Platform, pose: Array, masses: Array, against: float) -> li
     return bodies
 
 
-def _same(first: Array, second: Array) -> bool:
+def _share_axis(first: Array, second: Array) -> bool:
     """Return whether two places of the platform are on one axis of it."""
     return bool(np.abs(first - second)[:2].max() <= _COINCIDENT)
 
@@ -233,10 +232,10 @@ def _distinct(places: Sequence[Array]) -> list[Array]:
     return [
         place
         for k, place in enumerate(places)
-        if not any(_same(place, earlier) for earlier in places[:k])
+        if not any(_share_axis(place, earlier) for earlier in places[:k])
     ]
 
 
-def _which(places: Sequence[Array], place: Array) -> int:
-    """Return which of the places is on the axis of another."""
-    return next(k for k, candidate in enumerate(places) if _same(candidate, place))
+def _axis_index(places: Sequence[Array], place: Array) -> int:
+    """Return the index of the place on the same axis as another."""
+    return next(k for k, candidate in enumerate(places) if _share_axis(candidate, place))

@@ -5,11 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 from pteron.atomic import write_texts
-from pteron.export.engines.formatting import FORMATS, frame, head, left_out
+from pteron.export.engines.formatting import FORMATS, frame, head, omission_notes
 from pteron.export.engines.inertia import SHARE
-from pteron.export.engines.links import joint_drive, link_shape, links_of, placed
+from pteron.export.engines.links import frame_texts, joint_drive, link_shape, links_of
 from pteron.export.engines.parts import Tree
-from pteron.export.engines.shapes import dressed
+from pteron.export.engines.shapes import add_shapes
 from pteron.export.engines.tree import tree
 from pteron.export.names import identifier
 from pteron.kernels.code import render_template
@@ -60,19 +60,19 @@ def export_sdf(
 
 def sdf(opened: Tree) -> str:
     """Return a machine as SDF."""
-    opened = dressed(opened)
+    opened = add_shapes(opened)
     return render_template(
         "pteron.export",
         "robot.sdf.j2",
         **FORMATS,
         head=head(opened, "SDF"),
-        notes=left_out(opened, ("viscous", "coulomb", "max_force", "max_speed")),
+        notes=omission_notes(opened, ("viscous", "coulomb", "max_force", "max_speed")),
         share=SHARE,
         name=identifier(opened.robot),
         opened=opened,
         links=links_of(opened.bodies),
         frame=frame,
-        placed=placed,
+        frame_texts=frame_texts,
         link_shape=link_shape,
         drive_of=lambda joint: joint_drive(opened, joint),
     )

@@ -26,7 +26,7 @@ _SAME = 1e-6
 """Distance below which points count as one, m."""
 
 
-def dressed(opened: Tree) -> Tree:
+def add_shapes(opened: Tree) -> Tree:
     """Return the tree with a shape for each body, and for guides and axles on the base."""
     thick = _THICK * opened.size
     looks: list[list[BodyShape]] = [[] for _ in opened.bodies]

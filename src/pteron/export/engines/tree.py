@@ -18,7 +18,7 @@ import numpy as np
 from pteron.errors import SingularPose
 from pteron.export.engines.chains import LegStance, leg_stances, shaft_ratio
 from pteron.export.engines.home_pose import chosen_home
-from pteron.export.engines.inertia import about_center, cube_moments, plane_moments, rod_moments
+from pteron.export.engines.inertia import central_inertia, cube_moments, plane_moments, rod_moments
 from pteron.export.engines.parts import BASE, Closing, Tree, TreeBody, TreeJoint, TreeMotor
 from pteron.export.engines.platform import platform_bodies
 from pteron.kernels import Array
@@ -151,7 +151,7 @@ def _leg(
 
 def _body(leg: LegKind, stance: LegStance, letter: str, joint: TreeJoint, size: float) -> TreeBody:
     """Return a body that a joint carries; its name, its parent and its joints come later."""
-    mass, (x, y), moment = about_center(leg.bodies[letter])
+    mass, (x, y), moment = central_inertia(leg.bodies[letter])
     reference = stance.references[letter]
     if letter not in stance.along:
         axes = _frame_along(joint.axis)

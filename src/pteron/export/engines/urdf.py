@@ -9,16 +9,16 @@ import numpy as np
 from pteron.atomic import write_texts
 from pteron.export.engines.formatting import (
     FORMATS,
+    body_frame_points,
     from_parent,
     head,
-    left_out,
     number,
-    within,
+    omission_notes,
 )
 from pteron.export.engines.inertia import SHARE
-from pteron.export.engines.links import joint_drive, link_shape, links_of, placed
-from pteron.export.engines.parts import Tree, at_zero
-from pteron.export.engines.shapes import dressed
+from pteron.export.engines.links import frame_texts, joint_drive, link_shape, links_of
+from pteron.export.engines.parts import Tree, bodies_at_zero
+from pteron.export.engines.shapes import add_shapes
 from pteron.export.engines.tree import tree
 from pteron.export.names import identifier
 from pteron.kernels.code import render_template
@@ -76,19 +76,21 @@ def export_urdf(
 
 def urdf(opened: Tree) -> str:
     """Return the opened machine as URDF."""
-    opened = dressed(opened)
-    bodies = at_zero(opened)
+    opened = add_shapes(opened)
+    bodies = bodies_at_zero(opened)
     return render_template(
         "pteron.export",
         "robot.urdf.j2",
         **FORMATS,
         head=head(opened, "URDF"),
-        notes=left_out(opened, ("viscous", "coulomb", "max_force", "max_speed")),
+        notes=omission_notes(opened, ("viscous", "coulomb", "max_force", "max_speed")),
         share=SHARE,
         name=identifier(opened.robot),
         opened=opened,
         links=links_of(bodies),
-        place_of=lambda link: placed(from_parent(bodies, link.body) if link.first else np.eye(4)),
+        place_of=lambda link: frame_texts(
+            from_parent(bodies, link.body) if link.first else np.eye(4)
+        ),
         link_shape=link_shape,
         most=_MOST,
         far=_FAR,
@@ -104,7 +106,7 @@ def closure_yaml(opened: Tree) -> str:
         head=head(opened, "loops of the URDF"),
         name=identifier(opened.robot),
         opened=opened,
-        within=within,
+        body_frame_points=body_frame_points,
         real=_real,
     )
 

@@ -17,7 +17,7 @@ from pteron.export.printers.sections import (
     INSTEAD,
     reading_comment,
     rotation_distance,
-    signed,
+    signed_number,
 )
 from pteron.kernels import Array
 from pteron.kinematics import inverse_kinematics, jacobian
@@ -62,7 +62,7 @@ def cartesian(robot: Manipulator) -> dict[str, Any]:
     )
     steppers = []
     for i, joint in enumerate(robot.joint_names):
-        place = f"Its position is {joint} in mm {signed(-offsets[i])} mm."
+        place = f"Its position is {joint} in mm {signed_number(-offsets[i])} mm."
         steppers.append(
             {
                 "comments": (place, *reading_comment(robot, i, "rotation_distance")),

@@ -13,7 +13,7 @@ from pteron.export.printers.sections import (
     number,
     reading_comment,
     rotation_distance,
-    signed,
+    signed_number,
 )
 from pteron.manipulator import Manipulator
 
@@ -27,7 +27,7 @@ def delta(robot: Manipulator, centers: Sequence[Center]) -> dict[str, Any]:
         top = None if numbers.ends is None else mm(numbers.ends[i])
         place = (
             f"Its position is {'' if numbers.rises[i] > 0.0 else '-'}{joint} in mm "
-            f"{signed(1000.0 * numbers.zeros[i])} mm."
+            f"{signed_number(1000.0 * numbers.zeros[i])} mm."
         )
         reading = reading_comment(robot, i, "rotation_distance")
         steppers.append(
@@ -41,7 +41,7 @@ def delta(robot: Manipulator, centers: Sequence[Center]) -> dict[str, Any]:
         )
     return {
         "kinematics": "delta",
-        "comments": (*told_bed(robot, numbers.level, good, numbers.most), *numbers.told),
+        "comments": (*told_bed(robot, numbers.level, good, numbers.most), *numbers.error_comments),
         "radius": mm(numbers.radius),
         "steppers": steppers,
     }

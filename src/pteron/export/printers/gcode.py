@@ -40,7 +40,7 @@ def marlin_lines(robot: RobotLike) -> list[str]:
     numbers, order = _numbers(as_manipulator(robot))
     rod = float(np.mean(numbers.arms))
     trims = [numbers.arms[i] - rod for i in order]
-    trim_words = _each("ABC", trims) if max(map(abs, trims)) > 0.5e-7 else ""
+    trim_words = _lettered_values("ABC", trims) if max(map(abs, trims)) > 0.5e-7 else ""
     return _lines(numbers, order, _mm(rod), trim_words, min, -1.0)
 
 
@@ -70,9 +70,9 @@ def _lines(
     if numbers.ends is not None:
         level = float(of_ends(numbers.ends))
         ends = [sign * (numbers.ends[i] - level) for i in order]
-        height, end_lines = f" H{_mm(level)}", [f"M666{_each('XYZ', ends)}"]
+        height, end_lines = f" H{_mm(level)}", [f"M666{_lettered_values('XYZ', ends)}"]
     first = f"M665 L{rods} R{_mm(numbers.radius)}{height} B{1e3 * numbers.bed:.1f}"
-    return [first + _each("XYZ", _turns(numbers, order), 1.0) + trims, *end_lines]
+    return [first + _lettered_values("XYZ", _turns(numbers, order), 1.0) + trims, *end_lines]
 
 
 def export_marlin(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
@@ -124,7 +124,7 @@ def _write(robot: RobotLike, folder: str | Path, firmware: str, lines: Sequence[
     comments = [
         f"Towers: {towers}. Lengths in mm, angles in degrees.",
         f"X, Y and Z are P's place, Z from where its z is {1e3 * numbers.level + 0.0:.6g} mm.",
-        *numbers.told,
+        *numbers.error_comments,
         *(text for i in range(3) for text in reading_comment(machine, i, "steps per mm (M92)")),
     ]
     text = "\n".join([*(f"; {line}".rstrip() for line in (*head, *comments)), *lines]) + "\n"
@@ -135,7 +135,7 @@ def _write(robot: RobotLike, folder: str | Path, firmware: str, lines: Sequence[
 def _numbers(robot: Manipulator) -> tuple[LinearDelta, list[int]]:
     """Return a machine's numbers, and its leg, from 0, at each of the firmware's towers."""
     numbers = LinearDelta.of(robot)
-    beside = np.abs(_beside(np.subtract.outer(_TOWERS, numbers.angles)))
+    beside = np.abs(_wrap_degrees(np.subtract.outer(_TOWERS, numbers.angles)))
     order = [int(row.argmin()) for row in beside]
     if sorted(order) != [0, 1, 2] or beside.min(axis=1).max() > _MOST_TURN:
         angles = ", ".join(f"{angle:.1f}" for angle in numbers.angles)
@@ -149,16 +149,16 @@ def _numbers(robot: Manipulator) -> tuple[LinearDelta, list[int]]:
 def _turns(numbers: LinearDelta, order: Sequence[int]) -> list[float]:
     """Return each tower's angle less the one that it has in the firmware, degrees."""
     return [
-        float(_beside(numbers.angles[i] - firmware_angle))
+        float(_wrap_degrees(numbers.angles[i] - firmware_angle))
         for i, firmware_angle in zip(order, _TOWERS, strict=True)
     ]
 
 
-def _beside(angle: float | np.ndarray) -> np.ndarray:
+def _wrap_degrees(angle: float | np.ndarray) -> np.ndarray:
     return np.asarray((np.asarray(angle) + 180.0) % 360.0 - 180.0)
 
 
-def _each(letters: str, values: Sequence[float], factor: float = 1000.0) -> str:
+def _lettered_values(letters: str, values: Sequence[float], factor: float = 1000.0) -> str:
     pairs = zip(letters, values, strict=True)
     return "".join(f" {letter}{round(factor * value, 4) + 0.0:.4f}" for letter, value in pairs)
 

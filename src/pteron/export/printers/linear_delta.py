@@ -73,7 +73,7 @@ class LinearDelta:
     deviation: float
 
     @property
-    def told(self) -> tuple[str, ...]:
+    def error_comments(self) -> tuple[str, ...]:
         """The comment on a machine that these numbers describe with an error; else nothing."""
         if self.deviation <= SAME:
             return ()
@@ -104,7 +104,7 @@ class LinearDelta:
 
     @classmethod
     def from_centers(cls, robot: Manipulator, centers: Sequence[Center], taker: str) -> LinearDelta:
-        """Return the same by the spheres on which P moves; errors name the `taker`."""
+        """Return the numbers from the spheres on which P moves; errors name the `taker`."""
         for i, center in enumerate(centers, start=1):
             if np.hypot(*center.along[:2]) > _LEAN:
                 raise differs(robot, i, "its guide is not vertical, along z", taker)
@@ -115,7 +115,7 @@ class LinearDelta:
         lowest, highest = travels.min(axis=1), travels.max(axis=1)
         feet = np.array([center.at for center in centers])
         leans = np.array([center.along for center in centers]) * rises[:, None]
-        _above(robot, centers, taker)
+        _refuse_sliders_below(robot, centers, taker)
         # Towers as they stand where the carriages are on their way.
         towers = feet + (0.5 * (lowest + highest))[:, None] * leans
         radii, arms = np.hypot(*towers[:, :2].T), np.array([center.radius for center in centers])
@@ -134,7 +134,7 @@ class LinearDelta:
             level, good = bed(robot, most, float(low.max()), float(high.min()))
         angles = np.radians([degrees(tower) for tower in towers])
         start = np.array([radius, *angles, *arms, *(feet[:, 2] + highest - level)])
-        solution, off = _fitted(
+        solution, off = _fit_numbers(
             lambda p: _errors(robot, p, level, rises, highest, good), start, radius
         )
         if off > _WORST:  # then they may be anything
@@ -160,8 +160,10 @@ class LinearDelta:
         )
 
 
-def _fitted(errors: Callable[[Array], Array], start: Array, size: float) -> tuple[Array, float]:
-    """Return the numbers for which errors (K, 3) are least, and the greatest that is left, m."""
+def _fit_numbers(
+    errors: Callable[[Array], Array], start: Array, size: float
+) -> tuple[Array, float]:
+    """Return the least-squares numbers for errors (K, 3), and the greatest remaining error, m."""
     if np.abs(errors(start)).max() <= 0.1 * SAME:
         return start, 0.0
     accuracy = dict.fromkeys(("xtol", "ftol", "gtol"), 1e-14)
@@ -171,7 +173,7 @@ def _fitted(errors: Callable[[Array], Array], start: Array, size: float) -> tupl
     return fit.x, float(np.linalg.norm(fit.fun.reshape(-1, 3), axis=1).max())
 
 
-def _above(robot: Manipulator, centers: Sequence[Center], taker: str) -> None:
+def _refuse_sliders_below(robot: Manipulator, centers: Sequence[Center], taker: str) -> None:
     """Refuse a machine whose sliders are below its platform."""
     poses = random_poses(robot, 50, seed=1, type_i=0.02, type_ii=0.0, limits=False)
     joints = inverse_kinematics(robot, poses)

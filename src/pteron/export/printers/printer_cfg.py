@@ -231,7 +231,7 @@ def _slider(leg: LegKind, turn: float, base: list[float], lengths: list[float]) 
     if arm <= radius:
         raise ValueError
     return replace(
-        _placed(leg, turn, radius, 0.0, {"l": arm}),
+        _place_leg(leg, turn, radius, 0.0, {"l": arm}),
         limits=(math.sqrt(max(0.0, arm**2 - 4.0 * radius**2)), end + math.sqrt(arm**2 - radius**2)),
     )
 
@@ -239,7 +239,7 @@ def _slider(leg: LegKind, turn: float, base: list[float], lengths: list[float]) 
 def _crank(leg: LegKind, turn: float, base: list[float], lengths: list[float]) -> LegKind:
     """Return the catalog's leg turned about z, with Klipper's shoulder, arms and end stop."""
     (radius, height), (upper, lower, end) = base, lengths
-    moved = _placed(leg, turn, radius, height, {"u": upper, "l": lower})
+    moved = _place_leg(leg, turn, radius, height, {"u": upper, "l": lower})
     away = math.hypot(radius, end - height)
     if lower <= radius - upper:
         raise ValueError
@@ -252,16 +252,16 @@ def _crank(leg: LegKind, turn: float, base: list[float], lengths: list[float]) -
     return replace(moved, limits=(-0.5 * math.pi, top), **level)
 
 
-def _placed(
+def _place_leg(
     leg: LegKind, turn: float, radius: float, height: float, lengths: dict[str, float]
 ) -> LegKind:
     """Return a leg turned about z, at a radius and height, with links of given lengths, m."""
     cos, sin = math.cos(turn), math.sin(turn)
 
-    def turned(v: Vector) -> Vector:
+    def turn_vector(v: Vector) -> Vector:
         return (cos * v[0] - sin * v[1], sin * v[0] + cos * v[1], v[2])
 
-    moved = leg.turned(turned)
+    moved = leg.turned(turn_vector)
     out = np.array([*moved.guide_point[:2], 0.0]) / math.hypot(*moved.guide_point[:2])
     names = [quantity.name for quantity in leg.quantities if quantity.role == "length"]
     bodies = dict(moved.bodies)

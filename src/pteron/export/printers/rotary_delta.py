@@ -17,7 +17,7 @@ from pteron.export.printers.sections import (
     mm,
     number,
     reading_comment,
-    signed,
+    signed_number,
 )
 from pteron.kernels import Array
 from pteron.kinematics import inverse_kinematics, random_poses
@@ -78,7 +78,7 @@ def rotary(robot: Manipulator, centers: Sequence[Center]) -> dict[str, Any]:
     radius = common(robot, radii, "has its shoulder {:.6g} mm from the z axis", _TAKER)
     heights = [float(arm.shoulder[2]) for arm in arms]
     height = common(robot, heights, "has its shoulder at z = {:.6g} mm", _TAKER)
-    _outside(robot, arms, height)
+    _refuse_elbows_inside(robot, arms, height)
     tops = [arm.top(radius) for arm in arms]
     highest = min((top for top in tops if top is not None), default=0.0)
     level, comments = _bed(robot, arms, radius, height, highest)
@@ -87,8 +87,8 @@ def rotary(robot: Manipulator, centers: Sequence[Center]) -> dict[str, Any]:
         end = None if top is None else mm(height + top - level)
         joint = f"{'' if arm.lift > 0.0 else '-'}{robot.joint_names[k]}"
         place = (
-            f"Its position is {joint} in rad {signed(arm.zero)} rad: 0 where the arm is level, "
-            "growing as it lifts."
+            f"Its position is {joint} in rad {signed_number(arm.zero)} rad: 0 where the arm is "
+            "level, growing as it lifts."
         )
         reading = reading_comment(robot, k, "gear_ratio")
         steppers.append(
@@ -110,7 +110,7 @@ def rotary(robot: Manipulator, centers: Sequence[Center]) -> dict[str, Any]:
     }
 
 
-def _outside(robot: Manipulator, arms: Sequence[_Arm], height: float) -> None:
+def _refuse_elbows_inside(robot: Manipulator, arms: Sequence[_Arm], height: float) -> None:
     """Refuse a machine whose elbows are not where kin_rotary_delta.c takes them: outside.
 
     The platform is below the shoulders; of the two elbows it takes that of the greater angle.

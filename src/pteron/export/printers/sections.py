@@ -28,7 +28,7 @@ def number(value: float) -> str:
     return "0" if text in ("-0", "") else text
 
 
-def signed(value: float) -> str:
+def signed_number(value: float) -> str:
     """Return a number as it is added to something: "+ 1.5"."""
     return f"{'-' if value < 0.0 else '+'} {abs(value):.9g}"
 

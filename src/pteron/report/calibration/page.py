@@ -50,7 +50,7 @@ class ErrorMap(NamedTuple):
 
 def page(result: Calibration, *, written: bool = True, firmware: FirmwareFit | None = None) -> str:
     """Return the page as HTML without reference to another file; robot.toml may not be written."""
-    document = template("calibration/page.html.j2", scaled=scaled)
+    document = template("calibration/page.html.j2", error_text=error_text)
     return document.render(
         result=result,
         robot=result.drawn,
@@ -66,7 +66,7 @@ def page(result: Calibration, *, written: bool = True, firmware: FirmwareFit | N
     )
 
 
-def scaled(value: float, kind: str) -> str:
+def error_text(value: float, kind: str) -> str:
     """Return an error of a kind of measurement with its unit, the same all over the page."""
     return f"{significant(1e3 * value)} {_unit(kind)}"
 
@@ -94,7 +94,7 @@ def error_maps(result: Calibration) -> list[ErrorMap]:
             reached = (cut.status == 0).ravel() & np.isfinite(errors[0]) & np.isfinite(errors[1])
             if not reached.any() or not errors[0][reached].max() > 0.0:
                 continue
-            greatest = [scaled(float(error[reached].max()), kind) for error in errors]
+            greatest = [error_text(float(error[reached].max()), kind) for error in errors]
             values = [
                 np.where(reached, 1e3 * error, np.nan).reshape(cut.status.shape) for error in errors
             ]

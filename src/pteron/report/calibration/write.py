@@ -12,7 +12,7 @@ from pteron.json_values import json_ready
 from pteron.manipulator.saving import text_of
 from pteron.report.calibration.firmware import FirmwareFit
 from pteron.report.calibration.values import notes
-from pteron.report.write import checked_apart, checked_folder, commented
+from pteron.report.write import checked_folder, checked_output, comment_lines
 from pteron.report.written import Written as Written, write_found
 
 
@@ -56,10 +56,10 @@ def write_calibration(
 
     target = checked_folder(folder)
     for file in ("calibration.html", "calibration.json", "robot.toml"):
-        checked_apart(target / file, sources)
+        checked_output(target / file, sources)
     models = {}
     if anyway or result.verdict.grade != "not trustworthy":
-        models["robot.toml"] = commented(_header(result)) + text_of(result.robot)
+        models["robot.toml"] = comment_lines(_header(result)) + text_of(result.robot)
     html = page(result, written=bool(models), firmware=firmware)
     files = write_found(target, "calibration", html, numbers(result, firmware), models)
     if models:

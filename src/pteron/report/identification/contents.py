@@ -99,8 +99,8 @@ def short_sources(result: Identification) -> dict[str, str]:
     }
 
 
-def shortened(texts: Iterable[str], sources: Mapping[str, str]) -> tuple[str, ...]:
-    """Return messages with the recordings called as on the page."""
+def shorten_sources(texts: Iterable[str], sources: Mapping[str, str]) -> tuple[str, ...]:
+    """Return messages with the recordings' paths replaced by their short names."""
     short_texts = []
     for text in texts:
         for source in sorted(sources, key=len, reverse=True):
@@ -114,12 +114,12 @@ def contents(result: Identification) -> Contents:
     names, verdict = short_sources(result), result.verdict
     said = [shown.message for shown in result.findings]
     reasons, steps, notes, messages = (
-        shortened(texts, names)
+        shorten_sources(texts, names)
         for texts in (verdict.reasons, verdict.next_steps, result.notes, said)
     )
     findings = zip(result.findings, messages, strict=True)
     held_out, fitted = (
-        tuple(_shown(prediction, names) for prediction in predictions)
+        tuple(_page_recording(prediction, names) for prediction in predictions)
         for predictions in (result.held_out, result.fitted)
     )
     worst = sorted(held_out, key=lambda shown: -float(shown.prediction.nrms.max()))
@@ -145,7 +145,7 @@ def contents(result: Identification) -> Contents:
     )
 
 
-def _shown(prediction: Prediction, names: dict[str, str]) -> PageRecording:
+def _page_recording(prediction: Prediction, names: dict[str, str]) -> PageRecording:
     time = prediction.time
     step = float(time[-1] - time[0]) / max(len(time) - 1, 1)
     length = min(max(int(_STRETCH / max(step, 1e-9)), _FEWEST), len(time))

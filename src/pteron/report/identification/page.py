@@ -35,7 +35,7 @@ def page(result: Identification, model_file: str | None = None) -> str:
     page_contents = contents(result)
     joints = [leg.joint for leg in result.robot.legs]
     return document.render(
-        found=page_contents,
+        contents=page_contents,
         result=page_contents.result,
         robot=result.robot,
         estimate=result.estimate,

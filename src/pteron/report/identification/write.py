@@ -10,8 +10,8 @@ from typing import Any
 from pteron.identification import Identification
 from pteron.json_values import json_ready
 from pteron.manipulator.saving import text_of
-from pteron.report.identification.contents import short_sources, shortened
-from pteron.report.write import checked_apart, checked_folder, commented
+from pteron.report.identification.contents import short_sources, shorten_sources
+from pteron.report.write import checked_folder, checked_output, comment_lines
 from pteron.report.written import Written as Written, write_found
 
 _SAFE = re.compile(r"[^\w.-]+")
@@ -50,7 +50,7 @@ def write_identification(
     target = checked_folder(folder)
     model = {}
     if result.machine is not None:
-        model[path.name] = commented(_header(result)) + text_of(result.machine)
+        model[path.name] = comment_lines(_header(result)) + text_of(result.machine)
     html = page(result, path.name if model else None)
     return write_found(target, "identification", html, numbers(result), model)
 
@@ -59,7 +59,7 @@ def model_path(folder: str | Path, name: str, sources: Iterable[str | Path] = ()
     """Return a path for the model file that is no file that was read and no log's description."""
     stem = _SAFE.sub("_", name).strip("._") or "robot"
     path = Path(folder) / f"{stem[:100]}.toml"
-    return checked_apart(path, sources)
+    return checked_output(path, sources)
 
 
 def _header(result: Identification) -> list[str]:
@@ -79,7 +79,7 @@ def _header(result: Identification) -> list[str]:
         f"{result.robot.name}, identified from {', '.join(fitted)}; "
         f"judged on {', '.join(held_out)}{repeats}.",
         f"Verdict: {result.verdict.grade}.",
-        *shortened(result.verdict.reasons, names),
+        *shorten_sources(result.verdict.reasons, names),
         f"Bodies that have the identified base parameters {distance}.",
         "What the forces do not show of them is "
         + ("as near as can be to the CAD model." if consistency.nearest_to == "CAD" else plain),
