@@ -74,21 +74,21 @@ class DrawnValues:
             return estimate
         size = np.maximum(estimate.deviations, np.finfo(float).tiny)
         covariance = estimate.covariance / np.outer(size, size)
-        rows, own = covariance[self.places], self.deviations / size[self.places]
-        gain = np.linalg.solve(rows[:, self.places] + np.diag(own**2), rows).T
+        rows, deviations = covariance[self.places], self.deviations / size[self.places]
+        gain = np.linalg.solve(rows[:, self.places] + np.diag(deviations**2), rows).T
         shift = gain @ ((self.values - estimate.values[self.places]) / size[self.places])
-        left = np.eye(len(size))
-        left[:, self.places] -= gain
+        reduction = np.eye(len(size))
+        reduction[:, self.places] -= gain
         # Joseph's form, which stays positive where deviations differ by many orders.
-        covariance = left @ covariance @ left.T + gain @ np.diag(own**2) @ gain.T
+        covariance = reduction @ covariance @ reduction.T + gain @ np.diag(deviations**2) @ gain.T
         values = estimate.values + size * shift
-        rest = residuals_of(observations, values)
+        residuals = residuals_of(observations, values)
         return replace(
             estimate,
             values=values,
             covariance=0.5 * (covariance + covariance.T) * np.outer(size, size),
-            residuals=rest,
-            whiteness=whiteness(rest, observations.gain > 0.0),
+            residuals=residuals,
+            whiteness=whiteness(residuals, observations.gain > 0.0),
         )
 
     def rows_beside(self, observations: Observations, noise: Array) -> Observations:

@@ -92,11 +92,11 @@ class ColumnFault:
 
 def _exchanges(order: Sequence[int]) -> int:
     """Return the least number of exchanges of two that make an order."""
-    left, count = set(range(len(order))), len(order)
-    while left:
-        at, count = left.pop(), count - 1
-        while (at := order[at]) in left:
-            left.remove(at)
+    unplaced, count = set(range(len(order))), len(order)
+    while unplaced:
+        at, count = unplaced.pop(), count - 1
+        while (at := order[at]) in unplaced:
+            unplaced.remove(at)
     return count
 
 
@@ -127,39 +127,41 @@ def column_fault(model: Model, log: Log, preprocessing: Preprocessing) -> Column
     usual = observations_of(model, log, plain)
     none = _fault(model, usual.actuators)
     tried = _with_signs(none, permutations(none.order))
-    found = [(fault, usual, model) for fault in _with_errors(usual, tried)]
-    before = found[0][0].after
-    found += _others(none, model, log, plain, before)
-    faults = [replace(fault, before=before) for fault, _, _ in found]
+    candidates = [(fault, usual, model) for fault in _with_errors(usual, tried)]
+    error = candidates[0][0].after
+    candidates += _others(none, model, log, plain, error)
+    faults = [replace(fault, before=error) for fault, _, _ in candidates]
     least = min(fault.after for fault in faults)
     limit = _ALIKE * max(least, _ROUNDING)
-    if not max(least, _ROUNDING) * DECISIVE < before:
+    if not max(least, _ROUNDING) * DECISIVE < error:
         # Forces that no order explains say nothing about signs.
-        if before > _EXPLAINED:
+        if error > _EXPLAINED:
             return None
-        limit = _ALIKE * max(before, _ROUNDING)
+        limit = _ALIKE * max(error, _ROUNDING)
     alike = [k for k, fault in enumerate(faults) if fault.after <= limit]
     alike = sorted(alike, key=lambda k: (faults[k].changes, faults[k].after))[:_LOOKED_INTO]
-    states = {k: _unphysical(faults[k], *found[k][1:]) for k in alike}
-    first, *rest = sorted(alike, key=lambda k: (states[k], faults[k].changes, faults[k].after))
+    states = {k: _unphysical(faults[k], *candidates[k][1:]) for k in alike}
+    first, *equivalents = sorted(
+        alike, key=lambda k: (states[k], faults[k].changes, faults[k].after)
+    )
     if faults[first].changes == 0:
         return None
     # Equal legs can be renamed in every fault: faults of more changes add nothing.
     most = states[first], faults[first].changes
-    as_well = [faults[k].message() for k in rest if (states[k], faults[k].changes) <= most]
+    as_well = [faults[k].message() for k in equivalents if (states[k], faults[k].changes) <= most]
     return replace(faults[first], equivalents=tuple(as_well[:_TOLD]))
 
 
 def exchanged_joints(
-    model: LinearModel, log: Log, preprocessing: Preprocessing, before: float
+    model: LinearModel, log: Log, preprocessing: Preprocessing, error: float
 ) -> ColumnFault | None:
-    """Return the order of the joints, or the sign of one, that makes the error `before` small."""
+    """Return the order of the joints, or the sign of one, that makes the error of the fit small."""
     none = _fault(model, log.joints.shape[1])
     best: ColumnFault | None = None
     for fault, observations in _moved_joints(none, model, log, preprocessing):
-        (one,) = _with_errors(observations, [fault])
-        if one.after * DECISIVE < (before if best is None else best.after * DECISIVE):
-            best = replace(one, before=before)
+        (candidate,) = _with_errors(observations, [fault])
+        if candidate.after * DECISIVE < (error if best is None else best.after * DECISIVE):
+            best = replace(candidate, before=error)
     return best
 
 
@@ -177,7 +179,7 @@ def _with_signs(fault: ColumnFault, orders: Iterable[tuple[int, ...]]) -> list[C
 
 
 def _others(
-    none: ColumnFault, model: Model, log: Log, how: Preprocessing, before: float
+    none: ColumnFault, model: Model, log: Log, how: Preprocessing, error: float
 ) -> Iterator[tuple[ColumnFault, Observations, Model]]:
     """Yield faults of joints, of legs and of gravity that explain the forces far better."""
 
@@ -192,9 +194,9 @@ def _others(
             yield faults, observations_of(other, log, how), other
 
     for faults, observations, other in tried():
-        for one in _with_errors(observations, faults):
-            if one.after * DECISIVE < before:
-                yield one, observations, other
+        for candidate in _with_errors(observations, faults):
+            if candidate.after * DECISIVE < error:
+                yield candidate, observations, other
 
 
 def _moved_joints(
@@ -243,12 +245,12 @@ def _with_errors(observations: Observations, faults: Sequence[ColumnFault]) -> l
     # The projection of each column, given to each actuator: orders and signs add these up.
     parts = np.einsum("rnk,rj->njk", basis, forces)
     power = float((forces**2).sum())
-    found = []
+    with_errors = []
     for fault in faults:
         image = np.array(fault.signs) @ parts[np.arange(n), list(fault.order)]
         error = float(np.sqrt(max(power - float(image @ image), 0.0) / power))
-        found.append(replace(fault, after=error))
-    return found
+        with_errors.append(replace(fault, after=error))
+    return with_errors
 
 
 def _unphysical(fault: ColumnFault, observations: Observations, model: Model) -> int:

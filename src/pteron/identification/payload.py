@@ -192,12 +192,14 @@ class Payload:
         if hidden:
             lines.append(f"Not felt by the actuators: {', '.join(hidden)}.")
         lines.append(self._opinion())
-        lines += [one.message for one in self.fault_isolation.faults if one.matters]
+        lines += [fault.message for fault in self.fault_isolation.faults if fault.matters]
         if not self.allowed_for:
             lines.append("The stated errors do not allow for that.")
-        lines += [f"Note: {one.message}" for one in self.findings]
-        left = ", ".join(f"{value:.2g}" for value in self.residual)
-        lines.append(f"Residuals of the actuator forces: {left} (standard deviations, N or N m).")
+        lines += [f"Note: {finding.message}" for finding in self.findings]
+        residuals = ", ".join(f"{value:.2g}" for value in self.residual)
+        lines.append(
+            f"Residuals of the actuator forces: {residuals} (standard deviations, N or N m)."
+        )
         return "\n".join(lines)
 
     def _opinion(self) -> str:
@@ -281,7 +283,10 @@ def identify_payload(
         if cause and len(hidden) > _MOST_UNSEEN * model.base.rank:
             raise fit[0].log.fault("left over", cause)  # no verdict of a payload could say so
     return _payload(
-        model, estimate, isolate_faults(model, estimate, fit, plans), [one.findings for one in fit]
+        model,
+        estimate,
+        isolate_faults(model, estimate, fit, plans),
+        [recording.findings for recording in fit],
     )
 
 
@@ -303,8 +308,8 @@ def _payload(
     chosen = [estimate.names.index(name) for name in names]
 
     def known(*kinds: str) -> tuple[float, ...] | None:
-        wanted = [f"{kind}_L" for kind in kinds]
-        return tuple(map(estimate.value, wanted)) if set(wanted) <= set(names) else None
+        value_names = [f"{kind}_L" for kind in kinds]
+        return tuple(map(estimate.value, value_names)) if set(value_names) <= set(names) else None
 
     kinds = model.robot.platform.inertia.kinds
     mass, tensor = known("m"), known(*(kind for kind in kinds if kind[0] == "I"))
@@ -347,7 +352,7 @@ def _observed(
     model: Model, fit: Sequence[Recording], processing: Processing | None
 ) -> tuple[list[Observations], list[Preprocessing]]:
     """Return observations and preprocessing of each recording; both phases must be in them."""
-    logs = [one.head() for one in fit]
+    logs = [recording.head() for recording in fit]
     plans = [preprocessing_of(model.robot, log, processing) for log in logs]
     parts = [observations_of(model, *pair) for pair in zip(logs, plans, strict=True)]
     observations = stacked(parts)

@@ -235,8 +235,8 @@ class Identification:
         if self.rotors is None or beside is None or not (beside < 0.0).any():
             inertia = self._per_joint("rotor", self.estimate.values)
             return self.estimate.values, inertia, self.model.expressions
-        own = [*self.model.base.expressions(), *self.model.names[self.model.base.rank :]]
-        return self.values_without_rotors, self.reflected_inertia, own
+        expressions = [*self.model.base.expressions(), *self.model.names[self.model.base.rank :]]
+        return self.values_without_rotors, self.reflected_inertia, expressions
 
     def as_dict(self) -> dict[str, Any]:
         """Return everything but samples and residuals as plain data."""
@@ -276,8 +276,8 @@ class Identification:
             **picked(self, "unseen"),
             "real_bodies": bodies,
             **picked(self, "trial=fault_isolation fitted held_out"),
-            "preprocessing": [picked(one, *vars(one)) for one in self.preprocessing],
-            "findings": [picked(one, "kind row column message") for one in self.findings],
+            "preprocessing": [picked(how, *vars(how)) for how in self.preprocessing],
+            "findings": [picked(finding, "kind row column message") for finding in self.findings],
             **picked(self, "notes"),
         }
 

@@ -158,12 +158,12 @@ def _payload(m: FittedMotion) -> Array:
 
 
 def _weight(m: FittedMotion) -> Array:
-    rest = {
+    standstill = {
         name: np.zeros_like(getattr(m.states, name))
         for name in ("joint_rates", "joint_accelerations", "velocity", "acceleration")
     }
-    still = replace(m, states=replace(m.states, **rest))
-    return still.forces(of=["base", "payload"])[..., None]
+    at_rest = replace(m, states=replace(m.states, **standstill))
+    return at_rest.forces(of=["base", "payload"])[..., None]
 
 
 def _passive_legs(model: Model) -> Sequence[str]:
@@ -224,10 +224,10 @@ def families_of(model: Model) -> tuple[Family, ...]:
     with_rotors = replace(model.terms, rotors=True)
     rotors = []
     if not model.terms.rotors:
-        own = identification_model(model.robot, with_rotors, base=model.base).kept_terms
-        rotors = [_ROTORS] * any(term.kind == "rotor" for term in own)
+        terms = identification_model(model.robot, with_rotors, base=model.base).kept_terms
+        rotors = [_ROTORS] * any(term.kind == "rotor" for term in terms)
     drives = (_scale(i) for i in range(count))
-    joints = (one for i in range(count) for one in (_ratio((i,)), _zero(model.robot, i)))
+    joints = (family for i in range(count) for family in (_ratio((i,)), _zero(model.robot, i)))
     legs = range(len(model.robot.legs))
     geometry = (_geometry(model.robot, some) for some in (*((i,) for i in legs), legs))
     light = Tolerance(negligible=_LIGHT * model.robot.platform.inertia.mass)
@@ -259,15 +259,15 @@ def length_tolerance(robot: Manipulator) -> Tolerance:
 
 
 def _zero(robot: Manipulator, i: int) -> Family:
-    one, leg = slice(i, i + 1), robot.legs[i]
+    joint, leg = slice(i, i + 1), robot.legs[i]
     slides = leg.joint.unit == "m"
     usual = _ZERO_OF_SLIDE * leg.size if slides else _ZERO_OF_CRANK
     tolerance = Tolerance(usual, _NEGLIGIBLE * (leg.size if slides else 1.0))
     return Family(
         "zero",
         "",
-        lambda model: model.robot.joint_names[one],
-        lambda m: m.by_zeros[..., one],
+        lambda model: model.robot.joint_names[joint],
+        lambda m: m.by_zeros[..., joint],
         of_machine=False,
         tolerance=tolerance,
     )
@@ -287,12 +287,12 @@ def _geometry(robot: Manipulator, legs: Sequence[int]) -> Family:
 
 
 def _scale(i: int) -> Family:
-    one = slice(i, i + 1)
+    actuator = slice(i, i + 1)
     return Family(
         "scale",
         "",
-        lambda model: _forces(model)[one],
-        lambda m: diagonal(m.forces())[..., one],
+        lambda model: _forces(model)[actuator],
+        lambda m: diagonal(m.forces())[..., actuator],
         of_machine=False,
         largest=1.0,
     )
@@ -328,13 +328,13 @@ class FaultColumns:
         count = self.places[-1].stop - len(self.model.names)
         return extended(self.model, count, self.matrix)
 
-    def motion(self, states: States, along: Array, stride: int = 1) -> FittedMotion:
-        """Return the motion that columns are made of, at times `along` (R,)."""
-        return FittedMotion(self.model, self.values, states, self.usual, along, stride, self.cutoff)
+    def motion(self, states: States, share: Array, stride: int = 1) -> FittedMotion:
+        """Return the motion that columns are made of, at shares (R,) of the log's time."""
+        return FittedMotion(self.model, self.values, states, self.usual, share, stride, self.cutoff)
 
     def matrix(self, states: States) -> Array:
         """Return all columns (R, n, p + k)."""
-        along = (states.time - self.begin) / (self.end - self.begin) - 0.5
-        motion = self.motion(states, along, self.stride)
+        share = (states.time - self.begin) / (self.end - self.begin) - 0.5
+        motion = self.motion(states, share, self.stride)
         columns = [family.columns(motion) for family in self.families]
         return np.concatenate([motion.matrix, *columns], axis=-1)

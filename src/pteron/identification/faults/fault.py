@@ -238,17 +238,17 @@ class IsolatedFault:
         return float(np.linalg.norm(parts))
 
     def _sentence(self) -> str:
-        first, told = float(self.sizes[0]), "sampling" if self.of_sampling else str(self.fault)
-        if told == "clock" and first <= -1.0:
-            told = "sign"
+        first, key = float(self.sizes[0]), "sampling" if self.of_sampling else str(self.fault)
+        if key == "clock" and first <= -1.0:
+            key = "sign"
         size, error = abs(first), float(self.deviations[0])
         late, early = ("forces", "positions")[:: 1 if first > 0.0 else -1]
         clock = max(1.0 + first, 1e-300) ** -0.5 - 1.0
-        whole = self.labels[0] == "all joints"
+        all_joints = self.labels[0] == "all joints"
         clearest = int(np.argmax(np.abs(self.sizes) / np.maximum(self.deviations, 1e-300)))
         # Of the eighths of a log that filters cut off nothing is known.
         seen = np.flatnonzero(self.deviations) if self.fault == "payload" else np.array([0])
-        return _SENTENCES[told].format(
+        return _SENTENCES[key].format(
             label=self.labels[0],
             labels=", ".join(self.labels),
             times=float(self.sizes.max()),
@@ -263,7 +263,7 @@ class IsolatedFault:
             percent=100.0 * size,
             error=100.0 * error,
             more="large" if first > 0.0 else "small",
-            label_moves="All joints move" if whole else f"{self.labels[0]} moves",
+            label_moves="All joints move" if all_joints else f"{self.labels[0]} moves",
             less="less" if first > 0.0 else "more",
             shown_size=_rounded(size, self.labels[0].startswith("theta")),
             shown_leg=_rounded(self._leg_size(self.labels[clearest])),

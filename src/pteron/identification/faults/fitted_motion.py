@@ -26,12 +26,12 @@ _FEWEST = 8
 
 def lengths_of(robot: Manipulator) -> list[tuple[int, int]]:
     """Return leg, from 0, and place in the vector of `numbers`, of each number that is in m."""
-    found = []
+    places = []
     for i, (leg, at) in enumerate(zip(robot.legs, number_places(robot), strict=False)):
         sizes = {q.name: len(q.value) for q in leg.quantities if q.role in ("point", "length")}
         for name, size in (sizes | {"platform_point": 3}).items():
-            found += [(i, at[name] + k) for k in range(size)]
-    return found
+            places += [(i, at[name] + k) for k in range(size)]
+    return places
 
 
 @dataclass(frozen=True)
@@ -95,8 +95,8 @@ class FittedMotion:
     @cached_property
     def by_zeros(self) -> Array:
         """Slopes (R, n, n) of forces by the zero of each joint."""
-        still = np.zeros_like(self.states.joints)
-        return self.by_give([still + 1.0, still, still])
+        zero = np.zeros_like(self.states.joints)
+        return self.by_give([zero + 1.0, zero, zero])
 
     @cached_property
     def by_ratio(self) -> Array:
@@ -119,12 +119,12 @@ class FittedMotion:
 
         Joints are behind by a `motion`: its coordinates, rates and accelerations, (R, n) each.
         """
-        behind = [one[self._some] for one in motion]
+        behind = [change[self._some] for change in motion]
         columns = []
         for i, size in enumerate(_STEP * np.ptp(self._rigid[0].joints, axis=0)):
             part = np.zeros(behind[0].shape[1])
             part[i] = -size / max(float(np.abs(behind[0][:, i]).max()), np.finfo(float).tiny)
-            changed = self._forces_at(self._geometry, *(part * one for one in behind))
+            changed = self._forces_at(self._geometry, *(part * change for change in behind))
             columns.append((changed - self._unchanged) / -part[i])
         return self._at_all(np.stack(columns, axis=-1))
 
@@ -163,8 +163,8 @@ class FittedMotion:
 
     @cached_property
     def _kernels(self) -> tuple[Kernel, ...]:
-        wanted = "newton_step", "platform_motion", "inverse_dynamics"
-        return tuple(compile(self.model.robot, what, "vm", grade="general") for what in wanted)
+        outputs = "newton_step", "platform_motion", "inverse_dynamics"
+        return tuple(compile(self.model.robot, what, "vm", grade="general") for what in outputs)
 
     @cached_property
     def _unchanged(self) -> Array:
