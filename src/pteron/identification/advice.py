@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from pteron.identification.estimators import Estimate
-from pteron.identification.faults.fault import of_held_forces
+from pteron.identification.faults.fault import describe_held_forces
 from pteron.identification.model import Model
 from pteron.identification.unknowns import Unknowns
 from pteron.manipulator import Manipulator, parameter_data, parameters
@@ -102,7 +102,7 @@ def notes_on_unknowns(unknowns: Unknowns, model: Model, *, default: bool, half: 
     notes = []
     if default and half:
         notes.append(
-            f"{of_held_forces(unknowns.delay)}; that is taken out (--delay 0 leaves it in)."
+            f"{describe_held_forces(unknowns.delay)}; that is taken out (--delay 0 leaves it in)."
         )
     elif unknowns.delay_deviation and not default:
         notes.append(

@@ -174,7 +174,7 @@ def identify_drive_gains(
     observations = observations.columns(range(len(plain.names)))
     start, condition, gap = _total(observations, carried)
     units = [f"{leg.joint.force_unit}/{unit}" for leg in robot.legs]
-    estimate = _likely(observations, carried, start, units)
+    estimate = _fit_likelihood(observations, carried, start, units)
     n = observations.actuators
     return DriveGains(
         gains=estimate.values[:n],
@@ -241,7 +241,7 @@ def _total(observations: Observations, carried: Array) -> tuple[Array, float, fl
     return np.roll(values, n), float(sizes[0] / sizes[-2]), float(sizes[-1] / sizes[-2])
 
 
-def _likely(
+def _fit_likelihood(
     observations: Observations, carried: Array, start: Array, units: Sequence[str]
 ) -> Estimate:
     """Return g and beta of greatest likelihood, the noise being in the currents alone."""

@@ -78,15 +78,15 @@ class ColumnFault:
             parts.append("gravity points the other way than in the machine's file")
         if self.order == self.joint_order != usual:
             pairs = [f"leg {k + 1}" for k in usual if self.order[k] != k]
-            parts.append(f"{_listed(pairs)} are exchanged, forces and joints alike")
+            parts.append(f"{_join_names(pairs)} are exchanged, forces and joints alike")
         else:
             for names, order in ((self.joints, self.joint_order), (self.forces, self.order)):
-                parts += _moved(names, order)
-        parts += _flipped(self.joints, self.joint_order, self.joint_signs)
+                parts += _order_clauses(names, order)
+        parts += _sign_clauses(self.joints, self.joint_order, self.joint_signs)
         if -1 not in self.joint_signs and self.signs.count(-1) == len(usual):
             parts.append("the forces, or all joints, have the sign flipped")
         else:
-            parts += _flipped(self.forces, self.order, self.signs)
+            parts += _sign_clauses(self.forces, self.order, self.signs)
         return " and ".join(parts)
 
 
@@ -100,19 +100,21 @@ def _exchanges(order: Sequence[int]) -> int:
     return count
 
 
-def _moved(names: Sequence[str], order: Sequence[int]) -> Iterator[str]:
+def _order_clauses(names: Sequence[str], order: Sequence[int]) -> Iterator[str]:
     moved = [name for k, name in enumerate(names) if order[k] != k]
     if len(moved) == 2:
-        yield f"{_listed(moved)} are swapped"
+        yield f"{_join_names(moved)} are swapped"
     elif moved:
         right = ", ".join(names[k] for k in order)
-        yield f"{_listed(moved)} are in another order (they should be {right})"
+        yield f"{_join_names(moved)} are in another order (they should be {right})"
 
 
-def _flipped(names: Sequence[str], order: Sequence[int], signs: Sequence[int]) -> Iterator[str]:
+def _sign_clauses(
+    names: Sequence[str], order: Sequence[int], signs: Sequence[int]
+) -> Iterator[str]:
     flipped = [names[order[k]] for k, sign in enumerate(signs) if sign < 0]
     if flipped:
-        yield f"{_listed(flipped)} {'has' if len(flipped) == 1 else 'have'} the sign flipped"
+        yield f"{_join_names(flipped)} {'has' if len(flipped) == 1 else 'have'} the sign flipped"
 
 
 def column_fault(model: Model, log: Log, preprocessing: Preprocessing) -> ColumnFault | None:
@@ -129,7 +131,7 @@ def column_fault(model: Model, log: Log, preprocessing: Preprocessing) -> Column
     tried = _with_signs(none, permutations(none.order))
     candidates = [(fault, usual, model) for fault in _with_errors(usual, tried)]
     error = candidates[0][0].after
-    candidates += _others(none, model, log, plain, error)
+    candidates += _other_faults(none, model, log, plain, error)
     faults = [replace(fault, before=error) for fault, _, _ in candidates]
     least = min(fault.after for fault in faults)
     limit = _ALIKE * max(least, _ROUNDING)
@@ -178,12 +180,12 @@ def _with_signs(fault: ColumnFault, orders: Iterable[tuple[int, ...]]) -> list[C
     return [replace(fault, order=o, signs=s) for o in orders for s in signs]
 
 
-def _others(
+def _other_faults(
     none: ColumnFault, model: Model, log: Log, how: Preprocessing, error: float
 ) -> Iterator[tuple[ColumnFault, Observations, Model]]:
     """Yield faults of joints, of legs and of gravity that explain the forces far better."""
 
-    def tried() -> Iterator[tuple[list[ColumnFault], Observations, Model]]:
+    def trials() -> Iterator[tuple[list[ColumnFault], Observations, Model]]:
         for fault, observations in _moved_joints(none, model, log, how):
             yield _with_signs(fault, {none.order, fault.joint_order}), observations, model
         if any(model.robot.gravity):
@@ -193,7 +195,7 @@ def _others(
             faults = _with_signs(replace(none, gravity=True), [none.order])
             yield faults, observations_of(other, log, how), other
 
-    for faults, observations, other in tried():
+    for faults, observations, other in trials():
         for candidate in _with_errors(observations, faults):
             if candidate.after * DECISIVE < error:
                 yield candidate, observations, other
@@ -260,5 +262,5 @@ def _unphysical(fault: ColumnFault, observations: Observations, model: Model) ->
     return unphysical(model, mended, weighted(mended))
 
 
-def _listed(names: Sequence[str]) -> str:
+def _join_names(names: Sequence[str]) -> str:
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

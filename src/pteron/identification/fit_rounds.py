@@ -15,23 +15,23 @@ from pteron.identification.drawn_values import DrawnValues
 from pteron.identification.errors import LogError, name_cause
 from pteron.identification.estimators import Estimate, weighted
 from pteron.identification.faults import FaultIsolation, delay_of, isolate_faults
-from pteron.identification.faults.assumptions import contradicted
+from pteron.identification.faults.assumptions import find_contradiction
 from pteron.identification.faults.log_faults import LogFault, log_faults, lost_share
 from pteron.identification.fit_task import FitTask
 from pteron.identification.fitting import (
+    append_findings,
     check_columns,
     check_motion,
-    estimated,
-    findings_told,
-    preprocessing_for,
+    choose_preprocessing,
+    estimate_values,
 )
 from pteron.identification.model import Model
 from pteron.identification.observation import Observations
-from pteron.identification.plausibility import left_over, unphysical
+from pteron.identification.plausibility import excess_residual_cause, unphysical
 from pteron.identification.prediction import Prediction
 from pteron.identification.signals import Preprocessing, Processing
-from pteron.identification.unknowns import Unknowns, searched_speeds, settled
-from pteron.identification.verdict import judged, verdict_of
+from pteron.identification.unknowns import Unknowns, fit_nonlinear_terms, search_speeds
+from pteron.identification.verdict import predict_held_out, verdict_of
 from pteron.kernels import Array
 
 
@@ -116,7 +116,7 @@ class FitRound:
     fits_delay: bool
 
     @property
-    def distorted(self) -> bool:
+    def is_distorted(self) -> bool:
         """Whether a fault of a log may pass for faults of the machine."""
         return _distort(self.log_faults)
 
@@ -134,12 +134,12 @@ def fit_in_rounds(task: FitTask) -> FitRound:
 def _stack_equations(task: FitTask) -> FitEquations:
     """Return the equations of the rows to fit, with speeds of Stribeck's friction from a grid."""
     robot, model, processing = task.robot, task.model, task.processing
-    preprocessing = tuple(preprocessing_for(robot, log, processing) for log in task.motions.fit)
+    preprocessing = tuple(choose_preprocessing(robot, log, processing) for log in task.motions.fit)
     observe, unknowns = partial(task.observe, preprocessing), Unknowns()
     if model.terms.stribeck == "auto":
         usual = np.max([how.usual for how in preprocessing], axis=0)
-        unknowns = Unknowns(searched_speeds(model, observe, usual))
-        model = model.falling(np.asarray(unknowns.speeds))
+        unknowns = Unknowns(search_speeds(model, observe, usual))
+        model = model.with_speeds(np.asarray(unknowns.speeds))
     return FitEquations(model, observe(model), preprocessing, processing, unknowns, np.zeros(()))
 
 
@@ -147,19 +147,19 @@ def _run_round(task: FitTask, equations: FitEquations, *, fits_delay: bool) -> F
     """Return a fit and all that is judged by it."""
     motions = task.motions
     known = equations.model.known_values(task.known_rotors)
-    with findings_told(motions.recordings):
+    with append_findings(motions.recordings):
         if fits_delay or equations.unknowns.speeds is not None:
             equations = _fit_unknowns(task, equations, fits_delay=fits_delay)
         fit = _fit_values(task, equations, known)
 
     # Judge by held-out data, which show exchanged columns
-    held_out = _predict_held_out(task, fit)
+    held_out = _predict_checks(task, fit)
     trusted = verdict_of(held_out, repeats=not motions.separate).grade == "trustworthy"
     heads = [log.head() for log in motions.fit]
     lost = [lost_share(log) for log in motions.originals]
     find_log_faults = partial(log_faults, heads, fit.equations.preprocessing, lost, fits=trusted)
     of_log = find_log_faults()
-    with findings_told(motions.recordings):
+    with append_findings(motions.recordings):
         _check_log(task, fit, trusted=trusted, distorted=_distort(of_log))
     task.report("Looking for faults", 0, 0)
     faults = _isolate(task, fit)
@@ -180,7 +180,7 @@ def _fit_unknowns(task: FitTask, equations: FitEquations, *, fits_delay: bool) -
         begin = delay_of(model, first, task.motions.fit, preprocessing)
     else:
         begin = float(task.processing.delay or 0)
-    model, observations, unknowns, covariance = settled(
+    model, observations, unknowns, covariance = fit_nonlinear_terms(
         model,
         partial(task.observe, preprocessing),
         replace(equations.unknowns, delay=begin),
@@ -201,25 +201,27 @@ def _fit_values(task: FitTask, equations: FitEquations, known: Array) -> FittedV
     """Return the values, with those of the drawing where the log does not show them."""
     model, observations = equations.model, equations.observations
     preprocessing = equations.preprocessing
-    estimate_values = partial(estimated, task.estimator, model, task.motions.fit, preprocessing)
+    solve = partial(estimate_values, task.estimator, model, task.motions.fit, preprocessing)
     try:
-        alone = estimate_values(observations)
+        alone = solve(observations)
     except LogError as error:
         # The log does not determine all values: with those of the drawing it may.
         noise = np.mean([how.force_noise for how in preprocessing], axis=0)
         drawn_values = DrawnValues.of_all(model, known)
         observations = drawn_values.rows_beside(observations, noise)
-        estimate = _estimate_with_drawing(estimate_values, observations, error)
+        estimate = _estimate_with_drawing(solve, observations, error)
         equations = replace(equations, observations=observations)
-        return FittedValues(equations, known, estimate, estimate, drawn_values.told_of(estimate))
+        return FittedValues(
+            equations, known, estimate, estimate, drawn_values.name_undetermined(estimate)
+        )
     alone = replace(alone, covariance=alone.covariance + equations.covariance)
     drawn_values = DrawnValues.of(model, alone, known)
-    estimate = drawn_values.added_to(alone, observations)
+    estimate = drawn_values.update_estimate(alone, observations)
     return FittedValues(equations, known, alone, estimate, drawn_values)
 
 
 def _estimate_with_drawing(
-    estimate_values: Callable[[Observations], Estimate],
+    solve: Callable[[Observations], Estimate],
     observations: Observations,
     error: LogError,
 ) -> Estimate:
@@ -227,12 +229,12 @@ def _estimate_with_drawing(
     if error.reason != "too little motion":
         raise error
     try:
-        return estimate_values(observations)
+        return solve(observations)
     except LogError:
         raise error from None
 
 
-def _predict_held_out(task: FitTask, fit: FittedValues) -> tuple[Prediction, ...]:
+def _predict_checks(task: FitTask, fit: FittedValues) -> tuple[Prediction, ...]:
     """Return the predictions of held-out rows; ends of fitted logs have their assembly modes."""
     motions, equations = task.motions, fit.equations
     starts: list[tuple[float, ...] | None] = [None] * len(motions.held_out)
@@ -240,11 +242,11 @@ def _predict_held_out(task: FitTask, fit: FittedValues) -> tuple[Prediction, ...
         starts = [how.start for how in equations.preprocessing]
     recordings = task.with_progress(motions.held_out, "Checking")
     return tuple(
-        judged(
+        predict_held_out(
             equations.model,
             fit.estimate.values,
             log,
-            preprocessing_for(task.robot, log, equations.processing, start),
+            choose_preprocessing(task.robot, log, equations.processing, start),
         )
         for log, start in zip(recordings, starts, strict=True)
     )
@@ -257,14 +259,14 @@ def _check_log(task: FitTask, fit: FittedValues, *, trusted: bool, distorted: bo
     if not trusted or unphysical(model, equations.observations, fit.estimate):
         rotors = task.rotors or [(0.0, 1.0)] * task.robot.joint_count
         reflected = np.array([inertia * ratio**2 for inertia, ratio in rotors])
-        assumption = contradicted(task.robot, first.head(), preprocessing[0], reflected)
+        assumption = find_contradiction(task.robot, first.head(), preprocessing[0], reflected)
         if assumption is not None:
             raise first.log.fault("contradicted", assumption.message.rstrip("."))
         check_columns(model, first, preprocessing[0], decisive=distorted)
     try:
         check_motion(model, fit.without_drawing, preprocessing, first)
     except LogError as error:
-        if left_over(fit.without_drawing, preprocessing):
+        if excess_residual_cause(fit.without_drawing, preprocessing):
             name_cause(error, _isolate(task, fit).causes)
         raise
 

@@ -10,16 +10,16 @@ from dataclasses import dataclass, replace
 
 from pteron.identification.estimators import Estimate
 from pteron.identification.fitting import (
-    balanced,
     check_payload,
     check_recordings,
+    convert_to_newtons,
     fit_observations,
-    in_newtons,
+    stack_balanced,
 )
 from pteron.identification.logs import Finding, Log, LogFile
 from pteron.identification.model import Model, Terms, identification_model
 from pteron.identification.observation import LinearModel, Observations
-from pteron.identification.recordings import Recording, divided, recording
+from pteron.identification.recordings import Recording, read_recording, split_held_out
 from pteron.identification.result import reflected_inertia
 from pteron.identification.signals import Preprocessing, Processing
 from pteron.legs import Drive
@@ -111,7 +111,7 @@ class FitTask:
             preprocessing = [replace(how, delay=delay) for how in preprocessing]
         recordings = self.with_progress(self.motions.fit, "Filtering")
         pairs = zip(recordings, preprocessing, strict=True)
-        return balanced([fit_observations(columns, log, how) for log, how in pairs])
+        return stack_balanced([fit_observations(columns, log, how) for log, how in pairs])
 
 
 def read_task(
@@ -142,14 +142,17 @@ def _read_motions(
     """Return the recordings, checked; without held-out logs the end of each recording is."""
     count_rows = _row_counter(report, "Reading")
     recordings, separate = (
-        [recording(log, count_rows, processing.period) for log in logs_in_newtons(group, robot)]
+        [
+            read_recording(log, count_rows, processing.period)
+            for log in logs_in_newtons(group, robot)
+        ]
         for group in (logs, held_out)
     )
     check_recordings(robot, recordings, separate, processing)
     originals = _originals(logs)
     if separate:
         return Motions(recordings, separate, recordings, separate, originals)
-    parts = [divided(log, processing.period) for log in recordings]
+    parts = [split_held_out(log, processing.period) for log in recordings]
     beginnings, ends = [first for first, _ in parts], [second for _, second in parts]
     return Motions(recordings, separate, beginnings, ends, originals)
 
@@ -161,7 +164,7 @@ def logs_in_newtons(logs: Logs, robot: Manipulator) -> list[Log | LogFile]:
         replace(log, symbols=symbols) if isinstance(log, Log) and log.symbols is None else log
         for log in ([logs] if isinstance(logs, Log | LogFile) else logs)
     ]
-    return [in_newtons(log, robot) for log in named]
+    return [convert_to_newtons(log, robot) for log in named]
 
 
 def _originals(logs: Logs) -> list[Log]:

@@ -28,8 +28,8 @@ from pteron.identification.logs.at_motor import AnyLog, by_rated_torque, per_cen
 from pteron.identification.logs.recorded import at_limits, check_forces, check_recorded
 from pteron.identification.model import Model, identification_model
 from pteron.identification.observation import LinearModel, Observations, observations_of, stacked
-from pteron.identification.plausibility import left_over, unseen_shares
-from pteron.identification.recordings import Recording, same
+from pteron.identification.plausibility import excess_residual_cause, unseen_shares
+from pteron.identification.recordings import Recording, hold_same_samples
 from pteron.identification.signals import Preprocessing, Processing, preprocessing_of
 from pteron.manipulator import Manipulator
 
@@ -56,7 +56,7 @@ _NOISELESS = 1e-10
 """Residuals, relative to the forces, that are rounding."""
 
 
-def in_newtons(log: AnyLog, robot: Manipulator) -> AnyLog:
+def convert_to_newtons(log: AnyLog, robot: Manipulator) -> AnyLog:
     """Return a log; if its forces are in per cent of rated torque, by the machine's drives."""
     return by_rated_torque(log, robot) if log.description.force_unit == "%" else log
 
@@ -100,7 +100,7 @@ def check_recordings(
     pairs = [(*pair, twice.format(pair[0].source)) for pair in combinations(recordings, 2)]
     pairs += [(*pair, held_out) for pair in product(recordings, others)]
     for recording, again, said in pairs:
-        if same(recording, again):
+        if hold_same_samples(recording, again):
             raise again.log.fault("twice", said)
     for log in (recording.log for recording in recordings):
         period = processing.period
@@ -126,7 +126,7 @@ def check_payload(fit: Sequence[Recording]) -> None:
         raise fit[0].log.fault("no payload", said)
 
 
-def preprocessing_for(
+def choose_preprocessing(
     robot: Manipulator,
     recording: Recording,
     processing: Processing,
@@ -164,7 +164,7 @@ def fit_observations(
         raise
 
 
-def balanced(parts: Sequence[Observations]) -> Observations:
+def stack_balanced(parts: Sequence[Observations]) -> Observations:
     """Return the observations of recordings as one, with the rows of each by its own noise.
 
     A motion of small forces is recorded with less noise than one of large ones: unscaled, the noise
@@ -190,7 +190,7 @@ def balanced(parts: Sequence[Observations]) -> Observations:
     return stacked(scaled)
 
 
-def estimated(
+def estimate_values(
     estimator: str | Callable[[Observations], Estimate],
     model: Model,
     fit: Sequence[Recording],
@@ -219,7 +219,7 @@ def estimated(
 
 
 @contextmanager
-def findings_told(recordings: Sequence[Recording]) -> Iterator[None]:
+def append_findings(recordings: Sequence[Recording]) -> Iterator[None]:
     """Put the findings of logs behind an error that is raised within, which they may explain."""
     try:
         yield
@@ -240,7 +240,7 @@ def check_motion(
     hidden, nothing = unseen_shares(model, estimate.deviations)
     if not nothing:
         return
-    cause = left_over(estimate, preprocessing)
+    cause = excess_residual_cause(estimate, preprocessing)
     rank = model.base.rank
     names = ", ".join(hidden) if len(hidden) < rank else "all"
     raise first.log.fault(

@@ -24,23 +24,23 @@ from pteron.identification.estimators import (
     essential_parameters,
     weighted,
 )
-from pteron.identification.faults.assumptions import contradicted, hidden_orders
+from pteron.identification.faults.assumptions import find_contradiction, hidden_orders
 from pteron.identification.faults.fault import is_half
-from pteron.identification.faults.log_faults import of_delay
+from pteron.identification.faults.log_faults import delay_fault
 from pteron.identification.fit_rounds import FitRound, FittedValues, fit_in_rounds
 from pteron.identification.fit_task import FitTask, Logs, Stage, logs_in_newtons, read_task
 from pteron.identification.fitted_bodies import FittedBodies, fit_real_bodies
-from pteron.identification.fitting import METHODS, findings_told
+from pteron.identification.fitting import METHODS, append_findings
 from pteron.identification.model import Terms
 from pteron.identification.observation import Observations
 from pteron.identification.plausibility import (
     common_factor,
+    excess_residual_cause,
     friction_below_zero,
-    left_over,
     plausibility_warnings,
 )
 from pteron.identification.prediction import Prediction, predict
-from pteron.identification.recordings import recording
+from pteron.identification.recordings import read_recording
 from pteron.identification.result import Identification
 from pteron.identification.signals import Processing, preprocessing_of
 from pteron.identification.verdict import verdict_of, with_bodies, with_hidden_first
@@ -138,11 +138,11 @@ def _refusal_cause(
     if not (of_log or of_poses):
         return ""
     try:
-        log = recording(logs_in_newtons(logs, robot)[0]).head()
+        log = read_recording(logs_in_newtons(logs, robot)[0]).head()
         start = (0.0,) * robot.freedom if of_poses else None
         how = preprocessing_of(robot, log, processing, start=start)
         reflected = np.array([(leg.drive or Drive()).inertia for leg in robot.legs])
-        assumption = contradicted(robot, log, how, reflected)
+        assumption = find_contradiction(robot, log, how, reflected)
     except PteronError:
         return ""
     return assumption.message.rstrip(".") if assumption else ""
@@ -157,12 +157,12 @@ def _judge_fit(
     half = is_half(unknowns.delay, unknowns.delay_deviation, 1.0 / motions.fit[0].head().rate)
     by_default = last.fits_delay and task.processing.delay is None
     if by_default and not half:
-        delay = of_delay(unknowns.delay, unknowns.delay_deviation)
+        delay = delay_fault(unknowns.delay, unknowns.delay_deviation)
         last = replace(last, log_faults=(*last.log_faults, delay))
     fitted = _predict_fitted(task, fit)
     task.report("Finding real bodies", 0, 0)
     essential = _fit_essential(task, fit)
-    with findings_told(motions.recordings):
+    with append_findings(motions.recordings):
         bodies = fit_real_bodies(fit, drawn, bounds)
     factor = 1.0
     if last.trusted:
@@ -198,7 +198,7 @@ def _predict_fitted(task: FitTask, fit: FittedValues) -> tuple[Prediction, ...]:
     model, preprocessing = fit.equations.model, fit.equations.preprocessing
     recordings = task.with_progress(task.motions.fit, "Predicting")
     return tuple(
-        predict(model, fit.estimate.values, log.beginning(), how)
+        predict(model, fit.estimate.values, log.first_rows(), how)
         for log, how in zip(recordings, preprocessing, strict=True)
     )
 
@@ -228,7 +228,7 @@ def _judge_round(task: FitTask, last: FitRound, bodies: FittedBodies, factor: fl
         factor=factor,
         hidden_orders=hidden_orders(task.robot, task.motions.fit[0].head(), preprocessing[0]),
         followed=frozenset(name for name, chosen in options.items() if chosen),
-        left=left_over(fit.estimate, preprocessing),
+        left=excess_residual_cause(fit.estimate, preprocessing),
     )
     verdict = replace(verdict, reasons=(*pushed, *verdict.reasons))
     return with_hidden_first(with_bodies(verdict, bodies.consistency, bodies.force_share))
@@ -249,6 +249,6 @@ def _advice(
     if essential.dropped:
         advice[:0] = advice_on_weak_values(model, list(essential.dropped))
     if fit.drawn_values.names:
-        clean = last.trusted and not last.faults.faults and not last.distorted
+        clean = last.trusted and not last.faults.faults and not last.is_distorted
         advice[:0] = advice_on_hidden_values(model.base, fit.drawn_values.names, clean=clean)
     return advice

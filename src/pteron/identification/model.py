@@ -158,7 +158,7 @@ class Model:
         speeds = self.speeds if self.terms.stribeck == "auto" else self.terms.stribeck
         return None if speeds is None else np.broadcast_to(speeds, (len(self.robot.legs),))
 
-    def falling(self, speeds: Array) -> Model:
+    def with_speeds(self, speeds: Array) -> Model:
         """Return the model with speeds (n,) that were found."""
         return _independent(Model(self.base, self.terms, speeds=tuple(speeds.tolist())))
 
@@ -234,7 +234,7 @@ class Model:
         """Return the regressor (R, n, p) of states: N or N m per unit of each value."""
         names = (*self.base.names, *(term.name for term in self.all_terms))
         columns = [k for k, name in enumerate(names) if name not in self.joins]
-        return np.ascontiguousarray(self._everything(states)[..., columns])
+        return np.ascontiguousarray(self._all_columns(states)[..., columns])
 
     @cached_property
     def _passive(self) -> dict[tuple[str, ...], list[PassiveJoint]]:
@@ -255,7 +255,7 @@ class Model:
             coefficients.setdefault(index, []).append(joint)
         return coefficients
 
-    def _everything(self, states: States) -> Array:
+    def _all_columns(self, states: States) -> Array:
         robot, terms = self.robot, self.terms
         n = len(robot.legs)
         motion = states.pose, states.velocity, states.acceleration
@@ -326,7 +326,7 @@ def identification_model(
 def _independent(model: Model) -> Model:
     """Return a model without the terms whose columns depend on others at every state."""
     names = model.names
-    flat = model._everything(_probes(model.robot)).reshape(-1, len(names))
+    flat = model._all_columns(_probes(model.robot)).reshape(-1, len(names))
     columns, lengths = scaled(flat)
     factor: Array = np.linalg.qr(columns)[1]
     # The diagonal of R is what is left of each column once those before it are taken out of it.
@@ -365,11 +365,11 @@ def diagonal(values: Array) -> Array:
 class ExtendedModel(Model):
     """A model with so many columns more, which have no units and numbers for names.
 
-    `whole` returns all columns (R, n, p + count) at states.
+    `columns` returns all columns (R, n, p + count) at states.
     """
 
     count: int
-    whole: Callable[[States], Array]
+    columns: Callable[[States], Array]
 
     @cached_property
     def kept_terms(self) -> tuple[Term, ...]:
@@ -379,10 +379,10 @@ class ExtendedModel(Model):
 
     def matrix(self, states: States) -> Array:
         """Return all columns (R, n, p + count)."""
-        return self.whole(states)
+        return self.columns(states)
 
 
-def extended(model: Model, count: int, columns: Callable[[States], Array]) -> Model:
+def extend_model(model: Model, count: int, columns: Callable[[States], Array]) -> Model:
     """Return a model with `count` further columns; `columns` makes all (R, n, p + count)."""
     about = model.base, model.terms, model.joins, model.speeds
-    return ExtendedModel(*about, count=count, whole=columns)
+    return ExtendedModel(*about, count=count, columns=columns)

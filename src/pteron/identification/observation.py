@@ -169,7 +169,7 @@ def observations_of(
     margin = preprocessing.decimation.margin + preprocessing.settling
     observations, source = [], "the log"
     for sample_block in samples(model.robot, log, preprocessing, margin=margin, block=block):
-        observations.append(_filtered(model, sample_block, preprocessing))
+        observations.append(_filter_block(model, sample_block, preprocessing))
         source = sample_block.source
     return replace(stacked(observations), source=source)
 
@@ -195,7 +195,9 @@ def in_motion(rates: Array, slow: Array, rows: int, *, wraps: bool = False) -> A
     return np.asarray(scipy.ndimage.minimum_filter1d(moves, size, axis=0, mode=mode))
 
 
-def _filtered(model: LinearModel, block: SampleBlock, preprocessing: Preprocessing) -> Observations:
+def _filter_block(
+    model: LinearModel, block: SampleBlock, preprocessing: Preprocessing
+) -> Observations:
     decimation = preprocessing.decimation
     settling = preprocessing.settling
     inner = slice(settling, len(block.states) - settling)

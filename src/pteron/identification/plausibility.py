@@ -126,7 +126,7 @@ def plausibility_warnings(
 def friction_below_zero(model: Model, observations: Observations, fit: Estimate) -> tuple[str, ...]:
     """Return a sentence on friction that is below zero by more than its interval; none else."""
     high = fit.intervals()[1]
-    felt = (high < 0.0) & _felt(observations, fit, _FELT)
+    felt = (high < 0.0) & _values_that_contribute(observations, fit, _FELT)
     chosen = np.flatnonzero(np.isin(model.kinds, _FRICTION) & felt)
     if not len(chosen):
         return ()
@@ -176,7 +176,7 @@ class Factor(NamedTuple):
     deviation: float
 
     @property
-    def told(self) -> bool:
+    def is_detectable(self) -> bool:
         """Whether a factor that matters would be seen."""
         return CLEAR * self.deviation < WANTED
 
@@ -228,7 +228,7 @@ def factor_of_forces(model: Model, fit: Estimate, known: Mapping[str, float]) ->
     return Factor(float(weights @ fit.values[places]) / power, power**-0.5)
 
 
-def left_over(estimate: Estimate, preprocessing: Sequence[Preprocessing]) -> str:
+def excess_residual_cause(estimate: Estimate, preprocessing: Sequence[Preprocessing]) -> str:
     """Return a cause for residuals far larger than the forces' noise; empty if they are not."""
     noise = np.max([how.force_noise for how in preprocessing], axis=0)
     ratio = float((estimate.noise / np.maximum(noise, np.finfo(float).tiny)).max())
@@ -252,11 +252,13 @@ def unphysical(model: Model, observations: Observations, fit: Estimate) -> int:
     more than 5 % of the forces.
     """
     pushed = np.isin(model.kinds, _POSITIVE) & (fit.values < -_CERTAIN * fit.deviations)
-    pushed &= _felt(observations, fit, _PUSHED)
+    pushed &= _values_that_contribute(observations, fit, _PUSHED)
     return _negative_directions(model, fit.values, fit.covariance) + int(pushed.sum())
 
 
-def _felt(observations: Observations, fit: Estimate, share: float) -> NDArray[np.bool_]:
+def _values_that_contribute(
+    observations: Observations, fit: Estimate, share: float
+) -> NDArray[np.bool_]:
     """Return which values (p,) make more than a share of the forces at an actuator."""
     effect = np.abs(fit.values) * np.sqrt((observations.matrix**2).mean(axis=0))
     size = np.sqrt((observations.forces**2).mean(axis=0))
@@ -285,7 +287,7 @@ def _negative_directions(model: Model, values: Array, covariance: Array) -> int:
     return count
 
 
-def unseen(model: Model, deviations: Array) -> tuple[str, ...]:
+def unseen_names(model: Model, deviations: Array) -> tuple[str, ...]:
     """Return the base parameters whose deviations (p,) exceed their usual size."""
     return unseen_shares(model, deviations)[0]
 

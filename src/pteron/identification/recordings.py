@@ -1,7 +1,7 @@
 """Recordings: logs in memory, or files read in pieces, divided into rows to fit and to hold out.
 
-Held-out rows judge the fit. `recording` mends time stamps first, and leaves lead-in and lead-out
-aside.
+Held-out rows judge the fit. `read_recording` mends time stamps first, and leaves lead-in and
+lead-out aside.
 """
 
 from __future__ import annotations
@@ -82,7 +82,7 @@ class Recording:
             if first < last:
                 yield piece.part(first, last)
 
-    def beginning(self) -> Recording:
+    def first_rows(self) -> Recording:
         """Return the first rows of a large file, enough to look at; else the whole log."""
         if isinstance(self.log, Log):
             return self
@@ -93,7 +93,7 @@ class Recording:
         return self.head() if isinstance(self.log, Log) else self.pieces()
 
 
-def recording(
+def read_recording(
     log: Log | LogFile,
     progress: Callable[[int], None] | None = None,
     period: float | None = None,
@@ -106,13 +106,13 @@ def recording(
     if isinstance(log, LogFile) and (log.rows_estimate or 0) <= log.rows_in_memory:
         log = log.read(progress)
     if isinstance(log, Log):
-        log = bridged(replace(log, time=_since(log.time), findings=_noticed(log)))
+        log = bridged(replace(log, time=_rebase_times(log.time), findings=_stamp_findings(log)))
         log = periodic_part(log, period)
         return Recording(log, 0, log.rows)
     return Recording(log, 0, _END)
 
 
-def _noticed(log: Log) -> tuple[Finding, ...]:
+def _stamp_findings(log: Log) -> tuple[Finding, ...]:
     """Return a log's findings; of one that comes from no file, those of its time stamps."""
     if log.findings or log.rows < 2:
         return log.findings
@@ -156,13 +156,13 @@ def periodic_part(log: Log, period: float | None = None) -> Log:
     )
 
 
-def same(first: Recording, other: Recording) -> bool:
+def hold_same_samples(first: Recording, other: Recording) -> bool:
     """Say whether two recordings hold the same samples."""
     a, b = first.head(), other.head()
     return np.array_equal(a.forces, b.forces) and np.array_equal(a.joints, b.joints)
 
 
-def _since(time: Array) -> Array:
+def _rebase_times(time: Array) -> Array:
     """Return times from the first on: far from zero, stamps are rounded.
 
     Those of a steady clock are put on its ticks again, with the roundest step that fits them.
@@ -183,7 +183,7 @@ def _since(time: Array) -> Array:
     return steady if np.abs(since - steady).max() <= _ROUNDINGS * rounding else since
 
 
-def divided(recording: Recording, period: float | None) -> tuple[Recording, Recording]:
+def split_held_out(recording: Recording, period: float | None) -> tuple[Recording, Recording]:
     """Return the part of a recording to fit, and the part to hold out: its end.
 
     At a whole number of periods, where the motion is periodic: with `period`, or as it is declared.
@@ -194,11 +194,13 @@ def divided(recording: Recording, period: float | None) -> tuple[Recording, Reco
     if isinstance(log, Log) and log.payload is not None and np.ptp(log.payload):
         out = np.zeros(log.rows, dtype=bool)
         for start, stop in log.phases:
-            out[start + _cut(log.part(start, stop), stop - start, period) : stop] = True
+            out[start + _count_fitted_rows(log.part(start, stop), stop - start, period) : stop] = (
+                True
+            )
         parts = log.without(out), log.without(~out)
         first, second = (Recording(part, 0, part.rows) for part in parts)
         return first, second
-    cut = recording.start + _cut(log, recording.rows, period)
+    cut = recording.start + _count_fitted_rows(log, recording.rows, period)
     if cut - recording.start < 2 or recording.start + recording.rows - cut < 2:
         raise DataError(
             f"{recording.source}: {recording.rows} rows are too few to hold some out; record longer"
@@ -206,7 +208,7 @@ def divided(recording: Recording, period: float | None) -> tuple[Recording, Reco
     return replace(recording, stop=cut), replace(recording, start=cut)
 
 
-def _cut(log: Log | LogFile, rows: int, period: float | None) -> int:
+def _count_fitted_rows(log: Log | LogFile, rows: int, period: float | None) -> int:
     """Return how many of a log's rows are fitted."""
     if period is not None and isinstance(log, Log):
         whole_periods = int((log.duration + 1.0 / log.rate) / period + 1e-3)

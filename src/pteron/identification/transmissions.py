@@ -135,24 +135,24 @@ def identify_transmissions(
     )
     bent = smoothed(motors - log.joints, log.rate, how.cutoff)
     rate = np.gradient(bent, log.time, axis=0)
-    side = smoothed(np.sign(_at(time, load, log.time)), log.rate, how.cutoff)
-    bent, rate, side = (_at(log.time, signal, time) for signal in (bent, rate, side))
+    side = smoothed(np.sign(_interpolate(time, load, log.time)), log.rate, how.cutoff)
+    bent, rate, side = (_interpolate(log.time, signal, time) for signal in (bent, rate, side))
     edge = SETTLING / (how.cutoff or log.rate)
     inner = (time > time[0] + edge) & (time < time[-1] - edge)
     fits = [
-        _fitted(robot, j, *(signal[clear_rows, j] for signal in (bent, load, side, rate)))
+        _fit_transmission(robot, j, *(signal[clear_rows, j] for signal in (bent, load, side, rate)))
         for j in range(robot.joint_count)
         for clear_rows in [inner & (np.abs(np.abs(side[:, j]) - 1.0) < _ACROSS)]
     ]
     return Transmissions(*np.array(fits).T)
 
 
-def _at(known: Array, values: Array, time: Array) -> Array:
+def _interpolate(known: Array, values: Array, time: Array) -> Array:
     """Return signals (T, n), known at some times, at other times between these."""
     return np.column_stack([np.interp(time, known, column) for column in values.T])
 
 
-def _fitted(
+def _fit_transmission(
     robot: Manipulator, j: int, bent: Array, load: Array, side: Array, rate: Array
 ) -> tuple[float, ...]:
     """Return stiffness, damping and backlash of a joint's transmission, and their deviations.

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from pteron.identification.estimators import weighted
 from pteron.identification.estimators.least_squares import actuator_noise
-from pteron.identification.model import Model, diagonal, extended
+from pteron.identification.model import Model, diagonal, extend_model
 from pteron.identification.observation import LinearModel, Observations, scaled
 from pteron.identification.signals import States
 from pteron.identification.signals.preprocessing import LATEST
@@ -97,7 +97,7 @@ class Unknowns:
         return record
 
 
-def settled(
+def fit_nonlinear_terms(
     model: Model,
     observe: Callable[[LinearModel, float], Observations],
     begin: Unknowns,
@@ -132,9 +132,9 @@ def settled(
     seen = np.flatnonzero(np.isfinite(speeds)) if speeds is not None else np.zeros(0, dtype=int)
     for _ in range(_ROUNDS):
         if speeds is not None:
-            model = model.falling(speeds)
+            model = model.with_speeds(speeds)
         columns = partial(_slopes, model, seen, values, late)
-        rows = observe(extended(model, len(seen) + late, columns), unknowns.delay)
+        rows = observe(extend_model(model, len(seen) + late, columns), unknowns.delay)
         plain = rows.columns(range(p))
         extended_fit, part = weighted(rows), weighted(plain)
         values, covariance = part.values, extended_fit.covariance[:p, :p] - part.covariance
@@ -159,7 +159,7 @@ def settled(
     return model, plain, unknowns, covariance
 
 
-def searched_speeds(model: Model, observe: Observe, usual: Array) -> Array:
+def search_speeds(model: Model, observe: Observe, usual: Array) -> Array:
     """Return the speeds (n,) of least squares, about; infinite where friction is not seen to fall.
 
     `model` has none of that friction yet, and `usual` (n,) are the root mean squares of the joints'
@@ -173,7 +173,7 @@ def searched_speeds(model: Model, observe: Observe, usual: Array) -> Array:
         falls = np.exp(-((rates / (usual[:, None] * shares)) ** 2))
         return np.concatenate([model.matrix(states), np.sign(rates) * falls], axis=-1)
 
-    rows = observe(extended(model, _COLUMNS, columns))
+    rows = observe(extend_model(model, _COLUMNS, columns))
     plain = rows.columns(range(p))
     noise = weighted(plain).noise
     tried = np.geomspace(_SLOWEST, _FASTEST, _FINE)

@@ -157,9 +157,9 @@ def verdict_of(
         opinion.lower("usable with care")
     if factor != 1.0:
         opinion.lower("usable with care")
-    opinions = [_of_prediction(prediction) for prediction in held_out]
+    opinions = [_judge_prediction(prediction) for prediction in held_out]
     if faults is not None:
-        opinions.append(_of_faults(faults))
+        opinions.append(_judge_faults(faults))
     for part in opinions:
         opinion.lower(part.grade)
         opinion.reasons += part.reasons
@@ -206,7 +206,7 @@ def with_bodies(verdict: Verdict, consistency: Consistency | None, off: float) -
     return replace(verdict, grade="not trustworthy", reasons=(reason, *verdict.reasons))
 
 
-def judged(
+def predict_held_out(
     model: Model, values: Array, recording: Recording, preprocessing: Preprocessing
 ) -> Prediction:
     """Return the prediction by a model with values (p,) of a recording that was not fitted.
@@ -219,7 +219,7 @@ def judged(
     if preprocessing.cutoff is None or preprocessing.derivatives == "periodic":
         return prediction
     for share in _LOWER:
-        if _of_prediction(prediction).grade == "trustworthy":
+        if _judge_prediction(prediction).grade == "trustworthy":
             break
         lower = replace(preprocessing, cutoff=share * preprocessing.cutoff)
         other = predict(model, values, recording, lower)
@@ -229,13 +229,13 @@ def judged(
     return prediction
 
 
-def _graded(percent: float, small: float) -> Grade:
+def _grade_error(percent: float, small: float) -> Grade:
     if percent <= small:
         return "trustworthy"
     return "usable with care" if percent <= LARGE else "not trustworthy"
 
 
-def _of_prediction(prediction: Prediction) -> Opinion:
+def _judge_prediction(prediction: Prediction) -> Opinion:
     ratio = prediction.robust_nrms / np.maximum(prediction.floor, 1e-12)
     missed = prediction.unexplained
     # The worst actuator is the one farthest beyond both limits.
@@ -250,7 +250,7 @@ def _of_prediction(prediction: Prediction) -> Opinion:
             grade="not trustworthy",
         )
     elif ratio[worst] > AT_THE_FLOOR:
-        opinion.grade = _graded(float(missed[worst]), SMALL)
+        opinion.grade = _grade_error(float(missed[worst]), SMALL)
     opinion.add(
         f"{prediction.source}: held-out NRMS of {percentages(prediction.nrms)} where noise alone "
         f"makes {percentages(prediction.floor)}."
@@ -278,7 +278,7 @@ def _of_prediction(prediction: Prediction) -> Opinion:
     return opinion
 
 
-def _of_faults(shown: FaultIsolation) -> Opinion:
+def _judge_faults(shown: FaultIsolation) -> Opinion:
     opinion = Opinion(reasons=list(shown.causes))
     if shown.matters:
         opinion.grade = "usable with care"
@@ -299,7 +299,7 @@ def _of_faults(shown: FaultIsolation) -> Opinion:
         f"{percentages([off]) if off < 0.01 else f'{off:.2g} %'} off "
         f"in its forces (actuator {worst + 1}); up to {CYCLE:g} % is trusted, above {LARGE:g} % "
         "not.",
-        grade=_graded(off, CYCLE),
+        grade=_grade_error(off, CYCLE),
     )
     if opinion.grade != "trustworthy" and shown.uncertain[worst] > shown.spoiled[worst]:
         opinion.steps.append(

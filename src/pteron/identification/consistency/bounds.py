@@ -112,12 +112,12 @@ class Bounds:
                 if not np.isfinite(limit):
                     raise ModelError(f"bounds: {key}: {limit} is not a number")
                 known = {p.name: f"{p.kind}_{p.body}" for p in columns}
-                for name in _matching(key, known, "parameter"):
+                for name in _names_of_key(key, known, "parameter"):
                     row = sign * unit[list(known).index(name)]
                     rows.append((row, sign * limit, f"{name} {sense} {limit:g}"))
         for key, box in self.boxes.items():
             turning = {p.owner: p.body for p in columns if p.kind in ("I", "Izz")}
-            for body in _matching(key, turning, "body"):
+            for body in _names_of_key(key, turning, "body"):
                 place = {kind: unit[column] for kind, column in places[body].items()}
                 rows += [(row, 0.0, f"box of {body}: {what}") for row, what in _box(place, box)]
         for body, (low, high) in _rods(robot).items():
@@ -146,7 +146,7 @@ def _rods(robot: Manipulator) -> dict[str, tuple[float, float]]:
     return ends
 
 
-def _matching(key: str, known: Mapping[str, str], what: str) -> list[str]:
+def _names_of_key(key: str, known: Mapping[str, str], what: str) -> list[str]:
     """Return the name itself, or those of all legs that go by the same name without a number."""
     names = [name for name, stem in known.items() if key in (name, stem)]
     if not names:

@@ -71,7 +71,9 @@ def widest(real: RealBodies, start: Array, free: Array, most: float) -> tuple[fl
     rows = np.column_stack([of_z @ free, of_depth])
     last = np.eye(rows.shape[1])[-1]
     right = np.concatenate([[most], constant + of_z @ start])
-    solution = _solved(real, np.zeros(len(last)), -last, np.vstack([-last, rows]), right)
+    solution = _solve_cone_program(
+        real, np.zeros(len(last)), -last, np.vstack([-last, rows]), right
+    )
     if solution is None:
         return -np.inf, start
     return float(solution[0][-1]), start + free @ solution[0][:-1]
@@ -131,12 +133,12 @@ def _least_squares(
     squares = np.repeat([0.0, 1.0], [count, residual_count])
     constraints = np.block([[matrix, -spread], [rows, np.zeros((len(rows), residual_count))]])
     right = np.concatenate([shift, right])
-    return _solved(
+    return _solve_cone_program(
         real, squares, np.zeros(count + residual_count), constraints, right, equal=len(shift)
     )
 
 
-def _solved(
+def _solve_cone_program(
     real: RealBodies, squares: Array, linear: Array, rows: Array, right: Array, *, equal: int = 0
 ) -> tuple[Array, Array] | None:
     """Return v with the least squares @ v^2 + linear @ v, and multipliers of the rows, or None.

@@ -110,7 +110,7 @@ class _Samples:
     start: tuple[float, ...]
 
 
-def contradicted(
+def find_contradiction(
     robot: Manipulator, log: Log, how: Preprocessing, rotors: Array
 ) -> Assumption | None:
     """Return the assumption that explains a log's forces far better than the file does.
@@ -121,15 +121,15 @@ def contradicted(
     samples = _samples(log, how, rotors)
     if samples is None:
         return None
-    error_before = _left(robot, samples)
+    error_before = _unexplained_share(robot, samples)
     noise = how.force_noise / np.maximum(samples.forces.std(axis=0), 1e-300)
     least = _EXPLAINED if np.isfinite(error_before) else _EXPLAINED_ALONE
     explained = max(least, 3.0 * float(noise.max()))
     if error_before < explained:
         return None
     tried: list[Assumption] = []
-    for fault, message, other, changed in _tried(robot, samples):
-        error_after = _left(other, changed)
+    for fault, message, other, changed in _alternatives(robot, samples):
+        error_after = _unexplained_share(other, changed)
         if error_after < explained and error_after * _DECISIVE < error_before:
             tried.append(
                 Assumption(
@@ -164,11 +164,11 @@ def hidden_orders(robot: Manipulator, log: Log, how: Preprocessing) -> str:
         orders = [tuple({i: j, j: i}.get(k, k) for k in usual) for i, j in pairs]
     else:
         orders = _symmetries(robot)
-    error_before = _left(robot, samples) if orders else np.inf
+    error_before = _unexplained_share(robot, samples) if orders else np.inf
     hidden = []
     for order in orders:
         parts = {k: v[:, list(order)] for k, v in vars(samples).items() if k != "start"}
-        if _left(robot, replace(samples, **parts)) <= _AS_GOOD * error_before:
+        if _unexplained_share(robot, replace(samples, **parts)) <= _AS_GOOD * error_before:
             hidden.append(order)
     if not hidden:
         return ""
@@ -223,7 +223,7 @@ def _samples(log: Log, how: Preprocessing, rotors: Array) -> _Samples | None:
     return _Samples(q[rows], rates[rows], accelerations[rows], forces[rows], how.start)
 
 
-def _tried(
+def _alternatives(
     robot: Manipulator, s: _Samples
 ) -> Iterator[tuple[Literal["ratio", "gravity", "mode"], tuple[str, str], Manipulator, _Samples]]:
     """Yield assumptions: gear ratios, gravity along other axes, working modes."""
@@ -290,7 +290,7 @@ def _other_modes(
         yield "mode", message, other, s
 
 
-def _left(robot: Manipulator, s: _Samples) -> float:
+def _unexplained_share(robot: Manipulator, s: _Samples) -> float:
     """Return what is left of the forces, over their deviation, with all parameters free.
 
     Infinite where the joints have no poses.

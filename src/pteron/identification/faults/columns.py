@@ -17,7 +17,7 @@ import numpy as np
 from pteron.equations.friction import passive_joints
 from pteron.identification.faults.fault import FaultName
 from pteron.identification.faults.fitted_motion import FittedMotion, lengths_of
-from pteron.identification.model import Model, diagonal, extended, identification_model
+from pteron.identification.model import Model, diagonal, extend_model, identification_model
 from pteron.identification.signals import States
 from pteron.identification.signals.filters import smoothed
 from pteron.kernels import Array
@@ -113,7 +113,7 @@ class Family:
     of_path: bool = False
     effect: Callable[[FittedMotion], Array] | None = None
 
-    def of_cycle(self, motion: FittedMotion) -> Array:
+    def deviation_columns(self, motion: FittedMotion) -> Array:
         """Return the columns (R, n, k) by which the machine differs from the model without it."""
         return (self.effect or self.columns)(motion)
 
@@ -139,7 +139,7 @@ def _elasticity(m: FittedMotion) -> Array:
         # Noise of the accelerations would be in both, the residuals and the column.
         load = smoothed(load, pace, m.cutoff)
     rate = m.rate(load)
-    return m.by_give([load, rate, m.rate(rate)])
+    return m.give_slopes([load, rate, m.rate(rate)])
 
 
 def _drift(m: FittedMotion) -> Array:
@@ -186,7 +186,7 @@ DELAY = Family(
 )
 
 _OTHERS = (
-    Family("gravity", "rad", lambda m: ["tilt", "tilt"], FittedMotion.by_tilt, largest=0.2),
+    Family("gravity", "rad", lambda m: ["tilt", "tilt"], FittedMotion.tilt_slopes, largest=0.2),
     Family(
         "clock",
         "",
@@ -242,7 +242,7 @@ def _ratio(joints: Sequence[int]) -> Family:
 
     def columns(m: FittedMotion) -> Array:
         force = diagonal(m.forces())[..., some].sum(axis=-1, keepdims=True)
-        return np.asarray(m.by_ratio[..., some].sum(axis=-1, keepdims=True) - force)
+        return np.asarray(m.ratio_slopes[..., some].sum(axis=-1, keepdims=True) - force)
 
     def sizes(model: Model) -> Sequence[str]:
         names = [model.robot.joint_names[i] for i in some]
@@ -267,7 +267,7 @@ def _zero(robot: Manipulator, i: int) -> Family:
         "zero",
         "",
         lambda model: model.robot.joint_names[joint],
-        lambda m: m.by_zeros[..., joint],
+        lambda m: m.zero_slopes[..., joint],
         of_machine=False,
         tolerance=tolerance,
     )
@@ -281,7 +281,7 @@ def _geometry(robot: Manipulator, legs: Sequence[int]) -> Family:
         "geometry",
         "m",
         lambda m: labels,
-        lambda m: m.by_lengths[..., places],
+        lambda m: m.length_slopes[..., places],
         tolerance=length_tolerance(robot),
     )
 
@@ -323,10 +323,10 @@ class FaultColumns:
         return tuple(slice(a, b) for a, b in pairwise(ends))
 
     @property
-    def whole(self) -> Model:
+    def extended_model(self) -> Model:
         """The model with all columns behind its own."""
         count = self.places[-1].stop - len(self.model.names)
-        return extended(self.model, count, self.matrix)
+        return extend_model(self.model, count, self.matrix)
 
     def motion(self, states: States, share: Array, stride: int = 1) -> FittedMotion:
         """Return the motion that columns are made of, at shares (R,) of the log's time."""

@@ -70,12 +70,12 @@ class ReferenceCycle:
                 slow = within(duration=1.0)
             except PteronError:
                 continue
-            gone = _whole(robot, slow)
+            gone = _complete_motion(robot, slow)
             rate = np.abs(gone.rates).max(axis=0) / extent.rates
             acceleration = np.abs(gone.accelerations).max(axis=0) / extent.accelerations
             duration = float(np.maximum(rate, np.sqrt(acceleration)).max())
             motion = within(scale=size * slow.scale, direction=slow.across, duration=duration)
-            gone = _whole(robot, motion)
+            gone = _complete_motion(robot, motion)
             rates = np.abs(gone.rates)
             return cls(States.of(motion.time, gone), rates > _MOVES * rates.max(axis=0))
         return None
@@ -111,5 +111,5 @@ class ReferenceCycle:
         return np.asarray(100.0 * size / np.maximum(spread, max(_LEAST * spread.max(), 1e-300)))
 
 
-def _whole(robot: Manipulator, motion: Motion) -> FullMotion:
+def _complete_motion(robot: Manipulator, motion: Motion) -> FullMotion:
     return FullMotion.of_platform(robot, motion.pose, motion.velocity, motion.acceleration)

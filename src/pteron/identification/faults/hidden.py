@@ -62,7 +62,7 @@ def hidden_faults(
         elif len(other.states) > 0 and (usual := _usual_sizes(family, motion)) is not None:
             error = motion.matrix @ (back @ taken_in)
             if family.of_machine and not family.of_path:
-                error = error - family.of_cycle(motion)
+                error = error - family.deviation_columns(motion)
             if _largest_error(unexplained, error, usual, other, motion) > _HARMFUL:
                 hidden[family.name] = None
     return list(hidden)

@@ -17,8 +17,8 @@ from pteron.identification.faults.cycle import Extent, ReferenceCycle
 from pteron.identification.faults.fault import ORDER, FaultName, IsolatedFault
 from pteron.identification.faults.hidden import hidden_faults
 from pteron.identification.faults.log_faults import LogFault
-from pteron.identification.faults.play import Record, knocks
-from pteron.identification.faults.search import FoundFault, searched
+from pteron.identification.faults.play import Record, backlash_signature
+from pteron.identification.faults.search import FoundFault, search_faults
 from pteron.identification.logs import Log
 from pteron.identification.model import Model
 from pteron.identification.observation import Observations, in_motion, observations_of, stacked
@@ -193,7 +193,7 @@ def isolate_faults(
     for rows in (_ROWS, _MORE):
         try:
             parts = _parts(model, estimate, recordings, preprocessing, rows)
-            return _isolated(parts, model, estimate, known, drawn)
+            return _isolate_in_parts(parts, model, estimate, known, drawn)
         except LogError as error:
             why_not = str(error)
         if sum(recording.rows for recording in recordings) <= rows:
@@ -202,7 +202,7 @@ def isolate_faults(
     return FaultIsolation((), (), nothing, nothing, why_not)
 
 
-def _isolated(
+def _isolate_in_parts(
     parts: list[_Part],
     model: Model,
     estimate: Estimate,
@@ -212,12 +212,12 @@ def _isolated(
     columns = parts[0].model
     noise = np.mean([part.how.force_noise for part in parts], axis=0)
 
-    def observed(some: Sequence[_Part]) -> Observations:
-        rows = _observed(some)
+    def observe(some: Sequence[_Part]) -> Observations:
+        rows = _observe_parts(some)
         return rows if drawn is None else drawn.rows_beside(rows, estimate.noise)
 
-    observations = observed(parts)
-    plain, found_faults = _found_faults(parts, observations, observed, estimate, noise)
+    observations = observe(parts)
+    plain, found_faults = _found_faults(parts, observations, observe, estimate, noise)
     states = [s for part in parts for s in part.states]
     other = ReferenceCycle.shuffled(model.robot, states)
     uncertain, spoiled, each = _expected_errors(
@@ -244,7 +244,7 @@ def _isolated(
         spoiled = np.hypot(spoiled, gain.cycle)
     names = dict.fromkeys(family.name for family in columns.families)
     tried = (*names, *["play"] * looked, *["gain"] * (factor is not None))
-    if factor is None or not factor.told:
+    if factor is None or not factor.is_detectable:
         left_open.insert(0, "gain")
     if not looked:
         left_open.append("play")
@@ -261,7 +261,7 @@ def _isolated(
 def _found_faults(
     parts: list[_Part],
     observations: Observations,
-    observed: Callable[[Sequence[_Part]], Observations],
+    observe: Callable[[Sequence[_Part]], Observations],
     estimate: Estimate,
     noise: Array,
 ) -> tuple[Estimate, list[FoundFault]]:
@@ -269,12 +269,12 @@ def _found_faults(
     columns = parts[0].model
     largest = max(float(np.abs(part.log.forces).max()) for part in parts)
     exact = np.abs(estimate.residuals).max() < _EXACT * largest
-    plain, found_faults = searched(columns, observations, () if exact else None, noise)
+    plain, found_faults = search_faults(columns, observations, () if exact else None, noise)
     if any(fault.family is DELAY for fault in found_faults):
         # Columns hold for small delays: other faults are sought after a long one is corrected.
-        late, shifted = _delay(parts, observed)
+        late, shifted = _delay(parts, observe)
         others = tuple(family for family in columns.families if family is not DELAY)
-        fit, found_faults = _searched_for(others, shifted, observed)
+        fit, found_faults = _search_families(others, shifted, observe)
         if late is not None:
             found_faults.insert(0, replace(late, fit=fit))
     return plain, found_faults
@@ -320,7 +320,7 @@ def _cycle_errors(
         with_fault = matrix @ fault.fit.values[:p]
         for family, sizes in (*fault.others, (fault.family, fault.sizes)):
             if family.of_machine and (cycle.in_order or not family.of_path):
-                with_fault = with_fault + family.of_cycle(motion) @ sizes
+                with_fault = with_fault + family.deviation_columns(motion) @ sizes
         forces.append(with_fault)
     each = [cycle.share(b - a, forces[0]) for a, b in pairwise(forces)]
     spoiled = cycle.share(forces[-1] - forces[0], forces[0])
@@ -388,7 +388,7 @@ def _play(parts: Sequence[_Part], values: Array, step: float) -> tuple[IsolatedF
             residual = block.forces - matrix @ values
             load = matrix @ np.where(carried, values, 0.0)
             records.append(Record(block.states.time, load, residual, moving))
-    signature = knocks(records, band)
+    signature = backlash_signature(records, band)
     looked = bool(signature.looked.any())
     if np.isnan(signature.times).all():
         return None, looked
@@ -412,7 +412,7 @@ def delay_of(
 ) -> float:
     """Return the delay, s, of recordings' forces that fits best, less the assumed delay."""
     parts = _parts(model, estimate, recordings, preprocessing)
-    _, shifted = _delay(parts, _observed)
+    _, shifted = _delay(parts, _observe_parts)
     return shifted[0].how.delay - parts[0].how.delay
 
 
@@ -426,10 +426,10 @@ def _parts(
     """Return the parts of recordings that are searched, `most` rows in all."""
     rows = most // len(recordings)
     chosen = [
-        (log, _unaveraged(model, log, how), part)
+        (log, _plan_single_periods(model, log, how), part)
         for recording, how in zip(recordings, preprocessing, strict=True)
         for log in [recording.head()]
-        for part in _moving_most(log, rows)
+        for part in _select_moving_parts(log, rows)
     ]
     states = [[b.states for b in samples(model.robot, part, how)] for _, how, part in chosen]
     rates = np.concatenate([s.joint_rates for blocks in states for s in blocks])
@@ -447,7 +447,7 @@ def _parts(
     return parts
 
 
-def _moving_most(log: Log, rows: int) -> list[Log]:
+def _select_moving_parts(log: Log, rows: int) -> list[Log]:
     """Return the parts of a log, `rows` in all, in which the joints move most.
 
     There is one part of each payload phase.
@@ -469,7 +469,7 @@ def _moving_most(log: Log, rows: int) -> list[Log]:
     return parts
 
 
-def _unaveraged(model: Model, log: Log, how: Preprocessing) -> Preprocessing:
+def _plan_single_periods(model: Model, log: Log, how: Preprocessing) -> Preprocessing:
     """Return the preprocessing without averaging of periods, which would hide passing faults."""
     if how.derivatives != "periodic":
         return how
@@ -478,28 +478,30 @@ def _unaveraged(model: Model, log: Log, how: Preprocessing) -> Preprocessing:
     return replace(again, slow=how.slow, delay=how.delay)
 
 
-def _observed(parts: Sequence[_Part]) -> Observations:
-    return stacked([observations_of(part.model.whole, part.log, part.how) for part in parts])
+def _observe_parts(parts: Sequence[_Part]) -> Observations:
+    return stacked(
+        [observations_of(part.model.extended_model, part.log, part.how) for part in parts]
+    )
 
 
-def _searched_for(
+def _search_families(
     families: tuple[Family, ...],
     parts: Sequence[_Part],
-    observed: Callable[[Sequence[_Part]], Observations],
+    observe: Callable[[Sequence[_Part]], Observations],
 ) -> tuple[Estimate, list[FoundFault]]:
     """Return the fit of parts without faults, and the faults of some families that they show."""
     some = [replace(part, model=replace(part.model, families=families)) for part in parts]
     noise = np.mean([part.how.force_noise for part in parts], axis=0)
-    return searched(some[0].model, observed(some), noise=noise)
+    return search_faults(some[0].model, observe(some), noise=noise)
 
 
 def _delay(
-    parts: Sequence[_Part], observed: Callable[[Sequence[_Part]], Observations]
+    parts: Sequence[_Part], observe: Callable[[Sequence[_Part]], Observations]
 ) -> tuple[FoundFault | None, list[_Part]]:
     """Return the whole delay of the logs' forces, None if none shows, and the parts without it."""
     late, shifted = None, list(parts)
     for _ in range(_ROUNDS):
-        _, found_faults = _searched_for((DELAY,), shifted, observed)
+        _, found_faults = _search_families((DELAY,), shifted, observe)
         if not found_faults:
             break
         first, late = late or found_faults[0], found_faults[0]

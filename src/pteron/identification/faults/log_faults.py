@@ -123,7 +123,7 @@ def log_faults(
     for log, how in zip(logs, preprocessing, strict=True):
         said = at_limits(log) or (() if fits else _plateaus(log, how.force_noise))
         if said:
-            message = _of_all(said)
+            message = _merge_limit_sentences(said)
             faults.append(LogFault("saturation", message, float("nan"), True))
     for log in logs:
         steps = force_steps(log.forces) / np.maximum(log.forces.std(axis=0), 1e-300)
@@ -138,7 +138,7 @@ def log_faults(
     return tuple(faults)
 
 
-def _of_all(sentences: Sequence[str]) -> str:
+def _merge_limit_sentences(sentences: Sequence[str]) -> str:
     """Return the first of sentences on forces at a limit, with the names of the other forces."""
     first = sentences[0].rstrip(".")
     names = dict.fromkeys(sentence.partition(" ")[0] for sentence in sentences[1:])
@@ -171,7 +171,7 @@ def _plateaus(log: Log, noise: Array) -> tuple[str, ...]:
     )
 
 
-def of_delay(delay: float, deviation: float) -> LogFault:
+def delay_fault(delay: float, deviation: float) -> LogFault:
     """Return the fault of forces that are so late, s; it is taken out."""
     late, early = ("forces", "positions")[:: 1 if delay > 0.0 else -1]
     said = (

@@ -95,7 +95,7 @@ class FoundFault:
     as_well: tuple[FaultName, ...] = ()
 
 
-def searched(
+def search_faults(
     model: FaultColumns,
     observations: Observations,
     families: Sequence[Family] | None = None,
@@ -120,7 +120,7 @@ def searched(
         for k, family in enumerate(model.families):
             if family not in sought or family.name in (fault.family.name for fault in found_faults):
                 continue
-            fault = _taken_in(model, observations, triangles, found_faults, k)
+            fault = _fit_fault(model, observations, triangles, found_faults, k)
             if fault is None or not fault.chance < _CHANCE:
                 continue
             if _is_possible(fault, model, fit_noise, floor):
@@ -167,7 +167,7 @@ def _likeliest(
     return replace(first, as_well=tuple(n for n in names if n != first.family.name)[:_TOLD])
 
 
-def _taken_in(
+def _fit_fault(
     model: FaultColumns,
     observations: Observations,
     triangles: Observations,
@@ -193,25 +193,25 @@ def _taken_in(
     if q == 0 or observations.rows < _ENOUGH * (p + q):
         return None
 
-    def fitted(mix: Array) -> tuple[Estimate, Array, Array]:
+    def fit_combinations(mix: Array) -> tuple[Estimate, Array, Array]:
         """Return the fit with these combinations, their sizes, and the sizes' covariance."""
         chosen = [*zip(places, mixes, strict=True), (model.places[k], mix)]
 
-        def mixed(rows: Observations) -> Observations:
+        def append_combinations(rows: Observations) -> Observations:
             parts = [rows.matrix[..., place] @ combination for place, combination in chosen]
             return rows.with_matrix(np.concatenate([rows.matrix[..., :p], *parts], axis=-1))
 
-        fit = weighted(mixed(observations), triangles=mixed(triangles))
+        fit = weighted(append_combinations(observations), triangles=append_combinations(triangles))
         last = slice(len(fit.values) - mix.shape[1], None)
         return fit, fit.values[last], fit.covariance[last, last]
 
-    fit, size, covariance = fitted(mix)
+    fit, size, covariance = fit_combinations(mix)
     statistic = wald(size, covariance)
     chance = float(scipy.stats.chi2.sf(statistic, q))
     clear = np.abs(size) > _CLEAR * np.sqrt(np.maximum(np.diag(covariance), 0.0))
     if chance < _CHANCE and clear.any() and not clear.all():
         mix = mix[:, clear]
-        fit, size, covariance = fitted(mix)
+        fit, size, covariance = fit_combinations(mix)
     ends = np.cumsum([p, *(mix.shape[1] for mix in mixes)])
     others = [
         (fault.family, fault.mix @ fit.values[start:stop])
@@ -220,12 +220,12 @@ def _taken_in(
     # Without noise a size may be known exactly: its variance is rounding, of either sign.
     variances = np.einsum("ij,jk,ik->i", mix, covariance, mix)
     deviations = np.sqrt(np.maximum(variances, 0.0))
-    usual = _likely(size, covariance, mix, model) if family.unit == "m" else 1.0
+    usual = _usual_error_share(size, covariance, mix, model) if family.unit == "m" else 1.0
     seen_as = mix, mix @ size, deviations, statistic, chance
     return FoundFault(family, *seen_as, fit, usual, tuple(others))
 
 
-def _likely(size: Array, covariance: Array, mix: Array, model: FaultColumns) -> float:
+def _usual_error_share(size: Array, covariance: Array, mix: Array, model: FaultColumns) -> float:
     """Return the share of Wald's statistic that errors of lengths of the usual size explain."""
     spread = length_tolerance(model.model.robot).usual
     back = spread * np.linalg.pinv(mix)
