@@ -223,7 +223,7 @@ def _scale_problem(
     real = RealBodies(bodies, target.margins, matrix / lengths[:, None], limits.right / lengths)
     grouping = base.grouping @ bodies.sharing * target.scale
     sizes = np.linalg.norm(grouping, axis=1)
-    left, singular, right = np.linalg.svd(grouping / sizes[:, None])
+    u, singular, vt = np.linalg.svd(grouping / sizes[:, None])
     return _Problem(
         robot=robot,
         values=values,
@@ -234,8 +234,8 @@ def _scale_problem(
         real=real,
         grouping=grouping,
         sizes=sizes,
-        inverse=right[: base.rank].T / singular @ left.T,
-        free=right[base.rank :].T,
+        inverse=vt[: base.rank].T / singular @ u.T,
+        free=vt[base.rank :].T,
     )
 
 

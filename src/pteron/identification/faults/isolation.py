@@ -12,25 +12,20 @@ import numpy as np
 from pteron.identification.drawn_values import DrawnValues
 from pteron.identification.errors import LogError
 from pteron.identification.estimators import Estimate
-from pteron.identification.faults.columns import DELAY, Family, FaultColumns, families_of
-from pteron.identification.faults.cycle import Extent, ReferenceCycle
+from pteron.identification.faults.columns import DELAY, Family, FaultColumns
+from pteron.identification.faults.cycle import ReferenceCycle
+from pteron.identification.faults.cycle_errors import expected_errors
 from pteron.identification.faults.fault import ORDER, FaultName, IsolatedFault
 from pteron.identification.faults.hidden import hidden_faults
 from pteron.identification.faults.log_faults import LogFault
 from pteron.identification.faults.play import Record, backlash_signature
 from pteron.identification.faults.search import FoundFault, search_faults
-from pteron.identification.logs import Log
+from pteron.identification.faults.searched_parts import SearchedPart, choose_parts, observe_parts
 from pteron.identification.model import Model
-from pteron.identification.observation import Observations, in_motion, observations_of, stacked
+from pteron.identification.observation import Observations, in_motion
 from pteron.identification.plausibility import Factor, factor_of_forces, known_values
 from pteron.identification.recordings import Recording
-from pteron.identification.signals import (
-    Preprocessing,
-    Processing,
-    States,
-    preprocessing_of,
-    samples,
-)
+from pteron.identification.signals import Preprocessing, samples
 from pteron.identification.signals.preprocessing import LATEST
 from pteron.json_values import picked
 from pteron.kernels import Array
@@ -42,13 +37,6 @@ where these have too little motion."""
 
 _EXACT = 1e-7
 """Residuals, over the forces, below which they are rounding and show no faults."""
-
-_POINTS = 5
-"""States in a period of the highest frequency at which slow columns are computed; between them they
-are interpolated."""
-
-_MOTION = 0.3
-"""Share of the band that the motion's own forces are in."""
 
 _ROUNDS = 6
 """Greatest number of times that a delay is corrected and sought again."""
@@ -150,16 +138,6 @@ class FaultIsolation:
         }
 
 
-@dataclass(frozen=True)
-class _Part:
-    """A part of a recording that is searched, with its states, model and preprocessing."""
-
-    model: FaultColumns
-    log: Log
-    how: Preprocessing
-    states: list[States]
-
-
 def isolate_faults(
     model: Model,
     estimate: Estimate,
@@ -192,7 +170,7 @@ def isolate_faults(
     known, why_not = known_values(model, recordings, rotors or {}), ""
     for rows in (_ROWS, _MORE):
         try:
-            parts = _parts(model, estimate, recordings, preprocessing, rows)
+            parts = choose_parts(model, estimate, recordings, preprocessing, rows)
             return _isolate_in_parts(parts, model, estimate, known, drawn)
         except LogError as error:
             why_not = str(error)
@@ -203,7 +181,7 @@ def isolate_faults(
 
 
 def _isolate_in_parts(
-    parts: list[_Part],
+    parts: list[SearchedPart],
     model: Model,
     estimate: Estimate,
     known: Mapping[str, float],
@@ -212,15 +190,15 @@ def _isolate_in_parts(
     columns = parts[0].model
     noise = np.mean([part.how.force_noise for part in parts], axis=0)
 
-    def observe(some: Sequence[_Part]) -> Observations:
-        rows = _observe_parts(some)
+    def observe(some: Sequence[SearchedPart]) -> Observations:
+        rows = observe_parts(some)
         return rows if drawn is None else drawn.rows_beside(rows, estimate.noise)
 
     observations = observe(parts)
     plain, found_faults = _found_faults(parts, observations, observe, estimate, noise)
     states = [s for part in parts for s in part.states]
     other = ReferenceCycle.shuffled(model.robot, states)
-    uncertain, spoiled, each = _expected_errors(
+    uncertain, spoiled, each = expected_errors(
         columns, states, other, estimate, plain, found_faults
     )
     step = 1.0 / max(part.how.rate for part in parts)
@@ -259,9 +237,9 @@ def _isolate_in_parts(
 
 
 def _found_faults(
-    parts: list[_Part],
+    parts: list[SearchedPart],
     observations: Observations,
-    observe: Callable[[Sequence[_Part]], Observations],
+    observe: Callable[[Sequence[SearchedPart]], Observations],
     estimate: Estimate,
     noise: Array,
 ) -> tuple[Estimate, list[FoundFault]]:
@@ -278,57 +256,6 @@ def _found_faults(
         if late is not None:
             found_faults.insert(0, replace(late, fit=fit))
     return plain, found_faults
-
-
-def _expected_errors(
-    columns: FaultColumns,
-    states: list[States],
-    other: ReferenceCycle,
-    estimate: Estimate,
-    plain: Estimate,
-    found_faults: Sequence[FoundFault],
-) -> tuple[Array, Array, list[Array]]:
-    """Return `_cycle_errors` of a cycle; the first two of another motion where these are larger."""
-    cycle = ReferenceCycle.within(columns.model.robot, Extent.of(states))
-    uncertain, spoiled, each = _cycle_errors(columns, cycle, estimate, plain, found_faults)
-    if cycle is not None and len(other.states) > 0:
-        # What a cycle spares another motion of the same range may show.
-        elsewhere = _cycle_errors(columns, other, estimate, plain, found_faults)
-        uncertain, spoiled = np.fmax(uncertain, elsewhere[0]), np.fmax(spoiled, elsewhere[1])
-    return uncertain, spoiled, each
-
-
-def _cycle_errors(
-    columns: FaultColumns,
-    cycle: ReferenceCycle | None,
-    estimate: Estimate,
-    plain: Estimate,
-    found_faults: Sequence[FoundFault],
-) -> tuple[Array, Array, list[Array]]:
-    """Return errors of a cycle's forces, percent: by covariance, by all faults, and by each (n,).
-
-    NaN without a cycle.
-    """
-    if cycle is None:
-        nothing = np.full(len(estimate.noise), np.nan)
-        return nothing, nothing, [nothing for _ in found_faults]
-    motion = columns.motion(cycle.states, np.full(len(cycle.states), 0.5))
-    matrix = motion.matrix
-    p = matrix.shape[-1]
-    forces = [matrix @ plain.values]
-    for fault in found_faults:
-        with_fault = matrix @ fault.fit.values[:p]
-        for family, sizes in (*fault.others, (fault.family, fault.sizes)):
-            if family.of_machine and (cycle.in_order or not family.of_path):
-                with_fault = with_fault + family.deviation_columns(motion) @ sizes
-        forces.append(with_fault)
-    each = [cycle.share(b - a, forces[0]) for a, b in pairwise(forces)]
-    spoiled = cycle.share(forces[-1] - forces[0], forces[0])
-    # A fault that is not named adds to the residuals, and so to the covariance.
-    covariance = found_faults[-1].fit.covariance[:p, :p] if found_faults else estimate.covariance
-    variance = np.einsum("rnp,pq,rnq->rn", matrix, covariance, matrix, optimize=True)
-    uncertain = cycle.share(np.sqrt(np.maximum(variance, 0.0)), forces[0])
-    return uncertain, spoiled, each
 
 
 def _named_faults(
@@ -373,7 +300,9 @@ def _wrong_gain(
     )
 
 
-def _play(parts: Sequence[_Part], values: Array, step: float) -> tuple[IsolatedFault | None, bool]:
+def _play(
+    parts: Sequence[SearchedPart], values: Array, step: float
+) -> tuple[IsolatedFault | None, bool]:
     """Return the play of drives, or None, and whether any load changes direction often enough.
 
     Play shows as large residuals where loads change direction.
@@ -411,83 +340,15 @@ def delay_of(
     preprocessing: Sequence[Preprocessing],
 ) -> float:
     """Return the delay, s, of recordings' forces that fits best, less the assumed delay."""
-    parts = _parts(model, estimate, recordings, preprocessing)
-    _, shifted = _delay(parts, _observe_parts)
+    parts = choose_parts(model, estimate, recordings, preprocessing, _ROWS)
+    _, shifted = _delay(parts, observe_parts)
     return shifted[0].how.delay - parts[0].how.delay
-
-
-def _parts(
-    model: Model,
-    estimate: Estimate,
-    recordings: Sequence[Recording],
-    preprocessing: Sequence[Preprocessing],
-    most: int = _ROWS,
-) -> list[_Part]:
-    """Return the parts of recordings that are searched, `most` rows in all."""
-    rows = most // len(recordings)
-    chosen = [
-        (log, _plan_single_periods(model, log, how), part)
-        for recording, how in zip(recordings, preprocessing, strict=True)
-        for log in [recording.head()]
-        for part in _select_moving_parts(log, rows)
-    ]
-    states = [[b.states for b in samples(model.robot, part, how)] for _, how, part in chosen]
-    rates = np.concatenate([s.joint_rates for blocks in states for s in blocks])
-    usual = np.sqrt((rates**2).mean(axis=0))
-    families = families_of(model)
-    if model.terms.stribeck == "auto":  # its speeds are found already
-        families = tuple(family for family in families if family.name != "stribeck")
-    parts = []
-    for (log, how, part), blocks in zip(chosen, states, strict=True):
-        fastest = max(how.cutoff or 0.0, how.band)
-        ends, stride = log.time[[0, -1]].tolist(), max(int(how.rate / (_POINTS * fastest)), 1)
-        about = families, stride, _MOTION * how.band
-        columns = FaultColumns(model, estimate.values, usual, ends[0], ends[1], *about)
-        parts.append(_Part(columns, part, how, blocks))
-    return parts
-
-
-def _select_moving_parts(log: Log, rows: int) -> list[Log]:
-    """Return the parts of a log, `rows` in all, in which the joints move most.
-
-    There is one part of each payload phase.
-    """
-    if log.rows <= rows:
-        return [log]
-    steps = (np.diff(log.joints, axis=0) ** 2).sum(axis=1)
-    travel = np.concatenate([[0.0], np.cumsum(steps)])
-    phase = np.zeros(log.rows) if log.payload is None else log.payload
-    phases = sorted(log.phases, key=lambda part: part[0] - part[1])
-    longest = {phase[start]: (start, stop) for start, stop in reversed(phases)}
-    size = rows // len(longest)
-    parts = []
-    for start, stop in longest.values():
-        starts = np.arange(start, max(stop - size, start) + 1, max(size // 2, 1))
-        ends = np.minimum(starts + size, stop)
-        best = int(np.argmax(travel[ends - 1] - travel[starts]))
-        parts.append(log.part(int(starts[best]), int(ends[best])))
-    return parts
-
-
-def _plan_single_periods(model: Model, log: Log, how: Preprocessing) -> Preprocessing:
-    """Return the preprocessing without averaging of periods, which would hide passing faults."""
-    if how.derivatives != "periodic":
-        return how
-    processing = Processing(derivatives="central")
-    again = preprocessing_of(model.robot, log, processing, start=how.start)
-    return replace(again, slow=how.slow, delay=how.delay)
-
-
-def _observe_parts(parts: Sequence[_Part]) -> Observations:
-    return stacked(
-        [observations_of(part.model.extended_model, part.log, part.how) for part in parts]
-    )
 
 
 def _search_families(
     families: tuple[Family, ...],
-    parts: Sequence[_Part],
-    observe: Callable[[Sequence[_Part]], Observations],
+    parts: Sequence[SearchedPart],
+    observe: Callable[[Sequence[SearchedPart]], Observations],
 ) -> tuple[Estimate, list[FoundFault]]:
     """Return the fit of parts without faults, and the faults of some families that they show."""
     some = [replace(part, model=replace(part.model, families=families)) for part in parts]
@@ -496,8 +357,8 @@ def _search_families(
 
 
 def _delay(
-    parts: Sequence[_Part], observe: Callable[[Sequence[_Part]], Observations]
-) -> tuple[FoundFault | None, list[_Part]]:
+    parts: Sequence[SearchedPart], observe: Callable[[Sequence[SearchedPart]], Observations]
+) -> tuple[FoundFault | None, list[SearchedPart]]:
     """Return the whole delay of the logs' forces, None if none shows, and the parts without it."""
     late, shifted = None, list(parts)
     for _ in range(_ROUNDS):
