@@ -14,7 +14,7 @@ from pteron.identification import Processing, Terms, identification_model, ident
 from pteron.identification.faults import isolate_faults
 from pteron.identification.faults.columns import FaultColumns, families_of
 from pteron.identification.faults.fitted_motion import FittedMotion, lengths_of
-from pteron.identification.recordings import recording
+from pteron.identification.recordings import read_recording
 from pteron.identification.signals import States
 from pteron.legs import Drive, Stribeck
 from pteron.workspace import home_pose
@@ -245,7 +245,7 @@ def test_columns_are_what_a_fault_does_to_the_forces(name):
     other = replace(robot, legs=tuple(legs))
     s = States.of_joints(other, motion, part.time, tuple(states.pose[0]))
     there = pteron.inverse_dynamics(other, s.pose, s.velocity, s.acceleration)
-    columns = fitted.by_lengths
+    columns = fitted.length_slopes
     assert columns.shape[-1] == len(lengths_of(robot))
     wanted = (there - here) / step
     assert np.abs(columns[..., place] - wanted).max() < 1e-5 * size / 0.1
@@ -255,7 +255,7 @@ def test_columns_are_what_a_fault_does_to_the_forces(name):
     s = States.of_joints(robot, shifted, part.time, tuple(states.pose[0]))
     there = pteron.inverse_dynamics(robot, s.pose, s.velocity, s.acceleration)
     wanted = (there - here) / step
-    given = fitted.by_give(behind)[..., 1]
+    given = fitted.give_slopes(behind)[..., 1]
     assert np.abs(given - wanted).max() < 1e-3 * np.abs(wanted).max() + 1e-5 * size
 
 
@@ -264,7 +264,7 @@ def test_every_family_names_its_columns():
     model = identification_model(robot)
     values = np.ones(len(model.names))
     columns = FaultColumns(model, values, np.ones(4), 0.0, 1.0, families_of(model))
-    whole = columns.whole
+    whole = columns.extended_model
     assert len(whole.names) == len(whole.units) == len(whole.kinds)
     assert columns.places[-1].stop == len(whole.names)
 
@@ -274,5 +274,7 @@ def test_a_log_too_short_for_fault_isolation_is_not_refused():
     result = found(robot, noisy(log))
     (how,) = result.preprocessing
     slow = replace(how, derivatives="central", cutoff=0.5)  # its edges leave nothing
-    shown = isolate_faults(result.model, result.estimate, [recording(log.part(0, 1000))], [slow])
+    shown = isolate_faults(
+        result.model, result.estimate, [read_recording(log.part(0, 1000))], [slow]
+    )
     assert (shown.tried, shown.faults) == ((), ())

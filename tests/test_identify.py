@@ -30,7 +30,7 @@ from pteron.identification.exchanged_columns import ColumnFault
 from pteron.identification.logs import Description
 from pteron.identification.plausibility import has_negative_inertia
 from pteron.identification.prediction import Prediction
-from pteron.identification.recordings import divided, recording
+from pteron.identification.recordings import read_recording, split_held_out
 from pteron.identification.verdict import verdict_of
 from pteron.manipulator import parameter_data
 from pteron.workspace import home_pose
@@ -241,7 +241,7 @@ def test_without_other_logs_the_end_is_held_out_and_said():
 
 def test_a_periodic_log_is_divided_at_its_periods():
     log = noisy(QUADRUPTERON, duration=12.0, description=Description(period=4.0))
-    fit, check = divided(recording(log), 4.0)
+    fit, check = split_held_out(read_recording(log), 4.0)
     assert (fit.rows, check.rows) == (2400, 1200)
     found = identify(QUADRUPTERON, log)
     assert found.preprocessing[0].derivatives == "periodic"

@@ -44,7 +44,7 @@ from pteron.identification import (
 )
 from pteron.identification.plausibility import usual_sizes
 from pteron.identification.prediction import predict
-from pteron.identification.recordings import recording
+from pteron.identification.recordings import read_recording
 from pteron.kernels import Array
 
 matplotlib.use("Agg")
@@ -247,7 +247,7 @@ def score(
                 judged = predict(
                     bench.model,
                     found.values,
-                    recording(other),
+                    read_recording(other),
                     preprocessing_of(bench.robot, other),
                 )
                 true_floor = noise[1] * np.sqrt((bench.other.forces**2).mean(axis=0))

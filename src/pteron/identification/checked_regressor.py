@@ -66,10 +66,10 @@ def checked_observations(
     )
 
 
-def finite(given: ArrayLike, place: str) -> Array:
+def finite(array: ArrayLike, place: str) -> Array:
     """Return an array of finite numbers; messages call it `place`."""
     try:
-        numbers = np.asarray(given, dtype=float)
+        numbers = np.asarray(array, dtype=float)
     except (TypeError, ValueError):
         raise DataError(f"{place}: an array of numbers expected") from None
     if not np.isfinite(numbers).all():
@@ -81,8 +81,8 @@ def finite(given: ArrayLike, place: str) -> Array:
     return numbers
 
 
-def _texts(given: Sequence[str] | None, count: int, place: str) -> tuple[str, ...]:
-    texts = () if given is None else tuple(given)
-    if given is not None and (isinstance(given, str) or len(texts) != count):
+def _texts(labels: Sequence[str] | None, count: int, place: str) -> tuple[str, ...]:
+    texts = () if labels is None else tuple(labels)
+    if labels is not None and (isinstance(labels, str) or len(texts) != count):
         raise DataError(f"{place}: {len(texts)} given, {count} expected, one for each column")
     return texts

@@ -41,13 +41,13 @@ def conditional_values(
     """
     rank = len(bodies)
     fixed, targets = list(range(rank)), bodies.tolist()
-    found = values
+    adjusted = values
     for _ in range(_ROUNDS):
         shift = np.array(targets) - values[fixed]
-        found = values + conditional_shift(covariance, fixed, shift)
-        below = [k for k in positive if found[k] < 0.0 and k not in fixed]
+        adjusted = values + conditional_shift(covariance, fixed, shift)
+        below = [k for k in positive if adjusted[k] < 0.0 and k not in fixed]
         if not below:
             break
         fixed += below
         targets += [0.0] * len(below)
-    return np.asarray(found)
+    return np.asarray(adjusted)

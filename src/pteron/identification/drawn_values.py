@@ -15,7 +15,7 @@ from pteron.identification.estimators import Estimate
 from pteron.identification.estimators.estimate import residuals_of, whiteness
 from pteron.identification.model import Model
 from pteron.identification.observation import Observations
-from pteron.identification.plausibility import unseen, usual_sizes
+from pteron.identification.plausibility import unseen_names, usual_sizes
 from pteron.kernels import Array
 from pteron.manipulator import parameters
 
@@ -45,7 +45,7 @@ class DrawnValues:
     @classmethod
     def of(cls, model: Model, estimate: Estimate, known: Array) -> DrawnValues:
         """Return those that a fit leaves open; `known` (p,) is the rotors' part of the values."""
-        names = unseen(model, estimate.deviations)
+        names = unseen_names(model, estimate.deviations)
         places = np.array([model.names.index(name) for name in names], dtype=np.int64)
         drawn = parameters(model.robot)
         values = (model.base.grouping @ drawn + known[: model.base.rank])[places]
@@ -62,33 +62,33 @@ class DrawnValues:
         places = np.arange(model.base.rank)
         return cls(model.base.names, places, values, usual_sizes(model.base, drawn))
 
-    def told_of(self, estimate: Estimate) -> DrawnValues:
+    def name_undetermined(self, estimate: Estimate) -> DrawnValues:
         """Return it with the names of those only that are little better known after a fit."""
         share = estimate.deviations[self.places] / self.deviations
         names = zip(self.names, share.tolist(), strict=True)
         return replace(self, names=tuple(name for name, s in names if s > _LITTLE))
 
-    def added_to(self, estimate: Estimate, observations: Observations) -> Estimate:
+    def update_estimate(self, estimate: Estimate, observations: Observations) -> Estimate:
         """Return the estimate with the drawn values as further measurements."""
         if not len(self.places):
             return estimate
         size = np.maximum(estimate.deviations, np.finfo(float).tiny)
         covariance = estimate.covariance / np.outer(size, size)
-        rows, own = covariance[self.places], self.deviations / size[self.places]
-        gain = np.linalg.solve(rows[:, self.places] + np.diag(own**2), rows).T
+        rows, deviations = covariance[self.places], self.deviations / size[self.places]
+        gain = np.linalg.solve(rows[:, self.places] + np.diag(deviations**2), rows).T
         shift = gain @ ((self.values - estimate.values[self.places]) / size[self.places])
-        left = np.eye(len(size))
-        left[:, self.places] -= gain
+        reduction = np.eye(len(size))
+        reduction[:, self.places] -= gain
         # Joseph's form, which stays positive where deviations differ by many orders.
-        covariance = left @ covariance @ left.T + gain @ np.diag(own**2) @ gain.T
+        covariance = reduction @ covariance @ reduction.T + gain @ np.diag(deviations**2) @ gain.T
         values = estimate.values + size * shift
-        rest = residuals_of(observations, values)
+        residuals = residuals_of(observations, values)
         return replace(
             estimate,
             values=values,
             covariance=0.5 * (covariance + covariance.T) * np.outer(size, size),
-            residuals=rest,
-            whiteness=whiteness(rest, observations.gain > 0.0),
+            residuals=residuals,
+            whiteness=whiteness(residuals, observations.gain > 0.0),
         )
 
     def rows_beside(self, observations: Observations, noise: Array) -> Observations:

@@ -87,8 +87,8 @@ class DriveGains:
                 f"  g{i}  {gain:.6g} +- {deviation:.2g} {self.estimate.units[i - 1]} "
                 f"(total least squares {start:.6g})"
             )
-        left = ", ".join(f"{value:.2g}" for value in self.residual)
-        lines.append(f"Left of the currents: {left} {self.unit}.")
+        residuals = ", ".join(f"{value:.2g}" for value in self.residual)
+        lines.append(f"Left of the currents: {residuals} {self.unit}.")
         lines.append(f"Condition number {self.condition:.3g}, gap {self.gap:.2g}.")
         lines.append("The gains are as exact as the payload's mass and inertia at best.")
         lines.append(f"In the log's description, under [forces]: {self.note}")
@@ -174,7 +174,7 @@ def identify_drive_gains(
     observations = observations.columns(range(len(plain.names)))
     start, condition, gap = _total(observations, carried)
     units = [f"{leg.joint.force_unit}/{unit}" for leg in robot.legs]
-    estimate = _likely(observations, carried, start, units)
+    estimate = _fit_likelihood(observations, carried, start, units)
     n = observations.actuators
     return DriveGains(
         gains=estimate.values[:n],
@@ -229,19 +229,19 @@ def _total(observations: Observations, carried: Array) -> tuple[Array, float, fl
     upper = np.zeros((p + n + 1, p + n + 1))
     upper[:-1, :-1] = factor.factor
     upper[:, -1] = np.r_[factor.image, np.sqrt(factor.rest)]
-    found = smallest_corrections(upper, p, np.r_[np.ones(n), length])
-    sizes = found.sizes
-    if sizes[-2] <= _UNSEEN * sizes[0] or found.share <= _UNSEEN:
+    corrections = smallest_corrections(upper, p, np.r_[np.ones(n), length])
+    sizes = corrections.sizes
+    if sizes[-2] <= _UNSEEN * sizes[0] or corrections.share <= _UNSEEN:
         raise observations.fault(
             "too little motion",
             "the payload does not tell the gains from the inertia; carry a heavier one, and move "
             "all coordinates in both phases",
         )
-    values = found.values / np.where(factor.scale > 0.0, factor.scale, 1.0)
+    values = corrections.values / np.where(factor.scale > 0.0, factor.scale, 1.0)
     return np.roll(values, n), float(sizes[0] / sizes[-2]), float(sizes[-1] / sizes[-2])
 
 
-def _likely(
+def _fit_likelihood(
     observations: Observations, carried: Array, start: Array, units: Sequence[str]
 ) -> Estimate:
     """Return g and beta of greatest likelihood, the noise being in the currents alone."""
@@ -263,8 +263,8 @@ def _likely(
         step = qr_factor(linear, 1.0 / noise).values() - values
         values = values + step
         change = np.linalg.norm(tangent @ step)
-        rest = np.linalg.norm(observations.forces - inverse * force)
-        if change <= max(_SETTLED * rest, _ROUNDING * np.linalg.norm(observations.forces)):
+        residual = np.linalg.norm(observations.forces - inverse * force)
+        if change <= max(_SETTLED * residual, _ROUNDING * np.linalg.norm(observations.forces)):
             break
         if iteration == _ITERATIONS:
             raise observations.fault(

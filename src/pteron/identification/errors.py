@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Literal
 
-from pteron.errors import DataError
+from pteron.errors import DataError, ModelError
 
 Reason = Literal[
     "columns",
@@ -53,3 +54,10 @@ class OfLog:
     def fault(self, reason: Reason, message: str) -> LogError:
         """Return the error that it does not show what is asked of it."""
         return LogError(reason, self.source, message)
+
+
+def name_cause(error: DataError | ModelError, causes: Sequence[str]) -> None:
+    """Put the first of causes at the beginning of an error's message, if there is one."""
+    for cause in causes[:1]:
+        place = f"{error.place}: " if isinstance(error, LogError) else ""
+        error.args = (f"{place}{cause.rstrip('.')} ({str(error).removeprefix(place)})",)

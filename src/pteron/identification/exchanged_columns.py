@@ -78,41 +78,43 @@ class ColumnFault:
             parts.append("gravity points the other way than in the machine's file")
         if self.order == self.joint_order != usual:
             pairs = [f"leg {k + 1}" for k in usual if self.order[k] != k]
-            parts.append(f"{_listed(pairs)} are exchanged, forces and joints alike")
+            parts.append(f"{_join_names(pairs)} are exchanged, forces and joints alike")
         else:
             for names, order in ((self.joints, self.joint_order), (self.forces, self.order)):
-                parts += _moved(names, order)
-        parts += _flipped(self.joints, self.joint_order, self.joint_signs)
+                parts += _order_clauses(names, order)
+        parts += _sign_clauses(self.joints, self.joint_order, self.joint_signs)
         if -1 not in self.joint_signs and self.signs.count(-1) == len(usual):
             parts.append("the forces, or all joints, have the sign flipped")
         else:
-            parts += _flipped(self.forces, self.order, self.signs)
+            parts += _sign_clauses(self.forces, self.order, self.signs)
         return " and ".join(parts)
 
 
 def _exchanges(order: Sequence[int]) -> int:
     """Return the least number of exchanges of two that make an order."""
-    left, count = set(range(len(order))), len(order)
-    while left:
-        at, count = left.pop(), count - 1
-        while (at := order[at]) in left:
-            left.remove(at)
+    unplaced, count = set(range(len(order))), len(order)
+    while unplaced:
+        at, count = unplaced.pop(), count - 1
+        while (at := order[at]) in unplaced:
+            unplaced.remove(at)
     return count
 
 
-def _moved(names: Sequence[str], order: Sequence[int]) -> Iterator[str]:
+def _order_clauses(names: Sequence[str], order: Sequence[int]) -> Iterator[str]:
     moved = [name for k, name in enumerate(names) if order[k] != k]
     if len(moved) == 2:
-        yield f"{_listed(moved)} are swapped"
+        yield f"{_join_names(moved)} are swapped"
     elif moved:
         right = ", ".join(names[k] for k in order)
-        yield f"{_listed(moved)} are in another order (they should be {right})"
+        yield f"{_join_names(moved)} are in another order (they should be {right})"
 
 
-def _flipped(names: Sequence[str], order: Sequence[int], signs: Sequence[int]) -> Iterator[str]:
+def _sign_clauses(
+    names: Sequence[str], order: Sequence[int], signs: Sequence[int]
+) -> Iterator[str]:
     flipped = [names[order[k]] for k, sign in enumerate(signs) if sign < 0]
     if flipped:
-        yield f"{_listed(flipped)} {'has' if len(flipped) == 1 else 'have'} the sign flipped"
+        yield f"{_join_names(flipped)} {'has' if len(flipped) == 1 else 'have'} the sign flipped"
 
 
 def column_fault(model: Model, log: Log, preprocessing: Preprocessing) -> ColumnFault | None:
@@ -127,39 +129,41 @@ def column_fault(model: Model, log: Log, preprocessing: Preprocessing) -> Column
     usual = observations_of(model, log, plain)
     none = _fault(model, usual.actuators)
     tried = _with_signs(none, permutations(none.order))
-    found = [(fault, usual, model) for fault in _with_errors(usual, tried)]
-    before = found[0][0].after
-    found += _others(none, model, log, plain, before)
-    faults = [replace(fault, before=before) for fault, _, _ in found]
+    candidates = [(fault, usual, model) for fault in _with_errors(usual, tried)]
+    error = candidates[0][0].after
+    candidates += _other_faults(none, model, log, plain, error)
+    faults = [replace(fault, before=error) for fault, _, _ in candidates]
     least = min(fault.after for fault in faults)
     limit = _ALIKE * max(least, _ROUNDING)
-    if not max(least, _ROUNDING) * DECISIVE < before:
+    if not max(least, _ROUNDING) * DECISIVE < error:
         # Forces that no order explains say nothing about signs.
-        if before > _EXPLAINED:
+        if error > _EXPLAINED:
             return None
-        limit = _ALIKE * max(before, _ROUNDING)
+        limit = _ALIKE * max(error, _ROUNDING)
     alike = [k for k, fault in enumerate(faults) if fault.after <= limit]
     alike = sorted(alike, key=lambda k: (faults[k].changes, faults[k].after))[:_LOOKED_INTO]
-    states = {k: _unphysical(faults[k], *found[k][1:]) for k in alike}
-    first, *rest = sorted(alike, key=lambda k: (states[k], faults[k].changes, faults[k].after))
+    states = {k: _unphysical(faults[k], *candidates[k][1:]) for k in alike}
+    first, *equivalents = sorted(
+        alike, key=lambda k: (states[k], faults[k].changes, faults[k].after)
+    )
     if faults[first].changes == 0:
         return None
     # Equal legs can be renamed in every fault: faults of more changes add nothing.
     most = states[first], faults[first].changes
-    as_well = [faults[k].message() for k in rest if (states[k], faults[k].changes) <= most]
+    as_well = [faults[k].message() for k in equivalents if (states[k], faults[k].changes) <= most]
     return replace(faults[first], equivalents=tuple(as_well[:_TOLD]))
 
 
 def exchanged_joints(
-    model: LinearModel, log: Log, preprocessing: Preprocessing, before: float
+    model: LinearModel, log: Log, preprocessing: Preprocessing, error: float
 ) -> ColumnFault | None:
-    """Return the order of the joints, or the sign of one, that makes the error `before` small."""
+    """Return the order of the joints, or the sign of one, that makes the error of the fit small."""
     none = _fault(model, log.joints.shape[1])
     best: ColumnFault | None = None
     for fault, observations in _moved_joints(none, model, log, preprocessing):
-        (one,) = _with_errors(observations, [fault])
-        if one.after * DECISIVE < (before if best is None else best.after * DECISIVE):
-            best = replace(one, before=before)
+        (candidate,) = _with_errors(observations, [fault])
+        if candidate.after * DECISIVE < (error if best is None else best.after * DECISIVE):
+            best = replace(candidate, before=error)
     return best
 
 
@@ -176,12 +180,12 @@ def _with_signs(fault: ColumnFault, orders: Iterable[tuple[int, ...]]) -> list[C
     return [replace(fault, order=o, signs=s) for o in orders for s in signs]
 
 
-def _others(
-    none: ColumnFault, model: Model, log: Log, how: Preprocessing, before: float
+def _other_faults(
+    none: ColumnFault, model: Model, log: Log, how: Preprocessing, error: float
 ) -> Iterator[tuple[ColumnFault, Observations, Model]]:
     """Yield faults of joints, of legs and of gravity that explain the forces far better."""
 
-    def tried() -> Iterator[tuple[list[ColumnFault], Observations, Model]]:
+    def trials() -> Iterator[tuple[list[ColumnFault], Observations, Model]]:
         for fault, observations in _moved_joints(none, model, log, how):
             yield _with_signs(fault, {none.order, fault.joint_order}), observations, model
         if any(model.robot.gravity):
@@ -191,10 +195,10 @@ def _others(
             faults = _with_signs(replace(none, gravity=True), [none.order])
             yield faults, observations_of(other, log, how), other
 
-    for faults, observations, other in tried():
-        for one in _with_errors(observations, faults):
-            if one.after * DECISIVE < before:
-                yield one, observations, other
+    for faults, observations, other in trials():
+        for candidate in _with_errors(observations, faults):
+            if candidate.after * DECISIVE < error:
+                yield candidate, observations, other
 
 
 def _moved_joints(
@@ -243,12 +247,12 @@ def _with_errors(observations: Observations, faults: Sequence[ColumnFault]) -> l
     # The projection of each column, given to each actuator: orders and signs add these up.
     parts = np.einsum("rnk,rj->njk", basis, forces)
     power = float((forces**2).sum())
-    found = []
+    with_errors = []
     for fault in faults:
         image = np.array(fault.signs) @ parts[np.arange(n), list(fault.order)]
         error = float(np.sqrt(max(power - float(image @ image), 0.0) / power))
-        found.append(replace(fault, after=error))
-    return found
+        with_errors.append(replace(fault, after=error))
+    return with_errors
 
 
 def _unphysical(fault: ColumnFault, observations: Observations, model: Model) -> int:
@@ -258,5 +262,5 @@ def _unphysical(fault: ColumnFault, observations: Observations, model: Model) ->
     return unphysical(model, mended, weighted(mended))
 
 
-def _listed(names: Sequence[str]) -> str:
+def _join_names(names: Sequence[str]) -> str:
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

@@ -28,8 +28,8 @@ from pteron.identification.logs.at_motor import AnyLog, by_rated_torque, per_cen
 from pteron.identification.logs.recorded import at_limits, check_forces, check_recorded
 from pteron.identification.model import Model, identification_model
 from pteron.identification.observation import LinearModel, Observations, observations_of, stacked
-from pteron.identification.plausibility import left_over, unseen_shares
-from pteron.identification.recordings import Recording, same
+from pteron.identification.plausibility import excess_residual_cause, unseen_shares
+from pteron.identification.recordings import Recording, hold_same_samples
 from pteron.identification.signals import Preprocessing, Processing, preprocessing_of
 from pteron.manipulator import Manipulator
 
@@ -56,44 +56,54 @@ _NOISELESS = 1e-10
 """Residuals, relative to the forces, that are rounding."""
 
 
-def in_newtons(log: AnyLog, robot: Manipulator) -> AnyLog:
+def convert_to_newtons(log: AnyLog, robot: Manipulator) -> AnyLog:
     """Return a log; if its forces are in per cent of rated torque, by the machine's drives."""
     return by_rated_torque(log, robot) if log.description.force_unit == "%" else log
 
 
 def check_recordings(
-    robot: Manipulator, whole: Sequence[Recording], others: Sequence[Recording], wanted: Processing
+    robot: Manipulator,
+    recordings: Sequence[Recording],
+    others: Sequence[Recording],
+    processing: Processing,
 ) -> None:
     """Refuse recordings that are none, too short, of currents, of no forces, or given twice."""
-    if not whole:
+    if not recordings:
         raise DataError("logs: none given, one or more expected")
-    for one in (*whole, *others):
+    for recording in (*recordings, *others):
         # What is no force at all would hide how much the others change.
-        if isinstance(one.log, Log):
-            check_forces(one.log.forces, one.log.force_names, one.source, one.log.first_row)
-        check_recorded(one.head())
-        if isinstance(one.log, Log) and one.rows < _FEWEST:
-            raise DataError(f"{one.source}: {one.rows} rows are too few to identify; record longer")
-        unit = one.head().description.force_unit
+        if isinstance(recording.log, Log):
+            check_forces(
+                recording.log.forces,
+                recording.log.force_names,
+                recording.source,
+                recording.log.first_row,
+            )
+        check_recorded(recording.head())
+        if isinstance(recording.log, Log) and recording.rows < _FEWEST:
+            raise DataError(
+                f"{recording.source}: {recording.rows} rows are too few to identify; record longer"
+            )
+        unit = recording.head().description.force_unit
         if unit != "N":
             other = f", {per_cent_advice(robot)}" if unit == "%" else ""
-            raise one.log.fault(
+            raise recording.log.fault(
                 "currents",
                 f"its forces are in {unit}; declare gains (N, at a crank N m, per {unit}) in its "
                 f"description, or find them with identify_drive_gains{other}",
             )
     twice = "the same samples as {}; give them once"
-    held = (
+    held_out = (
         "is held out, but the same samples are fitted; hold out another motion, or nothing: then "
         "the end of each log is"
     )
-    pairs = [(*pair, twice.format(pair[0].source)) for pair in combinations(whole, 2)]
-    pairs += [(*pair, held) for pair in product(whole, others)]
-    for one, again, said in pairs:
-        if same(one, again):
+    pairs = [(*pair, twice.format(pair[0].source)) for pair in combinations(recordings, 2)]
+    pairs += [(*pair, held_out) for pair in product(recordings, others)]
+    for recording, again, said in pairs:
+        if hold_same_samples(recording, again):
             raise again.log.fault("twice", said)
-    for log in (one.log for one in whole):
-        period = wanted.period
+    for log in (recording.log for recording in recordings):
+        period = processing.period
         if isinstance(log, Log) and period and log.duration < period * (1.0 - 1e-3):
             raise log.fault(
                 "too short",
@@ -104,7 +114,7 @@ def check_recordings(
 
 def check_payload(fit: Sequence[Recording]) -> None:
     """Refuse recordings that do not tell when a payload is carried, or carry several."""
-    heads = [one.head() for one in fit]
+    heads = [recording.head() for recording in fit]
     masses = {head.payload_mass: head.source for head in heads if head.payload_mass is not None}
     said = ""
     if len(masses) > 1:
@@ -116,45 +126,45 @@ def check_payload(fit: Sequence[Recording]) -> None:
         raise fit[0].log.fault("no payload", said)
 
 
-def preprocessing_for(
+def choose_preprocessing(
     robot: Manipulator,
-    one: Recording,
-    wanted: Processing,
+    recording: Recording,
+    processing: Processing,
     start: tuple[float, ...] | None = None,
 ) -> Preprocessing:
     """Return the preprocessing of a recording, from its beginning.
 
     `start` is a pose of its assembly mode, where it is known.
     """
-    head = one.head()
-    period = wanted.period or head.description.period
+    head = recording.head()
+    period = processing.period or head.description.period
     # What lasts less than a period is no periodic log.
-    if wanted.derivatives is None and period is not None and head.duration < 0.999 * period:
+    if processing.derivatives is None and period is not None and head.duration < 0.999 * period:
         described = replace(head.description, period=None, start=None, end=None)
         head = replace(head, description=described)
-        wanted = replace(wanted, period=None)
+        processing = replace(processing, period=None)
     # A file that is read in pieces is never fitted in one.
-    rows = one.rows if isinstance(one.log, Log) else 1 << 30
-    return preprocessing_of(robot, head, wanted, rows=rows, start=start)
+    rows = recording.rows if isinstance(recording.log, Log) else 1 << 30
+    return preprocessing_of(robot, head, processing, rows=rows, start=start)
 
 
 def fit_observations(
-    model: LinearModel, one: Recording, preprocessing: Preprocessing
+    model: LinearModel, recording: Recording, preprocessing: Preprocessing
 ) -> Observations:
     """Return a recording's observations; where it has no poses, say whether joints are swapped."""
     try:
-        return observations_of(model, one.samples(), preprocessing)
+        return observations_of(model, recording.samples(), preprocessing)
     except LogError as error:
         if error.reason != "no pose":
             raise
-        swap = exchanged_joints(model, one.head().part(0, _LOOK), preprocessing, _EXPLAINED)
+        swap = exchanged_joints(model, recording.head().part(0, _LOOK), preprocessing, _EXPLAINED)
         if swap is None:
             raise
         error.args = (f"{error}; or {swap.message()}: then every row has a pose",)
         raise
 
 
-def balanced(parts: Sequence[Observations]) -> Observations:
+def stack_balanced(parts: Sequence[Observations]) -> Observations:
     """Return the observations of recordings as one, with the rows of each by its own noise.
 
     A motion of small forces is recorded with less noise than one of large ones: unscaled, the noise
@@ -162,25 +172,25 @@ def balanced(parts: Sequence[Observations]) -> Observations:
     """
     if len(parts) == 1:
         return parts[0]
-    whole = stacked(parts)
-    found = weighted(whole)
+    unscaled = stacked(parts)
+    estimate = weighted(unscaled)
     ends = np.cumsum([len(part.forces) for part in parts])[:-1]
-    rest = [
-        median_noise(part, left)
-        for part, left in zip(parts, np.split(found.residuals, ends), strict=True)
+    noises = [
+        median_noise(part, residuals)
+        for part, residuals in zip(parts, np.split(estimate.residuals, ends), strict=True)
     ]
-    usual = median_noise(whole, found.residuals)
-    if (usual <= _NOISELESS * np.abs(whole.forces).max(axis=0)).any():
-        return whole
+    usual = median_noise(unscaled, estimate.residuals)
+    if (usual <= _NOISELESS * np.abs(unscaled.forces).max(axis=0)).any():
+        return unscaled
     scaled = []
-    for part, one in zip(parts, rest, strict=True):
-        factor = np.clip(usual / np.maximum(one, 1e-300), 1.0 / _MOST, _MOST)
+    for part, noise in zip(parts, noises, strict=True):
+        factor = np.clip(usual / np.maximum(noise, 1e-300), 1.0 / _MOST, _MOST)
         rows, forces = part.matrix * factor[:, None], part.forces * factor
         scaled.append(replace(part, matrix=rows, forces=forces, gain=part.gain / factor))
     return stacked(scaled)
 
 
-def estimated(
+def estimate_values(
     estimator: str | Callable[[Observations], Estimate],
     model: Model,
     fit: Sequence[Recording],
@@ -192,7 +202,7 @@ def estimated(
         return estimator(observations)
     if estimator in ESTIMATORS and estimator != "total":
         return ESTIMATORS[estimator](observations)
-    logs = [one.head() for one in fit if isinstance(one.log, Log)]
+    logs = [recording.head() for recording in fit if isinstance(recording.log, Log)]
     if len(logs) < len(fit) or (len(logs) > 1 and estimator != "instrumental"):
         how_many = "logs" if estimator == "instrumental" else "one log"
         raise DataError(
@@ -209,13 +219,15 @@ def estimated(
 
 
 @contextmanager
-def findings_told(whole: Sequence[Recording]) -> Iterator[None]:
+def append_findings(recordings: Sequence[Recording]) -> Iterator[None]:
     """Put the findings of logs behind an error that is raised within, which they may explain."""
     try:
         yield
     except PteronError as error:
-        findings = [said.rstrip(".") for one in whole for said in at_limits(one.head())]
-        findings += [finding.message for one in whole for finding in one.findings]
+        findings = [
+            said.rstrip(".") for recording in recordings for said in at_limits(recording.head())
+        ]
+        findings += [finding.message for recording in recordings for finding in recording.findings]
         if findings:
             error.args = (f"{error} (noticed before: {'; '.join(findings[:3])})",)
         raise
@@ -228,7 +240,7 @@ def check_motion(
     hidden, nothing = unseen_shares(model, estimate.deviations)
     if not nothing:
         return
-    cause = left_over(estimate, preprocessing)
+    cause = excess_residual_cause(estimate, preprocessing)
     rank = model.base.rank
     names = ", ".join(hidden) if len(hidden) < rank else "all"
     raise first.log.fault(
@@ -242,14 +254,14 @@ def check_motion(
 
 
 def check_columns(
-    model: Model, one: Recording, preprocessing: Preprocessing, *, decisive: bool = False
+    model: Model, recording: Recording, preprocessing: Preprocessing, *, decisive: bool = False
 ) -> None:
     """Refuse a log whose columns, exchanged or with other signs, would be explained far better.
 
     With `decisive` only where the error falls so: not for values that are no machine's, which
     another fault of the log may have made.
     """
-    head = one.head().part(0, _LOOK)
+    head = recording.head().part(0, _LOOK)
     if model.terms.payload and (head.payload is None or not head.payload.any()):
         model = identification_model(
             model.robot, replace(model.terms, payload=False), base=model.base
@@ -265,7 +277,7 @@ def check_columns(
         why = ": as they are, the machine would have negative inertia or friction"
     if fault.equivalents:
         why += f" (as well explained: {'; or '.join(fault.equivalents)})"
-    raise one.log.fault(
+    raise recording.log.fault(
         "columns",
         f"{fault.message()}{why}; "
         + (

@@ -72,8 +72,8 @@ class Terms:
             speeds = np.atleast_1d(np.array(self.stribeck, dtype=float))
             if not (speeds.size and np.isfinite(speeds).all() and (speeds > 0.0).all()):
                 raise ModelError(f"stribeck: {self.stribeck} given, speeds above 0 expected")
-            found = tuple(speeds.tolist())
-            object.__setattr__(self, "stribeck", found if len(found) > 1 else found[0])
+            checked = tuple(speeds.tolist())
+            object.__setattr__(self, "stribeck", checked if len(checked) > 1 else checked[0])
         expect_one_of(get_args(Passive), ModelError, passive=self.passive)
 
 
@@ -127,38 +127,38 @@ class Model:
         """The terms, those that join others too."""
         joints = list(enumerate((leg.joint for leg in self.robot.legs), start=1))
         slides = {i: joint.unit == "m" for i, joint in joints}
-        found: list[Term] = []
+        terms: list[Term] = []
         if self.terms.coulomb:
-            found += [Term("coulomb", f"Fc{i}", "F", f"c{i}", j.force_unit) for i, j in joints]
+            terms += [Term("coulomb", f"Fc{i}", "F", f"c{i}", j.force_unit) for i, j in joints]
         if self.terms.viscous:
             units = {i: "N s/m" if slides[i] else "N m s" for i in slides}
-            found += [Term("viscous", f"Fv{i}", "F", f"v{i}", units[i]) for i in slides]
+            terms += [Term("viscous", f"Fv{i}", "F", f"v{i}", units[i]) for i in slides]
         if self.terms.offset:
-            found += [
+            terms += [
                 Term("offset", f"offset{i}", "offset", f"{i}", j.force_unit) for i, j in joints
             ]
         for index, (joint, *_) in self._passive.items():
             unit = "N s/m" if joint.kind == "P" else "N m s"
-            found.append(Term("passive", f"F{'_'.join(index)}", "F", ",".join(index), unit))
+            terms.append(Term("passive", f"F{'_'.join(index)}", "F", ",".join(index), unit))
         if self.terms.rotors:
             units = {i: "kg" if slides[i] else "kg m^2" for i in slides}
-            found += [Term("rotor", f"J_m{i}", "J", f"m{i}", units[i]) for i in slides]
+            terms += [Term("rotor", f"J_m{i}", "J", f"m{i}", units[i]) for i in slides]
         if self.stribeck_speeds is not None:
-            found += [Term("stribeck", f"Fs{i}", "F", f"s{i}", j.force_unit) for i, j in joints]
+            terms += [Term("stribeck", f"Fs{i}", "F", f"s{i}", j.force_unit) for i, j in joints]
         if self.terms.payload:
             for kind in self.robot.platform.inertia.kinds:
                 letter, axes = ("m\u03b3", kind[2:]) if kind[1:2] == "g" else (kind[0], kind[1:])
                 place = ",".join(part for part in (axes, "L") if part)
-                found.append(Term("payload", f"{kind}_L", letter, place, unit_of(kind)))
-        return tuple(found)
+                terms.append(Term("payload", f"{kind}_L", letter, place, unit_of(kind)))
+        return tuple(terms)
 
     @property
     def stribeck_speeds(self) -> Array | None:
         """The speed of each joint with which friction falls (n,), where the model has that."""
-        given = self.speeds if self.terms.stribeck == "auto" else self.terms.stribeck
-        return None if given is None else np.broadcast_to(given, (len(self.robot.legs),))
+        speeds = self.speeds if self.terms.stribeck == "auto" else self.terms.stribeck
+        return None if speeds is None else np.broadcast_to(speeds, (len(self.robot.legs),))
 
-    def falling(self, speeds: Array) -> Model:
+    def with_speeds(self, speeds: Array) -> Model:
         """Return the model with speeds (n,) that were found."""
         return _independent(Model(self.base, self.terms, speeds=tuple(speeds.tolist())))
 
@@ -191,26 +191,26 @@ class Model:
     @property
     def expressions(self) -> tuple[str, ...]:
         """The values in words: base parameters as sums, the others by name."""
-        own = [*self.base.expressions(), *self.names[self.base.rank :]]
-        return self.with_joins(own, {name: name for name in self.joins})
+        texts = [*self.base.expressions(), *self.names[self.base.rank :]]
+        return self.with_joins(texts, {name: name for name in self.joins})
 
     def with_joins(
         self, texts: Sequence[str], names: Mapping[str, str], *, minus: str = "-", gap: str = " "
     ) -> tuple[str, ...]:
         """Return texts of the values with the terms behind that join them, by their names."""
-        found = list(texts)
+        sums = list(texts)
         for name, shares in self.joins.items():
-            for kept, share in shares.items():
+            for joined, share in shares.items():
                 sign, size = minus if share < 0.0 else "+", abs(share)
                 times = "" if abs(size - 1.0) < 1e-9 else f"{size:.4g}{gap}"
-                found[self.names.index(kept)] += f" {sign} {times}{names[name]}"
-        return tuple(found)
+                sums[self.names.index(joined)] += f" {sign} {times}{names[name]}"
+        return tuple(sums)
 
     def share_of(self, name: str, value: float) -> Array:
         """Return the part of the values (p,) that a term which joins them adds."""
         added = np.zeros(len(self.names))
-        for kept, share in self.joins.get(name, {name: 1.0}).items():
-            added[self.names.index(kept)] = share * value
+        for joined, share in self.joins.get(name, {name: 1.0}).items():
+            added[self.names.index(joined)] = share * value
         return added
 
     def known_values(self, known: Mapping[str, float]) -> Array:
@@ -233,15 +233,15 @@ class Model:
     def matrix(self, states: States) -> Array:
         """Return the regressor (R, n, p) of states: N or N m per unit of each value."""
         names = (*self.base.names, *(term.name for term in self.all_terms))
-        kept = [k for k, name in enumerate(names) if name not in self.joins]
-        return np.ascontiguousarray(self._everything(states)[..., kept])
+        columns = [k for k, name in enumerate(names) if name not in self.joins]
+        return np.ascontiguousarray(self._all_columns(states)[..., columns])
 
     @cached_property
     def _passive(self) -> dict[tuple[str, ...], list[PassiveJoint]]:
         """The passive joints of each coefficient, by its subscripts."""
         if self.terms.passive == "none":
             return {}
-        found: dict[tuple[str, ...], list[PassiveJoint]] = {}
+        coefficients: dict[tuple[str, ...], list[PassiveJoint]] = {}
         kinds = [leg.type for leg in self.robot.legs]
         for joint in passive_joints(self.robot):
             index: tuple[str, ...] = ("v", f"{joint.kind}{joint.number}")
@@ -250,12 +250,12 @@ class Model:
             elif joint.leg is not None:
                 kind = kinds[joint.leg - 1]
                 if kinds.count(kind) < len(kinds):
-                    alike = [str(i) for i, one in enumerate(kinds, start=1) if one == kind]
+                    alike = [str(i) for i, other in enumerate(kinds, start=1) if other == kind]
                     index = ("v", f"{index[1]}({','.join(alike)})")
-            found.setdefault(index, []).append(joint)
-        return found
+            coefficients.setdefault(index, []).append(joint)
+        return coefficients
 
-    def _everything(self, states: States) -> Array:
+    def _all_columns(self, states: States) -> Array:
         robot, terms = self.robot, self.terms
         n = len(robot.legs)
         motion = states.pose, states.velocity, states.acceleration
@@ -313,8 +313,8 @@ def identification_model(
     """
     robot = as_manipulator(robot)
     model = Model(base or base_parameters(robot), terms or Terms())
-    given = model.terms.stribeck
-    speeds = np.atleast_1d(1.0 if given in (None, "auto") else given)
+    stribeck = model.terms.stribeck
+    speeds = np.atleast_1d(1.0 if stribeck in (None, "auto") else stribeck)
     if speeds.size not in (1, len(robot.legs)):
         raise ModelError(
             f"stribeck: {speeds.size} speeds given, one expected or {len(robot.legs)}, one for "
@@ -326,20 +326,20 @@ def identification_model(
 def _independent(model: Model) -> Model:
     """Return a model without the terms whose columns depend on others at every state."""
     names = model.names
-    flat = model._everything(_probes(model.robot)).reshape(-1, len(names))
+    flat = model._all_columns(_probes(model.robot)).reshape(-1, len(names))
     columns, lengths = scaled(flat)
     factor: Array = np.linalg.qr(columns)[1]
     # The diagonal of R is what is left of each column once those before it are taken out of it.
-    rest = np.abs(np.diag(factor))
-    dependent = [k for k in range(model.base.rank, len(names)) if rest[k] < _DEPENDENT]
-    kept = [k for k in range(len(names)) if k not in dependent]
+    remainders = np.abs(np.diag(factor))
+    dependent = [k for k in range(model.base.rank, len(names)) if remainders[k] < _DEPENDENT]
+    independent = [k for k in range(len(names)) if k not in dependent]
     joins = {}
     for k in dependent:
-        shares = np.linalg.lstsq(factor[:, kept], factor[:, k], rcond=None)[0]
-        found = shares * lengths[k] / lengths[kept]
+        shares = np.linalg.lstsq(factor[:, independent], factor[:, k], rcond=None)[0]
+        coefficients = shares * lengths[k] / lengths[independent]
         joins[names[k]] = {
             names[j]: float(share)
-            for j, share, size in zip(kept, found, shares, strict=True)
+            for j, share, size in zip(independent, coefficients, shares, strict=True)
             if abs(size) > _DEPENDENT
         }
     return replace(model, joins=joins)
@@ -365,11 +365,11 @@ def diagonal(values: Array) -> Array:
 class ExtendedModel(Model):
     """A model with so many columns more, which have no units and numbers for names.
 
-    `whole` returns all columns (R, n, p + count) at states.
+    `columns` returns all columns (R, n, p + count) at states.
     """
 
     count: int
-    whole: Callable[[States], Array]
+    columns: Callable[[States], Array]
 
     @cached_property
     def kept_terms(self) -> tuple[Term, ...]:
@@ -379,10 +379,10 @@ class ExtendedModel(Model):
 
     def matrix(self, states: States) -> Array:
         """Return all columns (R, n, p + count)."""
-        return self.whole(states)
+        return self.columns(states)
 
 
-def extended(model: Model, count: int, whole: Callable[[States], Array]) -> Model:
-    """Return a model with `count` further columns, for `whole` columns (R, n, p + count)."""
+def extend_model(model: Model, count: int, columns: Callable[[States], Array]) -> Model:
+    """Return a model with `count` further columns; `columns` makes all (R, n, p + count)."""
     about = model.base, model.terms, model.joins, model.speeds
-    return ExtendedModel(*about, count=count, whole=whole)
+    return ExtendedModel(*about, count=count, columns=columns)

@@ -167,11 +167,11 @@ def observations_of(
         return replace(stacked(parts), source=log.source)
     # The mask of a row depends on the rows around it, in the next block too.
     margin = preprocessing.decimation.margin + preprocessing.settling
-    found, source = [], "the log"
-    for one in samples(model.robot, log, preprocessing, margin=margin, block=block):
-        found.append(_filtered(model, one, preprocessing))
-        source = one.source
-    return replace(stacked(found), source=source)
+    observations, source = [], "the log"
+    for sample_block in samples(model.robot, log, preprocessing, margin=margin, block=block):
+        observations.append(_filter_block(model, sample_block, preprocessing))
+        source = sample_block.source
+    return replace(stacked(observations), source=source)
 
 
 def stacked(parts: Sequence[Observations]) -> Observations:
@@ -195,21 +195,23 @@ def in_motion(rates: Array, slow: Array, rows: int, *, wraps: bool = False) -> A
     return np.asarray(scipy.ndimage.minimum_filter1d(moves, size, axis=0, mode=mode))
 
 
-def _filtered(model: LinearModel, block: SampleBlock, preprocessing: Preprocessing) -> Observations:
+def _filter_block(
+    model: LinearModel, block: SampleBlock, preprocessing: Preprocessing
+) -> Observations:
     decimation = preprocessing.decimation
     settling = preprocessing.settling
     inner = slice(settling, len(block.states) - settling)
     moving = in_motion(block.states.joint_rates, preprocessing.slow, settling)
     moving = (moving * block.smooth[:, None])[inner]
     states, forces = block.states.part(inner), block.forces[inner]
-    kept = decimation.centers(len(states))
+    centers = decimation.centers(len(states))
     return assembled(
         model,
         decimation(moving[..., None] * model.matrix(states)),
         decimation(moving * forces),
         decimation.noise(moving),
-        states.time[kept],
-        states.payload[kept],
+        states.time[centers],
+        states.payload[centers],
         np.linalg.norm(decimation.taps),
     )
 
@@ -245,14 +247,16 @@ def assembled(
 def _phases(log: Log, rate: float, fit: FourierFit) -> list[Log]:
     """Return the stretches of a periodic log with one payload that last a period or more."""
     parts = [log.part(start, stop) for start, stop in log.phases]
-    whole = [part for part in parts if part.duration + 1.0 / rate >= fit.period * (1.0 - 1e-3)]
-    if not whole:
+    long_enough = [
+        part for part in parts if part.duration + 1.0 / rate >= fit.period * (1.0 - 1e-3)
+    ]
+    if not long_enough:
         raise log.fault(
             "too short",
             f"no stretch with one payload lasts its period of {fit.period:g} s; record longer, or "
             'choose derivatives "central"',
         )
-    return whole
+    return long_enough
 
 
 def _periodic(
@@ -271,7 +275,7 @@ def _periodic(
     fine = np.linspace(start, start + period, per_period, endpoint=False)
     moving = in_motion(series.at(fine)[1], preprocessing.slow, preprocessing.settling, wraps=True)
     count = 2 * harmonics + 1
-    kept = np.linspace(start, start + period, count, endpoint=False)
+    instants = np.linspace(start, start + period, count, endpoint=False)
 
     places = (log.time - start) * (per_period / period)
     used = moving[np.round(places).astype(int) % per_period]
@@ -288,13 +292,15 @@ def _periodic(
         return np.asarray(shown[part][..., None] * model.matrix(states)).reshape(len(states), -1)
 
     n, p = used.shape[1], len(model.names)
-    basis = fourier_basis(kept, harmonics, period)
-    projection, whole = (Projection(each, period, harmonics) for each in (time, log.time))
+    basis = fourier_basis(instants, harmonics, period)
+    projection, force_projection = (
+        Projection(each, period, harmonics) for each in (time, log.time)
+    )
     matrix = (basis @ projection.coefficients(regressor, n * p)).reshape(count, n, p)
-    rows = basis @ whole.coefficients(lambda part: used[part] * log.forces[part], n)
-    noise = projection.noise(shown, kept) * np.sqrt(len(time) / log.rows)
+    rows = basis @ force_projection.coefficients(lambda part: used[part] * log.forces[part], n)
+    noise = projection.noise(shown, instants) * np.sqrt(len(time) / log.rows)
     payload = np.full(count, 0 if log.payload is None else log.payload[0], dtype=np.int64)
-    return assembled(model, matrix, rows, noise, kept, payload, np.sqrt(count / log.rows))
+    return assembled(model, matrix, rows, noise, instants, payload, np.sqrt(count / log.rows))
 
 
 def scaled(columns: Array) -> tuple[Array, Array]:

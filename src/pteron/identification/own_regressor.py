@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -134,62 +135,84 @@ def estimate(
         raise ModelError(f"estimator: {estimator!r} is not one of {', '.join(_ESTIMATORS)}")
     if (estimator == "instrumental") != (instruments is not None):
         raise ModelError('instruments: belong to estimator "instrumental"; give both or neither')
-    whole = checked_observations(
+    observations = checked_observations(
         regressor, forces, names=names, units=units, kinds=kinds, time=time, used=used
     )
-    if held_out is None:
-        rows = round(FITTED * len(whole.time))
-        if rows in (0, len(whole.time)):
-            raise DataError(f"forces: {len(whole.time)} samples given, more are needed")
-        fit, check = whole.part(slice(rows)), whole.part(slice(rows, None))
-    else:
-        fit = whole
-        other, measured, *counting = held_out
-        check = checked_observations(
-            other,
-            measured,
-            names=whole.names,
-            units=whole.units,
-            kinds=kinds,
-            used=counting[0] if counting else None,
-            place="held_out",
-        )
-        told = f"forces of {check.actuators} actuators"
-        expect(check.actuators == whole.actuators, "held_out", told, whole.actuators)
-    found = reduced(fit) if reduce else None
-    if found is not None:
-        fit, check = fit.columns(found.kept), check.columns(found.kept)
-
-    def alike(numbers: ArrayLike) -> Observations:
-        """Return instruments as observations of the fitted samples."""
-        given = finite(numbers, "instruments")
-        wanted = f"that of the regressor, {whole.matrix.shape},"
-        fits = given.size == whole.matrix.size
-        expect(fits, "instruments", f"shape {given.shape}", wanted)
-        part = replace(whole, matrix=given.reshape(whole.matrix.shape)).part(slice(len(fit.time)))
-        return part if found is None else part.columns(found.kept)
-
-    again = ESTIMATORS.get(estimator, weighted) if isinstance(estimator, str) else estimator
+    fit, check = _hold_out(observations, held_out, kinds)
+    independent = reduced(fit) if reduce else None
+    if independent is not None:
+        fit, check = fit.columns(independent.kept), check.columns(independent.kept)
+    solve = ESTIMATORS.get(estimator, weighted) if isinstance(estimator, str) else estimator
     try:
         if instruments is None:
-            answer = again(fit)
-        elif callable(instruments):
-            asked = instruments
-            answer = instrumental(fit, lambda values: alike(asked(values)))
+            values = solve(fit)
         else:
-            answer = instrumental(fit, alike(instruments))
+            read = partial(_instruments, observations, len(fit.time), independent)
+            values = _estimate_by_instruments(fit, instruments, read)
     except LogError as error:
         if error.reason == "too little motion" and not reduce:
             error.args = (f"{error}; or give reduce=True, which leaves out dependent columns",)
         raise
-    prediction = _prediction(check, answer, repeats=held_out is None)
+    prediction = _prediction(check, values, repeats=held_out is None)
     return Fit(
-        answer,
-        essential_parameters(fit, answer, again),
+        values,
+        essential_parameters(fit, values, solve),
         prediction,
         verdict_of([prediction], repeats=held_out is None),
-        found,
+        independent,
     )
+
+
+def _hold_out(
+    observations: Observations,
+    held_out: tuple[ArrayLike, ...] | None,
+    kinds: Sequence[str] | None,
+) -> tuple[Observations, Observations]:
+    """Return the observations to fit, and those held out: another motion's, or the last samples."""
+    count = len(observations.time)
+    if held_out is None:
+        rows = round(FITTED * count)
+        if rows in (0, count):
+            raise DataError(f"forces: {count} samples given, more are needed")
+        return observations.part(slice(rows)), observations.part(slice(rows, None))
+    regressor, forces, *used = held_out
+    check = checked_observations(
+        regressor,
+        forces,
+        names=observations.names,
+        units=observations.units,
+        kinds=kinds,
+        used=used[0] if used else None,
+        place="held_out",
+    )
+    actuators = f"forces of {check.actuators} actuators"
+    expect(check.actuators == observations.actuators, "held_out", actuators, observations.actuators)
+    return observations, check
+
+
+def _estimate_by_instruments(
+    fit: Observations,
+    instruments: ArrayLike | Callable[[Array], ArrayLike],
+    read: Callable[[ArrayLike], Observations],
+) -> Estimate:
+    """Return the estimate by instruments, or by a function that returns them for values."""
+    if callable(instruments):
+        return instrumental(fit, lambda values: read(instruments(values)))
+    return instrumental(fit, read(instruments))
+
+
+def _instruments(
+    observations: Observations, count: int, independent: Reduced | None, numbers: ArrayLike
+) -> Observations:
+    """Return instruments as observations of the first `count` samples, which are fitted."""
+    matrix = finite(numbers, "instruments")
+    shape = observations.matrix.shape
+    expected = f"that of the regressor, {shape},"
+    expect(
+        matrix.size == observations.matrix.size, "instruments", f"shape {matrix.shape}", expected
+    )
+    part = replace(observations, matrix=matrix.reshape(shape)).part(slice(count))
+    return part if independent is None else part.columns(independent.kept)
 
 
 def _prediction(check: Observations, estimate: Estimate, *, repeats: bool) -> Prediction:
@@ -200,8 +223,9 @@ def _prediction(check: Observations, estimate: Estimate, *, repeats: bool) -> Pr
         without = check.matrix @ np.where(np.isin(check.kinds, FRICTION), 0.0, estimate.values)
     # Equations that do not count are zero on both sides.
     used, counts = check.gain > 0.0, np.maximum(check.used, 1)
-    error, bare = (
-        np.sqrt(((check.forces - one) ** 2).sum(axis=0) / counts) for one in (predicted, without)
+    error, error_without_friction = (
+        np.sqrt(((check.forces - forces) ** 2).sum(axis=0) / counts)
+        for forces in (predicted, without)
     )
     mean = check.forces.sum(axis=0) / counts
     size = np.sqrt((used * (check.forces - mean) ** 2).sum(axis=0) / counts)
@@ -215,7 +239,7 @@ def _prediction(check: Observations, estimate: Estimate, *, repeats: bool) -> Pr
         left_out=1.0 - used.mean(axis=0),
         size=np.maximum(size, np.finfo(float).tiny),
         error=error,
-        error_without_friction=bare,
+        error_without_friction=error_without_friction,
         error_of_all=error,
         # Filters spread outliers: which samples they come from is not known.
         robust_error=error,

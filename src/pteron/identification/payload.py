@@ -18,18 +18,23 @@ from pteron.identification.estimators import Estimate, weighted
 from pteron.identification.faults import FaultIsolation, isolate_faults
 from pteron.identification.fitting import (
     NO_COLUMN,
-    balanced,
+    append_findings,
     check_columns,
     check_motion,
     check_recordings,
-    findings_told,
-    in_newtons,
+    convert_to_newtons,
+    stack_balanced,
 )
 from pteron.identification.logs import Finding, Log
 from pteron.identification.model import Model, Terms, identification_model
 from pteron.identification.observation import Observations, observations_of, stacked
-from pteron.identification.plausibility import CHANCE, left_over, unphysical, unseen
-from pteron.identification.recordings import Recording, recording
+from pteron.identification.plausibility import (
+    CHANCE,
+    excess_residual_cause,
+    unphysical,
+    unseen_names,
+)
+from pteron.identification.recordings import Recording, read_recording
 from pteron.identification.signals import Preprocessing, Processing, preprocessing_of
 from pteron.json_values import picked
 from pteron.kernels import Array
@@ -192,12 +197,14 @@ class Payload:
         if hidden:
             lines.append(f"Not felt by the actuators: {', '.join(hidden)}.")
         lines.append(self._opinion())
-        lines += [one.message for one in self.fault_isolation.faults if one.matters]
+        lines += [fault.message for fault in self.fault_isolation.faults if fault.matters]
         if not self.allowed_for:
             lines.append("The stated errors do not allow for that.")
-        lines += [f"Note: {one.message}" for one in self.findings]
-        left = ", ".join(f"{value:.2g}" for value in self.residual)
-        lines.append(f"Residuals of the actuator forces: {left} (standard deviations, N or N m).")
+        lines += [f"Note: {finding.message}" for finding in self.findings]
+        residuals = ", ".join(f"{value:.2g}" for value in self.residual)
+        lines.append(
+            f"Residuals of the actuator forces: {residuals} (standard deviations, N or N m)."
+        )
         return "\n".join(lines)
 
     def _opinion(self) -> str:
@@ -265,23 +272,29 @@ def identify_payload(
     """
     robot = as_manipulator(robot)
     model = identification_model(robot, replace(terms or Terms(), payload=True), base=base)
-    without = in_newtons(without, robot)
+    without = convert_to_newtons(without, robot)
     if with_payload is not None:
-        with_payload = in_newtons(with_payload, robot)
+        with_payload = convert_to_newtons(with_payload, robot)
     fit = _phases(without, with_payload, processing)
     check_recordings(robot, fit, (), processing or Processing())
-    with findings_told(fit):
-        parts, plans = _observed(model, fit, processing)
-        observations = balanced(parts)
+    with append_findings(fit):
+        parts, plans = _observe_phases(model, fit, processing)
+        observations = stack_balanced(parts)
         estimate = estimator(observations)
-        if unphysical(model, observations, estimate) or left_over(estimate, plans):
+        if unphysical(model, observations, estimate) or excess_residual_cause(estimate, plans):
             check_columns(model, fit[0], plans[0])
         check_motion(model, estimate, plans, fit[0])
-        hidden, cause = unseen(model, estimate.deviations), left_over(estimate, plans)
+        hidden, cause = (
+            unseen_names(model, estimate.deviations),
+            excess_residual_cause(estimate, plans),
+        )
         if cause and len(hidden) > _MOST_UNSEEN * model.base.rank:
             raise fit[0].log.fault("left over", cause)  # no verdict of a payload could say so
     return _payload(
-        model, estimate, isolate_faults(model, estimate, fit, plans), [one.findings for one in fit]
+        model,
+        estimate,
+        isolate_faults(model, estimate, fit, plans),
+        [recording.findings for recording in fit],
     )
 
 
@@ -302,15 +315,15 @@ def _payload(
     names = tuple(name for name in estimate.names if name in _BOTH)
     chosen = [estimate.names.index(name) for name in names]
 
-    def known(*kinds: str) -> tuple[float, ...] | None:
-        wanted = [f"{kind}_L" for kind in kinds]
-        return tuple(map(estimate.value, wanted)) if set(wanted) <= set(names) else None
+    def value_of_kinds(*kinds: str) -> tuple[float, ...] | None:
+        value_names = [f"{kind}_L" for kind in kinds]
+        return tuple(map(estimate.value, value_names)) if set(value_names) <= set(names) else None
 
     kinds = model.robot.platform.inertia.kinds
-    mass, tensor = known("m"), known(*(kind for kind in kinds if kind[0] == "I"))
+    mass, tensor = value_of_kinds("m"), value_of_kinds(*(kind for kind in kinds if kind[0] == "I"))
     return Payload(
         mass=None if mass is None else mass[0],
-        first_moment=known(*(kind for kind in kinds if kind[:2] == "mg")),
+        first_moment=value_of_kinds(*(kind for kind in kinds if kind[:2] == "mg")),
         inertia=tensor[0] if tensor and len(tensor) == 1 else tensor,
         names=names,
         covariance=estimate.covariance[np.ix_(chosen, chosen)],
@@ -326,8 +339,8 @@ def observations_with_payload(
 ) -> Observations:
     """Return the observations of a log with both phases, or of two logs, as one."""
     fit = _phases(without, with_payload, processing)
-    with findings_told(fit):
-        return stacked(_observed(model, fit, processing)[0])
+    with append_findings(fit):
+        return stacked(_observe_phases(model, fit, processing)[0])
 
 
 def _phases(
@@ -338,16 +351,16 @@ def _phases(
         logs = [without]
         _check_phases(without)
     else:
-        logs = [_in_phase(without, 0), _in_phase(with_payload, 1)]
+        logs = [_set_phase(without, 0), _set_phase(with_payload, 1)]
     period = None if processing is None else processing.period
-    return [recording(log, period=period) for log in logs]
+    return [read_recording(log, period=period) for log in logs]
 
 
-def _observed(
+def _observe_phases(
     model: Model, fit: Sequence[Recording], processing: Processing | None
 ) -> tuple[list[Observations], list[Preprocessing]]:
     """Return observations and preprocessing of each recording; both phases must be in them."""
-    logs = [one.head() for one in fit]
+    logs = [recording.head() for recording in fit]
     plans = [preprocessing_of(model.robot, log, processing) for log in logs]
     parts = [observations_of(model, *pair) for pair in zip(logs, plans, strict=True)]
     observations = stacked(parts)
@@ -374,7 +387,7 @@ def _check_phases(log: Log) -> None:
     raise log.fault("no payload", f"{said}, or give two logs")
 
 
-def _in_phase(log: Log, phase: int) -> Log:
+def _set_phase(log: Log, phase: int) -> Log:
     """Return a log as one phase throughout."""
     if log.payload is not None and ((log.payload != 0) != phase).any():
         row = int(np.argmax((log.payload != 0) != phase))

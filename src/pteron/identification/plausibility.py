@@ -94,11 +94,11 @@ def plausibility_warnings(
     `known` (p,) is the part of the values that is none of the bodies, such as rotors; `consistency`
     are the real bodies that were found, and `cad` is the machine as it is drawn.
     """
-    found = []
+    warnings = []
     if has_negative_inertia(model, estimate.values, estimate.covariance):
-        found.append("With these values the machine has negative inertia: forces do not belong.")
+        warnings.append("With these values the machine has negative inertia: forces do not belong.")
     if consistency is not None and consistency.p_value < CHANCE:
-        found.append(
+        warnings.append(
             f"No real bodies have these values: they are {consistency.distance:.2g} standard "
             "deviations away. Look at what the model takes for granted: geometry, working mode, "
             "units, legs that share parameters."
@@ -116,28 +116,28 @@ def plausibility_warnings(
                 f"{base.names[k]} ({values[k]:.3g}, drawn {base.grouping[k] @ drawn:.3g})"
                 for k in worst
             )
-            found.append(
+            warnings.append(
                 f"Far from the drawn machine: {names}. If the bodies are not that different, look "
                 "at geometry, working mode and units: other ones can explain forces as well."
             )
-    return found
+    return warnings
 
 
 def friction_below_zero(model: Model, observations: Observations, fit: Estimate) -> tuple[str, ...]:
     """Return a sentence on friction that is below zero by more than its interval; none else."""
     high = fit.intervals()[1]
-    felt = (high < 0.0) & _felt(observations, fit, _FELT)
+    felt = (high < 0.0) & _values_that_contribute(observations, fit, _FELT)
     chosen = np.flatnonzero(np.isin(model.kinds, _FRICTION) & felt)
     if not len(chosen):
         return ()
-    told = ", ".join(
+    negative = ", ".join(
         f"{fit.names[k]} = {fit.values[k]:.2g} (+- {high[k] - fit.values[k]:.1g}) {fit.units[k]}"
         for k in chosen
     )
     return (
-        f"Below zero beyond its interval, which no friction is: {told}. Where there is none, one "
-        "in 40 is so by chance; else something acts that the model has not, and intervals are too "
-        "short.",
+        f"Below zero beyond its interval, which no friction is: {negative}. Where there is none, "
+        "one in 40 is so by chance; else something acts that the model has not, and intervals are "
+        "too short.",
     )
 
 
@@ -176,7 +176,7 @@ class Factor(NamedTuple):
     deviation: float
 
     @property
-    def told(self) -> bool:
+    def is_detectable(self) -> bool:
         """Whether a factor that matters would be seen."""
         return CLEAR * self.deviation < WANTED
 
@@ -204,14 +204,14 @@ def known_values(
     them, and of the others the values are their differences from it.
     """
     part = model.known_values(rotors)
-    found = {name: float(part[model.names.index(name)]) for name in rotors if name in model.names}
-    for one in recordings:
-        if (payload := one.head().description.payload) is not None:
+    values = {name: float(part[model.names.index(name)]) for name in rotors if name in model.names}
+    for recording in recordings:
+        if (payload := recording.head().description.payload) is not None:
             kinds = model.robot.platform.inertia.kinds
-            found |= zip((f"{kind}_L" for kind in kinds), payload.values, strict=True)
+            values |= zip((f"{kind}_L" for kind in kinds), payload.values, strict=True)
     least = _ROUNDING * max(map(abs, rotors.values()), default=0.0)
     return {
-        name: value for name, value in found.items() if name in model.names and abs(value) > least
+        name: value for name, value in values.items() if name in model.names and abs(value) > least
     }
 
 
@@ -228,9 +228,9 @@ def factor_of_forces(model: Model, fit: Estimate, known: Mapping[str, float]) ->
     return Factor(float(weights @ fit.values[places]) / power, power**-0.5)
 
 
-def left_over(estimate: Estimate, preprocessing: Sequence[Preprocessing]) -> str:
+def excess_residual_cause(estimate: Estimate, preprocessing: Sequence[Preprocessing]) -> str:
     """Return a cause for residuals far larger than the forces' noise; empty if they are not."""
-    noise = np.max([one.force_noise for one in preprocessing], axis=0)
+    noise = np.max([how.force_noise for how in preprocessing], axis=0)
     ratio = float((estimate.noise / np.maximum(noise, np.finfo(float).tiny)).max())
     if ratio < _FAR_ABOVE:
         return ""
@@ -252,11 +252,13 @@ def unphysical(model: Model, observations: Observations, fit: Estimate) -> int:
     more than 5 % of the forces.
     """
     pushed = np.isin(model.kinds, _POSITIVE) & (fit.values < -_CERTAIN * fit.deviations)
-    pushed &= _felt(observations, fit, _PUSHED)
+    pushed &= _values_that_contribute(observations, fit, _PUSHED)
     return _negative_directions(model, fit.values, fit.covariance) + int(pushed.sum())
 
 
-def _felt(observations: Observations, fit: Estimate, share: float) -> NDArray[np.bool_]:
+def _values_that_contribute(
+    observations: Observations, fit: Estimate, share: float
+) -> NDArray[np.bool_]:
     """Return which values (p,) make more than a share of the forces at an actuator."""
     effect = np.abs(fit.values) * np.sqrt((observations.matrix**2).mean(axis=0))
     size = np.sqrt((observations.forces**2).mean(axis=0))
@@ -269,23 +271,23 @@ def _negative_directions(model: Model, values: Array, covariance: Array) -> int:
     robot, rng = model.robot, np.random.default_rng(0)
     drawn = model.base.grouping @ parameters(robot)
     pose = random_poses(robot, _PROBES, seed=rng)
-    rest = np.zeros_like(pose)
-    still = base_regressor(robot, model.base, pose, rest, rest)
+    zero = np.zeros_like(pose)
+    gravity_regressor = base_regressor(robot, model.base, pose, zero, zero)
     jacobians = evaluate_unchecked(robot, "jacobian", pose)
     rank = model.base.rank
     known = covariance[:rank, :rank]
-    directions = [rng.normal(size=pose.shape), *(rest + axis for axis in np.eye(pose.shape[1]))]
-    found = 0
-    for along in directions:
-        needed = base_regressor(robot, model.base, pose, rest, along)
-        rows = np.einsum("rnp,rnm,rm->rp", needed - still, jacobians, along)
+    directions = [rng.normal(size=pose.shape), *(zero + axis for axis in np.eye(pose.shape[1]))]
+    count = 0
+    for direction in directions:
+        needed = base_regressor(robot, model.base, pose, zero, direction)
+        rows = np.einsum("rnp,rnm,rm->rp", needed - gravity_regressor, jacobians, direction)
         spread = np.sqrt(np.maximum(np.einsum("rp,pq,rq->r", rows, known, rows), 0.0))
         least = np.maximum(_CERTAIN * spread, _NOTABLE * np.abs(rows @ drawn))
-        found += bool((rows @ values[:rank] < -least).mean() > 0.5)
-    return found
+        count += bool((rows @ values[:rank] < -least).mean() > 0.5)
+    return count
 
 
-def unseen(model: Model, deviations: Array) -> tuple[str, ...]:
+def unseen_names(model: Model, deviations: Array) -> tuple[str, ...]:
     """Return the base parameters whose deviations (p,) exceed their usual size."""
     return unseen_shares(model, deviations)[0]
 

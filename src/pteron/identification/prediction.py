@@ -147,20 +147,20 @@ def predict(
         out = used * _stands_out(error, np.maximum(preprocessing.force_noise, least))
         squares = used * error**2, used * bare**2, error**2, out * error**2
         each = used, out, measured, measured**2, *squares
-        sums += [one.sum(axis=0) for one in each]
+        sums += [quantity.sum(axis=0) for quantity in each]
         rows = slice(-total % step, None, step)
         columns = states.time, measured, predicted, without, states.joint_rates, used
         shown.append(np.column_stack([column[rows] for column in columns]))
         total += len(states)
-    kept = np.concatenate(shown)
-    parts = np.split(kept[:, 1:], 5, axis=1)
-    counts, out_counts, force, power, moving, bare, whole, out_power = sums
+    table = np.concatenate(shown)
+    parts = np.split(table[:, 1:], 5, axis=1)
+    counts, out_counts, force, power, moving, bare, total_power, out_power = sums
     seen = np.maximum(counts, 1.0)
     error = np.sqrt(moving / seen)
     share = out_counts / seen
     outliers = np.where((share > _RARE) & (share < _FEW), share, 0.0)
-    rest = (moving - out_power) / np.maximum(counts - out_counts, 1.0)
-    robust = np.where(outliers > 0.0, np.sqrt(np.maximum(rest, 0.0)), error)
+    inlier_power = (moving - out_power) / np.maximum(counts - out_counts, 1.0)
+    robust = np.where(outliers > 0.0, np.sqrt(np.maximum(inlier_power, 0.0)), error)
     return Prediction(
         source=recording.source,
         samples=total,
@@ -168,11 +168,11 @@ def predict(
         size=np.sqrt(np.maximum(power / total - (force / total) ** 2, np.finfo(float).tiny)),
         error=error,
         error_without_friction=np.sqrt(bare / seen),
-        error_of_all=np.sqrt(whole / total),
+        error_of_all=np.sqrt(total_power / total),
         robust_error=robust,
         outliers=outliers,
         noise=preprocessing.force_noise,
-        time=kept[:, 0],
+        time=table[:, 0],
         measured=parts[0],
         predicted=parts[1],
         without_friction=parts[2],

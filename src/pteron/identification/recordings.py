@@ -1,7 +1,7 @@
 """Recordings: logs in memory, or files read in pieces, divided into rows to fit and to hold out.
 
-Held-out rows judge the fit. `recording` mends time stamps first, and leaves lead-in and lead-out
-aside.
+Held-out rows judge the fit. `read_recording` mends time stamps first, and leaves lead-in and
+lead-out aside.
 """
 
 from __future__ import annotations
@@ -82,7 +82,7 @@ class Recording:
             if first < last:
                 yield piece.part(first, last)
 
-    def beginning(self) -> Recording:
+    def first_rows(self) -> Recording:
         """Return the first rows of a large file, enough to look at; else the whole log."""
         if isinstance(self.log, Log):
             return self
@@ -93,7 +93,7 @@ class Recording:
         return self.head() if isinstance(self.log, Log) else self.pieces()
 
 
-def recording(
+def read_recording(
     log: Log | LogFile,
     progress: Callable[[int], None] | None = None,
     period: float | None = None,
@@ -106,13 +106,13 @@ def recording(
     if isinstance(log, LogFile) and (log.rows_estimate or 0) <= log.rows_in_memory:
         log = log.read(progress)
     if isinstance(log, Log):
-        log = bridged(replace(log, time=_since(log.time), findings=_noticed(log)))
+        log = bridged(replace(log, time=_rebase_times(log.time), findings=_stamp_findings(log)))
         log = periodic_part(log, period)
         return Recording(log, 0, log.rows)
     return Recording(log, 0, _END)
 
 
-def _noticed(log: Log) -> tuple[Finding, ...]:
+def _stamp_findings(log: Log) -> tuple[Finding, ...]:
     """Return a log's findings; of one that comes from no file, those of its time stamps."""
     if log.findings or log.rows < 2:
         return log.findings
@@ -135,32 +135,34 @@ def periodic_part(log: Log, period: float | None = None) -> Log:
     phases = log.payload is not None and bool(np.ptp(log.payload))
     rows = None if phases else repeating_rows(log.time, log.joints, period)
     if rows is None:
-        told = "it has two phases of payload" if phases else "nothing in it repeats"
-        part, kept, rest = log, None, "the whole log is taken as a motion that is not periodic"
+        reason = "it has two phases of payload" if phases else "nothing in it repeats"
+        part, part_period = log, None
+        consequence = "the whole log is taken as a motion that is not periodic"
     else:
         first, last = (log.first_row + row + 1 for row in (rows.start, rows.stop - 1))
-        told, part, kept = f"rows {first} to {last} repeat", log.part(rows.start, rows.stop), period
-        rest = "lead-in, lead-out and rest are left out"
+        reason = f"rows {first} to {last} repeat"
+        part, part_period = log.part(rows.start, rows.stop), period
+        consequence = "lead-in, lead-out and rest are left out"
     if not phases:
-        told += f" after the period of {period:g} s"
+        reason += f" after the period of {period:g} s"
     return replace(
         part,
         time=part.time - part.time[0],
-        description=replace(about, period=kept, start=None, end=None),
+        description=replace(about, period=part_period, start=None, end=None),
         findings=(
             *log.findings,
-            Finding("periodic", f"{log.source}: {told}; {rest}", part.first_row + 1),
+            Finding("periodic", f"{log.source}: {reason}; {consequence}", part.first_row + 1),
         ),
     )
 
 
-def same(one: Recording, other: Recording) -> bool:
+def hold_same_samples(first: Recording, other: Recording) -> bool:
     """Say whether two recordings hold the same samples."""
-    a, b = one.head(), other.head()
+    a, b = first.head(), other.head()
     return np.array_equal(a.forces, b.forces) and np.array_equal(a.joints, b.joints)
 
 
-def _since(time: Array) -> Array:
+def _rebase_times(time: Array) -> Array:
     """Return times from the first on: far from zero, stamps are rounded.
 
     Those of a steady clock are put on its ticks again, with the roundest step that fits them.
@@ -175,36 +177,38 @@ def _since(time: Array) -> Array:
     ticks = np.r_[0.0, np.cumsum(np.round(steps / np.median(steps)))]
     step = float(since[-1] / ticks[-1])
     rounded = (float(f"{step:.{digits}g}") for digits in range(1, 17))
-    roundest = (one for one in rounded if abs(one - step) * ticks[-1] <= rounding)
+    roundest = (candidate for candidate in rounded if abs(candidate - step) * ticks[-1] <= rounding)
     step = next(roundest, step)
     steady: Array = ticks * step
     return steady if np.abs(since - steady).max() <= _ROUNDINGS * rounding else since
 
 
-def divided(whole: Recording, period: float | None) -> tuple[Recording, Recording]:
+def split_held_out(recording: Recording, period: float | None) -> tuple[Recording, Recording]:
     """Return the part of a recording to fit, and the part to hold out: its end.
 
     At a whole number of periods, where the motion is periodic: with `period`, or as it is declared.
     Of a log that carries a payload at times, the end of each phase is held out: both are fitted.
     """
-    log = whole.log
+    log = recording.log
     period = period or log.description.period
     if isinstance(log, Log) and log.payload is not None and np.ptp(log.payload):
         out = np.zeros(log.rows, dtype=bool)
         for start, stop in log.phases:
-            out[start + _cut(log.part(start, stop), stop - start, period) : stop] = True
+            out[start + _count_fitted_rows(log.part(start, stop), stop - start, period) : stop] = (
+                True
+            )
         parts = log.without(out), log.without(~out)
         first, second = (Recording(part, 0, part.rows) for part in parts)
         return first, second
-    cut = whole.start + _cut(log, whole.rows, period)
-    if cut - whole.start < 2 or whole.start + whole.rows - cut < 2:
+    cut = recording.start + _count_fitted_rows(log, recording.rows, period)
+    if cut - recording.start < 2 or recording.start + recording.rows - cut < 2:
         raise DataError(
-            f"{whole.source}: {whole.rows} rows are too few to hold some out; record longer"
+            f"{recording.source}: {recording.rows} rows are too few to hold some out; record longer"
         )
-    return replace(whole, stop=cut), replace(whole, start=cut)
+    return replace(recording, stop=cut), replace(recording, start=cut)
 
 
-def _cut(log: Log | LogFile, rows: int, period: float | None) -> int:
+def _count_fitted_rows(log: Log | LogFile, rows: int, period: float | None) -> int:
     """Return how many of a log's rows are fitted."""
     if period is not None and isinstance(log, Log):
         whole_periods = int((log.duration + 1.0 / log.rate) / period + 1e-3)

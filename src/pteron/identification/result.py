@@ -197,9 +197,9 @@ class Identification:
     def _friction(self, values: Array) -> tuple[dict[str, Any], ...]:
         """Return the friction of each joint by values (p,), by the fields of `Drive`."""
         coulomb, viscous, falls = (
-            self._per_joint(kind, values) for kind in ("coulomb", "viscous", "stribeck")
+            self._terms_per_joint(kind, values) for kind in ("coulomb", "viscous", "stribeck")
         )
-        offset = self._per_joint("offset", values, least=-np.inf)
+        offset = self._terms_per_joint("offset", values, least=-np.inf)
         speeds = self.model.stribeck_speeds
         laws = [
             Stribeck(force, speed) if force > 0.0 else None
@@ -210,7 +210,7 @@ class Identification:
             for c, v, o, law in zip(coulomb, viscous, offset, laws, strict=True)
         )
 
-    def _per_joint(self, kind: str, values: Array, least: float = 0.0) -> Array:
+    def _terms_per_joint(self, kind: str, values: Array, least: float = 0.0) -> Array:
         """Return a kind of term (n,) of values (p,), 0 where there is none.
 
         Friction and inertia below zero are noise: no joint pushes itself.
@@ -224,7 +224,7 @@ class Identification:
         return self.estimate.values[: self.model.base.rank]
 
     @property
-    def _exported(self) -> tuple[Array, Array, Sequence[str]]:
+    def _export_values(self) -> tuple[Array, Array, Sequence[str]]:
         """Values (p,), inertia of rotors (n,) and expressions for code from base parameters.
 
         Values are those of the fit, with the rotors that join them. Where legs share what one rotor
@@ -233,15 +233,15 @@ class Identification:
         """
         beside = self.model.per_joint("rotor", self.estimate.values)
         if self.rotors is None or beside is None or not (beside < 0.0).any():
-            inertia = self._per_joint("rotor", self.estimate.values)
+            inertia = self._terms_per_joint("rotor", self.estimate.values)
             return self.estimate.values, inertia, self.model.expressions
-        own = [*self.model.base.expressions(), *self.model.names[self.model.base.rank :]]
-        return self.values_without_rotors, self.reflected_inertia, own
+        expressions = [*self.model.base.expressions(), *self.model.names[self.model.base.rank :]]
+        return self.values_without_rotors, self.reflected_inertia, expressions
 
     def as_dict(self) -> dict[str, Any]:
         """Return everything but samples and residuals as plain data."""
         consistency, base = self.consistency, self.model.base
-        exported, inertia, expressions = self._exported
+        exported, inertia, expressions = self._export_values
         bodies = consistency and {
             **picked(consistency, "feasible distance p_value at_border cad_feasible"),
             **picked(consistency, "cad_violations"),
@@ -276,8 +276,8 @@ class Identification:
             **picked(self, "unseen"),
             "real_bodies": bodies,
             **picked(self, "trial=fault_isolation fitted held_out"),
-            "preprocessing": [picked(one, *vars(one)) for one in self.preprocessing],
-            "findings": [picked(one, "kind row column message") for one in self.findings],
+            "preprocessing": [picked(how, *vars(how)) for how in self.preprocessing],
+            "findings": [picked(finding, "kind row column message") for finding in self.findings],
             **picked(self, "notes"),
         }
 

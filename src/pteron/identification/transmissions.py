@@ -67,8 +67,8 @@ class Transmissions:
         return replace(
             robot,
             legs=tuple(
-                replace(leg, drive=replace(leg.drive or Drive(), elastic=Elastic(*own)))
-                for leg, *own in legs
+                replace(leg, drive=replace(leg.drive or Drive(), elastic=Elastic(*elasticity)))
+                for leg, *elasticity in legs
             ),
         )
 
@@ -135,24 +135,24 @@ def identify_transmissions(
     )
     bent = smoothed(motors - log.joints, log.rate, how.cutoff)
     rate = np.gradient(bent, log.time, axis=0)
-    side = smoothed(np.sign(_at(time, load, log.time)), log.rate, how.cutoff)
-    bent, rate, side = (_at(log.time, one, time) for one in (bent, rate, side))
+    side = smoothed(np.sign(_interpolate(time, load, log.time)), log.rate, how.cutoff)
+    bent, rate, side = (_interpolate(log.time, signal, time) for signal in (bent, rate, side))
     edge = SETTLING / (how.cutoff or log.rate)
     inner = (time > time[0] + edge) & (time < time[-1] - edge)
     fits = [
-        _fitted(robot, j, *(one[own, j] for one in (bent, load, side, rate)))
+        _fit_transmission(robot, j, *(signal[clear_rows, j] for signal in (bent, load, side, rate)))
         for j in range(robot.joint_count)
-        for own in [inner & (np.abs(np.abs(side[:, j]) - 1.0) < _ACROSS)]
+        for clear_rows in [inner & (np.abs(np.abs(side[:, j]) - 1.0) < _ACROSS)]
     ]
     return Transmissions(*np.array(fits).T)
 
 
-def _at(known: Array, values: Array, time: Array) -> Array:
+def _interpolate(known: Array, values: Array, time: Array) -> Array:
     """Return signals (T, n), known at some times, at other times between these."""
     return np.column_stack([np.interp(time, known, column) for column in values.T])
 
 
-def _fitted(
+def _fit_transmission(
     robot: Manipulator, j: int, bent: Array, load: Array, side: Array, rate: Array
 ) -> tuple[float, ...]:
     """Return stiffness, damping and backlash of a joint's transmission, and their deviations.
@@ -162,22 +162,22 @@ def _fitted(
     columns = np.column_stack([load, -rate, np.ones_like(load), np.sign(side)])
     blocks = np.array_split(np.arange(len(load)), _BLOCKS)
     rare = columns[:, 3] == -np.sign(columns[:, 3].sum())
-    told = rare.mean() > _RARE and sum(rare[block].any() for block in blocks) > _RARE_BLOCKS
-    if not told:
+    both_sides = rare.mean() > _RARE and sum(rare[block].any() for block in blocks) > _RARE_BLOCKS
+    if not both_sides:
         columns, bent = columns[~rare, :3], bent[~rare]
         blocks = np.array_split(np.arange(len(bent)), _BLOCKS)
 
     def values(left_out: NDArray[np.int64]) -> tuple[float, float, float]:
         rows, known = np.delete(columns, left_out, axis=0), np.delete(bent, left_out)
         sizes = np.linalg.norm(rows, axis=0)
-        give, lag, *more = np.linalg.lstsq(rows / sizes, known)[0] / sizes
-        return 1.0 / give, lag / give, 2.0 * more[1] if told else np.nan
+        give, lag, *offsets = np.linalg.lstsq(rows / sizes, known)[0] / sizes
+        return 1.0 / give, lag / give, 2.0 * offsets[1] if both_sides else np.nan
 
-    found = values(np.zeros(0, np.int64))
+    estimates = values(np.zeros(0, np.int64))
     spread = np.sqrt(_BLOCKS - 1.0) * np.std([values(block) for block in blocks], axis=0)
-    if not found[0] > _CLEAR * spread[0]:
+    if not estimates[0] > _CLEAR * spread[0]:
         raise DataError(
             f"{robot.joint_names[j]}: its load does not tell how its transmission bends; record "
             "faster motions, or both sides with finer encoders"
         )
-    return *found, *spread
+    return *estimates, *spread

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from pteron.identification.estimators import weighted
 from pteron.identification.estimators.least_squares import actuator_noise
-from pteron.identification.model import Model, diagonal, extended
+from pteron.identification.model import Model, diagonal, extend_model
 from pteron.identification.observation import LinearModel, Observations, scaled
 from pteron.identification.signals import States
 from pteron.identification.signals.preprocessing import LATEST
@@ -88,16 +88,16 @@ class Unknowns:
 
     def as_dict(self) -> dict[str, Any]:
         """Return it as plain data, null where friction is not seen to fall."""
-        found: dict[str, Any] = {"delay": self.delay, "delay_deviation": self.delay_deviation}
+        record: dict[str, Any] = {"delay": self.delay, "delay_deviation": self.delay_deviation}
         if self.speeds is not None:
             ends = np.array([self.speeds, *self.speed_intervals()]).T.tolist()
             rows = [row if np.isfinite(row[0]) else None for row in ends]
-            found["stribeck_speeds"] = [row and row[0] for row in rows]
-            found["stribeck_intervals_95"] = [row and row[1:] for row in rows]
-        return found
+            record["stribeck_speeds"] = [row and row[0] for row in rows]
+            record["stribeck_intervals_95"] = [row and row[1:] for row in rows]
+        return record
 
 
-def settled(
+def fit_nonlinear_terms(
     model: Model,
     observe: Callable[[LinearModel, float], Observations],
     begin: Unknowns,
@@ -127,37 +127,39 @@ def settled(
         The model, its observations, the unknowns, and the part of the values' covariance (p, p)
         that comes from them.
     """
-    found, p = begin, len(model.names)
-    speeds = None if found.speeds is None else found.speeds.copy()
+    unknowns, p = begin, len(model.names)
+    speeds = None if unknowns.speeds is None else unknowns.speeds.copy()
     seen = np.flatnonzero(np.isfinite(speeds)) if speeds is not None else np.zeros(0, dtype=int)
     for _ in range(_ROUNDS):
         if speeds is not None:
-            model = model.falling(speeds)
+            model = model.with_speeds(speeds)
         columns = partial(_slopes, model, seen, values, late)
-        rows = observe(extended(model, len(seen) + late, columns), found.delay)
+        rows = observe(extend_model(model, len(seen) + late, columns), unknowns.delay)
         plain = rows.columns(range(p))
-        whole, part = weighted(rows), weighted(plain)
-        values, more = part.values, whole.covariance[:p, :p] - part.covariance
-        step, deviations = whole.values[p:], whole.deviations[p:]
+        extended_fit, part = weighted(rows), weighted(plain)
+        values, covariance = part.values, extended_fit.covariance[:p, :p] - part.covariance
+        step, deviations = extended_fit.values[p:], extended_fit.deviations[p:]
         if speeds is not None:
             forces = np.array([part.value(f"Fs{i + 1}") for i in seen])
             step[: len(seen)] /= forces
             deviations[: len(seen)] /= np.abs(forces)
             spread = np.full(len(speeds), np.nan)
             spread[seen] = deviations[: len(seen)]
-            found = replace(found, speeds=speeds.copy(), speed_deviations=spread)
+            unknowns = replace(unknowns, speeds=speeds.copy(), speed_deviations=spread)
         if late:
-            found = replace(found, delay_deviation=float(deviations[-1]))
+            unknowns = replace(unknowns, delay_deviation=float(deviations[-1]))
         if not (np.abs(step) > np.maximum(_SETTLED * deviations, _ROUNDING)).any():
             break
         if speeds is not None:
             speeds[seen] *= np.exp(np.clip(step[: len(seen)], -_STEP, _STEP))
         if late:
-            found = replace(found, delay=float(np.clip(found.delay + step[-1], -LATEST, LATEST)))
-    return model, plain, found, more
+            unknowns = replace(
+                unknowns, delay=float(np.clip(unknowns.delay + step[-1], -LATEST, LATEST))
+            )
+    return model, plain, unknowns, covariance
 
 
-def searched_speeds(model: Model, observe: Observe, usual: Array) -> Array:
+def search_speeds(model: Model, observe: Observe, usual: Array) -> Array:
     """Return the speeds (n,) of least squares, about; infinite where friction is not seen to fall.
 
     `model` has none of that friction yet, and `usual` (n,) are the root mean squares of the joints'
@@ -171,7 +173,7 @@ def searched_speeds(model: Model, observe: Observe, usual: Array) -> Array:
         falls = np.exp(-((rates / (usual[:, None] * shares)) ** 2))
         return np.concatenate([model.matrix(states), np.sign(rates) * falls], axis=-1)
 
-    rows = observe(extended(model, _COLUMNS, columns))
+    rows = observe(extend_model(model, _COLUMNS, columns))
     plain = rows.columns(range(p))
     noise = weighted(plain).noise
     tried = np.geomspace(_SLOWEST, _FASTEST, _FINE)
@@ -185,16 +187,16 @@ def searched_speeds(model: Model, observe: Observe, usual: Array) -> Array:
         basis = np.linalg.qr(scaled(weighed.reshape(-1, p))[0])[0]
         forces = (plain.forces / noise).ravel()
         each = rows.matrix[..., p:] / noise[:, None]
-        own = np.einsum("ric,ij->rijc", each, np.eye(n)).reshape(len(forces), -1)
-        inner = basis.T @ own
-        gram = (own.T @ own - inner.T @ inner).reshape(n, _COLUMNS, n, _COLUMNS)
-        image = (own.T @ forces - inner.T @ (basis.T @ forces)).reshape(n, _COLUMNS)
+        joint_columns = np.einsum("ric,ij->rijc", each, np.eye(n)).reshape(len(forces), -1)
+        inner = basis.T @ joint_columns
+        gram = (joint_columns.T @ joint_columns - inner.T @ inner).reshape(n, _COLUMNS, n, _COLUMNS)
+        image = (joint_columns.T @ forces - inner.T @ (basis.T @ forces)).reshape(n, _COLUMNS)
         chosen = _coordinatewise(spline, gram, image)
         speeds = np.where(chosen >= 0, usual * tried[np.maximum(chosen, 0)], np.inf)
         falls = np.einsum("ric,ic->ri", rows.matrix[..., p:], spline[chosen])
         extra = diagonal(falls)[..., chosen >= 0]
-        whole = plain.with_matrix(np.concatenate([plain.matrix, extra], axis=-1))
-        noise = actuator_noise(whole, weighted(whole).values)
+        with_friction = plain.with_matrix(np.concatenate([plain.matrix, extra], axis=-1))
+        noise = actuator_noise(with_friction, weighted(with_friction).values)
     return speeds
 
 
@@ -215,7 +217,7 @@ def _coordinatewise(spline: Array, gram: Array, image: Array) -> NDArray[np.int6
         return float(right @ sizes) if (sizes > 0.0).all() else -1.0
 
     for _ in range(_ROUNDS):
-        before = chosen.copy()
+        previous = chosen.copy()
         for i in range(n):
             without = chosen.copy()
             without[i] = -1
@@ -226,7 +228,7 @@ def _coordinatewise(spline: Array, gram: Array, image: Array) -> NDArray[np.int6
             without[i] = -1
             best = int(np.argmax(gains))
             chosen[i] = best if gains[best] > gain(without) + _CLEAR else -1
-        if (chosen == before).all():
+        if (chosen == previous).all():
             break
     return chosen
 
@@ -239,13 +241,13 @@ def _slopes(
     And, where forces are late, how those of a fit change with the delay, but for dry friction.
     """
     rates, matrix = states.joint_rates, model.matrix(states)
-    found = np.zeros((*rates.shape, len(seen) + late))
+    slopes = np.zeros((*rates.shape, len(seen) + late))
     if len(seen):
         square = (rates[:, seen] / np.asarray(model.stribeck_speeds)[seen]) ** 2
         slope = 2.0 * np.sign(rates[:, seen]) * square * np.exp(-square)
-        found[:, seen, np.arange(len(seen))] = slope
+        slopes[:, seen, np.arange(len(seen))] = slope
     if late:
         dry = np.isin(model.kinds, ("coulomb", "stribeck"))
         smooth = matrix @ np.where(dry, 0.0, values)
-        found[..., -1] = -np.gradient(smooth, states.time, axis=0, edge_order=2)
-    return np.concatenate([matrix, found], axis=-1)
+        slopes[..., -1] = -np.gradient(smooth, states.time, axis=0, edge_order=2)
+    return np.concatenate([matrix, slopes], axis=-1)

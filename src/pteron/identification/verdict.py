@@ -148,46 +148,46 @@ def verdict_of(
     left : str
         How far what the model leaves is above the noise, said where no cause shows.
     """
-    found = Opinion()
+    opinion = Opinion()
     if faults is not None:
         # Beside the drawing a common factor shows, if only to some per cent.
-        hidden = tuple(one for one in faults.hidden if one != "gain" or factor == 1.0)
+        hidden = tuple(name for name in faults.hidden if name != "gain" or factor == 1.0)
         faults = replace(faults, log=tuple(log), factor=factor, hidden=hidden)
-    if any(one.distorts for one in log):
-        found.lower("usable with care")
+    if any(fault.distorts for fault in log):
+        opinion.lower("usable with care")
     if factor != 1.0:
-        found.lower("usable with care")
-    opinions = [_of_prediction(one) for one in held_out]
+        opinion.lower("usable with care")
+    opinions = [_judge_prediction(prediction) for prediction in held_out]
     if faults is not None:
-        opinions.append(_of_faults(faults))
-    for one in opinions:
-        found.lower(one.grade)
-        found.reasons += one.reasons
-        found.steps += one.steps
-    if left and found.grade != "trustworthy" and not (faults is not None and faults.causes):
-        found.add(f"{left[0].upper()}{left[1:]}.")
+        opinions.append(_judge_faults(faults))
+    for part in opinions:
+        opinion.lower(part.grade)
+        opinion.reasons += part.reasons
+        opinion.steps += part.steps
+    if left and opinion.grade != "trustworthy" and not (faults is not None and faults.causes):
+        opinion.add(f"{left[0].upper()}{left[1:]}.")
     if hidden_orders:
-        found.add(hidden_orders)
+        opinion.add(hidden_orders)
     if repeats:
-        found.add(
+        opinion.add(
             "What was held out repeats the motion that was fitted: it tells of noise and drift, "
             "less of other motions.",
             "Record another motion, such as a pick-and-place cycle, and hold it out (--held-out): "
             "pteron excite ROBOT --out motion.csv writes one too, motion-held-out.csv.",
         )
     unwanted = followed if faults is None or not faults.causes else {*followed, *_GENERAL}
-    found.steps = [step for step in found.steps if not any(name in step for name in unwanted)]
-    return found.verdict()
+    opinion.steps = [step for step in opinion.steps if not any(name in step for name in unwanted)]
+    return opinion.verdict()
 
 
 def with_hidden_first(verdict: Verdict) -> Verdict:
     """Return the verdict with what its logs cannot show at all in the first sentence."""
     hidden = [reason for reason in verdict.reasons if reason.startswith(_CANNOT)]
-    rest = [reason for reason in verdict.reasons if not reason.startswith(_CANNOT)]
+    others = [reason for reason in verdict.reasons if not reason.startswith(_CANNOT)]
     if not hidden:
         return verdict
     together = "; ".join(reason.removeprefix(_CANNOT).strip().rstrip(".") for reason in hidden)
-    return replace(verdict, reasons=(f"{_CANNOT} {together}.", *rest))
+    return replace(verdict, reasons=(f"{_CANNOT} {together}.", *others))
 
 
 def with_bodies(verdict: Verdict, consistency: Consistency | None, off: float) -> Verdict:
@@ -206,7 +206,7 @@ def with_bodies(verdict: Verdict, consistency: Consistency | None, off: float) -
     return replace(verdict, grade="not trustworthy", reasons=(reason, *verdict.reasons))
 
 
-def judged(
+def predict_held_out(
     model: Model, values: Array, recording: Recording, preprocessing: Preprocessing
 ) -> Prediction:
     """Return the prediction by a model with values (p,) of a recording that was not fitted.
@@ -215,96 +215,98 @@ def judged(
     chosen for the whole recording, whose samples at rest have less noise but do not count. No value
     is fitted to the recording, and a wrong model stays wrong at every cut-off.
     """
-    found = predict(model, values, recording, preprocessing)
+    prediction = predict(model, values, recording, preprocessing)
     if preprocessing.cutoff is None or preprocessing.derivatives == "periodic":
-        return found
+        return prediction
     for share in _LOWER:
-        if _of_prediction(found).grade == "trustworthy":
+        if _judge_prediction(prediction).grade == "trustworthy":
             break
         lower = replace(preprocessing, cutoff=share * preprocessing.cutoff)
         other = predict(model, values, recording, lower)
-        found = min(found, other, key=lambda one: float(one.robust_nrms.max()))
-    return found
+        prediction = min(
+            prediction, other, key=lambda candidate: float(candidate.robust_nrms.max())
+        )
+    return prediction
 
 
-def _graded(percent: float, small: float) -> Grade:
+def _grade_error(percent: float, small: float) -> Grade:
     if percent <= small:
         return "trustworthy"
     return "usable with care" if percent <= LARGE else "not trustworthy"
 
 
-def _of_prediction(prediction: Prediction) -> Opinion:
+def _judge_prediction(prediction: Prediction) -> Opinion:
     ratio = prediction.robust_nrms / np.maximum(prediction.floor, 1e-12)
     missed = prediction.unexplained
     # The worst actuator is the one farthest beyond both limits.
     worst = int(np.argmax(np.where(ratio <= AT_THE_FLOOR, 0.0, missed)))
-    found = Opinion()
+    opinion = Opinion()
     drowned = int(np.argmax(prediction.robust_nrms))
     if not (prediction.robust_nrms <= DROWNED).all():
-        found.add(
+        opinion.add(
             f"The forces of actuator {drowned + 1} are not explained: what is left of them is "
             f"{prediction.robust_nrms[drowned]:.0f} % of what was measured.",
             "Look for what else acts on the forces, or move faster than their noise.",
             grade="not trustworthy",
         )
     elif ratio[worst] > AT_THE_FLOOR:
-        found.grade = _graded(float(missed[worst]), SMALL)
-    found.add(
+        opinion.grade = _grade_error(float(missed[worst]), SMALL)
+    opinion.add(
         f"{prediction.source}: held-out NRMS of {percentages(prediction.nrms)} where noise alone "
         f"makes {percentages(prediction.floor)}."
     )
     if (share := float(prediction.outliers.max())) > 0.0:
-        found.add(
+        opinion.add(
             f"{prediction.source}: up to {100.0 * share:.2g} % of a force's samples stand out; "
             f"without them the NRMS is {percentages(prediction.robust_nrms)}, which is what "
             "counts.",
             "Forces stand out: --estimator huber counts such samples less.",
         )
-    if found.grade == "trustworthy" and ratio[worst] > AT_THE_FLOOR:
-        found.add(
+    if opinion.grade == "trustworthy" and ratio[worst] > AT_THE_FLOOR:
+        opinion.add(
             f"The model misses {percentages([missed[worst]], 1)} of the force of actuator "
             f"{worst + 1} beyond the noise (its error is {times(ratio[worst])} the noise); up to "
             f"{SMALL:g} % is trusted."
         )
-    elif found.grade != "trustworthy":
+    elif opinion.grade != "trustworthy":
         friction = prediction.nrms_without_friction[worst] - prediction.nrms[worst]
-        found.add(
+        opinion.add(
             f"Actuator {worst + 1} is the worst: the model misses {missed[worst]:.1f} % of its "
             f"force beyond the noise; up to {SMALL:g} % is trusted, above {LARGE:g} % not.",
             _STEPS[bool(friction < 0.1 * prediction.nrms_without_friction[worst])],
         )
-    return found
+    return opinion
 
 
-def _of_faults(shown: FaultIsolation) -> Opinion:
-    found = Opinion(reasons=list(shown.causes))
+def _judge_faults(shown: FaultIsolation) -> Opinion:
+    opinion = Opinion(reasons=list(shown.causes))
     if shown.matters:
-        found.grade = "usable with care"
+        opinion.grade = "usable with care"
     if shown.understates:
-        found.add("The stated errors of the values do not allow for that.")
+        opinion.add("The stated errors of the values do not allow for that.")
     if not shown.tried:
-        found.add(f"Fault isolation was not run: {shown.why_not}.", grade="usable with care")
+        opinion.add(f"Fault isolation was not run: {shown.why_not}.", grade="usable with care")
     elif not shown.causes:
-        found.add(f"No fault shows in the residuals; tried: {', '.join(shown.tried)}.")
+        opinion.add(f"No fault shows in the residuals; tried: {', '.join(shown.tried)}.")
     for fault in shown.hidden:
-        found.add(*_HIDDEN[fault])
+        opinion.add(*_HIDDEN[fault])
     if np.isnan(shown.off).any():
-        return found
+        return opinion
     worst = int(np.argmax(shown.off))
     off = float(shown.off[worst])
-    found.add(
+    opinion.add(
         f"A pick-and-place cycle, or another motion as fast as this one, is expected to be up to "
         f"{percentages([off]) if off < 0.01 else f'{off:.2g} %'} off "
         f"in its forces (actuator {worst + 1}); up to {CYCLE:g} % is trusted, above {LARGE:g} % "
         "not.",
-        grade=_graded(off, CYCLE),
+        grade=_grade_error(off, CYCLE),
     )
-    if found.grade != "trustworthy" and shown.uncertain[worst] > shown.spoiled[worst]:
-        found.steps.append(
+    if opinion.grade != "trustworthy" and shown.uncertain[worst] > shown.spoiled[worst]:
+        opinion.steps.append(
             "The motion leaves such a cycle's forces open: record a motion from pteron excite, "
             "faster or longer."
         )
-    return found
+    return opinion
 
 
 def percentages(values: Iterable[float], places: int = 2) -> str:

@@ -70,11 +70,11 @@ class Bodies:
     def scale(self, masses: Array) -> Array:
         """Return the unit of each free parameter, from the bodies' masses, kg."""
         lengths = self.extents[:, 1] - self.extents[:, 0]
-        found = np.empty(len(self.columns))
+        units = np.empty(len(self.columns))
         for mass, length, place in zip(masses, lengths, self.places.values(), strict=True):
             for column in place.values():
-                found[column] = mass * length ** self.columns[column].length_power
-        return found
+                units[column] = mass * length ** self.columns[column].length_power
+        return units
 
     def mean(self, values: Array) -> Array:
         """Return the free parameters of given parameters (N,): their mean where legs share."""
@@ -115,9 +115,9 @@ def bodies_of(base: BaseParameters) -> Bodies:
     extents = {}
     for p in columns:
         known = [robot.legs[leg - 1].extents.get(p.body) for leg in p.legs]
-        found = [extent[1:3] for extent in known if extent is not None]
+        ends = [extent[1:3] for extent in known if extent is not None]
         default = (-half, half) if not p.legs else (-mean, 0.0) if p.body == "l" else (0.0, mean)
-        extents[p.owner] = np.mean(found, axis=0) if found else np.array(default)
+        extents[p.owner] = np.mean(ends, axis=0) if ends else np.array(default)
     return Bodies(columns, sharing, np.array(list(extents.values())))
 
 
@@ -217,8 +217,8 @@ def plain_target(bodies: Bodies, base: BaseParameters, values: Array) -> Target:
     (1/2, 1/3) or a disc (0, 1/2), in lengths of the body: strictly convex, so that the answer is
     one, also where the forces leave a parameter entirely free (a Tripteron's platform's inertia).
     """
-    kept = (base.parameters[column] for column in base.kept)
-    masses = [abs(v) for v, p in zip(values, kept, strict=True) if p.kind == "m"]
+    parameters = (base.parameters[column] for column in base.kept)
+    masses = [abs(v) for v, p in zip(values, parameters, strict=True) if p.kind == "m"]
     typical = float(np.mean(masses)) if masses and np.mean(masses) > 0.0 else 1.0
     heads, count = bodies.masses, len(bodies.names)
     scale = bodies.scale(np.full(count, typical))

@@ -112,12 +112,12 @@ class Bounds:
                 if not np.isfinite(limit):
                     raise ModelError(f"bounds: {key}: {limit} is not a number")
                 known = {p.name: f"{p.kind}_{p.body}" for p in columns}
-                for name in _matching(key, known, "parameter"):
+                for name in _names_of_key(key, known, "parameter"):
                     row = sign * unit[list(known).index(name)]
                     rows.append((row, sign * limit, f"{name} {sense} {limit:g}"))
         for key, box in self.boxes.items():
             turning = {p.owner: p.body for p in columns if p.kind in ("I", "Izz")}
-            for body in _matching(key, turning, "body"):
+            for body in _names_of_key(key, turning, "body"):
                 place = {kind: unit[column] for kind, column in places[body].items()}
                 rows += [(row, 0.0, f"box of {body}: {what}") for row, what in _box(place, box)]
         for body, (low, high) in _rods(robot).items():
@@ -137,21 +137,21 @@ class Bounds:
 
 def _rods(robot: Manipulator) -> dict[str, tuple[float, float]]:
     """Return where each rod of known ends begins and ends along its x, m."""
-    found = {}
+    ends = {}
     for p in parameter_data(robot):
         if p.kind == "I" and p.legs:
             leg = robot.legs[p.legs[0] - 1]
             if p.body in leg.extents and leg.bodies[p.body].kinds == RodInertia.kinds:
-                found[p.owner] = leg.extents[p.body][1:3]
-    return found
+                ends[p.owner] = leg.extents[p.body][1:3]
+    return ends
 
 
-def _matching(key: str, known: Mapping[str, str], what: str) -> list[str]:
+def _names_of_key(key: str, known: Mapping[str, str], what: str) -> list[str]:
     """Return the name itself, or those of all legs that go by the same name without a number."""
-    found = [name for name, stem in known.items() if key in (name, stem)]
-    if not found:
+    names = [name for name, stem in known.items() if key in (name, stem)]
+    if not names:
         raise ModelError(f"bounds: {key!r} is no {what} of this machine: {', '.join(known)}")
-    return found
+    return names
 
 
 def _box(place: Mapping[str, Array], box: Box) -> Iterator[tuple[Array, str]]:

@@ -53,13 +53,13 @@ class RealBodies:
         of_z, of_depth = [-self.matrix], [np.zeros(len(self.right))]
         for moments, margin in zip(self.bodies.moments, self.margins, strict=True):
             column, row = np.tril_indices(len(moments))
-            across = row == column
-            of_z.append(moments[row, column] * np.where(across, 1.0, np.sqrt(2.0))[:, None])
-            of_depth.append(np.where(across, -margin, 0.0))
-        whole = np.vstack(of_z)
-        constant = np.zeros(len(whole))
+            on_diagonal = row == column
+            of_z.append(moments[row, column] * np.where(on_diagonal, 1.0, np.sqrt(2.0))[:, None])
+            of_depth.append(np.where(on_diagonal, -margin, 0.0))
+        matrix = np.vstack(of_z)
+        constant = np.zeros(len(matrix))
         constant[: len(self.right)] = self.right
-        return whole, np.concatenate(of_depth), constant
+        return matrix, np.concatenate(of_depth), constant
 
 
 def widest(real: RealBodies, start: Array, free: Array, most: float) -> tuple[float, Array]:
@@ -71,10 +71,12 @@ def widest(real: RealBodies, start: Array, free: Array, most: float) -> tuple[fl
     rows = np.column_stack([of_z @ free, of_depth])
     last = np.eye(rows.shape[1])[-1]
     right = np.concatenate([[most], constant + of_z @ start])
-    found = _solved(real, np.zeros(len(last)), -last, np.vstack([-last, rows]), right)
-    if found is None:
+    solution = _solve_cone_program(
+        real, np.zeros(len(last)), -last, np.vstack([-last, rows]), right
+    )
+    if solution is None:
         return -np.inf, start
-    return float(found[0][-1]), start + free @ found[0][:-1]
+    return float(solution[0][-1]), start + free @ solution[0][:-1]
 
 
 def nearest(
@@ -82,11 +84,11 @@ def nearest(
 ) -> Array | None:
     """Return z = start + free @ y in the set with the least |matrix @ z - right|, or None."""
     of_z, of_depth, constant = real.rows
-    held = constant + of_z @ start + depth * of_depth
-    found = _least_squares(
-        real, matrix @ free, matrix @ start - right, np.eye(len(right)), of_z @ free, held
+    right_side = constant + of_z @ start + depth * of_depth
+    solution = _least_squares(
+        real, matrix @ free, matrix @ start - right, np.eye(len(right)), of_z @ free, right_side
     )
-    return None if found is None else np.asarray(start + free @ found[0][: free.shape[1]])
+    return None if solution is None else np.asarray(start + free @ solution[0][: free.shape[1]])
 
 
 def closest(
@@ -100,7 +102,7 @@ def closest(
     size = np.linalg.norm(matrix, axis=1)
     distance = float(np.linalg.norm(np.linalg.solve(spread, values)))
     for share in _UNITS:
-        found = _least_squares(
+        solution = _least_squares(
             real,
             matrix / size[:, None],
             -values / size,
@@ -108,11 +110,11 @@ def closest(
             of_z,
             constant + depth * of_depth,
         )
-        if found is not None:
+        if solution is not None:
             break
     else:
         return None
-    answer, multipliers = found
+    answer, multipliers = solution
     limits, cones = np.split(np.abs(multipliers[len(size) :]), [len(real.right)])
     # A body's multipliers are a matrix as well: its trace counts.
     traces = np.where(of_depth[len(real.right) :] < 0.0, cones, 0.0)
@@ -127,14 +129,16 @@ def _least_squares(
 
     What holds y in the set are the `rows` of y, and `right`.
     """
-    count, rest = matrix.shape[1], spread.shape[1]
-    squares = np.repeat([0.0, 1.0], [count, rest])
-    whole = np.block([[matrix, -spread], [rows, np.zeros((len(rows), rest))]])
+    count, residual_count = matrix.shape[1], spread.shape[1]
+    squares = np.repeat([0.0, 1.0], [count, residual_count])
+    constraints = np.block([[matrix, -spread], [rows, np.zeros((len(rows), residual_count))]])
     right = np.concatenate([shift, right])
-    return _solved(real, squares, np.zeros(count + rest), whole, right, equal=len(shift))
+    return _solve_cone_program(
+        real, squares, np.zeros(count + residual_count), constraints, right, equal=len(shift)
+    )
 
 
-def _solved(
+def _solve_cone_program(
     real: RealBodies, squares: Array, linear: Array, rows: Array, right: Array, *, equal: int = 0
 ) -> tuple[Array, Array] | None:
     """Return v with the least squares @ v^2 + linear @ v, and multipliers of the rows, or None.
@@ -145,8 +149,8 @@ def _solved(
     try:
         import clarabel  # type: ignore[import-untyped]
     except ImportError:
-        told = "consistency needs Clarabel, which is not installed"
-        raise MissingSolver(f"{told}; {install_command('consistency')}") from None
+        message = "consistency needs Clarabel, which is not installed"
+        raise MissingSolver(f"{message}; {install_command('consistency')}") from None
     cones = [clarabel.PSDTriangleConeT(len(moments)) for moments in real.bodies.moments]
     positive = clarabel.NonnegativeConeT(len(rows) - equal - sum(real.counts))
     status = clarabel.SolverStatus
@@ -154,7 +158,7 @@ def _solved(
     settings.verbose = False
     for tolerance in _TOLERANCES:
         settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = tolerance
-        found = clarabel.DefaultSolver(
+        solution = clarabel.DefaultSolver(
             scipy.sparse.diags(2.0 * squares, format="csc"),
             linear,
             scipy.sparse.csc_matrix(-rows),
@@ -162,11 +166,11 @@ def _solved(
             [clarabel.ZeroConeT(equal), positive, *cones],
             settings,
         ).solve()
-        if found.status not in (status.NumericalError, status.InsufficientProgress):
+        if solution.status not in (status.NumericalError, status.InsufficientProgress):
             break
-    if found.status not in (status.Solved, status.AlmostSolved):
+    if solution.status not in (status.Solved, status.AlmostSolved):
         return None
-    return np.array(found.x), np.array(found.z)
+    return np.array(solution.x), np.array(solution.z)
 
 
 class MissingSolver(ModelError):

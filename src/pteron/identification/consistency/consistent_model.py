@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
@@ -13,13 +14,14 @@ from pteron.arguments import expect
 from pteron.errors import DataError, ModelError
 from pteron.identification.consistency.bodies import (
     Bodies,
+    Target,
     bodies_of,
     cad_target,
     parameters_of,
     plain_target,
     real_bodies,
 )
-from pteron.identification.consistency.bounds import Bounds
+from pteron.identification.consistency.bounds import Bounds, LinearLimits
 from pteron.identification.consistency.cones import RealBodies, closest, nearest, widest
 from pteron.identification.consistency.consistency import Consistency
 from pteron.kernels import Array
@@ -115,10 +117,86 @@ def consistent_model(
     >>> result.feasible, result.distance
     (True, 0.0)
     """
-    # Arguments: values, their spread, the bodies, the limits, the CAD model
     robot = as_manipulator(robot)
-    names = parameter_names(robot)
-    if names != parameter_names(base.robot):
+    vector = _check_values(robot, base, values)
+    root = None if covariance is None else _square_root(covariance, base.rank)
+    problem = _scale_problem(robot, base, vector, root, cad, bounds or Bounds())
+    aim = _choose_aim(problem)
+    z = _bodies_nearest_target(problem, aim)
+    answer, residual = _checked_parameters(problem, aim, z)
+    base_values = base.grouping @ answer
+    shift = np.zeros(base.rank) if aim.feasible else base_values - vector
+    distance = float(np.linalg.norm(np.linalg.solve(problem.spread, shift)))
+    p_value = float("nan") if root is None else float(scipy.stats.chi2.sf(distance**2, base.rank))
+    cad_violations = _cad_violations(problem)
+    return Consistency(
+        robot=with_parameters(robot, answer),
+        parameters=answer,
+        base_values=base_values,
+        names=base.names,
+        feasible=aim.feasible,
+        distance=distance,
+        p_value=p_value,
+        shifts=shift / np.linalg.norm(problem.spread, axis=1),
+        metric="relative" if root is None else "covariance",
+        at_border=_names_at_border(problem, aim, z),
+        cad_feasible=not cad_violations,
+        cad_violations=cad_violations,
+        residual=residual,
+        nearest_to=problem.target.kind,
+    )
+
+
+@dataclass(frozen=True)
+class _Problem:
+    """Identified values, and the scaled free parameters z (k,) of bodies that may have them.
+
+    z has the values (rank,) where `grouping` @ z = values: at `inverse` @ (values / sizes), moved
+    along the columns of `free`. `sizes` (rank,) are the lengths of the rows of `grouping`,
+    `spread` (rank, rank) is the square root of the values' covariance, and `cad` (N,) are the CAD
+    model's parameters.
+    """
+
+    robot: Manipulator
+    values: Array
+    spread: Array
+    limits: LinearLimits
+    cad: Array | None
+    target: Target
+    real: RealBodies
+    grouping: Array
+    sizes: Array
+    inverse: Array
+    free: Array
+
+    @property
+    def bodies(self) -> Bodies:
+        """The bodies, and how their parameters are shared."""
+        return self.real.bodies
+
+
+@dataclass(frozen=True)
+class _Aim:
+    """Base parameters (rank,) that real bodies have: the identified ones, or those closest to them.
+
+    `point` (k,) are scaled free parameters that have them, `depth` is how far inside their cones
+    bodies shall be, over the margin, and `multipliers` are those of the closest values.
+    """
+
+    values: Array
+    point: Array
+    depth: float
+    multipliers: Array | None = None
+
+    @property
+    def feasible(self) -> bool:
+        """Whether real bodies have the identified values."""
+        return self.multipliers is None
+
+
+def _check_values(robot: Manipulator, base: BaseParameters, values: ArrayLike) -> Array:
+    """Return identified values (rank,) as an array, after checking that they are the machine's."""
+    if parameter_names(robot) != parameter_names(base.robot):
         raise ModelError(
             f"base: made for {base.robot.name}, which has other parameters than {robot.name}"
         )
@@ -126,104 +204,120 @@ def consistent_model(
     expect(vector.shape == (base.rank,), "values", f"shape {vector.shape}", f"({base.rank},)")
     if not np.isfinite(vector).all():
         raise DataError("values: not all are finite numbers; identify the parameters again")
-    root = None if covariance is None else _square_root(covariance, base.rank)
-    bodies = bodies_of(base)
-    limits = (bounds or Bounds()).limits(robot)
-    prior = _prior(robot, cad)
-    target = plain_target(bodies, base, vector) if prior is None else cad_target(bodies, prior)
-    cad_violations: tuple[str, ...] = ()
-    if prior is not None:
-        rounding = _HOLDS * np.abs(limits.matrix) @ bodies.sharing @ target.scale
-        cad_violations = real_bodies(robot, prior) + limits.violations(prior, rounding)
+    return vector
 
-    # Scaled free parameters z: the set of real bodies, and grouping z = values
+
+def _scale_problem(
+    robot: Manipulator,
+    base: BaseParameters,
+    values: Array,
+    root: Array | None,
+    cad: RobotLike | ArrayLike | None,
+    bounds: Bounds,
+) -> _Problem:
+    """Return the problem in scaled parameters; without a `root` its spread is relative."""
+    bodies, limits, prior = bodies_of(base), bounds.limits(robot), _prior(robot, cad)
+    target = plain_target(bodies, base, values) if prior is None else cad_target(bodies, prior)
     matrix = limits.matrix @ bodies.sharing * target.scale
     lengths = np.linalg.norm(matrix, axis=1)
     real = RealBodies(bodies, target.margins, matrix / lengths[:, None], limits.right / lengths)
     grouping = base.grouping @ bodies.sharing * target.scale
     sizes = np.linalg.norm(grouping, axis=1)
-    left, singular, right = np.linalg.svd(grouping / sizes[:, None])
-    inverse, free = right[: base.rank].T / singular @ left.T, right[base.rank :].T
-
-    # Have any real bodies these values? If none, those of the closest ones are aimed at
-    depth, border = widest(real, inverse @ (vector / sizes), free, _DEEPEST)
-    feasible = depth >= _SHALLOW
-    spread = np.diag(sizes) if root is None else root
-    if feasible:
-        aim, inner = vector, 0.5 * depth
-    else:
-        deep = nearest(
-            real, np.zeros(free.shape[0]), np.eye(free.shape[0]), 1.0, target.matrix, target.right
-        )
-        if deep is None:
-            raise ModelError(
-                "bounds: no real bodies keep them all, whatever the identified values are; "
-                f"loosen some of: {', '.join(limits.names)}"
-            )
-        least = closest(real, grouping, vector, spread, _SHALLOW)
-        if least is None:
-            raise ModelError(_TOO_FAR)
-        border = _inside(bodies, least[0], deep, 0.5 * _SHALLOW * target.margins)
-        forces = least[1]
-        aim, inner = grouping @ border, 0.5 * _SHALLOW
-
-    # Of all real bodies with these values, those nearest to the target
-    start = inverse @ (aim / sizes)
-    found = nearest(real, start, free, inner, target.matrix, target.right)
-    if found is None or (bodies.least(found) <= 0.0).any():
-        # The closest model is then the only one, to the solver's accuracy; of feasible values that
-        # are far from any drawing the answer may be off by more than bodies have to spare.
-        margins = 0.5 * inner * target.margins
-        found = border if found is None or not feasible else _inside(bodies, found, border, margins)
-
-    # The answer, checked without the solver
-    residual = float(np.abs((grouping @ found - aim) / (sizes * np.linalg.norm(found))).max())
-    answer = bodies.sharing @ (target.scale * found)
-    failed = list(real_bodies(robot, answer))
-    units = np.maximum(np.abs(answer), bodies.sharing @ target.scale)
-    failed += limits.violations(answer, 10 * _HOLDS * np.abs(limits.matrix) @ units)
-    if residual > _HOLDS:
-        failed.append(f"base parameters: relative error {residual:.1e}")
-    if (bodies.least(found) <= 0.0).any():
-        failed.append("a body has no inertia left")
-    if failed:
-        raise ModelError(f"consistency: the solver's answer does not hold ({'; '.join(failed)})")
-    if feasible:
-        close = bodies.least(found) < 1.01 * target.margins
-        tight = real.matrix @ found > real.right - 1e-6 * np.linalg.norm(found)
-        held = np.concatenate([close, tight])
-    else:
-        held = forces > _FORCE * forces.max()
-    at_border = tuple(np.array([*bodies.names, *limits.names])[held].tolist())
-
-    base_values = base.grouping @ answer
-    moved = np.zeros(base.rank) if feasible else base_values - vector
-    distance = float(np.linalg.norm(np.linalg.solve(spread, moved)))
-    return Consistency(
-        robot=with_parameters(robot, answer),
-        parameters=answer,
-        base_values=base_values,
-        names=base.names,
-        feasible=feasible,
-        distance=distance,
-        p_value=float("nan")
-        if root is None
-        else float(scipy.stats.chi2.sf(distance**2, base.rank)),
-        shifts=moved / np.linalg.norm(spread, axis=1),
-        metric="relative" if root is None else "covariance",
-        at_border=at_border,
-        cad_feasible=not cad_violations,
-        cad_violations=cad_violations,
-        residual=residual,
-        nearest_to=target.kind,
+    u, singular, vt = np.linalg.svd(grouping / sizes[:, None])
+    return _Problem(
+        robot=robot,
+        values=values,
+        spread=np.diag(sizes) if root is None else root,
+        limits=limits,
+        cad=prior,
+        target=target,
+        real=real,
+        grouping=grouping,
+        sizes=sizes,
+        inverse=vt[: base.rank].T / singular @ u.T,
+        free=vt[base.rank :].T,
     )
+
+
+def _choose_aim(problem: _Problem) -> _Aim:
+    """Return the identified values where real bodies have them, else the closest that some have."""
+    real, target, values, free = problem.real, problem.target, problem.values, problem.free
+    depth, deepest = widest(real, problem.inverse @ (values / problem.sizes), free, _DEEPEST)
+    if depth >= _SHALLOW:
+        return _Aim(values, deepest, 0.5 * depth)
+    count = free.shape[0]
+    inside = nearest(real, np.zeros(count), np.eye(count), 1.0, target.matrix, target.right)
+    if inside is None:
+        raise ModelError(
+            "bounds: no real bodies keep them all, whatever the identified values are; "
+            f"loosen some of: {', '.join(problem.limits.names)}"
+        )
+    solution = closest(real, problem.grouping, values, problem.spread, _SHALLOW)
+    if solution is None:
+        raise ModelError(_TOO_FAR)
+    point, multipliers = solution
+    point = _move_inside(problem.bodies, point, inside, 0.5 * _SHALLOW * target.margins)
+    return _Aim(problem.grouping @ point, point, 0.5 * _SHALLOW, multipliers)
+
+
+def _bodies_nearest_target(problem: _Problem, aim: _Aim) -> Array:
+    """Return the bodies z (k,) with the values aimed at that are nearest to the target."""
+    bodies, target = problem.bodies, problem.target
+    start = problem.inverse @ (aim.values / problem.sizes)
+    z = nearest(problem.real, start, problem.free, aim.depth, target.matrix, target.right)
+    if z is not None and not (bodies.least(z) <= 0.0).any():
+        return z
+    # The closest model is then the only one, to the solver's accuracy; of feasible values that
+    # are far from any drawing the answer may be off by more than bodies have to spare.
+    if z is None or not aim.feasible:
+        return aim.point
+    return _move_inside(bodies, z, aim.point, 0.5 * aim.depth * target.margins)
+
+
+def _checked_parameters(problem: _Problem, aim: _Aim, z: Array) -> tuple[Array, float]:
+    """Return the parameters (N,) of bodies z and their error, checked without the solver."""
+    bodies, limits, target = problem.bodies, problem.limits, problem.target
+    error = (problem.grouping @ z - aim.values) / (problem.sizes * np.linalg.norm(z))
+    residual = float(np.abs(error).max())
+    answer = bodies.sharing @ (target.scale * z)
+    failures = list(real_bodies(problem.robot, answer))
+    units = np.maximum(np.abs(answer), bodies.sharing @ target.scale)
+    failures += limits.violations(answer, 10 * _HOLDS * np.abs(limits.matrix) @ units)
+    if residual > _HOLDS:
+        failures.append(f"base parameters: relative error {residual:.1e}")
+    if (bodies.least(z) <= 0.0).any():
+        failures.append("a body has no inertia left")
+    if failures:
+        raise ModelError(f"consistency: the solver's answer does not hold ({'; '.join(failures)})")
+    return answer, residual
+
+
+def _names_at_border(problem: _Problem, aim: _Aim, z: Array) -> tuple[str, ...]:
+    """Return the names of bodies z next to their cones' border, or of what holds the fit back."""
+    real, target = problem.real, problem.target
+    if aim.multipliers is None:
+        close = problem.bodies.least(z) < 1.01 * target.margins
+        tight = real.matrix @ z > real.right - 1e-6 * np.linalg.norm(z)
+        at_border = np.concatenate([close, tight])
+    else:
+        at_border = aim.multipliers > _FORCE * aim.multipliers.max()
+    names = np.array([*problem.bodies.names, *problem.limits.names])
+    return tuple(names[at_border].tolist())
+
+
+def _cad_violations(problem: _Problem) -> tuple[str, ...]:
+    """Return why the CAD model's bodies are not real, or do not keep the limits."""
+    if problem.cad is None:
+        return ()
+    limits, sharing = problem.limits, problem.bodies.sharing
+    rounding = _HOLDS * np.abs(limits.matrix) @ sharing @ problem.target.scale
+    return real_bodies(problem.robot, problem.cad) + limits.violations(problem.cad, rounding)
 
 
 def _square_root(covariance: ArrayLike, rank: int) -> Array:
     """Return the lower triangular square root of a covariance (rank, rank), after checking it."""
     matrix = np.asarray(covariance, dtype=float)
-    wanted = rank, rank
-    expect(matrix.shape == wanted, "covariance", f"shape {matrix.shape}", wanted)
+    expect(matrix.shape == (rank, rank), "covariance", f"shape {matrix.shape}", (rank, rank))
     deviations = np.sqrt(np.abs(np.diag(matrix)))
     if not np.isfinite(matrix).all() or (np.diag(matrix) <= 0.0).any():
         raise DataError("covariance: every variance must be a positive, finite number")
@@ -256,11 +350,11 @@ def _prior(robot: Manipulator, cad: RobotLike | ArrayLike | None) -> Array | Non
     return parameters_of(robot, parameters(cad) if isinstance(cad, Manipulator) else cad, "cad")
 
 
-def _inside(bodies: Bodies, point: Array, deep: Array, margins: Array) -> Array:
-    """Return the point, moved towards a deep one as little as its bodies need to be real."""
+def _move_inside(bodies: Bodies, point: Array, inside: Array, margins: Array) -> Array:
+    """Return a point, moved towards one inside as little as its bodies need to be real."""
     # Values that are thousands of deviations off leave the solver little accuracy at the border.
     for part in (0.0, *np.logspace(-12, 0, 37)):
-        moved = (1.0 - part) * point + part * deep
-        if (bodies.least(moved) >= margins).all():
+        candidate = (1.0 - part) * point + part * inside
+        if (bodies.least(candidate) >= margins).all():
             break
-    return np.asarray(moved)
+    return np.asarray(candidate)

@@ -110,7 +110,7 @@ class _Samples:
     start: tuple[float, ...]
 
 
-def contradicted(
+def find_contradiction(
     robot: Manipulator, log: Log, how: Preprocessing, rotors: Array
 ) -> Assumption | None:
     """Return the assumption that explains a log's forces far better than the file does.
@@ -121,24 +121,31 @@ def contradicted(
     samples = _samples(log, how, rotors)
     if samples is None:
         return None
-    before = _left(robot, samples)
+    error_before = _unexplained_share(robot, samples)
     noise = how.force_noise / np.maximum(samples.forces.std(axis=0), 1e-300)
-    least = _EXPLAINED if np.isfinite(before) else _EXPLAINED_ALONE
+    least = _EXPLAINED if np.isfinite(error_before) else _EXPLAINED_ALONE
     explained = max(least, 3.0 * float(noise.max()))
-    if before < explained:
+    if error_before < explained:
         return None
     tried: list[Assumption] = []
-    for fault, message, other, changed in _tried(robot, samples):
-        after = _left(other, changed)
-        if after < explained and after * _DECISIVE < before:
-            tried.append(Assumption(fault, _sentence(message, before, after), before, after))
+    for fault, message, other, changed in _alternatives(robot, samples):
+        error_after = _unexplained_share(other, changed)
+        if error_after < explained and error_after * _DECISIVE < error_before:
+            tried.append(
+                Assumption(
+                    fault, _sentence(message, error_before, error_after), error_before, error_after
+                )
+            )
     if not tried:
         return None
-    least = min(one.after for one in tried)
+    least = min(assumption.after for assumption in tried)
     at_noise = least <= _AT_NOISE * float(noise.max())
     as_good = (_AS_GOOD_AT_NOISE if at_noise else _AS_GOOD) * least
-    first = next(one.fault for one in tried if one.after <= as_good)
-    return min((one for one in tried if one.fault == first), key=lambda one: one.after)
+    first = next(assumption.fault for assumption in tried if assumption.after <= as_good)
+    return min(
+        (assumption for assumption in tried if assumption.fault == first),
+        key=lambda assumption: assumption.after,
+    )
 
 
 def hidden_orders(robot: Manipulator, log: Log, how: Preprocessing) -> str:
@@ -157,11 +164,11 @@ def hidden_orders(robot: Manipulator, log: Log, how: Preprocessing) -> str:
         orders = [tuple({i: j, j: i}.get(k, k) for k in usual) for i, j in pairs]
     else:
         orders = _symmetries(robot)
-    before = _left(robot, samples) if orders else np.inf
+    error_before = _unexplained_share(robot, samples) if orders else np.inf
     hidden = []
     for order in orders:
         parts = {k: v[:, list(order)] for k, v in vars(samples).items() if k != "start"}
-        if _left(robot, replace(samples, **parts)) <= _AS_GOOD * before:
+        if _unexplained_share(robot, replace(samples, **parts)) <= _AS_GOOD * error_before:
             hidden.append(order)
     if not hidden:
         return ""
@@ -186,21 +193,21 @@ def _symmetries(robot: Manipulator) -> list[tuple[int, ...]]:
     points = [np.array([getattr(leg, name, np.nan) for leg in robot.legs]) for name in _POINTS]
     distances = [np.linalg.norm(p[:, None] - p, axis=-1) for p in points]
     limits = [_ALIKE * d.max() for d in distances]
-    found = []
+    orders = []
     for order in permutations(range(count)):
         rows = np.ix_(order, order)
         pairs = zip(distances, limits, strict=True)
         if all(np.abs(d[rows] - d).max() <= limit for d, limit in pairs):
-            found.append(order)
-    return found[1:]
+            orders.append(order)
+    return orders[1:]
 
 
-def _sentence(message: tuple[str, str], before: float, after: float) -> str:
+def _sentence(message: tuple[str, str], error_before: float, error_after: float) -> str:
     fault, remedy = message
-    was = f"{100.0 * before:.2g} % of the forces is left"
-    if not np.isfinite(before):
+    was = f"{100.0 * error_before:.2g} % of the forces is left"
+    if not np.isfinite(error_before):
         was = "the joints have no poses"
-    return f"{fault}: as the file has it {was}, so {100.0 * after:.2g} %; {remedy}."
+    return f"{fault}: as the file has it {was}, so {100.0 * error_after:.2g} %; {remedy}."
 
 
 def _samples(log: Log, how: Preprocessing, rotors: Array) -> _Samples | None:
@@ -216,7 +223,7 @@ def _samples(log: Log, how: Preprocessing, rotors: Array) -> _Samples | None:
     return _Samples(q[rows], rates[rows], accelerations[rows], forces[rows], how.start)
 
 
-def _tried(
+def _alternatives(
     robot: Manipulator, s: _Samples
 ) -> Iterator[tuple[Literal["ratio", "gravity", "mode"], tuple[str, str], Manipulator, _Samples]]:
     """Yield assumptions: gear ratios, gravity along other axes, working modes."""
@@ -283,7 +290,7 @@ def _other_modes(
         yield "mode", message, other, s
 
 
-def _left(robot: Manipulator, s: _Samples) -> float:
+def _unexplained_share(robot: Manipulator, s: _Samples) -> float:
     """Return what is left of the forces, over their deviation, with all parameters free.
 
     Infinite where the joints have no poses.
@@ -338,7 +345,7 @@ def _residual(robot: Manipulator, pose: Array, s: _Samples) -> float:
     columns = scaled(flat)[0]
     basis, sizes, _ = np.linalg.svd(columns, full_matrices=False)
     basis = basis[:, sizes > 1e-9 * sizes[0]]
-    rest = forces - basis @ (basis.T @ forces)
+    residuals = forces - basis @ (basis.T @ forces)
     means = (s.forces[good] / spread).mean(axis=0)
     centred = forces - np.broadcast_to(means, used.shape)[used]
-    return float(np.linalg.norm(rest) / max(float(np.linalg.norm(centred)), 1e-300))
+    return float(np.linalg.norm(residuals) / max(float(np.linalg.norm(centred)), 1e-300))

@@ -17,7 +17,7 @@ import numpy as np
 from pteron.equations.friction import passive_joints
 from pteron.identification.faults.fault import FaultName
 from pteron.identification.faults.fitted_motion import FittedMotion, lengths_of
-from pteron.identification.model import Model, diagonal, extended, identification_model
+from pteron.identification.model import Model, diagonal, extend_model, identification_model
 from pteron.identification.signals import States
 from pteron.identification.signals.filters import smoothed
 from pteron.kernels import Array
@@ -113,7 +113,7 @@ class Family:
     of_path: bool = False
     effect: Callable[[FittedMotion], Array] | None = None
 
-    def of_cycle(self, motion: FittedMotion) -> Array:
+    def deviation_columns(self, motion: FittedMotion) -> Array:
         """Return the columns (R, n, k) by which the machine differs from the model without it."""
         return (self.effect or self.columns)(motion)
 
@@ -139,7 +139,7 @@ def _elasticity(m: FittedMotion) -> Array:
         # Noise of the accelerations would be in both, the residuals and the column.
         load = smoothed(load, pace, m.cutoff)
     rate = m.rate(load)
-    return m.by_give([load, rate, m.rate(rate)])
+    return m.give_slopes([load, rate, m.rate(rate)])
 
 
 def _drift(m: FittedMotion) -> Array:
@@ -158,12 +158,12 @@ def _payload(m: FittedMotion) -> Array:
 
 
 def _weight(m: FittedMotion) -> Array:
-    rest = {
+    standstill = {
         name: np.zeros_like(getattr(m.states, name))
         for name in ("joint_rates", "joint_accelerations", "velocity", "acceleration")
     }
-    still = replace(m, states=replace(m.states, **rest))
-    return still.forces(of=["base", "payload"])[..., None]
+    at_rest = replace(m, states=replace(m.states, **standstill))
+    return at_rest.forces(of=["base", "payload"])[..., None]
 
 
 def _passive_legs(model: Model) -> Sequence[str]:
@@ -186,7 +186,7 @@ DELAY = Family(
 )
 
 _OTHERS = (
-    Family("gravity", "rad", lambda m: ["tilt", "tilt"], FittedMotion.by_tilt, largest=0.2),
+    Family("gravity", "rad", lambda m: ["tilt", "tilt"], FittedMotion.tilt_slopes, largest=0.2),
     Family(
         "clock",
         "",
@@ -224,10 +224,10 @@ def families_of(model: Model) -> tuple[Family, ...]:
     with_rotors = replace(model.terms, rotors=True)
     rotors = []
     if not model.terms.rotors:
-        own = identification_model(model.robot, with_rotors, base=model.base).kept_terms
-        rotors = [_ROTORS] * any(term.kind == "rotor" for term in own)
+        terms = identification_model(model.robot, with_rotors, base=model.base).kept_terms
+        rotors = [_ROTORS] * any(term.kind == "rotor" for term in terms)
     drives = (_scale(i) for i in range(count))
-    joints = (one for i in range(count) for one in (_ratio((i,)), _zero(model.robot, i)))
+    joints = (family for i in range(count) for family in (_ratio((i,)), _zero(model.robot, i)))
     legs = range(len(model.robot.legs))
     geometry = (_geometry(model.robot, some) for some in (*((i,) for i in legs), legs))
     light = Tolerance(negligible=_LIGHT * model.robot.platform.inertia.mass)
@@ -242,7 +242,7 @@ def _ratio(joints: Sequence[int]) -> Family:
 
     def columns(m: FittedMotion) -> Array:
         force = diagonal(m.forces())[..., some].sum(axis=-1, keepdims=True)
-        return np.asarray(m.by_ratio[..., some].sum(axis=-1, keepdims=True) - force)
+        return np.asarray(m.ratio_slopes[..., some].sum(axis=-1, keepdims=True) - force)
 
     def sizes(model: Model) -> Sequence[str]:
         names = [model.robot.joint_names[i] for i in some]
@@ -259,15 +259,15 @@ def length_tolerance(robot: Manipulator) -> Tolerance:
 
 
 def _zero(robot: Manipulator, i: int) -> Family:
-    one, leg = slice(i, i + 1), robot.legs[i]
+    joint, leg = slice(i, i + 1), robot.legs[i]
     slides = leg.joint.unit == "m"
     usual = _ZERO_OF_SLIDE * leg.size if slides else _ZERO_OF_CRANK
     tolerance = Tolerance(usual, _NEGLIGIBLE * (leg.size if slides else 1.0))
     return Family(
         "zero",
         "",
-        lambda model: model.robot.joint_names[one],
-        lambda m: m.by_zeros[..., one],
+        lambda model: model.robot.joint_names[joint],
+        lambda m: m.zero_slopes[..., joint],
         of_machine=False,
         tolerance=tolerance,
     )
@@ -281,18 +281,18 @@ def _geometry(robot: Manipulator, legs: Sequence[int]) -> Family:
         "geometry",
         "m",
         lambda m: labels,
-        lambda m: m.by_lengths[..., places],
+        lambda m: m.length_slopes[..., places],
         tolerance=length_tolerance(robot),
     )
 
 
 def _scale(i: int) -> Family:
-    one = slice(i, i + 1)
+    actuator = slice(i, i + 1)
     return Family(
         "scale",
         "",
-        lambda model: _forces(model)[one],
-        lambda m: diagonal(m.forces())[..., one],
+        lambda model: _forces(model)[actuator],
+        lambda m: diagonal(m.forces())[..., actuator],
         of_machine=False,
         largest=1.0,
     )
@@ -323,18 +323,18 @@ class FaultColumns:
         return tuple(slice(a, b) for a, b in pairwise(ends))
 
     @property
-    def whole(self) -> Model:
+    def extended_model(self) -> Model:
         """The model with all columns behind its own."""
         count = self.places[-1].stop - len(self.model.names)
-        return extended(self.model, count, self.matrix)
+        return extend_model(self.model, count, self.matrix)
 
-    def motion(self, states: States, along: Array, stride: int = 1) -> FittedMotion:
-        """Return the motion that columns are made of, at times `along` (R,)."""
-        return FittedMotion(self.model, self.values, states, self.usual, along, stride, self.cutoff)
+    def motion(self, states: States, share: Array, stride: int = 1) -> FittedMotion:
+        """Return the motion that columns are made of, at shares (R,) of the log's time."""
+        return FittedMotion(self.model, self.values, states, self.usual, share, stride, self.cutoff)
 
     def matrix(self, states: States) -> Array:
         """Return all columns (R, n, p + k)."""
-        along = (states.time - self.begin) / (self.end - self.begin) - 0.5
-        motion = self.motion(states, along, self.stride)
+        share = (states.time - self.begin) / (self.end - self.begin) - 0.5
+        motion = self.motion(states, share, self.stride)
         columns = [family.columns(motion) for family in self.families]
         return np.concatenate([motion.matrix, *columns], axis=-1)

@@ -70,12 +70,12 @@ class ReferenceCycle:
                 slow = within(duration=1.0)
             except PteronError:
                 continue
-            gone = _whole(robot, slow)
+            gone = _complete_motion(robot, slow)
             rate = np.abs(gone.rates).max(axis=0) / extent.rates
             acceleration = np.abs(gone.accelerations).max(axis=0) / extent.accelerations
             duration = float(np.maximum(rate, np.sqrt(acceleration)).max())
             motion = within(scale=size * slow.scale, direction=slow.across, duration=duration)
-            gone = _whole(robot, motion)
+            gone = _complete_motion(robot, motion)
             rates = np.abs(gone.rates)
             return cls(States.of(motion.time, gone), rates > _MOVES * rates.max(axis=0))
         return None
@@ -93,15 +93,15 @@ class ReferenceCycle:
             log = np.concatenate([getattr(s, name) for s in states])
             rows = rng.integers(len(log), size=(_SAMPLES, log.shape[1]))
             motion.append(np.take_along_axis(log, rows, axis=0))
-        whole = FullMotion.of_platform(robot, *motion)
+        full_motion = FullMotion.of_platform(robot, *motion)
         # A slider's motion is finite out of the legs' reach too; that of the links is not.
         within = np.isfinite(evaluate_unchecked(robot, "regressor", *motion)).all(axis=(1, 2))
-        within &= np.isfinite(np.hstack(whole)).all(axis=1)
-        whole = FullMotion(*(np.ascontiguousarray(part[within]) for part in whole))
-        rates = np.abs(whole.rates)
+        within &= np.isfinite(np.hstack(full_motion)).all(axis=1)
+        full_motion = FullMotion(*(np.ascontiguousarray(part[within]) for part in full_motion))
+        rates = np.abs(full_motion.rates)
         time = np.arange(len(rates), dtype=float)
         moves = rates > _MOVES * rates.max(axis=0, initial=0.0)
-        return cls(States.of(time, whole), moves, in_order=False)
+        return cls(States.of(time, full_motion), moves, in_order=False)
 
     def share(self, error: Array, forces: Array) -> Array:
         """Return the size of an error (R, n), percent of the forces' standard deviation (n,)."""
@@ -111,5 +111,5 @@ class ReferenceCycle:
         return np.asarray(100.0 * size / np.maximum(spread, max(_LEAST * spread.max(), 1e-300)))
 
 
-def _whole(robot: Manipulator, motion: Motion) -> FullMotion:
+def _complete_motion(robot: Manipulator, motion: Motion) -> FullMotion:
     return FullMotion.of_platform(robot, motion.pose, motion.velocity, motion.acceleration)

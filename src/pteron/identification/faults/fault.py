@@ -127,7 +127,7 @@ _REMEDY: dict[FaultName, str] = {
 }
 
 
-def _rounded(size: float, angle: bool = False) -> str:
+def _format_size(size: float, angle: bool = False) -> str:
     """Return a size in mm, or degrees, with the digits that an estimate has."""
     number = np.degrees(size) if angle else 1e3 * size
     text = f"{number:.0f}" if number >= 10.0 else f"{number:.2g}"
@@ -143,7 +143,7 @@ def is_half(delay: float, deviation: float, step: float) -> bool:
     return abs(abs(delay) - 0.5 * step) <= off
 
 
-def of_held_forces(delay: float) -> str:
+def describe_held_forces(delay: float) -> str:
     """Return the words, without a full stop, for a delay, s, of forces that are held."""
     late, early = ("forces", "positions")[:: 1 if delay > 0.0 else -1]
     return _SAMPLING.format(late=late, early=early, size_ms=1e3 * abs(delay))
@@ -209,12 +209,14 @@ class IsolatedFault:
     @property
     def message(self) -> str:
         """The fault, and its remedy, in a sentence."""
-        return f"{self._sentence()}{self._others()}; {_REMEDY[self.fault]}."
+        return f"{self._sentence()}{self._equivalents()}; {_REMEDY[self.fault]}."
 
     @property
     def beside_another(self) -> str:
         """The fault without a remedy: another one, which is mended first, may be all there is."""
-        return f"{self._sentence()}{self._others()}, or what is named before looks so: mend that."
+        return (
+            f"{self._sentence()}{self._equivalents()}, or what is named before looks so: mend that."
+        )
 
     def as_dict(self) -> dict[str, Any]:
         """Return it as plain data."""
@@ -226,7 +228,7 @@ class IsolatedFault:
             **picked(self, "speeds"),
         }
 
-    def _others(self) -> str:
+    def _equivalents(self) -> str:
         """Return, in brackets, the other faults that explain the residuals as well."""
         if not self.as_well:
             return ""
@@ -238,17 +240,17 @@ class IsolatedFault:
         return float(np.linalg.norm(parts))
 
     def _sentence(self) -> str:
-        first, told = float(self.sizes[0]), "sampling" if self.of_sampling else str(self.fault)
-        if told == "clock" and first <= -1.0:
-            told = "sign"
+        first, key = float(self.sizes[0]), "sampling" if self.of_sampling else str(self.fault)
+        if key == "clock" and first <= -1.0:
+            key = "sign"
         size, error = abs(first), float(self.deviations[0])
         late, early = ("forces", "positions")[:: 1 if first > 0.0 else -1]
         clock = max(1.0 + first, 1e-300) ** -0.5 - 1.0
-        whole = self.labels[0] == "all joints"
+        all_joints = self.labels[0] == "all joints"
         clearest = int(np.argmax(np.abs(self.sizes) / np.maximum(self.deviations, 1e-300)))
         # Of the eighths of a log that filters cut off nothing is known.
         seen = np.flatnonzero(self.deviations) if self.fault == "payload" else np.array([0])
-        return _SENTENCES[told].format(
+        return _SENTENCES[key].format(
             label=self.labels[0],
             labels=", ".join(self.labels),
             times=float(self.sizes.max()),
@@ -263,10 +265,10 @@ class IsolatedFault:
             percent=100.0 * size,
             error=100.0 * error,
             more="large" if first > 0.0 else "small",
-            label_moves="All joints move" if whole else f"{self.labels[0]} moves",
+            label_moves="All joints move" if all_joints else f"{self.labels[0]} moves",
             less="less" if first > 0.0 else "more",
-            shown_size=_rounded(size, self.labels[0].startswith("theta")),
-            shown_leg=_rounded(self._leg_size(self.labels[clearest])),
+            shown_size=_format_size(size, self.labels[0].startswith("theta")),
+            shown_leg=_format_size(self._leg_size(self.labels[clearest])),
             tilt=np.degrees(np.linalg.norm(self.sizes)),
             tilt_error=np.degrees(self.deviations.max()),
             clock=100.0 * abs(clock),

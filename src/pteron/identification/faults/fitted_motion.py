@@ -26,12 +26,12 @@ _FEWEST = 8
 
 def lengths_of(robot: Manipulator) -> list[tuple[int, int]]:
     """Return leg, from 0, and place in the vector of `numbers`, of each number that is in m."""
-    found = []
+    places = []
     for i, (leg, at) in enumerate(zip(robot.legs, number_places(robot), strict=False)):
         sizes = {q.name: len(q.value) for q in leg.quantities if q.role in ("point", "length")}
         for name, size in (sizes | {"platform_point": 3}).items():
-            found += [(i, at[name] + k) for k in range(size)]
-    return found
+            places += [(i, at[name] + k) for k in range(size)]
+    return places
 
 
 @dataclass(frozen=True)
@@ -87,64 +87,64 @@ class FittedMotion:
     # How the rigid bodies' forces change with the machine
 
     @cached_property
-    def by_lengths(self) -> Array:
+    def length_slopes(self) -> Array:
         """Slopes (R, n, k) of forces by each of `lengths_of`, the joints being measured."""
         unit = np.eye(len(self._geometry))
-        return self._along(unit[[place for _, place in lengths_of(self.model.robot)]])
+        return self._slopes_along(unit[[place for _, place in lengths_of(self.model.robot)]])
 
     @cached_property
-    def by_zeros(self) -> Array:
+    def zero_slopes(self) -> Array:
         """Slopes (R, n, n) of forces by the zero of each joint."""
-        still = np.zeros_like(self.states.joints)
-        return self.by_give([still + 1.0, still, still])
+        zero = np.zeros_like(self.states.joints)
+        return self.give_slopes([zero + 1.0, zero, zero])
 
     @cached_property
-    def by_ratio(self) -> Array:
+    def ratio_slopes(self) -> Array:
         """Slopes (R, n, n) of forces as each joint moves less than was measured, as a share."""
         s = self.states
         middle = s.joints.mean(axis=0)
-        return self.by_give([s.joints - middle, s.joint_rates, s.joint_accelerations])
+        return self.give_slopes([s.joints - middle, s.joint_rates, s.joint_accelerations])
 
-    def by_tilt(self) -> Array:
+    def tilt_slopes(self) -> Array:
         """Return slopes (R, n, 2) of forces as gravity tilts about two axes."""
         g = np.array(self.model.robot.gravity)
         size = float(np.linalg.norm(g))
         changes = np.zeros((2, len(self._geometry)))
         if size > 0.0:
             changes[:, -3:] = size * np.linalg.svd(g[None, :])[2][1:]
-        return self._along(changes)
+        return self._slopes_along(changes)
 
-    def by_give(self, motion: Sequence[Array]) -> Array:
+    def give_slopes(self, motion: Sequence[Array]) -> Array:
         """Return slopes (R, n, n) of forces as each joint is behind what was measured.
 
         Joints are behind by a `motion`: its coordinates, rates and accelerations, (R, n) each.
         """
-        behind = [one[self._some] for one in motion]
+        behind = [change[self._sampled_rows] for change in motion]
         columns = []
         for i, size in enumerate(_STEP * np.ptp(self._rigid[0].joints, axis=0)):
             part = np.zeros(behind[0].shape[1])
             part[i] = -size / max(float(np.abs(behind[0][:, i]).max()), np.finfo(float).tiny)
-            changed = self._forces_at(self._geometry, *(part * one for one in behind))
-            columns.append((changed - self._unchanged) / -part[i])
-        return self._at_all(np.stack(columns, axis=-1))
+            changed = self._forces_at(self._geometry, *(part * change for change in behind))
+            columns.append((changed - self._reference_forces) / -part[i])
+        return self._interpolate_rows(np.stack(columns, axis=-1))
 
-    def _along(self, changes: Array) -> Array:
+    def _slopes_along(self, changes: Array) -> Array:
         columns = [
-            (self._forces_at(self._geometry + _STEP * change) - self._unchanged) / _STEP
+            (self._forces_at(self._geometry + _STEP * change) - self._reference_forces) / _STEP
             for change in changes
         ]
-        return self._at_all(np.stack(columns, axis=-1))
+        return self._interpolate_rows(np.stack(columns, axis=-1))
 
-    def _at_all(self, columns: Array) -> Array:
+    def _interpolate_rows(self, columns: Array) -> Array:
         rows = len(self.states)
-        if len(self._some) == rows:
+        if len(self._sampled_rows) == rows:
             return columns
         return np.asarray(
-            scipy.interpolate.make_interp_spline(self._some, columns, k=5)(np.arange(rows))
+            scipy.interpolate.make_interp_spline(self._sampled_rows, columns, k=5)(np.arange(rows))
         )
 
     @cached_property
-    def _some(self) -> NDArray[np.int64]:
+    def _sampled_rows(self) -> NDArray[np.int64]:
         """Rows of every `stride`-th state, the first and the last among them."""
         rows = len(self.states)
         count = max(rows // self.stride, min(rows, _FEWEST))
@@ -159,15 +159,15 @@ class FittedMotion:
         """Some of the states, and parameters as drawn but with the base parameters of the fit."""
         base, drawn = self.model.base, parameters(self.model.robot)
         change = self.values[: base.rank] - base.grouping @ drawn
-        return self.states.part(self._some), drawn + base.selection @ change
+        return self.states.part(self._sampled_rows), drawn + base.selection @ change
 
     @cached_property
     def _kernels(self) -> tuple[Kernel, ...]:
-        wanted = "newton_step", "platform_motion", "inverse_dynamics"
-        return tuple(compile(self.model.robot, what, "vm", grade="general") for what in wanted)
+        outputs = "newton_step", "platform_motion", "inverse_dynamics"
+        return tuple(compile(self.model.robot, what, "vm", grade="general") for what in outputs)
 
     @cached_property
-    def _unchanged(self) -> Array:
+    def _reference_forces(self) -> Array:
         return self._forces_at(self._geometry)
 
     def _forces_at(self, geometry: Array, *added: Array) -> Array:

@@ -51,19 +51,19 @@ def hidden_faults(
     back = np.linalg.pinv(triangle) / lengths[:, None]
     hidden: dict[FaultName, None] = {}
     for family, place in zip(columns.families, columns.places, strict=True):
-        own = flat[:, place]
-        taken_in = basis.T @ own
-        left = own - basis @ taken_in
+        fault_columns = flat[:, place]
+        taken_in = basis.T @ fault_columns
+        unexplained = fault_columns - basis @ taken_in
         if family.name in ("clock", "scale"):
-            size = float(np.linalg.norm(left))
-            independent = size > _INDEPENDENT * float(np.linalg.norm(own))
+            size = float(np.linalg.norm(unexplained))
+            independent = size > _INDEPENDENT * float(np.linalg.norm(fault_columns))
             if not (independent and WANTED * size > CLEAR):
                 hidden[family.name] = None
         elif len(other.states) > 0 and (usual := _usual_sizes(family, motion)) is not None:
             error = motion.matrix @ (back @ taken_in)
             if family.of_machine and not family.of_path:
-                error = error - family.of_cycle(motion)
-            if _largest_error(left, error, usual, other, motion) > _HARMFUL:
+                error = error - family.deviation_columns(motion)
+            if _largest_error(unexplained, error, usual, other, motion) > _HARMFUL:
                 hidden[family.name] = None
     return list(hidden)
 
@@ -83,15 +83,15 @@ def _usual_sizes(family: Family, motion: FittedMotion) -> Array | None:
 
 
 def _largest_error(
-    left: Array, error: Array, usual: Array, other: ReferenceCycle, motion: FittedMotion
+    unexplained: Array, error: Array, usual: Array, other: ReferenceCycle, motion: FittedMotion
 ) -> float:
     """Return the error of another motion's forces, percent, by a usual fault that stays hidden.
 
-    `left` (N, k) are a fault's columns over the noise, without what the model's columns take in;
+    `unexplained` (N, k) are a fault's columns over the noise, without what the model's take in;
     `error` (R, n, k) is that of the other motion's forces per unit of its sizes, and `usual` (k,)
     are their standard deviations. A size is told from zero at `CLEAR` standard deviations.
     """
-    columns = left * (usual / CLEAR)
+    columns = unexplained * (usual / CLEAR)
     seen, directions = np.linalg.eigh(columns.T @ columns)
     spread = usual[:, None] * directions / np.sqrt(1.0 + np.maximum(seen, 0.0))
     size = np.sqrt(((error @ spread) ** 2).sum(axis=-1))

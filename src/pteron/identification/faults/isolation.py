@@ -12,25 +12,20 @@ import numpy as np
 from pteron.identification.drawn_values import DrawnValues
 from pteron.identification.errors import LogError
 from pteron.identification.estimators import Estimate
-from pteron.identification.faults.columns import DELAY, Family, FaultColumns, families_of
-from pteron.identification.faults.cycle import Extent, ReferenceCycle
+from pteron.identification.faults.columns import DELAY, Family, FaultColumns
+from pteron.identification.faults.cycle import ReferenceCycle
+from pteron.identification.faults.cycle_errors import expected_errors
 from pteron.identification.faults.fault import ORDER, FaultName, IsolatedFault
 from pteron.identification.faults.hidden import hidden_faults
 from pteron.identification.faults.log_faults import LogFault
-from pteron.identification.faults.play import Record, knocks
-from pteron.identification.faults.search import FoundFault, searched
-from pteron.identification.logs import Log
+from pteron.identification.faults.play import Record, backlash_signature
+from pteron.identification.faults.search import FoundFault, search_faults
+from pteron.identification.faults.searched_parts import SearchedPart, choose_parts, observe_parts
 from pteron.identification.model import Model
-from pteron.identification.observation import Observations, in_motion, observations_of, stacked
+from pteron.identification.observation import Observations, in_motion
 from pteron.identification.plausibility import Factor, factor_of_forces, known_values
 from pteron.identification.recordings import Recording
-from pteron.identification.signals import (
-    Preprocessing,
-    Processing,
-    States,
-    preprocessing_of,
-    samples,
-)
+from pteron.identification.signals import Preprocessing, samples
 from pteron.identification.signals.preprocessing import LATEST
 from pteron.json_values import picked
 from pteron.kernels import Array
@@ -42,13 +37,6 @@ where these have too little motion."""
 
 _EXACT = 1e-7
 """Residuals, over the forces, below which they are rounding and show no faults."""
-
-_POINTS = 5
-"""States in a period of the highest frequency at which slow columns are computed; between them they
-are interpolated."""
-
-_MOTION = 0.3
-"""Share of the band that the motion's own forces are in."""
 
 _ROUNDS = 6
 """Greatest number of times that a delay is corrected and sought again."""
@@ -113,15 +101,15 @@ class FaultIsolation:
     @property
     def causes(self) -> tuple[str, ...]:
         """All that shows in a sentence each: log, scale, then machine, as to be mended."""
-        distorted = any(one.distorts for one in self.log)
+        distorted = any(fault.distorts for fault in self.log)
         of_file = [] if self.factor == 1.0 else [_OF_FACTOR.format(factor=self.factor)]
-        ranked = sorted(self.faults, key=lambda one: ORDER.index(one.fault))
+        ranked = sorted(self.faults, key=lambda fault: ORDER.index(fault.fault))
         # What comes first may look like what comes later: only the first gets a remedy.
         machine = [
-            one.message if k == 0 and not distorted else one.beside_another
-            for k, one in enumerate(ranked)
+            fault.message if k == 0 and not distorted else fault.beside_another
+            for k, fault in enumerate(ranked)
         ]
-        return (*(one.message for one in self.log), *of_file, *machine)
+        return (*(fault.message for fault in self.log), *of_file, *machine)
 
     @property
     def off(self) -> Array:
@@ -131,33 +119,23 @@ class FaultIsolation:
     @property
     def matters(self) -> bool:
         """Whether a fault shows that lowers the grade."""
-        return any(one.matters for one in self.faults)
+        return any(fault.matters for fault in self.faults)
 
     @property
     def understates(self) -> bool:
         """Whether a fault shows that the stated errors of the values do not include."""
-        return any(one.understates for one in self.faults)
+        return any(fault.understates for fault in self.faults)
 
     def as_dict(self) -> dict[str, Any]:
         """Return it as plain data."""
         shares = {"uncertain": self.uncertain, "spoiled": self.spoiled, "off": self.off}
         return picked(self, "tried why_not cannot_be_told=hidden faults") | {
-            "log": [one.as_dict() for one in self.log],
+            "log": [fault.as_dict() for fault in self.log],
             "cycle_percent": {
                 name: None if np.isnan(values).any() else values.tolist()
                 for name, values in shares.items()
             },
         }
-
-
-@dataclass(frozen=True)
-class _Part:
-    """A part of a recording that is searched, with its states, model and preprocessing."""
-
-    model: FaultColumns
-    log: Log
-    how: Preprocessing
-    states: list[States]
 
 
 def isolate_faults(
@@ -192,18 +170,18 @@ def isolate_faults(
     known, why_not = known_values(model, recordings, rotors or {}), ""
     for rows in (_ROWS, _MORE):
         try:
-            parts = _parts(model, estimate, recordings, preprocessing, rows)
-            return _isolated(parts, model, estimate, known, drawn)
+            parts = choose_parts(model, estimate, recordings, preprocessing, rows)
+            return _isolate_in_parts(parts, model, estimate, known, drawn)
         except LogError as error:
             why_not = str(error)
-        if sum(one.rows for one in recordings) <= rows:
+        if sum(recording.rows for recording in recordings) <= rows:
             break
     nothing = np.full(model.robot.joint_count, np.nan)
     return FaultIsolation((), (), nothing, nothing, why_not)
 
 
-def _isolated(
-    parts: list[_Part],
+def _isolate_in_parts(
+    parts: list[SearchedPart],
     model: Model,
     estimate: Estimate,
     known: Mapping[str, float],
@@ -212,17 +190,19 @@ def _isolated(
     columns = parts[0].model
     noise = np.mean([part.how.force_noise for part in parts], axis=0)
 
-    def observed(some: Sequence[_Part]) -> Observations:
-        rows = _observed(some)
+    def observe(some: Sequence[SearchedPart]) -> Observations:
+        rows = observe_parts(some)
         return rows if drawn is None else drawn.rows_beside(rows, estimate.noise)
 
-    observations = observed(parts)
-    plain, found = _found_faults(parts, observations, observed, estimate, noise)
+    observations = observe(parts)
+    plain, found_faults = _found_faults(parts, observations, observe, estimate, noise)
     states = [s for part in parts for s in part.states]
     other = ReferenceCycle.shuffled(model.robot, states)
-    uncertain, spoiled, each = _expected_errors(columns, states, other, estimate, plain, found)
+    uncertain, spoiled, each = expected_errors(
+        columns, states, other, estimate, plain, found_faults
+    )
     step = 1.0 / max(part.how.rate for part in parts)
-    faults = _named_faults(columns, plain, found, each, step)
+    faults = _named_faults(columns, plain, found_faults, each, step)
 
     # Play, which no column has
     play, looked = _play(parts, estimate.values, step)
@@ -231,7 +211,7 @@ def _isolated(
         spoiled = np.hypot(spoiled, play.cycle)
 
     # The scale of all forces, which the residuals cannot show
-    factor = factor_of_forces(model, found[-1].fit if found else plain, known)
+    factor = factor_of_forces(model, found_faults[-1].fit if found_faults else plain, known)
     gain = None if factor is None else _wrong_gain(factor, tuple(known), faults, len(noise))
     left_open = hidden_faults(columns, observations, noise, other)
     if gain is not None:
@@ -242,7 +222,7 @@ def _isolated(
         spoiled = np.hypot(spoiled, gain.cycle)
     names = dict.fromkeys(family.name for family in columns.families)
     tried = (*names, *["play"] * looked, *["gain"] * (factor is not None))
-    if factor is None or not factor.told:
+    if factor is None or not factor.is_detectable:
         left_open.insert(0, "gain")
     if not looked:
         left_open.append("play")
@@ -251,15 +231,15 @@ def _isolated(
         tuple(faults),
         uncertain,
         spoiled,
-        hidden=tuple(name for name in left_open if name not in {one.fault for one in faults}),
-        late=any(one.family is DELAY for one in found),
+        hidden=tuple(name for name in left_open if name not in {fault.fault for fault in faults}),
+        late=any(fault.family is DELAY for fault in found_faults),
     )
 
 
 def _found_faults(
-    parts: list[_Part],
+    parts: list[SearchedPart],
     observations: Observations,
-    observed: Callable[[Sequence[_Part]], Observations],
+    observe: Callable[[Sequence[SearchedPart]], Observations],
     estimate: Estimate,
     noise: Array,
 ) -> tuple[Estimate, list[FoundFault]]:
@@ -267,91 +247,40 @@ def _found_faults(
     columns = parts[0].model
     largest = max(float(np.abs(part.log.forces).max()) for part in parts)
     exact = np.abs(estimate.residuals).max() < _EXACT * largest
-    plain, found = searched(columns, observations, () if exact else None, noise)
-    if any(one.family is DELAY for one in found):
+    plain, found_faults = search_faults(columns, observations, () if exact else None, noise)
+    if any(fault.family is DELAY for fault in found_faults):
         # Columns hold for small delays: other faults are sought after a long one is corrected.
-        late, shifted = _delay(parts, observed)
-        others = tuple(one for one in columns.families if one is not DELAY)
-        fit, found = _searched_for(others, shifted, observed)
+        late, shifted = _delay(parts, observe)
+        others = tuple(family for family in columns.families if family is not DELAY)
+        fit, found_faults = _search_families(others, shifted, observe)
         if late is not None:
-            found.insert(0, replace(late, fit=fit))
-    return plain, found
-
-
-def _expected_errors(
-    columns: FaultColumns,
-    states: list[States],
-    other: ReferenceCycle,
-    estimate: Estimate,
-    plain: Estimate,
-    found: Sequence[FoundFault],
-) -> tuple[Array, Array, list[Array]]:
-    """Return `_cycle_errors` of a cycle; the first two of another motion where these are larger."""
-    cycle = ReferenceCycle.within(columns.model.robot, Extent.of(states))
-    uncertain, spoiled, each = _cycle_errors(columns, cycle, estimate, plain, found)
-    if cycle is not None and len(other.states) > 0:
-        # What a cycle spares another motion of the same range may show.
-        elsewhere = _cycle_errors(columns, other, estimate, plain, found)
-        uncertain, spoiled = np.fmax(uncertain, elsewhere[0]), np.fmax(spoiled, elsewhere[1])
-    return uncertain, spoiled, each
-
-
-def _cycle_errors(
-    columns: FaultColumns,
-    cycle: ReferenceCycle | None,
-    estimate: Estimate,
-    plain: Estimate,
-    found: Sequence[FoundFault],
-) -> tuple[Array, Array, list[Array]]:
-    """Return errors of a cycle's forces, percent: by covariance, by all faults, and by each (n,).
-
-    NaN without a cycle.
-    """
-    if cycle is None:
-        nothing = np.full(len(estimate.noise), np.nan)
-        return nothing, nothing, [nothing for _ in found]
-    motion = columns.motion(cycle.states, np.full(len(cycle.states), 0.5))
-    matrix = motion.matrix
-    p = matrix.shape[-1]
-    forces = [matrix @ plain.values]
-    for one in found:
-        with_fault = matrix @ one.fit.values[:p]
-        for family, sizes in (*one.others, (one.family, one.sizes)):
-            if family.of_machine and (cycle.in_order or not family.of_path):
-                with_fault = with_fault + family.of_cycle(motion) @ sizes
-        forces.append(with_fault)
-    each = [cycle.share(b - a, forces[0]) for a, b in pairwise(forces)]
-    spoiled = cycle.share(forces[-1] - forces[0], forces[0])
-    # A fault that is not named adds to the residuals, and so to the covariance.
-    covariance = found[-1].fit.covariance[:p, :p] if found else estimate.covariance
-    variance = np.einsum("rnp,pq,rnq->rn", matrix, covariance, matrix, optimize=True)
-    uncertain = cycle.share(np.sqrt(np.maximum(variance, 0.0)), forces[0])
-    return uncertain, spoiled, each
+            found_faults.insert(0, replace(late, fit=fit))
+    return plain, found_faults
 
 
 def _named_faults(
     columns: FaultColumns,
     plain: Estimate,
-    found: Sequence[FoundFault],
+    found_faults: Sequence[FoundFault],
     each: Sequence[Array],
     step: float,
 ) -> list[IsolatedFault]:
     """Return the faults that change a cycle's forces by enough to be named."""
     p = len(columns.model.names)
-    fits = [plain, *(one.fit for one in found)]
+    fits = [plain, *(fault.fit for fault in found_faults)]
     shifts = [
         float(np.abs((b.values[:p] - a.values[:p]) / b.deviations[:p]).max())
         for a, b in pairwise(fits)
     ]
     faults = []
-    for one, shift, spoils in zip(found, shifts, each, strict=True):
-        family = one.family
-        negligible = np.abs(one.sizes).max() <= family.tolerance.negligible
+    for fault, shift, spoils in zip(found_faults, shifts, each, strict=True):
+        family = fault.family
+        negligible = np.abs(fault.sizes).max() <= family.tolerance.negligible
         if not (spoils < _NAMED).all() and not negligible:
-            seen = (one.sizes, one.deviations, one.chance, shift, spoils)
+            seen = (fault.sizes, fault.deviations, fault.chance, shift, spoils)
             speeds = None if family.speed is None else family.speed * columns.usual
             labels = tuple(family.sizes(columns.model))
-            faults.append(IsolatedFault(family.name, labels, *seen, speeds, step, one.as_well))
+            faults.append(IsolatedFault(family.name, labels, *seen, speeds, step, fault.as_well))
     return faults
 
 
@@ -360,7 +289,7 @@ def _wrong_gain(
 ) -> IsolatedFault | None:
     """Return the fault of a factor of all forces, by known values; None if it is one."""
     # A slow clock makes all inertia too small, that of known rotors too.
-    slow = [1.0 + float(one.sizes[0]) for one in faults if one.fault == "clock"]
+    slow = [1.0 + float(fault.sizes[0]) for fault in faults if fault.fault == "clock"]
     if not (factor.wrong and all(factor.times(s).wrong for s in slow)):
         return None
     off = factor.value - 1.0
@@ -371,7 +300,9 @@ def _wrong_gain(
     )
 
 
-def _play(parts: Sequence[_Part], values: Array, step: float) -> tuple[IsolatedFault | None, bool]:
+def _play(
+    parts: Sequence[SearchedPart], values: Array, step: float
+) -> tuple[IsolatedFault | None, bool]:
     """Return the play of drives, or None, and whether any load changes direction often enough.
 
     Play shows as large residuals where loads change direction.
@@ -386,18 +317,18 @@ def _play(parts: Sequence[_Part], values: Array, step: float) -> tuple[IsolatedF
             residual = block.forces - matrix @ values
             load = matrix @ np.where(carried, values, 0.0)
             records.append(Record(block.states.time, load, residual, moving))
-    found = knocks(records, band)
-    looked = bool(found.looked.any())
-    if np.isnan(found.times).all():
+    signature = backlash_signature(records, band)
+    looked = bool(signature.looked.any())
+    if np.isnan(signature.times).all():
         return None, looked
-    named = np.flatnonzero(~np.isnan(found.times)).tolist()
+    named = np.flatnonzero(~np.isnan(signature.times)).tolist()
     labels = tuple(parts[0].model.model.robot.force_names[joint] for joint in named)
     # The knocks of a cycle are taken to be as strong as those of the logs.
     forces = np.concatenate([part.log.forces for part in parts])
-    cycle = 100.0 * np.sqrt(found.power) / forces.std(axis=0)
+    cycle = 100.0 * np.sqrt(signature.power) / forces.std(axis=0)
     unknown = np.full(len(named), np.nan)
     fault = IsolatedFault(
-        "play", labels, found.times[named], unknown, found.chance, 0.0, cycle, step=step
+        "play", labels, signature.times[named], unknown, signature.chance, 0.0, cycle, step=step
     )
     return fault, looked
 
@@ -409,102 +340,36 @@ def delay_of(
     preprocessing: Sequence[Preprocessing],
 ) -> float:
     """Return the delay, s, of recordings' forces that fits best, less the assumed delay."""
-    parts = _parts(model, estimate, recordings, preprocessing)
-    _, shifted = _delay(parts, _observed)
+    parts = choose_parts(model, estimate, recordings, preprocessing, _ROWS)
+    _, shifted = _delay(parts, observe_parts)
     return shifted[0].how.delay - parts[0].how.delay
 
 
-def _parts(
-    model: Model,
-    estimate: Estimate,
-    recordings: Sequence[Recording],
-    preprocessing: Sequence[Preprocessing],
-    most: int = _ROWS,
-) -> list[_Part]:
-    """Return the parts of recordings that are searched, `most` rows in all."""
-    rows = most // len(recordings)
-    chosen = [
-        (log, _unaveraged(model, log, how), part)
-        for one, how in zip(recordings, preprocessing, strict=True)
-        for log in [one.head()]
-        for part in _moving_most(log, rows)
-    ]
-    states = [[b.states for b in samples(model.robot, part, how)] for _, how, part in chosen]
-    rates = np.concatenate([s.joint_rates for blocks in states for s in blocks])
-    usual = np.sqrt((rates**2).mean(axis=0))
-    families = families_of(model)
-    if model.terms.stribeck == "auto":  # its speeds are found already
-        families = tuple(one for one in families if one.name != "stribeck")
-    found = []
-    for (log, how, part), blocks in zip(chosen, states, strict=True):
-        fastest = max(how.cutoff or 0.0, how.band)
-        ends, stride = log.time[[0, -1]].tolist(), max(int(how.rate / (_POINTS * fastest)), 1)
-        about = families, stride, _MOTION * how.band
-        columns = FaultColumns(model, estimate.values, usual, ends[0], ends[1], *about)
-        found.append(_Part(columns, part, how, blocks))
-    return found
-
-
-def _moving_most(log: Log, rows: int) -> list[Log]:
-    """Return the parts of a log, `rows` in all, in which the joints move most.
-
-    There is one part of each payload phase.
-    """
-    if log.rows <= rows:
-        return [log]
-    steps = (np.diff(log.joints, axis=0) ** 2).sum(axis=1)
-    travel = np.concatenate([[0.0], np.cumsum(steps)])
-    phase = np.zeros(log.rows) if log.payload is None else log.payload
-    phases = sorted(log.phases, key=lambda part: part[0] - part[1])
-    longest = {phase[start]: (start, stop) for start, stop in reversed(phases)}
-    size = rows // len(longest)
-    found = []
-    for start, stop in longest.values():
-        starts = np.arange(start, max(stop - size, start) + 1, max(size // 2, 1))
-        ends = np.minimum(starts + size, stop)
-        best = int(np.argmax(travel[ends - 1] - travel[starts]))
-        found.append(log.part(int(starts[best]), int(ends[best])))
-    return found
-
-
-def _unaveraged(model: Model, log: Log, how: Preprocessing) -> Preprocessing:
-    """Return the preprocessing without averaging of periods, which would hide passing faults."""
-    if how.derivatives != "periodic":
-        return how
-    wanted = Processing(derivatives="central")
-    again = preprocessing_of(model.robot, log, wanted, start=how.start)
-    return replace(again, slow=how.slow, delay=how.delay)
-
-
-def _observed(parts: Sequence[_Part]) -> Observations:
-    return stacked([observations_of(part.model.whole, part.log, part.how) for part in parts])
-
-
-def _searched_for(
+def _search_families(
     families: tuple[Family, ...],
-    parts: Sequence[_Part],
-    observed: Callable[[Sequence[_Part]], Observations],
+    parts: Sequence[SearchedPart],
+    observe: Callable[[Sequence[SearchedPart]], Observations],
 ) -> tuple[Estimate, list[FoundFault]]:
     """Return the fit of parts without faults, and the faults of some families that they show."""
     some = [replace(part, model=replace(part.model, families=families)) for part in parts]
     noise = np.mean([part.how.force_noise for part in parts], axis=0)
-    return searched(some[0].model, observed(some), noise=noise)
+    return search_faults(some[0].model, observe(some), noise=noise)
 
 
 def _delay(
-    parts: Sequence[_Part], observed: Callable[[Sequence[_Part]], Observations]
-) -> tuple[FoundFault | None, list[_Part]]:
+    parts: Sequence[SearchedPart], observe: Callable[[Sequence[SearchedPart]], Observations]
+) -> tuple[FoundFault | None, list[SearchedPart]]:
     """Return the whole delay of the logs' forces, None if none shows, and the parts without it."""
     late, shifted = None, list(parts)
     for _ in range(_ROUNDS):
-        _, found = _searched_for((DELAY,), shifted, observed)
-        if not found:
+        _, found_faults = _search_families((DELAY,), shifted, observe)
+        if not found_faults:
             break
-        first, late = late or found[0], found[0]
+        first, late = late or found_faults[0], found_faults[0]
         delay = shifted[0].how.delay + float(late.sizes[0])
         delay = min(max(delay, -LATEST), LATEST)
         shifted = [replace(part, how=replace(part.how, delay=delay)) for part in shifted]
     if late is not None:
-        whole = np.array([shifted[0].how.delay - parts[0].how.delay])
-        late = replace(late, sizes=whole, chance=first.chance)
+        total_delay = np.array([shifted[0].how.delay - parts[0].how.delay])
+        late = replace(late, sizes=total_delay, chance=first.chance)
     return late, shifted

@@ -101,14 +101,14 @@ def log_faults(
     which then are not at their limits, whatever plateaus they have. `doubtful` says that residuals
     show a fault of the machine, which any likely jitter may be the cause of.
     """
-    found: list[LogFault] = []
+    faults: list[LogFault] = []
     if (share := max(lost, default=0.0)) > _LOST:
         worst = logs[int(np.argmax(lost))]
         message = (
             f"{100.0 * share:.2g} % of the samples of {worst.source} are missing (lost); record "
             "with a buffer, or at a lower rate"
         )
-        found.append(LogFault("lost", f"{message}.", share, False))
+        faults.append(LogFault("lost", f"{message}.", share, False))
     for log, how in zip(logs, preprocessing, strict=True):
         jitter, clear, noise = sampling_jitter(log, how)
         sure = clear > _SURE and jitter * log.rate > _UNEVEN
@@ -118,13 +118,13 @@ def log_faults(
                 "stamps, at random (jitter): record with stamps of the drives' own clock, or at "
                 "the cycle of the bus"
             )
-            found.append(LogFault("jitter", f"{message}.", jitter, True))
+            faults.append(LogFault("jitter", f"{message}.", jitter, True))
             break
     for log, how in zip(logs, preprocessing, strict=True):
         said = at_limits(log) or (() if fits else _plateaus(log, how.force_noise))
         if said:
-            message = _of_all(said)
-            found.append(LogFault("saturation", message, float("nan"), True))
+            message = _merge_limit_sentences(said)
+            faults.append(LogFault("saturation", message, float("nan"), True))
     for log in logs:
         steps = force_steps(log.forces) / np.maximum(log.forces.std(axis=0), 1e-300)
         if (coarse := float(steps.max(initial=0.0))) > _COARSE:
@@ -133,15 +133,15 @@ def log_faults(
                 f"{name} is recorded in steps of {100.0 * coarse:.2g} % of its deviation "
                 f"(quantised): record it with more digits"
             )
-            found.append(LogFault("steps", f"{message}.", coarse, False))
+            faults.append(LogFault("steps", f"{message}.", coarse, False))
             break
-    return tuple(found)
+    return tuple(faults)
 
 
-def _of_all(sentences: Sequence[str]) -> str:
+def _merge_limit_sentences(sentences: Sequence[str]) -> str:
     """Return the first of sentences on forces at a limit, with the names of the other forces."""
     first = sentences[0].rstrip(".")
-    names = dict.fromkeys(one.partition(" ")[0] for one in sentences[1:])
+    names = dict.fromkeys(sentence.partition(" ")[0] for sentence in sentences[1:])
     others = ", ".join(name for name in names if not first.startswith(f"{name} "))
     return f"{first}; the same of {others}." if others else f"{first}."
 
@@ -152,7 +152,7 @@ def _plateaus(log: Log, noise: Array) -> tuple[str, ...]:
     A smooth force that turns round has at most 2.4 times as many within six deviations of its
     extreme value as within the next six.
     """
-    found = []
+    saturated = []
     for name, force, size in zip(log.force_names, log.forces.T, noise.tolist(), strict=True):
         for sign in (1.0, -1.0):
             signed = np.sort(sign * force)[::-1]
@@ -160,10 +160,10 @@ def _plateaus(log: Log, noise: Array) -> tuple[str, ...]:
             within = int(((signed <= top) & (signed > top - 6.0 * size)).sum())
             below = int(((signed <= top - 6.0 * size) & (signed > top - 12.0 * size)).sum())
             if within >= _SHARE * len(signed) and within > _LEVEL * max(below, 1):
-                found.append(name)
-    if not found:
+                saturated.append(name)
+    if not saturated:
         return ()
-    names = ", ".join(dict.fromkeys(found))
+    names = ", ".join(dict.fromkeys(saturated))
     return (
         f"{names} stay within the noise of an extreme value far more often than a force that only "
         f"turns round there: the drive may be at its limit in {log.source} (saturation); move more "
@@ -171,7 +171,7 @@ def _plateaus(log: Log, noise: Array) -> tuple[str, ...]:
     )
 
 
-def of_delay(delay: float, deviation: float) -> LogFault:
+def delay_fault(delay: float, deviation: float) -> LogFault:
     """Return the fault of forces that are so late, s; it is taken out."""
     late, early = ("forces", "positions")[:: 1 if delay > 0.0 else -1]
     said = (

@@ -55,7 +55,7 @@ class Knocks(NamedTuple):
     """Mean square (n,) that this adds to the residuals, over all samples."""
 
 
-def knocks(records: Sequence[Record], band: float) -> Knocks:
+def backlash_signature(records: Sequence[Record], band: float) -> Knocks:
     """Return what shows play in joints' drives, and of which of them enough is seen to tell.
 
     Windows' mean squares are ranked (Mann and Whitney's test, over all joints, each in units of its

@@ -95,7 +95,7 @@ class FoundFault:
     as_well: tuple[FaultName, ...] = ()
 
 
-def searched(
+def search_faults(
     model: FaultColumns,
     observations: Observations,
     families: Sequence[Family] | None = None,
@@ -106,69 +106,72 @@ def searched(
     Only `families` are tried, by default all of them; `noise` (n,) is that of the forces.
     """
     p = len(model.model.names)
-    found: list[FoundFault] = []
+    found_faults: list[FoundFault] = []
     first = 0.0
-    wanted = model.families if families is None else families
+    sought = model.families if families is None else families
     # A fit needs products of columns only, which are the same for their triangular factors.
     triangles = actuator_factors(observations)
     plain = weighted(observations.columns(range(p)), triangles=triangles.columns(range(p)))
-    while len(found) < _MOST:
+    while len(found_faults) < _MOST:
         clear = []
-        before = found[-1].fit.noise if found else plain.noise
-        floor = _VANISHED * before if noise is None else np.maximum(noise, _VANISHED * before)
+        fit_noise = found_faults[-1].fit.noise if found_faults else plain.noise
+        vanished = _VANISHED * fit_noise
+        floor = vanished if noise is None else np.maximum(noise, vanished)
         for k, family in enumerate(model.families):
-            if family not in wanted or family.name in (one.family.name for one in found):
+            if family not in sought or family.name in (fault.family.name for fault in found_faults):
                 continue
-            one = _taken_in(model, observations, triangles, found, k)
-            if one is not None and one.chance < _CHANCE and _is_possible(one, model, before, floor):
-                clear.append(one)
-        best = max((one.statistic for one in clear), default=0.0)
+            fault = _fit_fault(model, observations, triangles, found_faults, k)
+            if fault is None or not fault.chance < _CHANCE:
+                continue
+            if _is_possible(fault, model, fit_noise, floor):
+                clear.append(fault)
+        best = max((fault.statistic for fault in clear), default=0.0)
         first = first or best
         # Residuals beside a clear fault may come from its shape, which no column has exactly.
         if not best > _BESIDE * first:
             break
-        found.append(_likeliest(clear, before, observations.used, floor))
-    return plain, found
+        found_faults.append(_likeliest(clear, fit_noise, observations.used, floor))
+    return plain, found_faults
 
 
 def _likeliest(
-    faults: Sequence[FoundFault], before: Array, rows: Array, floor: Array
+    faults: Sequence[FoundFault], fit_noise: Array, rows: Array, floor: Array
 ) -> FoundFault:
-    """Return the fault that explains residuals of deviations `before` (n,) of so many rows (n,).
+    """Return the fault that explains residuals of deviations (n,) of so many rows (n,).
 
     Where one leaves only the noise of forces, `floor` (n,), likelihood decides: of those that
     explain as much the one of fewest sizes. Else the fault is large, its columns hold to first
     order only, and what comes first among those that explain nearly as much is taken.
     """
     gains = [
-        float(rows @ np.log(np.maximum(before, 1e-300) / np.maximum(one.fit.noise, 1e-300)))
-        for one in faults
+        float(rows @ np.log(np.maximum(fit_noise, 1e-300) / np.maximum(fault.fit.noise, 1e-300)))
+        for fault in faults
     ]
     most = int(np.argmax(gains))
     clearest = faults[most]
     as_well = _AS_WELL * gains[most]
-    whole = bool((clearest.fit.noise <= _AT_NOISE * floor).all())
-    if whole or clearest.family.exact:
+    at_noise = bool((clearest.fit.noise <= _AT_NOISE * floor).all())
+    if at_noise or clearest.family.exact:
         as_well = gains[most] - 0.5 * float(scipy.stats.chi2.isf(_CHANCE, clearest.mix.shape[1]))
-    explaining = [(one, g) for one, g in zip(faults, gains, strict=True) if g >= as_well]
+    explaining = [(fault, g) for fault, g in zip(faults, gains, strict=True) if g >= as_well]
     explaining.sort(
         key=lambda pair: (
-            0 if whole else ORDER.index(pair[0].family.name),
+            0 if at_noise else ORDER.index(pair[0].family.name),
             len(pair[0].sizes),
             -pair[1],
         )
     )
     first = explaining[0][0]
     others = sorted(explaining, key=lambda pair: -pair[1])
-    names = dict.fromkeys(one.family.name for one, _ in others)
+    names = dict.fromkeys(fault.family.name for fault, _ in others)
     return replace(first, as_well=tuple(n for n in names if n != first.family.name)[:_TOLD])
 
 
-def _taken_in(
+def _fit_fault(
     model: FaultColumns,
     observations: Observations,
     triangles: Observations,
-    before: Sequence[FoundFault],
+    known_faults: Sequence[FoundFault],
     k: int,
 ) -> FoundFault | None:
     """Return the fault of family `k`, fitted beside the faults before it; None if it is not seen.
@@ -178,11 +181,11 @@ def _taken_in(
     `triangles` are the `actuator_factors` of the observations.
     """
     p, family = len(model.model.names), model.families[k]
-    places = [model.places[model.families.index(one.family)] for one in before]
-    mixes = [one.mix for one in before]
+    places = [model.places[model.families.index(fault.family)] for fault in known_faults]
+    mixes = [fault.mix for fault in known_faults]
     flat = triangles.matrix.reshape(-1, triangles.matrix.shape[-1])
-    made = [flat[:, place] @ mix for place, mix in zip(places, mixes, strict=True)]
-    known = np.linalg.qr(np.hstack([scaled(part)[0] for part in (flat[:, :p], *made)]))[0]
+    fault_columns = [flat[:, place] @ mix for place, mix in zip(places, mixes, strict=True)]
+    known = np.linalg.qr(np.hstack([scaled(part)[0] for part in (flat[:, :p], *fault_columns)]))[0]
     columns, lengths = scaled(flat[:, model.places[k]])
     _, seen, right = np.linalg.svd(columns - known @ (known.T @ columns), full_matrices=False)
     mix = right[seen > _SEEN].T / lengths[:, None]
@@ -190,64 +193,64 @@ def _taken_in(
     if q == 0 or observations.rows < _ENOUGH * (p + q):
         return None
 
-    def fitted(mix: Array) -> tuple[Estimate, Array, Array]:
+    def fit_combinations(mix: Array) -> tuple[Estimate, Array, Array]:
         """Return the fit with these combinations, their sizes, and the sizes' covariance."""
         chosen = [*zip(places, mixes, strict=True), (model.places[k], mix)]
 
-        def mixed(rows: Observations) -> Observations:
-            parts = [rows.matrix[..., place] @ one for place, one in chosen]
+        def append_combinations(rows: Observations) -> Observations:
+            parts = [rows.matrix[..., place] @ combination for place, combination in chosen]
             return rows.with_matrix(np.concatenate([rows.matrix[..., :p], *parts], axis=-1))
 
-        fit = weighted(mixed(observations), triangles=mixed(triangles))
+        fit = weighted(append_combinations(observations), triangles=append_combinations(triangles))
         last = slice(len(fit.values) - mix.shape[1], None)
         return fit, fit.values[last], fit.covariance[last, last]
 
-    fit, size, covariance = fitted(mix)
+    fit, size, covariance = fit_combinations(mix)
     statistic = wald(size, covariance)
     chance = float(scipy.stats.chi2.sf(statistic, q))
     clear = np.abs(size) > _CLEAR * np.sqrt(np.maximum(np.diag(covariance), 0.0))
     if chance < _CHANCE and clear.any() and not clear.all():
         mix = mix[:, clear]
-        fit, size, covariance = fitted(mix)
-    ends = np.cumsum([p, *(one.shape[1] for one in mixes)])
+        fit, size, covariance = fit_combinations(mix)
+    ends = np.cumsum([p, *(mix.shape[1] for mix in mixes)])
     others = [
-        (one.family, one.mix @ fit.values[start:stop])
-        for one, (start, stop) in zip(before, pairwise(ends), strict=True)
+        (fault.family, fault.mix @ fit.values[start:stop])
+        for fault, (start, stop) in zip(known_faults, pairwise(ends), strict=True)
     ]
     # Without noise a size may be known exactly: its variance is rounding, of either sign.
     variances = np.einsum("ij,jk,ik->i", mix, covariance, mix)
     deviations = np.sqrt(np.maximum(variances, 0.0))
-    usual = _likely(size, covariance, mix, model) if family.unit == "m" else 1.0
+    usual = _usual_error_share(size, covariance, mix, model) if family.unit == "m" else 1.0
     seen_as = mix, mix @ size, deviations, statistic, chance
     return FoundFault(family, *seen_as, fit, usual, tuple(others))
 
 
-def _likely(size: Array, covariance: Array, mix: Array, model: FaultColumns) -> float:
+def _usual_error_share(size: Array, covariance: Array, mix: Array, model: FaultColumns) -> float:
     """Return the share of Wald's statistic that errors of lengths of the usual size explain."""
     spread = length_tolerance(model.model.robot).usual
     back = spread * np.linalg.pinv(mix)
     both = back @ back.T + covariance
     # Of the sizes, C (C0 + C)^-1 remains beside the most likely ones.
-    left = np.linalg.solve(both, size)
-    return 1.0 - float(left @ covariance @ left) / wald(size, covariance)
+    weighted_size = np.linalg.solve(both, size)
+    return 1.0 - float(weighted_size @ covariance @ weighted_size) / wald(size, covariance)
 
 
-def _is_possible(one: FoundFault, model: FaultColumns, before: Array, floor: Array) -> bool:
+def _is_possible(fault: FoundFault, model: FaultColumns, fit_noise: Array, floor: Array) -> bool:
     """Say whether the sizes are possible: friction must brake, errors of lengths be small.
 
     A fault that varies freely with time must leave noise alone, `floor` (n,), or a small part of
-    the residuals `before` (n,).
+    the residuals `fit_noise` (n,) without it.
     """
-    family = one.family
+    family = fault.family
     if (
         family.free
-        and not (one.fit.noise <= np.maximum(_AT_NOISE * floor, before / _MOST_OF)).all()
+        and not (fault.fit.noise <= np.maximum(_AT_NOISE * floor, fit_noise / _MOST_OF)).all()
     ):
         return False
     largest = family.largest
     if family.speed is not None:
         dry = model.model.per_joint("coulomb", np.abs(model.values))
         largest = np.inf if dry is None else _TIMES * float(dry.max())
-    if family.positive and not (one.sizes / np.maximum(one.deviations, 1e-300)).sum() > 0.0:
+    if family.positive and not (fault.sizes / np.maximum(fault.deviations, 1e-300)).sum() > 0.0:
         return False
-    return one.likely > _MOSTLY and bool(np.abs(one.sizes).max() < largest)
+    return fault.likely > _MOSTLY and bool(np.abs(fault.sizes).max() < largest)
