@@ -136,13 +136,8 @@ def cycle(
     lists = {name: parsed_list(text, f"--{name}") for name, text in joint_limits.items()}
     limits = limits_of(machine, **lists, tool_speed=tool_speed, tool_acceleration=tool_acceleration)
     way = kind or ("replay" if table else "line" if to or via else "adept")
-    options: dict[str, object] = {
-        "to": to,
-        "via": via,
-        "from": from_,
-        "corner": corner,
-        "back": back,
-    }
+    options: dict[str, object] = {"to": to, "via": via, "from": from_}
+    options |= {"corner": corner, "back": back}
     options |= {"around": around, "scale": scale, "table": table, "optimal": optimal}
     _expect_fitting(way, options | {"duration": duration, "jerk": jerk})
     if way == "replay" and table is None:

@@ -73,12 +73,7 @@ def maximum_likelihood(
     _check(log)
     curve = preprocessing.differentiator.curve(log)
     measured = curve.coefficients
-    if measured.size > _MOST:
-        raise log.fault(
-            "too large",
-            f"its motion has {measured.size} coefficients, more than the {_MOST} that maximum "
-            "likelihood fits at once; give a part of the log",
-        )
+    _expect_small(log, measured.size)
     base = curve.bases[0]
     precision = scipy.sparse.diags(1.0 / preprocessing.joint_noise**2)
     information = scipy.sparse.kron(base.T @ base, precision, format="csc")
@@ -135,6 +130,16 @@ def _check(log: Log) -> None:
     if log.payload is not None and np.ptp(log.payload) > 0:
         said = f"the payload changes; give a part with one payload {advice}"
         raise log.fault("no payload", said)
+
+
+def _expect_small(log: Log, coefficients: int) -> None:
+    """Refuse a motion of more coefficients than are fitted at once."""
+    if coefficients > _MOST:
+        raise log.fault(
+            "too large",
+            f"its motion has {coefficients} coefficients, more than the {_MOST} that maximum "
+            "likelihood fits at once; give a part of the log",
+        )
 
 
 def _sampled(model: Model, log: Log, curve: Curve, preprocessing: Preprocessing) -> Observations:

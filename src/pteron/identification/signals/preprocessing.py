@@ -255,13 +255,7 @@ def preprocessing_of(
 
     # How fast the motion is
     rates, _ = central_differences(smoothed(joints, rate, cutoff), rate)
-    if series is None:
-        frequencies = np.asarray(np.fft.rfftfreq(len(rates), 1.0 / rate), dtype=float)
-        power = np.abs(np.fft.rfft(np.hanning(len(rates))[:, None] * rates, axis=0)) ** 2
-    else:
-        order = np.arange(1, series.harmonics + 1)
-        frequencies = order / series.period
-        power = (order**2)[:, None] * (np.square(series.cosines) + np.square(series.sines))
+    frequencies, power = _rate_spectrum(rates, rate, series)
     edge = float(frequencies[min(bins_below(power, _POWER), len(frequencies) - 1)])
     band = settings.band or min(_PRODUCTS * edge, rate / 2.0)
     if settings.band is None and cutoff is not None and series is None:
@@ -320,6 +314,17 @@ def _is_series(series: FittedSeries, joints: Array) -> bool:
     """Say whether a Fourier series leaves noise alone: jumps of acceleration take more terms."""
     least = _ROUNDING * np.ptp(joints, axis=0)
     return bool((series.noise <= np.maximum(_NOISE_ALONE * position_noise(joints), least)).all())
+
+
+def _rate_spectrum(rates: Array, rate: float, series: FittedSeries | None) -> tuple[Array, Array]:
+    """Return frequencies (F,), Hz, and the power (F, n) of the joints' rates at each."""
+    if series is None:
+        frequencies = np.asarray(np.fft.rfftfreq(len(rates), 1.0 / rate), dtype=float)
+        windowed = np.hanning(len(rates))[:, None] * rates
+        return frequencies, np.abs(np.fft.rfft(windowed, axis=0)) ** 2
+    order = np.arange(1, series.harmonics + 1)
+    power = (order**2)[:, None] * (np.square(series.cosines) + np.square(series.sines))
+    return order / series.period, power
 
 
 def _check_frequencies(settings: Processing, rate: float) -> None:
