@@ -182,7 +182,7 @@ class Design:
         elif any(cycle.scale for cycle in spec.cycles):
             middle[:lengths] = self.cube.center
         return tuple(
-            one.motion(self.robot, middle, spec.motion.acceleration) for one in spec.cycles
+            table.motion(self.robot, middle, spec.motion.acceleration) for table in spec.cycles
         )
 
     @cached_property

@@ -70,8 +70,8 @@ class ProvedCube:
 
 def place_words(center: Array) -> str:
     """Return a place in words: "(0, 0, -812.4) mm"."""
-    told = ", ".join(f"{round(1000.0 * x, 1) + 0.0:g}" for x in center)
-    return f"({told}) mm" if len(center) > 1 else f"{told} mm"
+    numbers = ", ".join(f"{round(1000.0 * x, 1) + 0.0:g}" for x in center)
+    return f"({numbers}) mm" if len(center) > 1 else f"{numbers} mm"
 
 
 @dataclass(frozen=True)
@@ -95,25 +95,23 @@ class Proved:
 
 def proved(design: Design) -> Proved:
     """Return a design with its proofs, and with the cube that they leave it."""
-    task, found = design.task, None
+    task, cube = design.task, None
     workspace: tuple[Proof, ...] = ()
     if task.seeks_place:
-        known, found = design.cube, proved_cube(design)
-        if found is not None:
-            known = Fit(found.center, found.edge, found.side, 0.0)
+        known, cube = design.cube, proved_cube(design)
+        if cube is not None:
+            known = Fit(cube.center, cube.edge, cube.side, 0.0)
         elif known.edge > task.shape[1] * _SHARES[0]:
             known = replace(known, edge=0.0, margin=UNKNOWN)
         design = replace(design, known=known)
     if task.floats:
-        if found is not None and found.edge >= task.shape[1] * _SHARES[0] * (1.0 - ROUNDING):
-            workspace = found.proofs
-            design = replace(
-                design, known=replace(design.cube, edge=max(found.edge, task.shape[1]))
-            )
+        if cube is not None and cube.edge >= task.shape[1] * _SHARES[0] * (1.0 - ROUNDING):
+            workspace = cube.proofs
+            design = replace(design, known=replace(design.cube, edge=max(cube.edge, task.shape[1])))
         return Proved(design, None, workspace)
     workspace = workspace_proofs(design)
-    least = min((_least(design, one) for one in workspace if not one.holds), default=np.inf)
-    return Proved(replace(design, least=least), found, workspace)
+    least = min((_least(design, proof) for proof in workspace if not proof.holds), default=np.inf)
+    return Proved(replace(design, least=least), cube, workspace)
 
 
 @lru_cache(maxsize=8)
@@ -143,10 +141,10 @@ def proved_cube(design: Design) -> ProvedCube | None:
         return cube_proofs(design, fit.center, fit.edge)
 
     shares = _PLACED if capped else _SHARES
-    found = proved_fit(search, proofs, shape, shares, design.robot.freedom)
-    if found is None:
+    fitted = proved_fit(search, proofs, shape, shares, design.robot.freedom)
+    if fitted is None:
         return None
-    fit, proved = found
+    fit, proved = fitted
     return ProvedCube(fit.center, fit.edge, design.cube.edge, proved, fit.side)
 
 
@@ -155,7 +153,7 @@ def cube_proofs(design: Design, center: Array, edge: float) -> tuple[Proof, ...]
 
     Of a workspace that floats, at this place, its greatest side being `edge`.
     """
-    found = []
+    proofs = []
     floating = design.task.spec.workspace if design.task.floats else None
     for pose in design.task.orientations:
         if floating is None:
@@ -164,10 +162,10 @@ def cube_proofs(design: Design, center: Array, edge: float) -> tuple[Proof, ...]
         else:
             share = edge / design.task.shape[1]
             region = workspace_region(floating.placed(center), pose, share)
-        found.append(_proof(design, region))
-        if not found[-1].holds:
+        proofs.append(_proof(design, region))
+        if not proofs[-1].holds:
             break
-    return tuple(found)
+    return tuple(proofs)
 
 
 def workspace_proofs(design: Design) -> tuple[Proof, ...]:
@@ -176,16 +174,18 @@ def workspace_proofs(design: Design) -> tuple[Proof, ...]:
     Where it touches the boundary it is undecided; the proof is then of 0.9999 of it, about its
     middle, if that can be proved: its region tells, and `workspace_share`.
     """
-    found: list[Proof] = []
-    asked = design.workspace
-    if asked is None:
+    proofs: list[Proof] = []
+    required = design.workspace
+    if required is None:
         return ()
     for pose in design.task.orientations:
-        whole = _proof(design, workspace_region(asked, pose))
-        smaller = None if whole.holds is not None else workspace_region(asked, pose, _SHARES[0])
-        nearly = whole if smaller is None else _proof(design, smaller)
-        found.append(nearly if nearly.holds else whole)
-    return tuple(found)
+        full_proof = _proof(design, workspace_region(required, pose))
+        smaller = (
+            None if full_proof.holds is not None else workspace_region(required, pose, _SHARES[0])
+        )
+        nearly = full_proof if smaller is None else _proof(design, smaller)
+        proofs.append(nearly if nearly.holds else full_proof)
+    return tuple(proofs)
 
 
 def counterexamples(design: Design, center: Array, edge: float) -> Samples:
@@ -205,13 +205,13 @@ def counterexamples(design: Design, center: Array, edge: float) -> Samples:
 
 def workspace_share(design: Design, proof: Proof) -> float:
     """Return which share of the required workspace a proof is of."""
-    asked = design.workspace
-    assert asked is not None  # who asks has one
+    required = design.workspace
+    assert required is not None  # who asks has one
     if design.task.floats:
         sides = np.ptp(proof.region.box, axis=0)[: len(design.cube.center)]
         return min(1.0, round(float(sides.max()) / design.task.shape[1], 6))
-    whole = (workspace_region(asked, pose) for pose in design.task.orientations)
-    return 1.0 if proof.region in whole else _SHARES[0]
+    full_regions = (workspace_region(required, pose) for pose in design.task.orientations)
+    return 1.0 if proof.region in full_regions else _SHARES[0]
 
 
 def _proof(design: Design, region: Region) -> Proof:

@@ -39,12 +39,12 @@ def refined(task: Task, values: Sequence[float], objective: int) -> list[float]:
     with the counterexample among its conditions.
     """
     spec, start = task.spec, np.array(values)
-    asked = spec.objectives[objective]
+    target = spec.objectives[objective]
     try:
         design = proved(Design(task, task.machine(values))).design
         slopes = _Slopes(task, design, start)
-        wanted = slopes.of(asked.quantity)
-        if wanted is None or not wanted.any() or design.margin < -ROUNDING:
+        target_slopes = slopes.of(target.quantity)
+        if target_slopes is None or not target_slopes.any() or design.margin < -ROUNDING:
             return list(values)
         geometry = geometry_slopes(task.robot, task.variables, values)
     except ModelError:  # at the end of what can be made
@@ -65,7 +65,7 @@ def refined(task: Task, values: Sequence[float], objective: int) -> list[float]:
         z0,
         design.geometry,
         geometry,
-        asked.sign * wanted,
+        target.sign * target_slopes,
         np.vstack([task.ranges.T, reach]),
         shape,
         task.orientations if seeks else task.orientations[:0],
@@ -74,12 +74,12 @@ def refined(task: Task, values: Sequence[float], objective: int) -> list[float]:
     first, dense = (_asked_at(design, lengths, count) for count in (_FIRST, POINTS))
     for _ in range(_EXCHANGES):
         z = improve_unknowns(program, first, dense)
-        found: list[float] = z[: len(start)].tolist()
-        missed = counterexamples(Design(task, task.machine(found)), z[len(start) : -1], z[-1])
+        variables: list[float] = z[: len(start)].tolist()
+        missed = counterexamples(Design(task, task.machine(variables)), z[len(start) : -1], z[-1])
         if not len(missed.inside):
             break
         first = first.joined(missed)
-    return found
+    return variables
 
 
 def _asked_at(design: Design, lengths: int, count: int) -> Samples:
@@ -109,24 +109,24 @@ class _Slopes:
         alone = quantities()[name].of_machine
         if alone is None:
             return None
-        own = slopes_of(
+        slopes = slopes_of(
             lambda v: alone(task.machine(v.tolist())), task.variables, self.start.tolist()
         )
-        return np.append(own, np.zeros(tail))
+        return np.append(slopes, np.zeros(tail))
 
     def bounds(self, objective: int, z0: Array) -> list[tuple[Array, float]]:
         """Return what holds the other objectives, and what is asked of quantities with slopes."""
-        found = []
-        for k, one in enumerate(self.task.spec.objectives):
-            row = self.of(one.quantity)
+        bounds = []
+        for k, target in enumerate(self.task.spec.objectives):
+            row = self.of(target.quantity)
             if k != objective and row is not None:
-                found.append((-one.sign * row, float(-one.sign * row @ z0)))
-        for asked in self.task.spec.requirements:
-            row = self.of(asked.quantity)
+                bounds.append((-target.sign * row, float(-target.sign * row @ z0)))
+        for requirement in self.task.spec.requirements:
+            row = self.of(requirement.quantity)
             if row is None:
                 continue
-            now = self.design.quantity(asked.quantity)
-            for bound, side in ((asked.least, 1.0), (asked.most, -1.0)):
+            now = self.design.quantity(requirement.quantity)
+            for bound, side in ((requirement.least, 1.0), (requirement.most, -1.0)):
                 if bound is not None:
-                    found.append((side * row, float(side * (row @ z0 + bound - now))))
-        return found
+                    bounds.append((side * row, float(side * (row @ z0 + bound - now))))
+        return bounds

@@ -22,17 +22,17 @@ def workspace_shape(workspace: WorkspaceTable, count: int) -> tuple[Shape, float
     half = sides / edge
     if workspace.shape != "cylinder":
         return Shape(half, lambda v: np.abs(v / half).max(axis=-1), np.empty((0, count))), edge
-    along = "xyz".index(workspace.axis)
-    across = [k for k in range(3) if k != along]
+    axis = "xyz".index(workspace.axis)
+    radial = [k for k in range(3) if k != axis]
     turns = 2.0 * np.pi * np.arange(_RING) / _RING
     rim = np.zeros((5, _RING, 3))
-    rim[..., across] = half[across] * np.stack([np.cos(turns), np.sin(turns)], axis=-1)
-    rim[..., along] = half[along] * np.linspace(-1.0, 1.0, 5)[:, None]
+    rim[..., radial] = half[radial] * np.stack([np.cos(turns), np.sin(turns)], axis=-1)
+    rim[..., axis] = half[axis] * np.linspace(-1.0, 1.0, 5)[:, None]
 
     def gauge(vectors: Array) -> Array:
         scaled = vectors / half
-        away = np.linalg.norm(scaled[..., across], axis=-1)
-        return np.asarray(np.maximum(away, np.abs(scaled[..., along])))
+        away = np.linalg.norm(scaled[..., radial], axis=-1)
+        return np.asarray(np.maximum(away, np.abs(scaled[..., axis])))
 
     return Shape(half, gauge, rim.reshape(-1, 3)), edge
 
@@ -40,9 +40,9 @@ def workspace_shape(workspace: WorkspaceTable, count: int) -> tuple[Shape, float
 def workspace_poses(workspace: WorkspaceTable, angles: Array, samples: int | None = None) -> Array:
     """Return poses (N, m) over a workspace at orientations (A, m); with 2 samples its corners."""
     positions = _positions(workspace, samples or workspace.samples)
-    found = np.repeat(angles, len(positions), axis=0)
-    found[:, : positions.shape[1]] = np.tile(positions, (len(angles), 1))
-    return found
+    poses = np.repeat(angles, len(positions), axis=0)
+    poses[:, : positions.shape[1]] = np.tile(positions, (len(angles), 1))
+    return poses
 
 
 def _positions(workspace: WorkspaceTable, count: int) -> Array:
@@ -53,31 +53,31 @@ def _positions(workspace: WorkspaceTable, count: int) -> Array:
         return np.asarray((low + high) / 2.0 + units * (high - low) / 2.0)
     assert workspace.radius is not None  # the shape says so
     assert workspace.height is not None
-    along = "xyz".index(workspace.axis)
+    axis = "xyz".index(workspace.axis)
     turns = np.linspace(0.0, 2.0 * np.pi, 4 * count, endpoint=False)
     radii = np.linspace(0.0, workspace.radius, max(2, (count + 1) // 2))
-    found = [
+    points = [
         (r * np.cos(a), r * np.sin(a), h * workspace.height / 2.0)
         for h in line
         for r in radii
         for a in (turns if r else turns[:1])
     ]
     # The last is along the axis.
-    order = [(along + 1) % 3, (along + 2) % 3, along]
-    positions = np.empty((len(found), 3))
-    positions[:, order] = found
+    order = [(axis + 1) % 3, (axis + 2) % 3, axis]
+    positions = np.empty((len(points), 3))
+    positions[:, order] = points
     return np.asarray(positions + np.array(workspace.center))
 
 
-def workspace_region(asked: WorkspaceTable, pose: Array, share: float = 1.0) -> Region:
+def workspace_region(table: WorkspaceTable, pose: Array, share: float = 1.0) -> Region:
     """Return a workspace that has its place, at the orientation of a pose, or a share of it."""
-    if asked.shape == "cylinder":
-        assert asked.radius is not None  # the shape says so
-        assert asked.height is not None
-        x, y, z = np.eye(3)["xyz".index(asked.axis)].tolist()
-        center = placed_pose(pose, np.array(asked.center))
-        return Cylinder(center, share * asked.radius, share * asked.height, (x, y, z))
-    low, high = (np.array(end) for end in asked.ends)
+    if table.shape == "cylinder":
+        assert table.radius is not None  # the shape says so
+        assert table.height is not None
+        x, y, z = np.eye(3)["xyz".index(table.axis)].tolist()
+        center = placed_pose(pose, np.array(table.center))
+        return Cylinder(center, share * table.radius, share * table.height, (x, y, z))
+    low, high = (np.array(end) for end in table.ends)
     inset = 0.5 * (1.0 - share) * (high - low)
     return Box(placed_pose(pose, low + inset), placed_pose(pose, high - inset))
 

@@ -80,8 +80,8 @@ class ReportedDesign(Proved):
     @property
     def lacking(self) -> list[str]:
         """The quantities that the machine does not have, with the reason."""
-        found = ((name, self.design.lack(name)) for name in self.design.task.asked)
-        return [f"{name}: none, because {lack}" for name, lack in found if lack]
+        reasons = ((name, self.design.lack(name)) for name in self.design.task.asked)
+        return [f"{name}: none, because {lack}" for name, lack in reasons if lack]
 
     @property
     def covers(self) -> list[str]:
@@ -91,12 +91,12 @@ class ReportedDesign(Proved):
         for name in task.asked:
             value = design.quantity(name)
             if not design.lack(name):
-                told = Change(name, value, value, task.unit(name)).shown(value)
-                known.setdefault(design.cover(name), []).append(f"{name} {told}")
-        lines = [*self.lacking, *(f"{', '.join(told)}: {how}" for how, told in known.items())]
+                text = Change(name, value, value, task.unit(name)).shown(value)
+                known.setdefault(design.cover(name), []).append(f"{name} {text}")
+        lines = [*self.lacking, *(f"{', '.join(text)}: {how}" for how, text in known.items())]
         if task.motors and "motor_margin" in task.asked and not design.lack("motor_margin"):
-            asked = (r.least for r in task.spec.requirements if r.quantity == "motor_margin")
-            least = max((one for one in asked if one is not None), default=1.0)
+            minimums = (r.least for r in task.spec.requirements if r.quantity == "motor_margin")
+            least = max((minimum for minimum in minimums if minimum is not None), default=1.0)
             lines += map(_motor_words, best_motors(design.sizing, task.motors, least))
         return lines
 
@@ -132,9 +132,9 @@ class Summary:
     def robots(self) -> dict[str, str]:
         """Return the chosen machines as texts of files, by the files' names."""
         return {
-            f"{name}.toml": text_of(one.design.robot)
-            for one in self.chosen
-            for name in one.name.split(", ")
+            f"{name}.toml": text_of(reported.design.robot)
+            for reported in self.chosen
+            for name in reported.name.split(", ")
         }
 
     def table(self) -> pl.DataFrame:
@@ -155,7 +155,7 @@ class Summary:
             ],
             "objectives": [o.quantity for o in front.task.spec.objectives],
             "start": _data(self.start),
-            "chosen": {one.name: _data(one) for one in self.chosen},
+            "chosen": {reported.name: _data(reported) for reported in self.chosen},
             "front": front.table.select(list(front.headings)).to_dicts(),
         }
 
@@ -181,14 +181,14 @@ class Summary:
             "",
             *(f"- {line}" for line in _lines(self.start)),
         ]
-        for one in self.chosen:
-            lines += ["", f"## {one.name.replace('-', ' ').capitalize()}", ""]
+        for reported in self.chosen:
+            lines += ["", f"## {reported.name.replace('-', ' ').capitalize()}", ""]
             lines += ["| what | to begin with | now | change |", "| --- | ---: | ---: | ---: |"]
             lines += [
                 f"| {c.what} | {c.shown(c.before)} | {c.shown(c.after)} | {c.by} |"
-                for c in one.changes
+                for c in reported.changes
             ]
-            lines += ["", *(f"- {line}" for line in _lines(one))]
+            lines += ["", *(f"- {line}" for line in _lines(reported))]
         return "\n".join(lines) + "\n"
 
 
@@ -201,29 +201,37 @@ def _told(name: str, design: Design) -> ReportedDesign:
     return ReportedDesign(**vars(proved(design)), name=name)
 
 
-def _lines(one: ReportedDesign) -> list[str]:
+def _lines(reported: ReportedDesign) -> list[str]:
     """Return the lines on proofs, on the poses that each quantity is over, and on strokes."""
-    task, lines = one.design.task, [*one.proofs, *one.covers]
+    task, lines = reported.design.task, [*reported.proofs, *reported.covers]
     region = "the workspace" if task.spec.workspace is not None else "the cube"
-    if (task.seeks_place and one.design.cube.edge <= 0.0) or not one.design.reached:
+    if (task.seeks_place and reported.design.cube.edge <= 0.0) or not reported.design.reached:
         return lines
-    return [*lines, *(f"{line}, over {region}" for line in stroke_words(one.design))]
+    return [*lines, *(f"{line}, over {region}" for line in stroke_words(reported.design))]
 
 
-def _data(one: ReportedDesign) -> dict[str, Any]:
-    task = one.design.task
-    found: dict[str, Any] = {"machine": machine_record(one.design.robot)}
-    found |= {name: one.design.quantity(name) for name in task.asked}
-    found["known"] = {name: one.design.lack(name) or one.design.cover(name) for name in task.asked}
+def _data(reported: ReportedDesign) -> dict[str, Any]:
+    task = reported.design.task
+    contents: dict[str, Any] = {"machine": machine_record(reported.design.robot)}
+    contents |= {name: reported.design.quantity(name) for name in task.asked}
+    contents["known"] = {
+        name: reported.design.lack(name) or reported.design.cover(name) for name in task.asked
+    }
     if task.floats:
-        found["workspace_center"] = one.design.cube.center.tolist() if one.workspace else None
-    found["changes"] = [vars(change) for change in one.changes] if one.name != "start" else []
-    if one.cube is not None:
-        found["proved_cube"] = {
-            "center": one.cube.center.tolist(),
-            "edge": one.cube.edge,
-            "boxes": sum(proof.boxes for proof in one.cube.proofs),
+        contents["workspace_center"] = (
+            reported.design.cube.center.tolist() if reported.workspace else None
+        )
+    contents["changes"] = (
+        [vars(change) for change in reported.changes] if reported.name != "start" else []
+    )
+    if reported.cube is not None:
+        contents["proved_cube"] = {
+            "center": reported.cube.center.tolist(),
+            "edge": reported.cube.edge,
+            "boxes": sum(proof.boxes for proof in reported.cube.proofs),
         }
-    found["workspace_proved"] = [proof.holds for proof in one.workspace]
-    found["workspace_share"] = [workspace_share(one.design, proof) for proof in one.workspace]
-    return found
+    contents["workspace_proved"] = [proof.holds for proof in reported.workspace]
+    contents["workspace_share"] = [
+        workspace_share(reported.design, proof) for proof in reported.workspace
+    ]
+    return contents

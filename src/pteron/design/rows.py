@@ -36,15 +36,17 @@ def evaluated(task: Task, values: Sequence[float], *, proofs: bool = False) -> d
         design = Design(task, task.machine(values))
         if proofs:
             design = proved(design).design
-        found = {name: design.quantity(name) for name in task.asked}
-        found |= zip(places(task), design.cube.center.tolist() if task.floats else (), strict=True)
+        row = {name: design.quantity(name) for name in task.asked}
+        row |= zip(places(task), design.cube.center.tolist() if task.floats else (), strict=True)
         margin = design.margin
     except ModelError:
-        found, margin = dict.fromkeys((*task.asked, *places(task)), float("nan")), -FAILED
+        row, margin = dict.fromkeys((*task.asked, *places(task)), float("nan")), -FAILED
     misses = {f"{MISSES}workspace": 0.0 if margin >= -ROUNDING else -margin}
-    for k, one in enumerate(task.spec.requirements, start=1):
-        misses[f"{MISSES}{k} {one.quantity}"] = one.missed_by(found[one.quantity], FAILED)
-    return found | misses
+    for k, requirement in enumerate(task.spec.requirements, start=1):
+        misses[f"{MISSES}{k} {requirement.quantity}"] = requirement.missed_by(
+            row[requirement.quantity], FAILED
+        )
+    return row | misses
 
 
 def places(task: Task) -> list[str]:
@@ -59,5 +61,5 @@ def design_table(task: Task, designs: ArrayLike, *, proofs: bool = False) -> pl.
     values = np.asarray(designs)
     with one_thread():
         rows = [evaluated(task, row, proofs=proofs) for row in values.tolist()]
-    found = {v.name: values[:, k].tolist() for k, v in enumerate(task.variables)}
-    return pl.DataFrame(found | {name: [row[name] for row in rows] for name in rows[0]})
+    columns = {v.name: values[:, k].tolist() for k, v in enumerate(task.variables)}
+    return pl.DataFrame(columns | {name: [row[name] for row in rows] for name in rows[0]})

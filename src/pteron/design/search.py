@@ -88,10 +88,12 @@ def search(
     if workers is not None and scheduler is not None:
         raise DataError("workers and scheduler given; a scheduler has its own workers: give one")
     with ExitStack() as opened:
-        kept = folder or opened.enter_context(TemporaryDirectory(prefix="pteron-design-"))
+        generations_folder = folder or opened.enter_context(
+            TemporaryDirectory(prefix="pteron-design-")
+        )
         # The same for all generations: a process compiles what it needs once.
         shared = opened.enter_context(processes(task, workers or 1))
-        return _generations(task, Path(kept), scheduler, shared, progress)
+        return _generations(task, Path(generations_folder), scheduler, shared, progress)
 
 
 def _generations(
@@ -126,9 +128,9 @@ def _generations(
         _swept(task, worked, chunks, store, shared, scheduler=scheduler, progress=tell)
         tables.append(store.scan().collect())
         front = _proved_front(proofs, tables)
-        found = proofs.applied(tables[-1])
-        values = np.asarray(found.select([v.name for v in task.variables]).to_numpy())
-        evolution.tell((values - low) / (high - low), *_costs(task, found))
+        proved_rows = proofs.applied(tables[-1])
+        values = np.asarray(proved_rows.select([v.name for v in task.variables]).to_numpy())
+        evolution.tell((values - low) / (high - low), *_costs(task, proved_rows))
     return proofs.front(lambda: tables)
 
 

@@ -101,7 +101,7 @@ class Kind:
 
     @cached_property
     def _choices(self) -> dict[str, Sequence[str]]:
-        keys = {own for leg in self.robot.legs for own, *_ in leg.extents.values()}
+        keys = {part_key for leg in self.robot.legs for part_key, *_ in leg.extents.values()}
         return {key: stock for key, stock in self.stocks.items() if key in keys and len(stock) > 1}
 
     @property
