@@ -78,13 +78,13 @@ def _write(
         echo(parameters.to_latex(symbols=symbols))
     else:
         echo("\n".join(map(str, parameters.expressions(form, symbols=symbols))))
-    for line in _closing(parameters, symbols):
+    for line in _closing_lines(parameters, symbols):
         echo(f"{_COMMENTS[form]} {line}")
 
 
 def _show(parameters: BaseParameters, symbols: Symbols) -> None:
     expressions = parameters.expressions(symbols=symbols)
-    closing = [plain(line) for line in _closing(parameters, symbols)]
+    closing = [plain(line) for line in _closing_lines(parameters, symbols)]
     if not is_terminal():
         show(*(plain(line) for line in expressions), "", *closing)
         return
@@ -103,7 +103,7 @@ def _geometry(parameters: BaseParameters, symbols: Symbols) -> dict[str, float]:
     return parameters.leg_geometry_values if symbols == "leg" else parameters.geometry_values
 
 
-def _closing(parameters: BaseParameters, symbols: Symbols) -> list[str]:
+def _closing_lines(parameters: BaseParameters, symbols: Symbols) -> list[str]:
     """Return the values of the symbols, if there are any, and the proof."""
     lines = []
     if symbols:

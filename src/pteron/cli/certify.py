@@ -86,7 +86,7 @@ class Proofs:
         """Run the proof and return its result; the exit code is 1 if a box is not proved."""
         if self.prove is None:
             pose = _orientation(robot, slice_)
-            proved = self._certify if robot.platform.lengths else self._leaning
+            proved = self._certify if robot.platform.lengths else self._certify_tilt
             return proved(robot, pose, warnings)
         from pteron.workspace import prove
 
@@ -103,7 +103,7 @@ class Proofs:
     def _unsure(self) -> list[str]:
         return [] if self.type_ii else [_MAY_BE_SINGULAR]
 
-    def _leaning(self, robot: Manipulator, pose: Array, warnings: list[str]) -> Result:
+    def _certify_tilt(self, robot: Manipulator, pose: Array, warnings: list[str]) -> Result:
         from pteron.workspace import conditions, largest_tilt
 
         warn(warnings)
@@ -132,7 +132,7 @@ class Proofs:
         if not paved.complete:
             note(f"Warning: the gap is not {percent(tolerance)}: there were too many boxes")
         contents = paved, pose, self.floors, cube
-        return Result(_certified(*contents) | {"warnings": warnings}, partial(_show, *contents))
+        return Result(_paving_data(*contents) | {"warnings": warnings}, partial(_show, *contents))
 
 
 def _expect_none(options: Mapping[str, object], what: str) -> None:
@@ -168,7 +168,7 @@ def _region(robot: Manipulator, text: str) -> Box:
     return box_of([spans[name] for name in robot.coordinates])
 
 
-def _certified(
+def _paving_data(
     paved: Paving, pose: Array, floors: dict[str, float], cube: Inscribed | None
 ) -> dict[str, Any]:
     return {

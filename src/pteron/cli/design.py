@@ -80,7 +80,7 @@ def design(
 
         checked_folder(out)
         _tell_resumed(Path(out))
-    front = _found(requirements, out, sweep, workers, scheduler)
+    front = _search_front(requirements, out, sweep, workers, scheduler)
     summary = Summary(front)
     files = [] if out is None else _write(summary, Path(out))
     data = summary.data() | ({"files": [str(file) for file in files]} if files else {})
@@ -95,7 +95,7 @@ def _tell_resumed(folder: Path) -> None:
             note(f"Note: {folder / name}: going on; an earlier run has begun {count} {word}")
 
 
-def _found(
+def _search_front(
     spec: Spec, out: str | None, count: int | None, workers: int | None, scheduler: str | None
 ) -> Front:
     from pteron.design import search, survey

@@ -227,7 +227,7 @@ def _result(
     from pteron.motion.overloads import overloads_of
 
     rate = file.rate
-    led, cycles = excitation.with_leads(series.periods), _held_out(excitation, rate)
+    led, cycles = excitation.with_leads(series.periods), _held_out_cycles(excitation, rate)
     slow = excitation.slow() if series.stribeck else None
     motions = {"motion": led, "held out": cycles, "slow": slow}
     margins = {name: m.margins(limits, rate) for name, m in motions.items() if m is not None}
@@ -253,7 +253,7 @@ def _result(
     }
     lines: list[str | Table] = [
         *(_quality(excitation), excitation.progress_text, _margins(margins)),
-        *_kept_off(machine, limits, margins),
+        *_clearance_sentence(machine, limits, margins),
         f"From rest to rest in {led.duration:g} s: periodic from {led.start:g} to {led.end:g} s, "
         "lead-in before, lead-out behind.",
     ]
@@ -268,7 +268,7 @@ def _result(
     return Result(data, lines, files)
 
 
-def _held_out(excitation: Excitation, rate: float) -> RepeatedCycle | None:
+def _held_out_cycles(excitation: Excitation, rate: float) -> RepeatedCycle | None:
     """Return the motion to be held out; None, with a note, where there is none."""
     try:
         return excitation.held_out(rate)
@@ -297,7 +297,7 @@ def _number(value: float, digits: int) -> str:
     return f"{value:.{digits}g}" if math.isfinite(value) else "-"
 
 
-def _kept_off(
+def _clearance_sentence(
     machine: Manipulator, limits: Limits, margins_by_motion: dict[str, Margins]
 ) -> list[str]:
     """Return the distance that the joints keep from their limits, in a sentence, if they have any.

@@ -54,7 +54,7 @@ def insistent_interrupts() -> Iterator[None]:
     def handler(number: int, frame: FrameType | None) -> None:
         nonlocal waits, raised
         waits += 1
-        if waits <= _WAITS and _in_casadi(frame):
+        if waits <= _WAITS and _is_in_casadi(frame):
             again()
         else:
             waits, raised = 0, True
@@ -118,7 +118,7 @@ def _interrupt() -> None:
         _thread.interrupt_main()
 
 
-def _in_casadi(frame: FrameType | None) -> bool:
+def _is_in_casadi(frame: FrameType | None) -> bool:
     """Say whether a function of CasADi is among those that are running."""
     while frame is not None:
         if frame.f_globals.get("__name__") == "casadi.casadi":

@@ -66,7 +66,7 @@ class CommandGroup(TyperGroup):
         _open_closed_streams()
         try:
             with insistent_interrupts(), ended_with_compilers(), warnings.catch_warnings():
-                warnings.showwarning = _noted
+                warnings.showwarning = _note_warnings
                 warnings.simplefilter("default", UnlikelyValue)
                 status = super().main(*args, **extra | {"standalone_mode": False})
                 sys.stdout.flush()
@@ -79,7 +79,7 @@ class CommandGroup(TyperGroup):
             _close_standard_output()
             status = _PIPE_CLOSED
         except OSError as error:
-            where = error.filename or ("standard output" if _by_output(error) else "")
+            where = error.filename or ("standard output" if _is_output_error(error) else "")
             complain(f"{where}{': ' * bool(where)}{error.strerror or error}")
             _close_standard_output()
             status = _USER_ERROR
@@ -98,7 +98,7 @@ class CommandGroup(TyperGroup):
         sys.exit(status if isinstance(status, int) else 0)
 
 
-def _noted(message: Warning | str, category: type[Warning], *place: Any, **_: Any) -> None:
+def _note_warnings(message: Warning | str, category: type[Warning], *place: Any, **_: Any) -> None:
     """Show a warning of unlikely values as a note; others are a programmer's."""
     if issubclass(category, UnlikelyValue):
         note(f"Note: {message}")
@@ -106,7 +106,7 @@ def _noted(message: Warning | str, category: type[Warning], *place: Any, **_: An
         sys.stderr.write(warnings.formatwarning(message, category, *place[:2]))
 
 
-def _by_output(error: OSError) -> bool:
+def _is_output_error(error: OSError) -> bool:
     """Return whether an error was raised by what writes to standard output, as on a full disk."""
     modules = [frame.f_globals.get("__name__", "") for frame, _ in walk_tb(error.__traceback__)]
     return "pteron.cli.terminal" in modules or modules[-1].partition(".")[0] in ("rich", "click")

@@ -41,7 +41,7 @@ def replayed(robot: Manipulator, file: str, start: PoseLike | None = None) -> Mo
     """
     from pteron.tables import read_table
 
-    return _of_table(robot, read_table(file), start).motion
+    return _playback_of_table(robot, read_table(file), start).motion
 
 
 def played(robot: Manipulator, file: str) -> Playback:
@@ -50,10 +50,12 @@ def played(robot: Manipulator, file: str) -> Playback:
     from pteron.tables import Table
 
     motion = read_motion(robot, file)
-    return _of_table(robot, motion) if isinstance(motion, Table) else playback(robot, motion)
+    return (
+        _playback_of_table(robot, motion) if isinstance(motion, Table) else playback(robot, motion)
+    )
 
 
-def _of_table(robot: Manipulator, rows: Table, start: PoseLike | None = None) -> Playback:
+def _playback_of_table(robot: Manipulator, rows: Table, start: PoseLike | None = None) -> Playback:
     """Return the motion of a table; what it cannot do may be in another unit."""
     from pteron.kinematics.unlikely_values import unlikely_values
     from pteron.playback import of_table
@@ -115,7 +117,7 @@ class Carried:
     def __str__(self) -> str:
         """Return it in words behind a machine's name, empty if there is nothing."""
         tool = [] if self.tool is None else [f"tool {self.tool}"]
-        at = "" if self.payload_center is None else f" at {_told(self.payload_center)} m"
+        at = "" if self.payload_center is None else f" at {_vector_text(self.payload_center)} m"
         words = [*tool, *([f"{self.payload:g} kg{at}"] if self.payload else [])]
         return f" with {' and '.join(words)}" if words else ""
 
@@ -164,5 +166,5 @@ def _check_rates(robot: Manipulator, rows: Table) -> None:
         )
 
 
-def _told(values: Sequence[float]) -> str:
+def _vector_text(values: Sequence[float]) -> str:
     return f"({', '.join(f'{value:g}' for value in values)})"

@@ -110,14 +110,14 @@ def size(
         sizing = sized(carrying, motions, places=region, **how)
         fits = choose(sizing, chosen, margin=margin)
         common = choose_common(sizing, chosen, margin=margin)
-    lacking = [*_weak(sizing, margin), *_unserved(sizing, fits, margin)]
+    lacking = [*_weak(sizing, margin), *_unserved_legs(sizing, fits, margin)]
     warn(lacking)
     request = _Asked(" and ".join(cycles), carried, where, margin)
     # A list of motors is what its choice is asked for.
     return destination.deliver(
         fits_frame(machine, fits) if fits and out is None else sizing.table(),
         _data(sizing, fits, request) | {"common_motors": common_rows(machine, common)},
-        partial(_more, sizing, fits),
+        partial(_further_files, sizing, fits),
         partial(_show, sizing, fits, common, request),
         _OVERLOADED if lacking else 0,
     )
@@ -161,7 +161,7 @@ def _weak(sizing: Sizing, margin: float) -> list[str]:
     return [*sizing.overloads, *beyond]
 
 
-def _unserved(sizing: Sizing, fits: tuple[Fit, ...], margin: float) -> list[str]:
+def _unserved_legs(sizing: Sizing, fits: tuple[Fit, ...], margin: float) -> list[str]:
     """Return the joints for which no motor of the list is enough, and what the best one lacks."""
     lines = []
     for leg in range(1, sizing.robot.joint_count + 1):
@@ -212,7 +212,7 @@ def _worst(sizing: Sizing) -> list[dict[str, Any]]:
     return rows
 
 
-def _more(sizing: Sizing, fits: tuple[Fit, ...]) -> dict[str, str]:
+def _further_files(sizing: Sizing, fits: tuple[Fit, ...]) -> dict[str, str]:
     """Return the further files of a folder."""
     from pteron.plots import svg_file
     from pteron.report.drive_figures import force_speed, power

@@ -53,14 +53,14 @@ class TypedRow:
     def extended(self, results: Mapping[str, ArrayLike]) -> TypedRow:
         """Return the rows with columns of results added, as `Table.extended` does."""
         added = {name: _column(values) for name, values in results.items()}
-        return replace(self, cells=self._without(results) | added)
+        return replace(self, cells=self._drop_columns(results) | added)
 
     def repeated(self, modes: Sequence[int | None], replaced: Collection[str]) -> TypedRow:
         """Return the row once for each mode, with a first column `row` and a last one `mode`.
 
         Columns that are `replaced` are left out.
         """
-        columns = self._without({"row", "mode", *replaced})
+        columns = self._drop_columns({"row", "mode", *replaced})
         count = len(modes)
         cells = {name: [*values] * count for name, values in columns.items()}
         return replace(self, cells={"row": [1] * count, **cells, "mode": modes})
@@ -90,7 +90,7 @@ class TypedRow:
         for row in zip(*self.cells.values(), strict=True):
             yield ",".join(map(_text, row)) + "\n"
 
-    def _without(self, names: Collection[str]) -> dict[str, Sequence[Cell]]:
+    def _drop_columns(self, names: Collection[str]) -> dict[str, Sequence[Cell]]:
         return {name: values for name, values in self.cells.items() if name not in names}
 
 

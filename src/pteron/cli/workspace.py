@@ -117,7 +117,7 @@ def workspace(
     from pteron.maps import map_index
 
     names = _checked_indices(machine, index or [])
-    ending = _checked_out(out)
+    ending = _expect_output(out)
     if ending in (*_FILMS, *_SURFACES) and len(names) > 1:
         raise DataError(f"--index: {len(names)} given, and {out} shows one; give one")
     if scheduler is not None and ending != ".zarr":
@@ -130,7 +130,7 @@ def workspace(
     warn(warnings)
     with spinner(f"The reach of {machine.name}"):
         volume = _volume(machine, grid)
-    warn(outside := _outside(grid, volume))
+    warn(outside := _outside_warnings(grid, volume))
     with progress_bar(f"Mapping {machine.name}") as tell:
         index_map = map_index(
             machine,
@@ -178,7 +178,7 @@ def _checked_indices(robot: Manipulator, names: list[str]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(names)) or (MARGIN.name,)
 
 
-def _checked_out(out: str | None) -> str:
+def _expect_output(out: str | None) -> str:
     """Return the ending of a file after a check, before the work begins, that it can be written."""
     if out is None:
         return ""
@@ -259,7 +259,7 @@ def _volume(robot: Manipulator, grid: Grid) -> ReachVolume | None:
         return None
 
 
-def _outside(grid: Grid, volume: ReachVolume | None) -> list[str]:
+def _outside_warnings(grid: Grid, volume: ReachVolume | None) -> list[str]:
     """Return the held lengths at which nothing is in reach."""
     from pteron.platforms.coordinates import coordinate
 

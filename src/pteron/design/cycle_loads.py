@@ -37,7 +37,7 @@ def shortest_time(robot: Manipulator, motion: Motion) -> float:
         If no drive has a limit, or one cannot hold the machine at rest.
     """
     robot = replace(
-        robot, legs=tuple(replace(leg, drive=_without_stribeck(leg.drive)) for leg in robot.legs)
+        robot, legs=tuple(replace(leg, drive=_remove_stribeck(leg.drive)) for leg in robot.legs)
     )
     forces = np.stack(
         [
@@ -62,7 +62,7 @@ def shortest_time(robot: Manipulator, motion: Motion) -> float:
     return motion.duration / rate
 
 
-def _without_stribeck(drive: Drive | None) -> Drive | None:
+def _remove_stribeck(drive: Drive | None) -> Drive | None:
     if drive is None or drive.stribeck is None:
         return drive
     return replace(drive, coulomb=drive.coulomb + drive.stribeck.force, stribeck=None)
@@ -77,7 +77,7 @@ def _first_root(square: Array, line: Array, constant: Array) -> Array:
     return np.where(np.isfinite(roots) & (roots > 0.0), roots, inf)
 
 
-def _at_its_best(sizing: Sizing, leg: int, motor: Motor) -> Fit:
+def _best_fit(sizing: Sizing, leg: int, motor: Motor) -> Fit:
     """Return a motor at the ratio where its margin is greatest: from 1 on it serves.
 
     Each limit allows an interval of ratios, so that the least of their margins has one maximum.
@@ -104,7 +104,7 @@ def best_motors(sizing: Sizing, motors: Sequence[Motor], enough: float = inf) ->
     """
     best = []
     for leg in range(1, sizing.robot.joint_count + 1):
-        fits = [_at_its_best(sizing, leg, motor) for motor in motors]
+        fits = [_best_fit(sizing, leg, motor) for motor in motors]
         serving = [fit for fit in fits if fit.margin >= enough]
         best.append(
             min(serving, key=lambda fit: fit.motor.rated_torque * fit.motor.max_speed)

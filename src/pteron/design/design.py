@@ -264,15 +264,15 @@ class Design:
         return bool(np.isfinite(self.joints).all())
 
     @cached_property
-    def _found(self) -> dict[str, tuple[float, str]]:
+    def _best_cube(self) -> dict[str, tuple[float, str]]:
         return {}
 
     def _quantities(self, name: str) -> tuple[float, str]:
-        if name not in self._found:
-            self._found[name] = self._evaluated(name)
-        return self._found[name]
+        if name not in self._best_cube:
+            self._best_cube[name] = self._evaluate_quantity(name)
+        return self._best_cube[name]
 
-    def _evaluated(self, name: str) -> tuple[float, str]:
+    def _evaluate_quantity(self, name: str) -> tuple[float, str]:
         """Return a quantity and, where there is none, why."""
         quantity = quantities()[name]
         if quantity.of_machine is not None:

@@ -146,7 +146,7 @@ def front_of_parts(task: Task, parts: Iterable[pl.DataFrame]) -> Front:
     nearest: pl.DataFrame | None = None
     evaluated = feasible = 0
     for part in parts:
-        missed = _missed(task, part)
+        missed = _misses_of(task, part)
         good = part.filter(missed == 0.0)
         evaluated, feasible = evaluated + len(part), feasible + len(good)
         if len(good):
@@ -154,14 +154,14 @@ def front_of_parts(task: Task, parts: Iterable[pl.DataFrame]) -> Front:
         elif best is None:
             near = part[[int(missed.argmin())]]
             both = near if nearest is None else pl.concat([nearest, near])
-            nearest = both[[int(_missed(task, both).argmin())]]
+            nearest = both[[int(_misses_of(task, both).argmin())]]
     if best is None:
         assert nearest is not None  # there is at least one design
         raise _impossible(task, nearest, evaluated)
     return Front(task, best, evaluated, feasible)
 
 
-def _missed(task: Task, designs: pl.DataFrame) -> Array:
+def _misses_of(task: Task, designs: pl.DataFrame) -> Array:
     """Return how much each design misses, all in all; one without an objective misses it."""
     names = [name for name in designs.columns if name.startswith(MISSES)]
     objectives = designs.select([o.quantity for o in task.spec.objectives]).to_numpy()

@@ -199,7 +199,7 @@ class ElasticityTable(TomlTable):
     rod_distance: Positive | None = key("of a pair of rods, m", None)
 
     @model_validator(mode="after")
-    def _some(self) -> Self:
+    def _expect_some(self) -> Self:
         if self.actuators is None and self.upper is None and self.lower is None:
             raise ValueError("nothing gives way; give actuators, upper or lower")
         return self

@@ -56,13 +56,13 @@ def misfits(spec: Spec, robot: Manipulator) -> Iterator[str]:
     for name in sorted(quantities_asked & INDICES.keys()):
         if INDICES[name].turning and not robot.platform.angles:
             yield f"{name}: about turning, but the platform of {robot.name} does not turn"
-    if "drive_load" in quantities_asked and not _limited(robot):
+    if "drive_load" in quantities_asked and not _has_drive_limits(robot):
         yield f"drive_load: no drive of {robot.name} has max_force or max_speed; ask for force"
     named = [o.quantity for o in spec.objectives]
     for name in sorted({name for name in named if named.count(name) > 1}):
         yield f"objectives: {name} given more than once"
     assert quantities_asked <= quantities().keys()  # the spec has checked them
-    yield from _missing(spec, robot, quantities_asked)
+    yield from _missing_tables(spec, robot, quantities_asked)
     yield from _loads(spec, robot)
 
 
@@ -75,13 +75,13 @@ _NEEDS = {
 """Tables that quantities need."""
 
 
-def _limited(robot: Manipulator) -> bool:
+def _has_drive_limits(robot: Manipulator) -> bool:
     """Say whether a drive of a machine has limits."""
     limits = limits_of(robot)
     return bool(np.isfinite([limits.force, limits.speed]).any())
 
 
-def _missing(spec: Spec, robot: Manipulator, quantities_asked: set[str]) -> Iterator[str]:
+def _missing_tables(spec: Spec, robot: Manipulator, quantities_asked: set[str]) -> Iterator[str]:
     """Yield what quantities need and the file does not have."""
     for name, table in _NEEDS.items():
         if name in quantities_asked and getattr(spec, table) is None:
@@ -97,7 +97,7 @@ def _missing(spec: Spec, robot: Manipulator, quantities_asked: set[str]) -> Iter
     )
     if moving and not spec.cycles:
         yield f"{', '.join(moving)}: needs [[cycles]], a motion to drive"
-    if "cycle_time" in quantities_asked and not _limited(robot):
+    if "cycle_time" in quantities_asked and not _has_drive_limits(robot):
         yield (
             f"cycle_time: no drive of {robot.name} has max_force or max_speed in its file, which "
             "say how fast it can be"

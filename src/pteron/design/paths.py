@@ -79,7 +79,11 @@ def places(robot: Manipulator, path: str) -> list[Place]:
     else:
         legs_named = [i for i in legs if key in geometric_keys(robot.legs[i - 1])]
     sign = -1 if minus else 1
-    return [place for i in legs_named or legs for place in _in_leg(robot, path, i, key, part, sign)]
+    return [
+        place
+        for i in legs_named or legs
+        for place in _places_in_leg(robot, path, i, key, part, sign)
+    ]
 
 
 def geometric_keys(leg: LegKind) -> list[str]:
@@ -91,7 +95,7 @@ def geometric_keys(leg: LegKind) -> list[str]:
     ]
 
 
-def _in_leg(
+def _places_in_leg(
     robot: Manipulator, path: str, i: int, key: str, part: str | None, sign: int
 ) -> Iterator[Place]:
     leg = robot.legs[i - 1]

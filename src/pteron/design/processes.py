@@ -33,7 +33,7 @@ class Pool(ProcessPoolExecutor):
     """
 
     def __init__(self, workers: int, begin: Callable[..., None], *arguments: Any) -> None:
-        super().__init__(workers, get_context("spawn"), _begun, (begin, *arguments))
+        super().__init__(workers, get_context("spawn"), _initialise_worker, (begin, *arguments))
         self._others = set(active_children())
 
     def submit(self, function: Any, /, *given: Any, **named: Any) -> Future[Any]:
@@ -49,7 +49,7 @@ class Pool(ProcessPoolExecutor):
         return super().__exit__(kind, *error)
 
 
-def _begun(begin: Callable[..., None], *arguments: Any) -> None:
+def _initialise_worker(begin: Callable[..., None], *arguments: Any) -> None:
     """Begin a process, which ends with the one that asked, and ignores Ctrl-C as what it starts."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     Thread(target=_end_with_parent, daemon=True).start()
@@ -81,7 +81,7 @@ class Processes:
         designs that take longest.
         """
         pending = {
-            number: [self._pool.submit(_in_process, function, job) for job in chunks[number]]
+            number: [self._pool.submit(_call_in_process, function, job) for job in chunks[number]]
             for number in sorted(chunks, reverse=True)
         }
         return lambda number: _table(pending[number])
@@ -125,5 +125,5 @@ def _begin(task: Task) -> None:
     _task = task
 
 
-def _in_process(function: Callable[[Task, Sequence[_Job]], pl.DataFrame], job: _Job) -> Any:
+def _call_in_process(function: Callable[[Task, Sequence[_Job]], pl.DataFrame], job: _Job) -> Any:
     return function(_task, [job])

@@ -65,7 +65,7 @@ class Quantity:
     cover: Cover = "lattice"
 
 
-def _sampled(
+def _sample_cover(
     unit: str,
     about: str,
     at: Callable[[Any, Array], Array],
@@ -157,9 +157,11 @@ _OWN = {
     "size": Quantity(
         "m", "diagonal of the box that holds all joints at the poses of the workspace", _size
     ),
-    "type_i": _sampled("", "least type-I measure of a leg in the workspace", _type_i, least=True),
-    "type_ii": _sampled("", "least type-II measure in the workspace", _type_ii, least=True),
-    "clearance": _sampled(
+    "type_i": _sample_cover(
+        "", "least type-I measure of a leg in the workspace", _type_i, least=True
+    ),
+    "type_ii": _sample_cover("", "least type-II measure in the workspace", _type_ii, least=True),
+    "clearance": _sample_cover(
         "m",
         "least distance of two bodies in the workspace, with the file's radii",
         lambda d, poses: clearance(d.robot, poses, on_failure="nan").least,
@@ -172,38 +174,38 @@ _OWN = {
         "them, over its travel in the machine to begin with",
         _stroke,
     ),
-    "speed": _sampled(
+    "speed": _sample_cover(
         "m/s or rad/s",
         "greatest speed of a joint, at [motion] speed in any direction",
         lambda d, poses: d.speeds(poses).max(axis=-1),
         cover="directions",
     ),
-    "force": _sampled(
+    "force": _sample_cover(
         "N or N m",
         "greatest force of a drive, at [motion] speed and acceleration in any directions",
         lambda d, poses: d.forces(poses).max(axis=-1),
         cover="directions",
     ),
-    "drive_load": _sampled(
+    "drive_load": _sample_cover(
         "",
         "greatest of these forces and speeds over what the file says a drive can do",
         _drive_load,
         cover="directions",
     ),
-    "stiffness": _sampled(
+    "stiffness": _sample_cover(
         "N/m",
         "least stiffness at the tool, in its worst direction",
         _stiffness,
         least=True,
         cover="directions",
     ),
-    "deflection": _sampled(
+    "deflection": _sample_cover(
         "m",
         "most that the tool gives way under [elasticity] force",
         lambda d, poses: d.task.spec.elasticity.force / _stiffness(d, poses),
         cover="directions",
     ),
-    "accuracy": _sampled(
+    "accuracy": _sample_cover(
         "m", "most that the tool may be off by all [errors] together", _accuracy, cover="bound"
     ),
     "cycle_time": Quantity(
@@ -248,7 +250,7 @@ def quantities() -> dict[str, Quantity]:
 def _worst(index: Index) -> Quantity:
     """Return the worst value of an index over the workspace."""
     word = "least" if index.better == "more" else "greatest"
-    return _sampled(
+    return _sample_cover(
         index.unit,
         f"{word} {index.title} in the workspace",
         lambda design, poses: design.values(index.name, poses),

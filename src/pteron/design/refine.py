@@ -71,7 +71,7 @@ def refined(task: Task, values: Sequence[float], objective: int) -> list[float]:
         task.orientations if seeks else task.orientations[:0],
         tuple(slopes.bounds(objective, z0)),
     )
-    first, dense = (_asked_at(design, lengths, count) for count in (_FIRST, POINTS))
+    first, dense = (_condition_samples(design, lengths, count) for count in (_FIRST, POINTS))
     for _ in range(_EXCHANGES):
         z = improve_unknowns(program, first, dense)
         variables: list[float] = z[: len(start)].tolist()
@@ -82,7 +82,7 @@ def refined(task: Task, values: Sequence[float], objective: int) -> list[float]:
     return variables
 
 
-def _asked_at(design: Design, lengths: int, count: int) -> Samples:
+def _condition_samples(design: Design, lengths: int, count: int) -> Samples:
     """Return poses of the workspace, of the cube, or of both, as the search asks for them."""
     task = design.task
     moving = shape_samples(task.shape[0], task.orientations, count)

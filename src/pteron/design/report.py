@@ -117,7 +117,7 @@ class Summary:
     @cached_property
     def start(self) -> ReportedDesign:
         """The machine to begin with."""
-        return _told("start", Design(self.front.task, self.front.task.robot))
+        return _change_text("start", Design(self.front.task, self.front.task.robot))
 
     @cached_property
     def chosen(self) -> list[ReportedDesign]:
@@ -126,7 +126,8 @@ class Summary:
         for name, at in self.front.chosen.items():
             names[at] = f"{names[at]}, {name}" if at in names else name
         return [
-            _told(name, _design(task, self.front.robot(at), name)) for at, name in names.items()
+            _change_text(name, _design(task, self.front.robot(at), name))
+            for at, name in names.items()
         ]
 
     def robots(self) -> dict[str, str]:
@@ -197,7 +198,7 @@ def _design(task: Task, robot: Manipulator, name: str) -> Design:
     return Design(task, replace(robot, name=robot.name[: LONGEST_NAME - len(ending)] + ending))
 
 
-def _told(name: str, design: Design) -> ReportedDesign:
+def _change_text(name: str, design: Design) -> ReportedDesign:
     return ReportedDesign(**vars(proved(design)), name=name)
 
 

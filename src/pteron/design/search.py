@@ -120,7 +120,7 @@ def _generations(
         designs = low + evolution.ask() * (high - low)
         jobs = [(values, -1) for values in designs.tolist()]
         if front is not None:
-            jobs += _promising(front, number, used)
+            jobs += _designs_to_improve(front, number, used)
         plan = {**task.plan, "generation": number, "designs": _digest(designs)}
         store = TableStore(folder / f"{number:04d}", plan)
         chunks = [jobs[k : k + _CHUNK] for k in range(0, len(jobs), _CHUNK)]
@@ -203,7 +203,7 @@ def proved_table(task: Task, designs: Sequence[list[float]]) -> pl.DataFrame:
     return design_table(task, designs, proofs=True)
 
 
-def _promising(
+def _designs_to_improve(
     front: Front, number: int, used: set[tuple[bytes, int]]
 ) -> list[tuple[list[float], int]]:
     """Return designs of the front so far to improve, spread over it, each in one objective."""

@@ -34,7 +34,7 @@ Floor = Annotated[Number, Field(ge=0.0, lt=1.0)]
 """Type of the least value of a measure that is 1 at best."""
 
 
-def _rising(pair: tuple[float, float]) -> tuple[float, float]:
+def _expect_rising(pair: tuple[float, float]) -> tuple[float, float]:
     low, high = pair
     if not low < high:
         raise ValueError(f"[{low:g}, {high:g}] given, whose range is empty; give [low, high]")
@@ -56,7 +56,7 @@ class VariableTable(TomlTable):
     each: bool = key("whether every leg has a variable of its own", False)
     name: str | None = key("what tables call it; its first path if left out", None)
 
-    _rises = field_validator("range")(_rising)
+    _rises = field_validator("range")(_expect_rising)
 
 
 class WorkspaceTable(TomlTable):
@@ -166,7 +166,7 @@ class ObjectiveTable(TomlTable):
 
     @field_validator("maximise", "minimise")
     @classmethod
-    def _known(cls, name: str | None) -> str | None:
+    def _expect_known(cls, name: str | None) -> str | None:
         return name and known(name)
 
     @model_validator(mode="after")
@@ -195,11 +195,11 @@ class RequirementTable(TomlTable):
 
     @field_validator("quantity")
     @classmethod
-    def _known(cls, name: str) -> str:
+    def _expect_known(cls, name: str) -> str:
         return known(name)
 
     @model_validator(mode="after")
-    def _bounded(self) -> Self:
+    def _expect_bound(self) -> Self:
         if self.least is None and self.most is None:
             raise ValueError(f"{self.quantity}: neither least nor most given")
         if None not in (self.least, self.most) and self.least > self.most:  # type: ignore[operator]

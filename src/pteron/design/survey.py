@@ -75,7 +75,7 @@ def survey(
     store = TableStore(folder, {**task.plan, "survey": _CHUNK})
     chunks = range(0, count, _CHUNK)
     sweep(
-        partial(_surveyed, task),
+        partial(_evaluate_chunk, task),
         chunks,
         store,
         scheduler=scheduler,
@@ -86,7 +86,7 @@ def survey(
     return proofs.front(lambda: _parts(store, chunks))
 
 
-def _surveyed(task: Task, first: int) -> pl.DataFrame:
+def _evaluate_chunk(task: Task, first: int) -> pl.DataFrame:
     """Return the rows of the chunk of designs that begins with number `first`."""
     return design_table(task, survey_designs(task, first, _CHUNK))
 

@@ -49,7 +49,7 @@ def worst_forces(robot: Manipulator, poses: Array, speed: float, acceleration: f
     the side that adds to it, with all of Stribeck's part.
     """
     legs = (replace(leg, drive=_frictionless(leg.drive)) for leg in robot.legs)
-    static, rows, squares = _expanded(replace(robot, legs=tuple(legs)), poses)
+    static, rows, squares = _force_expansion(replace(robot, legs=tuple(legs)), poses)
     known = np.isfinite(static).all(axis=-1)
     greatest = np.full(static.shape, np.nan)
     if not known.all():
@@ -62,8 +62,8 @@ def worst_forces(robot: Manipulator, poses: Array, speed: float, acceleration: f
     parts = np.einsum("...ij,...i->...j", vectors, lines) ** 2
     independent = acceleration * np.linalg.norm(rows, axis=-1) + drives.coulomb + drives.stribeck
     static = static + drives.offset
-    above = static + _most(values, parts, speed) + independent
-    below = -static + _most(-values, parts, speed) + independent
+    above = static + _greatest_over_directions(values, parts, speed) + independent
+    below = -static + _greatest_over_directions(-values, parts, speed) + independent
     return np.asarray(np.maximum(above, below))
 
 
@@ -71,7 +71,7 @@ def _frictionless(drive: Drive | None) -> Drive | None:
     return drive and Drive(rotor_inertia=drive.rotor_inertia, ratio=drive.ratio)
 
 
-def _expanded(robot: Manipulator, poses: Array) -> tuple[Array, Array, Array]:
+def _force_expansion(robot: Manipulator, poses: Array) -> tuple[Array, Array, Array]:
     """Return forces at rest (N, n), by acceleration (N, n, k), and as a form in v (N, n, k, k)."""
     k = len(robot.platform.lengths)
     axes = np.eye(robot.freedom)[:k]
@@ -92,7 +92,7 @@ def _expanded(robot: Manipulator, poses: Array) -> tuple[Array, Array, Array]:
     return static, rows.swapaxes(1, 2), squares
 
 
-def _most(values: Array, parts: Array, size: float) -> Array:
+def _greatest_over_directions(values: Array, parts: Array, size: float) -> Array:
     """Return the maximum over |v| <= size of v^T C v + b^T v, by its dual.
 
     `values` are the eigenvalues of C (..., k), `parts` the squares of b along its axes. The dual is

@@ -124,7 +124,7 @@ def map_index(
         if engine == "auto":
             prepare(robot, names, poses.size)  # once, for all processes
         sweep(
-            partial(_computed, robot, names, poses, engine),
+            partial(_compute_region, robot, names, poses, engine),
             poses.regions(),
             store,
             scheduler=scheduler,
@@ -147,7 +147,7 @@ def checked_indices(robot: Manipulator, index: str | Sequence[str]) -> tuple[str
     return names or (MARGIN.name,)
 
 
-def _computed(
+def _compute_region(
     robot: Manipulator, names: tuple[str, ...], grid: Grid, engine: str, region: Region
 ) -> dict[str, Array]:
     """Return the indices of a part of a grid, and `status`."""

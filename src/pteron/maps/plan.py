@@ -51,12 +51,12 @@ def _differences(name: str, stored: Any, plan: Any) -> Iterator[str]:
     if isinstance(stored, Mapping) and isinstance(plan, Mapping):
         for key in {**plan, **stored}:
             yield from _differences(f"{label}{key}", stored.get(key), plan.get(key))
-    elif _listed(stored) and _listed(plan) and len(stored) == len(plan):
+    elif _is_table_list(stored) and _is_table_list(plan) and len(stored) == len(plan):
         for k, both in enumerate(zip(stored, plan, strict=True), start=1):
             yield from _differences(f"{name}[{k}]", *both)
     # True is 1 and -0.0 is 0.0, but not as they are written.
     elif json.dumps(stored, default=str) != json.dumps(plan, default=str):
-        yield _told(name, stored, plan)
+        yield _difference_text(name, stored, plan)
 
 
 def _machine(text: Any) -> Mapping[str, Any]:
@@ -67,13 +67,13 @@ def _machine(text: Any) -> Mapping[str, Any]:
         return {"name": text}
 
 
-def _listed(value: Any) -> bool:
+def _is_table_list(value: Any) -> bool:
     return isinstance(value, list) and any(
         isinstance(entry_of_list, Mapping) for entry_of_list in value
     )
 
 
-def _told(name: str, stored: Any, plan: Any) -> str:
+def _difference_text(name: str, stored: Any, plan: Any) -> str:
     texts = ["none" if value is None else shown(value) for value in (stored, plan)]
     name = shown(name, bare=True, longest=2 * _LONG)
     if any(len(text) > _LONG for text in texts):

@@ -93,9 +93,9 @@ class MapStore:
         """
         full_plan = {**plan, "index": list(names), "grid": grid.plain()}
         if not path.exists():
-            with _beside(path) as work:
+            with _temporary_beside(path) as work:
                 _make(work, grid, names, {"name": robot, "plan": full_plan})
-                _placed(work, path)
+                _move_into_place(work, path)
         attributes = _attributes(path)
         if "plan" not in attributes:
             raise OutputError(f"{path}: is no map's store; name another place, or remove it")
@@ -174,7 +174,7 @@ def save_store(index_map: Map, path: Path) -> Path:
     names = tuple(index_map.values)
     if path.exists():
         MapStore.of(path, index_map.robot, index_map.grid, names, plan)
-    with _beside(path) as work:
+    with _temporary_beside(path) as work:
         new_store = work / path.name
         store = MapStore.of(new_store, index_map.robot, index_map.grid, names, plan)
         for number, region in enumerate(index_map.grid.regions()):
@@ -246,7 +246,7 @@ def _dtype(name: str) -> str:
 
 
 @contextmanager
-def _beside(path: Path) -> Iterator[Path]:
+def _temporary_beside(path: Path) -> Iterator[Path]:
     """Yield a temporary folder beside a path; it is removed at the end, unless it was renamed."""
     try:
         work = Path(tempfile.mkdtemp(prefix=f".{path.name}.", dir=path.parent))
@@ -258,7 +258,7 @@ def _beside(path: Path) -> Iterator[Path]:
         shutil.rmtree(work, ignore_errors=True)
 
 
-def _placed(work: Path, path: Path) -> None:
+def _move_into_place(work: Path, path: Path) -> None:
     """Rename a finished store to its path, unless another process has just made it there."""
     try:
         work.chmod(0o755)

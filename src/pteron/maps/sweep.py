@@ -117,24 +117,24 @@ def sweep(
     if not remaining:
         return 0
     tasks = ((k, chunks[k]) for k in remaining)
-    task = partial(_computed, function, store)
+    task = partial(_compute_chunk, function, store)
     finished = (
-        _here(task, tasks, threads)
+        _run_here(task, tasks, threads)
         if scheduler is None and workers is None
-        else _elsewhere(task, tasks, scheduler, workers)
+        else _run_elsewhere(task, tasks, scheduler, workers)
     )
     for count, _ in enumerate(finished, start=ready + 1):
         tell(count / total)
     return len(remaining)
 
 
-def _computed(
+def _compute_chunk(
     function: Callable[[_Chunk], _Result], store: Store[_Result], number: int, chunk: _Chunk
 ) -> None:
     store.write(number, function(chunk))
 
 
-def _here(
+def _run_here(
     task: Callable[[int, Any], None], tasks: Iterator[tuple[int, Any]], threads: int
 ) -> Iterator[None]:
     """Do the tasks in this process; yield after each."""
@@ -159,14 +159,14 @@ def _here(
                 future.cancel()
 
 
-def _elsewhere(
+def _run_elsewhere(
     task: Callable[[int, Any], None],
     tasks: Iterator[tuple[int, Any]],
     scheduler: str | None,
     workers: int | None,
 ) -> Iterator[None]:
     """Do the tasks in other processes; yield after each."""
-    distributed = _distributed()
+    distributed = _import_distributed()
 
     def submitted(numbered_chunk: tuple[int, Any]) -> Future[None]:
         # Each is a task of its own: that its result is none does not mean it is not needed.
@@ -201,13 +201,13 @@ def _settle(future: Future[None], where: str) -> None:
     """Raise what ended a task, if anything did."""
     try:
         future.result()
-    except _distributed().KilledWorker as error:
+    except _import_distributed().KilledWorker as error:
         raise PteronError(
             f"a chunk has ended {error.allowed_failures + 1} workers one after another: do they "
             f"have enough memory? {_AGAIN}"
         ) from None
     except CancelledError:
-        raise _lost(where) from None
+        raise _lost_workers_error(where) from None
 
 
 @contextmanager
@@ -216,10 +216,10 @@ def _told_if_lost(where: str) -> Iterator[None]:
     try:
         yield
     except (CancelledError, OSError, RuntimeError):
-        raise _lost(where) from None
+        raise _lost_workers_error(where) from None
 
 
-def _lost(where: str) -> PteronError:
+def _lost_workers_error(where: str) -> PteronError:
     return PteronError(f"{where}: has ended, or its connection has; {_AGAIN}")
 
 
@@ -239,7 +239,7 @@ def _quiet() -> Iterator[None]:
 
 def local_workers(count: int | None) -> Any:
     """Return a cluster of processes of this computer."""
-    cluster = _distributed().LocalCluster
+    cluster = _import_distributed().LocalCluster
     if os.name == "posix":
         resource_tracker.ensure_running()
     with held_interrupts():
@@ -255,7 +255,7 @@ def local_workers(count: int | None) -> Any:
 @contextmanager
 def _client(where: str, scheduler: str | None, workers: int | None) -> Iterator[Any]:
     """Yield a client of a cluster that answers and has Pteron as it is here."""
-    distributed = _distributed()
+    distributed = _import_distributed()
     with ExitStack() as opened:
         address = scheduler or opened.enter_context(local_workers(workers))
         limit = _START if scheduler is None else _WAIT
@@ -285,7 +285,7 @@ def _client(where: str, scheduler: str | None, workers: int | None) -> Iterator[
         yield client
 
 
-def _distributed() -> Any:
+def _import_distributed() -> Any:
     """Return `dask.distributed`, whose functions have no types."""
     return import_extra("cluster", "distributed", "other processes need dask.distributed")
 

@@ -56,7 +56,7 @@ def read_map_table(source: Path) -> Map:
     if not names or not indices or _STATUS not in table.columns:
         raise DataError(f"{source}: is no map's table: coordinates, indices and status expected")
     poses = table.numbers([columns[name] for name in names])
-    status = _whole(table, len(names))
+    status = _status_column(table, len(names))
     grid, order = _grid(table, names, poses)
     columns_of_indices = table.numbers([columns[name] for name in indices], "nan")[order]
     values = {
@@ -79,7 +79,7 @@ def _column(table: Table, name: str, heading: str) -> str:
     return columns[0] if columns else ""
 
 
-def _whole(table: Table, legs: int) -> NDArray[np.int8]:
+def _status_column(table: Table, legs: int) -> NDArray[np.int8]:
     """Return the status of each row."""
     numbers = table.numbers([_STATUS])[:, 0]
     wrong = (numbers != np.rint(numbers)) | (numbers < BEYOND_LIMITS) | (numbers > legs)

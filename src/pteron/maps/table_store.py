@@ -66,7 +66,7 @@ class TableStore:
 
     def finished(self) -> frozenset[int]:
         """Return the numbers of the chunks that are there as they were written."""
-        return frozenset(number for number, _ in self._whole())
+        return frozenset(number for number, _ in self._is_complete())
 
     def write(self, number: int, result: pl.DataFrame) -> None:
         """Write a chunk's rows, through a temporary file and a rename."""
@@ -84,12 +84,12 @@ class TableStore:
         """
         import polars as pl
 
-        files = [file for _, file in sorted(self._whole())]
+        files = [file for _, file in sorted(self._is_complete())]
         if not files:
             raise DataError(f"{self.folder}: no chunk is finished yet")
         return pl.scan_parquet(files, glob=False)
 
-    def _whole(self) -> Iterator[tuple[int, Path]]:
+    def _is_complete(self) -> Iterator[tuple[int, Path]]:
         """Yield the number and the file of each chunk that is as it was written."""
         seen = set()
         for file in sorted(self.folder.glob(f"[0-9]*{_ENDING}")):

@@ -190,8 +190,8 @@ class ExactCertificate(Certificate):
                 "No transfer explains, but this machine's special geometry adds, what is grouped "
                 f"of {', '.join(self.unexplained)}."
             )
-        lines += _listed("Taken as exact", self.recognised)
-        lines += _listed("Approximated", self.approximated)
+        lines += _sentence_of_list("Taken as exact", self.recognised)
+        lines += _sentence_of_list("Approximated", self.approximated)
         if self.numerical is not None:
             comparison = f"that of the machine itself is {self.numerical}"
             if self.numerical.rank != self.rank:
@@ -206,10 +206,10 @@ class ExactCertificate(Certificate):
                 )
             else:
                 lines.append(f"In floating point {comparison}: the same.")
-        lines += _listed("Not kept exactly", self.lost)
-        lines += _listed("Nearly special, and perhaps meant to be", self.nearly)
+        lines += _sentence_of_list("Not kept exactly", self.lost)
+        lines += _sentence_of_list("Nearly special, and perhaps meant to be", self.nearly)
         return "\n".join(lines)
 
 
-def _listed(head: str, items: tuple[str, ...]) -> list[str]:
+def _sentence_of_list(head: str, items: tuple[str, ...]) -> list[str]:
     return [f"{head}: {'; '.join(items)}."] if items else []

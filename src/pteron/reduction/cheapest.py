@@ -72,7 +72,7 @@ def _cheapest_parameters(robot: Manipulator) -> BaseParameters:
 def _cheapest_columns(robot: Manipulator) -> tuple[int, ...]:
     columns = parameter_data(robot)
     base = base_parameters(robot)
-    grouping = _without_units(robot, base)
+    grouping = _unitless_grouping(robot, base)
     places = [(p.kind, p.body) for p in columns]
     leg_columns = [k for k, place in enumerate(places) if place in OWN]
     shared_columns = [k for k, place in enumerate(places) if place in JOINED]
@@ -88,21 +88,23 @@ def _cheapest_columns(robot: Manipulator) -> tuple[int, ...]:
         # The columns of a platform that tilts are too many to exchange one by one.
         tilts = robot.platform.tilts
         candidates.add(
-            start if tilts else _improved(model, grouping, start, [*leg_columns, *others])
+            start
+            if tilts
+            else _improve_by_exchange(model, grouping, start, [*leg_columns, *others])
         )
     return min(
         candidates, key=lambda base_columns: (_final_cost(robot, base_columns), base_columns)
     )
 
 
-def _without_units(robot: Manipulator, base: BaseParameters) -> Array:
+def _unitless_grouping(robot: Manipulator, base: BaseParameters) -> Array:
     """Return the grouping with lengths in multiples of a link, so that no entry is extreme."""
     length = max(leg.size for leg in robot.legs)
     powers = length ** np.array([float(p.length_power) for p in base.parameters])
     return np.asarray(base.grouping * powers / powers[list(base.kept), None])
 
 
-def _improved(
+def _improve_by_exchange(
     model: _Model, grouping: Array, base_columns: tuple[int, ...], candidates: Sequence[int]
 ) -> tuple[int, ...]:
     """Exchange columns one by one as long as that saves operations."""

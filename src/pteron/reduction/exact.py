@@ -149,7 +149,7 @@ def exact_grouping(
         If every pose is singular, so that there is no regressor.
     """
     if is_singular_everywhere(robot):
-        raise _without_dynamics(robot)
+        raise _no_dynamics_error(robot)
     geometry, rng = exact_geometry(robot), random.Random(seed)
     regressor = _ExactRegressor(robot, geometry, columns, order, sharing, mass_transfers, rng)
     primes = primes_of(geometry, rng)
@@ -171,17 +171,17 @@ def _eliminate(regressor: _ExactRegressor, primes: Iterator[int]) -> _Eliminatio
         try:
             rows = regressor.rows(prime, regressor.states)
         except ZeroDivisionError:
-            raise _without_dynamics(regressor.robot) from None
+            raise _no_dynamics_error(regressor.robot) from None
         eliminations[prime] = dependencies(rows, order, prime)
         # A prime may hide a column by bad luck, never invent one: keep those of greatest rank.
         best = max(len(independent) for independent, _ in eliminations.values())
         eliminations = {p: pair for p, pair in eliminations.items() if len(pair[0]) == best}
         if len(eliminations) > 1:
-            shares = _lifted(eliminations)
+            shares = _lift_to_fractions(eliminations)
         first, (base_columns, relations) = next(iter(eliminations.items()))
         dropped = [column for column in order if column not in base_columns]
         by_mass = regressor.mass_vectors(first)
-        extra = _unexplained(by_mass, relations, dropped, len(order), first)
+        extra = _unexplained_columns(by_mass, relations, dropped, len(order), first)
         most = _MOST_PRIMES if extra and not geometry.radicands else _FEW_PRIMES
     if shares is None and not extra and not geometry.radicands:
         # Fractions of more digits than the primes hold.
@@ -269,7 +269,7 @@ def _certificate(
     )
 
 
-def _without_dynamics(robot: Manipulator) -> SingularPose:
+def _no_dynamics_error(robot: Manipulator) -> SingularPose:
     return SingularPose(
         "singular at every pose (type II), so that it has no inverse dynamics and no base "
         "parameters; change what the Jacobian depends on, a leg's "
@@ -291,7 +291,7 @@ def _modular(
     return {column: value for column, value in entries.items() if value}
 
 
-def _unexplained(
+def _unexplained_columns(
     by_mass: Sequence[dict[int, int]],
     relations: Relations,
     dropped: Sequence[int],
@@ -323,7 +323,7 @@ def _shared_rows(rows: Sequence[Sequence[Number]], sharing: Array) -> list[list[
     return [[reduce(add, (row[j] for j in group)) for group in members] for row in rows]
 
 
-def _lifted(
+def _lift_to_fractions(
     eliminations: dict[int, tuple[list[int], Relations]],
 ) -> dict[int, dict[int, Fraction]] | None:
     """Return the shares as fractions, if all primes but the last give what the last confirms."""

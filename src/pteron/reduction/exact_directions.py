@@ -49,9 +49,9 @@ class Notes:
         exact = length(value)
         if exact is None:
             exact = Surd(Fraction(value).limit_denominator(FINE))
-            self._approximated(name, value, exact)
+            self._note_approximated(name, value, exact)
         elif exact.s != 1:
-            self._recognised(name, value, exact)
+            self._note_recognised(name, value, exact)
         return exact
 
     def direction(self, name: str, vector: Array) -> ExactVector:
@@ -61,11 +61,11 @@ class Notes:
         if len(known) == 3 and sum(c.square for c in known) == 1:
             for axis, value, exact in zip("xyz", vector, known, strict=True):
                 if exact.s != 1 or abs(float(exact) - float(value)) > _NOISE:
-                    self._recognised(f"{name}.{axis}", float(value), exact)
+                    self._note_recognised(f"{name}.{axis}", float(value), exact)
             return (known[0], known[1], known[2])
         unit = rational_unit(vector)
         for axis, value, exact in zip("xyz", vector, unit, strict=True):
-            self._approximated(f"{name}.{axis}", float(value), exact)
+            self._note_approximated(f"{name}.{axis}", float(value), exact)
         return unit
 
     def planar(self, name: str, x: float, y: float) -> tuple[Surd, Surd]:
@@ -76,16 +76,16 @@ class Notes:
             ux, uy, _ = rational_unit(np.array([x, y, 0.0]) / np.hypot(x, y))
             polar = Surd(ux.q * radius.q, radius.s), Surd(uy.q * radius.q, radius.s)
             for axis, value, exact in zip("xy", (x, y), polar, strict=True):
-                self._approximated(f"{name}.{axis}", value, exact)
+                self._note_approximated(f"{name}.{axis}", value, exact)
             return polar
         return self.length(f"{name}.x", x), self.length(f"{name}.y", y)
 
-    def _recognised(self, name: str, value: float, exact: Surd) -> None:
+    def _note_recognised(self, name: str, value: float, exact: Surd) -> None:
         error = abs(float(exact) - value)
         difference = f"off by {error:.0e}" if error else "to the last digit"
         self.recognised.append(f"{name} = {exact} ({difference})")
 
-    def _approximated(self, name: str, value: float, exact: Surd) -> None:
+    def _note_approximated(self, name: str, value: float, exact: Surd) -> None:
         error = abs(float(exact) - value)
         if error:
             self.approximated.append(f"{name} (off by {error:.0e})")

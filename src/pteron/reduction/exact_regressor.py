@@ -53,7 +53,7 @@ def modular_rows(
             values = program(pose, *motion)[0]
         except (NoSquareRoot, ZeroDivisionError):
             continue
-        rows += _split(values, topology)
+        rows += _split_rows(values, topology)
         if len(rows) >= states * topology.freedom:
             return rows
     raise ZeroDivisionError
@@ -95,7 +95,7 @@ def rational_rows(
             values = program(placed, pose, *motion)[0]
         except ZeroDivisionError:
             continue
-        rows += _split(values, topology)
+        rows += _split_rows(values, topology)
     return rows
 
 
@@ -108,7 +108,7 @@ def _draw(count: int, prime: int, rng: random.Random) -> list[int]:
     return [rng.randrange(prime) for _ in range(count)]
 
 
-def _split(values: Sequence[Element], topology: Manipulator) -> list[list[Element]]:
+def _split_rows(values: Sequence[Element], topology: Manipulator) -> list[list[Element]]:
     """Return the rows of a regressor; the program stores it transposed, by columns."""
     n = len(parameter_data(topology))
     return [list(values[i * n : (i + 1) * n]) for i in range(topology.freedom)]
@@ -208,7 +208,7 @@ def degree_bound(topology: Manipulator) -> int:
     entries = evaluate(program, field, [constants, *states])[0]
     return max(
         max(field.over(common_powers(row), entry) for entry in row)
-        for row in _split(entries, topology)
+        for row in _split_rows(entries, topology)
     )
 
 

@@ -38,7 +38,7 @@ def as_text(columns: Sequence[Parameter], terms: Terms, digits: int) -> str:
     """Return a base parameter such as ``m_p1 + m_u1 + 20.11 I_l1``."""
 
     def product(column: int, share: Share) -> tuple[bool, str]:
-        minus, size = _written(share, digits, str)
+        minus, size = _write_terms(share, digits, str)
         size = size.replace("**", "^")
         return minus, f"{size} {columns[column].name}" if size else columns[column].name
 
@@ -49,7 +49,7 @@ def as_html(columns: Sequence[Parameter], terms: Terms, digits: int) -> str:
     """Return a base parameter in HTML, in the paper's notation; each term stays on one line."""
 
     def product(column: int, share: Share) -> tuple[bool, str]:
-        minus, size = _written(share, digits, _html_share)
+        minus, size = _write_terms(share, digits, _html_share)
         name = html_name(columns[column])
         gap = " " if _is_symbolic(share) else _NARROW
         return minus, f"{size}{gap}{name}" if size else name
@@ -64,11 +64,11 @@ def as_latex(columns: Sequence[Parameter], terms: Terms, digits: int) -> str:
         if _is_symbolic(share):
             from sympy import latex
 
-            minus, value = _signed(share)
+            minus, value = _signed_text(share)
             size = latex(value, symbol_names=_geometry_names(share))
             size = rf"\left({size}\right)" if value.is_Add or size.startswith("-") else size
         else:
-            minus, size = _written(share, digits, str)
+            minus, size = _write_terms(share, digits, str)
         name = _latex_name(columns[column])
         return minus, f"{size}\\, {name}" if size else name
 
@@ -85,13 +85,13 @@ def _sum(terms: Terms, product: Callable[[int, Share], tuple[bool, str]]) -> str
     return text
 
 
-def _written(share: Share, digits: int, write: Callable[[Any], str]) -> tuple[bool, str]:
+def _write_terms(share: Share, digits: int, write: Callable[[Any], str]) -> tuple[bool, str]:
     """Return a share's sign and size: empty for one, in brackets where it holds symbols."""
     if not _is_symbolic(share):
         value = float(share)
         size = f"{abs(value):.{digits}g}"
         return value < 0, "" if size == "1" else size
-    minus, quotient = _signed(share)
+    minus, quotient = _signed_text(share)
     top, bottom = quotient.as_numer_denom()
     # A sum needs brackets under a sign or over a denominator.
     text = f"({write(top)})" if top.is_Add else write(top)
@@ -104,7 +104,7 @@ def _is_symbolic(share: Share) -> bool:
     return bool(getattr(share, "free_symbols", None))
 
 
-def _signed(share: Any) -> tuple[bool, Any]:
+def _signed_text(share: Any) -> tuple[bool, Any]:
     """Return whether a share is written with a minus sign, and what is then written after it."""
     from sympy import factor
 

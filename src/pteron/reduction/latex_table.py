@@ -42,7 +42,7 @@ def latex_table(
         Significant digits of the values.
     """
     rows = [
-        rf"    {i} & ${_broken(text, plain)}$ & ${_number(value, digits)}$ & {_unit(unit)} \\"
+        rf"    {i} & ${_break_lines(text, plain)}$ & ${_number(value, digits)}$ & {_unit(unit)} \\"
         for i, (text, plain, value, unit) in enumerate(
             zip(sums, printed, values, units, strict=True), start=1
         )
@@ -51,7 +51,7 @@ def latex_table(
     lines = [
         *(_NEEDS, r"\begin{table}", r"  \centering"),
         *([r"  \renewcommand{\arraystretch}{1.4}"] if fractions else []),
-        rf"  \caption{{Base inertial parameters of {_escaped(name)}.}}",
+        rf"  \caption{{Base inertial parameters of {_escape_latex(name)}.}}",
         *(r"  \label{tab:base-parameters}", r"  \begin{tabular}{@{}rlrl@{}}", r"    \toprule"),
         r"    & Base parameter & Value & Unit \\",
         *(r"    \midrule", *rows, r"    \bottomrule"),
@@ -60,7 +60,7 @@ def latex_table(
     return "\n".join(lines)
 
 
-def _broken(latex: str, printed: str) -> str:
+def _break_lines(latex: str, printed: str) -> str:
     """Return a sum, in several lines where it is long."""
     widths = [_width(term) for term in _terms(printed)]
     if sum(widths) <= _LONGEST:
@@ -104,5 +104,5 @@ def _unit(unit: str) -> str:
     return rf"$\mathrm{{{spaced}}}$"
 
 
-def _escaped(text: str) -> str:
+def _escape_latex(text: str) -> str:
     return "".join(_SPECIAL.get(letter, letter) for letter in text)

@@ -110,12 +110,12 @@ def judged(case: Case, ratings: list[Rating]) -> Candidate:
     for rating in (good[2**k - 1] for k in range(_TRIED) if 2**k <= len(good)):
         proofs, rating.robot = proofs_of(case, rating)
         bad = next((p for p in proofs if p.counterexample is not None), None)
-        why = str(bad) if bad is not None else _beyond(case, rating)
+        why = str(bad) if bad is not None else _cell_violation(case, rating)
         if not why:
             candidate = _candidate(
                 case, rating, proofs, counts, front(good, shown_objectives(objectives))
             )
-            why = _exceeded(case, candidate)
+            why = _exceeded_limit(case, candidate)
             if not why and candidate.least_margin >= case.job.motors.margin:
                 return candidate
             # Where no design keeps the whole margin between the search's places, the best serves.
@@ -123,7 +123,7 @@ def judged(case: Case, ratings: list[Rating]) -> Candidate:
     return tight or Candidate(case.kind.name, False, (f"no proof ({why})",), *counts)
 
 
-def _beyond(case: Case, rating: Rating) -> str:
+def _cell_violation(case: Case, rating: Rating) -> str:
     """Return in words where a design leaves its room between the poses of its search; note it."""
     robot = rating.robot
     assert robot is not None  # it keeps all that is asked
@@ -136,7 +136,7 @@ def _beyond(case: Case, rating: Rating) -> str:
     return "".join(f"not so: {words}" for _, words in list(misses.values())[:1])
 
 
-def _exceeded(case: Case, candidate: Candidate) -> str:
+def _exceeded_limit(case: Case, candidate: Candidate) -> str:
     """Return in words what a design exceeds between the poses of its search; empty for nothing."""
     job, figures = case.job, candidate.figures
     bounds = {"error": job.accuracy, "deflection": job.stiffness}
@@ -180,7 +180,7 @@ def _candidate(
         springs = elasticity(case.sections(rating), [o.gearbox.stiffness for o in rating.options])
         stiff = least(lambda poses: stiffness(robot, poses, springs).least)
         figures["deflection"] = float(case.job.stiffness.force / stiff)
-    times = _reached(case, carrying, rating, margins.place)
+    times = _shortest_times(case, carrying, rating, margins.place)
     objectives = shown_objectives(case.job.objectives)
     return Candidate(
         case.kind.name,
@@ -237,14 +237,14 @@ def _tolerances(case: Case, rating: Rating) -> Tolerances:
     return tolerances(accuracy, joint_errors(accuracy, *gears.T).tolist())
 
 
-def _reached(
+def _shortest_times(
     case: Case, robot: Manipulator, rating: Rating, place: tuple[Places, int] | None
 ) -> dict[str, float]:
     """Return the shortest time of the cycle at its worst place with these drives, s."""
     if place is None:
         return {}
     cycle, k = place
-    path = _Moved(cycle.at(np.array([k])), rating.middle)
+    path = _ShiftedPath(cycle.at(np.array([k])), rating.middle)
     # Drives are left what the margin asks for.
     share, drive_limits = case.job.motors.margin, limits_of(robot)
     limits = replace(
@@ -255,7 +255,7 @@ def _reached(
     return {}
 
 
-class _Moved(Path):
+class _ShiftedPath(Path):
     """A path from the middle of a workspace at one place."""
 
     def __init__(self, place: Places, middle: Array) -> None:

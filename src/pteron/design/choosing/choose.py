@@ -125,7 +125,7 @@ def choose_machine(
         cannot be read, or a price is asked for of motors that have none.
     """
     cases = cases_of(job)
-    store = _Kept(None if folder is None else Path(folder) / _KEPT, job, cases)
+    store = _CandidateStore(None if folder is None else Path(folder) / _KEPT, job, cases)
     candidates = {name: known for name in cases if (known := store.find(name)) is not None}
     resumed = tuple(candidates)
     shares = {name: float(name in candidates) for name in cases}
@@ -140,7 +140,7 @@ def choose_machine(
         begun(tuple(remaining), resumed)
     if progress is not None and remaining:  # what was done before is not this run's
         progress(sum(shares.values()) / len(shares), next(iter(remaining)))
-    for name, candidate in _searched(remaining, workers, tell):
+    for name, candidate in _search_kinds(remaining, workers, tell):
         candidates[name] = candidate
         store.keep(candidate)
         tell(name, 1.0)
@@ -171,7 +171,7 @@ def cases_of(job: Job) -> dict[str, Case]:
             f"price: asked for, but {unpriced[0]} has none; add a column price, or ask for "
             '"rated_power"'
         )
-    names = [name for name in names if _driven(name, options, job)]
+    names = [name for name in names if _has_drives(name, options, job)]
     needed = 2.0 * float(job.workspace.half.max())
     tool = job.payload.tool
     kinds = (Kind(name, max(needed, _SMALL), job.links, tool, job.free) for name in names)
@@ -184,7 +184,7 @@ def cases_of(job: Job) -> dict[str, Case]:
     return cases
 
 
-def _driven(name: str, options: Mapping[str, Options], job: Job) -> bool:
+def _has_drives(name: str, options: Mapping[str, Options], job: Job) -> bool:
     """Say whether there are gearboxes for a kind's joints; refuse a kind that is asked for."""
     units = {leg.joint.unit for leg in load(name).legs}
     lacking = [unit for unit in sorted(units) if not options[unit].all]
@@ -201,7 +201,7 @@ def _candidate(case: Case, progress: Callable[[float], None]) -> Candidate:
         return judged(case, search_kind(case, search.evaluations, search.seed, progress))
 
 
-def _searched(
+def _search_kinds(
     cases: Mapping[str, Case], workers: int, tell: Callable[[str, float], None]
 ) -> Iterator[tuple[str, Candidate]]:
     """Yield the candidates as they are found, in as many processes."""
@@ -212,7 +212,8 @@ def _searched(
     done = get_context("spawn").Array("d", len(cases))
     with Pool(workers, _begin, done) as pool:
         jobs = {
-            pool.submit(_in_process, case, k): name for k, (name, case) in enumerate(cases.items())
+            pool.submit(_search_in_process, case, k): name
+            for k, (name, case) in enumerate(cases.items())
         }
         names, pending = list(cases), set(jobs)
         while pending:
@@ -232,14 +233,14 @@ def _begin(shares: Any) -> None:
     _shares = shares
 
 
-def _in_process(case: Case, k: int) -> Candidate:
+def _search_in_process(case: Case, k: int) -> Candidate:
     def tell(share: float) -> None:
         _shares[k] = share
 
     return _candidate(case, tell)
 
 
-class _Kept:
+class _CandidateStore:
     """Finished kinds in a folder, each with a digest of all that it depends on."""
 
     def __init__(self, folder: Path | None, job: Job, cases: Mapping[str, Case]) -> None:

@@ -129,10 +129,10 @@ def cycles_of(job: Job, robot: Manipulator) -> list[Places]:
     DataError
         If a cycle does not fit into the workspace, at any place and in any direction.
     """
-    return [_placed(job, robot, cycle, k) for k, cycle in enumerate(job.cycles, start=1)]
+    return [_cycle_places(job, robot, cycle, k) for k, cycle in enumerate(job.cycles, start=1)]
 
 
-def _placed(job: Job, robot: Manipulator, cycle: CycleTable, k: int) -> Places:
+def _cycle_places(job: Job, robot: Manipulator, cycle: CycleTable, k: int) -> Places:
     name = cycle.name or f"cycle {k}"
     points = np.zeros((len(cycle.points), robot.freedom))
     rows = np.array(cycle.points)
@@ -144,7 +144,7 @@ def _placed(job: Job, robot: Manipulator, cycle: CycleTable, k: int) -> Places:
     path: Path = line_path(bare, points, cycle.corner)
     path = there_and_back(path) if cycle.back else path
     poses = path.at(np.linspace(0.0, path.length, _IN_CYCLE))[0]
-    fitting = list(_fitting(job, robot, poses, cycle.anywhere))
+    fitting = list(_fitting_shifts(job, robot, poses, cycle.anywhere))
     if not fitting:
         size = " x ".join(f"{1e3 * x:.0f}" for x in np.ptp(wide(rows[:, : job.lengths]), axis=0))
         room = " x ".join(f"{2e3 * x:.0f}" for x in job.workspace.half)
@@ -176,7 +176,7 @@ def near_places(job: Job, cycle: Places, chosen: Iterable[int], part: float) -> 
     ways = np.vstack([np.zeros_like(steps), np.diag(steps), -np.diag(steps)])
     for k, way in product(chosen, (-1.0, 0.0, 1.0) if cycle.anywhere else (0.0,)):
         turn = float(cycle.turns[k] + way * part * np.pi / _DIRECTIONS)
-        turned = _turned(path, turn)
+        turned = _turn_path(path, turn)
         limits[:, :count] = (
             (-half - turned.min(axis=0))[:count],
             (half - turned.max(axis=0))[:count],
@@ -199,12 +199,12 @@ def _plane(turns: Array) -> Array:
     return np.moveaxis(np.array([[c, -s], [s, c]]), -1, 0)
 
 
-def _turned(path: Array, turn: float) -> Array:
+def _turn_path(path: Array, turn: float) -> Array:
     """Return places (K, 3) turned about the upright."""
     return np.column_stack([path[:, :2] @ _plane(np.array([turn]))[0].T, path[:, 2]])
 
 
-def _fitting(
+def _fitting_shifts(
     job: Job, robot: Manipulator, poses: Array, anywhere: bool
 ) -> Iterator[tuple[Array, float]]:
     """Yield shifts (m,) and turns of a path (K, m): its outermost places in the workspace."""
@@ -218,7 +218,7 @@ def _fitting(
         else [np.zeros(angles_of_path.shape[1])]
     )
     for turn in directions:
-        turned = _turned(path, turn)
+        turned = _turn_path(path, turn)
         low, high = -half - turned.min(axis=0), half - turned.max(axis=0)
         ends = [
             sorted({a, b}) if b > a else [0.5 * (a + b)] for a, b in zip(low, high, strict=True)

@@ -46,7 +46,7 @@ OBJECTIVES = {
 """The objectives that a machine can be chosen for, less being better, with units."""
 
 
-def _named_once(names: list[str], known: Collection[str]) -> list[str]:
+def _expect_names_once(names: list[str], known: Collection[str]) -> list[str]:
     for k, name in enumerate(names):
         if name not in known:
             raise ValueError(f"{shown(name)} is none of {', '.join(known)}")
@@ -79,12 +79,12 @@ class Job(TomlTable):
     @field_validator("objectives")
     @classmethod
     def _known_objectives(cls, names: list[str]) -> list[str]:
-        return _named_once(names, OBJECTIVES)
+        return _expect_names_once(names, OBJECTIVES)
 
     @field_validator("kinds")
     @classmethod
     def _known_kinds(cls, names: list[str] | None) -> list[str] | None:
-        return names and _named_once(names, KINDS)
+        return names and _expect_names_once(names, KINDS)
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:

@@ -27,7 +27,7 @@ _TURNS = 7.0
 """Angle, rad, from which a turn was probably given in degrees."""
 
 
-def _near(coordinates: Any) -> Any:
+def _expect_near(coordinates: Any) -> Any:
     """Refuse lengths, m, that are too large for a cell."""
     lengths = np.abs(coordinates).ravel()
     if lengths.max() > _FAR:
@@ -42,28 +42,28 @@ def _fine(error: float) -> float:
     return error
 
 
-def _leaning(angle: float) -> float:
+def _expect_tilt(angle: float) -> float:
     if angle >= _LEANS:
         raise ValueError(f"{angle:g} rad given, below {_LEANS:g} expected: is this in degrees?")
     return angle
 
 
-def _near_points(points: list[tuple[float, ...]]) -> list[tuple[float, ...]]:
+def _expect_near_points(points: list[tuple[float, ...]]) -> list[tuple[float, ...]]:
     """Refuse points whose first two coordinates, lengths in m, are too large for a cell."""
-    _near([point[:2] for point in points])
+    _expect_near([point[:2] for point in points])
     return points
 
 
 Names = Annotated[list[str], BeforeValidator(listed), Field(min_length=1)]
 """One name, or a list of names."""
 
-Near = Annotated[Positive, AfterValidator(_near)]
+Near = Annotated[Positive, AfterValidator(_expect_near)]
 """A length above 0 and of a cell's size, m."""
 
 Fine = Annotated[Positive, AfterValidator(_fine)]
 """A greatest error above 0, m."""
 
-Place = Annotated[Three, AfterValidator(_near)]
+Place = Annotated[Three, AfterValidator(_expect_near)]
 """A place in a cell, m."""
 
 
@@ -82,7 +82,7 @@ class WorkspaceTable(TomlTable):
         "its middle in the cell, m; left out, it may be anywhere in the cell", None
     )
     turn: Two | None = key("least and greatest turn about the upright, rad", None)
-    tilt: Annotated[Positive, AfterValidator(_leaning)] | None = key(
+    tilt: Annotated[Positive, AfterValidator(_expect_tilt)] | None = key(
         "of the platform to every side, rad: it fills a cone", None
     )
     directions: Annotated[list[Three], Field(min_length=1)] | None = key(
@@ -100,7 +100,7 @@ class WorkspaceTable(TomlTable):
             )
         if self.poses is not None and {len(vector) for vector in self.poses} not in ({2}, {3}):
             raise ValueError("poses: each has x y, or x y z")
-        _near(self.poses or 0.0)
+        _expect_near(self.poses or 0.0)
         if self.turn is not None and not self.turn[0] < self.turn[1]:
             raise ValueError(f"turn: {list(self.turn)} given, [low, high] expected, rad")
         if self.turn is not None and max(map(abs, self.turn)) > _TURNS:
@@ -160,7 +160,7 @@ class CycleTable(TomlTable):
 
     name: str | None = None
     points: Annotated[
-        list[tuple[Number, ...]], Field(min_length=2), AfterValidator(_near_points)
+        list[tuple[Number, ...]], Field(min_length=2), AfterValidator(_expect_near_points)
     ] = key(
         "from the middle of the workspace, m; a turn about the upright may follow, or "
         "roll, pitch and yaw, rad"
@@ -259,7 +259,7 @@ class LinksTable(TomlTable):
 
     @field_validator("upper", "lower")
     @classmethod
-    def _known(cls, names: list[str]) -> list[str]:
+    def _expect_known(cls, names: list[str]) -> list[str]:
         for name in names:
             try:
                 Stock.parse(name)

@@ -137,7 +137,7 @@ class Kind:
                 middle[i] += numbers[letter] * size * reach
             elif letter == "x" or (letter == "y" and "z" in KINDS[self.name][1]):
                 middle[i] = 0.0
-        return _built(self.robot, numbers, self._stock(values), self.links), middle
+        return _build_machine(self.robot, numbers, self._stock(values), self.links), middle
 
     def cut(self, values: Array) -> dict[str, str]:
         """Return what a design's upper and lower links are cut from."""
@@ -165,7 +165,7 @@ def _lengths(leg: Any) -> set[str]:
     return {name for name, key in keys if key.role == "length" and getattr(leg, name) is not None}
 
 
-def _built(
+def _build_machine(
     robot: Manipulator, numbers: Mapping[str, float], stocks: Mapping[str, Stock], links: LinksTable
 ) -> Manipulator:
     """Return a machine of another size, proportions and parts.

@@ -103,7 +103,7 @@ def regions(case: Case, robot: Manipulator, middle: Array) -> list[Region]:
     if space.poses is not None:
         return [Box(tuple(pose), tuple(pose)) for pose in middle + case.poses]
     if space.turn is not None and not space.tilts and space.radius is None:
-        return [_turning(case, robot, middle)]
+        return [_turned_box(case, robot, middle)]
     boxes: list[Region] = []
     half = np.zeros(robot.freedom)
     half[:count] = case.half[:count]
@@ -115,7 +115,7 @@ def regions(case: Case, robot: Manipulator, middle: Array) -> list[Region]:
     return boxes
 
 
-def _turning(case: Case, robot: Manipulator, middle: Array) -> Region:
+def _turned_box(case: Case, robot: Manipulator, middle: Array) -> Region:
     """Return the box of positions and turns of a workspace with a range of turns."""
     platform, count = robot.platform, len(robot.platform.lengths)
     assert case.job.workspace.turn is not None  # the caller has checked it

@@ -139,16 +139,18 @@ class Case:
             _miss(rating, "machine", 1.0, "numbers that no machine has")
             return rating
         rating.robot = robot
-        for stage, judge in enumerate((self._reach, self._room, self._drive, self._rest), start=1):
+        for stage, judge in enumerate(
+            (self._judge_reach, self._judge_room, self._choose_drives, self._judge_bounds), start=1
+        ):
             judge(rating)
             if rating.misses:
                 rating.stage = stage
                 return rating
         return rating
 
-    def _reach(self, rating: Rating) -> None:
+    def _judge_reach(self, rating: Rating) -> None:
         """Judge reach, floors and limits over the workspace; set the travel of guides and rams."""
-        robot, poses, floors = _of(rating), rating.middle + self.visited, self.job.floors
+        robot, poses, floors = _robot_of(rating), rating.middle + self.visited, self.job.floors
         least = float(np.min(numeric(robot, "squared_type_i")(poses)[0]))
         if least >= 0.0:
             sign = np.sign(np.median(numeric(robot, "type_ii")(poses)[0]))
@@ -171,9 +173,9 @@ class Case:
             _miss(rating, "reach", 1.0 - least, "a leg that does not reach the whole workspace")
             return
         rating.figures["type_ii"] = float(type_ii[0])
-        _below(rating, "type-I measure", float(np.sqrt(least)), _FLOOR * floors.type_i)
-        _below(rating, "type-II measure", float(type_ii[0]), _FLOOR * floors.type_ii)
-        _below(rating, "passive joints' margin to their limits", float(room.min()), 0.0)
+        _judge_least(rating, "type-I measure", float(np.sqrt(least)), _FLOOR * floors.type_i)
+        _judge_least(rating, "type-II measure", float(type_ii[0]), _FLOOR * floors.type_ii)
+        _judge_least(rating, "passive joints' margin to their limits", float(room.min()), 0.0)
         joints = inverse_kinematics(robot, poses, on_failure="nan")
         if not np.isfinite(joints).all():
             _miss(rating, "reach", 1.0, "a leg that does not reach the whole workspace")
@@ -194,26 +196,28 @@ class Case:
                 travel = float(low - spare), float(high + spare)
                 if not slides(leg):
                     beyond = travel[1] - _TELESCOPE * travel[0]
-                    _below(rating, "rams' margin to their shortest", -beyond / travel[1], 0.0)
+                    _judge_least(rating, "rams' margin to their shortest", -beyond / travel[1], 0.0)
                 if slides(leg) or not rating.misses:
                     leg = self.kind.with_travel(leg, travel, rating.values)
             elif leg.limits is not None:
                 half = 0.5 * (leg.limits[1] - leg.limits[0])
                 margin = min(low - leg.limits[0], leg.limits[1] - high) / half
-                _below(rating, "joints' margin to their limits", float(margin), 0.01)
+                _judge_least(rating, "joints' margin to their limits", float(margin), 0.01)
             legs.append(leg)
         rating.robot = replace(robot, legs=tuple(legs))
 
-    def _room(self, rating: Rating) -> None:
+    def _judge_room(self, rating: Rating) -> None:
         """Judge the footprint, the height, what is to be kept out of, and whether links touch."""
-        figures, misses = self.room.judged(_of(rating), rating.middle + self.visited, rating.middle)
+        figures, misses = self.room.judged(
+            _robot_of(rating), rating.middle + self.visited, rating.middle
+        )
         rating.figures |= figures
         for name, (share, words) in misses.items():
             _miss(rating, name, share, words)
 
-    def _drive(self, rating: Rating) -> None:
+    def _choose_drives(self, rating: Rating) -> None:
         """Choose the drives: the cheapest that serve loads, accuracy and stiffness."""
-        robot = self.loaded(_of(rating))
+        robot = self.loaded(_robot_of(rating))
         numbers = self.kind.numbers(rating.values)
         try:
             loads, work = self.loads(robot, rating, numbers.get("time"))
@@ -260,9 +264,9 @@ class Case:
         rating.options = tuple(o for o in options if o is not None)
         legs_with = (
             replace(leg, drive=option.drive)
-            for leg, option in zip(_of(rating).legs, rating.options, strict=True)
+            for leg, option in zip(_robot_of(rating).legs, rating.options, strict=True)
         )
-        rating.robot = replace(_of(rating), legs=tuple(legs_with))
+        rating.robot = replace(_robot_of(rating), legs=tuple(legs_with))
         friction = np.array([option.drive.coulomb for option in rating.options])
         rating.figures |= {
             "price": float(sum(o.price for o in rating.options)),
@@ -294,10 +298,10 @@ class Case:
             return max(worst, default=0.0)
         return float(np.average(worst, weights=shares))
 
-    def _rest(self, rating: Rating) -> None:
+    def _judge_bounds(self, rating: Rating) -> None:
         """Judge what else has a greatest value."""
         for name, most in self.job.most.model_dump().items():
-            _above(rating, name, rating.figures[name], most, f" {OBJECTIVES[name]}".rstrip())
+            _judge_most(rating, name, rating.figures[name], most, f" {OBJECTIVES[name]}".rstrip())
 
     def loaded(self, robot: Manipulator) -> Manipulator:
         """Return a machine with the payload."""
@@ -305,7 +309,7 @@ class Case:
 
     def sections(self, rating: Rating) -> dict[str, Section]:
         """Return the sections of a design's links."""
-        return link_sections(_of(rating), self.kind.cut(rating.values))
+        return link_sections(_robot_of(rating), self.kind.cut(rating.values))
 
     def loads(
         self, robot: Manipulator, rating: Rating, time: float | None
@@ -361,7 +365,7 @@ class Case:
         return middle + pose, velocity / duration, acceleration / duration**2
 
 
-def _of(rating: Rating) -> Manipulator:
+def _robot_of(rating: Rating) -> Manipulator:
     assert rating.robot is not None  # the first stage has made it
     return rating.robot
 
@@ -381,13 +385,13 @@ def _miss_parts(rating: Rating, parts: Mapping[str, float], option: str) -> None
             _miss(rating, name, 1.0 / max(part, 1e-3) - 1.0, words)
 
 
-def _below(rating: Rating, name: str, value: float, least: float, unit: str = "") -> None:
+def _judge_least(rating: Rating, name: str, value: float, least: float, unit: str = "") -> None:
     if not value >= least:
         share = least - value if np.isfinite(value) else 1.0
         _miss(rating, name, share, f"{name} {value:.3g}{unit}, at least {least:.3g}{unit} asked")
 
 
-def _above(rating: Rating, name: str, value: float, most: float | None, unit: str) -> None:
+def _judge_most(rating: Rating, name: str, value: float, most: float | None, unit: str) -> None:
     if most is not None and not value <= most:
         share = value / most - 1.0 if np.isfinite(value) else 1.0
         words = name.replace("_", " ")

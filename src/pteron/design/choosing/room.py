@@ -46,7 +46,9 @@ class Room:
         """
         floor = self._job.floors.clearance
         points = np.asarray(numeric(robot, "joint_points")(poses)[0])
-        figures, misses = self.within(self._taken(robot, poses, points, middle).min(axis=0), _TIGHT)
+        figures, misses = self.within(
+            self._room_taken(robot, poses, points, middle).min(axis=0), _TIGHT
+        )
         clear = self._clearance(robot, poses, points)
         if clear < floor + _SPARE:
             requirement = f"at least {1e3 * floor:g} mm asked, and {1e3 * _SPARE:g} mm to spare"
@@ -60,9 +62,9 @@ class Room:
         The least coordinates, minus the greatest, and how far it stays outside each keep-out box.
         """
         points = np.asarray(numeric(robot, "joint_points")(poses)[0])
-        return self._taken(robot, poses, points, middle)
+        return self._room_taken(robot, poses, points, middle)
 
-    def _taken(self, robot: Manipulator, poses: Array, points: Array, middle: Array) -> Array:
+    def _room_taken(self, robot: Manipulator, poses: Array, points: Array, middle: Array) -> Array:
         margin, center = self._job.cell.margin, tool_places(robot, middle[None])[0]
         starts, ends = (part - center for part in _lines(robot, poses, points))
         both = np.stack([starts, ends])

@@ -49,7 +49,7 @@ def with_tool_in_the_middle(robot: Manipulator, angles: Array) -> Array:
 
 def sample_poses(job: Job, robot: Manipulator, count: int | None = None) -> Array:
     """Return poses (N, m) over the workspace and its orientations, from its middle."""
-    return _poses_at(job, robot, _places(job, robot, count or _along(job)))
+    return _poses_at(job, robot, _places(job, robot, count or _positions_along(job)))
 
 
 def about_the_worst(
@@ -67,7 +67,7 @@ def about_the_worst(
     what is worst near a singularity is worst in a valley that samples miss. Poses `besides` those
     of the workspace count as they are.
     """
-    along, count, space = along or _along(job), len(robot.platform.lengths), job.workspace
+    along, count, space = along or _positions_along(job), len(robot.platform.lengths), job.workspace
     places = _places(job, robot, along)
     values = values_of(_poses_at(job, robot, places))
     steps = np.zeros(robot.freedom)
@@ -78,11 +78,11 @@ def about_the_worst(
         steps[-1] = 0.25 * (space.turn[1] - space.turn[0])
     if space.poses is not None:
         steps[:count] = 0.0
-    ways = _ways(steps, count)
+    ways = _neighbour_steps(steps, count)
     for _ in range(_ROUNDS if steps.any() else 0):
         worst = np.unique(np.argsort(values, axis=0)[:keep])
         near = (places[worst][:, None] + steps * ways).reshape(-1, robot.freedom)
-        places = _into(job, near, count)
+        places = _clip_to_workspace(job, near, count)
         values = values_of(_poses_at(job, robot, places))
         steps /= 2.0
     poses = _poses_at(job, robot, places)
@@ -91,7 +91,7 @@ def about_the_worst(
     return values.min(axis=0), poses[values.argmin(axis=0)]
 
 
-def _ways(steps: Array, count: int) -> Array:
+def _neighbour_steps(steps: Array, count: int) -> Array:
     """Return the neighbours of a place (W, m), in steps: any, but if it tilts in part of it."""
     several = [(-1.0, 0.0, 1.0) if step else (0.0,) for step in steps]
     if not steps[count:-1].any():
@@ -101,27 +101,27 @@ def _ways(steps: Array, count: int) -> Array:
     return np.unique(np.vstack([list(product(*part)) for part in parts]), axis=0)
 
 
-def _into(job: Job, places: Array, count: int) -> Array:
+def _clip_to_workspace(job: Job, places: Array, count: int) -> Array:
     """Return places (N, m) brought into the workspace where they are outside."""
     space, half, clipped = job.workspace, job.workspace.half[:count], places.copy()
     if space.poses is None:
         clipped[:, :count] = np.clip(clipped[:, :count], -half, half)
     if space.radius is not None:
-        clipped[:, :2] = _within(clipped[:, :2], space.radius)
+        clipped[:, :2] = _clip_to_radius(clipped[:, :2], space.radius)
     if space.tilt is not None:
-        clipped[:, count : count + 2] = _within(clipped[:, count : count + 2], space.tilt)
+        clipped[:, count : count + 2] = _clip_to_radius(clipped[:, count : count + 2], space.tilt)
     if space.turn is not None and space.directions is None:
         clipped[:, -1] = np.clip(clipped[:, -1], *space.turn)
     return np.unique(clipped, axis=0)
 
 
-def _within(points: Array, radius: float) -> Array:
+def _clip_to_radius(points: Array, radius: float) -> Array:
     """Return points (N, 2) drawn into a circle."""
     shares = np.minimum(1.0, radius / np.maximum(np.hypot(*points.T), 1e-12))
     return np.asarray(points * shares[:, None])
 
 
-def _along(job: Job) -> int:
+def _positions_along(job: Job) -> int:
     return _ALONG_TILTED if job.workspace.tilts else _ALONG
 
 
@@ -142,7 +142,7 @@ def _poses_at(job: Job, robot: Manipulator, places: Array) -> Array:
     count = len(robot.platform.lengths)
     angles = places[:, count:]
     if job.workspace.tilt is not None:
-        angles = _leaning(robot, angles[:, :2])
+        angles = _tilted_angles(robot, angles[:, :2])
         angles[:, -1] += places[:, -1]
     poses = with_tool_in_the_middle(robot, angles)
     poses[:, :count] += places[:, :count]
@@ -184,14 +184,14 @@ def tilts(job: Job, robot: Manipulator) -> Array:
     """Return angles (A, a) of the tilts: of a cone those of its middle and round its rim."""
     space, count = job.workspace, len(robot.platform.angles)
     if space.tilt is not None:
-        return _leaning(robot, _leans(space.tilt))
+        return _tilted_angles(robot, _leans(space.tilt))
     if space.directions is None:
         return np.zeros((1, count))
     directions = np.array(space.directions)
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     away = np.linalg.norm(directions[:, :2], axis=1, keepdims=True)
     angle = np.arctan2(away, directions[:, 2:])
-    return _leaning(robot, directions[:, :2] / np.where(away > 0.0, away, 1.0) * angle)
+    return _tilted_angles(robot, directions[:, :2] / np.where(away > 0.0, away, 1.0) * angle)
 
 
 def _leans(tilt: float) -> Array:
@@ -200,7 +200,7 @@ def _leans(tilt: float) -> Array:
     return np.vstack([np.zeros((1, 2)), tilt * np.c_[np.cos(rim), np.sin(rim)]])
 
 
-def _leaning(robot: Manipulator, leans: Array) -> Array:
+def _tilted_angles(robot: Manipulator, leans: Array) -> Array:
     """Return the angles (L, a) of a platform that leans to x and y (L, 2): the shortest turn."""
     vectors = np.c_[-leans[:, 1], leans[:, 0], np.zeros(len(leans))]
     matrices = scipy.spatial.transform.Rotation.from_rotvec(vectors).as_matrix()

@@ -49,13 +49,13 @@ def search_kind(
         for k, objective in enumerate(objectives):
             rng = np.random.default_rng((seed, k))
             end = evaluations * (k + 1) // len(objectives)
-            _evolved(rated, ratings, rng, end, objective, (low, high))
+            _evolve(rated, ratings, rng, end, objective, (low, high))
             start = min(ratings, key=lambda rating: rating.cost(objective))
-            _refined(rated, ratings, (start.values - low) / (high - low), end, objective, counts)
+            _refine(rated, ratings, (start.values - low) / (high - low), end, objective, counts)
     return ratings
 
 
-def _evolved(
+def _evolve(
     rated: Callable[[Array], Rating],
     ratings: list[Rating],
     rng: np.random.Generator,
@@ -93,7 +93,7 @@ def _evolved(
                 units[i], costs[i] = trial, cost
 
 
-def _refined(
+def _refine(
     rated: Callable[[Array], Rating],
     ratings: list[Rating],
     start: Array,
