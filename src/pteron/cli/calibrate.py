@@ -148,8 +148,8 @@ def _plan(
         "fewer give a second log (--held-out)."
     )
     lines = [
-        f"{plain(machine.name)}: {count} poses at which to measure {measure}{_plane_text(poses)}, in "
-        f"a {_region(poses)}; every pose of it is proved to serve",
+        f"{plain(machine.name)}: {count} poses at which to measure {measure}{_plane_text(poses)}, "
+        f"in a {_region(poses)}; every pose of it is proved to serve",
         f"The {what} {off} off by up to {1e3 * poses.before:.3g} {unit} as drawn (one standard "
         f"deviation of the tolerances); {1e3 * poses.after:.3g} {unit} are expected to be left.",
         *([few] if count < poses.checked else []),
