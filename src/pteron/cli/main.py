@@ -153,6 +153,9 @@ _COMMANDS: dict[str, tuple[Callable[..., Result | None], ...]] = {
 _NUMERIC = (inverse, direct, forces, cycle)
 """Subcommands whose arguments may be negative numbers."""
 
+_GENERAL = (check, report, workspace, inverse, direct, forces, base, table1)
+"""Subcommands that one repeats after editing a number of a machine's file."""
+
 
 class Commands(Mapping[str, Any]):
     """The subcommands by their names, each made when it is asked for: most often one is."""
@@ -170,7 +173,10 @@ class Commands(Mapping[str, Any]):
     def __getitem__(self, name: str) -> Any:
         if name not in self._made:
             panel, function = self._panels[name]
-            cls, command = NumbersCommand if function in _NUMERIC else Command, typed(function)
+            cls, command = (
+                NumbersCommand if function in _NUMERIC else Command,
+                typed(function, general=function in _GENERAL),
+            )
             alone = Typer(add_completion=False, **_LOOKS)
             alone.command(cls=cls, rich_help_panel=panel, **help_of(command))(command)
             self._made[name] = get_command(alone)
