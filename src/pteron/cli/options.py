@@ -101,8 +101,8 @@ def typed(command: Callable[..., Result | None], *, general: bool = False) -> Ca
             passed["machine"] = load_robot(values["robot"], values["elbows"], quiet=quiet)
         with _alike() if general else nullcontext():
             outcome = command(**passed)
-        if outcome is not None:
-            outcome.tell(as_json=values["json"])
+            if outcome is not None:
+                outcome.tell(as_json=values["json"])
 
     run.__dict__["__signature__"] = Signature(list(options.values()))
     run.__annotations__ = {name: option.annotation for name, option in options.items()}

@@ -78,7 +78,10 @@ def _cached_kernel(
     robot: Manipulator, what: str, columns: Columns | None, wrench: bool, like: object
 ) -> TieredKernel:
     kernel = kernel_with_status(robot, what, VirtualMachine, columns, wrench=wrench)
-    return TieredKernel(kernel, _tier(program(robot, what, columns, wrench=wrench, guarded=True)))
+    tier = _tier(program(robot, what, columns, wrench=wrench, guarded=True))
+    if like is not None:
+        tier.fetch(at_any_cost=False)
+    return TieredKernel(kernel, tier)
 
 
 def kernel_with_status(
