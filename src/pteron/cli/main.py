@@ -153,7 +153,7 @@ _COMMANDS: dict[str, tuple[Callable[..., Result | None], ...]] = {
 _NUMERIC = (inverse, direct, forces, cycle)
 """Subcommands whose arguments may be negative numbers."""
 
-_GENERAL = (check, report, workspace, base, table1)
+_GENERAL = (check, report, workspace, base, table1, export)
 """Subcommands that one repeats after editing a number of a machine's file."""
 
 

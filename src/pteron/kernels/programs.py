@@ -120,13 +120,25 @@ def program(
         raise ModelError(f"base: {what!r} has no use for it; it goes with {useful}")
     if what not in LOADED and wrench:
         raise ModelError(f"wrench: {what!r} has no use for it; it goes with {', '.join(LOADED)}")
-    like = ALIKE.get()
-    if like is not None:
-        plain = True
-        own = _OF_ONE_MACHINE if like is True else _BY_CASES
-        if columns is None and what not in own:
-            return _general(layout_of(robot), _Form(what, wrench, guarded, plain))
     return _cached_program(bare(robot), _Form(what, wrench, guarded, plain, named), columns)
+
+
+def numeric_program(
+    robot: RobotLike,
+    what: str,
+    columns: Columns | None = None,
+    *,
+    wrench: bool = False,
+    guarded: bool = False,
+    plain: bool = False,
+) -> Program:
+    """Return the program with which numbers are computed: `program`, general within `alike`."""
+    like = ALIKE.get()
+    own = _OF_ONE_MACHINE if like is True else _BY_CASES
+    if like is None or columns is not None or what in own:
+        plain = plain or like is not None
+        return program(robot, what, columns, wrench=wrench, guarded=guarded, plain=plain)
+    return _general(layout_of(robot), _Form(what, wrench, guarded, plain=True))
 
 
 @contextmanager
