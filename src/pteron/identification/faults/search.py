@@ -125,6 +125,9 @@ def search_faults(
             fault = _fit_fault(model, observations, triangles, found_faults, k)
             if fault is None or not fault.chance < _CHANCE:
                 continue
+            # Beside a fault that explains most, a second one can fit worse than none.
+            if not _likelihood_gain(fault, fit_noise, observations.equation_counts) > 0:
+                continue
             if _is_possible(fault, model, fit_noise, floor):
                 clear.append(fault)
         best = max((fault.statistic for fault in clear), default=0.0)
@@ -136,6 +139,12 @@ def search_faults(
     return plain, found_faults
 
 
+def _likelihood_gain(fault: FoundFault, fit_noise: Array, rows: Array) -> float:
+    """Return by how much a fault raises the log-likelihood of so many rows (n,) of forces."""
+    noise = np.maximum(fault.fit.noise, 1e-300)
+    return float(rows @ np.log(np.maximum(fit_noise, 1e-300) / noise))
+
+
 def _likeliest(
     faults: Sequence[FoundFault], fit_noise: Array, rows: Array, floor: Array
 ) -> FoundFault:
@@ -145,10 +154,7 @@ def _likeliest(
     explain as much the one of fewest sizes. Else the fault is large, its columns hold to first
     order only, and what comes first among those that explain nearly as much is taken.
     """
-    gains = [
-        float(rows @ np.log(np.maximum(fit_noise, 1e-300) / np.maximum(fault.fit.noise, 1e-300)))
-        for fault in faults
-    ]
+    gains = [_likelihood_gain(fault, fit_noise, rows) for fault in faults]
     most = int(np.argmax(gains))
     clearest = faults[most]
     as_well = _AS_WELL * gains[most]
