@@ -12,9 +12,9 @@ from functools import lru_cache
 from itertools import product
 
 import numpy as np
-import scipy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
+from pteron.bodies.vectors import rotation_matrices
 from pteron.errors import ModelError
 from pteron.kernels import Array, bare
 from pteron.kernels.program_cache import cached_result
@@ -364,7 +364,7 @@ def _move_onto_axis(robot: Manipulator, poses: Array) -> Array:
     # Legs of a hexapod may stand in pairs, or in two halves.
     folds = [count, *(k for k in (3, 2) if k < count)] if robot.platform.tilts else [count]
     for fold in folds:
-        turn = scipy.spatial.transform.Rotation.from_rotvec(2.0 * np.pi / fold * axis).as_matrix()
+        turn = rotation_matrices(2.0 * np.pi / fold * axis)
         images = poses.copy()
         images[:, :lengths] = center + offsets @ (directions @ turn @ directions.T).T
         if np.allclose(_worth(robot, images), _worth(robot, poses), rtol=0.0, atol=_SAME):

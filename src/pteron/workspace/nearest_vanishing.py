@@ -119,8 +119,8 @@ class Search:
             boxes = np.concatenate([halve_boxes(batch), others])
             distances = self._distances(boxes)
             boxes, distances = boxes[distances < nearest], distances[distances < nearest]
-            proved = distances.min(initial=nearest) / ((1.0 - _CLOSE) * nearest)
-            self._report(min(max(examined / most, proved), 1.0))
+            proved = float(distances.min(initial=nearest)) / nearest if best is not None else 0.0
+            self._report(min(max(examined / most, proved / (1.0 - _CLOSE)), 1.0))
         if len(boxes) and distances.min() < (1.0 - _CLOSE) * nearest:
             order = np.argsort(distances, kind="stable")
             last = np.concatenate([order[:_LAST], order[:: max(1, len(order) // _LAST)]])
