@@ -119,7 +119,9 @@ class Search:
             boxes = np.concatenate([halve_boxes(batch), others])
             distances = self._distances(boxes)
             boxes, distances = boxes[distances < nearest], distances[distances < nearest]
-            proved = float(distances.min(initial=nearest)) / nearest if best is not None else 0.0
+            proved = (
+                float(distances.min(initial=nearest)) / nearest if 0.0 < nearest < np.inf else 0.0
+            )
             self._report(min(max(examined / most, proved / (1.0 - _CLOSE)), 1.0))
         if len(boxes) and distances.min() < (1.0 - _CLOSE) * nearest:
             order = np.argsort(distances, kind="stable")
