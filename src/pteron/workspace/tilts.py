@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import lru_cache
+from importlib.metadata import version
 
 import numpy as np
 import scipy  # type: ignore[import-untyped]
@@ -14,6 +16,7 @@ from pteron.arguments import expect, expect_share
 from pteron.bodies.vectors import PARALLEL_TOLERANCE, dot
 from pteron.errors import ModelError
 from pteron.kernels import Array
+from pteron.kernels.program_cache import cached_result
 from pteron.kinematics.evaluate import finite_pose
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import PoseLike
@@ -93,7 +96,7 @@ class TiltedBall:
     def sampled(self) -> Array:
         """Return poses (K, m) spread over it, a third of them on its rim."""
         free = len(self.lengths) + 2
-        shares = scipy.stats.qmc.Sobol(free, seed=0).random(_SAMPLES)
+        shares = _sobol_points(free)
         tilt = self.tilt * np.sqrt(shares[:, 0])
         tilt[: _SAMPLES // 3] = self.tilt
         azimuth = 2.0 * np.pi * shares[:, 1]
@@ -133,6 +136,19 @@ class LargestTilt:
     radius: float
     region: TiltedBall
     proof: Proof = field(repr=False)
+
+
+@lru_cache(maxsize=4)
+def _sobol_points(count: int) -> Array:
+    """Return scrambled Sobol points (_SAMPLES, count), from disk if they are there.
+
+    SciPy's statistics are slow to import.
+    """
+
+    def draw() -> Array:
+        return np.asarray(scipy.stats.qmc.Sobol(count, seed=0).random(_SAMPLES))
+
+    return cached_result(("sobol", count, _SAMPLES, version("scipy")), (), draw)
 
 
 def largest_tilt(
