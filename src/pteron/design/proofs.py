@@ -16,7 +16,7 @@ from pteron.design.design import Design
 from pteron.design.region import placed_pose, workspace_region
 from pteron.design.spec import ROUNDING
 from pteron.design.task import Task
-from pteron.kernels import Array, alike
+from pteron.kernels import Array, sharing_programs
 from pteron.workspace import Box, Proof, Region, prove
 from pteron.workspace.fit import UNKNOWN, Fit, proved_fit
 from pteron.workspace.shape_samples import Samples, fixed_samples
@@ -200,7 +200,7 @@ def counterexamples(design: Design, center: Array, edge: float) -> Samples:
     inside, fixed = inside.reshape(-1, size), fixed.reshape(-1, size)
     units = (inside[:, :lengths] - center) / (0.5 * edge or 1.0)
     inside[:, :lengths] = 0.0
-    return Samples(inside, units, np.ones(len(inside))).joined(fixed_samples(fixed, lengths))
+    return Samples(inside, units, np.ones(len(inside))).join(fixed_samples(fixed, lengths))
 
 
 def workspace_share(design: Design, proof: Proof) -> float:
@@ -216,7 +216,7 @@ def workspace_share(design: Design, proof: Proof) -> float:
 
 def _proof(design: Design, region: Region) -> Proof:
     floors = design.task.floors
-    with alike(design.task.robot):
+    with sharing_programs(design.task.robot):
         return prove(design.robot, region, type_i=floors.type_i, type_ii=floors.type_ii, most=_MOST)
 
 

@@ -78,7 +78,7 @@ def refined(task: Task, values: Sequence[float], objective: int) -> list[float]:
         missed = counterexamples(Design(task, task.machine(variables)), z[len(start) : -1], z[-1])
         if not len(missed.inside):
             break
-        first = first.joined(missed)
+        first = first.join(missed)
     return variables
 
 
@@ -89,7 +89,7 @@ def _condition_samples(design: Design, lengths: int, count: int) -> Samples:
     if task.spec.workspace is None or task.floats:
         return moving
     fixed = fixed_samples(design.poses, lengths)
-    return fixed.joined(moving) if task.seeks_cube else fixed
+    return fixed.join(moving) if task.seeks_cube else fixed
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from pteron.kernels.bounds import (
         UNBOUNDED as UNBOUNDED,
         Bounded as Bounded,
-        bounded as bounded,
+        bounded_function as bounded_function,
         bounds as bounds,
     )
     from pteron.kernels.choice import numeric as numeric
@@ -38,12 +38,12 @@ if TYPE_CHECKING:
         REDUCIBLE as REDUCIBLE,
         SELECTED as SELECTED,
         Columns as Columns,
-        alike as alike,
-        bare as bare,
         general_program as general_program,
+        geometry_only as geometry_only,
         layout_of as layout_of,
         program as program,
-        specialised as specialised,
+        sharing_programs as sharing_programs,
+        specialise_program as specialise_program,
     )
     from pteron.kernels.targets import (
         OTHER_LAYOUT as OTHER_LAYOUT,
@@ -56,4 +56,4 @@ if TYPE_CHECKING:
 
 # The others serve the floors above, in inner loops.
 
-_publish(__name__, checked=("bounded", "bounds", "compile"))
+_publish(__name__, checked=("bounded_function", "bounds", "compile"))

@@ -107,7 +107,7 @@ def _mean_value(
     return Interval(*(np.where(useful, bound, np.nan) for bound in total[:2]))
 
 
-def bounded(robot: RobotLike, what: str) -> Bounded:
+def bounded_function(robot: RobotLike, what: str) -> Bounded:
     """Return a function of a machine's poses, in its plain form, for `bounds`.
 
     Raises
@@ -175,7 +175,7 @@ def bounds(robot: RobotLike, what: str, boxes: ArrayLike) -> dict[str, Enclosure
     >>> round(float(found.low), 3), round(float(found.high), 3), bool(found.defined)
     (0.646, 0.65, True)
     """
-    function = bounded(robot, what)
+    function = bounded_function(robot, what)
     corners = as_array(boxes, "boxes", (2, function.function.size1_in(0)))
     if not (corners[..., 0, :] <= corners[..., 1, :]).all():
         raise DataError("boxes: a least value is above the greatest, or NaN")

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from pteron.bodies.vectors import rotation_matrices
 from pteron.errors import ModelError
-from pteron.kernels import Array, bare
+from pteron.kernels import Array, geometry_only
 from pteron.kernels.program_cache import cached_result
 from pteron.kinematics import inverse_kinematics, singular_orientations
 from pteron.kinematics.sampling import search_ball
@@ -183,7 +183,7 @@ def home_poses(robot: RobotLike) -> HomePoses:
         expect_regular(robot, np.array(robot.home))
         return HomePoses(robot.home, None, named=True)
     # Neither bodies nor drives matter; a refusal tells the name.
-    return HomePoses(*_cached_home_poses(replace(bare(robot), name=robot.name)))
+    return HomePoses(*_cached_home_poses(replace(geometry_only(robot), name=robot.name)))
 
 
 def expect_usable(robot: Manipulator, pose: Array) -> None:
@@ -205,7 +205,7 @@ def expect_usable(robot: Manipulator, pose: Array) -> None:
 @lru_cache(maxsize=256)
 def _cached_home_poses(robot: Manipulator) -> tuple[tuple[float, ...], tuple[float, ...] | None]:
     """Return both poses, worked out before, in another process too, or now."""
-    key, packages = ("home_poses", bare(robot)), ("kinematics", "workspace")
+    key, packages = ("home_poses", geometry_only(robot)), ("kinematics", "workspace")
     return cached_result(key, packages, lambda: _both_sides(robot))
 
 

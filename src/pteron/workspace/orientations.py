@@ -38,7 +38,7 @@ class VolumesOverAngles:
     unit: str
 
 
-def over_angles(
+def volumes_over_angles(
     robot: RobotLike,
     pose: PoseLike,
     angles: ArrayLike,

@@ -93,7 +93,7 @@ class TiltedBall:
         least = np.maximum(np.maximum(low[:, self.angles], -high[:, self.angles]), 0.0)
         return np.asarray(far | (np.cos(least).prod(axis=-1) < math.cos(self.tilt) - 1e-12))
 
-    def sampled(self) -> Array:
+    def sample_poses(self) -> Array:
         """Return poses (K, m) spread over it, a third of them on its rim."""
         free = len(self.lengths) + 2
         shares = _sobol_points(free)
@@ -279,9 +279,9 @@ def _largest_region(
         radius, tilt = sizes(size)
         return TiltedBall(tuple(reference.tolist()), radius, tilt, lengths, angles)
 
-    if not keeps(robot, required, region(0.0).sampled()).all():
+    if not keeps(robot, required, region(0.0).sample_poses()).all():
         raise ModelError(
-            f"not even the middle, pose {region(0.0).sampled()[-1].tolist()}, serves",
+            f"not even the middle, pose {region(0.0).sample_poses()[-1].tolist()}, serves",
             subject=robot.name,
         )
     shares = ((1.0 - tolerance) ** k for k in range(1, _SHARES + 1))
@@ -289,7 +289,7 @@ def _largest_region(
         robot,
         required,
         region,
-        lambda size: region(size).sampled(),
+        lambda size: region(size).sample_poses(),
         most,
         _HALVINGS,
         shares,

@@ -9,7 +9,7 @@ import numpy as np
 import scipy  # type: ignore[import-untyped]
 
 from pteron.design.choosing.rating import Case, Rating
-from pteron.kernels import Array, alike
+from pteron.kernels import Array, sharing_programs
 
 _POPULATION = 3
 """Size of the population, for each number that a design has."""
@@ -45,7 +45,7 @@ def search_kind(
             progress(len(ratings) / evaluations)
         return ratings[-1]
 
-    with alike(case.kind.like):
+    with sharing_programs(case.kind.like):
         for k, objective in enumerate(objectives):
             rng = np.random.default_rng((seed, k))
             end = evaluations * (k + 1) // len(objectives)
