@@ -80,8 +80,8 @@ _OF_ONE_MACHINE = (*_BY_CASES, "clearances", "least_clearances", "reactions", "b
 half a turn: a general program has those of one machine."""
 
 ALIKE: ContextVar[Manipulator | Literal[True] | None] = ContextVar("alike", default=None)
-"""The machine whose general programs are used for others of its topology, within `sharing_programs`;
-True: each machine's topology has its own."""
+"""The machine whose general programs are used for others of its topology, within
+`sharing_programs`; True: each machine's topology has its own."""
 
 Columns = tuple[tuple[int, ...], ...]
 """For each column of a base regressor, the inertial parameters whose columns it adds up."""

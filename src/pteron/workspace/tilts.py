@@ -19,6 +19,7 @@ from pteron.kernels import Array
 from pteron.kernels.program_cache import cached_result
 from pteron.kinematics.evaluate import finite_pose
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.renamed import former_attribute
 from pteron.shapes import PoseLike
 from pteron.workspace.conditions import Condition, conditions, keeps
 from pteron.workspace.largest_proved import largest_proved
@@ -92,6 +93,8 @@ class TiltedBall:
         far = np.linalg.norm(nearest, axis=-1) > self.radius + slack
         least = np.maximum(np.maximum(low[:, self.angles], -high[:, self.angles]), 0.0)
         return np.asarray(far | (np.cos(least).prod(axis=-1) < math.cos(self.tilt) - 1e-12))
+
+    sampled = former_attribute("sampled", "sample_poses")
 
     def sample_poses(self) -> Array:
         """Return poses (K, m) spread over it, a third of them on its rim."""
