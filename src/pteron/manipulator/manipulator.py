@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, fields, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any
 
@@ -19,6 +19,7 @@ from pteron.errors import ModelError
 from pteron.legs import LegKind
 from pteron.legs.protocol import breaches
 from pteron.manipulator.names import name_faults
+from pteron.manipulator.owner_data import OwnerData
 from pteron.manipulator.radii import Radii
 from pteron.manipulator.tool import Tool, tool_faults
 from pteron.platforms import Platform
@@ -59,6 +60,9 @@ class Manipulator:
         Tools that the platform can carry; `pteron.motion.with_tool` mounts one.
     home : tuple of float, optional
         The pose, m and rad, where the machine stands; `pteron.workspace.home_pose` finds one.
+    owner : mapping
+        Data of the machine's owner, such as a serial number: kept in its file, without effect, and
+        not compared.
 
     Raises
     ------
@@ -74,6 +78,7 @@ class Manipulator:
     radii: Radii | None = None
     tools: tuple[Tool, ...] = ()
     home: tuple[float, ...] | None = None
+    owner: Mapping[str, Any] = field(default_factory=OwnerData, compare=False, repr=False)
 
     def __hash__(self) -> int:
         """Hash once: the public functions look machines up at every call."""
@@ -81,7 +86,8 @@ class Manipulator:
 
     @cached_property
     def _hash(self) -> int:
-        return hash(tuple(getattr(self, field.name) for field in fields(self)))
+        compared = (part.name for part in fields(self) if part.compare)
+        return hash(tuple(getattr(self, name) for name in compared))
 
     def __getstate__(self) -> dict[str, Any]:
         # Texts hash differently in every process.
@@ -93,6 +99,7 @@ class Manipulator:
         legs = tuple(leg.under(self.platform.frame) for leg in legs)
         object.__setattr__(self, "legs", legs)
         object.__setattr__(self, "tools", tuple(self.tools))
+        object.__setattr__(self, "owner", OwnerData(self.owner))
         if self.home is not None:
             object.__setattr__(self, "home", tuple(float(coordinate) for coordinate in self.home))
         object.__setattr__(self, "platform", _with_held_points(self.platform, legs))
