@@ -19,11 +19,12 @@ from test_report import Reader, strict
 
 import pteron
 from pteron.cli import identify as command
-from pteron.cli.progress import TimeLeft, stages
+from pteron.cli.progress import TimeLeft, progress_bar
 from pteron.extras import install_command
 from pteron.identification import METHODS, write_log
 from pteron.identification.model import Passive
 from pteron.identification.signals import Derivatives
+from pteron.progress import Share
 
 FILES = ["identification.html", "identification.json"]
 
@@ -273,7 +274,8 @@ def test_each_stage_shows_a_bar(monkeypatch: pytest.MonkeyPatch):
     shown = run(line, FORCE_COLOR="1")
     assert shown.exit_code == 0
     assert "Reading" in shown.stderr
-    with stages("Working", 100) as tell:
-        for done_rows, total in ((40, 40), (80, 80), (30, 30), (100, 100), (100, 200)):
-            tell("Reading", done_rows, total)
-            tell("Filtering", done_rows, total)
+    assert "Looking for faults" in shown.stderr
+    with progress_bar("Working") as tell:
+        for share in (0.1, 0.5, 0.5, 1.0):
+            tell(Share(share, "Reading"))
+            tell(share)

@@ -23,6 +23,7 @@ from pteron.errors import DataError, ModelError
 from pteron.kernels import numeric
 from pteron.kinematics import random_poses
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.shapes import Seed
 from pteron.workspace import Box, Cylinder, home_pose, prove
 
 Array = NDArray[np.float64]
@@ -119,7 +120,7 @@ def plan(
     free: Sequence[str] | None = None,
     prior: Mapping[str, float] | None = None,
     criterion: Criterion = "D",
-    seed: int = 0,
+    seed: Seed = 0,
 ) -> Plan:
     """Choose the poses to measure for a calibration.
 

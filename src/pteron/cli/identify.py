@@ -8,7 +8,7 @@ from shutil import get_terminal_size
 from typing import TYPE_CHECKING, Any, Literal
 
 from pteron.cli.arguments import MachineArgument, load_robot, split_numbers
-from pteron.cli.progress import Times, spinner, stages
+from pteron.cli.progress import Times, progress_bar, spinner
 from pteron.cli.result import Result
 from pteron.cli.terminal import (
     GRADE_COLORS,
@@ -126,15 +126,14 @@ def identify(
     read = [*log, *(held_out or ()), *(path for path in (robot, description) if path)]
     sources = [path for path in read if Path(path).is_file()]
     model_path(out, machine.name, sources)
-    rows = sum(log.rows_estimate or 0 for log in (*fit, *check))
     folder = checked_folder(out)
-    with stages(f"Identifying {machine.name}", rows) as tell:
+    with progress_bar(f"Identifying {machine.name}") as tell:
         times = Times(tell)
         model: dict[str, Any] = {"terms": terms, "shared": shared, "cad": drawn, "bounds": bounds}
         how: dict[str, Any] = {"estimator": estimator, "processing": processing}
         result = identified(machine, fit, held_out=check, **model, **how, progress=times)
     with spinner("Drawing the report"):
-        times("Drawing the report", 0, 0)
+        times.begin("Drawing the report")
         files = write_identification(result, folder, sources=sources)
     if is_terminal():
         note(times.summary())

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack
 from functools import lru_cache, partial
 from pathlib import Path
@@ -25,6 +25,7 @@ from pteron.maps.plan import RESULTS
 from pteron.maps.stores import MapStore, MemoryStore
 from pteron.maps.surfaces import ENDINGS as SURFACES
 from pteron.maps.sweep import cores, sweep
+from pteron.progress import Progress
 from pteron.shapes import Workers
 
 Engine = Literal["auto", "jax"]
@@ -46,7 +47,7 @@ def map_index(
     out: str | Path | None = None,
     scheduler: str | None = None,
     workers: Workers | None = None,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress | None = None,
 ) -> Map:
     """Return what indices of performance are over a grid of poses, and which of the poses serve.
 

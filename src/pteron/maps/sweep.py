@@ -22,6 +22,7 @@ from typing import Any, Protocol, TypeVar
 from pteron.errors import DataError, PteronError
 from pteron.extras import import_extra
 from pteron.maps.held_interrupts import held_interrupts
+from pteron.progress import Progress
 from pteron.shapes import Workers
 
 _Chunk = TypeVar("_Chunk")
@@ -62,7 +63,7 @@ def sweep(
     scheduler: str | None = None,
     workers: Workers | None = None,
     threads: Workers = 1,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress | None = None,
 ) -> int:
     """Compute the chunks that a store has not yet, and write what each gives to the store.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from matplotlib.figure import Figure
@@ -14,6 +14,7 @@ from pteron.plots.canvas import pixels
 from pteron.plots.film_encoders import ENCODERS, Pixels
 from pteron.plots.films import Film, checked_film, write_film
 from pteron.plots.index_maps import color_scale, map_panels
+from pteron.progress import Progress
 
 _FPS = 10.0
 """Frames a second where nothing else is asked."""
@@ -28,7 +29,7 @@ def map_film(
     path: str | Path,
     *,
     fps: float = _FPS,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress | None = None,
 ) -> Film:
     """Write a film that goes through the last coordinate of a map over three.
 

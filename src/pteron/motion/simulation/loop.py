@@ -34,9 +34,13 @@ from pteron.motion.simulation.stops import (
     why_not_further,
 )
 from pteron.motion.trajectories.limits import limits_of
+from pteron.progress import Progress
 
 _WHOLE = 1e-9
 """Part of a sample, from rounding, by which a delay of whole samples may miss them."""
+
+_BLOCK = 1000
+"""Samples after which a run returns from compiled code: some 10 ms, at most a second."""
 
 _ASKED, _MOVED = 1.0, 2.0
 """Fault codes of a run: no force command, or the state could not be integrated further."""
@@ -136,6 +140,7 @@ def run_simulation(
     timing: Timing,
     *,
     limits: bool,
+    progress: Progress | None = None,
 ) -> Simulation:
     """Simulate; `limits` says whether joints' limits and singularities of type II end it.
 
@@ -165,7 +170,7 @@ def run_simulation(
     ask, memories = None, [memory]
     if isinstance(source, ControlLaw) and law is None:
         ask = _callback(source, reference, n, memories)
-    _run_segments(simulator, arrays, outputs, loads, timing, times, counts, ask)
+    _run_segments(simulator, arrays, outputs, loads, timing, times, counts, ask, progress)
     end = int(arrays["done"].item())
     columns = _simulation_columns(robot, {name: array[0, :end] for name, array in outputs.items()})
     why = _fault_text(robot, arrays, columns["joints"], has_callback=ask is not None)
@@ -199,25 +204,32 @@ def _run_segments(
     times: list[float],
     counts: list[int],
     ask: Callable[[int, int, Array], Array] | None,
+    progress: Progress | None,
 ) -> None:
-    """Run the loop with the machine of each payload in turn; it fills `outputs`."""
+    """Run the loop with the machine of each payload in turn; it fills `outputs`.
+
+    It returns from compiled code after `_BLOCK` samples, for interrupts and progress.
+    """
     count = len(loads.masses)
     changes = np.flatnonzero(np.diff(loads.masses)) + 1
-    for first, stop in pairwise([0, *changes.tolist(), count]):
-        machine = loads.machines[float(loads.masses[first])]
-        inputs = arrays | machine_numbers(machine, simulator.plant, "plant") | outputs
-        inputs |= {
-            name: inputs[name][:, first:stop]
-            for name in (*outputs, "reference", "given", "noise", "wrench")
-            if inputs[name].shape[1] > 1
-        }
+    for start, end in pairwise([0, *changes.tolist(), count]):
+        machine = loads.machines[float(loads.masses[start])]
+        numbers = arrays | machine_numbers(machine, simulator.plant, "plant") | outputs
         advance_state = (
             AdaptivePlant(machine, timing.tolerance).go if timing.method == "dop853" else None
         )
-        call_counts = [*counts, first, int(stop == count)]
-        simulator.run(inputs, stop - first, times, call_counts, ask, go=advance_state)
-        if arrays["fault"].any():
-            return
+        for first, stop in pairwise([*range(start, end, _BLOCK), end]):
+            inputs = numbers | {
+                name: numbers[name][:, first:stop]
+                for name in (*outputs, "reference", "given", "noise", "wrench")
+                if numbers[name].shape[1] > 1
+            }
+            call_counts = [*counts, first, int(stop == count)]
+            simulator.run(inputs, stop - first, times, call_counts, ask, go=advance_state)
+            if arrays["fault"].any():
+                return
+            if progress is not None:
+                progress(stop / count)
 
 
 def _simulation_columns(robot: Manipulator, columns: dict[str, Array]) -> dict[str, Array]:
