@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from importlib import import_module
-from typing import Any, Literal
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
 
 from pteron.cli.arguments import MachineArgument
 from pteron.cli.motion_argument import Carried
@@ -11,6 +12,9 @@ from pteron.cli.progress import spinner
 from pteron.cli.result import Result
 from pteron.cli.terminal import note
 from pteron.errors import DataError
+
+if TYPE_CHECKING:
+    from pteron.manipulator import Manipulator
 
 _TRUSTED = "trustworthy"
 """The verdict on an identified model with which its export needs no warning."""
@@ -40,6 +44,7 @@ def export(
     marlin: str | None = None,
     reprap: str | None = None,
     linuxcnc: str | None = None,
+    target: str | None = None,
     function: list[str] | None = None,
     float_: bool = False,
     specialised: bool = False,
@@ -74,6 +79,7 @@ def export(
     --marlin DIR: Write M665 and M666 of a linear Delta for Marlin.
     --reprap DIR: Write M665 and M666 of a linear Delta for RepRapFirmware.
     --linuxcnc DIR: Write kinematics for LinuxCNC.
+    --target NAME=DIR: Write with the export NAME of an installed package.
     --float: C: float instead of double.
     --specialised: C: fold the inertial parameters in.
     --wrench: Dynamics take a wrench on the platform too.
@@ -97,6 +103,8 @@ def export(
     """
     folders = (c, st, mjcf, sdf, urdf, pinocchio, casadi, fmu, klipper, marlin, reprap, linuxcnc)
     targets = {name: folder for name, folder in zip(_TARGETS, folders, strict=True) if folder}
+    if target is not None:
+        targets["target"] = target
     options: dict[str, object] = {"function": function, "float": float_, "gains": gains}
     options |= {"specialised": specialised, "wrench": wrench, "base": base}
     options |= {"output": output != "force"}
@@ -126,17 +134,29 @@ def export(
         if st is not None:
             files += export_st(machine, asked_for, st, wrench=wrench, output=output, base=base)
         for name, folder in targets.items():
-            if name not in ("c", "st"):
+            if name == "target":
+                files += _export_with_extension(machine, folder)
+            elif name not in ("c", "st"):
                 files += getattr(import_module("pteron.export"), f"export_{name}")(machine, folder)
     if grade != _TRUSTED:
         note(f"Warning: {base}: the verdict on these values is: {grade}")
     return Result({"robot": machine.name, "files": [str(path) for path in files]}, files=files)
 
 
+def _export_with_extension(machine: Manipulator, target: str) -> list[Path]:
+    """Return the files that an installed package's export writes; `target` is NAME=DIR."""
+    from pteron.export.installed import export_named
+
+    name, separator, folder = target.partition("=")
+    if not (name and separator and folder):
+        raise DataError(f"--target: {target!r} given, NAME=DIR expected, as in acme=controller")
+    return export_named(name)(machine, folder)
+
+
 def _check(targets: dict[str, str], options: list[str]) -> None:
     """Refuse no target, or several (but C with Structured Text), and options of another target."""
     if not targets:
-        names = ", ".join(f"--{name}" for name in _TARGETS)
+        names = ", ".join(f"--{name}" for name in (*_TARGETS, "target"))
         raise DataError(f"{names}: none given; say what to write, such as --c controller")
     others = [name for name in targets if name not in ("c", "st")]
     if others and len(targets) > 1:
