@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import tilting
+from command_line import run
 from mechanisms import CLIENTS, TILTED
 from scipy.optimize import root
 from scipy.spatial.transform import Rotation
-from test_cli import run
 
 import pteron
 from pteron.errors import ModelError, SingularPose, UnlikelyValue, UnreachablePose

@@ -13,9 +13,9 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import pytest
 import tomlkit
+from command_line import refused, run
 from mechanisms import CLIENTS
 from scipy.spatial.transform import Rotation
-from test_cli import refused, run
 
 import pteron
 from pteron.design import Job, choose_machine

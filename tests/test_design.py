@@ -15,8 +15,8 @@ import numpy as np
 import polars as pl
 import pytest
 import tomlkit
+from command_line import done, refused, run
 from mechanisms import CATALOG, CLIENTS
-from test_cli import done, refused, run
 from threadpoolctl import threadpool_limits
 
 import pteron

@@ -6,13 +6,13 @@ import sys
 
 import numpy as np
 import pytest
-from test_cli import refused, run
+from command_line import refused, run
 
 import pteron
 from pteron.export import export_named, export_names
 from pteron.indices import INDICES, Index, evaluate
 
-PACKAGE = '''
+PACKAGE = """
 import json
 from pteron.indices import Index
 
@@ -30,7 +30,7 @@ def write(robot, folder):
 
 def silent(robot, folder):
     return None
-'''
+"""
 ENTRY_POINTS = """
 [pteron.indices]
 height = acme_pteron:height

@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 import pytest
+from command_line import done, refused, run
 from logs_of_motions import log_of, motion
 from mechanisms import CATALOG, CLIENTS
-from test_cli import done, refused, run
 from test_report import Reader, strict
 
 import pteron
@@ -270,7 +270,7 @@ def test_each_stage_shows_a_bar(monkeypatch: pytest.MonkeyPatch):
     write_log(log("tripteron"), "fit.csv")
     line = "identify fit.csv --robot tripteron --out out"
     assert run(line, FORCE_COLOR="1").stderr == ""
-    monkeypatch.setattr("pteron.cli.progress.is_watched", lambda: True)
+    monkeypatch.setenv("TTY_INTERACTIVE", "1")
     shown = run(line, FORCE_COLOR="1")
     assert shown.exit_code == 0
     assert "Reading" in shown.stderr

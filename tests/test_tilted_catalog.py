@@ -5,8 +5,8 @@ import json
 import numpy as np
 import pytest
 import tilting
+from command_line import run
 from mechanisms import CLIENTS, TILTED, gated
-from test_cli import run
 
 import pteron
 from pteron.export.engines import tree

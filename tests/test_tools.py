@@ -8,9 +8,9 @@ from zipfile import ZipFile
 import numpy as np
 import polars as pl
 import pytest
+from command_line import done, refused
 from mechanisms import CLIENTS
 from scipy.spatial.transform import Rotation
-from test_cli import done, refused
 from test_export import compiled, states
 
 import pteron

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from time import perf_counter
 from typing import TYPE_CHECKING
 
-from pteron.cli.terminal import plain
+from pteron.cli.terminal import is_interactive, plain
 
 if TYPE_CHECKING:
     from rich import progress as rich_progress
@@ -29,19 +28,10 @@ _RECENT = 60.0
 """Time that a rate is taken over at least, s."""
 
 
-def is_watched() -> bool:
-    """Say whether a person watches standard error.
-
-    Rich takes FORCE_COLOR for one, which Jupyter and build servers set: colours are meant, not
-    pictures that move.
-    """
-    return sys.stderr.isatty()
-
-
 @contextmanager
 def spinner(task: str) -> Iterator[None]:
     """Show a person that work of unknown length goes on."""
-    if not is_watched():
+    if not is_interactive():
         yield
         return
     from rich.console import Console
@@ -140,7 +130,7 @@ def _bar(estimate: TimeLeft) -> rich_progress.Progress:
         progress.TaskProgressColumn(),
         Left(),
         console=Console(stderr=True),
-        disable=not is_watched(),
+        disable=not is_interactive(),
         transient=True,
     )
 
