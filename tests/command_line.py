@@ -48,4 +48,9 @@ def read(line: str, stdin: str | None = None, **env: str) -> str:
     """Return what a person reads on a terminal, without colours and bold letters."""
     result = run(line, stdin, **env, TTY_COMPATIBLE="1")
     assert result.exit_code == 0, result.output
-    return re.sub(r"\x1b\[[0-9;]*m", "", result.stdout)
+    return without_styles(result.stdout)
+
+
+def without_styles(text: str) -> str:
+    """Return a terminal's text without colours and bold letters."""
+    return re.sub(r"\x1b\[[0-9;]*m", "", text)
