@@ -6,11 +6,17 @@ log that is identified lasts 20 s at 1 kHz, four periods of the motion that `pte
 encoders of 20 bits a turn, friction, bodies off by up to 20 %, 1 % of noise in the forces.
 `--before FOLDER` names an earlier checkout, whose commands take turns with these; names of commands
 choose some.
+
+`edits`: the waiting of a person who edits a number of a file and repeats a command, in CPU seconds:
+with an empty cache; the same again; with a number in the file that no earlier run has had. A C
+compiler that runs in the background counts. `analyses`: analyses of a 6-RSS with an empty cache,
+and the wall seconds until the first call of `progress`.
 """
 
 from __future__ import annotations
 
 import os
+import re
 import resource
 import subprocess
 import sys
@@ -52,6 +58,28 @@ _COMMANDS = {
 
 _QUICK = "start", "catalog", "check", "base"
 
+_EDITED = {
+    "check": ("check robot.toml", 1.1, 2.9),
+    "export": ("export robot.toml --c controller", 1.7, 5.0),
+    "report": ("report robot.toml --out report", 4.0, 8.0),
+    "base": ("base robot.toml", 0.8, 2.0),
+}
+"""The arguments of `pteron`, and the CPU seconds asked for after an edit, of each machine."""
+
+_MACHINES = "delta", "hexa"
+
+_ANALYSES = {"nearest_singularities": 60.0, "largest_tilt": 10.0, "largest_ball": 10.0}
+"""Functions of `pteron.workspace`, of a machine and its home pose; the CPU seconds asked for."""
+
+_ANALYSIS = """
+import sys, time, pteron
+from pteron.workspace import {name}, home_pose
+robot, calls = pteron.load("{machine}"), []
+home, begin = home_pose(robot), time.perf_counter()
+{name}(robot, home, progress=lambda share: calls.append(time.perf_counter() - begin))
+print(calls[0], len(calls))
+"""
+
 _COULOMB, _VISCOUS = np.array([4.0, 4.3, 4.6]), np.array([1.0, 1.1, 1.2])
 """Friction of the drives, N m and N m s."""
 
@@ -68,13 +96,26 @@ _NOISE = 0.01
 def main() -> None:
     """Print the medians of each command."""
     parser = ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("names", nargs="*", metavar="COMMAND", help=", ".join(_COMMANDS))
+    sections = {"edits": print_edits, "analyses": print_analyses}
+    names = ", ".join([*_COMMANDS, *sections])
+    parser.add_argument("names", nargs="*", metavar="COMMAND", help=names)
     parser.add_argument("--before", type=Path, help="an earlier checkout")
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--quick", action="store_true")
-    given = parser.parse_args()
-    states = [state for state in (given.before, _HERE.parent) if state]
-    names = given.names or (_QUICK if given.quick else _COMMANDS)
+    options = parser.parse_args()
+    states = [state for state in (options.before, _HERE.parent) if state]
+    selected = options.names or (_QUICK if options.quick else [*_COMMANDS, *sections])
+    rounds = 1 if options.quick else options.rounds
+    commands = [name for name in selected if name in _COMMANDS]
+    if commands:
+        print_commands(states, commands, rounds)
+    for name in sections.keys() & set(selected):
+        for state in states:
+            sections[name](state, rounds)
+
+
+def print_commands(states: list[Path], names: list[str], rounds: int) -> None:
+    """Print the median CPU and wall seconds of commands, of each state of the sources in turn."""
     print("| command | CPU (s) | wall (s) |" + " CPU now | wall now |" * (len(states) - 1), end="")
     print(" wall asked |\n|" + " --- |" + " ---: |" * (2 * len(states) + 1))
     with TemporaryDirectory() as folder:
@@ -85,15 +126,65 @@ def main() -> None:
         for name in names:
             for state in states if name != "demo" else ():
                 _seconds(state, name, root)
-            found = np.median(
+            medians = np.median(
                 [
                     [seconds for state in states for seconds in _seconds(state, name, root)]
-                    for _ in range(1 if given.quick else given.rounds)
+                    for _ in range(rounds)
                 ],
                 axis=0,
             )
-            told = " | ".join(f"{seconds:.2f}" for seconds in found)
-            print(f"| {name} | {told} | {_COMMANDS[name][0]:g} |", flush=True)
+            cells = " | ".join(f"{seconds:.2f}" for seconds in medians)
+            print(f"| {name} | {cells} | {_COMMANDS[name][0]:g} |", flush=True)
+
+
+def print_edits(state: Path, rounds: int) -> None:
+    """Print the CPU seconds of commands after an edit, by median, and those asked for."""
+    print("| command | machine | empty cache | asked | again | after an edit | asked | factor |")
+    print("| --- | --- |" + " ---: |" * 6)
+    for k, machine in enumerate(_MACHINES):
+        for name, (command, *limits) in _EDITED.items():
+            with TemporaryDirectory() as folder:
+                cold, again, edited = _edit_seconds(state, command, machine, Path(folder), rounds)
+            cells = cold, 2.0 * limits[k], again, edited, limits[k], edited / again
+            row = " | ".join(f"{cell:.2f}" for cell in cells)
+            print(f"| {name} | {machine} | {row} |", flush=True)
+
+
+def _edit_seconds(
+    state: Path, command: str, machine: str, folder: Path, rounds: int
+) -> tuple[float, float, float]:
+    """Return a command's CPU seconds with an empty cache, and medians again and after an edit."""
+    robot = folder / "robot.toml"
+    pteron.save(pteron.load(machine), robot)
+
+    def run() -> float:
+        return _run(["-m", "pteron", *command.split()], state, folder / "cache", folder)[0]
+
+    cold, _ = run(), run()  # a second run compiles what the first one only began to need
+    again = [run() for _ in range(rounds)]
+    edited = []
+    for _ in range(rounds):
+        text = re.sub(
+            r"(?<=lower_length = )[\d.]+",
+            lambda number: f"{1.001 * float(number[0]):.6f}",
+            robot.read_text(),
+            count=1,
+        )
+        robot.write_text(text)
+        edited.append(run())
+    return cold, float(np.median(again)), float(np.median(edited))
+
+
+def print_analyses(state: Path, _: int) -> None:
+    """Print the CPU seconds of analyses with an empty cache, and when they report progress."""
+    print("| analysis of a hexa | CPU (s) | asked | first progress (s) | reports |")
+    print("| --- |" + " ---: |" * 4)
+    for name, limit in _ANALYSES.items():
+        with TemporaryDirectory() as folder:
+            code = _ANALYSIS.format(name=name, machine=_MACHINES[1])
+            cpu, _wall, output = _run(["-c", code], state, Path(folder) / "cache", Path(folder))
+        first, count = output.split()
+        print(f"| {name} | {cpu:.1f} | {limit:g} | {float(first):.2f} | {count} |", flush=True)
 
 
 def record(motion: Path, log: Path) -> None:
@@ -119,13 +210,25 @@ def _seconds(state: Path, name: str, root: Path) -> tuple[float, float]:
     """Return CPU and wall seconds of a command of a state of the sources."""
     with TemporaryDirectory(dir=root) as fresh:
         cache = Path(fresh) if name == "demo" else root / state.resolve().name
-        places = {"PTERON_CACHE": str(cache), "PYTHONPATH": str(state.resolve() / "src")}
-        run = [sys.executable, "-m", "pteron", *_COMMANDS[name][1].split()]
-        before, begin = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
-        subprocess.run(run, check=True, cwd=fresh, env=os.environ | places, capture_output=True)
-        wall, after = time.perf_counter() - begin, resource.getrusage(resource.RUSAGE_CHILDREN)
+        arguments = ["-m", "pteron", *_COMMANDS[name][1].split()]
+        return _run(arguments, state, cache, Path(fresh))[:2]
+
+
+def _run(arguments: list[str], state: Path, cache: Path, folder: Path) -> tuple[float, float, str]:
+    """Return CPU and wall seconds and the output of Python with a state of the sources."""
+    places = {"PTERON_CACHE": str(cache), "PYTHONPATH": str(state.resolve() / "src")}
+    before, begin = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
+    process = subprocess.run(
+        [sys.executable, *arguments],
+        check=True,
+        cwd=folder,
+        env=os.environ | places,
+        capture_output=True,
+        text=True,
+    )
+    wall, after = time.perf_counter() - begin, resource.getrusage(resource.RUSAGE_CHILDREN)
     cpu = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-    return cpu, wall
+    return cpu, wall, process.stdout
 
 
 if __name__ == "__main__":

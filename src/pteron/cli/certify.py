@@ -9,7 +9,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from pteron.cli.pose_ranges import box_of, pose_ranges, pose_spans, pose_text, span_text
-from pteron.cli.progress import spinner
+from pteron.cli.progress import progress_bar, spinner
 from pteron.cli.result import Result
 from pteron.cli.terminal import note, percent, plain, show, table, warn
 from pteron.errors import DataError, ModelError
@@ -92,8 +92,9 @@ class RequestedProofs:
 
         region = _region(robot, self.prove)
         warn(warnings)
-        with spinner(f"Proving a region for {robot.name}"):
-            proof = prove(robot, region, type_i=self.type_i or 0.0, type_ii=self.type_ii or 0.0)
+        type_i, type_ii = self.type_i or 0.0, self.type_ii or 0.0
+        with progress_bar(f"Proving a region for {robot.name}") as bar:
+            proof = prove(robot, region, type_i=type_i, type_ii=type_ii, progress=bar)
         lines = [f"[bold]{plain(robot.name)}[/bold]: {_spans(robot, region)}", plain(str(proof))]
         lines += self._unsure if proof.holds else []
         data = _proof(proof, self.floors) | {"warnings": warnings}
@@ -107,8 +108,9 @@ class RequestedProofs:
         from pteron.workspace import conditions, largest_tilt
 
         warn(warnings)
-        with spinner(f"Proving how far {robot.name} leans"):
-            leans = largest_tilt(robot, pose, given=conditions(robot, **self.floors))
+        required = conditions(robot, **self.floors)
+        with progress_bar(f"Proving how far {robot.name} leans") as bar:
+            leans = largest_tilt(robot, pose, given=required, progress=bar)
         data = {"robot": robot.name, "floors": self.floors, "tilt": leans.tilt}
         lines = [
             _heading(robot, dict(list(_angles(robot, pose).items())[2:]), self.floors),

@@ -153,6 +153,9 @@ _COMMANDS: dict[str, tuple[Callable[..., Result | None], ...]] = {
 _NUMERIC = (inverse, direct, forces, cycle)
 """Subcommands whose arguments may be negative numbers."""
 
+_GENERAL = (check, report, workspace, base, table1, export)
+"""Subcommands that one repeats after editing a number of a machine's file."""
+
 
 class Commands(Mapping[str, Any]):
     """The subcommands by their names, each made when it is asked for: most often one is."""
@@ -172,7 +175,7 @@ class Commands(Mapping[str, Any]):
             panel, function = self._panels[name]
             cls, command = (
                 NumbersCommand if function in _NUMERIC else Command,
-                parsed_command(function),
+                parsed_command(function, general=function in _GENERAL),
             )
             alone = Typer(add_completion=False, **_LOOKS)
             alone.command(cls=cls, rich_help_panel=panel, **help_of(command))(command)

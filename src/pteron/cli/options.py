@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import fields, is_dataclass
 from functools import wraps
 from inspect import Parameter, Signature, cleandoc, signature
@@ -58,12 +59,15 @@ _COMPLETION = {
 }
 
 
-def parsed_command(command: Callable[..., Result | None]) -> Callable[..., None]:
+def parsed_command(
+    command: Callable[..., Result | None], *, general: bool = False
+) -> Callable[..., None]:
     """Return a command as it is typed.
 
     Its `machine` is loaded from ROBOT in the working mode of --elbows, what it carries is read from
     --payload and --tool, and its result is printed for a person or, with --json, for a program.
-    A parameter whose type is a dataclass stands for an option for each of its fields.
+    A parameter whose type is a dataclass stands for an option for each of its fields. A `general`
+    command builds and compiles functions for a topology, not for a machine.
     """
     hints, arguments = get_type_hints(command), signature(command).parameters
     options: dict[str, Parameter] = {}
@@ -97,13 +101,20 @@ def parsed_command(command: Callable[..., Result | None]) -> Callable[..., None]
         if "machine" in arguments:
             quiet = "warns" in vars(command)  # the command tells the file's warnings itself
             passed["machine"] = load_robot(values["robot"], values["elbows"], quiet=quiet)
-        outcome = command(**passed)
-        if outcome is not None:
-            outcome.tell(as_json=values["json"])
+        with _alike() if general else nullcontext():
+            outcome = command(**passed)
+            if outcome is not None:
+                outcome.tell(as_json=values["json"])
 
     run.__dict__["__signature__"] = Signature(list(options.values()))
     run.__annotations__ = {name: option.annotation for name, option in options.items()}
     return run
+
+
+def _alike() -> AbstractContextManager[None]:
+    from pteron.kernels import alike
+
+    return alike()
 
 
 def _is_group(hint: Any) -> bool:

@@ -39,13 +39,22 @@ def passive_joints(machine: Machine, pose: Expression) -> list[list[Passive]]:
     """Return the passive joints that have limits: the platform's angles first, then every leg's."""
     state, platform = machine.state(pose), machine.robot.platform
     base_axes, platform_axes = ca.horzcat(*machine.platform.frame), state.platform.axes
-    radius = max(norm(leg.platform_point) for leg in machine.robot.legs) or 1.0
+    radius = _platform_radius(machine)
     angles = [
         Passive(name, "rad", pose[platform.coordinates.index(name)], *limits, radius)
         for name, limits in platform.angle_limits.items()
     ]
     pairs = zip(machine.robot.legs, state.legs, strict=True)
     return [angles, *(leg.passive(motion, base_axes, platform_axes) for leg, motion in pairs)]
+
+
+def _platform_radius(machine: Machine) -> Expression:
+    """Return the greatest distance of a platform point from P, m; 1 m where all are at P."""
+    points = [leg.platform_point for leg in machine.robot.legs]
+    if all(isinstance(component, float) for point in points for component in point):
+        return max(map(norm, points)) or 1.0
+    radius = ca.mmax(ca.vertcat(*(ca.norm_2(ca.vertcat(*point)) for point in points)))
+    return ca.if_else(radius > 0.0, radius, 1.0)
 
 
 def passive_margins(machine: Machine, pose: Expression) -> tuple[Expression, Expression]:

@@ -22,7 +22,7 @@ from pteron.kernels.graph import Graph, graph_of
 from pteron.kernels.interval_arithmetic import Interval, add, multiply, subtract
 from pteron.kernels.intervals import Enclosure, enclose_nodes, occurs_once
 from pteron.kernels.kernel import Array, Port, as_array
-from pteron.kernels.programs import program
+from pteron.kernels.programs import numeric_program
 from pteron.kernels.targets import FIXED
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 
@@ -121,7 +121,7 @@ def bounded(robot: RobotLike, what: str) -> Bounded:
 
 @lru_cache(maxsize=256)
 def _cached_bounded_function(robot: Manipulator, what: str) -> Bounded:
-    built = program(robot, what, plain=True)
+    built = numeric_program(robot, what, plain=True)
     names = [port.name for port in built.inputs]
     if "pose" not in names or set(names) - {"pose", *FIXED}:
         input_names = ", ".join(names)

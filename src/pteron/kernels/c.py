@@ -41,7 +41,7 @@ from pteron.kernels.compilers import compile_library, run
 from pteron.kernels.exponential import with_lowered_exponentials
 from pteron.kernels.graph import Graph, graph_of
 from pteron.kernels.kernel import SHARE, Array, ArrayKernel, Port
-from pteron.kernels.program_cache import cached_result
+from pteron.kernels.program_cache import cached_result, is_stored
 
 FLAGS = (
     *("-std=c99", "-O3", "-march=native", "-fno-math-errno", "-fPIC"),
@@ -160,9 +160,13 @@ class Code:
     @cached_property
     def source(self) -> str:
         """The C code, cached on disk: writing it takes 0.1 s and more."""
+        return cached_result(self._key, ("templates",), self._write_source)
+
+    @cached_property
+    def _key(self) -> tuple[Any, ...]:
         function, outputs = self._program
-        key = self.name, function.serialize(), self.ports, outputs, self.dtype, version("jinja2")
-        return cached_result(("c source", *key), ("templates",), self._write_source)
+        parts = self.name, function.serialize(), self.ports, outputs, self.dtype
+        return "c source", *parts, version("jinja2")
 
     def _write_source(self) -> str:
         function, outputs = self._program
@@ -183,7 +187,7 @@ class Code:
 
     def is_cached(self) -> bool:
         """Return whether the compiled code is on disk, ready to be loaded."""
-        return find(self._entry, _LIBRARY) is not None
+        return is_stored(self._key, ("templates",)) and find(self._entry, _LIBRARY) is not None
 
     @property
     def module(self) -> ModuleType:

@@ -18,7 +18,7 @@ from pteron.kernels.c import Code, compiler
 from pteron.kernels.compilers import end_all
 from pteron.kernels.kernel import Array, Kernel, slice_states
 from pteron.kernels.program_cache import Program, cached_program
-from pteron.kernels.programs import ALIKE, Columns, layout_of, program
+from pteron.kernels.programs import ALIKE, Columns, numeric_program
 from pteron.kernels.targets import FIXED, Selects, columns_of
 from pteron.kernels.vm import VirtualMachine
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
@@ -75,10 +75,12 @@ def numeric(
 
 @lru_cache(maxsize=512)
 def _cached_kernel(
-    robot: Manipulator, what: str, columns: Columns | None, wrench: bool, like: Manipulator | None
+    robot: Manipulator, what: str, columns: Columns | None, wrench: bool, like: object
 ) -> TieredKernel:
     kernel = kernel_with_status(robot, what, VirtualMachine, columns, wrench=wrench)
-    tier = _tier(layout_of(robot), what, columns, wrench, like is not None)
+    tier = _tier(numeric_program(robot, what, columns, wrench=wrench, guarded=True))
+    if like is not None:
+        tier.fetch(at_any_cost=False)
     return TieredKernel(kernel, tier)
 
 
@@ -91,7 +93,7 @@ def kernel_with_status(
     wrench: bool = False,
 ) -> Kernel:
     """Return a kernel whose last output is `status`: 1 where the others are valid, else 0."""
-    built = program(robot, what, columns, wrench=wrench, guarded=True)
+    built = numeric_program(robot, what, columns, wrench=wrench, guarded=True)
     fixed = {p.name: FIXED[p.name](robot) for p in built.inputs if p.name in FIXED}
     return kind(built.name, built.function, built.inputs, built.outputs, fixed)
 
@@ -104,11 +106,8 @@ def tiered_kernel(key: tuple[Any, ...], build: Callable[[], Program]) -> TieredK
 
 
 @lru_cache(maxsize=512)
-def _tier(
-    layout: Manipulator, what: str, columns: Columns | None, wrench: bool, general: bool
-) -> SharedCode:
-    """Return the code that machines of one layout share; if `general`, those of one topology."""
-    built = program(layout, what, columns, wrench=wrench, guarded=True)
+def _tier(built: Program) -> SharedCode:
+    """Return the code that all machines of a program share."""
     return _tier_of(Code(built.name, built.function, built.inputs, built.outputs))
 
 

@@ -12,7 +12,9 @@ import operator
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from fractions import Fraction
+from functools import lru_cache
 from math import isnan, isqrt
+from types import CodeType
 from typing import Any, Generic, Protocol, TypeVar
 
 import casadi as ca
@@ -109,6 +111,16 @@ class PrimeField:
         return root
 
 
+_SIGNS = {"add": "+", "sub": "-", "mul": "*"}
+"""Operations that Python has, followed by the remainder."""
+
+
+@lru_cache(maxsize=64)
+def _compile_function(lines: str) -> CodeType:
+    """Return the code of a function `compute` of a list e, of lines of its body."""
+    return compile(f"def compute(e):\n pass\n{lines}", "<evaluation>", "exec")
+
+
 class Evaluation(Generic[Element]):
     """A function in a field, for many states: nodes of its first inputs alone are precomputed.
 
@@ -128,12 +140,12 @@ class Evaluation(Generic[Element]):
         field: Field[Element],
         fixed: Sequence[Sequence[Element]] = (),
     ) -> None:
-        graph = graph_of(function)
+        self._graph = graph = graph_of(function)
         self._outputs = graph.outputs
         self._known: list[Any] = [None] * len(graph.nodes)
         self._inputs: list[tuple[int, int, int]] = []
         self._steps: dict[int, tuple[Callable[..., Element], tuple[int, ...]]] = {}
-        operations = _operations(field)
+        operations, self._field = _operations(field), field
         moving: set[int] = set()
         for k, node in enumerate(graph.nodes):
             if node.operation == CONSTANT:
@@ -159,7 +171,8 @@ class Evaluation(Generic[Element]):
                         continue
                 moving.add(k)
                 self._steps[k] = step
-        self._steps_by_element: list[list[int]] | None = None
+        self._operations = operations
+        self._codes: list[Callable[[list[Element]], None]] | None = None
 
     def __call__(self, *inputs: Sequence[Element]) -> list[list[Element]]:
         """Return the outputs at a state, the other inputs given; nonzeros by columns.
@@ -177,13 +190,30 @@ class Evaluation(Generic[Element]):
 
     def elements(self, *inputs: Sequence[Element]) -> Iterator[Element]:
         """Yield the outputs element by element, lazily."""
-        if self._steps_by_element is None:
-            self._steps_by_element = self._separate_steps()
+        if self._codes is None:
+            self._codes = [self._code_of(steps) for steps in self._separate_steps()]
         known = self._initial_elements(inputs)
         output_nodes = (k for nodes in self._outputs for k in nodes)
-        for k, steps in zip(output_nodes, self._steps_by_element, strict=True):
-            self._compute_steps(known, steps)
+        for k, compute in zip(output_nodes, self._codes, strict=True):
+            compute(known)
             yield known[k]
+
+    def _code_of(self, steps: list[int]) -> Callable[[list[Element]], None]:
+        """Return what computes steps: Python code, four times as fast, modulo a prime."""
+        if not isinstance(self._field, PrimeField):
+            return lambda elements: self._compute_steps(elements, steps)
+        lines = []
+        for k in steps:
+            name, arguments = self._graph.nodes[k].operation, self._graph.nodes[k].arguments
+            parts = [f"e[{i}]" for i in arguments]
+            sign = _SIGNS.get(name)
+            text = f"({sign.join(parts)}) % p" if sign else f"{name}_({', '.join(parts)})"
+            lines.append(f" e[{k}] = {text}\n")
+        space: dict[str, Any] = {f"{name}_": rule for name, rule in self._operations.items()}
+        space["p"] = self._field.prime
+        exec(_compile_function("".join(lines)), space)
+        compute: Callable[[list[Element]], None] = space["compute"]
+        return compute
 
     def _initial_elements(self, inputs: Sequence[Sequence[Element]]) -> list[Element]:
         elements = self._known.copy()

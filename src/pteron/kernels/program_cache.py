@@ -121,6 +121,12 @@ def cached_result(
     return computed
 
 
+def is_stored(key: tuple[Any, ...], packages: tuple[str, ...]) -> bool:
+    """Return whether `cached_result` has the result of a key on disk."""
+    name = name_of(*key, sources=(*EQUATIONS, *packages))
+    return name is not None and cache.find_text(name) is not None
+
+
 def name_of(*key: Any, sources: tuple[str, ...] = EQUATIONS) -> str | None:
     """Return the name of a key's cached text, see `cache`; None for a foreign leg.
 

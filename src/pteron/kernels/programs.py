@@ -8,12 +8,13 @@ in exported code it is the other way round, 0 where it is valid.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import replace
 from functools import lru_cache, partial
-from typing import Any, NamedTuple
+from types import MappingProxyType
+from typing import Any, Literal, NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -24,6 +25,7 @@ from pteron.bodies.motion import Expression
 from pteron.equations import control, kinematics
 from pteron.equations.drives import Drives
 from pteron.equations.machine import Machine
+from pteron.equations.topology import stored_numbers, topology_of, with_stored_numbers
 from pteron.equations.transmissions import DriveKind, actuator_count
 from pteron.errors import ModelError
 from pteron.kernels.functions import (
@@ -66,11 +68,20 @@ _FORCES = ("inverse_dynamics", "drive_forces", "feed_forward")
 SELECTED = ("base_regressor", "adaptive", "adaptive_drives")
 """Functions that take a choice of base parameters, but not their values."""
 
-_SHARED = ("geometry", "gains", "parameters", "base_parameters", "drives", "actuators")
+_SHARED = ("geometry", "stored", "gains", "parameters", "base_parameters", "drives", "actuators")
 """Inputs of which one value serves a whole batch."""
 
-ALIKE: ContextVar[Manipulator | None] = ContextVar("alike", default=None)
-"""The machine whose general programs are used for others of its topology, within `alike`."""
+_BY_CASES = ("constraint", "passive_friction")
+"""Functions whose equations are others where numbers, such as couples along an axis, are zero: they
+have no general program."""
+
+_OF_ONE_MACHINE = (*_BY_CASES, "clearances", "least_clearances", "reactions", "beams", "room")
+"""Functions whose equations depend on a machine's stored numbers, such as which limits are beyond
+half a turn: a general program has those of one machine."""
+
+ALIKE: ContextVar[Manipulator | Literal[True] | None] = ContextVar("alike", default=None)
+"""The machine whose general programs are used for others of its topology, within `alike`; True:
+each machine's topology has its own."""
 
 Columns = tuple[tuple[int, ...], ...]
 """For each column of a base regressor, the inertial parameters whose columns it adds up."""
@@ -109,18 +120,34 @@ def program(
         raise ModelError(f"base: {what!r} has no use for it; it goes with {useful}")
     if what not in LOADED and wrench:
         raise ModelError(f"wrench: {what!r} has no use for it; it goes with {', '.join(LOADED)}")
-    like = ALIKE.get()
-    if like is not None and columns is None:
-        return _general(like, _Form(what, wrench, guarded, plain=True))
     return _cached_program(bare(robot), _Form(what, wrench, guarded, plain, named), columns)
 
 
+def numeric_program(
+    robot: RobotLike,
+    what: str,
+    columns: Columns | None = None,
+    *,
+    wrench: bool = False,
+    guarded: bool = False,
+    plain: bool = False,
+) -> Program:
+    """Return the program with which numbers are computed: `program`, general within `alike`."""
+    like = ALIKE.get()
+    own = _OF_ONE_MACHINE if like is True else _BY_CASES
+    if like is None or columns is not None or what in own:
+        plain = plain or like is not None
+        return program(robot, what, columns, wrench=wrench, guarded=guarded, plain=plain)
+    return _general(layout_of(robot), _Form(what, wrench, guarded, plain=True))
+
+
 @contextmanager
-def alike(robot: RobotLike) -> Iterator[None]:
+def alike(robot: RobotLike | None = None) -> Iterator[None]:
     """Make the public functions fast for many machines of one topology, each used a few times.
 
     In this context they evaluate programs whose geometry is an input, so that nothing is built for
-    a machine that differs from `robot` in its numbers alone. Results are the same but for rounding.
+    a machine that differs from `robot` in its numbers alone, nor, without a `robot`, for any whose
+    topology has been used before, in another process too. Results are the same but for rounding.
 
     Examples
     --------
@@ -134,7 +161,7 @@ def alike(robot: RobotLike) -> Iterator[None]:
     [0.183 0.183 0.183]
     [0.006 0.006 0.006]
     """
-    token = ALIKE.set(bare(robot))
+    token = ALIKE.set(True if robot is None else bare(robot))
     try:
         yield
     finally:
@@ -143,7 +170,8 @@ def alike(robot: RobotLike) -> Iterator[None]:
 
 def layout_of(robot: RobotLike) -> Manipulator:
     """Return the machine whose geometry programs have: the machine itself, or that of `alike`."""
-    return ALIKE.get() or bare(robot)
+    like = ALIKE.get()
+    return like if isinstance(like, Manipulator) else bare(robot)
 
 
 def specialised(given: Program, values: dict[str, NDArray[np.float64]]) -> Program:
@@ -238,9 +266,12 @@ def _motion(robot: Manipulator, kind: DriveKind, general: bool) -> Program:
     extra |= {"brake": ca.SX.sym("brake")} if kind.dry else {}
     extra |= {"pace": ca.SX.sym("pace")} if any(kind.lugre) else {}
     extra["actuators"] = ca.SX.sym("actuators", actuator_count(kind))
-    machine, vector = Machine.symbolic(robot) if general else (Machine.numeric(robot), None)
     form = _Form("driven_motion", wrench=True, guarded=True)
-    return _program(machine, vector, form=form, constants={"kind": kind}, extra=extra)
+    machine, vectors = Machine.numeric(robot), {}
+    if general:
+        machine, geometry = Machine.symbolic(robot)
+        vectors = {"geometry": geometry}
+    return _program(machine, vectors, form=form, constants={"kind": kind}, extra=extra)
 
 
 def general_program(robot: RobotLike, what: str) -> Program:
@@ -251,27 +282,47 @@ def general_program(robot: RobotLike, what: str) -> Program:
     return _general(layout_of(robot), _Form(what, plain=True))
 
 
-@lru_cache(maxsize=256)
 def _general(robot: Manipulator, form: _Form) -> Program:
-    # The form is plain: exact arithmetic evaluates the equations as they are written.
-    return cached_program(
-        ("general", robot, form), lambda: _program(*Machine.symbolic(robot), form=form)
-    )
+    layout = robot if form.what in _OF_ONE_MACHINE else topology_of(robot)
+    return _cached_general(layout, form)
+
+
+@lru_cache(maxsize=256)
+def _cached_general(layout: Manipulator, form: _Form) -> Program:
+    return cached_program(("general", layout, form), partial(_build_general, layout, form))
+
+
+def _build_general(layout: Manipulator, form: _Form) -> Program:
+    """Return the program of a topology, or of a machine if its numbers decide between cases.
+
+    The form is plain: exact arithmetic evaluates the equations as they are written.
+    """
+    machine, geometry = Machine.symbolic(layout)
+    vectors = {"geometry": geometry}
+    if form.what not in _OF_ONE_MACHINE:
+        vectors["stored"] = ca.SX.sym("stored", len(stored_numbers(layout)))
+        symbols = iter(ca.vertsplit(vectors["stored"]))
+        machine = replace(machine, robot=with_stored_numbers(layout, symbols))
+    return _program(machine, vectors, form=form)
 
 
 def _program(
     machine: Machine,
-    vector: Expression | None = None,
+    vectors: Mapping[str, Expression] = MappingProxyType({}),
     constants: Symbols | None = None,
     extra: dict[str, Expression] | None = None,
     *,
     form: _Form,
 ) -> Program:
-    """Return a function of the table; `constants` stand for inputs, `extra` are more inputs."""
+    """Return a function of the table; `constants` stand for inputs, `extra` are more inputs.
+
+    `vectors` are the machine's numbers, as symbols: those that the results depend on, and the
+    geometry, become inputs.
+    """
     what, definition = form.what, TABLE[form.what]
     symbols = _input_symbols(machine, form, constants or {}, extra or {})
     known = symbols | (constants or {})
-    if what in _FORCES and not form.named and vector is None:
+    if what in _FORCES and not form.named and not vectors:
         seen = machine.move_to_platform_frame(symbols["pose"])
         if seen is not None:
             machine, axes = seen
@@ -284,8 +335,9 @@ def _program(
         results = [expression for expression, _ in forms[0].values()]
         statuses = _statuses(machine, definition, symbols, results)
         forms = [{**forms[0], "status": (status, ())} for status in statuses]
-    if vector is not None:
-        symbols = {"geometry": vector, **symbols}
+    everything = ca.veccat(*(expression for expression, _ in forms[0].values()))
+    used = [n for n, v in vectors.items() if n == "geometry" or ca.depends_on(everything, v)]
+    symbols = {name: vectors[name] for name in used} | symbols
     # A matrix goes out transposed: CasADi stores columns, NumPy rows.
     dense = (
         [ca.densify(expression).T for expression, _ in candidate.values()] for candidate in forms

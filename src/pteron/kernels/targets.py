@@ -11,6 +11,7 @@ import numpy as np
 
 from pteron.equations.drives import drive_numbers
 from pteron.equations.machine import numbers
+from pteron.equations.topology import stored_numbers
 from pteron.equations.transmissions import actuator_numbers
 from pteron.errors import ModelError
 from pteron.kernels.c import Compiled
@@ -21,7 +22,7 @@ from pteron.kernels.jax import Traced
 from pteron.kernels.kernel import Array, Kernel
 from pteron.kernels.numba import Jitted
 from pteron.kernels.program_cache import Program
-from pteron.kernels.programs import Columns, general_program, program, specialised
+from pteron.kernels.programs import Columns, bare, general_program, program, specialised
 from pteron.kernels.vm import VirtualMachine
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator, parameters
 
@@ -44,6 +45,7 @@ FIXED: dict[str, Callable[[Manipulator], Array]] = {
     "drives": drive_numbers,
     "actuators": actuator_numbers,
     "geometry": lambda robot: np.array(numbers(robot)),
+    "stored": lambda robot: np.array(stored_numbers(bare(robot))),
 }
 """The inputs that have a machine's own values unless a call gives others."""
 
@@ -201,7 +203,8 @@ def _cached_kernel(
         if wrench:
             raise ModelError('wrench: not with grade "general"; use "specialised" or "parametric"')
         built = general_program(robot, what)
-        fixed["geometry"] = np.array(numbers(robot))
+        own = {port.name for port in built.inputs} & {"geometry", "stored"}
+        fixed |= {name: FIXED[name](robot) for name in own}
     for array in fixed.values():
         array.setflags(write=False)  # the kernel is shared by all who ask for it
     kernel = _instantiate_kernel(TARGETS[target], built, fixed, dtype, threads)

@@ -21,6 +21,7 @@ from pteron.bodies.motion import Expression
 from pteron.kernels.exponential import with_lowered_exponentials
 from pteron.kernels.graph import INPUT, Graph, Node, expression, graph_of, rewrite_operations
 from pteron.kernels.kernel import Array, ArrayKernel, Port, as_array
+from pteron.kernels.program_cache import cached_result
 from pteron.kernels.sincos import LIMIT, reduced_sincos
 
 LENGTH = 1024
@@ -170,7 +171,7 @@ class VirtualMachine(ArrayKernel):
 
     @cached_property
     def _lowered_function(self) -> ca.Function:
-        return _with_lowered_sines(with_lowered_exponentials(self.function))
+        return _lower(self.function)
 
     @cached_property
     def _thread_memory(self) -> threading.local:
@@ -236,6 +237,16 @@ class OneState:
 
 
 @lru_cache(maxsize=256)
+def _lower(function: ca.Function) -> ca.Function:
+    """Return a function in plain arithmetic, from disk if it is there: rewriting takes 10 ms."""
+
+    def rewrite() -> str:
+        lowered: str = _with_lowered_sines(with_lowered_exponentials(function)).serialize()
+        return lowered
+
+    return ca.Function.deserialize(cached_result(("lowered", function.serialize()), (), rewrite))
+
+
 def _with_lowered_sines(function: ca.Function) -> ca.Function:
     """Return the function with the sines and cosines of `sincos`."""
     rules = {"sin": partial(_sine_or_cosine, 0, ca.sin), "cos": partial(_sine_or_cosine, 1, ca.cos)}

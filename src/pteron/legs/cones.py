@@ -52,7 +52,7 @@ def cone_limit(
     """
     if cone is None:
         return []
-    angle = angle_between(ca.mtimes(socket, ca.SX(list(cone.axis))), rod)
+    angle = angle_between(ca.mtimes(socket, ca.SX(ca.vertcat(*cone.axis))), rod)
     # The angle has no lower limit: one below zero is never reached.
     return [Passive(noun, "rad", angle, -cone.angle, cone.angle, length, True)]
 

@@ -56,8 +56,8 @@ class PRR(SlideLeg):
 
     def passive(self, motion: LegMotion, still: Expression, turned: Expression) -> list[Passive]:
         # The branch keeps the link ahead of the slider along sigma e.
-        ahead, link = self.elbow * ca.SX(list(self.slider_direction)), motion.links[1]
-        sideways = ca.cross(ca.SX(list(self.plane_normal)), ahead)
+        ahead, link = self.elbow * ca.SX(ca.vertcat(*self.slider_direction)), motion.links[1]
+        sideways = ca.cross(ca.SX(ca.vertcat(*self.plane_normal)), ahead)
         angle = ca.atan2(ca.dot(link, sideways), ca.dot(link, ahead))
         return joint_limit("link", "rad", angle, self.elbow_limits, self.lower_length)
 

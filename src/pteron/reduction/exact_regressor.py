@@ -14,9 +14,11 @@ from functools import lru_cache
 from typing import Any, NamedTuple, TypeVar
 
 from pteron.equations.machine import number_places
+from pteron.equations.topology import topology_of
 from pteron.kernels import NoSquareRoot, PrimeField, RationalField, evaluate, general_program
 from pteron.kernels.fields import Evaluation
 from pteron.kernels.graph import graph_of
+from pteron.kernels.program_cache import cached_result
 from pteron.legs.circles import random_fraction
 from pteron.manipulator import Manipulator, parameter_data
 from pteron.reduction.exact_geometry import ExactGeometry
@@ -197,6 +199,11 @@ def degree_bound(topology: Manipulator) -> int:
     The variables are the pose (angles by the tangents of their halves), velocity and acceleration;
     the geometry is constant.
     """
+    key = "degree bound", topology_of(topology)
+    return cached_result(key, ("reduction",), lambda: _degree_bound(topology))
+
+
+def _degree_bound(topology: Manipulator) -> int:
     program = general_program(topology, "regressor").function
     field = _DegreeField()
     constants = [field.number(Fraction(0))] * program.size1_in(0)

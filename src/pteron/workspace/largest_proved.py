@@ -5,6 +5,7 @@ Its size is found by samples of its poses, and then made smaller until a proof h
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterable
 
 from pteron.kernels import Array
@@ -23,20 +24,29 @@ def largest_proved(
     most: float,
     halvings: int,
     shares: Iterable[float],
+    report: Callable[[float], None] = lambda share: None,
 ) -> tuple[float, Proof]:
     """Return the size of the largest region that is proved to keep conditions, and its proof.
 
     `region` and `poses` return the region of a size and poses (K, m) of it. The size is sought up
     to `most` by bisection, and the proof with these shares of it, the largest first. The proof does
-    not hold where none does.
+    not hold where none does. `report` is called with the share of the work that is done: half of it
+    is the bisection.
     """
-    size = float(
-        bisect_condition(
-            lambda size: keeps(robot, required, poses(size)).all(), 0.0, most, halvings
-        )[0]
-    )
+    halved = itertools.count(1)
+
+    def keeps_all(size: float) -> bool:
+        report(0.5 * next(halved) / halvings)
+        return bool(keeps(robot, required, poses(size)).all())
+
+    size = float(bisect_condition(keeps_all, 0.0, most, halvings)[0])
     for share in shares:
-        proof = prove(robot, region(share * size), given=required)
+        proof = prove(
+            robot,
+            region(share * size),
+            given=required,
+            progress=lambda decided: report(0.5 + 0.5 * decided),
+        )
         if proof.holds:
             break
     return share * size, proof

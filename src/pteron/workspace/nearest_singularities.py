@@ -7,7 +7,7 @@ sought in all of the reach, under rotation in a whole turn; intervals prove how 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Literal
 
@@ -75,7 +75,11 @@ class NearestSingularity:
 
 
 def nearest_singularities(
-    robot: RobotLike, pose: PoseLike, *, most: int = _MOST
+    robot: RobotLike,
+    pose: PoseLike,
+    *,
+    most: int = _MOST,
+    progress: Callable[[float], None] | None = None,
 ) -> tuple[NearestSingularity, ...]:
     """Return the nearest singular poses of each kind, by translation and by rotation alone.
 
@@ -92,6 +96,9 @@ def nearest_singularities(
     most : int
         Boxes after which the search for each is given up; what is proved until then is its
         `lower_bound`. It ends before where that is 0.5 % below the distance.
+    progress : callable, optional
+        Called with the share of the work that is done, 0 to 1: at once, and after every batch of
+        boxes.
 
     Returns
     -------
@@ -120,28 +127,32 @@ def nearest_singularities(
     >>> all(0.99 * one.distance < one.lower_bound <= one.distance for one in found)
     True
     """
+    report = progress or (lambda share: None)
+    report(0.0)
     robot = as_manipulator(robot)
     reference = finite_pose(robot, pose, "pose")
     expect(most >= 1, "most", most, "1 box at least")
     expect_regular(robot)
     inverse_kinematics(robot, reference)
-    singularities: list[NearestSingularity] = []
-    kinds: dict[By, tuple[str, ...]] = {
-        "translation": robot.platform.lengths,
-        "rotation": robot.platform.angles,
-    }
-    for by in (by for by, moving in kinds.items() if moving):
-        by_kind = [
-            _singularity_of(
-                robot, reference, by, vanishing, _search(vanishing, reference, by, most)
-            )
-            for vanishing in _kinds(robot)
-        ]
-        existing = [singularity for singularity in by_kind if np.isfinite(singularity.lower_bound)]
-        singularities += sorted(
-            existing, key=lambda singularity: (singularity.distance, singularity.lower_bound)
-        )
-    return tuple(singularities)
+    functions = list(_kinds(robot))
+    searches: list[tuple[By, Vanishing]] = []
+    if robot.platform.lengths:
+        searches += [("translation", vanishing) for vanishing in functions]
+    if robot.platform.angles:
+        searches += [("rotation", vanishing) for vanishing in functions]
+    singularities = []
+    for k, (by, vanishing) in enumerate(searches):
+
+        def report_share(share: float, done: int = k) -> None:
+            report((done + share) / len(searches))
+
+        nearest = _search(vanishing, reference, by, most, report_share)
+        singularity = _singularity_of(robot, reference, by, vanishing, nearest)
+        if np.isfinite(singularity.lower_bound):
+            singularities.append(singularity)
+    return tuple(
+        sorted(singularities, key=lambda s: (s.by == "rotation", s.distance, s.lower_bound))
+    )
 
 
 def _kinds(robot: Manipulator) -> Iterator[Vanishing]:
@@ -170,7 +181,9 @@ def _varying_coordinates(robot: Manipulator, by: By) -> NDArray[np.intp]:
     return np.flatnonzero(robot.platform.angular == (by == "rotation"))
 
 
-def _search(vanishing: Vanishing, reference: Array, by: By, most: int) -> Nearest:
+def _search(
+    vanishing: Vanishing, reference: Array, by: By, most: int, report: Callable[[float], None]
+) -> Nearest:
     """Return the nearest pose at which a function vanishes, moved or turned alone."""
     robot, moving = vanishing.robot, _varying_coordinates(vanishing.robot, by)
     if by == "translation":
@@ -180,7 +193,7 @@ def _search(vanishing: Vanishing, reference: Array, by: By, most: int) -> Neares
             center, radius = search_ball(robot)
             horizon = float(np.linalg.norm(reference[moving] - center)) + radius
             box = reference[moving] + horizon * np.array([[-1.0], [1.0]])
-        return Search(vanishing, reference, moving, box).run(horizon, most)
+        return Search(vanishing, reference, moving, box, report).run(horizon, most)
     if vanishing.kind == "II" and closure_of(robot).orientation is not None:
         turns = singular_orientations(robot) - reference[moving]
         turns -= 2.0 * np.pi * np.round(turns / (2.0 * np.pi))
@@ -190,4 +203,4 @@ def _search(vanishing: Vanishing, reference: Array, by: By, most: int) -> Neares
         return Nearest(pose, 0.0, abs(turn) * (1.0 - SINGULAR))
     horizon = np.pi if robot.platform.slides else np.inf
     box = reference[moving] + np.pi * np.array([[-1.0], [1.0]])
-    return Search(vanishing, reference, moving, box).run(horizon, most)
+    return Search(vanishing, reference, moving, box, report).run(horizon, most)

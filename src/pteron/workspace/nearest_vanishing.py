@@ -10,6 +10,7 @@ them sequential quadratic programming leads to the nearest.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cached_property, lru_cache
 from typing import NamedTuple
 
@@ -83,12 +84,19 @@ class Nearest(NamedTuple):
 class Search:
     """A search about a pose, in some of its coordinates.
 
-    Coordinates `moving` (k,) of the pose vary, metres or angles, within a box (2, k).
+    Coordinates `moving` (k,) of the pose vary, metres or angles, within a box (2, k). `report` is
+    called with the share of the work that is done, after each batch of boxes.
     """
 
     def __init__(
-        self, vanishing: Vanishing, at: Array, moving: NDArray[np.intp], box: Array
+        self,
+        vanishing: Vanishing,
+        at: Array,
+        moving: NDArray[np.intp],
+        box: Array,
+        report: Callable[[float], None],
     ) -> None:
+        self._report = report
         self.vanishing, self.at, self.moving, self.box = vanishing, at, moving, box
         self.smooth = vanishing.smooth
         others = np.ones(len(at), bool)
@@ -111,6 +119,8 @@ class Search:
             boxes = np.concatenate([halve_boxes(batch), others])
             distances = self._distances(boxes)
             boxes, distances = boxes[distances < nearest], distances[distances < nearest]
+            proved = distances.min(initial=nearest) / ((1.0 - _CLOSE) * nearest)
+            self._report(min(max(examined / most, proved), 1.0))
         if len(boxes) and distances.min() < (1.0 - _CLOSE) * nearest:
             order = np.argsort(distances, kind="stable")
             last = np.concatenate([order[:_LAST], order[:: max(1, len(order) // _LAST)]])

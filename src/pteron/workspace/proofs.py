@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -115,6 +116,7 @@ def prove(
     type_ii: float = 0.0,
     given: tuple[Condition, ...] | None = None,
     most: int = 1_000_000,
+    progress: Callable[[float], None] | None = None,
 ) -> Proof:
     """Prove that every pose of a region keeps reach, limits and floors, or show one that does not.
 
@@ -135,6 +137,8 @@ def prove(
         Conditions in place of reach and limits; the floors come on top.
     most : int
         Undecided boxes at which it gives up.
+    progress : callable, optional
+        Called with the share of the region's volume that is decided, 0 to 1.
 
     Returns
     -------
@@ -184,6 +188,9 @@ def prove(
         boxes, open_bits = np.concatenate(parts), np.concatenate(open_parts)
         if not examined:
             raise DataError("region: it holds no pose, so that nothing can be proved of it")
+        sides = boxes[:, 1] - boxes[:, 0]
+        if progress is not None:
+            progress(1.0 - float(np.prod(sides / sizes + (sides == 0.0), axis=1).sum()))
         if not len(boxes):
             return Proof(True, robot, region, required, boxes=examined)
         counterexample = _find_counterexample(robot, test, region, boxes)
@@ -196,7 +203,6 @@ def prove(
             return Proof(
                 False, robot, region, required, counterexample, causes=failed, boxes=examined
             )
-        sides = boxes[:, 1] - boxes[:, 0]
         if 2 * len(boxes) > most or (sides <= least).all():
             smallest = int(np.prod(np.where(sides > 0.0, sides, 1.0), axis=1).argmin())
             causes = tuple(c for k, c in enumerate(required) if int(open_bits[smallest]) >> k & 1)

@@ -15,6 +15,7 @@ import numpy as np
 
 from pteron.kernels import TARGETS, Array, Kernel, Port, bare, general_program
 from pteron.kernels.c import compiler
+from pteron.kernels.targets import FIXED
 from pteron.manipulator import Manipulator
 from pteron.workspace.conditions import Condition, conditions
 
@@ -64,7 +65,9 @@ class SmoothConditions:
 
     def _output(self, robot: Manipulator, what: str, name: str) -> ca.SX:
         program = general_program(robot, what)
-        outputs = program.function.call([self._symbols[2], self._symbols[0]])
+        inputs = {"geometry": self._symbols[2], "pose": self._symbols[0]}
+        inputs["stored"] = ca.SX(ca.DM(FIXED["stored"](robot)))
+        outputs = program.function.call([inputs[port.name] for port in program.inputs])
         return ca.vec(ca.densify(outputs[[port.name for port in program.outputs].index(name)]))
 
     def rows(self, geometry: Array, poses: Array, side: float) -> Array:

@@ -142,6 +142,7 @@ def largest_tilt(
     radius: float = 0.0,
     tolerance: float = 5e-3,
     given: tuple[Condition, ...] | None = None,
+    progress: Callable[[float], None] | None = None,
 ) -> LargestTilt:
     """Return the largest tilt to every side at a place that is proved to lie in the workspace.
 
@@ -157,6 +158,8 @@ def largest_tilt(
         By which share it may be smaller than the one that sampling found, so that it is proved.
     given : tuple of Condition, optional
         The conditions on a pose; by default `conditions(robot)`: reach and limits.
+    progress : callable, optional
+        Called with the share of the work that is done, 0 to 1: at once, and after each step.
 
     Returns
     -------
@@ -169,8 +172,14 @@ def largest_tilt(
     ModelError
         If the platform does not tilt by two angles, or the level pose does not serve.
     """
+    report = progress or (lambda share: None)
+    report(0.0)
     robot, reference = _expect_tilting(robot, pose)
-    return _largest_region(robot, reference, _MOST, tolerance, given, lambda tilt: (radius, tilt))
+
+    def sizes(tilt: float) -> tuple[float, float]:
+        return radius, tilt
+
+    return _largest_region(robot, reference, _MOST, tolerance, given, sizes, report)
 
 
 def largest_ball(
@@ -180,6 +189,7 @@ def largest_ball(
     tilt: float = 0.0,
     tolerance: float = 5e-3,
     given: tuple[Condition, ...] | None = None,
+    progress: Callable[[float], None] | None = None,
 ) -> LargestTilt:
     """Return the largest ball of places at each of which every tilt up to a given one is reached.
 
@@ -191,7 +201,7 @@ def largest_ball(
         The ball's centre and the yaw, m and rad; its roll and pitch do not count.
     tilt : float
         The tilt that is reached to every side, rad.
-    tolerance, given
+    tolerance, given, progress
         As for `largest_tilt`.
 
     Returns
@@ -205,10 +215,16 @@ def largest_ball(
     ModelError
         If the platform does not tilt and move, or the centre does not serve at that tilt.
     """
+    report = progress or (lambda share: None)
+    report(0.0)
     robot, reference = _expect_tilting(robot, pose)
     expect_places(robot, "it only turns")
     reach = sum(leg.size for leg in robot.legs)
-    return _largest_region(robot, reference, reach, tolerance, given, lambda radius: (radius, tilt))
+
+    def sizes(radius: float) -> tuple[float, float]:
+        return radius, tilt
+
+    return _largest_region(robot, reference, reach, tolerance, given, sizes, report)
 
 
 def _expect_tilting(robot: RobotLike, pose: PoseLike) -> tuple[Manipulator, Array]:
@@ -235,6 +251,7 @@ def _largest_region(
     tolerance: float,
     own_conditions: tuple[Condition, ...] | None,
     sizes: Callable[[float], tuple[float, float]],
+    report: Callable[[float], None],
 ) -> LargestTilt:
     expect_share("tolerance", tolerance)
     required = conditions(robot) if own_conditions is None else own_conditions
@@ -253,7 +270,14 @@ def _largest_region(
         )
     shares = ((1.0 - tolerance) ** k for k in range(1, _SHARES + 1))
     size, proof = largest_proved(
-        robot, required, region, lambda size: region(size).sampled(), most, _HALVINGS, shares
+        robot,
+        required,
+        region,
+        lambda size: region(size).sampled(),
+        most,
+        _HALVINGS,
+        shares,
+        report,
     )
     if not proof.holds:
         raise ModelError(
