@@ -79,10 +79,6 @@ def constraint_measure(machine: Machine, state: State) -> Expression:
     if count < turns:
         return ca.SX(0)
     if count == turns:
-        return _determinant(rows)
-    volume = ca.fmax(_determinant(ca.mtimes(rows.T, rows)), 0)
+        return determinant(rows)
+    volume = ca.fmax(determinant(ca.mtimes(rows.T, rows)), 0)
     return ca.sqrt(volume) / (count / turns) ** (0.5 * turns)
-
-
-def _determinant(m: Expression) -> Expression:
-    return determinant(m) if m.shape[0] <= 4 else ca.det(m)
