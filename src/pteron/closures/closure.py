@@ -18,6 +18,7 @@ import casadi as ca
 
 from pteron.bodies.motion import Expression
 from pteron.closures.determinants import determinant, solve, solve_transposed
+from pteron.errors import ModelError
 from pteron.legs.leg import LegEquations, LegMotion, Plane, Turned
 from pteron.platforms.motion import PlatformEquations, PlatformMotion
 
@@ -29,6 +30,11 @@ class Closure(ABC):
     """The closure of one machine, for one state, from its legs and platform."""
 
     def __init__(self, legs: Sequence[LegEquations], platform: PlatformEquations) -> None:
+        if len(legs) != len(platform.coordinates):
+            raise ModelError(
+                f"legs: {len(legs)} given, {len(platform.coordinates)} expected, one for each "
+                f"coordinate of the platform: {', '.join(platform.coordinates)}"
+            )
         self.legs, self.platform = legs, platform
 
     @classmethod

@@ -13,6 +13,7 @@ import casadi as ca
 
 from pteron.bodies.motion import Expression
 from pteron.equations.machine import Machine, State
+from pteron.legs.leg import Needs
 
 
 def inverse_dynamics(
@@ -57,6 +58,8 @@ def needed_forces(
     platform = state.platform
     needs = [
         leg.needs(point, platform.rotation, machine.gravity, bodies)
+        if bodies
+        else Needs.zeros(parameters.shape[1])
         for leg, point, bodies in zip(machine.legs, platform.points, legs, strict=True)
     ]
     if carried:

@@ -138,6 +138,11 @@ class Needs(NamedTuple):
     mass: Expression
     """(1, K): a point mass at the platform point, which the platform's inertia includes."""
 
+    @classmethod
+    def zeros(cls, columns: int) -> Needs:
+        """Return the forces of a leg without bodies, such as a cable: none."""
+        return cls(ca.SX(1, columns), ca.SX(6, columns), ca.SX(1, columns))
+
 
 def force_wrench(force: Expression) -> Expression:
     """Return the wrench (6, K) of a force (3, K) on the platform point alone."""
@@ -285,6 +290,8 @@ class LegEquations(ABC):
         F_b is the wrench on a body of its weight and inertia; the required wrench is -F_b. Eq. (13)
         sums J_b^T F_b, J_b being the body's rows in (c', omega).
         """
+        if not inertia:
+            return Needs.zeros(1)
         motion = self.motion(point, rotation)
         columns = next(iter(inertia.values())).m.shape[1]
         total = ca.SX(6, columns)

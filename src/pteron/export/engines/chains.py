@@ -103,6 +103,12 @@ def _numbers_before_the_cut(robot: Manipulator, i: int, motion: LegMotion) -> tu
             f"{list(motion.bodies)}; let each body's joint name it (Joint.body)",
             subject=robot.name,
         )
+    if not carried:
+        raise ModelError(
+            f"leg {i + 1}: a {leg.type} leg has no bodies, and an engine moves nothing else; give "
+            "its kind a body, however light",
+            subject=robot.name,
+        )
     last = max((k for k, joint in enumerate(motion.chain) if joint.body), default=-1)
     moved_joints = [k for k, joint in enumerate(motion.chain) if motion.pushes or not joint.driven]
     return tuple(k for k in moved_joints if k <= last)
