@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pteron.calibration.fit import Fitter
-from pteron.calibration.guess import Block, Guess, Unknown, number_unknowns
+from pteron.calibration.guess import Guess, Unknown, UnknownBlock, number_unknowns
 from pteron.calibration.measurements import VALUES, Measurements
 from pteron.calibration.start import starting_poses
 from pteron.calibration.thresholds import OFF_TOLERANCES
@@ -36,10 +36,10 @@ _COMMON = 0.1
 
 Chosen: geometry within tolerances moves single scales of small machines by up to 6 %."""
 
-_LARGE_HEIGHTS = 0.05
+_LARGE_HEIGHTS = 0.01
 """Spread of heights, as a share of the machine's size, from which they may be in millimetres.
 
-Chosen: a calibration's heights spread by millimetres, so that mm read as m are 1000 times that."""
+Chosen: heights over a bed spread by 2e-5 of the size and more, which mm read as m make 2e-2."""
 
 _STEPS = (
     (2.0, "half", "as with half the lead or twice the steps"),
@@ -367,7 +367,7 @@ def _fit_readings(
     travel = [_WIDE_ZERO * leg.size if leg.joint.unit == "m" else _WIDE_ANGLE for leg in legs]
     widths = {"zeros": travel, "scales": [_WIDE_SCALE] * len(legs)}
     blocks = number_unknowns(
-        Block(
+        UnknownBlock(
             kind,
             "",
             tuple(Unknown("", kind, "", widths[kind][i]) for i in chosen),

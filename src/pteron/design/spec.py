@@ -21,7 +21,7 @@ from pteron.design.loads import (
     listed,
 )
 from pteron.design.quantities import known
-from pteron.errors import DataError, shown
+from pteron.errors import DataError, shorten
 from pteron.toml import read_toml, to_model
 
 _ABSENT = "no such file; it should describe a search for a design"
@@ -301,7 +301,7 @@ def read_spec(path: str | Path) -> Spec:
         If it cannot be read, has unknown keys, or asks for the impossible; all its faults are
         listed.
     """
-    source = shown(str(path), bare=True, longest=1000)
+    source = shorten(str(path), bare=True, longest=1000)
     spec = to_model(Spec, read_toml(path, DataError, _ABSENT), source, DataError)
     folder = Path(path).parent
     update: dict[str, Any] = {}
