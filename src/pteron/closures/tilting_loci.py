@@ -27,7 +27,7 @@ class TiltingLoci(Closure):
 
     @classmethod
     def fits(cls, legs: Sequence[type[LegEquations]], platform: type[PlatformEquations]) -> bool:
-        return len(platform.angles()) > 1
+        return platform.tilts
 
     @property
     def modes(self) -> int:

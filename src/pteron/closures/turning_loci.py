@@ -40,7 +40,7 @@ class TurningLoci(Closure):
 
     @classmethod
     def fits(cls, legs: Sequence[type[LegEquations]], platform: type[PlatformEquations]) -> bool:
-        return len(platform.angles()) == 1
+        return platform.axis_angle is not None
 
     @property
     def modes(self) -> int:

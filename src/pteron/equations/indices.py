@@ -62,7 +62,7 @@ def point_jacobian(machine: Machine, state: State) -> Expression:
     """
     if not machine.platform.angles():
         return homogeneous(machine, state).matrix
-    if machine.robot.platform.tilts:
+    if machine.platform.axis_angle is None:
         return _point_jacobian_in_space(machine, state)
     first, *_ = arms = lever_arms(machine, state)
     # Relative to the first point, so that coincident points differ by exactly zero.

@@ -168,7 +168,7 @@ def stiffness(
         np.concatenate(part).reshape((*poses.shape[:-1], *part[0].shape[1:]))
         for part in zip(*parts, strict=True)
     )
-    lengths = 3 if robot.platform.tilts else len(robot.platform.lengths)
+    lengths = sum(name.startswith("f") for name in robot.platform.wrench_columns)
     return Stiffness(compliance, frequencies, lengths)
 
 
@@ -183,7 +183,7 @@ def _block_compliance(
     )
     link_lines: tuple[Array, ...] = evaluate_kernel(robot, "beams", "nan", poses)
     mass: Array = mass_matrix(robot, poses, on_failure="nan")
-    size = 6 if robot.platform.tilts else m
+    size = len(robot.platform.wrench_columns)
     compliance, frequencies = np.full((batch, size, size), np.nan), np.full((batch, m), np.nan)
     solvable = np.asarray(np.isfinite(outputs[0]).all(axis=(-2, -1)))
     if solvable.any():
@@ -192,7 +192,7 @@ def _block_compliance(
         energy = _energy_matrix(elasticity.of_legs(robot), elasticity.rod_distance, balance, beams)
         point_compliance = _compliance(robot, balance, energy, np.zeros((len(energy), 3)))
         compliance[solvable] = point_compliance
-        if robot.platform.tilts:
+        if robot.platform.wrench_in_base_axes:
             twists = twist(robot, poses[solvable][:, None], np.eye(m)).mT
             size_of_legs = float(np.mean([leg.size for leg in robot.legs]))
             point_compliance = np.stack(
@@ -236,7 +236,7 @@ def _compliance(robot: Manipulator, balance: Equations, energy: Array, arm: Arra
 def _unit_loads(robot: Manipulator, balance: Equations, arm: Array) -> tuple[Array, Array]:
     """Return unit loads at a point: about P (B, 6, K), and against the freedoms (B, m, K)."""
     batch, m = len(arm), robot.freedom
-    if robot.platform.tilts:
+    if robot.platform.wrench_in_base_axes:
         load = wrench_shift(arm)
         return load, balance.loads @ load
     wrench = np.broadcast_to(np.eye(m), (batch, m, m)).copy()  # a row for each unit load

@@ -237,7 +237,7 @@ def _reason(robot: Manipulator) -> str:
         )
     if _points_are_in_line(robot):
         where = " through P" if robot.platform.center else ""
-        where = where if robot.platform.tilts else " along the platform's axis"
+        where = " along the platform's axis" if robot.platform.turning_axis else where
         return f"all platform points lie on one line{where}, about which no force then has a moment"
     if balance := balance_of_rams(robot):
         return balance
@@ -263,15 +263,8 @@ def _reason(robot: Manipulator) -> str:
 
 def _points_are_in_line(robot: Manipulator) -> bool:
     """Return whether the platform turns about an axis through all its points, up to rounding."""
-    platform = robot.platform
-    if not robot.wraps.any() or (platform.tilts and len(platform.angles) < 3):
-        return False
     points = np.array([leg.platform_point for leg in robot.legs])
-    size = max(float(np.abs(points).max()), 1e-9)
-    if platform.tilts:
-        centred = points if platform.center else points - points.mean(axis=0)
-        return bool(np.linalg.svd(centred, compute_uv=False)[1] <= 1e-9 * size)
-    return bool(np.ptp(points[:, :2], axis=0).max() <= 1e-9 * size)
+    return bool(robot.wraps.any()) and robot.platform.has_points_in_line(points)
 
 
 def _always_free(rows: Array) -> Array | None:

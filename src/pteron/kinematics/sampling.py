@@ -61,9 +61,6 @@ _PARENTS = 200
 _INSIDE = 0.05, 0.3
 """Share of a batch in reach below which the walk's steps shorten, and above which they lengthen."""
 
-_TILT = 0.5
-"""Greatest size of the angles drawn, rad, of a tilting platform whose file does not limit them."""
-
 _SEEN = 1000
 """Poses that show how often limits are kept."""
 
@@ -207,12 +204,7 @@ def widest_box(robot: Manipulator) -> tuple[Array, Array]:
     """Return the ends of a box (m,) of poses from which to draw."""
     center, radius = search_ball(robot)
     platform = robot.platform
-    # Beyond half a turn phi counts where the platform's shaft makes several.
-    turn = max((np.pi, *(abs(end) for pair in platform.angle_limits.values() for end in pair)))
-    ends = dict.fromkeys(platform.angles, (-turn, turn))
-    if platform.tilts:
-        ends = dict.fromkeys(platform.angles, (-_TILT, _TILT)) | platform.angle_limits
-    angles = np.array(list(ends.values())).reshape(-1, 2)
+    angles = np.array(list(platform.angle_box.values())).reshape(-1, 2)
     low = np.concatenate([center - radius, angles[:, 0]])
     return low, np.concatenate([center + radius, angles[:, 1]])
 

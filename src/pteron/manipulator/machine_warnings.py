@@ -59,7 +59,8 @@ def machine_warnings(robot: Manipulator, *, bodies: bool = True) -> tuple[str, .
     warnings = _millimetre_warnings(long_lengths)
     if hypot(*robot.gravity) > _PULL:
         warnings.append(f"gravity: {hypot(*robot.gravity):g} m/s^2: is that mm/s^2?")
-    turn, most = ("half a turn", pi) if platform.tilts else ("a turn", 2.0 * pi)
+    most = 2.0 * platform.angle_range
+    turn = "a turn" if most > pi else "half a turn"
     warnings += [
         f"platform: limits: {list(limits)} rad, more than {turn} from {angle} = 0: are these "
         "degrees?"
@@ -90,7 +91,7 @@ def machine_warnings(robot: Manipulator, *, bodies: bool = True) -> tuple[str, .
 def _beside_the_pin(robot: Manipulator) -> Iterator[str]:
     """Yield what stands beside the pin where both legs of a five-bar meet."""
     platform = robot.platform
-    if platform.tilts:
+    if platform.plane_normal is None:
         return
     axes = unheld_axes(platform, robot.legs)
     if len(axes) != 1:

@@ -183,7 +183,7 @@ def joint_points(robot: RobotLike, pose: PoseLike) -> JointPoints:
         axes,
         coordinates,
         tuple(None if leg.bar is None else np.array(leg.bar) for leg in robot.legs),
-        robot.platform.directions if robot.platform.planar else None,
+        None if robot.platform.plane_normal is None else robot.platform.directions,
         tuple(leg.cylinder is not None for leg in robot.legs),
     )
 

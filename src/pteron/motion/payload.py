@@ -146,7 +146,7 @@ def add_payload(
         raise DataError(f"payload: {mass!r} given, a mass of 0 kg or more expected")
     platform, inertia_before = robot.platform, robot.platform.inertia
     center_of_mass = platform.tool if center is None else vector(center, "center")
-    if platform.slides and any(center_of_mass[:2]) and payload:
+    if platform.carries_on_axis and any(center_of_mass[:2]) and payload:
         place = "platform.tool" if center is None else "center"
         raise ModelError(
             f"{place} is {math.hypot(*center_of_mass[:2]):g} m off the axis of a platform that "

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from typing import Any, ClassVar, NamedTuple
 
 import casadi as ca
+import numpy as np
 
 from pteron.bodies.inertia import SpatialInertia
 from pteron.bodies.motion import (
@@ -78,6 +79,7 @@ class Tilting(PlatformEquations):
 
     kinds = SpatialInertia.kinds
     wrench_columns = ("fx", "fy", "fz", "mx", "my", "mz")
+    tilts, arm_axes, angle_range = True, "xyz", 0.5 * np.pi
     order: ClassVar[tuple[str, ...]]
     """The angles' coordinates, in the order in which their turns follow each other."""
 
@@ -212,11 +214,15 @@ class Tilting(PlatformEquations):
     def applied(self, motion: PlatformMotion, wrench: Expression) -> Expression:
         return ca.mtimes(motion.matrix.T, wrench)
 
+    def constraint(self, motion: PlatformMotion) -> Expression:
+        return ca.SX(1)  # there are none
+
 
 class RollPitchYaw(Tilting):
     """3T3R: R = Rz(yaw) Ry(pitch) Rx(roll)."""
 
-    coordinates = ("x", "y", "z", "roll", "pitch", "yaw")
+    coordinates, spin_angle = ("x", "y", "z", "roll", "pitch", "yaw"), "yaw"
+    freedom_text = "translates and turns in space any way (3T3R)"
     order = ("yaw", "pitch", "roll")
     joints = ("x", "y", "z", *order)
 
@@ -224,7 +230,8 @@ class RollPitchYaw(Tilting):
 class TurnsXYZ(Tilting):
     """3T3R: R = Rx(rx) Ry(ry) Rz(rz)."""
 
-    coordinates = ("x", "y", "z", "rx", "ry", "rz")
+    coordinates, spin_angle = ("x", "y", "z", "rx", "ry", "rz"), "rz"
+    freedom_text = "translates and turns in space any way (3T3R)"
     order = ("rx", "ry", "rz")
 
 
@@ -232,6 +239,7 @@ class _Centred(Tilting):
     """A platform whose point P stays at `center`, on a joint there."""
 
     on_legs_alone = False
+    freedom_text = "turns any way about a centre that stays (3R)"
 
     def motion(
         self, pose: Expression, velocity: Expression, acceleration: Expression
@@ -249,14 +257,14 @@ class _Centred(Tilting):
 class CentredRollPitchYaw(_Centred):
     """3R: R = Rz(yaw) Ry(pitch) Rx(roll) about a ball joint."""
 
-    coordinates = ("roll", "pitch", "yaw")
+    coordinates, spin_angle = ("roll", "pitch", "yaw"), "yaw"
     order = joints = ("yaw", "pitch", "roll")
 
 
 class CentredXYZ(_Centred):
     """3R: R = Rx(rx) Ry(ry) Rz(rz) about a ball joint."""
 
-    coordinates = ("rx", "ry", "rz")
+    coordinates, spin_angle = ("rx", "ry", "rz"), "rz"
     order = ("rx", "ry", "rz")
 
 
@@ -264,6 +272,7 @@ class Universal(_Centred):
     """2R: R = Rot(axis, alpha) Rot(second_axis, beta) about a universal joint."""
 
     coordinates = ("alpha", "beta")
+    freedom_text = "turns about two axes through a centre that stays (2R)"
     order = ("alpha", "beta")
 
     def turn_axes(self) -> list[Expression]:

@@ -26,6 +26,7 @@ class Tripod(Tilting):
     """
 
     coordinates = ("z", "roll", "pitch")
+    freedom_text = "moves along its axis and tilts to every side (1T2R), a tripod's"
     order = ("yaw", "pitch", "roll")
     joints = ("x", "y", "z", *order)
 

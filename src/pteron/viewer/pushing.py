@@ -178,7 +178,4 @@ class Push:
             damping = 2.0 * _DAMPING * np.sqrt(self.stiffness * self._mass)
             force = self.stiffness * (self._held - grip) - damping * speed
         moment = np.cross(arm, force)
-        if platform.tilts:
-            return np.concatenate([force, moment])
-        turning = [np.array(platform.axis) @ moment] * len(platform.angles)
-        return np.array([*(platform.directions @ force), *turning])
+        return platform.wrench_of(force, moment)

@@ -77,13 +77,12 @@ def slice_planes(robot: Manipulator) -> tuple[Plane, ...]:
     Of a platform that tilts they are those of its lengths with two of its angles, or all pairs of
     coordinates where these are few.
     """
-    if robot.platform.planar:
-        return ("xy",)
-    if not robot.platform.tilts:
-        return "xy", "xz", "yz"
     angles, lengths = robot.platform.angles, robot.platform.lengths
-    if len(lengths) == 3:
-        return "xy", "xz", "yz", (angles[0], angles[1])
+    planes = tuple(first + second for first, second in combinations(lengths, 2))
+    if not robot.platform.tilts:
+        return planes
+    if planes:
+        return *planes, (angles[0], angles[1])
     mixed = ((angle, length) for length in lengths for angle in angles)
     return *combinations(angles, 2), *mixed
 

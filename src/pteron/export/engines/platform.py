@@ -44,7 +44,7 @@ def platform_bodies(robot: Manipulator, pose: Array) -> Pieces:
     platform = robot.platform
     if platform.slides:
         return _sliding_platform(robot, pose)
-    if platform.turns:
+    if platform.turning_axis is not None:
         return _turning_platform(robot, pose)
     joints = _joints(platform, pose)
     if isinstance(platform.joined, SpatialInertia):

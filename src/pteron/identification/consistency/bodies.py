@@ -108,7 +108,7 @@ def bodies_of(base: BaseParameters) -> Bodies:
     _, sharing = share(robot, groups)
     # A telescope has no length: its parts count as long as a link.
     sizes = [leg.size / max(len(leg.extents), 1) for leg in robot.legs if leg.size > 0.0]
-    counted = 3 if robot.platform.tilts else 2
+    counted = len(robot.platform.arm_axes)
     radius = max(float(np.linalg.norm(leg.platform_point[:counted])) for leg in robot.legs)
     mean = float(np.mean(sizes))
     half = 0.5 * (radius if radius > 1e-3 * mean else _SMALL_PLATFORM * mean)
