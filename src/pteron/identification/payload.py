@@ -221,7 +221,7 @@ class Payload:
         return fields_as_json(
             self,
             "mass first_moment inertia center_of_mass central_inertia names",
-            "standard_deviations=deviations covariance felt real residual trial=fault_isolation",
+            "standard_deviations=deviations covariance felt=is_significant real residual trial=fault_isolation",
             "findings",
         )
 

@@ -125,7 +125,7 @@ class Prediction:
             "rms_error_of_all_samples=error_of_all nrms_percent=nrms",
             "robust_nrms_percent=robust_nrms outliers",
             "nrms_percent_without_friction=nrms_without_friction",
-            "noise_floor_percent=floor unexplained_percent=unexplained",
+            "noise_floor_percent=floor unexplained_percent=unexplained_error",
         )
 
     unexplained = former_attribute("unexplained", "unexplained_error")
