@@ -63,7 +63,7 @@ class StrutEquations(UPSEquations):
 
     kinds: ClassVar = {}
     rides = ()
-    needs, along = LegEquations.needs, LegEquations.along
+    needs, change_frame = LegEquations.needs, LegEquations.change_frame
 
     def motion(self, point, rotation):
         motion = super().motion(point, rotation)

@@ -109,7 +109,7 @@ def test_a_cycles_derivatives_are_exact(name):
 
 def tool(robot, pose):
     """Return where the tool's centre point is."""
-    p, axes = robot.platform.at(np.asarray(pose))
+    p, axes = robot.platform.placement(np.asarray(pose))
     return p + robot.platform.tool @ axes
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from pteron.bodies.motion import Expression
 from pteron.closures.closure import Closure, nan_below_zero
 from pteron.closures.determinants import adjugate, determinant
-from pteron.legs.leg import LegEquations, LegMotion, Plane
+from pteron.legs.leg import LegEquations, LegMotion, PlaneLocus
 from pteron.platforms.motion import PlatformEquations, PlatformMotion
 from pteron.platforms.translating import Translating
 from pteron.platforms.turning import Turning
@@ -135,7 +135,7 @@ class ConstantRows(Closure):
             self.legs, self.platform.offsets, ca.vertsplit(joints), strict=True
         ):
             locus = leg.locus(q)
-            assert isinstance(locus, Plane)
+            assert isinstance(locus, PlaneLocus)
             constant = offset.constant if self.turns else offset.constant + offset.a
             constants.append(locus.offset - ca.dot(locus.normal, constant))
             sizes.append(locus.size)

@@ -242,7 +242,7 @@ def pressure_angle(machine: Machine, state: State) -> Expression:
     for leg in state.legs:
         if not leg.pushes:
             continue
-        place = leg.chain.index(leg.driven)
+        place = leg.chain.index(leg.actuated_joint)
         joint, next_joint = leg.chain[place : place + 2]
         direction = joint.axis
         if joint.kind == "R":

@@ -32,7 +32,7 @@ def inverse_dynamics(
     """
     joints, load = needed_forces(machine, state, parameters, carried)
     if wrench is not None:
-        load = load - machine.platform.applied(state.platform, wrench)
+        load = load - machine.platform.generalized_forces(state.platform, wrench)
     forces = machine.closure.forces(load, state.platform, state.legs)
     return joints + forces  # Eq. (13), Contribution 2, Section 4
 
@@ -63,10 +63,12 @@ def needed_forces(
         for leg, point, bodies in zip(machine.legs, platform.points, legs, strict=True)
     ]
     if carried:
-        inertia = machine.platform.carrying(inertia, [leg.mass for leg in needs])
+        inertia = machine.platform.add_point_masses(inertia, [leg.mass for leg in needs])
     else:
         trios = zip(machine.legs, platform.points, needs, strict=True)
-        needs += [leg.riding(point, machine.gravity, need.mass) for leg, point, need in trios]
+        needs += [
+            leg.point_mass_needs(point, machine.gravity, need.mass) for leg, point, need in trios
+        ]
     load = machine.platform.needs(platform, machine.gravity, inertia)
     joints = ca.SX(len(machine.legs), parameters.shape[1])
     for k, need in enumerate(needs):

@@ -188,7 +188,7 @@ def export_linuxcnc(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
     home = start_pose(robot)
     axes, joints = linuxcnc_axes(robot), tuple(_joints(machine, home))
     platform, seen = robot.platform, home.copy()
-    seen[~platform.angular] += platform.directions @ (platform.tool @ platform.at(home)[1])
+    seen[~platform.angular] += platform.directions @ (platform.tool @ platform.placement(home)[1])
     tilted = _TurnedArm.from_platform(platform, home) if platform.tilts else None
     arm = None if tilted else _Arm.from_platform(platform)
     places = {a.letter: f"{a.scale * at:.6f}" for a, at in zip(axes, seen, strict=True)}

@@ -221,8 +221,8 @@ class Payload:
         return fields_as_json(
             self,
             "mass first_moment inertia center_of_mass central_inertia names",
-            "standard_deviations=deviations covariance felt=is_significant real residual trial=fault_isolation",
-            "findings",
+            "standard_deviations=deviations covariance felt=is_significant real residual",
+            "trial=fault_isolation findings",
         )
 
     carried_by = former_attribute("carried_by", "add_to")

@@ -23,6 +23,7 @@ from pteron.kernels import Array, as_array
 from pteron.kinematics import twist
 from pteron.kinematics.evaluate import evaluate_kernel, finite_rows
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.renamed import former_attribute
 from pteron.shapes import Matrices, Numbers, OnFailure, PerCoordinate, PoseLike
 
 _GAUSS = 0.5 - 0.5 / np.sqrt(3.0), 0.5 + 0.5 / np.sqrt(3.0)
@@ -65,7 +66,8 @@ class Stiffness:
         if freedom < size:
             raise ModelError(
                 f"matrix: a platform of {freedom} freedoms does not give way in {size - freedom} "
-                "others, so that the compliance has no inverse; use compliance, least or along"
+                "others, so that the compliance has no inverse; use compliance, least or "
+                "directional_stiffness"
             )
         return np.linalg.inv(self.compliance)
 
@@ -76,7 +78,7 @@ class Stiffness:
             return np.asarray(1.0 / self._principal_compliances[..., -1])
 
     @property
-    def most(self) -> Numbers:
+    def greatest(self) -> Numbers:
         """The same in the best direction."""
         with np.errstate(divide="ignore"):
             return np.asarray(1.0 / np.maximum(self._principal_compliances[..., 0], 0.0))
@@ -89,7 +91,7 @@ class Stiffness:
         eigenvalues = np.linalg.eigvalsh(np.where(known[..., None, None], part, 0.0))
         return np.asarray(np.where(known[..., None], eigenvalues, np.nan))
 
-    def along(self, direction: ArrayLike) -> Numbers:
+    def directional_stiffness(self, direction: ArrayLike) -> Numbers:
         """Return force over the tool's displacement along a direction (..., k), N/m.
 
         Raises
@@ -107,6 +109,9 @@ class Stiffness:
             return np.asarray(
                 1.0 / np.einsum("...i,...ij,...j", u, self.compliance[..., :k, :k], u)
             )
+
+    most = former_attribute("most", "greatest")
+    along = former_attribute("along", "directional_stiffness")
 
 
 def stiffness(
@@ -189,7 +194,9 @@ def _block_compliance(
     if solvable.any():
         balance = Equations(*(array[solvable] for array in outputs))
         beams = [array[solvable] for array in link_lines]
-        energy = _energy_matrix(elasticity.of_legs(robot), elasticity.rod_distance, balance, beams)
+        energy = _energy_matrix(
+            elasticity.leg_springs(robot), elasticity.rod_distance, balance, beams
+        )
         point_compliance = _compliance(robot, balance, energy, np.zeros((len(energy), 3)))
         compliance[solvable] = point_compliance
         if robot.platform.wrench_in_base_axes:

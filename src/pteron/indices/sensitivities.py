@@ -123,7 +123,7 @@ def _slopes(robot: Manipulator) -> ca.Function:
 
 def tool_arm(robot: Manipulator, poses: Array) -> Array:
     """Return the vector (..., 3) from P to the tool's centre point, base frame."""
-    _, axes = robot.platform.at(poses)
+    _, axes = robot.platform.placement(poses)
     return np.asarray(np.array(robot.platform.tool) @ axes)
 
 

@@ -90,7 +90,7 @@ class Manipulator:
     def __post_init__(self) -> None:
         legs = tuple(self.legs)
         raise_faults(faults_of(self.name, self.platform, legs, self.tools, self.home))
-        legs = tuple(leg.under(self.platform.frame) for leg in legs)
+        legs = tuple(leg.with_platform_frame(self.platform.frame) for leg in legs)
         object.__setattr__(self, "legs", legs)
         object.__setattr__(self, "tools", tuple(self.tools))
         if self.home is not None:
@@ -210,7 +210,7 @@ def faults_of(
     ]
     if faults or len(known_legs) < freedom:
         return faults
-    placed_legs = [leg.under(platform.frame) for leg in known_legs.values()]
+    placed_legs = [leg.with_platform_frame(platform.frame) for leg in known_legs.values()]
     return (_unheld_tilting if platform.tilts else _unheld_freedoms)(platform, placed_legs)
 
 
@@ -245,7 +245,7 @@ def _leg_faults(platform: Platform, leg: object) -> Iterator[str]:
             "across it, so give 0"
         )
     try:
-        leg = leg.under(platform.frame)
+        leg = leg.with_platform_frame(platform.frame)
     except ModelError as error:
         yield str(error)
         return
@@ -281,7 +281,10 @@ def _leg_faults(platform: Platform, leg: object) -> Iterator[str]:
 
 def _tilting_leg_faults(platform: Platform, leg: LegKind) -> Iterator[str]:
     """Yield the faults of a leg under a platform that tilts."""
-    takes, on_planes = "legs that end in ball joints and hold nothing else", platform.on_planes
+    takes, on_planes = (
+        "legs that end in ball joints and hold nothing else",
+        platform.keeps_points_in_planes,
+    )
     if on_planes:
         takes = "legs that keep their points in planes and end in ball joints"
     normal, free = leg.plane_normal, len(complement(leg.free_axes(None))) == 0
@@ -322,7 +325,7 @@ def _unheld_tilting(platform: Platform, legs: Sequence[LegKind]) -> list[str]:
 
 def _with_held_points(platform: Platform, legs: Sequence[LegKind]) -> Platform:
     """Return a platform with the planes in which its legs keep its points, if it is a tripod's."""
-    if not platform.on_planes:
+    if not platform.keeps_points_in_planes:
         return platform
     planes = [
         HeldPoint(leg.plane_normal, leg.guide_point, leg.platform_point)

@@ -168,7 +168,7 @@ def joint_points(robot: RobotLike, pose: PoseLike) -> JointPoints:
     coordinates = inverse_kinematics(robot, poses)
     chain: Array = evaluate_kernel(robot, "joint_points", "raise", poses)
     points: Array = evaluate_kernel(robot, "platform_points", "raise", poses)
-    p, axes = robot.platform.at(poses)
+    p, axes = robot.platform.placement(poses)
     links = tuple(
         _links(leg, chain[..., i, :, :], coordinates[..., i], points[..., i, :])
         for i, leg in enumerate(robot.legs)

@@ -21,7 +21,7 @@ _HEAVY = 20.0
 def payload_warning(robot: Manipulator, mass: float) -> str:
     """Return a warning about an unlikely payload, kg, as a clause; else an empty text."""
     bodies = [body for leg in robot.legs for body in leg.bodies.values()]
-    moving = sum(body.values[0] for body in (*bodies, robot.platform.joined))
+    moving = sum(body.values[0] for body in (*bodies, robot.platform.total_inertia))
     if mass <= _HEAVY * moving:
         return ""
     return (

@@ -187,7 +187,9 @@ class PlatformEquations(ABC):
         """Return the indices of the angles in a pose."""
         return np.flatnonzero(are_angles(cls.coordinates)).tolist()
 
-    def in_own_axes(self, pose: Expression) -> tuple[PlatformEquations, Expression] | None:
+    def change_to_platform_axes(
+        self, pose: Expression
+    ) -> tuple[PlatformEquations, Expression] | None:
         """Return the platform with vectors in its own axes, from P, and the axes (3, 3).
 
         None where that saves no operations.
@@ -228,7 +230,7 @@ class PlatformEquations(ABC):
         """Return mass times centre of mass, (3, K), in the base frame."""
         return mass_moment(motion.body, inertia)
 
-    def applied(self, motion: PlatformMotion, wrench: Expression) -> Expression:
+    def generalized_forces(self, motion: PlatformMotion, wrench: Expression) -> Expression:
         """Return the generalized forces (m, K) of a wrench, whose rows are `wrench_columns`."""
         return wrench
 
@@ -239,11 +241,13 @@ class PlatformEquations(ABC):
         """
         return None
 
-    def held_rows(self, motion: PlatformMotion) -> Expression | None:
+    def plane_wrenches(self, motion: PlatformMotion) -> Expression | None:
         """Return the unit constraint wrenches (k, 6) of planes about P; None without planes."""
         return None
 
-    def carrying(self, inertia: PlatformMoments, masses: Sequence[Expression]) -> PlatformMoments:
+    def add_point_masses(
+        self, inertia: PlatformMoments, masses: Sequence[Expression]
+    ) -> PlatformMoments:
         """Return the platform's inertia with point masses (1, K), one a leg, at its points."""
         m, hx, hy, i = inertia
         for s, mass in zip(self.points, masses, strict=True):

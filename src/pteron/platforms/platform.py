@@ -1,6 +1,6 @@
 """`Platform`, the moving platform of a machine: its freedom, axes, parts, inertia, limits and tool.
 
-Its constructor checks it; `at` and `tool_motion` give the positions of platform and tool.
+Its constructor checks it; `placement` and `tool_motion` give the positions of platform and tool.
 """
 
 from __future__ import annotations
@@ -25,7 +25,8 @@ from pteron.platforms.checked_fields import BASE_Z, checked_fields
 from pteron.platforms.coordinates import COORDINATES, Unit, are_angles
 from pteron.platforms.kinds import XYZ, AngleOrder, Motion, equations_class
 from pteron.platforms.motion import PlatformEquations, PlatformMotion
-from pteron.platforms.parts import Bar, Geared, HeldPoint
+from pteron.platforms.parts import Bar, GearedPart, HeldPoint
+from pteron.renamed import former_attribute
 from pteron.toml import raise_faults
 
 Limits = tuple[float, float]
@@ -67,7 +68,7 @@ class Platform:
         The tool's centre point in the platform frame, m.
     bars : tuple of Bar
         Parts that move with the platform's hinges and do not turn.
-    geared : tuple of Geared
+    geared : tuple of GearedPart
         Parts that a gear turns with the platform.
     angle_order : {"rpy", "xyz"}
         Which angles a 3T3R or 3R platform has: roll, pitch and yaw, or rx, ry and rz.
@@ -87,7 +88,7 @@ class Platform:
     limits: Limits | tuple[Limits, ...] | None = None
     tool: Vector = (0.0, 0.0, 0.0)
     bars: tuple[Bar, ...] = ()
-    geared: tuple[Geared, ...] = ()
+    geared: tuple[GearedPart, ...] = ()
     angle_order: AngleOrder = "rpy"
     center: Vector | None = None
     second_axis: Vector | None = None
@@ -121,7 +122,7 @@ class Platform:
         return self.motion in ("3T1R", "2T1R")
 
     @property
-    def on_planes(self) -> bool:
+    def keeps_points_in_planes(self) -> bool:
         """Whether planes, in which its legs keep its points, fix its dependent coordinates."""
         return self.motion == "1T2R"
 
@@ -300,7 +301,9 @@ class Platform:
         unit_vectors = np.array([frame_axes[name] for name in self.lengths]).reshape(-1, 3)
         return np.eye(3) if len(unit_vectors) == 3 else unit_vectors
 
-    def at(self, poses: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def placement(
+        self, poses: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return P (..., 3) and the platform frame's axes (..., 3, 3), one a row, in base frame.
 
         For a platform that slides the axes are the tool's.
@@ -397,9 +400,9 @@ class Platform:
         """Return vectors (..., k, 3) from P to platform points (k, 3), without fixed offsets."""
         if self.slides:
             return np.asarray(poses[..., -1:, None] * (points @ np.array(self.frame)))
-        return np.asarray(points @ self.at(poses)[1])
+        return np.asarray(points @ self.placement(poses)[1])
 
-    def turned(self, turn: Callable[[Vector], Vector]) -> Platform:
+    def map_vectors(self, turn: Callable[[Vector], Vector]) -> Platform:
         """Return the platform with every base-frame vector v replaced by `turn(v)`.
 
         The frame of a 2R platform is the base frame at angles zero: its tool, inertia and platform
@@ -420,7 +423,7 @@ class Platform:
         )
 
     @property
-    def joined(self) -> PlanarInertia | SpatialInertia:
+    def total_inertia(self) -> PlanarInertia | SpatialInertia:
         """The platform's inertia including its bars and geared parts, for the equations.
 
         A bar counts as a point mass at its hinge; a gear of ratio n adds n^2 times the inertia.
@@ -435,9 +438,15 @@ class Platform:
         inertia += sum(part.ratio**2 * part.inertia for part in self.geared)
         return PlanarInertia(mass, (hx, hy), inertia)
 
-    def with_joined(self, inertia: PlanarInertia | SpatialInertia) -> Platform:
+    def with_total_inertia(self, inertia: PlanarInertia | SpatialInertia) -> Platform:
         """Return the platform with this inertia for all of it, without separate parts."""
         return replace(self, inertia=inertia, bars=(), geared=())
+
+    at = former_attribute("at", "placement")
+    turned = former_attribute("turned", "map_vectors")
+    joined = former_attribute("joined", "total_inertia")
+    with_joined = former_attribute("with_joined", "with_total_inertia")
+    on_planes = former_attribute("on_planes", "keeps_points_in_planes")
 
 
 @lru_cache(maxsize=64)

@@ -127,7 +127,9 @@ class Tilting(PlatformEquations):
             place = PointMotion(pose[:3], velocity[:3], acceleration[:3])
         return self.assemble_motion(place, turned, ca.SX.eye(6), turned.axes)
 
-    def in_own_axes(self, pose: Expression) -> tuple[PlatformEquations, Expression] | None:
+    def change_to_platform_axes(
+        self, pose: Expression
+    ) -> tuple[PlatformEquations, Expression] | None:
         if "x" not in self.coordinates:
             return None
         in_own_frame = type(self)(ca.horzsplit(ca.SX.eye(3)), self.points, self.fixed, self.more)
@@ -208,10 +210,12 @@ class Tilting(PlatformEquations):
         moment = ca.mtimes(motion.axes, inertia.h)
         return ca.mtimes(motion.body.position, inertia.m) + moment
 
-    def carrying(self, inertia: SpatialMoments, masses: Sequence[Expression]) -> SpatialMoments:
+    def add_point_masses(
+        self, inertia: SpatialMoments, masses: Sequence[Expression]
+    ) -> SpatialMoments:
         return inertia.with_points(self.points, masses)
 
-    def applied(self, motion: PlatformMotion, wrench: Expression) -> Expression:
+    def generalized_forces(self, motion: PlatformMotion, wrench: Expression) -> Expression:
         return ca.mtimes(motion.matrix.T, wrench)
 
     def constraint(self, motion: PlatformMotion) -> Expression:

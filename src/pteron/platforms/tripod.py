@@ -105,7 +105,7 @@ class Tripod(Tilting):
         dp = ca.mtimes(twist[:3, :], velocity)
         return self.assemble_motion(PointMotion(place, dp, ddp), turned, twist, None)
 
-    def held_rows(self, motion: PlatformMotion) -> Expression:
+    def plane_wrenches(self, motion: PlatformMotion) -> Expression:
         normals = [plane.normal.T for plane in self.planes]
         pairs = zip(normals, motion.point_twists, strict=True)
         return ca.vertcat(*(ca.mtimes(n, shift[:3, :]) for n, shift in pairs))
@@ -116,7 +116,7 @@ class Tripod(Tilting):
         It is the determinant of the planes' forces and moments about k over its upper bound.
         """
         x, y, k = self.frame
-        rows = self.held_rows(motion)
+        rows = self.plane_wrenches(motion)
         flat = ca.horzcat(*(ca.mtimes(rows[:, :3], v) for v in (x, y)), ca.mtimes(rows[:, 3:], k))
         center = sum(self.points) / len(self.points)
         square = sum(ca.dot(s - center, s - center) for s in self.points)

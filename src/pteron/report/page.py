@@ -169,7 +169,7 @@ def bodies(robot: Manipulator) -> list[tuple[str, int | None, dict[str, float]]]
     for part in platform.geared:
         rows.append((f"geared part, ratio {compact(part.ratio)}", None, {"I": part.inertia}))
     if platform.bars or platform.geared:
-        rows.append(("platform with all of it", None, with_center(platform.joined)))
+        rows.append(("platform with all of it", None, with_center(platform.total_inertia)))
     return rows
 
 

@@ -178,7 +178,7 @@ class Session:
         if axis is None:
             target[~platform.angular] = platform.directions @ point
         elif platform.angles:
-            place, axes = platform.at(target)
+            place, axes = platform.placement(target)
             turned = axes @ _rotation(axes[axis], point - place).T
             target = pose_nearest_frame(platform, target, turned)
         self.set_pose(target)

@@ -60,7 +60,7 @@ def axis_poses(robot: Manipulator) -> Array:
         turns = (angles + np.pi) % (2.0 * np.pi) - np.pi
         poses[..., platform.coordinates.index(spin)] = turns[:, None]
     middle = np.mean([leg.platform_point for leg in robot.legs], axis=0)
-    offsets = middle @ np.nan_to_num(platform.at(poses[:, 0])[1])
+    offsets = middle @ np.nan_to_num(platform.placement(poses[:, 0])[1])
     heights = radius * np.linspace(-1.0, 1.0, _HEIGHTS)
     poses[..., :count] = (
         center - (offsets @ platform.directions.T)[:, None] + np.outer(heights, direction)
@@ -115,7 +115,7 @@ def sides(robot: Manipulator, poses: Array) -> Array:
         if not size > _ACROSS * np.linalg.norm(down):
             return np.zeros(len(poses))
         up = -gravity_part / size
-    place, axes = platform.at(poses)
+    place, axes = platform.placement(poses)
     points = np.mean([leg.platform_point for leg in robot.legs], axis=0) @ axes
     points += place + np.mean([leg.fixed_offset for leg in robot.legs], axis=0)
     joints = np.nan_to_num(numeric(robot, "joint_coordinates")(poses)[0])

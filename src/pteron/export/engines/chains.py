@@ -90,7 +90,7 @@ def leg_stances(robot: Manipulator, poses: Array) -> list[LegStance]:
 def shaft_ratio(robot: Manipulator, i: int) -> float:
     """Return the actuated joint's angle per radian of phi, of a leg that follows the angle."""
     motion = _states(robot)[1].legs[i]
-    return float(ca.evalf(ca.SX(motion.driven.gear)))
+    return float(ca.evalf(ca.SX(motion.actuated_joint.gear)))
 
 
 def _numbers_before_the_cut(robot: Manipulator, i: int, motion: LegMotion) -> tuple[int, ...]:

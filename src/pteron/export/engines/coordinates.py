@@ -51,8 +51,8 @@ def coordinates(opened: Tree, poses: PoseLike) -> Array:
             driven = k == home.driven
             name = robot.joint_names[i] if driven else f"leg{i + 1}_joint{k}"
             values[name] = joints[:, i] if driven else angle
-    p, axes = robot.platform.at(flat)
-    home_p, home_axes = robot.platform.at(opened.home)
+    p, axes = robot.platform.placement(flat)
+    home_p, home_axes = robot.platform.placement(opened.home)
     for body in opened.bodies:
         for joint in body.joints:
             if joint.follows is not None:

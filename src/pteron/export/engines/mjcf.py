@@ -152,7 +152,7 @@ def _sites(opened: Tree) -> list[list[tuple[str, Array]]]:
     for closing in opened.closings:
         sites[closing.one].append((f"{closing.name}_end", closing.point))
         sites[closing.other].append((f"{closing.name}_seat", closing.point))
-    p, axes = opened.robot.platform.at(opened.home)
+    p, axes = opened.robot.platform.placement(opened.home)
     sites[0].append(("tool", p + np.array(opened.robot.platform.tool) @ axes))
     return sites
 

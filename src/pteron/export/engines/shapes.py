@@ -85,7 +85,7 @@ def _stand(first: TreeBody, size: float) -> list[BodyShape]:
 def _platform(opened: Tree, looks: list[list[BodyShape]], thick: float) -> None:
     """Add the shapes of the platform's bodies: arms from their origins to where others close."""
     platform, bodies = opened.robot.platform, opened.bodies
-    p, axes = platform.at(opened.home)
+    p, axes = platform.placement(opened.home)
     axis = axes[2]
     for closing in opened.closings:
         for k in (closing.one, closing.other):

@@ -71,7 +71,7 @@ def tree(robot: RobotLike, home: PoseLike | None = None) -> Tree:
     pose = chosen_home(robot, home)
     stances = leg_stances(robot, pose)
     _expect_axes(stances, pose)
-    size = _size(stances, robot.platform.at(pose)[0])
+    size = _size(stances, robot.platform.placement(pose)[0])
     bodies, carriers, closings = platform_bodies(robot, pose)
     names = robot.joint_names
     motors = []

@@ -174,7 +174,7 @@ def real_bodies(robot: Manipulator, values: ArrayLike | None = None) -> tuple[st
         columns = list(place.values())
         first = data[columns[0]]
         legs, platform = robot.legs, robot.platform
-        kind = legs[first.legs[0] - 1].bodies[first.body] if first.legs else platform.joined
+        kind = legs[first.legs[0] - 1].bodies[first.body] if first.legs else platform.total_inertia
         try:
             kind.of_values(vector[columns].tolist())
         except ModelError as error:
