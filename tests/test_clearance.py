@@ -88,7 +88,7 @@ def test_bodies_are_where_they_are_drawn(name, distance):
             links = [names[letter] for letter in "ul" if letter in names]
             for link, ends in zip(links, pairwise(line), strict=True):
                 bodies[f"leg {i} {link}"] = [ends]
-            if guide.slides:
+            if guide.is_prismatic:
                 bodies[f"leg {i} guide"] = [guide.path]
         for part in points.parts:
             bodies["platform"] += [(part.hub, corner) for corner in part.corners]

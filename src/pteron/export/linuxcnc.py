@@ -127,7 +127,7 @@ class _TurnedArm:
         places = {name: k for k, name in enumerate(platform.coordinates)}
         # A tripod's yaw, which is none of the pose, does not move the tool along its z.
         chain = platform_joints(platform, pose)
-        turns = [(j.axis, places[j.name]) for j in chain if not j.slides and j.name in places]
+        turns = [(j.axis, places[j.name]) for j in chain if not j.is_prismatic and j.name in places]
         *_, upright = frame = np.array(platform.frame)
         zero = np.array(platform.tool) @ frame
         return cls(zero, tuple(reversed(turns)), upright, platform.directions)

@@ -22,7 +22,7 @@ from pteron.kinematics.jacobian_keys import alternatives, jacobian_keys
 from pteron.kinematics.modular_geometry import modular_geometry
 from pteron.kinematics.ram_figures import balance_of_rams
 from pteron.kinematics.ram_motions import self_motions_of_rams
-from pteron.kinematics.sampling import draw_poses, type_ii_sizes
+from pteron.kinematics.sampling import draw_poses, joints_limit_reach, type_ii_sizes
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 
 _VANISHING = 1e-10
@@ -189,7 +189,7 @@ def _poses(robot: Manipulator) -> Array:
     """Return some poses in reach, singular (type II) or not; an empty array if none is found."""
     try:
         # Limits, most of all those of short rams, leave few poses of a platform that tilts.
-        limits, rng = not robot.platform.tilts, np.random.default_rng(0)
+        limits, rng = not joints_limit_reach(robot), np.random.default_rng(0)
         return draw_poses(robot, _SAMPLES, rng, type_i=1e-3, limits=limits)
     except ModelError:
         return np.empty((0, robot.freedom))

@@ -173,7 +173,7 @@ class _Conditions(NamedTuple):
         """Return those of the poses that keep the limits."""
         if self.limits:
             poses = poses[(numeric(robot, "passive_room")(poses)[0] >= 0.0).all(axis=-1)]
-        if self.limits and _joints_limit_reach(robot):
+        if self.limits and joints_limit_reach(robot):
             low, high = joint_limits(robot)
             joints = numeric(robot, "joint_coordinates")(poses)[0]
             poses = poses[((low <= joints) & (joints <= high)).all(axis=-1)]
@@ -234,7 +234,7 @@ def _solved_poses(
     return conditions.keep_within_limits(robot, conditions.select_reachable(robot, poses))
 
 
-def _joints_limit_reach(robot: Manipulator) -> bool:
+def joints_limit_reach(robot: Manipulator) -> bool:
     """Return whether actuated joints' limits count: strokes of rams are the reach of a hexapod."""
     return robot.platform.tilts
 
@@ -244,7 +244,7 @@ def _joint_ranges(robot: Manipulator, *, limits: bool) -> Array | None:
 
     A crank has a turn where it has no limits, or where these do not count.
     """
-    if not _joints_limit_reach(robot):
+    if not joints_limit_reach(robot):
         return None
     low, high = joint_limits(robot).copy()
     cranks = np.array([leg.joint.unit == "rad" for leg in robot.legs])
@@ -344,7 +344,7 @@ def _too_few(
     if sample.regular >= count:
         text = (
             f"only {total} of {sample.regular} random poses in reach of all legs keep the limits "
-            f"of {'joints' if _joints_limit_reach(robot) else 'passive joints'}: "
+            f"of {'joints' if joints_limit_reach(robot) else 'passive joints'}: "
             f"{_rarely_kept_limits_phrase(robot, sample.seen)}; widen these limits"
         )
     elif not (sample.reachable or total):
@@ -385,7 +385,7 @@ def _rarely_kept_limits_phrase(robot: Manipulator, poses: Array) -> str:
     """Return a list, as text, of the passive joints that rarely keep their limits at poses."""
     pose, machine = ca.SX.sym("pose", robot.freedom), Machine.numeric(robot)
     angles, *legs = passive_joints(machine, pose)
-    if _joints_limit_reach(robot):
+    if joints_limit_reach(robot):
         for leg, motion, leg_joints in zip(robot.legs, machine.state(pose).legs, legs, strict=True):
             if leg.limits is not None:
                 leg_joints.append(

@@ -120,7 +120,7 @@ class Guide:
 
     Attributes
     ----------
-    slides : bool
+    is_prismatic : bool
         Whether it is a slider's guide, and not a crank's circle.
     axis : array, shape (3,)
         Unit vector along which the slider moves, or about which the crank, or a ram, turns.
@@ -129,7 +129,7 @@ class Guide:
         that only turns the platform, and of a ram, where it is fixed, K = 1.
     """
 
-    slides: bool
+    is_prismatic: bool
     axis: Array
     path: Array
 
@@ -268,11 +268,11 @@ def joint_guides(robot: RobotLike, poses: PoseLike) -> tuple[Guide, ...]:
     points = joint_points(robot, array.reshape(-1, robot.freedom))
     guides = []
     for i, leg in enumerate(robot.legs):
-        coordinates, slides = points.coordinates[:, i], "p" in leg.bodies
+        coordinates, is_prismatic = points.coordinates[:, i], "p" in leg.bodies
         axis = np.array(leg.base_axis)
-        if not slides and not leg.goes_round:
+        if not is_prismatic and not leg.goes_round:
             path = points.links[i][0, :1]
-        elif slides:
+        elif is_prismatic:
             spare = _SPARE * leg.size
             limits = leg.limits or (coordinates.min() - spare, coordinates.max() + spare)
             path = np.array(leg.guide_point) + np.multiply.outer(np.array(limits), axis)
@@ -282,5 +282,5 @@ def joint_guides(robot: RobotLike, poses: PoseLike) -> tuple[Guide, ...]:
             center, end = points.links[i][0, :2]
             rotations = scipy.spatial.transform.Rotation.from_rotvec(np.outer(angles, axis))
             path = center + rotations.apply(end - center)
-        guides.append(Guide(slides, axis, path))
+        guides.append(Guide(is_prismatic, axis, path))
     return tuple(guides)

@@ -17,7 +17,7 @@ class PlatformJoint(NamedTuple):
 
     name: str
     """Name of its coordinate: one of the pose's, or a dependent one."""
-    slides: bool
+    is_prismatic: bool
     axis: Array
     """Unit vector (3,) where all coordinates are zero; joints before it move it."""
     values: Array

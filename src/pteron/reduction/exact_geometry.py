@@ -200,7 +200,7 @@ def _exact_leg(
     shift = np.array(leg.fixed_offset)
     if robot.platform.angles:
         shift = shift + np.array(robot.platform.center or (0.0, 0.0, 0.0))
-        x, y = notes.planar(f"s{i + 1}", *leg.platform_point[:2])
+        x, y = notes.plane_vector(f"s{i + 1}", *leg.platform_point[:2])
         s0 = (x, y, notes.length(f"s{i + 1}.z", leg.platform_point[2]))
     else:
         shift = shift + np.array(robot.platform.frame).T @ np.array(leg.platform_point)

@@ -171,7 +171,7 @@ def still_parts(robot: Manipulator, guides: Sequence[Guide], home: JointPoints) 
         "gravity": picture_points(robot, gravity / strength),
         "grid": grid_step(home, guides),
         "guides": [picture_points(robot, guide.path) for guide in guides],
-        "slides": [guide.slides for guide in guides],
+        "slides": [guide.is_prismatic for guide in guides],
         "directions": _plain(np.array([guide.axis for guide in guides]) @ view_frame(robot).T),
         "bars": [None if bar is None else picture_points(robot, APART * bar) for bar in home.bars],
         "rams": home.rams,

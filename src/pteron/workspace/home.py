@@ -283,7 +283,7 @@ def _starts(robot: Manipulator, candidates: Array) -> Array:
 
 def has_exact_home(robot: Manipulator) -> bool:
     """Return whether home is a pose of its own: named in the file, or level where it tilts."""
-    return robot.platform.tilts or robot.home is not None
+    return robot.home is not None or bool(_tilting_angles(robot).any())
 
 
 def _tilting_angles(robot: Manipulator) -> NDArray[np.bool_]:

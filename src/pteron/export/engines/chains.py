@@ -22,7 +22,7 @@ class LegStance:
 
     Attributes
     ----------
-    slides, carries : tuple
+    prismatic, carries : tuple
         For each joint before the cut: whether it slides, and the body it carries, by letter.
     axes, points : tuple of array, shape (3,)
         Axis, and a point on it, of each of these joints, m.
@@ -41,7 +41,7 @@ class LegStance:
         The place in the chain of the driven joint, if it is among them.
     """
 
-    slides: tuple[bool, ...]
+    prismatic: tuple[bool, ...]
     carries: tuple[str, ...]
     axes: tuple[Array, ...]
     points: tuple[Array, ...]

@@ -70,11 +70,11 @@ def _leg(home: LegStance, away: LegStance) -> list[Array]:
     count = len(away.end)
     turn, shift = np.broadcast_to(np.eye(3), (count, 3, 3)), np.zeros((count, 3))
     motions: list[Array] = []
-    for k, (slides, axis, point) in enumerate(
-        zip(home.slides, home.axes, home.points, strict=True)
+    for k, (is_prismatic, axis, point) in enumerate(
+        zip(home.prismatic, home.axes, home.points, strict=True)
     ):
         now = turn @ axis
-        if slides:
+        if is_prismatic:
             after, where = _next_point(home, k), _next_point(away, k)
             by = np.einsum("ki,ki->k", now, where - turn @ after - shift)
             shift = shift + by[:, None] * now

@@ -157,10 +157,10 @@ def _joints(platform: Platform, pose: Array) -> list[TreeJoint]:
     """Return the joints by which the platform moves, the tool's where its halves slide."""
     p, moved, joints = platform.placement(pose)[0], np.eye(4), []
     limits = platform.angle_limits
-    for name, slides, axis, value in platform_joints(platform, pose):
+    for name, is_prismatic, axis, value in platform_joints(platform, pose):
         axis = moved[:3, :3] @ axis
-        joint = TreeJoint(name, slides, axis, p, float(value), limits.get(name))
-        if not slides:
+        joint = TreeJoint(name, is_prismatic, axis, p, float(value), limits.get(name))
+        if not is_prismatic:
             moved = displacement(joint, float(value)) @ moved
         joints.append(joint)
     return joints

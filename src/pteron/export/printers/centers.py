@@ -33,7 +33,7 @@ class Center:
     radius: float
 
     @property
-    def slides(self) -> bool:
+    def is_prismatic(self) -> bool:
         """Whether it moves along a line."""
         return self.across is None
 
