@@ -8,10 +8,11 @@ import pytest
 import pteron
 from pteron.controllers import Controller
 from pteron.design import Change, Design
+from pteron.export.engines import TreeJoint
 from pteron.identification import FaultIsolation, Identification, Payload
 from pteron.indices import Elasticity, Stiffness
 from pteron.legs import LegKind
-from pteron.motion import Motor
+from pteron.motion import Guide, Motor
 from pteron.platforms import Platform
 from pteron.renamed import RENAMED, UNTIL
 from pteron.workspace import LimitedJoint, PoseMargins
@@ -64,6 +65,8 @@ def test_former_names_are_gone_when_their_release_is_over():
         (Platform, "turned", "map_vectors"),
         (LegKind, "under", "with_platform_frame"),
         (Stiffness, "along", "directional_stiffness"),
+        (Guide, "slides", "is_prismatic"),
+        (TreeJoint, "slides", "is_prismatic"),
         (Elasticity, "of_legs", "leg_springs"),
     ],
 )

@@ -14,6 +14,7 @@ from pteron.kinematics import inverse_kinematics
 from pteron.kinematics.evaluate import evaluate_kernel
 from pteron.legs import LegKind
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.renamed import former_attribute
 from pteron.shapes import PerJoint, PoseLike
 
 _SAME = 1e-9
@@ -132,6 +133,8 @@ class Guide:
     is_prismatic: bool
     axis: Array
     path: Array
+
+    slides = former_attribute("slides", "is_prismatic")
 
 
 def joint_points(robot: RobotLike, pose: PoseLike) -> JointPoints:

@@ -15,6 +15,7 @@ import numpy as np
 from pteron.kernels import Array
 from pteron.legs import Drive
 from pteron.manipulator import Manipulator
+from pteron.renamed import former_attribute
 
 BASE = -1
 """The parent of a body that hangs on the base."""
@@ -47,6 +48,8 @@ class TreeJoint:
     home: float = 0.0
     limits: tuple[float, float] | None = None
     follows: tuple[str, float] | None = None
+
+    slides = former_attribute("slides", "is_prismatic")
 
 
 @dataclass(frozen=True)
