@@ -147,16 +147,16 @@ class LegKind(ABC):
             object.__setattr__(self, name, field_value)
 
     @classmethod
-    def check_fields(cls, given: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:
+    def check_fields(cls, fields: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:
         """Return the valid fields, converted, and the faults of the others; see `sound_fields`."""
-        return sound_fields(given, cls.every_key(), cls.conditions, cls.branches)
+        return sound_fields(fields, cls.every_key(), cls.conditions, cls.branches)
 
     @classmethod
     @cache
     def every_key(cls) -> dict[str, Key]:
         """Return all its keys, in the order of files and pages."""
         roles, keys = get_args(KeyRole), {**COMMON, **cls.keys}
-        return dict(sorted(keys.items(), key=lambda entry: roles.index(entry[1].role)))
+        return dict(sorted(keys.items(), key=lambda named_key: roles.index(named_key[1].role)))
 
     @property
     def bodies(self) -> dict[str, Inertia]:
@@ -344,10 +344,10 @@ class LegKind(ABC):
         """The length that its reach is relative to, m."""
         return sum(float(q.value[0]) for q in self.quantities if q.role == "length")
 
-    def passive(self, motion: LegMotion, still: Expression, turned: Expression) -> list[Passive]:
+    def passive(self, motion: LegMotion, zero_axes: Expression, axes: Expression) -> list[Passive]:
         """Return its passive joints that have limits.
 
-        The platform's axes are the columns (3, 3) of `turned`, and of `still` at phi = 0.
+        The columns (3, 3) of `axes` are the platform's axes, of `zero_axes` at phi = 0.
         """
         return []
 

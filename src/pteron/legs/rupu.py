@@ -114,7 +114,7 @@ class RUPU(LegKind):
     def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
         return (1, 0, 0), (0, 1, 0), (0, 0, 1)
 
-    def passive(self, motion: LegMotion, still: Expression, turned: Expression) -> list[Passive]:
+    def passive(self, motion: LegMotion, zero_axes: Expression, axes: Expression) -> list[Passive]:
         return joint_limit("shaft", "m", ca.norm_2(motion.links[1]), self.travel, 1.0)
 
     def doubts(self, axis: Vector | None) -> Iterator[str]:

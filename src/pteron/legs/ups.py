@@ -85,12 +85,12 @@ class UPS(RamLeg):
     def base_axis(self) -> Vector | None:
         return self.direction
 
-    def passive(self, motion: LegMotion, still: Expression, turned: Expression) -> list[Passive]:
+    def passive(self, motion: LegMotion, zero_axes: Expression, axes: Expression) -> list[Passive]:
         (_, way), length = motion.links, self.limits[1]
         assert way is not None
         return [
             *cone_limit("ram at the base", self.base_cone, ca.SX.eye(3), way, length),
-            *cone_limit("ram at the platform", self.platform_cone, turned, -way, length),
+            *cone_limit("ram at the platform", self.platform_cone, axes, -way, length),
         ]
 
     def rod_couple(self, motion: LegMotion) -> Expression:

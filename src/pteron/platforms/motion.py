@@ -163,10 +163,10 @@ class PlatformEquations(ABC):
         frame: Sequence[Expression],
         platform_points: Sequence[Expression],
         fixed_offsets: Sequence[Expression],
-        more: Mapping[str, Any] | None = None,
+        quantities: Mapping[str, Any] | None = None,
     ) -> None:
         self.frame, self.points, self.fixed = frame, platform_points, fixed_offsets
-        self.more = more or {}
+        self.quantities = quantities or {}
         self.offsets = [
             self.offset(s, t) for s, t in zip(platform_points, fixed_offsets, strict=True)
         ]

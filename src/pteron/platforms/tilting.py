@@ -132,7 +132,9 @@ class Tilting(PlatformEquations):
     ) -> tuple[PlatformEquations, Expression] | None:
         if "x" not in self.coordinates:
             return None
-        in_own_frame = type(self)(ca.horzsplit(ca.SX.eye(3)), self.points, self.fixed, self.more)
+        in_own_frame = type(self)(
+            ca.horzsplit(ca.SX.eye(3)), self.points, self.fixed, self.quantities
+        )
         in_own_frame.based, zero = self, ca.SX.zeros(len(self.coordinates))
         return in_own_frame, self.rotation_in_own_axes(pose, zero, zero)[0].T
 
@@ -250,7 +252,7 @@ class _Centred(Tilting):
     ) -> PlatformMotion:
         turned = self.pose_rotation(pose, velocity, acceleration)
         zero = ca.SX(3, 1)
-        place = PointMotion(self.more["center"], zero, zero)
+        place = PointMotion(self.quantities["center"], zero, zero)
         return self.assemble_motion(place, turned, *self.basis(turned))
 
     def basis(self, turned: Rotation) -> tuple[Expression, Expression | None]:
@@ -280,7 +282,7 @@ class Universal(_Centred):
     order = ("alpha", "beta")
 
     def turn_axes(self) -> list[Expression]:
-        return [self.more["first_axis"], self.more["second_axis"]]
+        return [self.quantities["first_axis"], self.quantities["second_axis"]]
 
     def basis(self, turned: Rotation) -> tuple[Expression, Expression | None]:
         return ca.vertcat(ca.SX(3, 2), turned.axes), None

@@ -32,7 +32,7 @@ class Tripod(Tilting):
 
     def __init__(self, *arguments: Any) -> None:
         super().__init__(*arguments)
-        self.planes: Sequence[HeldPlane] = self.more["planes"]
+        self.planes: Sequence[HeldPlane] = self.quantities["planes"]
         k = self.frame[2]
         normals = [plane.normal for plane in self.planes]
         pairs = [(1, 2), (2, 0), (0, 1)]
@@ -54,7 +54,7 @@ class Tripod(Tilting):
             a, b = a + weight * ca.dot(n, u), b - weight * ca.dot(ca.cross(n, u), k)
             c = c + weight * ca.dot(n, r)
         square = a * a + b * b
-        root = self.more["side"] * ca.sqrt(square - c * c)
+        root = self.quantities["side"] * ca.sqrt(square - c * c)
         return (a * c + b * root) / square, (b * c - a * root) / square
 
     def motion(
