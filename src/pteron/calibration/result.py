@@ -232,7 +232,7 @@ class Calibration:
             "values": values,
             **fields_as_json(self.fit.guess, "zeros scales"),
             "noise": self.noise,
-            **fields_as_json(self.observability, "rank shown columns"),
+            **fields_as_json(self.observability, "rank shown=determined_count columns"),
             "certificate": self.observability.summary(),
             **fields_as_json(self.observability, "unseen weak"),
             **fields_as_json(self, "held_out findings verdict open_errors hidden_order"),

@@ -254,7 +254,7 @@ class Identification:
             "machine": machine_record(self.robot),
             **fields_as_json(self, "verdict"),
             "expressions": [*expressions],
-            **fields_as_json(self.model, "kinds left_out"),
+            **fields_as_json(self.model, "kinds left_out=merged_terms"),
             "base_parameters": {
                 "names": list(base.names),
                 "expressions": list(base.expressions(digits=12)),
