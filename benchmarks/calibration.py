@@ -60,7 +60,7 @@ class Twin:
     def measured(self, part: slice) -> Measurements:
         """Return the measurements of some rows: whole poses with noise."""
         robot, poses = self.robot, self.poses[part]
-        place, axes = self.truth.robot.platform.at(poses)
+        place, axes = self.truth.robot.platform.placement(poses)
         tool = place + np.einsum("nij,i->nj", axes, self.truth.marks[""])
         seen = [name in robot.coordinates for name in "xyz"]
         lengths = int((~robot.platform.angular).sum())

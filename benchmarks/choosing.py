@@ -144,8 +144,8 @@ def random_poses(job: Job, robot: Manipulator, one: Candidate, rng: np.random.Ge
 
 def carried(robot: Manipulator, one: Candidate, places: Array) -> Array:
     """Return poses from places of the tool about the middle, and angles."""
-    _, axes = robot.platform.at(places)
-    _, upright = robot.platform.at(np.zeros((1, robot.freedom)))
+    _, axes = robot.platform.placement(places)
+    _, upright = robot.platform.placement(np.zeros((1, robot.freedom)))
     tool = np.array(robot.platform.tool)
     found = np.array(one.middle) + places
     found[:, :3] -= tool @ axes - tool @ upright

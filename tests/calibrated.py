@@ -38,7 +38,7 @@ def printer(radius, arm, angles=(210.0, 330.0, 90.0)):
 
 def tool_places(robot, poses, tool):
     """Return the tool (N, 3) as logs count it; NaN where the pose has no such coordinate."""
-    place, axes = robot.platform.at(poses)
+    place, axes = robot.platform.placement(poses)
     point = place + np.einsum("nij,i->nj", axes, tool)
     if int((~robot.platform.angular).sum()) not in (0, 3):
         point = point @ np.array(robot.platform.frame).T

@@ -245,7 +245,9 @@ def _drawn_machine(rng, name, kinds):
             pteron.platforms.Bar(rng.uniform(0.1, 0.3), (*rng.uniform(-0.06, 0.06, 2), 0.0))
             for _ in range(2)
         ]
-        parts["geared"] = [pteron.platforms.Geared(rng.uniform(1e-5, 1e-4), rng.uniform(-6.0, 6.0))]
+        parts["geared"] = [
+            pteron.platforms.GearedPart(rng.uniform(1e-5, 1e-4), rng.uniform(-6.0, 6.0))
+        ]
     platform = pteron.platforms.Platform(motion, inertia(rng, 0.08), axis, x_axis, slides, **parts)
     return pteron.Manipulator(name, platform, tuple(legs), 9.81 * unit(rng))
 

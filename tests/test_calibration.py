@@ -350,7 +350,7 @@ def test_rows_that_a_fault_explains_are_not_listed_one_by_one():
 def test_an_instrument_and_a_mark_that_moved_are_told_apart_where_the_platform_turns():
     robot = pteron.load("quadrupteron")
     given, step = measured(robot), np.array([0.0, 4e-4, 3e-4])
-    turns = robot.platform.at(off_drawing(robot)[2])[1][33:]
+    turns = robot.platform.placement(off_drawing(robot)[2])[1][33:]
     for moved, words in ((step, "The instrument moved"), (step @ turns, "The mark tool moved")):
         positions = given.positions.copy()
         positions[33:] += moved

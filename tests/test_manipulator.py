@@ -681,7 +681,7 @@ def test_parameters_stand_in_the_papers_order(name):
             moments = dict(zip(("mgx", "mgy"), body.first_moment, strict=False))
             values = {"m": body.mass, **moments, "I": body.inertia}
             expected |= {f"{kind}_{letter}{i}": value for kind, value in values.items()}
-    body = robot.platform.joined
+    body = robot.platform.total_inertia
     platform = body.mass, *body.first_moment, body.inertia
     expected |= zip(("m_e", "mgx_e", "mgy_e", "I_e"), platform, strict=True)
     assert pteron.parameter_names(robot) == tuple(expected)
@@ -701,7 +701,7 @@ def test_parameters_stand_in_the_papers_order(name):
 def test_with_parameters_gives_the_same_machine_back(name):
     robot = MECHANISMS[name]
     # Parameters tell the platform as a whole, not its bars and geared parts.
-    whole = replace(robot, platform=robot.platform.with_joined(robot.platform.joined))
+    whole = replace(robot, platform=robot.platform.with_total_inertia(robot.platform.total_inertia))
     values = pteron.parameters(robot)
     assert pteron.with_parameters(robot, values) == whole
     doubled = pteron.with_parameters(robot, 2 * values)

@@ -238,7 +238,7 @@ def test_controllers_logs_are_found_by_their_contents(tmp_path, name):
 def test_a_linuxcnc_of_a_hexapod_has_angles_and_its_tool(tmp_path):
     robot = pteron.load("stewart")
     pose = random_poses(robot, 1, seed=1)[0]
-    place, turn = robot.platform.at(pose)
+    place, turn = robot.platform.placement(pose)
     tool = 1e3 * (place + np.array(robot.platform.tool) @ turn)
     line = " ".join(f"{v:.9f}" for v in (*tool, *np.degrees(pose[3:]), 0.0, 0.0, 0.0))
     found = read_measurements(robot, written(tmp_path, line + "\n", name="probe.log"))

@@ -376,7 +376,7 @@ def test_the_platforms_inertia_is_told_with_all_its_parts():
     assert len(names) == 2 + len(own.bars) + len(own.geared)
     parts = [values.get("m", 0.0) for _, values in rows[:-1]]
     assert rows[-1][1]["m"] == pytest.approx(sum(parts))
-    assert rows[-1][1]["I"] == own.joined.inertia
+    assert rows[-1][1]["I"] == own.total_inertia.inertia
     assert [name for name, leg, _ in bodies(MACHINES["delta"]) if leg is None] == ["platform"]
 
 

@@ -40,7 +40,7 @@ GIVEN = {"sensors": Sensors(1e-6), "delay": 5e-4, "duration": 0.05}
 IN_THE_LOOP = ("five-bar", "quadrupteron", "delta", "par4", "stewart", "3-rrr")
 
 LAWS = {
-    one.what: one
+    one.law_name: one
     for one in (PDGravity(), FeedForwardPD(), ComputedTorque(), Adaptive(friction=True))
 }
 

@@ -240,7 +240,7 @@ def test_every_machine_is_pushed_by_a_spring_and_stays_where_it_may_be(name):
     session = Session(robot)
     session.begin_push("off: no force")
     push = session.push
-    place, _ = robot.platform.at(session.home)
+    place, _ = robot.platform.placement(session.home)
     rng = np.random.default_rng(0)
     for _ in range(3):
         push.pull(push.spring[0] if push.spring else place, place + rng.normal(size=3))
@@ -258,7 +258,7 @@ def test_a_damped_spring_only_takes_energy_and_the_free_machine_falls_as_simulat
     free = simulate(robot, start=(home, np.zeros(2)), duration=0.048)
     push.go(0.048)
     np.testing.assert_allclose(push.pose, free.pose[-1], atol=1e-9)
-    place, _ = robot.platform.at(push.pose)
+    place, _ = robot.platform.placement(push.pose)
     push.pull(place, place + np.array([0.03, 0.02, 0.0]))
 
     def energy():
@@ -284,7 +284,7 @@ def test_a_spring_lifts_a_small_machine_that_has_fallen():
     assert activity_text(session) == "Drives off: it falls. Pull at its platform."
     fallen = session.state.pose[0]
     assert fallen < session.home[0] - 0.02
-    place, _ = session.state.robot.platform.at(session.state.pose)
+    place, _ = session.state.robot.platform.placement(session.state.pose)
     session.push.pull(place, place + np.array([0.0, 0.0, 0.1]))
     for _ in range(20):
         session.advance(1.0 / 30.0)
@@ -462,10 +462,10 @@ def test_a_drag_moves_or_turns_the_platform(homes):
     session.drag(0, np.array([0.01 + np.cos(0.3), 0.02 + np.sin(0.3), 0.03]))
     assert session.state.pose[3] == pytest.approx(0.3, abs=1e-12)
     tilting = Session(pteron.load("ankle"))
-    axes = tilting.state.robot.platform.at(tilting.home)[1]
-    place = tilting.state.robot.platform.at(tilting.home)[0]
+    axes = tilting.state.robot.platform.placement(tilting.home)[1]
+    place = tilting.state.robot.platform.placement(tilting.home)[0]
     tilting.drag(2, place + axes[2] + 0.1 * axes[0])
-    turned = tilting.state.robot.platform.at(tilting.state.pose)[1]
+    turned = tilting.state.robot.platform.placement(tilting.state.pose)[1]
     assert turned[2] @ axes[0] == pytest.approx(np.sin(np.arctan(0.1)), abs=1e-9)
 
 

@@ -20,7 +20,7 @@ _MOVED = {
     ),
     "legs": "PRR PRRR PSS RPR RRR RSS RUPU Cone Drive Leg Stribeck",
     "manipulator": "Radii parameter_data parameter_units",
-    "platforms": "Bar Geared Platform",
+    "platforms": "Bar Platform",
     "reduction": "BaseParameters cheapest_parameters",
 }
 """Names that stood in `pteron` itself, by the package that has them."""
@@ -30,6 +30,18 @@ RENAMED = {
         name: f"pteron.{package}.{name}"
         for package, names in _MOVED.items()
         for name in names.split()
+    }
+    | {"Geared": "pteron.platforms.GearedPart"},
+    "pteron.platforms": {"Geared": "pteron.platforms.GearedPart"},
+    "pteron.legs.kind": {
+        "Quantity": "pteron.legs.kind.LegQuantity",
+        "Transfer": "pteron.legs.kind.LegTransfer",
+    },
+    "pteron.legs.leg": {
+        "Plane": "pteron.legs.leg.PlaneLocus",
+        "Sphere": "pteron.legs.leg.SphereLocus",
+        "Circle": "pteron.legs.leg.CircleLocus",
+        "Turned": "pteron.legs.leg.AngleLocus",
     },
     "pteron.design": {"Told": "pteron.design.ReportedDesign"},
     "pteron.export.engines": {"Motor": "pteron.export.engines.TreeMotor"},
@@ -159,3 +171,22 @@ def former_attribute(former: str, present: str) -> property:
         return getattr(own, present)
 
     return property(attribute)
+
+
+def adopt_former_methods(owner: type, **former: str) -> None:
+    """Take over methods that a subclass of a user defines under former names, with a warning.
+
+    Parameters
+    ----------
+    owner : type
+        The subclass, in its base's ``__init_subclass__``.
+    **former : str
+        Present names, by former ones.
+    """
+    for name in vars(owner).keys() & former.keys():
+        warnings.warn(
+            f"{owner.__name__}.{name} goes with version {UNTIL}; define {former[name]} instead",
+            DeprecationWarning,
+            stacklevel=3,
+        )
+        setattr(owner, former[name], vars(owner)[name])

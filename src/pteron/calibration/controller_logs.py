@@ -303,7 +303,7 @@ def _touched_heights(robot: Manipulator, touched: Sequence[_Touch]) -> Measureme
     poses = np.array(
         [[touch.at.get(axis.letter, 0.0) / axis.scale for axis in axes] for touch in touched]
     )
-    tool = np.einsum("i,nij->nj", np.array(platform.tool), platform.at(poses)[1])
+    tool = np.einsum("i,nij->nj", np.array(platform.tool), platform.placement(poses)[1])
     poses[:, ~platform.angular] -= tool @ platform.directions.T
     joints = inverse_kinematics(robot, poses, on_failure="nan")
     lost = np.isnan(joints).any(axis=-1)

@@ -99,7 +99,7 @@ class Guess:
 
     def points(self, marks: Sequence[str], poses: Array) -> Array:
         """Return where each row's mark is (N, 3) at its pose, in the base frame, m."""
-        place, axes = self.robot.platform.at(poses)
+        place, axes = self.robot.platform.placement(poses)
         return np.asarray(place + np.einsum("nij,ni->nj", axes, self.mark_points(marks)))
 
     def apply_step(self, blocks: Sequence[UnknownBlock], step: Array) -> Guess:

@@ -178,7 +178,7 @@ def plan(
         poses[:, _upright(robot)] = home[_upright(robot)]
         poses[:, robot.platform.angular] = home[robot.platform.angular]
     if measure == "distances" and not setup.anchors:
-        place = robot.platform.at(home[None])[0][0] - [0.0, 0.0, robot.legs[0].size]
+        place = robot.platform.placement(home[None])[0][0] - [0.0, 0.0, robot.legs[0].size]
         setup = replace(setup, anchors={TOOL: Place(tuple(place.tolist()), known=False)})
     measurements = _ideal_measurements(drawn, poses, measure, setup)
     blocks = blocks_of(robot, measurements, free, prior)

@@ -246,7 +246,7 @@ def _show(robot: Manipulator, findings: dict[str, Any]) -> None:
     angles = ", ".join(f"{math.degrees(angle):.4g}" for angle in findings["singular_orientations"])
     where = "" if findings["singular_at_every_position"] or not angles else " at the home position"
     singular = [f"Singular orientations{where}: {f'{angles} deg' if angles else 'none'}"]
-    singular = singular if robot.platform.angles and not robot.platform.tilts else []
+    singular = singular if robot.platform.axis_angle else []
     tool = [f"Tool: {_vector(findings['tool'])} m from P, in the platform frame"]
     tool = tool if any(findings["tool"]) else []
     work = "[green]Fine: the file is valid. This machine can work.[/green]"

@@ -20,8 +20,8 @@ def misfits(spec: Spec, robot: Manipulator) -> Iterator[str]:
     """Yield the faults for which a search does not suit its machine."""
     if spec.pose is not None and len(spec.pose) != robot.freedom:
         yield f"pose: {len(spec.pose)} numbers given, {' '.join(robot.coordinates)} expected"
-    if spec.angles is not None and len(robot.platform.angles) != 1:
-        turns = "tilts: give its orientation in pose" if robot.platform.tilts else "does not turn"
+    if spec.angles is not None and robot.platform.axis_angle is None:
+        turns = "tilts: give its orientation in pose" if robot.platform.angles else "does not turn"
         yield f"angles: given, but the platform of {robot.name} {turns}; leave it out"
     lengths = robot.platform.lengths
     count = spec.workspace and spec.workspace.lengths

@@ -172,7 +172,7 @@ def _arms(machine: Machine, state: State) -> Iterator[Segment]:
         hinge = point.position - ca.SX(list(leg.fixed_offset))
         ends = [p, hinge, point.position]
         offsets = [leg.platform_point, leg.fixed_offset]
-        if not state.platform.rotation.turns and not robot.platform.slides:
+        if not robot.platform.angles:
             total = tuple(a + b for a, b in zip(*offsets, strict=True))
             ends, offsets = [p, point.position], [total]
         for k, offset in enumerate(offsets):

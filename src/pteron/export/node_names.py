@@ -89,7 +89,7 @@ def _motion(machine: Machine, pose: Expression, *rates: Expression) -> Iterator[
     for i, (equations, leg, point) in enumerate(
         zip(machine.legs, state.legs, platform.points, strict=True), start=1
     ):
-        quantities = equations.named(point, platform.rotation) | {
+        quantities = equations.exported_terms(point, platform.rotation) | {
             "l_u": leg.links[0],
             "l_l": leg.links[1],
             "joint": leg.coordinate,

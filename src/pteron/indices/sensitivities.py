@@ -123,7 +123,7 @@ def _slopes(robot: Manipulator) -> ca.Function:
 
 def tool_arm(robot: Manipulator, poses: Array) -> Array:
     """Return the vector (..., 3) from P to the tool's centre point, base frame."""
-    _, axes = robot.platform.at(poses)
+    _, axes = robot.platform.placement(poses)
     return np.asarray(np.array(robot.platform.tool) @ axes)
 
 
@@ -133,7 +133,7 @@ def tool_pose_changes(robot: Manipulator, poses: Array, errors: Array) -> Array:
         return errors
     platform, turning = robot.platform, robot.platform.angular
     arm = tool_arm(robot, poses)
-    if platform.tilts:
+    if platform.axis_angle is None:
         turns = twist(robot, poses[..., None, :], np.eye(robot.freedom))[..., 3:]
         levers = np.cross(turns, arm[..., None, :]) @ platform.directions.T
     else:
@@ -150,7 +150,7 @@ _Dimension = tuple[str, str, str, Array]
 def _dimensions(robot: Manipulator) -> Iterator[_Dimension]:
     """Yield name, role, unit and d geometry of every dimension; `numbers` has the order."""
     size, start = len(numbers(robot)), 0
-    per_radian = "m/rad" if robot.platform.slides else "m"
+    point_unit = robot.platform.kind.point_unit
     for i, leg in enumerate(robot.legs, start=1):
         starts: dict[str, int] = {}
         for quantity in leg.quantities:
@@ -165,7 +165,7 @@ def _dimensions(robot: Manipulator) -> Iterator[_Dimension]:
                 direction[starts[key] : starts[key] + len(change)] = change
             unit = "rad" if role == "angle" else "m"
             if name.startswith("platform_point"):
-                unit = per_radian
+                unit = point_unit
             yield f"leg {i}: {name}", role, unit, direction
     yield from _platform_dimensions(robot)
 

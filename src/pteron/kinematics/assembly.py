@@ -115,7 +115,7 @@ def _poses(robot: Manipulator, joints: Array, most: int) -> Array:
     which, points, phi = _points(_rows_at(rows[which], phi, slides), which, phi)
     starts = np.column_stack([origin[which] + size[which, None] * points, phi])
     which, poses, residuals = _refine_poses(robot, joints, which, starts)
-    around = robot.platform.angular & (not slides)
+    around = robot.platform.angular & bool(robot.platform.rotation_axes)
     poses[:, around] = wrap_angle(poses[:, around])
     same = _are_duplicates(robot, joints, which, poses, residuals, size)
     which, poses = which[~same], poses[~same]
@@ -257,7 +257,7 @@ def _are_duplicates(
     for back in range(1, int(count.max(initial=0)) + 1):
         later = np.flatnonzero(count >= back)
         difference = poses[later] - poses[later - back]
-        if not robot.platform.slides:
+        if robot.platform.rotation_axes:
             difference[:, -1] = wrap_angle(difference[:, -1])
         units = np.ones_like(difference)
         units[:, :-1] = size[which[later], None]

@@ -58,7 +58,7 @@ def position_of(robot: RobotLike, pose: PoseLike) -> Vectors:
     array([0.  , 0.  , 0.12])
     """
     robot = as_manipulator(robot)
-    return robot.platform.at(finite_rows(robot, pose, "pose"))[0]
+    return robot.platform.placement(finite_rows(robot, pose, "pose"))[0]
 
 
 def rotation_of(robot: RobotLike, pose: PoseLike, *, form: RotationForm = "matrix") -> Array:
@@ -89,7 +89,7 @@ def rotation_of(robot: RobotLike, pose: PoseLike, *, form: RotationForm = "matri
     """
     robot = as_manipulator(robot)
     _expect_form(form)
-    matrix = np.swapaxes(robot.platform.at(finite_rows(robot, pose, "pose"))[1], -1, -2)
+    matrix = np.swapaxes(robot.platform.placement(finite_rows(robot, pose, "pose"))[1], -1, -2)
     if form == "matrix":
         return np.ascontiguousarray(matrix)
     if form == "tilt-torsion":
@@ -152,7 +152,7 @@ def pose_of(
     skewed = np.abs(np.swapaxes(matrix, -1, -2) @ matrix - np.eye(3)).max(axis=(-1, -2))
     skewed = np.where(np.linalg.det(matrix) > 0.0, skewed, np.inf)
     pose = nearest_pose(robot.platform, positions, matrix)
-    nearest_position, axes = robot.platform.at(pose)
+    nearest_position, axes = robot.platform.placement(pose)
     distance = np.linalg.norm(nearest_position - positions, axis=-1)
     turned = np.linalg.norm(axes @ matrix - np.eye(3), axis=(-1, -2)) / np.sqrt(2.0)
     good = (skewed <= _ROUNDING) & (distance <= _ROUNDING) & (turned <= _ROUNDING)

@@ -127,7 +127,7 @@ def singular_orientations(robot: RobotLike, position: ArrayLike | None = None) -
         a, b = (float(coefficient) for coefficient in orientation)
         angle = np.arctan2(b, a) + np.pi / 2
         return np.sort(_wrap_angles(np.array([angle, angle - np.pi])))
-    if position_array is None or not robot.platform.angles or robot.platform.tilts:
+    if position_array is None or robot.platform.axis_angle is None:
         return np.empty(0)
     return _sign_changes(robot, position_array)
 
@@ -142,7 +142,7 @@ def _sign_changes(robot: Manipulator, position: Array) -> Array:
 
     # Round angles, where many machines are singular, lie between the samples. The last is the first
     # again, but for a platform that slides.
-    count = _ANGLES if robot.platform.slides else _ANGLES + 1
+    count = _ANGLES + bool(robot.platform.rotation_axes)
     angles = np.pi * ((2.0 * np.arange(count) + 1.0) / _ANGLES - 1.0)
     measures = measure(angles)
     negative, known = measures < 0.0, ~np.isnan(measures)

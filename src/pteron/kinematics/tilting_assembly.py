@@ -72,7 +72,7 @@ def tilting_poses(
     place = size[which, None] * place + base[which] - turned @ top
     rotation = turned @ frame.T
     poses = nearest_pose(platform, place, rotation)
-    positions, axes = platform.at(poses)
+    positions, axes = platform.placement(poses)
     distance = np.abs(positions - place).max(axis=-1) / size[which]
     distance += np.abs(np.swapaxes(axes, -1, -2) - rotation).max(axis=(-2, -1))
     own_side = distance < _ANOTHER

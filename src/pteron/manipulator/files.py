@@ -21,7 +21,7 @@ from pteron.manipulator.machine_warnings import machine_warnings
 from pteron.manipulator.manipulator import Manipulator, faults_of
 from pteron.manipulator.radii import Radii
 from pteron.manipulator.tool import Tool
-from pteron.platforms import Bar, Geared, Platform
+from pteron.platforms import Bar, GearedPart, Platform
 from pteron.platforms.kinds import TILTING
 from pteron.toml import fault_lines, joined_faults, parsed_toml, toml_bytes
 
@@ -334,7 +334,9 @@ class _FileReader:
             required |= {"center": table.center, "second_axis": table.second_axis}
         else:
             optional["bars"] = tuple(self.parts("platform.bars", table.bars or [], Bar))
-            optional["geared"] = tuple(self.parts("platform.geared", table.geared or [], Geared))
+            optional["geared"] = tuple(
+                self.parts("platform.geared", table.geared or [], GearedPart)
+            )
             required["slides"] = bool(table.slides)
             if table.motion is None or table.axis is None:
                 return None

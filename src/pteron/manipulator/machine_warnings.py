@@ -59,7 +59,8 @@ def machine_warnings(robot: Manipulator, *, bodies: bool = True) -> tuple[str, .
     warnings = _millimetre_warnings(long_lengths)
     if hypot(*robot.gravity) > _PULL:
         warnings.append(f"gravity: {hypot(*robot.gravity):g} m/s^2: is that mm/s^2?")
-    turn, most = ("half a turn", pi) if platform.tilts else ("a turn", 2.0 * pi)
+    most = 2.0 * platform.angle_range
+    turn = "a turn" if most > pi else "half a turn"
     warnings += [
         f"platform: limits: {list(limits)} rad, more than {turn} from {angle} = 0: are these "
         "degrees?"
@@ -90,7 +91,7 @@ def machine_warnings(robot: Manipulator, *, bodies: bool = True) -> tuple[str, .
 def _beside_the_pin(robot: Manipulator) -> Iterator[str]:
     """Yield what stands beside the pin where both legs of a five-bar meet."""
     platform = robot.platform
-    if platform.tilts:
+    if platform.plane_normal is None:
         return
     axes = unheld_axes(platform, robot.legs)
     if len(axes) != 1:
@@ -203,17 +204,17 @@ def _leg_warnings(leg: LegKind, platform: Platform, bodies: bool) -> Iterator[st
         yield f"limits: {list(leg.limits)} rad: are these degrees?"
     for letter, (key, low, high, _) in leg.extents.items() if bodies else ():
         body: Any = leg.bodies[letter]
-        if text := leg.beyond_ends(letter, body.center_of_mass[0]):
+        if text := leg.center_of_mass_warning(letter, body.center_of_mass[0]):
             yield f"{key}: center_of_mass: {text}"
         length = high - low
         thick = sqrt(4.0 * body.mass / (pi * _STEEL * length))
         if body.mass > _DENSE * length:
             yield f"{key}: mass: {body.mass:g} kg on {length:g} m: is it in grams?"
-        elif thick > STOUT_LINK * length and body.mass > platform.joined.mass:
+        elif thick > STOUT_LINK * length and body.mass > platform.total_inertia.mass:
             yield (
                 f"{key}: mass: {body.mass:g} kg on {length:g} m, more than the platform's "
-                f"{platform.joined.mass:g} kg: solid steel {1e3 * thick:.0f} mm thick: is it this "
-                "machine's?"
+                f"{platform.total_inertia.mass:g} kg: solid steel {1e3 * thick:.0f} mm thick: is "
+                "it this machine's?"
             )
         yield from (f"{key}: {text}" for text in _inertia_warnings(body, high - low))
 
@@ -272,7 +273,7 @@ def _size_warnings(platform: Platform, radius: float) -> Iterator[str]:
             )
     for i, part in enumerate(platform.geared, start=1):
         joined = part.ratio**2 * part.inertia
-        away = sqrt(joined / platform.joined.mass)
+        away = sqrt(joined / platform.total_inertia.mass)
         if away > 3.0 * size:
             yield (
                 f"geared item {i}: {part.ratio:g}^2 times {part.inertia:g} kg m^2 is the "

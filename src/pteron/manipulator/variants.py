@@ -87,8 +87,8 @@ def turned(robot: RobotLike, rotation: ArrayLike, *, gravity: bool = True) -> Ma
 
     # A 2R platform's frame is the base frame at angles zero.
     on_platform = robot.platform.second_axis is not None
-    legs = tuple(leg.turned(turn, platform=on_platform) for leg in robot.legs)
-    platform, home = robot.platform.turned(turn), robot.home
+    legs = tuple(leg.map_vectors(turn, platform=on_platform) for leg in robot.legs)
+    platform, home = robot.platform.map_vectors(turn), robot.home
     if home is not None:
         count = len(platform.lengths)
         place = matrix @ (np.array(home[:count]) @ robot.platform.directions)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from itertools import product
-from math import isfinite, pi, prod
+from math import isfinite, prod
 from numbers import Integral
 from sys import float_info
 from typing import Any, Self
@@ -272,7 +272,7 @@ def pose_grid(
     free = [name for name in varying_names if name not in spans]
     angles = [name for name in free if name in robot.platform.angles]
     moved = [name for name in free if name not in angles]
-    most = pi / 2.0 if robot.platform.tilts else pi
+    most = robot.platform.angle_range
     spans |= {name: robot.platform.angle_limits.get(name, (-most, most)) for name in angles}
     if moved:
         box = _box(robot, pose, spans)

@@ -158,7 +158,7 @@ def cue(
         no steps keep it in the box.
     """
     robot = as_manipulator(robot)
-    if robot.platform.motion != "3T3R":
+    if not robot.platform.moves_freely:
         raise ModelError(
             f"a {robot.platform.motion} platform shows no vehicle's motion, which has six "
             "coordinates; take a 3T3R one",

@@ -14,6 +14,7 @@ from pteron.kinematics import inverse_kinematics
 from pteron.kinematics.evaluate import evaluate_kernel
 from pteron.legs import LegKind
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.renamed import former_attribute
 from pteron.shapes import PerJoint, PoseLike
 
 _SAME = 1e-9
@@ -120,7 +121,7 @@ class Guide:
 
     Attributes
     ----------
-    slides : bool
+    is_prismatic : bool
         Whether it is a slider's guide, and not a crank's circle.
     axis : array, shape (3,)
         Unit vector along which the slider moves, or about which the crank, or a ram, turns.
@@ -129,9 +130,11 @@ class Guide:
         that only turns the platform, and of a ram, where it is fixed, K = 1.
     """
 
-    slides: bool
+    is_prismatic: bool
     axis: Array
     path: Array
+
+    slides = former_attribute("slides", "is_prismatic")
 
 
 def joint_points(robot: RobotLike, pose: PoseLike) -> JointPoints:
@@ -168,7 +171,7 @@ def joint_points(robot: RobotLike, pose: PoseLike) -> JointPoints:
     coordinates = inverse_kinematics(robot, poses)
     chain: Array = evaluate_kernel(robot, "joint_points", "raise", poses)
     points: Array = evaluate_kernel(robot, "platform_points", "raise", poses)
-    p, axes = robot.platform.at(poses)
+    p, axes = robot.platform.placement(poses)
     links = tuple(
         _links(leg, chain[..., i, :, :], coordinates[..., i], points[..., i, :])
         for i, leg in enumerate(robot.legs)
@@ -183,7 +186,7 @@ def joint_points(robot: RobotLike, pose: PoseLike) -> JointPoints:
         axes,
         coordinates,
         tuple(None if leg.bar is None else np.array(leg.bar) for leg in robot.legs),
-        robot.platform.directions if robot.platform.planar else None,
+        None if robot.platform.plane_normal is None else robot.platform.directions,
         tuple(leg.cylinder is not None for leg in robot.legs),
     )
 
@@ -268,11 +271,11 @@ def joint_guides(robot: RobotLike, poses: PoseLike) -> tuple[Guide, ...]:
     points = joint_points(robot, array.reshape(-1, robot.freedom))
     guides = []
     for i, leg in enumerate(robot.legs):
-        coordinates, slides = points.coordinates[:, i], "p" in leg.bodies
+        coordinates, is_prismatic = points.coordinates[:, i], "p" in leg.bodies
         axis = np.array(leg.base_axis)
-        if not slides and not leg.goes_round:
+        if not is_prismatic and not leg.goes_round:
             path = points.links[i][0, :1]
-        elif slides:
+        elif is_prismatic:
             spare = _SPARE * leg.size
             limits = leg.limits or (coordinates.min() - spare, coordinates.max() + spare)
             path = np.array(leg.guide_point) + np.multiply.outer(np.array(limits), axis)
@@ -282,5 +285,5 @@ def joint_guides(robot: RobotLike, poses: PoseLike) -> tuple[Guide, ...]:
             center, end = points.links[i][0, :2]
             rotations = scipy.spatial.transform.Rotation.from_rotvec(np.outer(angles, axis))
             path = center + rotations.apply(end - center)
-        guides.append(Guide(slides, axis, path))
+        guides.append(Guide(is_prismatic, axis, path))
     return tuple(guides)

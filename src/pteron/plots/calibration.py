@@ -49,7 +49,7 @@ _RESIDUALS = {"position": "position (mm)", "angle": "angles (mrad)"}
 
 def differences_figure(
     drawn: RobotLike,
-    found: RobotLike,
+    calibrated: RobotLike,
     pose: PoseLike | None = None,
     *,
     enlarge: float | None = None,
@@ -60,7 +60,7 @@ def differences_figure(
 
     Parameters
     ----------
-    drawn, found : Manipulator, name or path
+    drawn, calibrated : Manipulator, name or path
         Two machines with the same kinds of legs: the grey one, and the one whose joints are moved
         away from it.
     pose : array, shape (m,), optional
@@ -89,7 +89,7 @@ def differences_figure(
     >>> found = replace(drawn, legs=(first, *drawn.legs[1:]))
     >>> figure = pteron.plots.differences_figure(drawn, found)
     """
-    machine, other = as_manipulator(drawn), as_manipulator(found)
+    machine, other = as_manipulator(drawn), as_manipulator(calibrated)
     expect_alike(machine, other)
     shown = home_pose(machine) if pose is None else finite_rows(machine, pose, "pose").ravel()
     points, there = joint_points(machine, shown), joint_points(other, shown)
@@ -147,7 +147,7 @@ def row_residuals_figure(
     residuals: Array,
     kinds: Sequence[str],
     measured: NDArray[np.bool_],
-    kept: NDArray[np.bool_],
+    sound: NDArray[np.bool_],
     noise: dict[str, float],
 ) -> Figure:
     """Return the residuals of measurements by row, each kind in a panel of its own.
@@ -158,7 +158,7 @@ def row_residuals_figure(
         m or rad, and which of them count.
     kinds : sequence of str, K
         "position", "angle", "height" or "distance".
-    kept : array of bool, shape (N,)
+    sound : array of bool, shape (N,)
         Rows that are no outliers; the others are red rings.
     noise : dict
         Standard deviation by kind, m or rad: the band is two of them to each side.
@@ -177,7 +177,10 @@ def row_residuals_figure(
         band = 2e3 * noise[kind]
         axes.axhspan(-band, band, color=MUTED, alpha=0.16, linewidth=0.0)
         for column in np.flatnonzero(named == kind):
-            for chosen, face, edge, size in ((kept, INK, INK, 2.6), (~kept, "none", WARNING, 5.0)):
+            for chosen, face, edge, size in (
+                (sound, INK, INK, 2.6),
+                (~sound, "none", WARNING, 5.0),
+            ):
                 here = chosen & measured[:, column]
                 (marks,) = axes.plot(
                     rows[here], 1e3 * residuals[here, column], "o", markersize=size

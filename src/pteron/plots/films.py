@@ -155,7 +155,7 @@ def film(
         raise DataError(
             f"size: {shorten(size)} given, two even numbers from {low} to {high} expected, pixels"
         )
-    if robot.platform.planar and turns:
+    if robot.platform.plane_normal is not None and turns:
         raise DataError(
             f"turns: {turns:g} given, but {robot.name} is planar and seen along its plane's "
             "normal; leave it out"

@@ -64,7 +64,7 @@ _BELOW = 4.5
 """Sizes of a letter from the axes to the legend: the scale's numbers and its name stand there."""
 
 
-def map_figure(given: Map, *names: str) -> Figure:
+def map_figure(index_map: Map, *names: str) -> Figure:
     """Return the picture of a map: a panel for each index, one below the other.
 
     Over one coordinate it is a curve, over two a plane. Over three it is the three planes through
@@ -74,7 +74,7 @@ def map_figure(given: Map, *names: str) -> Figure:
 
     Parameters
     ----------
-    given : Map
+    index_map : Map
         Over one to three coordinates.
     *names : str
         Its indices; by default all.
@@ -95,12 +95,12 @@ def map_figure(given: Map, *names: str) -> Figure:
     >>> grid = pose_grid("delta", {"z": -0.9}, points=31)
     >>> figure = map_figure(map_index("delta", "condition", grid))
     """
-    chosen = names or tuple(given.values)
+    chosen = names or tuple(index_map.values)
     for name in chosen:
-        if name not in given.values:
-            raise DataError(f"{name}: is not in this map; it has {', '.join(given.values)}")
-    planes = _planes(given)
-    scales = {name: color_scale(given, name) for name in chosen}
+        if name not in index_map.values:
+            raise DataError(f"{name}: is not in this map; it has {', '.join(index_map.values)}")
+    planes = _planes(index_map)
+    scales = {name: color_scale(index_map, name) for name in chosen}
     panels = [(plane, name) for plane in planes for name in chosen]
     return map_panels(panels, scales, {}, len(chosen) if len(planes) > 1 else 1)
 

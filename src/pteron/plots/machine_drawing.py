@@ -173,7 +173,7 @@ def base_outline(points: JointPoints, guides: Sequence[Guide]) -> Array:
     """Return the centres (k, 3) of cranks' circles and rams' base joints, in order round them."""
     legs = zip(points.links, guides, points.rams, strict=True)
     turning = [
-        line for line, guide, ram in legs if ram or (not guide.slides and len(guide.path) > 1)
+        line for line, guide, ram in legs if ram or (not guide.is_prismatic and len(guide.path) > 1)
     ]
     base = np.array([line[..., 0, :].reshape(-1, 3)[0] for line in turning])
     if len(base) < 3:
@@ -192,7 +192,7 @@ def rods(line: Array, bar: Array | None, size: float) -> list[Array]:
 
 
 def _draw_guide(sheet: MachineAxes, guide: Guide) -> None:
-    if not guide.slides:
+    if not guide.is_prismatic:
         sheet.line(guide.path, MUTED, 0.9, raised=-0.01, style=(0, (2.0, 2.0)))
         return
     sheet.line(guide.path, MUTED, 3.4, raised=-0.01)
@@ -202,7 +202,7 @@ def _draw_guide(sheet: MachineAxes, guide: Guide) -> None:
 
 def _draw_leg(sheet: MachineAxes, points: JointPoints, guide: Guide, i: int, size: float) -> None:
     color, line = LEG_COLORS[i], points.links[i]
-    if guide.slides:
+    if guide.is_prismatic:
         sheet.faces(_block(line[0], guide.axis, size), color, 0.95)
     else:
         axle = _AXLE * size * guide.axis
@@ -213,7 +213,7 @@ def _draw_leg(sheet: MachineAxes, points: JointPoints, guide: Guide, i: int, siz
         sheet.line(ends, color, 3.0 if points.bars[i] is None else 2.0)
     for joint in line[::2] if points.rams[i] else line:
         sheet.mark(joint, PAPER, color, 5.0)
-    direction = guide.axis if guide.slides else line[1] - line[0]
+    direction = guide.axis if guide.is_prismatic else line[1] - line[0]
     away = sheet.side_direction(line[0] - points.reference, direction)
     sheet.text(line[0] + 0.075 * size * away, str(i + 1), color, bold=True)
 

@@ -227,11 +227,11 @@ def poses_figure(
     figure = blank(columns * _PANEL, rows * (tall + over))
     sheets = []
     for k, (scene, points) in enumerate(zip(scenes, every, strict=True)):
-        left, below = (k % columns) / columns, 1.0 - (k // columns + 1) / rows
+        x_start, below = (k % columns) / columns, 1.0 - (k // columns + 1) / rows
         share = tall / (tall + over) / rows
         sheet = scene.sheet(
             figure,
-            (left + _INSET / columns, below, (1.0 - 2 * _INSET) / columns, share),
+            (x_start + _INSET / columns, below, (1.0 - 2 * _INSET) / columns, share),
             small=True,
         )
         draw_surroundings(sheet, scene)
@@ -241,7 +241,7 @@ def poses_figure(
         draw_directions(sheet, scene)
         if titles:
             style: dict[str, Any] = {"ha": "center", "va": "bottom", "fontsize": FONT_SIZE}
-            figure.text(left + 0.5 / columns, below + share, titles[k], color=INK, **style)
+            figure.text(x_start + 0.5 / columns, below + share, titles[k], color=INK, **style)
         sheets.append(sheet)
     together = np.vstack([sheet.drawn for sheet in sheets])
     for sheet in sheets:

@@ -24,7 +24,7 @@ _DPI = 160
 
 
 def map_film(
-    given: Map,
+    index_map: Map,
     name: str,
     path: str | Path,
     *,
@@ -37,7 +37,7 @@ def map_film(
 
     Parameters
     ----------
-    given : Map
+    index_map : Map
         Over three coordinates.
     name : str
         The index.
@@ -62,13 +62,13 @@ def map_film(
         If the encoder of MP4 files is not there; the extra `film` brings it.
     """
     target = checked_film(path)
-    if len(given.grid.axes) != 3 or name not in given.values:
+    if len(index_map.grid.axes) != 3 or name not in index_map.values:
         raise DataError("a film needs a map over three coordinates, and an index that is in it")
-    last, scales = given.grid.axes[-1], {name: color_scale(given, name)}
+    last, scales = index_map.grid.axes[-1], {name: color_scale(index_map, name)}
     rate = ENCODERS[target.suffix.lower()].rate(fps)
 
     def drawn(value: float) -> Figure:
-        return map_panels([(given.at(last.name, value), name)], scales, given.causes)
+        return map_panels([(index_map.at(last.name, value), name)], scales, index_map.causes)
 
     values = last.values.tolist()
     figure = drawn(values[0])

@@ -63,7 +63,7 @@ class PlaneAxes(MachineAxes):
                 spine.set_visible(False)
         self._small, self._step, self.plane = small, step, plane
 
-    def _to_axes(self, points: Array, *, held: bool = True) -> Array:
+    def _to_axes(self, points: Array, *, extends: bool = True) -> Array:
         flat = np.asarray(1e3 * points @ self.plane.T)
         self._drawn.append(flat)
         return flat

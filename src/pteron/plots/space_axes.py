@@ -73,9 +73,9 @@ class SpaceAxes(MachineAxes):
             [level * np.cos(azimuth), level * np.sin(azimuth), np.sin(elevation)]
         )
 
-    def _to_axes(self, points: Array, *, held: bool = True) -> Array:
+    def _to_axes(self, points: Array, *, extends: bool = True) -> Array:
         placed = np.asarray(points @ self.rotation.T)
-        if held:
+        if extends:
             self._drawn.append(placed)
         return placed
 

@@ -162,7 +162,7 @@ def still_parts(robot: Manipulator, guides: Sequence[Guide], home: JointPoints) 
     the bodies where the file has them. `home` are the joints of one pose, from which the base of
     cranks and rams is known, and `grid` is the side of the squares, m.
     """
-    planar, gravity = robot.platform.planar, np.array(robot.gravity)
+    planar, gravity = robot.platform.plane_normal is not None, np.array(robot.gravity)
     strength = float(np.linalg.norm(gravity)) or 1.0
     up = -gravity / strength if gravity.any() else np.array(robot.platform.frame[2])
     return {
@@ -171,7 +171,7 @@ def still_parts(robot: Manipulator, guides: Sequence[Guide], home: JointPoints) 
         "gravity": picture_points(robot, gravity / strength),
         "grid": grid_step(home, guides),
         "guides": [picture_points(robot, guide.path) for guide in guides],
-        "slides": [guide.slides for guide in guides],
+        "slides": [guide.is_prismatic for guide in guides],
         "directions": _plain(np.array([guide.axis for guide in guides]) @ view_frame(robot).T),
         "bars": [None if bar is None else picture_points(robot, APART * bar) for bar in home.bars],
         "rams": home.rams,
@@ -206,13 +206,13 @@ def moving_parts(robot: Manipulator, points: JointPoints) -> dict[str, Any]:
 
 def picture_points(robot: Manipulator, points: Array) -> Any:
     """Return points (..., 3) of the base frame as pictures have them, as plain lists."""
-    flat = [1.0, 1.0, 0.0] if robot.platform.planar else 1.0
+    flat = 1.0 if robot.platform.plane_normal is None else [1.0, 1.0, 0.0]
     return _plain(points @ view_frame(robot).T * flat)
 
 
 def view_frame(robot: Manipulator) -> Array:
     """Return the axes (3, 3), one a row, along which pictures of a machine count points."""
-    return np.array(robot.platform.frame) if robot.platform.planar else np.eye(3)
+    return np.eye(3) if robot.platform.plane_normal is None else np.array(robot.platform.frame)
 
 
 def _plain(array: Array) -> Any:

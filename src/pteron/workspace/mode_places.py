@@ -114,7 +114,7 @@ def _depth(robot: Manipulator, pose: Array) -> float:
     for leg, q in zip(robot.legs, inverse_kinematics(robot, pose), strict=True):
         slides = leg.joint.unit == "m" and leg.joint_axis is not None
         base += np.array(leg.guide_point) + (q * np.array(leg.joint_axis) if slides else 0.0)
-    offset = robot.platform.at(pose)[0] - base / len(robot.legs)
+    offset = robot.platform.placement(pose)[0] - base / len(robot.legs)
     return float(offset @ np.array(robot.gravity) / np.linalg.norm(robot.gravity))
 
 

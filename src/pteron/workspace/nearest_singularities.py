@@ -201,6 +201,6 @@ def _search(
         pose = reference.copy()
         pose[moving] += turn
         return Nearest(pose, 0.0, abs(turn) * (1.0 - SINGULAR))
-    horizon = np.pi if robot.platform.slides else np.inf
+    horizon = np.inf if robot.platform.rotation_axes else np.pi
     box = reference[moving] + np.pi * np.array([[-1.0], [1.0]])
     return Search(vanishing, reference, moving, box, report).run(horizon, most)

@@ -81,7 +81,7 @@ def over_angles(
     """
     robot = as_manipulator(robot)
     reference = finite_pose(robot, pose, "pose")
-    if len(robot.platform.angles) != 1:
+    if robot.platform.axis_angle is None:
         raise ModelError("the platform does not turn: it has one orientation", subject=robot.name)
     angle_row = np.asarray(angles, dtype=float)
     if angle_row.ndim != 1 or not len(angle_row) or not np.isfinite(angle_row).all():

@@ -77,15 +77,18 @@ def slice_planes(robot: Manipulator) -> tuple[Plane, ...]:
     Of a platform that tilts they are those of its lengths with two of its angles, or all pairs of
     coordinates where these are few.
     """
-    if robot.platform.planar:
-        return ("xy",)
-    if not robot.platform.tilts:
-        return "xy", "xz", "yz"
-    angles, lengths = robot.platform.angles, robot.platform.lengths
-    if len(lengths) == 3:
-        return "xy", "xz", "yz", (angles[0], angles[1])
+    lengths = robot.platform.lengths
+    angles = [name for name in slice_coordinates(robot) if name not in lengths]
+    planes = tuple(first + second for first, second in combinations(lengths, 2))
+    if planes or not angles:
+        return *planes, *combinations(angles[:2], 2)
     mixed = ((angle, length) for length in lengths for angle in angles)
     return *combinations(angles, 2), *mixed
+
+
+def slice_coordinates(robot: Manipulator) -> tuple[str, ...]:
+    """Return the coordinates of which a slice may vary any two: lengths, and angles that tilt."""
+    return robot.coordinates if robot.platform.tilts else robot.platform.lengths
 
 
 def reach_slice(
@@ -133,16 +136,13 @@ def reach_slice(
     (np.int64(0), np.float64(0.095))
     """
     robot = as_manipulator(robot)
-    planes = slice_planes(robot)
-    names = tuple(plane)
-    if robot.platform.tilts:
-        if len(set(names)) != 2 or not set(names) <= set(robot.coordinates):
-            raise DataError(
-                f"plane: {plane!r} given, two of {', '.join(robot.coordinates)} expected"
-            )
-    elif plane not in planes:
-        valid = ", ".join(f'"{option}"' for option in planes)
-        raise DataError(f"plane: {plane!r} is not one of {valid}")
+    planes, names, varying = slice_planes(robot), tuple(plane), slice_coordinates(robot)
+    if varying == robot.platform.lengths:
+        if plane not in planes:
+            valid = ", ".join(f'"{option}"' for option in planes)
+            raise DataError(f"plane: {plane!r} is not one of {valid}")
+    elif len(set(names)) != 2 or not set(names) <= set(varying):
+        raise DataError(f"plane: {plane!r} given, two of {', '.join(varying)} expected")
     expect(points >= 2, "points", points, "at least 2")
     expect_to_fit("points", points, 2.0 * points**2 * (robot.freedom + robot.joint_count))
     pose = finite_pose(robot, center, "center")

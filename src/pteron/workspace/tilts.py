@@ -234,10 +234,11 @@ def _expect_tilting(robot: RobotLike, pose: PoseLike) -> tuple[Manipulator, Arra
         abs(dot(platform.axis, platform.second_axis)) <= PARALLEL_TOLERANCE
         and max(abs(platform.axis[2]), abs(platform.second_axis[2])) <= PARALLEL_TOLERANCE
     )
-    if not platform.tilts or not upright:
+    tilts = platform.tilts
+    if not tilts or not upright:
         raise ModelError(
             f"a {platform.motion} platform has no tilt to every side"
-            + ("" if platform.tilts else "; this is about platforms that tilt")
+            + ("" if tilts else "; this is about platforms that tilt")
             + ("" if upright else ": its axes are not level and at right angles"),
             subject=machine.name,
         )

@@ -140,13 +140,13 @@ def _parts(beyond: float) -> str:
 
 def tool_places(robot: Manipulator, poses: Array) -> Array:
     """Return the places (N, 3) of the tool's centre point at poses (N, m)."""
-    places, axes = robot.platform.at(poses)
+    places, axes = robot.platform.placement(poses)
     return np.asarray(places + np.array(robot.platform.tool) @ axes)
 
 
 def _lines(robot: Manipulator, poses: Array, points: Array) -> tuple[Array, Array]:
     """Return starts and ends (N, L, 3) of links, guides, and what leads from P to legs and tool."""
-    count, place = len(poses), robot.platform.at(poses)[0]
+    count, place = len(poses), robot.platform.placement(poses)[0]
     legs = points.reshape(count, -1, *points.shape[-2:])
     tips = np.concatenate([legs[:, :, -1], tool_places(robot, poses)[:, None]], axis=1)
     guides = [(np.tile(a, (count, 1, 1)), np.tile(b, (count, 1, 1))) for _, a, b in _guides(robot)]

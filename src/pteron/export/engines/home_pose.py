@@ -15,6 +15,7 @@ from pteron.kinematics.sampling import type_ii_sizes
 from pteron.manipulator import Manipulator
 from pteron.shapes import PoseLike
 from pteron.workspace import home_pose
+from pteron.workspace.home import has_exact_home
 
 _GOOD = 0.1
 """Least singularity measures at which the middle of the joints' ranges is taken."""
@@ -40,8 +41,7 @@ def chosen_home(robot: Manipulator, home: PoseLike | None) -> Array:
         If the machine is singular at every pose.
     """
     if home is None:
-        named = robot.platform.tilts or robot.home is not None
-        return home_pose(robot) if named else np.array(_middle(robot))
+        return home_pose(robot) if has_exact_home(robot) else np.array(_middle(robot))
     pose = finite_pose(robot, home, "home")
     inverse_kinematics(robot, pose)
     return pose.copy()

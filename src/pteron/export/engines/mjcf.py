@@ -152,7 +152,7 @@ def _sites(opened: Tree) -> list[list[tuple[str, Array]]]:
     for closing in opened.closings:
         sites[closing.one].append((f"{closing.name}_end", closing.point))
         sites[closing.other].append((f"{closing.name}_seat", closing.point))
-    p, axes = opened.robot.platform.at(opened.home)
+    p, axes = opened.robot.platform.placement(opened.home)
     sites[0].append(("tool", p + np.array(opened.robot.platform.tool) @ axes))
     return sites
 
@@ -167,8 +167,9 @@ def _scene(opened: Tree) -> dict[str, Any]:
     low, high = points.min(axis=0), points.max(axis=0)
     center, extent = (low + high) / 2.0, float(np.linalg.norm(high - low))
     floor = center + (float((points @ up).min()) - center @ up - 0.08 * opened.size) * up
-    if opened.robot.platform.planar and abs(opened.robot.platform.frame[2] @ up) < 0.5:
-        toward = np.array(opened.robot.platform.frame[2])
+    normal = opened.robot.platform.plane_normal
+    if normal is not None and abs(normal @ up) < 0.5:
+        toward = np.array(normal)
     else:
         side = np.cross(up, np.eye(3)[np.argmin(np.abs(up))])
         side /= np.linalg.norm(side)

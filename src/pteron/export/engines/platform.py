@@ -1,7 +1,7 @@
 """The platform's bodies in the opened mechanism: its main part, parts that do not turn, gears.
 
 Platforms that slide have two halves. All bodies together have the platform's mass, first moment and
-moment of inertia (`Platform.joined`).
+moment of inertia (`Platform.total_inertia`).
 """
 
 from __future__ import annotations
@@ -44,20 +44,20 @@ def platform_bodies(robot: Manipulator, pose: Array) -> Pieces:
     platform = robot.platform
     if platform.slides:
         return _sliding_platform(robot, pose)
-    if platform.turns:
+    if platform.turning_axis is not None:
         return _turning_platform(robot, pose)
     joints = _joints(platform, pose)
-    if isinstance(platform.joined, SpatialInertia):
-        body = _tilting_body(platform, pose, joints, platform.joined)
+    if isinstance(platform.total_inertia, SpatialInertia):
+        body = _tilting_body(platform, pose, joints, platform.total_inertia)
     else:
-        body = _plane_body(platform, pose, joints, *central_inertia(platform.joined))
+        body = _plane_body(platform, pose, joints, *central_inertia(platform.total_inertia))
     return [body], [0] * len(robot.legs), []
 
 
 def _turning_platform(robot: Manipulator, pose: Array) -> Pieces:
     """Return a platform that turns, its gears, and the parts that hang on its hinges."""
     platform = robot.platform
-    p, axes = platform.at(pose)
+    p, axes = platform.placement(pose)
     # What of a leg's fixed offset is along the axis turns with the platform as well as not.
     offsets = [cross(leg.fixed_offset, platform.axis) for leg in robot.legs]
     hung = [bool(np.abs(offset).max() > _COINCIDENT) for offset in offsets]
@@ -90,7 +90,7 @@ def _sliding_platform(robot: Manipulator, pose: Array) -> Pieces:
     """
     platform = robot.platform
     turned, angle = _angle(platform, pose)
-    p, _ = platform.at(pose)
+    p, _ = platform.placement(pose)
     frame = np.array(platform.frame)
     points = [np.array(leg.platform_point) for leg in robot.legs]
     halves = _distinct([point for point in points if np.abs(point).max() > _COINCIDENT])
@@ -155,12 +155,12 @@ def _part_masses(
 
 def _joints(platform: Platform, pose: Array) -> list[TreeJoint]:
     """Return the joints by which the platform moves, the tool's where its halves slide."""
-    p, moved, joints = platform.at(pose)[0], np.eye(4), []
+    p, moved, joints = platform.placement(pose)[0], np.eye(4), []
     limits = platform.angle_limits
-    for name, slides, axis, value in platform_joints(platform, pose):
+    for name, is_prismatic, axis, value in platform_joints(platform, pose):
         axis = moved[:3, :3] @ axis
-        joint = TreeJoint(name, slides, axis, p, float(value), limits.get(name))
-        if not slides:
+        joint = TreeJoint(name, is_prismatic, axis, p, float(value), limits.get(name))
+        if not is_prismatic:
             moved = displacement(joint, float(value)) @ moved
         joints.append(joint)
     return joints
@@ -181,7 +181,7 @@ def _plane_body(
     about: float,
 ) -> TreeBody:
     """Return a body that turns with the platform; its centre (2,) is in the platform's frame."""
-    p, axes = platform.at(pose)
+    p, axes = platform.placement(pose)
     moments = plane_moments(mass, about, max(float(np.linalg.norm(center)), _SIDE))
     at = p + center @ axes[:2]
     return TreeBody("platform", BASE, tuple(joints), p, axes.T, mass, at, moments, 0)
@@ -191,7 +191,7 @@ def _tilting_body(
     platform: Platform, pose: Array, joints: Sequence[TreeJoint], inertia: SpatialInertia
 ) -> TreeBody:
     """Return a platform that turns about any axis."""
-    p, axes = platform.at(pose)
+    p, axes = platform.placement(pose)
     center = np.array(inertia.center_of_mass)
     moments, products = spatial_moments(inertia, max(float(np.linalg.norm(center)), _SIDE))
     at = p + center @ axes
@@ -210,7 +210,7 @@ def _still_body(
 
 def _gears(platform: Platform, pose: Array, masses: Array, against: float) -> list[TreeBody]:
     """Return what gears turn, on a body that itself turns by `against` times the angle."""
-    p, axes = platform.at(pose)
+    p, axes = platform.placement(pose)
     turned, angle = _angle(platform, pose) if platform.geared else ("", 0.0)
     bodies = []
     for j, (part, mass) in enumerate(zip(platform.geared, masses, strict=True), start=1):

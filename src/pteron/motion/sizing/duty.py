@@ -15,6 +15,7 @@ import numpy as np
 
 from pteron.arguments import expect_to_fit
 from pteron.dynamics import drive_forces, mass_matrix
+from pteron.dynamics.joint_space import moved_inertias
 from pteron.errors import DataError, SingularPose, UnreachablePose
 from pteron.kernels import Array
 from pteron.kinematics import jacobian, joint_accelerations, joint_rates
@@ -138,11 +139,8 @@ class DutyCycle:
 
     def _inertia(self, poses: Array) -> tuple[Array, Array]:
         """Return the least and the greatest inertia that each joint moves (n,), the others held."""
-        inverse = np.linalg.inv(jacobian(self.robot, poses))
-        joint_inertias = np.einsum(
-            "...ai,...ab,...bi->...i", inverse, mass_matrix(self.robot, poses), inverse
-        )
-        joint_inertias = joint_inertias.reshape(-1, self.robot.joint_count)
+        rows, mass = jacobian(self.robot, poses), mass_matrix(self.robot, poses)
+        joint_inertias = moved_inertias(rows, mass).reshape(-1, self.robot.joint_count)
         return joint_inertias.min(axis=0), joint_inertias.max(axis=0)
 
     def _assumed_friction(self, forces: Array) -> Array:

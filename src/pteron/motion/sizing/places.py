@@ -245,7 +245,7 @@ def _axis(robot: Manipulator) -> Array | None:
     platform = robot.platform
     if len(platform.lengths) < 2:
         return None
-    if not platform.planar:
+    if platform.plane_normal is None:
         return moves(robot, None, 1)[0][1]
     level = not (np.abs(platform.directions @ np.array(robot.gravity)) > _ROUNDING).any()
     return np.array(platform.axis) if level else None
@@ -255,13 +255,9 @@ def _yaw(robot: Manipulator, axis: Array | None) -> Array:
     """Return by how much a pose grows where the platform turns by 1 rad about an axis."""
     platform, rates = robot.platform, np.zeros(robot.freedom)
     last = len(rates) - 1
-    if (
-        axis is None
-        or not platform.angles
-        or (platform.tilts and platform.coordinates[-1] != "yaw")
-    ):
+    about = platform.spin_axis
+    if axis is None or about is None:
         return rates
-    about = platform.frame[2] if platform.tilts else platform.axis
     cosine = float(np.dot(about, axis))
     rates[last] = np.sign(cosine) if abs(cosine) > 1.0 - _ROUNDING else 0.0
     return rates
