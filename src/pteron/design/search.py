@@ -8,7 +8,7 @@ and goes on: it ends in the same front as a run that was not interrupted.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
@@ -19,7 +19,6 @@ import numpy as np
 
 from pteron.design.evolution import Evolution
 from pteron.design.front import Front, Proofs
-from pteron.design.processes import Processes, processes
 from pteron.design.refine import refined
 from pteron.design.rows import FAILED, MISSES, design_table
 from pteron.design.spec import Spec
@@ -28,6 +27,7 @@ from pteron.errors import DataError, ModelError
 from pteron.kernels import Array
 from pteron.kernels.one_thread import one_thread
 from pteron.maps import TableStore, sweep
+from pteron.processes import WorkerPool, result_of
 from pteron.shapes import Workers
 
 if TYPE_CHECKING:
@@ -91,16 +91,18 @@ def search(
         generations_folder = folder or opened.enter_context(
             TemporaryDirectory(prefix="pteron-design-")
         )
-        # The same for all generations: a process compiles what it needs once.
-        shared = opened.enter_context(processes(task, workers or 1))
-        return _generations(task, Path(generations_folder), scheduler, shared, progress)
+        pool = None
+        if workers is not None and workers > 1:
+            # The same for all generations: a process compiles what it needs once.
+            pool = opened.enter_context(WorkerPool(workers, task))
+        return _generations(task, Path(generations_folder), scheduler, pool, progress)
 
 
 def _generations(
     task: Task,
     folder: Path,
     scheduler: str | None,
-    shared: Processes | None,
+    pool: WorkerPool | None,
     progress: Callable[[float], None] | None,
 ) -> Front:
     """Return the front of all designs that were evaluated, each design of it proved."""
@@ -113,7 +115,7 @@ def _generations(
         settings.seed,
     )
     tables: list[pl.DataFrame] = []
-    proofs = Proofs(task, partial(swept_proofs, task, folder, scheduler, shared=shared))
+    proofs = Proofs(task, partial(swept_proofs, task, folder, scheduler, pool=pool))
     front: Front | None = None
     used: set[tuple[bytes, int]] = set()
     for number in range(1, settings.generations + 1):
@@ -125,7 +127,7 @@ def _generations(
         store = TableStore(folder / f"{number:04d}", plan)
         chunks = [jobs[k : k + _CHUNK] for k in range(0, len(jobs), _CHUNK)]
         tell = None if progress is None else partial(_tell, progress, number, settings.generations)
-        _swept(task, worked, chunks, store, shared, scheduler=scheduler, progress=tell)
+        _swept(task, worked, chunks, store, pool, scheduler=scheduler, progress=tell)
         tables.append(store.scan().collect())
         front = _proved_front(proofs, tables)
         proved_rows = proofs.applied(tables[-1])
@@ -139,16 +141,24 @@ def _swept(
     function: Callable[..., pl.DataFrame],
     chunks: Sequence[Any],
     store: TableStore,
-    shared: Processes | None,
+    pool: WorkerPool | None,
     **options: Any,
 ) -> None:
     """Compute the chunks of designs that a store has not yet; processes share them."""
-    if shared is None:
+    if pool is None:
         sweep(partial(function, task), chunks, store, **options)
-    else:
-        remaining = sorted({*range(len(chunks))} - store.finished())
-        table = shared.tables(function, {k: chunks[k] for k in remaining})
-        sweep(table, range(len(chunks)), store, **options)
+        return
+    # Each job goes to the process that is free next, those of the last chunk first: it has the
+    # designs that take longest.
+    numbers = sorted({*range(len(chunks))} - store.finished(), reverse=True)
+    pending = {k: [pool.start(function, [job]) for job in chunks[k]] for k in numbers}
+    sweep(lambda k: _joined(map(result_of, pending[k])), range(len(chunks)), store, **options)
+
+
+def _joined(tables: Iterable[pl.DataFrame]) -> pl.DataFrame:
+    import polars as pl
+
+    return pl.concat(tables, rechunk=True)
 
 
 def _tell(progress: Callable[[float], None], number: int, count: int, share: float) -> None:
@@ -171,13 +181,13 @@ def swept_proofs(
     designs: list[list[float]],
     *,
     workers: int | None = None,
-    shared: Processes | None = None,
+    pool: WorkerPool | None = None,
 ) -> pl.DataFrame:
     """Return the rows of designs, as far as they are proved, kept in a folder as the others are."""
     digest = _digest(np.array(designs))
     store = TableStore(folder / f"proofs-{digest}", {**task.plan, "designs": digest})
     chunks = [designs[k : k + _CHUNK] for k in range(0, len(designs), _CHUNK)]
-    _swept(task, proved_table, chunks, store, shared, scheduler=scheduler, workers=workers)
+    _swept(task, proved_table, chunks, store, pool, scheduler=scheduler, workers=workers)
     return store.scan().collect()
 
 

@@ -21,7 +21,7 @@ from typing import Any, Protocol, TypeVar
 
 from pteron.errors import DataError, PteronError
 from pteron.extras import import_extra
-from pteron.maps.held_interrupts import held_interrupts
+from pteron.processes import held_interrupts
 from pteron.shapes import Workers
 
 _Chunk = TypeVar("_Chunk")

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, wait
 from dataclasses import dataclass
 from functools import partial
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -20,13 +18,13 @@ from pteron.design.choosing.job import Job
 from pteron.design.choosing.kinds import Kind, fitting_kinds
 from pteron.design.choosing.rating import Case
 from pteron.design.choosing.search import search_kind
-from pteron.design.processes import Pool
 from pteron.errors import DataError, PteronError
 from pteron.json_values import json_ready
 from pteron.kernels.one_thread import one_thread
 from pteron.kernels.program_cache import EQUATIONS, name_of
 from pteron.manipulator import load
 from pteron.manipulator.saving import text_of
+from pteron.processes import WorkerPool
 
 _SEARCH = 0.9
 """Share of a kind's work that is its search."""
@@ -209,35 +207,13 @@ def _search_kinds(
         for name, case in cases.items():
             yield name, _candidate(case, partial(tell, name))
         return
-    done = get_context("spawn").Array("d", len(cases))
-    with Pool(workers, _begin, done) as pool:
-        jobs = {
-            pool.submit(_search_in_process, case, k): name
-            for k, (name, case) in enumerate(cases.items())
-        }
-        names, pending = list(cases), set(jobs)
-        while pending:
-            ready, pending = wait(pending, timeout=0.5, return_when=FIRST_COMPLETED)
-            for name, share in zip(names, done[:], strict=True):
-                if share:
-                    tell(name, share)
-            for future in ready:
-                yield jobs[future], future.result()
-
-
-_shares: Any = None
-
-
-def _begin(shares: Any) -> None:
-    global _shares
-    _shares = shares
-
-
-def _search_in_process(case: Case, k: int) -> Candidate:
-    def tell(share: float) -> None:
-        _shares[k] = share
-
-    return _candidate(case, tell)
+    names = list(cases)
+    with WorkerPool(workers) as pool:
+        for k, message in pool.messages(_candidate, list(cases.values())):
+            if isinstance(message, Candidate):
+                yield names[k], message
+            else:
+                tell(names[k], message)
 
 
 class _CandidateStore:
