@@ -6,9 +6,10 @@ from types import SimpleNamespace
 import pytest
 
 import pteron
-from pteron.design import Change, Design
+from pteron.design import Change, Design, Front, FrontReport, ReportedDesign, Spec, Task
 from pteron.identification import FaultIsolation, Identification, Payload
-from pteron.motion import Motor
+from pteron.maps import Grid, Map, TableStore
+from pteron.motion import DriveMargin, Motor, Sizing, Span
 from pteron.renamed import RENAMED, UNTIL
 from pteron.workspace import LimitedJoint, PoseMargins
 
@@ -43,6 +44,13 @@ def test_former_names_are_gone_when_their_release_is_over():
     assert [*map(int, pteron.__version__.split(".")[:2])] < [*map(int, UNTIL.split("."))]
 
 
+def test_a_former_method_of_a_class_answers_too():
+    with pytest.warns(
+        DeprecationWarning, match=r"^Task\.of goes with version .*write \.from_spec$"
+    ):
+        assert Task.of == Task.from_spec
+
+
 @pytest.mark.parametrize(
     ("owner", "old", "new"),
     [
@@ -54,7 +62,25 @@ def test_former_names_are_gone_when_their_release_is_over():
         (PoseMargins, "clearances", "joints"),
         (PoseMargins, "smallest", "least"),
         (LimitedJoint, "told_limits", "limits_text"),
-        (Change, "told", "shown"),
+        (Design, "carrying", "loaded_robot"),
+        (Design, "lack", "missing_reason"),
+        (Design, "reached", "is_reachable"),
+        (Design, "sizing", "cycle_loads"),
+        (Change, "by", "relative_change"),
+        (Change, "shown", "format_value"),
+        (Change, "told", "format_value"),
+        (Front, "chosen", "selection"),
+        (FrontReport, "chosen", "selection"),
+        (ReportedDesign, "lacking", "missing_quantities"),
+        (Spec, "asked", "quantity_names"),
+        (Task, "asked", "quantity_names"),
+        (Grid, "held", "fixed_coordinates"),
+        (Map, "at", "slice_at"),
+        (TableStore, "finished", "finished_chunks"),
+        (Sizing, "at", "select_place"),
+        (Sizing, "where", "place_text"),
+        (Span, "within", "intersect"),
+        (DriveMargin, "told", "overload_text"),
         (Motor, "doubts", "warnings"),
     ],
 )

@@ -31,7 +31,12 @@ RENAMED = {
         for package, names in _MOVED.items()
         for name in names.split()
     },
-    "pteron.design": {"Told": "pteron.design.ReportedDesign"},
+    "pteron.design": {
+        "Quantity": "pteron.design.DesignQuantity",
+        "Summary": "pteron.design.FrontReport",
+        "Told": "pteron.design.ReportedDesign",
+        "proved": "pteron.design.prove_design",
+    },
     "pteron.export.engines": {"Motor": "pteron.export.engines.TreeMotor"},
     "pteron.identification": {
         "Suspicion": "pteron.identification.IsolatedFault",
@@ -46,7 +51,12 @@ RENAMED = {
     "pteron.identification.signals": {
         "FourierSeries": "pteron.identification.signals.FittedSeries",
     },
-    "pteron.motion": {"least_reserve": "pteron.motion.least_margin"},
+    "pteron.motion": {
+        "Fit": "pteron.motion.MotorFit",
+        "Place": "pteron.motion.CyclePlace",
+        "least_reserve": "pteron.motion.least_margin",
+        "placed": "pteron.motion.motion_at_place",
+    },
     "pteron.motion.simulation": {"Law": "pteron.motion.simulation.ControlLaw"},
     "pteron.workspace": {
         "Reserve": "pteron.workspace.PoseMargins",
@@ -97,6 +107,15 @@ def former_name(package: str, name: str) -> Any:
         return import_module(present)
 
 
+class FormerAttribute(property):
+    """A property of a class and its objects: an attribute under its former name."""
+
+    def __get__(self, own: Any, owner: Any = None) -> Any:
+        """Return the attribute of an object, or of the class."""
+        assert self.fget is not None
+        return self.fget(owner if own is None else own)
+
+
 def former_attribute(former: str, present: str) -> property:
     """Return a property for a class's body: an attribute under its former name.
 
@@ -112,11 +131,12 @@ def former_attribute(former: str, present: str) -> property:
     """
 
     def attribute(own: Any) -> Any:
+        owner = own if isinstance(own, type) else type(own)
         warnings.warn(
-            f"{type(own).__name__}.{former} goes with version {UNTIL}; write .{present}",
+            f"{owner.__name__}.{former} goes with version {UNTIL}; write .{present}",
             DeprecationWarning,
-            stacklevel=2,
+            stacklevel=3,
         )
         return getattr(own, present)
 
-    return property(attribute)
+    return FormerAttribute(attribute)

@@ -13,7 +13,7 @@ from pteron.errors import DataError
 
 if TYPE_CHECKING:
     from pteron.design import Choice
-    from pteron.design.choosing.candidate import Candidate
+    from pteron.design.candidate import Candidate
 
 _NONE = 1
 """Exit code where no machine does the job."""
@@ -114,9 +114,16 @@ class _Log:
 
 
 def _show(choice: Choice) -> None:
-    from pteron.design.choosing.told import asked, assumed, cells, dimensions, drives, margins
+    from pteron.design.choice_text import (
+        assumption_lines,
+        cells,
+        dimensions,
+        drives,
+        margins,
+        requirement_lines,
+    )
 
-    show("[bold]Asked[/bold]: " + plain("; ".join(asked(choice.job))))
+    show("[bold]Asked[/bold]: " + plain("; ".join(requirement_lines(choice.job))))
     serving = [candidate for candidate in choice.candidates if candidate.serves]
     rows = {candidate.kind: cells(candidate) for candidate in serving}
     shown = list(dict.fromkeys(key for row in rows.values() for key in row))
@@ -138,4 +145,4 @@ def _show(choice: Choice) -> None:
             near = plain("; ".join(candidate.why))
             show(f"[bold]{candidate.kind}[/bold] falls out: the nearest design has {near}")
     if serving:
-        show(*(f"[dim]{plain(line)}[/dim]" for line in assumed(choice)))
+        show(*(f"[dim]{plain(line)}[/dim]" for line in assumption_lines(choice)))

@@ -18,7 +18,7 @@ from pteron.extras import expect_extra
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from pteron.design import Front, Spec, Summary
+    from pteron.design import Front, FrontReport, Spec
 
 _GENERATIONS, _SURVEY = "generations", "survey"
 """Subfolders of the results for the designs evaluated by a search, and by `--sweep`."""
@@ -66,7 +66,7 @@ def design(
     pteron design search.toml --out all --sweep 100000 --scheduler tcp://host:8786
     """
     expect_extra("design", "pymoo", "a search needs pymoo")
-    from pteron.design import Summary, read_spec
+    from pteron.design import FrontReport, read_spec
 
     requirements = read_spec(spec)
     if sweep is not None and out is None:
@@ -81,7 +81,7 @@ def design(
         checked_folder(out)
         _tell_resumed(Path(out))
     front = _search_front(requirements, out, sweep, workers, scheduler)
-    summary = Summary(front)
+    summary = FrontReport(front)
     files = [] if out is None else _write(summary, Path(out))
     data = summary.data() | ({"files": [str(file) for file in files]} if files else {})
     return Result(data, partial(_show, summary), files)
@@ -113,7 +113,7 @@ def _search_front(
         return search(spec, folder=None if out is None else Path(out) / _GENERATIONS, **work)
 
 
-def _write(summary: Summary, folder: Path) -> list[Path]:
+def _write(summary: FrontReport, folder: Path) -> list[Path]:
     from pteron.atomic import write_texts
     from pteron.json_values import json_text
     from pteron.plots import save_figure
@@ -130,7 +130,7 @@ def _write(summary: Summary, folder: Path) -> list[Path]:
     ]
 
 
-def _figure(summary: Summary) -> Figure:
+def _figure(summary: FrontReport) -> Figure:
     from pteron.design import start_design
     from pteron.plots import front_figure
 
@@ -141,11 +141,11 @@ def _figure(summary: Summary) -> Figure:
         names,
         [front.task.unit(name) for name in names],
         start=[start_design(front.task).quantity(name) for name in names],
-        chosen=front.chosen,
+        chosen=front.selection,
     )
 
 
-def _show(summary: Summary) -> None:
+def _show(summary: FrontReport) -> None:
     from pteron.design.spec import asked_words
 
     front = summary.front
@@ -154,13 +154,11 @@ def _show(summary: Summary) -> None:
         f"{front.kept} keep all that is asked, {len(front)} on the front"
     )
     show(*(f"Asked for: {plain(line)}" for line in asked_words(front.task.spec)))
-    lines = (*summary.start.proofs, *summary.start.lacking)
+    lines = (*summary.start.proofs, *summary.start.missing_quantities)
     show(*(f"To begin with: {plain(line)}" for line in lines))
     numbers = ("to begin with", "now", "change")
-    for reported in summary.chosen:
-        rows = (
-            (plain(c.what), c.shown(c.before), c.shown(c.after), c.by) for c in reported.changes
-        )
+    for reported in summary.selection:
+        rows = (map(plain, change.cells) for change in reported.changes)
         show(
             "",
             f"[bold]{plain(reported.name.replace('-', ' '))}[/bold]",

@@ -266,12 +266,13 @@ def _outside_warnings(grid: Grid, volume: ReachVolume | None) -> list[str]:
     if volume is None:
         return []
     lengths = [name for name in grid.coordinates if coordinate(name).unit == "m"]
+    fixed = grid.fixed_coordinates
     spans = zip(lengths, *volume.box.tolist(), strict=True)
     return [
-        f"nothing is in reach at {pose_text(name, grid.held[name])}: {name} goes from {low:.4g} to "
+        f"nothing is in reach at {pose_text(name, fixed[name])}: {name} goes from {low:.4g} to "
         f"{high:.4g} m at this orientation"
         for name, low, high in spans
-        if name in grid.held and not low <= grid.held[name] <= high
+        if name in fixed and not low <= fixed[name] <= high
     ]
 
 

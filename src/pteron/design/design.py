@@ -86,7 +86,7 @@ class Design:
     def workspace(self) -> WorkspaceTable | None:
         """The required workspace, where it is in this design."""
         table = self.task.spec.workspace
-        return table.placed(self.cube.center) if table is not None and table.floats else table
+        return table.with_center(self.cube.center) if table is not None and table.floats else table
 
     @cached_property
     def poses(self) -> Array:
@@ -116,15 +116,15 @@ class Design:
         return self.values("joint_coordinates")
 
     @cached_property
-    def carrying(self) -> Manipulator:
+    def loaded_robot(self) -> Manipulator:
         """The machine with the payload."""
         payload = self.task.spec.payload
-        return self.robot if payload is None else payload.on(self.robot)
+        return self.robot if payload is None else payload.add_to(self.robot)
 
     def forces(self, poses: Array) -> Array:
         """Return the greatest force of each drive (N, n) over all directions, N or N m."""
         motion = self.task.spec.motion
-        return worst_forces(self.carrying, poses, motion.speed, motion.acceleration)
+        return worst_forces(self.loaded_robot, poses, motion.speed, motion.acceleration)
 
     def speeds(self, poses: Array) -> Array:
         """Return the greatest speed of each joint (N, n) over all directions."""
@@ -186,7 +186,7 @@ class Design:
         )
 
     @cached_property
-    def sizing(self) -> Sizing:
+    def cycle_loads(self) -> Sizing:
         """The loads on the drives over the cycles, one after the other, with the payload.
 
         Where one may be anywhere they are taken at all its places and turns in the workspace.
@@ -194,7 +194,7 @@ class Design:
         cycles, pose = self.task.spec.cycles, self.task.orientations[0]
         anywhere = self.workspace is not None and any(cycle.anywhere for cycle in cycles)
         return size(
-            self.carrying,
+            self.loaded_robot,
             self.cycles,
             dwell=[cycle.dwell for cycle in cycles],
             places=workspace_region(self.workspace, pose) if anywhere and self.workspace else None,
@@ -236,13 +236,18 @@ class Design:
         return min(self._sides[self.side], self.least)
 
     reserve = former_attribute("reserve", "margin")
+    carrying = former_attribute("carrying", "loaded_robot")
+    lack = former_attribute("lack", "missing_reason")
+    reached = former_attribute("reached", "is_reachable")
+    sizing = former_attribute("sizing", "cycle_loads")
+
     start_strokes = former_attribute("start_strokes", "reference_strokes")
 
     def quantity(self, name: str) -> float:
-        """Return one of its quantities; NaN where it has none, see `lack`."""
+        """Return one of its quantities; NaN where it has none, see `missing_reason`."""
         return self._quantities(name)[0]
 
-    def lack(self, name: str) -> str:
+    def missing_reason(self, name: str) -> str:
         """Return why it has no such quantity; empty where it has it."""
         return self._quantities(name)[1]
 
@@ -252,14 +257,14 @@ class Design:
         times, places = 0, str(len(self.fine_poses if kind == "fine" else self.poses))
         if kind == "cycles":
             times = sum(2 * len(motion.time) - 1 for motion in self.cycles)
-            several = () if name == "cycle_time" else self.sizing.places
+            several = () if name == "cycle_time" else self.cycle_loads.places
             places = f", at {len(several)} places and turns" if several else ""
         words = COVERS[kind].format(times=times, places=places)
         floor = dict(self.task.floors).get(name)
         return f"{words}; the proof is of at least {floor:.12g}" if floor else words
 
     @property
-    def reached(self) -> bool:
+    def is_reachable(self) -> bool:
         """Whether all poses of the workspace, or the cube, are in reach."""
         return bool(np.isfinite(self.joints).all())
 

@@ -41,10 +41,17 @@ class Change:
     @property
     def words(self) -> str:
         """The change as a clause: "upper length of legs 2 and 4 154.0 mm -> 246.0 mm (+59.7 %)"."""
-        return f"{self.what} {self.shown(self.before)} -> {self.shown(self.after)} ({self.by})"
+        what, before, after, change = self.cells
+        return f"{what} {before} -> {after} ({change})"
 
     @property
-    def by(self) -> str:
+    def cells(self) -> tuple[str, str, str, str]:
+        """What changes, both values with their unit, and by how much it grows."""
+        before, after = self.format_value(self.before), self.format_value(self.after)
+        return self.what, before, after, self.relative_change
+
+    @property
+    def relative_change(self) -> str:
         """By how much the size grows, in %; what is new or turns its sign, as a difference."""
         if math.isnan(self.before) or math.isnan(self.after):
             return ""
@@ -53,13 +60,15 @@ class Change:
             return "none" if float(text[:-2]) == 0.0 else text
         if abs(self.after - self.before) <= _NONE:
             return "none"
-        return (
-            f"{'+' if self.after > self.before else '-'}{self.shown(abs(self.after - self.before))}"
-        )
+        sign = "+" if self.after > self.before else "-"
+        return f"{sign}{self.format_value(abs(self.after - self.before))}"
 
-    told = former_attribute("told", "shown")
+    by = former_attribute("by", "relative_change")
+    shown = former_attribute("shown", "format_value")
 
-    def shown(self, value: float) -> str:
+    told = former_attribute("told", "format_value")
+
+    def format_value(self, value: float) -> str:
         """Return a value with its unit; lengths in millimetres."""
         if math.isnan(value):
             return "none"
@@ -107,7 +116,7 @@ def quantity_changes(design: Design) -> list[Change]:
     task = design.task
     return [
         Change(name, start_design(task).quantity(name), design.quantity(name), task.unit(name))
-        for name in task.asked
+        for name in task.quantity_names
     ]
 
 

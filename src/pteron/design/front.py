@@ -16,6 +16,7 @@ from pteron.design.task import Task
 from pteron.errors import ModelError
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
+from pteron.renamed import former_attribute
 
 if TYPE_CHECKING:
     import polars as pl
@@ -70,7 +71,7 @@ class Front:
         return self.task.machine(self.values[index].tolist())
 
     @cached_property
-    def chosen(self) -> dict[str, int]:
+    def selection(self) -> dict[str, int]:
         """The designs of a report: the best in each objective, and the compromise.
 
         The compromise is nearest to the best of all objectives at once, each measured by its range
@@ -88,19 +89,21 @@ class Front:
             best_designs["compromise"] = int(np.linalg.norm(shares, axis=1).argmin())
         return best_designs
 
+    chosen = former_attribute("chosen", "selection")
+
     @property
     def headings(self) -> dict[str, str]:
         """Headings of the table's columns, with their units."""
         headings = {}
         for v in self.task.variables:
             headings[v.name] = f"{v.name} ({v.unit})" if v.unit else v.name
-        for name in self.task.asked:
+        for name in self.task.quantity_names:
             unit = self.task.unit(name)
             headings[name] = f"{name} ({unit})" if unit else name
         return headings | {name: f"{name} (m)" for name in places(self.task)}
 
 
-class Proofs:
+class ProvedRows:
     """The rows of designs that were proved, in place of those that a look at points gave.
 
     `prove` takes values of designs (N, V), and returns their rows, each as far as it is proved.
@@ -110,7 +113,7 @@ class Proofs:
         self._task, self._prove = task, prove
         self._rows: dict[bytes, tuple[Any, ...]] = {}
 
-    def applied(self, designs: pl.DataFrame) -> pl.DataFrame:
+    def replace_rows(self, designs: pl.DataFrame) -> pl.DataFrame:
         """Return a table of designs, with the rows of those that were proved."""
         keys = self._keys(designs)
         if self._rows.keys().isdisjoint(keys):
@@ -124,7 +127,7 @@ class Proofs:
         Where a proof takes something from one, the front is another, and that is proved.
         """
         while True:
-            front = front_of_parts(self._task, map(self.applied, parts()))
+            front = front_of_parts(self._task, map(self.replace_rows, parts()))
             values = front.values.tolist()
             keys = self._keys(front.table)
             unproved = [v for v, key in zip(values, keys, strict=True) if key not in self._rows]
@@ -214,7 +217,7 @@ def _value(design: Design, name: str, row: dict[str, Any]) -> str:
     """Return the value of a quantity in words, or why there is none."""
     if np.isfinite(row[name]):
         return f"with {row[name]:.4g} {design.task.unit(name)}".rstrip()
-    return f"for there is none: {design.lack(name)}"
+    return f"for there is none: {design.missing_reason(name)}"
 
 
 def _worst_condition(design: Design) -> str:

@@ -22,7 +22,7 @@ _SHAPE = 'a path such as "legs.platform_point" or "legs[1,3].guide_point.x"'
 
 
 @dataclass(frozen=True)
-class Place:
+class GeometryNumber:
     """One number of one leg.
 
     Attributes
@@ -57,7 +57,7 @@ class Place:
         return float(value if self.part is None else value[self.part])
 
 
-def places(robot: Manipulator, path: str) -> list[Place]:
+def named_numbers(robot: Manipulator, path: str) -> list[GeometryNumber]:
     """Return the numbers that a path names."""
     match = _WRITTEN.fullmatch(path.strip())
     if match is None:
@@ -97,7 +97,7 @@ def geometric_keys(leg: LegKind) -> list[str]:
 
 def _places_in_leg(
     robot: Manipulator, path: str, i: int, key: str, part: str | None, sign: int
-) -> Iterator[Place]:
+) -> Iterator[GeometryNumber]:
     leg = robot.legs[i - 1]
     known = geometric_keys(leg)
     if key not in known:
@@ -114,7 +114,7 @@ def _places_in_leg(
     if part is not None and part not in ("x", "y", "z"):
         raise ModelError(f"{shown(path)}: .{part} is none of .x, .y and .z")
     if scalar:
-        yield Place(i, key, None, sign, role)
+        yield GeometryNumber(i, key, None, sign, role)
     else:
         for k in range(3) if part is None else ["xyz".index(part)]:
-            yield Place(i, key, k, sign, role)
+            yield GeometryNumber(i, key, k, sign, role)

@@ -93,7 +93,7 @@ class Proved:
     workspace: tuple[Proof, ...]
 
 
-def proved(design: Design) -> Proved:
+def prove_design(design: Design) -> Proved:
     """Return a design with its proofs, and with the cube that they leave it."""
     task, cube = design.task, None
     workspace: tuple[Proof, ...] = ()
@@ -117,7 +117,7 @@ def proved(design: Design) -> Proved:
 @lru_cache(maxsize=8)
 def start_design(task: Task) -> Design:
     """Return the machine that a search begins with, as it is, as far as it is proved."""
-    return proved(Design(task, task.robot)).design
+    return prove_design(Design(task, task.robot)).design
 
 
 def proved_cube(design: Design) -> ProvedCube | None:
@@ -128,7 +128,7 @@ def proved_cube(design: Design) -> ProvedCube | None:
     """
     task = design.task
     shape, least = task.shape
-    capped = task.floats and "scale" not in task.asked
+    capped = task.floats and "scale" not in task.quantity_names
 
     def search(failing: Array) -> Fit:
         fit = design.cube_without(failing) if len(failing) else design.cube
@@ -161,7 +161,7 @@ def cube_proofs(design: Design, center: Array, edge: float) -> tuple[Proof, ...]
             region: Region = Box(*ends)
         else:
             share = edge / design.task.shape[1]
-            region = workspace_region(floating.placed(center), pose, share)
+            region = workspace_region(floating.with_center(center), pose, share)
         proofs.append(_proof(design, region))
         if not proofs[-1].holds:
             break

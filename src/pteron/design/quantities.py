@@ -41,7 +41,7 @@ COVERS: dict[Cover, str] = {
 
 
 @dataclass(frozen=True)
-class Quantity:
+class DesignQuantity:
     """One quantity of a design.
 
     Attributes
@@ -72,15 +72,15 @@ def _sample_cover(
     *,
     least: bool = False,
     cover: Cover = "places",
-) -> Quantity:
+) -> DesignQuantity:
     """Return the greatest or least of a function of a design and poses (N, m) in the workspace."""
     sign = -1.0 if least else 1.0
     fine = cover == "fine"
-    return Quantity(unit, about, lambda d: d.worst(at, sign, fine=fine), cover=cover)
+    return DesignQuantity(unit, about, lambda d: d.worst(at, sign, fine=fine), cover=cover)
 
 
-def _simple(unit: str, about: str, of: Callable[[Manipulator], float]) -> Quantity:
-    return Quantity(unit, about, lambda design: of(design.robot), of, "machine")
+def _simple(unit: str, about: str, of: Callable[[Manipulator], float]) -> DesignQuantity:
+    return DesignQuantity(unit, about, lambda design: of(design.robot), of, "machine")
 
 
 def _links(robot: Manipulator) -> float:
@@ -135,18 +135,18 @@ def _accuracy(design: Any, poses: Array) -> Array:
 
 
 def _cycle_time(design: Any) -> float:
-    rests = sum(cycle.dwell for cycle in design.task.spec.cycles)
-    return float(rests) + sum(shortest_time(design.carrying, motion) for motion in design.cycles)
+    robot, rests = design.loaded_robot, sum(cycle.dwell for cycle in design.task.spec.cycles)
+    return float(rests) + sum(shortest_time(robot, motion) for motion in design.cycles)
 
 
 _OWN = {
-    "cube": Quantity(
+    "cube": DesignQuantity(
         "m",
         "edge of the largest cube that keeps the floors and limits",
         lambda d: d.cube.edge,
         cover="proved",
     ),
-    "scale": Quantity(
+    "scale": DesignQuantity(
         "",
         "factor by which a workspace that floats can grow, 1 as it is asked for",
         lambda d: d.scale,
@@ -154,7 +154,7 @@ _OWN = {
     ),
     "links": _simple("m", "sum of the links' lengths", _links),
     "moving_mass": _simple("kg", "mass of all that moves", moving_mass),
-    "size": Quantity(
+    "size": DesignQuantity(
         "m", "diagonal of the box that holds all joints at the poses of the workspace", _size
     ),
     "type_i": _sample_cover(
@@ -168,7 +168,7 @@ _OWN = {
         least=True,
         cover="fine",
     ),
-    "stroke": Quantity(
+    "stroke": DesignQuantity(
         "",
         "greatest travel of a joint in the workspace, over the width of its limits or, without "
         "them, over its travel in the machine to begin with",
@@ -208,46 +208,46 @@ _OWN = {
     "accuracy": _sample_cover(
         "m", "most that the tool may be off by all [errors] together", _accuracy, cover="bound"
     ),
-    "cycle_time": Quantity(
+    "cycle_time": DesignQuantity(
         "s",
         "shortest time of all cycles, each evenly faster or slower, by the drives of the file",
         _cycle_time,
         cover="cycles",
     ),
-    "cycle_force": Quantity(
+    "cycle_force": DesignQuantity(
         "N or N m",
         "greatest force of a drive over the cycles, one after the other with their rests",
-        lambda d: d.sizing.peak_forces.max(),
+        lambda d: d.cycle_loads.peak_forces.max(),
         cover="cycles",
     ),
-    "cycle_speed": Quantity(
+    "cycle_speed": DesignQuantity(
         "m/s or rad/s",
         "greatest speed of a joint over the cycles",
-        lambda d: d.sizing.peak_speeds.max(),
+        lambda d: d.cycle_loads.peak_speeds.max(),
         cover="cycles",
     ),
-    "cycle_energy": Quantity(
+    "cycle_energy": DesignQuantity(
         "J",
         "energy that the drives give while they drive, all cycles once",
-        lambda d: d.sizing.given_energy.sum(),
+        lambda d: d.cycle_loads.given_energy.sum(),
         cover="cycles",
     ),
-    "motor_margin": Quantity(
+    "motor_margin": DesignQuantity(
         "",
         "least over joints of what the best motor of the list can do over what the cycles ask",
-        lambda d: min(fit.margin for fit in best_motors(d.sizing, d.task.motors)),
+        lambda d: min(fit.margin for fit in best_motors(d.cycle_loads, d.task.motors)),
         cover="cycles",
     ),
 }
 
 
 @lru_cache(maxsize=1)
-def quantities() -> dict[str, Quantity]:
+def quantities() -> dict[str, DesignQuantity]:
     """Return the quantities by name: those of this page, and the worst of each index."""
     return _OWN | {name: _worst(index) for name, index in INDICES.items()}
 
 
-def _worst(index: Index) -> Quantity:
+def _worst(index: Index) -> DesignQuantity:
     """Return the worst value of an index over the workspace."""
     word = "least" if index.better == "more" else "greatest"
     return _sample_cover(
@@ -258,7 +258,7 @@ def _worst(index: Index) -> Quantity:
     )
 
 
-def known(name: str) -> str:
+def expect_quantity(name: str) -> str:
     """Return the name of a quantity."""
     names = quantities()
     if name in names:

@@ -16,14 +16,15 @@ from pteron.design.differences import (
     stroke_words,
 )
 from pteron.design.front import Front
-from pteron.design.proofs import Proved, place_words, proved, workspace_share
+from pteron.design.proofs import Proved, place_words, prove_design, workspace_share
 from pteron.design.spec import asked_words
 from pteron.design.task import Task
 from pteron.manipulator import Manipulator
 from pteron.manipulator.machine_record import machine_record
 from pteron.manipulator.names import LONGEST_NAME
 from pteron.manipulator.saving import text_of
-from pteron.motion import Fit
+from pteron.motion import MotorFit
+from pteron.renamed import former_attribute
 
 if TYPE_CHECKING:
     import polars as pl
@@ -78,30 +79,41 @@ class ReportedDesign(Proved):
         return f"workspace placed about {place_words(design.cube.center)}"
 
     @property
-    def lacking(self) -> list[str]:
+    def missing_quantities(self) -> list[str]:
         """The quantities that the machine does not have, with the reason."""
-        reasons = ((name, self.design.lack(name)) for name in self.design.task.asked)
+        reasons = (
+            (name, self.design.missing_reason(name)) for name in self.design.task.quantity_names
+        )
         return [f"{name}: none, because {lack}" for name, lack in reasons if lack]
+
+    lacking = former_attribute("lacking", "missing_quantities")
 
     @property
     def covers(self) -> list[str]:
         """The quantities of the search by the samples or proofs behind them, and the motors."""
         design, task = self.design, self.design.task
         known: dict[str, list[str]] = {}
-        for name in task.asked:
+        for name in task.quantity_names:
             value = design.quantity(name)
-            if not design.lack(name):
-                text = Change(name, value, value, task.unit(name)).shown(value)
+            if not design.missing_reason(name):
+                text = Change(name, value, value, task.unit(name)).format_value(value)
                 known.setdefault(design.cover(name), []).append(f"{name} {text}")
-        lines = [*self.lacking, *(f"{', '.join(text)}: {how}" for how, text in known.items())]
-        if task.motors and "motor_margin" in task.asked and not design.lack("motor_margin"):
+        lines = [
+            *self.missing_quantities,
+            *(f"{', '.join(text)}: {how}" for how, text in known.items()),
+        ]
+        if (
+            task.motors
+            and "motor_margin" in task.quantity_names
+            and not design.missing_reason("motor_margin")
+        ):
             minimums = (r.least for r in task.spec.requirements if r.quantity == "motor_margin")
             least = max((minimum for minimum in minimums if minimum is not None), default=1.0)
-            lines += map(_motor_words, best_motors(design.sizing, task.motors, least))
+            lines += map(_motor_words, best_motors(design.cycle_loads, task.motors, least))
         return lines
 
 
-def _motor_words(fit: Fit) -> str:
+def _motor_words(fit: MotorFit) -> str:
     return (
         f"drive of leg {fit.leg}: {fit.motor.name} at a ratio of {fit.ratio:.4g} can do "
         f"{fit.margin:.3g} times what it must, least in {fit.scarcest}"
@@ -109,7 +121,7 @@ def _motor_words(fit: Fit) -> str:
 
 
 @dataclass(frozen=True)
-class Summary:
+class FrontReport:
     """A front with the designs that a report shows, and the machine that it began with."""
 
     front: Front
@@ -120,21 +132,23 @@ class Summary:
         return _change_text("start", Design(self.front.task, self.front.task.robot))
 
     @cached_property
-    def chosen(self) -> list[ReportedDesign]:
+    def selection(self) -> list[ReportedDesign]:
         """The best design of each objective and the compromise; a design of several names once."""
         task, names = self.front.task, dict[int, str]()
-        for name, at in self.front.chosen.items():
+        for name, at in self.front.selection.items():
             names[at] = f"{names[at]}, {name}" if at in names else name
         return [
             _change_text(name, _design(task, self.front.robot(at), name))
             for at, name in names.items()
         ]
 
+    chosen = former_attribute("chosen", "selection")
+
     def robots(self) -> dict[str, str]:
         """Return the chosen machines as texts of files, by the files' names."""
         return {
             f"{name}.toml": text_of(reported.design.robot)
-            for reported in self.chosen
+            for reported in self.selection
             for name in reported.name.split(", ")
         }
 
@@ -156,7 +170,7 @@ class Summary:
             ],
             "objectives": [o.quantity for o in front.task.spec.objectives],
             "start": _data(self.start),
-            "chosen": {reported.name: _data(reported) for reported in self.chosen},
+            "chosen": {reported.name: _data(reported) for reported in self.selection},
             "front": front.table.select(list(front.headings)).to_dicts(),
         }
 
@@ -182,13 +196,10 @@ class Summary:
             "",
             *(f"- {line}" for line in _lines(self.start)),
         ]
-        for reported in self.chosen:
+        for reported in self.selection:
             lines += ["", f"## {reported.name.replace('-', ' ').capitalize()}", ""]
             lines += ["| what | to begin with | now | change |", "| --- | ---: | ---: | ---: |"]
-            lines += [
-                f"| {c.what} | {c.shown(c.before)} | {c.shown(c.after)} | {c.by} |"
-                for c in reported.changes
-            ]
+            lines += [f"| {' | '.join(change.cells)} |" for change in reported.changes]
             lines += ["", *(f"- {line}" for line in _lines(reported))]
         return "\n".join(lines) + "\n"
 
@@ -199,14 +210,14 @@ def _design(task: Task, robot: Manipulator, name: str) -> Design:
 
 
 def _change_text(name: str, design: Design) -> ReportedDesign:
-    return ReportedDesign(**vars(proved(design)), name=name)
+    return ReportedDesign(**vars(prove_design(design)), name=name)
 
 
 def _lines(reported: ReportedDesign) -> list[str]:
     """Return the lines on proofs, on the poses that each quantity is over, and on strokes."""
     task, lines = reported.design.task, [*reported.proofs, *reported.covers]
     region = "the workspace" if task.spec.workspace is not None else "the cube"
-    if (task.seeks_place and reported.design.cube.edge <= 0.0) or not reported.design.reached:
+    if (task.seeks_place and reported.design.cube.edge <= 0.0) or not reported.design.is_reachable:
         return lines
     return [*lines, *(f"{line}, over {region}" for line in stroke_words(reported.design))]
 
@@ -214,9 +225,10 @@ def _lines(reported: ReportedDesign) -> list[str]:
 def _data(reported: ReportedDesign) -> dict[str, Any]:
     task = reported.design.task
     contents: dict[str, Any] = {"machine": machine_record(reported.design.robot)}
-    contents |= {name: reported.design.quantity(name) for name in task.asked}
+    contents |= {name: reported.design.quantity(name) for name in task.quantity_names}
     contents["known"] = {
-        name: reported.design.lack(name) or reported.design.cover(name) for name in task.asked
+        name: reported.design.missing_reason(name) or reported.design.cover(name)
+        for name in task.quantity_names
     }
     if task.floats:
         contents["workspace_center"] = (

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pteron.design.design import Design
-from pteron.design.proofs import proved
+from pteron.design.proofs import prove_design
 from pteron.design.spec import ROUNDING
 from pteron.design.task import Task
 from pteron.errors import ModelError
@@ -25,7 +25,9 @@ FAILED = 1e6
 """Amount for a design that is no possible machine, or has no such quantity."""
 
 
-def evaluated(task: Task, values: Sequence[float], *, proofs: bool = False) -> dict[str, float]:
+def evaluate_design(
+    task: Task, values: Sequence[float], *, proofs: bool = False
+) -> dict[str, float]:
     """Return the row of a design: quantities, and by how much it misses what is asked.
 
     "misses workspace" is how far the least condition is below 0, and "misses 1 links" how far
@@ -35,15 +37,15 @@ def evaluated(task: Task, values: Sequence[float], *, proofs: bool = False) -> d
     try:
         design = Design(task, task.machine(values))
         if proofs:
-            design = proved(design).design
-        row = {name: design.quantity(name) for name in task.asked}
+            design = prove_design(design).design
+        row = {name: design.quantity(name) for name in task.quantity_names}
         row |= zip(places(task), design.cube.center.tolist() if task.floats else (), strict=True)
         margin = design.margin
     except ModelError:
-        row, margin = dict.fromkeys((*task.asked, *places(task)), float("nan")), -FAILED
+        row, margin = dict.fromkeys((*task.quantity_names, *places(task)), float("nan")), -FAILED
     misses = {f"{MISSES}workspace": 0.0 if margin >= -ROUNDING else -margin}
     for k, requirement in enumerate(task.spec.requirements, start=1):
-        misses[f"{MISSES}{k} {requirement.quantity}"] = requirement.missed_by(
+        misses[f"{MISSES}{k} {requirement.quantity}"] = requirement.violation(
             row[requirement.quantity], FAILED
         )
     return row | misses
@@ -60,6 +62,6 @@ def design_table(task: Task, designs: ArrayLike, *, proofs: bool = False) -> pl.
 
     values = np.asarray(designs)
     with one_thread():
-        rows = [evaluated(task, row, proofs=proofs) for row in values.tolist()]
+        rows = [evaluate_design(task, row, proofs=proofs) for row in values.tolist()]
     columns = {v.name: values[:, k].tolist() for k, v in enumerate(task.variables)}
     return pl.DataFrame(columns | {name: [row[name] for row in rows] for name in rows[0]})

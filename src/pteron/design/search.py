@@ -18,8 +18,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pteron.design.evolution import Evolution
-from pteron.design.front import Front, Proofs
-from pteron.design.refine import refined
+from pteron.design.front import Front, ProvedRows
+from pteron.design.improvement import improve_design
 from pteron.design.rows import FAILED, MISSES, design_table
 from pteron.design.spec import Spec
 from pteron.design.task import Task
@@ -84,7 +84,7 @@ def search(
     """
     if seed is not None:
         spec = spec.with_seed(seed)
-    task = Task.of(spec)
+    task = Task.from_spec(spec)
     if workers is not None and scheduler is not None:
         raise DataError("workers and scheduler given; a scheduler has its own workers: give one")
     with ExitStack() as opened:
@@ -115,7 +115,7 @@ def _generations(
         settings.seed,
     )
     tables: list[pl.DataFrame] = []
-    proofs = Proofs(task, partial(swept_proofs, task, folder, scheduler, pool=pool))
+    proofs = ProvedRows(task, partial(swept_proofs, task, folder, scheduler, pool=pool))
     front: Front | None = None
     used: set[tuple[bytes, int]] = set()
     for number in range(1, settings.generations + 1):
@@ -127,10 +127,10 @@ def _generations(
         store = TableStore(folder / f"{number:04d}", plan)
         chunks = [jobs[k : k + _CHUNK] for k in range(0, len(jobs), _CHUNK)]
         tell = None if progress is None else partial(_tell, progress, number, settings.generations)
-        _swept(task, worked, chunks, store, pool, scheduler=scheduler, progress=tell)
+        _swept(task, evaluate_designs, chunks, store, pool, scheduler=scheduler, progress=tell)
         tables.append(store.scan().collect())
         front = _proved_front(proofs, tables)
-        proved_rows = proofs.applied(tables[-1])
+        proved_rows = proofs.replace_rows(tables[-1])
         values = np.asarray(proved_rows.select([v.name for v in task.variables]).to_numpy())
         evolution.tell((values - low) / (high - low), *_costs(task, proved_rows))
     return proofs.front(lambda: tables)
@@ -150,12 +150,12 @@ def _swept(
         return
     # Each job goes to the process that is free next, those of the last chunk first: it has the
     # designs that take longest.
-    numbers = sorted({*range(len(chunks))} - store.finished(), reverse=True)
+    numbers = sorted({*range(len(chunks))} - store.finished_chunks(), reverse=True)
     pending = {k: [pool.start(function, [job]) for job in chunks[k]] for k in numbers}
-    sweep(lambda k: _joined(map(result_of, pending[k])), range(len(chunks)), store, **options)
+    sweep(lambda k: _concatenate(map(result_of, pending[k])), range(len(chunks)), store, **options)
 
 
-def _joined(tables: Iterable[pl.DataFrame]) -> pl.DataFrame:
+def _concatenate(tables: Iterable[pl.DataFrame]) -> pl.DataFrame:
     import polars as pl
 
     return pl.concat(tables, rechunk=True)
@@ -166,7 +166,7 @@ def _tell(progress: Callable[[float], None], number: int, count: int, share: flo
     progress((number - 1 + share) / count)
 
 
-def _proved_front(proofs: Proofs, tables: list[pl.DataFrame]) -> Front | None:
+def _proved_front(proofs: ProvedRows, tables: list[pl.DataFrame]) -> Front | None:
     """Return the front so far, if any design keeps all that is asked."""
     try:
         return proofs.front(lambda: tables)
@@ -201,10 +201,10 @@ def first_designs(task: Task, count: int, seed: int) -> Array:
     return designs
 
 
-def worked(task: Task, jobs: Sequence[tuple[list[float], int]]) -> pl.DataFrame:
+def evaluate_designs(task: Task, jobs: Sequence[tuple[list[float], int]]) -> pl.DataFrame:
     """Return the rows of designs; one whose number is an objective is improved in it first."""
     with one_thread():
-        designs = [values if k < 0 else refined(task, values, k) for values, k in jobs]
+        designs = [values if k < 0 else improve_design(task, values, k) for values, k in jobs]
     return design_table(task, designs)
 
 

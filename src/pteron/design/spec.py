@@ -11,17 +11,18 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import BeforeValidator, Field, PrivateAttr, field_validator, model_validator
 
 from pteron.bodies.tables import Count, Number, TomlTable, Two, key
-from pteron.design.loads import (
+from pteron.design.load_tables import (
     CycleTable,
     ElasticityTable,
     ErrorsTable,
     MotorsTable,
     PayloadTable,
     Positive,
-    listed,
+    as_list,
 )
-from pteron.design.quantities import known
+from pteron.design.quantities import expect_quantity
 from pteron.errors import DataError, shown
+from pteron.renamed import former_attribute
 from pteron.toml import read_toml, to_model
 
 _ABSENT = "no such file; it should describe a search for a design"
@@ -44,7 +45,7 @@ def _expect_rising(pair: tuple[float, float]) -> tuple[float, float]:
 class VariableTable(TomlTable):
     """`[[variables]]`: numbers of the robot's file that move as one."""
 
-    moves: Annotated[tuple[str, ...], BeforeValidator(listed), Field(min_length=1)] = key(
+    moves: Annotated[tuple[str, ...], BeforeValidator(as_list), Field(min_length=1)] = key(
         'paths such as "legs[1,3].platform_point" or "-legs[2].guide_point.x"'
     )
     range: Two = key("least and greatest value")
@@ -112,7 +113,7 @@ class WorkspaceTable(TomlTable):
         """Whether it has no given place."""
         return self.low is None and self.center is None
 
-    def placed(self, center: Iterable[float]) -> Self:
+    def with_center(self, center: Iterable[float]) -> Self:
         """Return the same workspace at a given center, m."""
         return self.model_copy(update={"center": tuple(map(float, center))})
 
@@ -167,7 +168,7 @@ class ObjectiveTable(TomlTable):
     @field_validator("maximise", "minimise")
     @classmethod
     def _expect_known(cls, name: str | None) -> str | None:
-        return name and known(name)
+        return name and expect_quantity(name)
 
     @model_validator(mode="after")
     def _one_way(self) -> Self:
@@ -196,7 +197,7 @@ class RequirementTable(TomlTable):
     @field_validator("quantity")
     @classmethod
     def _expect_known(cls, name: str) -> str:
-        return known(name)
+        return expect_quantity(name)
 
     @model_validator(mode="after")
     def _expect_bound(self) -> Self:
@@ -209,7 +210,7 @@ class RequirementTable(TomlTable):
             )
         return self
 
-    def missed_by(self, value: float, failed: float) -> float:
+    def violation(self, value: float, failed: float) -> float:
         """Return the violation by a value over the bound, 0 if met; `failed` for a value of NaN."""
         if math.isnan(value):
             return failed
@@ -271,10 +272,12 @@ class Spec(TomlTable):
         return self._source
 
     @property
-    def asked(self) -> tuple[str, ...]:
+    def quantity_names(self) -> tuple[str, ...]:
         """The quantities that objectives and requirements name, each once."""
         named = (o.quantity for o in self.objectives), (r.quantity for r in self.requirements)
         return tuple(dict.fromkeys(chain(*named)))
+
+    asked = former_attribute("asked", "quantity_names")
 
     def with_seed(self, seed: int) -> Spec:
         """Return the same search with another seed of the random numbers."""
@@ -330,6 +333,6 @@ def asked_words(spec: Spec) -> list[str]:
         lines.append(f"a payload of {spec.payload.mass:.12g} kg")
     lines += [f"cycle {k}: {part.words}" for k, part in enumerate(spec.cycles, start=1)]
     speed, acceleration = spec.motion.speed, spec.motion.acceleration
-    if {"force", "speed", "drive_load"} & set(spec.asked):
+    if {"force", "speed", "drive_load"} & set(spec.quantity_names):
         lines.append(f"motion at up to {speed:.12g} m/s and {acceleration:.12g} m/s^2")
     return lines

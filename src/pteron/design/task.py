@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from pteron.design.misfits import misfits
 from pteron.design.quantities import quantities
 from pteron.design.region import workspace_shape
 from pteron.design.spec import FloorsTable, Spec
-from pteron.design.variables import Variable, moved, variables_of
+from pteron.design.spec_faults import misfits
+from pteron.design.variables import Variable, move_variables, variables_of
 from pteron.errors import DataError, ModelError, warn_unlikely
 from pteron.kernels import Array, Kernel, compile
 from pteron.manipulator import Manipulator, load
@@ -21,6 +21,7 @@ from pteron.manipulator.saving import text_of
 from pteron.maps.plan import RESULTS
 from pteron.motion import Motor, read_motors
 from pteron.motion.payload import payload_warning
+from pteron.renamed import former_attribute
 from pteron.toml import joined_faults
 from pteron.workspace.conditions import conditions
 from pteron.workspace.shape_samples import Shape, cube
@@ -56,7 +57,7 @@ class Task:
     motors: tuple[Motor, ...] = ()
 
     @classmethod
-    def of(cls, spec: Spec) -> Task:
+    def from_spec(cls, spec: Spec) -> Task:
         """Return the task of a search.
 
         Raises
@@ -104,8 +105,8 @@ class Task:
         plan: dict[str, Any] = {"robot": text_of(self.robot), "spec": spec, "pteron": RESULTS}
         if self.motors:
             plan["motors"] = [vars(motor) for motor in self.motors]
-        known = quantities()
-        if {known[name].cover for name in self.asked} & {"places", "fine", "directions", "bound"}:
+        covers = {quantities()[name].cover for name in self.quantity_names}
+        if covers & {"places", "fine", "directions", "bound"}:
             plan["definition of its quantities"] = _WORST
         return plan
 
@@ -157,14 +158,17 @@ class Task:
         return np.where(angular, np.array(spec.angles)[:, None], pose)
 
     @property
-    def asked(self) -> tuple[str, ...]:
+    def quantity_names(self) -> tuple[str, ...]:
         """The quantities that objectives and requirements name, each once."""
-        return self.spec.asked
+        return self.spec.quantity_names
+
+    asked = former_attribute("asked", "quantity_names")
+    of = former_attribute("of", "from_spec")
 
     @property
     def seeks_cube(self) -> bool:
         """Whether the largest cube of each design is looked for."""
-        return "cube" in self.asked or self.spec.workspace is None
+        return "cube" in self.quantity_names or self.spec.workspace is None
 
     @property
     def seeks_place(self) -> bool:
@@ -201,4 +205,4 @@ class Task:
             If there can be none.
         """
         stretch = self.spec.masses == "per length"
-        return moved(self.robot, self.variables, values, stretch=stretch)
+        return move_variables(self.robot, self.variables, values, stretch=stretch)

@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from pteron.design.paths import Place, places
+from pteron.design.paths import GeometryNumber, named_numbers
 from pteron.design.spec import VariableTable
 from pteron.equations.machine import numbers
 from pteron.errors import ModelError
@@ -30,7 +30,7 @@ class Variable:
     ----------
     name : str
         Its name in tables.
-    places : tuple of Place
+    places : tuple of GeometryNumber
         The numbers.
     by : {"value", "factor", "offset"}
         Whether they become the value, their start times it, or their start plus it.
@@ -41,7 +41,7 @@ class Variable:
     """
 
     name: str
-    places: tuple[Place, ...]
+    places: tuple[GeometryNumber, ...]
     by: Literal["value", "factor", "offset"]
     low: float
     high: float
@@ -53,7 +53,7 @@ class Variable:
         scale = {"length", "point"} & {place.role for place in self.places}
         return "m" if scale and self.by != "factor" else ""
 
-    def number(self, place: Place, start: float, value: float) -> float:
+    def number(self, place: GeometryNumber, start: float, value: float) -> float:
         """Return the new value of one of the numbers, from its value at the start."""
         if self.by == "factor":
             return start * value
@@ -82,7 +82,7 @@ def variables_of(robot: Manipulator, tables: Sequence[VariableTable]) -> tuple[V
 
 
 def _variables(robot: Manipulator, table: VariableTable) -> list[Variable]:
-    named = [place for path in table.moves for place in places(robot, path)]
+    named = [place for path in table.moves for place in named_numbers(robot, path)]
     legs = sorted({place.leg for place in named})
     groups = [[p for p in named if p.leg == leg] for leg in legs] if table.each else [named]
     variables = []
@@ -102,7 +102,7 @@ def _variables(robot: Manipulator, table: VariableTable) -> list[Variable]:
     return variables
 
 
-def moved(
+def move_variables(
     robot: Manipulator, variables: Sequence[Variable], values: Sequence[float], *, stretch: bool
 ) -> Manipulator:
     """Return a machine with its variables at other values.
@@ -140,7 +140,7 @@ def geometry_slopes(
     """
 
     def geometry(values: Array) -> Array:
-        return np.array(numbers(moved(robot, variables, values.tolist(), stretch=False)))
+        return np.array(numbers(move_variables(robot, variables, values.tolist(), stretch=False)))
 
     return slopes_of(geometry, variables, values).T
 

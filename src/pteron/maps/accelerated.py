@@ -21,7 +21,7 @@ from pteron.maps.grid import Grid, Region
 from pteron.maps.map import MARGIN
 
 
-def accelerated(
+def indices_by_jax(
     robot: Manipulator, names: tuple[str, ...], grid: Grid, region: Region
 ) -> dict[str, Array]:
     """Return the indices of a part of a grid, and `status`, computed by JAX where it runs."""

@@ -52,7 +52,7 @@ def read_archive(source: Path) -> Map:
         if given_sum != checksum(about, arrays):
             raise ValueError("its checksum is another one")
         values = {name: arrays[name] for name in about["units"]}
-        grid = Grid.of_plain(about["grid"])
+        grid = Grid.from_plain(about["grid"])
         return Map(about["robot"], grid, values, arrays[_STATUS], about["machine"])
     except Exception as error:  # unpacking damaged bytes raises anything
         reason = str(error) if type(error) is ValueError else type(error).__name__
@@ -68,7 +68,7 @@ def _expect_sizes_of_a_map(archive: ZipFile) -> None:
         raise ValueError("its description is too long")
     text = np.lib.format.read_array(io.BytesIO(archive.read(about)), allow_pickle=False)
     described = json.loads(str(text))
-    grid = Grid.of_plain(described["grid"])
+    grid = Grid.from_plain(described["grid"])
     names = {*described["units"], _STATUS, *(axis.name for axis in grid.axes)}
     expected = {about.filename} | {f"{name}.npy" for name in names}
     if set(archive.namelist()) != expected or len(archive.namelist()) != len(expected):

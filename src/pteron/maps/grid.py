@@ -20,6 +20,7 @@ from pteron.kinematics.evaluate import finite_pose
 from pteron.kinematics.unlikely_values import unlikely_values
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.platforms.coordinates import COORDINATES, coordinate
+from pteron.renamed import former_attribute
 from pteron.shapes import PoseLike
 from pteron.workspace import bounding_box, home_pose
 
@@ -139,7 +140,7 @@ class Grid:
         object.__setattr__(self, "pose", pose)
 
     @classmethod
-    def of_plain(cls, plain: Mapping[str, Any]) -> Self:
+    def from_plain(cls, plain: Mapping[str, Any]) -> Self:
         """Return the grid from its `plain` form."""
         axes = tuple(Axis(**axis) for axis in plain["axes"])
         return cls(tuple(plain["coordinates"]), tuple(plain["pose"]), axes)
@@ -163,11 +164,13 @@ class Grid:
         return prod(self.shape)
 
     @property
-    def held(self) -> dict[str, float]:
+    def fixed_coordinates(self) -> dict[str, float]:
         """The coordinates that do not vary, with their values, m or rad."""
         varying = {axis.name for axis in self.axes}
         pairs = zip(self.coordinates, self.pose, strict=True)
         return {name: value for name, value in pairs if name not in varying}
+
+    held = former_attribute("held", "fixed_coordinates")
 
     @cached_property
     def chunk(self) -> tuple[int, ...]:
@@ -246,7 +249,7 @@ def pose_grid(
     >>> import pteron
     >>> from pteron.maps import pose_grid
     >>> grid = pose_grid(pteron.load("quadrupteron"), {"z": 0.0, "phi": 0.0}, points=50)
-    >>> grid.shape, [axis.name for axis in grid.axes], grid.held
+    >>> grid.shape, [axis.name for axis in grid.axes], grid.fixed_coordinates
     ((50, 50), ['x', 'y'], {'z': 0.0, 'phi': 0.0})
     """
     robot = as_manipulator(robot)

@@ -14,6 +14,7 @@ from pteron.indices import INDICES, Index
 from pteron.kernels import Array
 from pteron.maps.grid import Grid
 from pteron.platforms.coordinates import coordinate
+from pteron.renamed import former_attribute
 from pteron.workspace import BEYOND_LIMITS, REACHABLE
 
 if TYPE_CHECKING:
@@ -172,24 +173,28 @@ class Map:
             f"{name} [{coordinate(name).unit}]": poses[:, k]
             for k, name in enumerate(self.grid.coordinates)
         }
-        columns |= {headed(index): self.values[index.name].ravel() for index in self.indices}
+        columns |= {
+            column_heading(index): self.values[index.name].ravel() for index in self.indices
+        }
         frame = pl.DataFrame(columns | {"status": self.status.ravel()})
         return frame.with_columns(pl.col(pl.Float64).fill_nan(None))
 
-    def at(self, name: str, value: float) -> Map:
+    def slice_at(self, name: str, coordinate: float) -> Map:
         """Return the map at the value of a coordinate that is nearest to one, m or rad."""
         k = [axis.name for axis in self.grid.axes].index(name)
         axes = list(self.grid.axes)
         steps = axes.pop(k).values
-        i = int(np.abs(steps - value).argmin())
+        i = int(np.abs(steps - coordinate).argmin())
         pose = list(self.grid.pose)
         pose[self.grid.coordinates.index(name)] = float(steps[i])
         values = {index: np.take(array, i, axis=k) for index, array in self.values.items()}
         grid = Grid(self.grid.coordinates, tuple(pose), tuple(axes))
         return Map(self.robot, grid, values, np.take(self.status, i, axis=k), self.machine)
 
+    at = former_attribute("at", "slice_at")
 
-def headed(index: Index) -> str:
+
+def column_heading(index: Index) -> str:
     """Return the heading of an index's column."""
     return f"{index.name} [{index.unit}]" if index.unit else index.name
 

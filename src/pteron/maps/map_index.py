@@ -17,7 +17,7 @@ from pteron.kernels import Array, numeric
 from pteron.kinematics.evaluate import evaluate_kernel
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.manipulator.saving import text_of
-from pteron.maps.accelerated import accelerated
+from pteron.maps.accelerated import indices_by_jax
 from pteron.maps.files import checked_map_file, save_map
 from pteron.maps.grid import Grid, Region, pose_grid
 from pteron.maps.map import MARGIN, Map
@@ -118,7 +118,7 @@ def map_index(
             if place is None or not streams:
                 folder = opened.enter_context(TemporaryDirectory(prefix="pteron-map-"))
                 place = Path(folder, "map.zarr")
-            store = MapStore.of(place, robot.name, poses, names, plan)
+            store = MapStore.create(place, robot.name, poses, names, plan)
         else:
             store = MemoryStore(poses, names)
         if engine == "auto":
@@ -152,7 +152,7 @@ def _compute_region(
 ) -> dict[str, Array]:
     """Return the indices of a part of a grid, and `status`."""
     if engine == "jax":
-        return accelerated(robot, names, grid, region)
+        return indices_by_jax(robot, names, grid, region)
     prepare(robot, names, grid.size)
     poses = grid.poses(region)
     rows = poses.reshape(-1, poses.shape[-1])

@@ -47,7 +47,7 @@ class MemoryStore:
         self._values = {name: np.empty(grid.shape) for name in names}
         self._status = np.empty(grid.shape, dtype=np.int8)
 
-    def finished(self) -> tuple[int, ...]:
+    def finished_chunks(self) -> tuple[int, ...]:
         """Return the numbers of no chunks: nothing is there before the sweep begins."""
         return ()
 
@@ -83,7 +83,7 @@ class MapStore:
     seal: str
 
     @classmethod
-    def of(
+    def create(
         cls, path: Path, robot: str, grid: Grid, names: tuple[str, ...], plan: Mapping[str, Any]
     ) -> MapStore:
         """Return the store of a map at a path; it is made if there is none.
@@ -105,7 +105,7 @@ class MapStore:
         except DataError as error:
             raise OutputError(f"{error}; remove it, or name another place") from None
 
-    def finished(self) -> frozenset[int]:
+    def finished_chunks(self) -> frozenset[int]:
         """Return the numbers of the chunks that are there as they were written."""
         count = len(self.grid.regions())
         return frozenset(k for k in range(count) if self._read(k) is not None)
@@ -164,7 +164,7 @@ def read_store(path: Path) -> Map:
         raise DataError(f"{path}: is no map's store")
     seal = _checked_seal(path, attributes)
     plan, name = attributes["plan"], attributes["name"]
-    store = MapStore(path.resolve(), Grid.of_plain(plan["grid"]), tuple(plan["index"]), seal)
+    store = MapStore(path.resolve(), Grid.from_plain(plan["grid"]), tuple(plan["index"]), seal)
     return store.map(name, "" if plan["robot"] == name else plan["robot"])
 
 
@@ -173,10 +173,10 @@ def save_store(index_map: Map, path: Path) -> Path:
     plan = {"robot": index_map.machine or index_map.robot, "saved": True}
     names = tuple(index_map.values)
     if path.exists():
-        MapStore.of(path, index_map.robot, index_map.grid, names, plan)
+        MapStore.create(path, index_map.robot, index_map.grid, names, plan)
     with _temporary_beside(path) as work:
         new_store = work / path.name
-        store = MapStore.of(new_store, index_map.robot, index_map.grid, names, plan)
+        store = MapStore.create(new_store, index_map.robot, index_map.grid, names, plan)
         for number, region in enumerate(index_map.grid.regions()):
             arrays = {name: values[region] for name, values in index_map.values.items()}
             store.write(number, arrays | {_STATUS: index_map.status[region]})

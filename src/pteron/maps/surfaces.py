@@ -22,7 +22,7 @@ from pteron.atomic import write_bytes
 from pteron.errors import DataError, ModelError
 from pteron.extras import install_command
 from pteron.kernels import Array
-from pteron.maps.map import MARGIN, Map, headed
+from pteron.maps.map import MARGIN, Map, column_heading
 
 ENDINGS = (".vtk", ".vtu", ".ply", ".stl")
 """Endings of files that hold surfaces; STL does not hold the value that a surface belongs to."""
@@ -139,7 +139,7 @@ def save_surfaces(given: Map, target: Path) -> Path:
     )
     if ending != ".stl":
         # Names in these files have no blanks.
-        label = headed(index).replace(" [", "[").replace(" ", "_")
+        label = column_heading(index).replace(" [", "[").replace(" ", "_")
         mesh.point_data[label] = np.concatenate([part.values for part in parts])
     if ending.startswith(".vt"):
         mesh.cell_data["surface"] = [np.concatenate(kinds)]

@@ -15,7 +15,7 @@ from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.maps.checksums import checksum
 from pteron.maps.grid import Axis, Grid
-from pteron.maps.map import ALL, Map, headed
+from pteron.maps.map import ALL, Map, column_heading
 from pteron.platforms.coordinates import COORDINATES
 from pteron.tables import Table, listed, read_table, write_table
 from pteron.workspace import BEYOND_LIMITS
@@ -48,7 +48,7 @@ def read_map_table(source: Path) -> Map:
     """Return the map of a table."""
     table = read_table(source)
     coordinates = {name: f"{name} [{at.unit}]" for name, at in COORDINATES.items()}
-    headings = {**coordinates, **{index.name: headed(index) for index in ALL.values()}}
+    headings = {**coordinates, **{index.name: column_heading(index) for index in ALL.values()}}
     columns = {name: _column(table, name, full) for name, full in headings.items()}
     columns = {name: column for name, column in columns.items() if column}
     names = tuple(name for name in COORDINATES if name in columns)
@@ -114,7 +114,7 @@ def _grid(table: Table, names: tuple[str, ...], poses: Array) -> tuple[Grid, NDA
             "are there already: drop them"
         )
     if grid.size > len(poses):
-        lost = dict(grid.held)
+        lost = dict(grid.fixed_coordinates)
         for axis, rank in zip(axes, _first_missing(grid.shape, places[:, order]), strict=True):
             lost[axis.name] = float(axis.values[rank])
         first_missing = ", ".join(f"{name} = {lost[name]:g}" for name in names)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from pteron.atomic import make_folder, write_bytes, write_text
 from pteron.errors import DataError, OutputError
 from pteron.maps.plan import expect_same
+from pteron.renamed import former_attribute
 from pteron.tables import table_bytes
 
 if TYPE_CHECKING:
@@ -64,9 +65,11 @@ class TableStore:
         else:
             write_text(file, json.dumps(plan_as_json, indent=1) + "\n")
 
-    def finished(self) -> frozenset[int]:
+    def finished_chunks(self) -> frozenset[int]:
         """Return the numbers of the chunks that are there as they were written."""
         return frozenset(number for number, _ in self._is_complete())
+
+    finished = former_attribute("finished", "finished_chunks")
 
     def write(self, number: int, result: pl.DataFrame) -> None:
         """Write a chunk's rows, through a temporary file and a rename."""

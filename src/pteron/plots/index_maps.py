@@ -119,7 +119,7 @@ def _planes(volume: Map) -> list[Map]:
     middle = np.unravel_index(int(depth.argmax()), depth.shape)
     places = [axis.values[i] for axis, i in zip(axes, middle, strict=True)]
     return [
-        volume.at(axis.name, float(place))
+        volume.slice_at(axis.name, float(place))
         for axis, place in zip(reversed(axes), reversed(places), strict=True)
     ]
 
@@ -332,7 +332,7 @@ def _unit(name: str) -> str:
 
 def _title(shown_map: Map) -> str:
     """Return the machine's name, and the coordinates that are held."""
-    pairs = ((coordinate(name), value) for name, value in shown_map.grid.held.items())
+    pairs = ((coordinate(name), value) for name, value in shown_map.grid.fixed_coordinates.items())
     constants = (
         f"{c.symbol} = {c.shown_factor * value + 0.0:.4g}{' ' * (c.unit == 'm')}{c.shown_unit}"
         for c, value in pairs

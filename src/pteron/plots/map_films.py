@@ -67,7 +67,7 @@ def map_film(
     rate = ENCODERS[target.suffix.lower()].rate(fps)
 
     def drawn(value: float) -> Figure:
-        return map_panels([(given.at(last.name, value), name)], scales, given.causes)
+        return map_panels([(given.slice_at(last.name, value), name)], scales, given.causes)
 
     values = last.values.tolist()
     figure = drawn(values[0])

@@ -20,7 +20,8 @@ from pteron.legs import Drive
 from pteron.legs.motor_limits import motor_peak
 from pteron.manipulator import Manipulator
 from pteron.motion.sizing.drive_margins import DriveMargin, drive_margins
-from pteron.motion.sizing.places import Place
+from pteron.motion.sizing.places import CyclePlace
+from pteron.renamed import former_attribute
 from pteron.shapes import PerJoint
 
 if TYPE_CHECKING:
@@ -64,7 +65,7 @@ class Sizing:
     load_inertia : array, shape (2, n)
         Least and greatest inertia of the rigid bodies at each joint, the other joints being held:
         the diagonal of J^-T M J^-1; kg or kg m^2.
-    places : tuple of Place
+    places : tuple of CyclePlace
         Where the cycle is done; empty where it is done as it stands.
     assumed_friction : array, shape (n,)
         Dry friction that was assumed where the machine's file has none, N or N m.
@@ -77,7 +78,7 @@ class Sizing:
     accelerations: Array
     dwell: float
     load_inertia: Array
-    places: tuple[Place, ...]
+    places: tuple[CyclePlace, ...]
     assumed_friction: PerJoint
 
     def __repr__(self) -> str:
@@ -112,11 +113,14 @@ class Sizing:
         """Load forces: `forces` without the motors' inertia, so independent of the ratio."""
         return self.forces - self.rotor_inertia * self.accelerations
 
-    def at(self, place: int) -> Sizing:
+    def select_place(self, place: int) -> Sizing:
         """Return the sizing at one of several places, by its index."""
         parts = (self.forces, self.speeds, self.accelerations)
         forces, speeds, accelerations = (part[:, place] for part in parts)
         return replace(self, forces=forces, speeds=speeds, accelerations=accelerations, places=())
+
+    at = former_attribute("at", "select_place")
+    where = former_attribute("where", "place_text")
 
     def worst(self, quantity: str) -> PerJoint:
         """Return, for each drive, the index in `places` where a quantity is greatest.
@@ -278,17 +282,17 @@ class Sizing:
         """Loads beyond the drives' limits, a line each: which leg, which limit, and by how much."""
         exceeded = [margin for margin in self.margins if margin.margin < 1.0]
         exceeded.sort(key=lambda margin: margin.quantity == "rms_force")
-        return tuple(margin.told(self.where(margin)) for margin in exceeded)
+        return tuple(margin.overload_text(self.place_text(margin)) for margin in exceeded)
 
-    def where(self, one: DriveMargin) -> str:
+    def place_text(self, margin: DriveMargin) -> str:
         """Return in words at which of several places a margin is so small; else an empty text."""
         if not self.places:
             return ""
-        leg = one.leg - 1
-        if one.quantity == "force_at_speed":
+        leg = margin.leg - 1
+        if margin.quantity == "force_at_speed":
             peak = motor_peak(self.drives[leg], self.forces[..., leg], self.speeds[..., leg])
             return f" {self.places[peak.at % len(self.places)]}"
-        return f" {self.places[self.worst(one.quantity)[leg]]}"
+        return f" {self.places[self.worst(margin.quantity)[leg]]}"
 
     def table(self) -> pl.DataFrame:
         """Return a table, one row a leg: SI units, at the joint but for motor_torque.

@@ -10,6 +10,7 @@ from pteron.kernels import Array
 from pteron.legs import Drive
 from pteron.legs.motor_limits import motor_peak
 from pteron.manipulator import Manipulator
+from pteron.renamed import former_attribute
 from pteron.shapes import PerJoint
 
 
@@ -32,7 +33,7 @@ class DriveMargin(NamedTuple):
         """The limit over what is needed: from 1 on it is enough."""
         return self.most / self.needed if self.needed > 0.0 else math.inf
 
-    def told(self, where: str) -> str:
+    def overload_text(self, where: str) -> str:
         """Return in a line that the limit is too small for what is needed at a place."""
         needed = f"{self.needed:.4g} {self.unit}"
         if self.quantity == "rms_force":
@@ -49,6 +50,9 @@ class DriveMargin(NamedTuple):
             f"leg {self.leg}: the motion takes up to {needed}{where}, but its drive gives "
             f"{self.most:g} {self.unit} ({self.limit})"
         )
+
+
+DriveMargin.told = former_attribute("told", "overload_text")  # type: ignore[attr-defined]
 
 
 def drive_margins(

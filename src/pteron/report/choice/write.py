@@ -11,9 +11,16 @@ from matplotlib.figure import Figure
 
 from pteron.atomic import write_texts
 from pteron.design import Choice
-from pteron.design.choosing.candidate import Candidate
-from pteron.design.choosing.job import OBJECTIVES
-from pteron.design.choosing.told import asked, assumed, cells, dimensions, drives, margins
+from pteron.design.candidate import Candidate
+from pteron.design.choice_text import (
+    assumption_lines,
+    cells,
+    dimensions,
+    drives,
+    margins,
+    requirement_lines,
+)
+from pteron.design.job import OBJECTIVES
 from pteron.json_values import json_text
 from pteron.manipulator import load
 from pteron.plots import draw, fronts_figure
@@ -127,8 +134,8 @@ def page(choice: Choice) -> str:
         dimensions=dimensions,
         drives=drives,
         margins=margins,
-        asked=asked(choice.job),
-        assumed=assumed(choice),
+        asked=requirement_lines(choice.job),
+        assumed=assumption_lines(choice),
         figure=figure,
         pictures={candidate.kind: picture(candidate) for candidate in serving},
     )

@@ -9,8 +9,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from pteron.design.choosing.job import Job
-from pteron.design.choosing.kinds import slides
+from pteron.design.job import Job
+from pteron.design.kinds import slides
 from pteron.equations.clearance import meetings, squared_distance
 from pteron.kernels import Array, numeric
 from pteron.manipulator import Manipulator
@@ -31,13 +31,13 @@ Misses = dict[str, tuple[float, str]]
 """By how much bounds are missed, as a share of them, and in words."""
 
 
-class Room:
+class MachineSpace:
     """The room that a job leaves machines of a kind."""
 
     def __init__(self, job: Job, robot: Manipulator) -> None:
         self._job, self._robot = job, robot
 
-    def judged(
+    def evaluate(
         self, robot: Manipulator, poses: Array, middle: Array
     ) -> tuple[dict[str, float], Misses]:
         """Return the sizes of a machine at poses (N, m), m, and what it misses.
@@ -46,8 +46,8 @@ class Room:
         """
         floor = self._job.floors.clearance
         points = np.asarray(numeric(robot, "joint_points")(poses)[0])
-        figures, misses = self.within(
-            self._room_taken(robot, poses, points, middle).min(axis=0), _TIGHT
+        figures, misses = self.judge_extents(
+            self._extents_of_points(robot, poses, points, middle).min(axis=0), _TIGHT
         )
         clear = self._clearance(robot, poses, points)
         if clear < floor + _SPARE:
@@ -56,15 +56,17 @@ class Room:
             misses["clearance"] = (floor + _SPARE - clear) / _CLOSE, words
         return figures, misses
 
-    def taken(self, robot: Manipulator, poses: Array, middle: Array) -> Array:
+    def extents(self, robot: Manipulator, poses: Array, middle: Array) -> Array:
         """Return the room that a machine takes at poses (N, 6 + boxes), from the tool's middle, m.
 
         The least coordinates, minus the greatest, and how far it stays outside each keep-out box.
         """
         points = np.asarray(numeric(robot, "joint_points")(poses)[0])
-        return self._room_taken(robot, poses, points, middle)
+        return self._extents_of_points(robot, poses, points, middle)
 
-    def _room_taken(self, robot: Manipulator, poses: Array, points: Array, middle: Array) -> Array:
+    def _extents_of_points(
+        self, robot: Manipulator, poses: Array, points: Array, middle: Array
+    ) -> Array:
         margin, center = self._job.cell.margin, tool_places(robot, middle[None])[0]
         starts, ends = (part - center for part in _lines(robot, poses, points))
         both = np.stack([starts, ends])
@@ -78,12 +80,12 @@ class Room:
         ]
         return np.column_stack([low, -high, *(-depth - margin for depth in depths)])
 
-    def within(self, taken: Array, tight: float = 0.0) -> tuple[dict[str, float], Misses]:
-        """Return the sizes of a machine that takes so much room (6 + boxes,), and what it misses.
+    def judge_extents(self, extents: Array, tight: float = 0.0) -> tuple[dict[str, float], Misses]:
+        """Return the sizes of a machine with extents (6 + boxes,), and what it misses.
 
         Bounds are tighter by a length, m.
         """
-        cell, (low, high, outside) = self._job.cell, np.split(taken, [3, 6])
+        cell, (low, high, outside) = self._job.cell, np.split(extents, [3, 6])
         high = -high
         width, depth, height = map(float, high - low)
         figures = {"footprint": width * depth, "width": width, "depth": depth, "height": height}

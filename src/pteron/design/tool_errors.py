@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from pteron.design.choosing.job_tables import AccuracyTable
+from pteron.design.job_tables import AccuracyTable
 from pteron.design.worst_cases import worst_position_errors
 from pteron.indices import (
     ALUMINIUM,
@@ -50,7 +50,7 @@ def joint_errors(accuracy: AccuracyTable, ratios: Array, backlash: Array) -> Arr
 def unit_errors(accuracy: AccuracyTable, robot: Manipulator, poses: Array) -> tuple[Array, Array]:
     """Return the tool's errors at poses, (N,) each, m: by joint errors of 1, and by all else."""
     joints = greatest_errors(accuracy, robot, poses, Tolerances(joints=1.0))
-    if not accuracy.of_parts:
+    if not accuracy.has_part_errors:
         return joints, np.zeros_like(joints)
     return joints, greatest_errors(accuracy, robot, poses, tolerances(accuracy, 0.0))
 
@@ -58,7 +58,7 @@ def unit_errors(accuracy: AccuracyTable, robot: Manipulator, poses: Array) -> tu
 def greatest_errors(
     accuracy: AccuracyTable, robot: Manipulator, poses: Array, errors: Tolerances
 ) -> Array:
-    """Return the tool's error at poses, (N,), m: the worst case or the standard deviation.
+    """Return the tool's error at poses, (N,), m: the worst evaluator or the standard deviation.
 
     `asked.counted` says which of both.
     """

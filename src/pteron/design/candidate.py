@@ -1,4 +1,4 @@
-"""`judged`: the best design of a kind, proved, with margins at the worst place and direction."""
+"""`prove_best_design`: the best design of a kind that can be proved, with its worst margins."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pteron.design.choosing.cycles import Places
-from pteron.design.choosing.margins import DENSE, margins_of
-from pteron.design.choosing.proofs import is_clear, proofs_of, told
-from pteron.design.choosing.rating import Case, Rating
-from pteron.design.choosing.samples import sample_poses
-from pteron.design.choosing.search import front
-from pteron.design.choosing.tool import elasticity, greatest_errors, joint_errors, tolerances
+from pteron.design.cycle_places import Places
+from pteron.design.kind_proofs import is_clear, proof_sentence, proofs_of
+from pteron.design.kind_search import front
+from pteron.design.load_margins import DENSE, margins_of
+from pteron.design.rating import KindEvaluator, Rating
+from pteron.design.tool_errors import elasticity, greatest_errors, joint_errors, tolerances
+from pteron.design.workspace_samples import sample_poses
 from pteron.errors import PteronError
 from pteron.indices import Tolerances, stiffness
 from pteron.kernels import Array
@@ -95,9 +95,9 @@ class Candidate:
         return asdict(self)
 
 
-def judged(case: Case, ratings: list[Rating]) -> Candidate:
+def prove_best_design(evaluator: KindEvaluator, ratings: list[Rating]) -> Candidate:
     """Return the best design of a search that can be proved, or why there is none."""
-    objectives = case.job.objectives
+    objectives = evaluator.job.objectives
     first, second = shown_objectives(objectives)[:2]
     good = sorted(
         (r for r in ratings if not r.misses), key=lambda r: (r.figures[first], r.figures[second])
@@ -105,40 +105,40 @@ def judged(case: Case, ratings: list[Rating]) -> Candidate:
     counts = len(ratings), len(good)
     if not good:
         nearest = min(ratings, key=lambda rating: rating.cost(objectives[0]))
-        return Candidate(case.kind.name, False, tuple(nearest.told.values()), *counts)
+        return Candidate(evaluator.kind.name, False, tuple(nearest.shortfalls.values()), *counts)
     why, tight = "", None
     for rating in (good[2**k - 1] for k in range(_TRIED) if 2**k <= len(good)):
-        proofs, rating.robot = proofs_of(case, rating)
+        proofs, rating.robot = proofs_of(evaluator, rating)
         bad = next((p for p in proofs if p.counterexample is not None), None)
-        why = str(bad) if bad is not None else _cell_violation(case, rating)
+        why = str(bad) if bad is not None else _cell_violation(evaluator, rating)
         if not why:
             candidate = _candidate(
-                case, rating, proofs, counts, front(good, shown_objectives(objectives))
+                evaluator, rating, proofs, counts, front(good, shown_objectives(objectives))
             )
-            why = _exceeded_limit(case, candidate)
-            if not why and candidate.least_margin >= case.job.motors.margin:
+            why = _exceeded_limit(evaluator, candidate)
+            if not why and candidate.least_margin >= evaluator.job.motors.margin:
                 return candidate
             # Where no design keeps the whole margin between the search's places, the best serves.
             tight = tight or (None if why else candidate)
-    return tight or Candidate(case.kind.name, False, (f"no proof ({why})",), *counts)
+    return tight or Candidate(evaluator.kind.name, False, (f"no proof ({why})",), *counts)
 
 
-def _cell_violation(case: Case, rating: Rating) -> str:
+def _cell_violation(evaluator: KindEvaluator, rating: Rating) -> str:
     """Return in words where a design leaves its room between the poses of its search; note it."""
     robot = rating.robot
     assert robot is not None  # it keeps all that is asked
 
-    def taken(poses: Array) -> Array:
-        return case.room.taken(robot, rating.middle + poses, rating.middle)
+    def extents(poses: Array) -> Array:
+        return evaluator.machine_space.extents(robot, rating.middle + poses, rating.middle)
 
-    sizes, misses = case.room.within(case.worst(robot, taken, DENSE)[0])
+    sizes, misses = evaluator.machine_space.judge_extents(evaluator.worst(robot, extents, DENSE)[0])
     rating.figures |= sizes
     return "".join(f"not so: {words}" for _, words in list(misses.values())[:1])
 
 
-def _exceeded_limit(case: Case, candidate: Candidate) -> str:
+def _exceeded_limit(evaluator: KindEvaluator, candidate: Candidate) -> str:
     """Return in words what a design exceeds between the poses of its search; empty for nothing."""
-    job, figures = case.job, candidate.figures
+    job, figures = evaluator.job, candidate.figures
     bounds = {"error": job.accuracy, "deflection": job.stiffness}
     for name, limit in bounds.items():
         if limit is not None and figures[name] > limit.most:
@@ -156,54 +156,60 @@ def shown_objectives(objectives: Sequence[str]) -> list[str]:
 
 
 def _candidate(
-    case: Case, rating: Rating, proofs: list[Proof], counts: tuple[int, int], best: list[Rating]
+    evaluator: KindEvaluator,
+    rating: Rating,
+    proofs: list[Proof],
+    counts: tuple[int, int],
+    best: list[Rating],
 ) -> Candidate:
     robot = rating.robot
     assert robot is not None  # it keeps all that is asked
-    carrying = case.loaded(robot)
+    loaded_robot = evaluator.add_payload(robot)
     figures = dict(rating.figures)
-    time = case.kind.numbers(rating.values).get("time")
-    margins = margins_of(case, carrying, rating.middle, time)
+    time = evaluator.kind.numbers(rating.values).get("time")
+    margins = margins_of(evaluator, loaded_robot, rating.middle, time)
     figures |= margins.figures
 
     def least(values_of: Callable[[Array], ArrayLike]) -> float:
         def column(poses: Array) -> Array:
             return np.reshape(values_of(rating.middle + poses), (-1, 1))
 
-        return float(case.worst(robot, column, DENSE, _WORST)[0][0])
+        return float(evaluator.worst(robot, column, DENSE, _WORST)[0][0])
 
     figures["clearance"] = least(lambda poses: clearance(robot, poses).least)
-    if (accuracy := case.job.accuracy) is not None:
-        errors = _tolerances(case, rating)
+    if (accuracy := evaluator.job.accuracy) is not None:
+        errors = _tolerances(evaluator, rating)
         figures["error"] = -least(lambda poses: -greatest_errors(accuracy, robot, poses, errors))
-    if case.job.stiffness is not None:
-        springs = elasticity(case.sections(rating), [o.gearbox.stiffness for o in rating.options])
+    if evaluator.job.stiffness is not None:
+        springs = elasticity(
+            evaluator.sections(rating), [o.gearbox.stiffness for o in rating.options]
+        )
         stiff = least(lambda poses: stiffness(robot, poses, springs).least)
-        figures["deflection"] = float(case.job.stiffness.force / stiff)
-    times = _shortest_times(case, carrying, rating, margins.place)
-    objectives = shown_objectives(case.job.objectives)
+        figures["deflection"] = float(evaluator.job.stiffness.force / stiff)
+    times = _shortest_times(evaluator, loaded_robot, rating, margins.place)
+    objectives = shown_objectives(evaluator.job.objectives)
     return Candidate(
-        case.kind.name,
+        evaluator.kind.name,
         True,
         (),
         *counts,
-        told(case, proofs),
-        _clear_words(case, robot, rating.middle),
+        proof_sentence(evaluator, proofs),
+        _clear_words(evaluator, robot, rating.middle),
         _dimensions(robot),
         {name: value for name, value in (figures | times).items() if np.isfinite(value)},
         tuple(option.name for option in rating.options),
         margins.worst,
         tuple({name: r.figures[name] for name in objectives} for r in best),
-        text_of(replace(robot, name=f"{case.kind.name}-chosen")),
+        text_of(replace(robot, name=f"{evaluator.kind.name}-chosen")),
         tuple(rating.middle.tolist()),
     )
 
 
-def _clear_words(case: Case, robot: Manipulator, middle: Array) -> str:
-    least, samples = case.job.floors.clearance, sample_poses(case.job, robot, DENSE)
-    count = len(samples) + len(case.between)
+def _clear_words(evaluator: KindEvaluator, robot: Manipulator, middle: Array) -> str:
+    least, samples = evaluator.job.floors.clearance, sample_poses(evaluator.job, robot, DENSE)
+    count = len(samples) + len(evaluator.between)
     distance_words = f"come nearer than {1e3 * least:g} mm" if least else "touch"
-    if not len(case.between) and is_clear(case, robot, middle):
+    if not len(evaluator.between) and is_clear(evaluator, robot, middle):
         return f"proved: no two links, guides or the platform {distance_words}"
     return (
         f"at {count} sample poses and about the worst of them no two links, guides or the "
@@ -229,24 +235,24 @@ def _dimensions(robot: Manipulator) -> dict[str, float]:
     return sizes | ({"stroke": max(strokes)} if strokes else {})
 
 
-def _tolerances(case: Case, rating: Rating) -> Tolerances:
+def _tolerances(evaluator: KindEvaluator, rating: Rating) -> Tolerances:
     """Return the tolerances of a design with its drives."""
-    accuracy = case.job.accuracy
+    accuracy = evaluator.job.accuracy
     assert accuracy is not None  # who asks has some
     gears = np.array([(o.gearbox.ratio, o.gearbox.backlash) for o in rating.options])
     return tolerances(accuracy, joint_errors(accuracy, *gears.T).tolist())
 
 
 def _shortest_times(
-    case: Case, robot: Manipulator, rating: Rating, place: tuple[Places, int] | None
+    evaluator: KindEvaluator, robot: Manipulator, rating: Rating, place: tuple[Places, int] | None
 ) -> dict[str, float]:
     """Return the shortest time of the cycle at its worst place with these drives, s."""
     if place is None:
         return {}
     cycle, k = place
-    path = _ShiftedPath(cycle.at(np.array([k])), rating.middle)
+    path = _ShiftedPath(cycle.select_places(np.array([k])), rating.middle)
     # Drives are left what the margin asks for.
-    share, drive_limits = case.job.motors.margin, limits_of(robot)
+    share, drive_limits = evaluator.job.motors.margin, limits_of(robot)
     limits = replace(
         drive_limits, force=drive_limits.force / share, speed=drive_limits.speed / share
     )
@@ -270,7 +276,7 @@ class _ShiftedPath(Path):
         return self._path.rests
 
     def at(self, s: Array) -> tuple[Array, Array, Array]:
-        pose, first, second = (part[0] for part in self._place.moved(*self._path.at(s)))
+        pose, first, second = (part[0] for part in self._place.curves(*self._path.at(s)))
         return self._middle + pose, first, second
 
     def place(self, s: float) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import Field, PrivateAttr, field_validator, model_validator
 
 from pteron.bodies.tables import TomlTable, key
-from pteron.design.choosing.job_tables import (
+from pteron.design.job_tables import (
     AccuracyTable,
     BoundTable,
     CellTable,
@@ -27,7 +27,7 @@ from pteron.design.choosing.job_tables import (
     StiffnessTable,
     WorkspaceTable,
 )
-from pteron.design.choosing.known_kinds import KINDS
+from pteron.design.known_kinds import KINDS
 from pteron.errors import DataError, shown
 from pteron.toml import read_toml, to_model
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pteron.design.choosing.rating import Case, Rating
-from pteron.design.choosing.samples import orientations, with_tool_in_the_middle
+from pteron.design.rating import KindEvaluator, Rating
+from pteron.design.workspace_samples import orientations, poses_about_tool
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator, Radii
 from pteron.motion.trajectories.tool import arm_motion, carries, tool_motion
@@ -70,15 +70,15 @@ class TurnedTool:
         return at, away
 
 
-def proofs_of(case: Case, rating: Rating) -> tuple[list[Proof], Manipulator]:
+def proofs_of(evaluator: KindEvaluator, rating: Rating) -> tuple[list[Proof], Manipulator]:
     """Return proofs of the workspace, and the machine, its guides and rams lengthened if needed."""
-    robot, floors = rating.robot, case.job.floors
+    robot, floors = rating.robot, evaluator.job.floors
     assert robot is not None  # a design that keeps all requirements has one
     proofs: list[Proof] = []
     for _ in range(4):
         proofs = [
             prove(robot, region, type_i=floors.type_i, type_ii=floors.type_ii, most=_BOXES)
-            for region in regions(case, robot, rating.middle)
+            for region in regions(evaluator, robot, rating.middle)
         ]
         causes = {c.leg for proof in proofs if not proof.holds for c in proof.causes}
         ended = {i for i in causes if i and robot.legs[i - 1].joint.unit == "m"}
@@ -89,25 +89,25 @@ def proofs_of(case: Case, rating: Rating) -> tuple[list[Proof], Manipulator]:
             low, high = legs[i - 1].limits or (0.0, 0.0)
             spare = _LONGER * (high - low)
             travel = low - spare, high + spare
-            legs[i - 1] = case.kind.with_travel(legs[i - 1], travel, rating.values)
+            legs[i - 1] = evaluator.kind.with_travel(legs[i - 1], travel, rating.values)
         robot = replace(robot, legs=tuple(legs))
     return proofs, robot
 
 
-def regions(case: Case, robot: Manipulator, middle: Array) -> list[Region]:
+def regions(evaluator: KindEvaluator, robot: Manipulator, middle: Array) -> list[Region]:
     """Return the workspace as regions: each pose of a list, else a box or cylinder an orientation.
 
     A range of turns without tilts is a coordinate of one box.
     """
-    space, count = case.job.workspace, len(robot.platform.lengths)
+    space, count = evaluator.job.workspace, len(robot.platform.lengths)
     if space.poses is not None:
-        return [Box(tuple(pose), tuple(pose)) for pose in middle + case.poses]
+        return [Box(tuple(pose), tuple(pose)) for pose in middle + evaluator.poses]
     if space.turn is not None and not space.tilts and space.radius is None:
-        return [_turned_box(case, robot, middle)]
+        return [_turned_box(evaluator, robot, middle)]
     boxes: list[Region] = []
     half = np.zeros(robot.freedom)
-    half[:count] = case.half[:count]
-    for pose in middle + with_tool_in_the_middle(robot, orientations(case.job, robot)):
+    half[:count] = evaluator.half[:count]
+    for pose in middle + poses_about_tool(robot, orientations(evaluator.job, robot)):
         if space.radius is not None and space.height is not None:
             boxes.append(Cylinder(tuple(pose.tolist()), space.radius, space.height))
         else:
@@ -115,34 +115,34 @@ def regions(case: Case, robot: Manipulator, middle: Array) -> list[Region]:
     return boxes
 
 
-def _turned_box(case: Case, robot: Manipulator, middle: Array) -> Region:
+def _turned_box(evaluator: KindEvaluator, robot: Manipulator, middle: Array) -> Region:
     """Return the box of positions and turns of a workspace with a range of turns."""
     platform, count = robot.platform, len(robot.platform.lengths)
-    assert case.job.workspace.turn is not None  # the caller has checked it
+    assert evaluator.job.workspace.turn is not None  # the caller has checked it
     zeros = np.zeros((1, robot.freedom))
     level = tool_motion(platform, middle[None], zeros, zeros)[0][0]
     low, high = level.copy(), level.copy()
-    low[:count] -= case.half[:count]
-    high[:count] += case.half[:count]
-    low[-1], high[-1] = case.job.workspace.turn
+    low[:count] -= evaluator.half[:count]
+    high[:count] += evaluator.half[:count]
+    low[-1], high[-1] = evaluator.job.workspace.turn
     box = Box(tuple(low.tolist()), tuple(high.tolist()))
     return TurnedTool(box, platform) if carries(platform) and any(platform.tool[:2]) else box
 
 
-def told(case: Case, proofs: Sequence[Proof]) -> str:
+def proof_sentence(evaluator: KindEvaluator, proofs: Sequence[Proof]) -> str:
     """Return what is proved of the workspace, in words."""
-    space, boxes = case.job.workspace, sum(proof.boxes for proof in proofs)
+    space, boxes = evaluator.job.workspace, sum(proof.boxes for proof in proofs)
     if not all(proof.holds for proof in proofs):
         return (
-            f"kept at {len(case.poses)} sample poses; intervals over {boxes} boxes do not decide "
-            "of all"
+            f"kept at {len(evaluator.poses)} sample poses; intervals over {boxes} boxes do not "
+            "decide of all"
         )
     if space.poses is not None:
         statement = (
             f"every one of {len(proofs)} poses and orientations keeps reach, limits and floors"
         )
-        between = f"; so do the cycles between them at {len(case.between)} samples"
-        return statement + (between if len(case.between) else "")
+        between = f"; so do the cycles between them at {len(evaluator.between)} samples"
+        return statement + (between if len(evaluator.between) else "")
     noun = "pose" if len(proofs) == 1 else f"position, at {len(proofs)} orientations,"
     statement = f"every {noun} keeps reach, limits and floors, by intervals over {boxes} boxes"
     return (
@@ -150,11 +150,11 @@ def told(case: Case, proofs: Sequence[Proof]) -> str:
     )
 
 
-def is_clear(case: Case, robot: Manipulator, middle: Array) -> bool:
+def is_clear(evaluator: KindEvaluator, robot: Manipulator, middle: Array) -> bool:
     """Say whether it is proved that no two bodies come nearer than the least clearance."""
-    radii, least = robot.radii or Radii(), case.job.floors.clearance / 2.0
+    radii, least = robot.radii or Radii(), evaluator.job.floors.clearance / 2.0
     parts = (radii.guide, radii.upper, radii.lower, radii.platform)
     required = interference(robot, Radii(*(part + least for part in parts)))
-    workspace = regions(case, robot, middle)
+    workspace = regions(evaluator, robot, middle)
     most = _BOXES_CLEAR // len(workspace)
     return all(prove(robot, region, given=required, most=most).holds for region in workspace)

@@ -11,7 +11,7 @@ from itertools import product
 import numpy as np
 import scipy  # type: ignore[import-untyped]
 
-from pteron.design.choosing.job import Job
+from pteron.design.job import Job
 from pteron.kernels import Array
 from pteron.kinematics import pose_of
 from pteron.manipulator import Manipulator
@@ -33,18 +33,18 @@ _ROUNDS = 4
 """Halvings of the distance at which worse places are looked for about the worst."""
 
 
-def of_platform(robot: Manipulator, *curve: Array) -> Curve:
+def platform_curve(robot: Manipulator, *curve: Array) -> Curve:
     """Return places of the tool from the middle, and two derivatives, as those of P."""
     pose, first, second = pose_motion(robot.platform, *curve)
     zeros = np.zeros((1, robot.freedom))
     return pose + tool_motion(robot.platform, zeros, zeros, zeros)[0], first, second
 
 
-def with_tool_in_the_middle(robot: Manipulator, angles: Array) -> Array:
+def poses_about_tool(robot: Manipulator, angles: Array) -> Array:
     """Return poses (A, m) from the middle at which P is elsewhere, but the tool is there."""
     poses = np.zeros((len(angles), robot.freedom))
     poses[:, len(robot.platform.lengths) :] = angles
-    return of_platform(robot, poses, np.zeros_like(poses), np.zeros_like(poses))[0]
+    return platform_curve(robot, poses, np.zeros_like(poses), np.zeros_like(poses))[0]
 
 
 def sample_poses(job: Job, robot: Manipulator, count: int | None = None) -> Array:
@@ -52,7 +52,7 @@ def sample_poses(job: Job, robot: Manipulator, count: int | None = None) -> Arra
     return _poses_at(job, robot, _places(job, robot, count or _positions_along(job)))
 
 
-def about_the_worst(
+def refine_worst_values(
     job: Job,
     robot: Manipulator,
     values_of: Callable[[Array], Array],
@@ -144,12 +144,12 @@ def _poses_at(job: Job, robot: Manipulator, places: Array) -> Array:
     if job.workspace.tilt is not None:
         angles = _tilted_angles(robot, angles[:, :2])
         angles[:, -1] += places[:, -1]
-    poses = with_tool_in_the_middle(robot, angles)
+    poses = poses_about_tool(robot, angles)
     poses[:, :count] += places[:, :count]
     return poses
 
 
-def wide(rows: object) -> Array:
+def pad_to_xyz(rows: object) -> Array:
     """Return rows of two or three numbers with three."""
     array = np.asarray(rows, dtype=float)
     return np.pad(array, ((0, 0), (0, 3 - array.shape[1])))
@@ -158,7 +158,7 @@ def wide(rows: object) -> Array:
 def _positions(job: Job, count: int) -> Array:
     space, half = job.workspace, job.workspace.half
     if space.poses is not None:
-        points = wide(space.poses)
+        points = pad_to_xyz(space.poses)
         return np.asarray(points - 0.5 * (points.min(axis=0) + points.max(axis=0)))
     line = np.linspace(-1.0, 1.0, count)
     upright = line if half[2] else np.zeros(1)
@@ -172,7 +172,7 @@ def _positions(job: Job, count: int) -> Array:
 
 def orientations(job: Job, robot: Manipulator) -> Array:
     """Return angles (A, a) of the platform that the workspace asks for; tilts at each turn."""
-    return np.concatenate([shifted(tilts(job, robot), angle) for angle in _turns(job)])
+    return np.concatenate([turn_angles(tilts(job, robot), angle) for angle in _turns(job)])
 
 
 def _turns(job: Job) -> list[float]:
@@ -207,7 +207,7 @@ def _tilted_angles(robot: Manipulator, leans: Array) -> Array:
     return np.array(pose_of(robot, np.zeros(3), matrices)[:, -len(robot.platform.angles) :])
 
 
-def shifted(angles: Array, turn: float) -> Array:
+def turn_angles(angles: Array, turn: float) -> Array:
     """Return angles (A, a) turned further about the upright."""
     if not angles.shape[1]:
         return angles

@@ -35,7 +35,7 @@ def misfits(spec: Spec, robot: Manipulator) -> Iterator[str]:
         middle = np.zeros((1, robot.freedom))
         placed = spec.workspace
         if placed.floats:
-            placed = placed.placed(middle[0, : len(lengths)])
+            placed = placed.with_center(middle[0, : len(lengths)])
         corners = workspace_poses(placed, middle, samples=2)
         for warning in unlikely_values(robot, robot.coordinates, corners):
             yield f"workspace: {warning}"
@@ -113,7 +113,7 @@ def _loads(spec: Spec, robot: Manipulator) -> Iterator[str]:
     """Yield the faults of payload, cycles and numbers that are one a leg."""
     if spec.payload is not None:
         try:
-            spec.payload.on(robot)
+            spec.payload.add_to(robot)
         except PteronError as error:
             yield f"payload: {error}"
     for i, cycle in enumerate(spec.cycles, start=1):

@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 
 from pteron.atomic import write_text
-from pteron.design.choosing.candidate import Candidate, judged
-from pteron.design.choosing.drives import GEARBOXES, MOTORS, Options, read_lists
-from pteron.design.choosing.job import Job
-from pteron.design.choosing.kinds import Kind, fitting_kinds
-from pteron.design.choosing.rating import Case
-from pteron.design.choosing.search import search_kind
+from pteron.design.candidate import Candidate, prove_best_design
+from pteron.design.drive_options import GEARBOXES, MOTORS, Options, read_lists
+from pteron.design.job import Job
+from pteron.design.kind_search import search_kind
+from pteron.design.kinds import Kind, fitting_kinds
+from pteron.design.rating import KindEvaluator
 from pteron.errors import DataError, PteronError
 from pteron.json_values import json_ready
 from pteron.kernels.one_thread import one_thread
@@ -122,18 +122,20 @@ def choose_machine(
         If no kind can do the motion, a cycle does not fit into the workspace, a list of motors
         cannot be read, or a price is asked for of motors that have none.
     """
-    cases = cases_of(job)
-    store = _CandidateStore(None if folder is None else Path(folder) / _KEPT, job, cases)
-    candidates = {name: known for name in cases if (known := store.find(name)) is not None}
+    evaluators = evaluators_of(job)
+    store = _CandidateStore(None if folder is None else Path(folder) / _KEPT, job, evaluators)
+    candidates = {name: known for name in evaluators if (known := store.find(name)) is not None}
     resumed = tuple(candidates)
-    shares = {name: float(name in candidates) for name in cases}
+    shares = {name: float(name in candidates) for name in evaluators}
 
     def tell(name: str, share: float) -> None:
         shares[name] = share if name in candidates else _SEARCH * share
         if progress is not None:
             progress(sum(shares.values()) / len(shares), name)
 
-    remaining = {name: case for name, case in cases.items() if name not in candidates}
+    remaining = {
+        name: evaluator for name, evaluator in evaluators.items() if name not in candidates
+    }
     if begun is not None:
         begun(tuple(remaining), resumed)
     if progress is not None and remaining:  # what was done before is not this run's
@@ -151,7 +153,7 @@ def choose_machine(
     return Choice(job, tuple(order), resumed)
 
 
-def cases_of(job: Job) -> dict[str, Case]:
+def evaluators_of(job: Job) -> dict[str, KindEvaluator]:
     """Return the job for each kind that can do the motion."""
     space = job.workspace
     names = fitting_kinds(job.kinds, job.lengths, space.turn is not None, space.tilts)
@@ -161,7 +163,7 @@ def cases_of(job: Job) -> dict[str, Case]:
     )
     motors, gearboxes = read_lists(*files)
     options = {
-        unit: Options.of(motors, gearboxes, unit, job.motors.friction) for unit in ("rad", "m")
+        unit: Options.combine(motors, gearboxes, unit, job.motors.friction) for unit in ("rad", "m")
     }
     unpriced = [o.name for some in options.values() for o in some.all if not np.isfinite(o.price)]
     if unpriced and ("price" in job.objectives or job.most.price is not None):
@@ -173,13 +175,13 @@ def cases_of(job: Job) -> dict[str, Case]:
     needed = 2.0 * float(job.workspace.half.max())
     tool = job.payload.tool
     kinds = (Kind(name, max(needed, _SMALL), job.links, tool, job.free) for name in names)
-    cases = {kind.name: Case(job, kind, options) for kind in kinds}
-    for case in cases.values():
+    evaluators = {kind.name: KindEvaluator(job, kind, options) for kind in kinds}
+    for evaluator in evaluators.values():
         try:
-            case.loaded(case.kind.robot)
+            evaluator.add_payload(evaluator.kind.robot)
         except PteronError as error:
             raise DataError(f"payload: {error}") from None
-    return cases
+    return evaluators
 
 
 def _has_drives(name: str, options: Mapping[str, Options], job: Job) -> bool:
@@ -193,23 +195,25 @@ def _has_drives(name: str, options: Mapping[str, Options], job: Job) -> bool:
     return not lacking
 
 
-def _candidate(case: Case, progress: Callable[[float], None]) -> Candidate:
-    search = case.job.search
+def _candidate(evaluator: KindEvaluator, progress: Callable[[float], None]) -> Candidate:
+    search = evaluator.job.search
     with one_thread():
-        return judged(case, search_kind(case, search.evaluations, search.seed, progress))
+        return prove_best_design(
+            evaluator, search_kind(evaluator, search.evaluations, search.seed, progress)
+        )
 
 
 def _search_kinds(
-    cases: Mapping[str, Case], workers: int, tell: Callable[[str, float], None]
+    evaluators: Mapping[str, KindEvaluator], workers: int, tell: Callable[[str, float], None]
 ) -> Iterator[tuple[str, Candidate]]:
     """Yield the candidates as they are found, in as many processes."""
-    if workers < 2 or len(cases) < 2:
-        for name, case in cases.items():
-            yield name, _candidate(case, partial(tell, name))
+    if workers < 2 or len(evaluators) < 2:
+        for name, evaluator in evaluators.items():
+            yield name, _candidate(evaluator, partial(tell, name))
         return
-    names = list(cases)
+    names = list(evaluators)
     with WorkerPool(workers) as pool:
-        for k, message in pool.messages(_candidate, list(cases.values())):
+        for k, message in pool.messages(_candidate, list(evaluators.values())):
             if isinstance(message, Candidate):
                 yield names[k], message
             else:
@@ -219,8 +223,10 @@ def _search_kinds(
 class _CandidateStore:
     """Finished kinds in a folder, each with a digest of all that it depends on."""
 
-    def __init__(self, folder: Path | None, job: Job, cases: Mapping[str, Case]) -> None:
-        self._folder, self._job, self._cases = folder, job, cases
+    def __init__(
+        self, folder: Path | None, job: Job, evaluators: Mapping[str, KindEvaluator]
+    ) -> None:
+        self._folder, self._job, self._cases = folder, job, evaluators
 
     def _digest(self, name: str) -> str:
         job = self._job.model_dump(mode="json", exclude={"kinds"})

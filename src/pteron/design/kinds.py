@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from pteron.bodies.vectors import Vector
-from pteron.design.choosing.job_tables import LinksTable
-from pteron.design.choosing.known_kinds import KINDS
+from pteron.design.job_tables import LinksTable
+from pteron.design.known_kinds import KINDS
 from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.kinematics.sampling import search_ball
@@ -139,13 +139,13 @@ class Kind:
                 middle[i] = 0.0
         return _build_machine(self.robot, numbers, self._stock(values), self.links), middle
 
-    def cut(self, values: Array) -> dict[str, str]:
+    def link_stocks(self, values: Array) -> dict[str, str]:
         """Return what a design's upper and lower links are cut from."""
         numbers = self.numbers(values)
         return {key: names[int(numbers.get(key, 0.0))] for key, names in self.stocks.items()}
 
     def _stock(self, values: Array) -> dict[str, Stock]:
-        return {key: Stock.parse(name) for key, name in self.cut(values).items()}
+        return {key: Stock.parse(name) for key, name in self.link_stocks(values).items()}
 
     def with_travel(self, leg: Any, travel: tuple[float, float], values: Array) -> Any:
         """Return a leg whose joint goes from one end to another, m; a ram's tubes are as long."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 
-from pteron.design.choosing.candidate import MARGINS, Candidate
-from pteron.design.choosing.choose import Choice
-from pteron.design.choosing.job import Job
+from pteron.design.candidate import MARGINS, Candidate
+from pteron.design.choose import Choice
+from pteron.design.job import Job
 
 _FIGURES = {
     "price": ("price (as in lists)", 1.0),
@@ -58,7 +58,7 @@ def _ratio(value: float) -> str:
     return f"{value:.{2 if value < 10.0 else 1 if value < 100.0 else 0}f}"
 
 
-def asked(job: Job) -> list[str]:
+def requirement_lines(job: Job) -> list[str]:
     """Return what a job asks for, a line each, as it was asked."""
     space, lines = job.workspace, []
     lines.append(space.words)
@@ -108,13 +108,13 @@ def _box(low: Sequence[float], high: Sequence[float]) -> str:
     return " x ".join(f"{a:g}..{b:g}" for a, b in zip(low, high, strict=True))
 
 
-def assumed(choice: Choice) -> list[str]:
+def assumption_lines(choice: Choice) -> list[str]:
     """Return what was assumed, a line each."""
     motors, links = choice.job.motors, choice.job.links
     examples = [] if motors.list else ["The motors are the package's examples, not products."]
     stocks = ", ".join(dict.fromkeys([*links.upper, *links.lower]))
     errors = choice.job.accuracy
-    left_out = errors is not None and not errors.of_parts
+    left_out = errors is not None and not errors.has_part_errors
     exact = ["The tool's error is that of encoders and gearboxes: links count as exact."]
     return [
         *examples,

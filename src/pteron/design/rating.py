@@ -8,20 +8,20 @@ from functools import cached_property
 
 import numpy as np
 
-from pteron.design.choosing.cycles import Places, cycles_of
-from pteron.design.choosing.drives import JointLoads, Option, Options, power
-from pteron.design.choosing.job import OBJECTIVES, Job
-from pteron.design.choosing.kinds import Kind, slides
-from pteron.design.choosing.room import Room
-from pteron.design.choosing.samples import about_the_worst, sample_poses
-from pteron.design.choosing.tool import (
+from pteron.design.cycle_places import Places, cycles_of
+from pteron.design.drive_options import JointLoads, Option, Options, power
+from pteron.design.job import OBJECTIVES, Job
+from pteron.design.kinds import Kind, slides
+from pteron.design.machine_space import MachineSpace
+from pteron.design.quantities import moving_mass
+from pteron.design.tool_errors import (
     compliance_with,
     compliances,
     errors_with,
     link_sections,
     unit_errors,
 )
-from pteron.design.quantities import moving_mass
+from pteron.design.workspace_samples import refine_worst_values, sample_poses
 from pteron.design.worst_cases import worst_forces, worst_speeds
 from pteron.dynamics import drive_forces
 from pteron.errors import ModelError, PteronError
@@ -59,7 +59,7 @@ class Rating:
         Quantities by name: objectives, margins, error, deflection.
     misses : dict
         By how much each bound is missed, as a share of it: empty where all is kept.
-    told : dict
+    shortfalls : dict
         The same in words.
     robot : Manipulator or None
         The machine with its drives, without payload.
@@ -78,7 +78,7 @@ class Rating:
     values: Array
     figures: dict[str, float] = field(default_factory=dict)
     misses: dict[str, float] = field(default_factory=dict)
-    told: dict[str, str] = field(default_factory=dict)
+    shortfalls: dict[str, str] = field(default_factory=dict)
     robot: Manipulator | None = None
     middle: Array = field(default_factory=lambda: np.zeros(0))
     options: tuple[Option, ...] = ()
@@ -95,7 +95,7 @@ class Rating:
         return float(np.log(value) + 0.01 * min(self.near, 1.0)) if value > 0.0 else 0.0
 
 
-class Case:
+class KindEvaluator:
     """A job for one kind of machine.
 
     Parameters
@@ -114,13 +114,13 @@ class Case:
         self.corners = sample_poses(job, kind.robot, 2)
         self.outline = sample_poses(job, kind.robot, 3)
         self.every_cycle = cycles_of(job, kind.robot)
-        self.cycles = [cycle.some() for cycle in self.every_cycle]
+        self.cycles = [cycle.spread_places() for cycle in self.every_cycle]
         # A box holds its cycles; between the poses of a list they go where no pose is.
         states = (c.states[0].reshape(-1, kind.robot.freedom) for c in self.every_cycle)
         self.between = np.vstack([self.poses[:0], *(states if job.workspace.poses else ())])
         self.visited = np.vstack([self.poses, self.between])
         self.half = job.workspace.half
-        self.room = Room(job, kind.robot)
+        self.machine_space = MachineSpace(job, kind.robot)
 
     @cached_property
     def groups(self) -> list[list[int]]:
@@ -208,7 +208,7 @@ class Case:
 
     def _judge_room(self, rating: Rating) -> None:
         """Judge the footprint, the height, what is to be kept out of, and whether links touch."""
-        figures, misses = self.room.judged(
+        figures, misses = self.machine_space.evaluate(
             _robot_of(rating), rating.middle + self.visited, rating.middle
         )
         rating.figures |= figures
@@ -217,7 +217,7 @@ class Case:
 
     def _choose_drives(self, rating: Rating) -> None:
         """Choose the drives: the cheapest that serve loads, accuracy and stiffness."""
-        robot = self.loaded(_robot_of(rating))
+        robot = self.add_payload(_robot_of(rating))
         numbers = self.kind.numbers(rating.values)
         try:
             loads, work = self.loads(robot, rating, numbers.get("time"))
@@ -283,8 +283,8 @@ class Case:
         along: int | None = None,
         keep: int = 1,
     ) -> tuple[Array, Array]:
-        """Return least values over the workspace and its cycles, as `about_the_worst` has them."""
-        return about_the_worst(self.job, robot, values_of, along, keep, self.between)
+        """Return least values over workspace and cycles, as `refine_worst_values` has them."""
+        return refine_worst_values(self.job, robot, values_of, along, keep, self.between)
 
     def shares(self, time: float | None) -> Array:
         """Return how much of a duty cycle's time each cycle has; none if each counts by itself."""
@@ -303,13 +303,13 @@ class Case:
         for name, most in self.job.most.model_dump().items():
             _judge_most(rating, name, rating.figures[name], most, f" {OBJECTIVES[name]}".rstrip())
 
-    def loaded(self, robot: Manipulator) -> Manipulator:
+    def add_payload(self, robot: Manipulator) -> Manipulator:
         """Return a machine with the payload."""
-        return self.job.payload.on(robot)
+        return self.job.payload.add_to(robot)
 
     def sections(self, rating: Rating) -> dict[str, Section]:
         """Return the sections of a design's links."""
-        return link_sections(_robot_of(rating), self.kind.cut(rating.values))
+        return link_sections(_robot_of(rating), self.kind.link_stocks(rating.values))
 
     def loads(
         self, robot: Manipulator, rating: Rating, time: float | None
@@ -373,7 +373,7 @@ def _robot_of(rating: Rating) -> Manipulator:
 def _miss(rating: Rating, name: str, share: float, words: str) -> None:
     """Note that a bound is missed."""
     if share > rating.misses.get(name, 0.0):
-        rating.misses[name], rating.told[name] = float(share), words
+        rating.misses[name], rating.shortfalls[name] = float(share), words
 
 
 def _miss_parts(rating: Rating, parts: Mapping[str, float], option: str) -> None:

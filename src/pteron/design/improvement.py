@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pteron.design.design import Design
-from pteron.design.proofs import counterexamples, proved
+from pteron.design.proofs import counterexamples, prove_design
 from pteron.design.quantities import quantities
 from pteron.design.spec import ROUNDING
 from pteron.design.task import Task
@@ -30,7 +30,7 @@ _FIRST = 5
 """Points along a cube's edge at which its conditions are evaluated at first."""
 
 
-def refined(task: Task, values: Sequence[float], objective: int) -> list[float]:
+def improve_design(task: Task, values: Sequence[float], objective: int) -> list[float]:
     """Return a design with a better objective, or the same where none is found.
 
     The unknowns are the variables together with the cube's centre and edge. Quantities of the
@@ -41,9 +41,9 @@ def refined(task: Task, values: Sequence[float], objective: int) -> list[float]:
     spec, start = task.spec, np.array(values)
     target = spec.objectives[objective]
     try:
-        design = proved(Design(task, task.machine(values))).design
+        design = prove_design(Design(task, task.machine(values))).design
         slopes = _Slopes(task, design, start)
-        target_slopes = slopes.of(target.quantity)
+        target_slopes = slopes.slopes_of_quantity(target.quantity)
         if target_slopes is None or not target_slopes.any() or design.margin < -ROUNDING:
             return list(values)
         geometry = geometry_slopes(task.robot, task.variables, values)
@@ -100,7 +100,7 @@ class _Slopes:
     design: Design
     start: Array
 
-    def of(self, name: str) -> Array | None:
+    def slopes_of_quantity(self, name: str) -> Array | None:
         """Return a quantity's slopes (V + k + 1,), or None where it has none."""
         task, tail = self.task, len(self.task.robot.platform.lengths) + 1
         if name in ("cube", "scale"):
@@ -118,11 +118,11 @@ class _Slopes:
         """Return what holds the other objectives, and what is asked of quantities with slopes."""
         bounds = []
         for k, target in enumerate(self.task.spec.objectives):
-            row = self.of(target.quantity)
+            row = self.slopes_of_quantity(target.quantity)
             if k != objective and row is not None:
                 bounds.append((-target.sign * row, float(-target.sign * row @ z0)))
         for requirement in self.task.spec.requirements:
-            row = self.of(requirement.quantity)
+            row = self.slopes_of_quantity(requirement.quantity)
             if row is None:
                 continue
             now = self.design.quantity(requirement.quantity)

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field, field_validator, model_validator
 
 from pteron.bodies.tables import Count, Number, Three, TomlTable, Two, key
-from pteron.design.loads import Least, PayloadTable, Positive, listed
+from pteron.design.load_tables import Least, PayloadTable, Positive, as_list
 from pteron.design.spec import Floor
 from pteron.errors import ModelError
 from pteron.kernels import Array
@@ -54,7 +54,7 @@ def _expect_near_points(points: list[tuple[float, ...]]) -> list[tuple[float, ..
     return points
 
 
-Names = Annotated[list[str], BeforeValidator(listed), Field(min_length=1)]
+Names = Annotated[list[str], BeforeValidator(as_list), Field(min_length=1)]
 """One name, or a list of names."""
 
 Near = Annotated[Positive, AfterValidator(_expect_near)]
@@ -200,7 +200,7 @@ class AccuracyTable(TomlTable):
     angle: Least = key("of axes, rad", 0.0)
 
     @property
-    def of_parts(self) -> bool:
+    def has_part_errors(self) -> bool:
         """Whether any tolerance of the machine's parts is given, beside errors of its drives."""
         return bool(self.point or self.length or self.angle)
 

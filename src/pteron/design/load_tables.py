@@ -32,7 +32,7 @@ _PEAK = 10.0 / sqrt(3.0)
 """Greatest acceleration of a quintic from rest to rest over its length and inverse squared time."""
 
 
-def listed(names: Any) -> Any:
+def as_list(names: Any) -> Any:
     """Return what may be one name or several as a list."""
     return [names] if isinstance(names, str) else names
 
@@ -62,7 +62,7 @@ class PayloadTable(TomlTable):
         "about its centre of mass, kg m^2: one number, or the tensor's six", 0.0
     )
 
-    def on(self, robot: Manipulator) -> Manipulator:
+    def add_to(self, robot: Manipulator) -> Manipulator:
         """Return a machine that carries it; a number is of a ball where the platform tilts."""
         inertia = self.inertia
         tensor = (
