@@ -13,7 +13,7 @@ from itertools import product
 import numpy as np
 
 from pteron.design.job import Job
-from pteron.design.job_tables import CycleTable
+from pteron.design.requirement_tables import ToolCycleTable
 from pteron.design.workspace_samples import INSIDE, pad_to_xyz, platform_curve, tilts, turn_angles
 from pteron.errors import DataError
 from pteron.kernels import Array
@@ -132,7 +132,7 @@ def cycles_of(job: Job, robot: Manipulator) -> list[Places]:
     return [_cycle_places(job, robot, cycle, k) for k, cycle in enumerate(job.cycles, start=1)]
 
 
-def _cycle_places(job: Job, robot: Manipulator, cycle: CycleTable, k: int) -> Places:
+def _cycle_places(job: Job, robot: Manipulator, cycle: ToolCycleTable, k: int) -> Places:
     name = cycle.name or f"cycle {k}"
     points = np.zeros((len(cycle.points), robot.freedom))
     rows = np.array(cycle.points)

@@ -11,8 +11,9 @@ import numpy as np
 
 from pteron.design.quantities import COVERS, quantities
 from pteron.design.region import placed_pose, workspace_poses, workspace_region
-from pteron.design.spec import ROUNDING, WorkspaceTable
+from pteron.design.spec import ROUNDING
 from pteron.design.task import Task
+from pteron.design.workspace_tables import WorkspaceTable
 from pteron.design.worst_cases import worst_forces, worst_speeds
 from pteron.equations.machine import numbers
 from pteron.errors import PteronError

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pteron.design.design import Design
+from pteron.design.evolution import pareto_front
 from pteron.design.proofs import counterexamples
 from pteron.design.rows import FAILED, MISSES, places
 from pteron.design.task import Task
@@ -153,7 +154,7 @@ def front_of_parts(task: Task, parts: Iterable[pl.DataFrame]) -> Front:
         good = part.filter(missed == 0.0)
         evaluated, feasible = evaluated + len(part), feasible + len(good)
         if len(good):
-            best = _foremost(task, good if best is None else pl.concat([best, good]))
+            best = _pareto_rows(task, good if best is None else pl.concat([best, good]))
         elif best is None:
             near = part[[int(missed.argmin())]]
             both = near if nearest is None else pl.concat([nearest, near])
@@ -172,16 +173,11 @@ def _misses_of(task: Task, designs: pl.DataFrame) -> Array:
     return np.asarray(missed + FAILED * (~np.isfinite(objectives)).sum(axis=1))
 
 
-def _foremost(task: Task, good: pl.DataFrame) -> pl.DataFrame:
-    """Return the rows that no other betters, each once, in the order of the objectives."""
-    from pteron.design.evolution import non_dominated
-
+def _pareto_rows(task: Task, designs: pl.DataFrame) -> pl.DataFrame:
+    """Return the distinct non-dominated rows, sorted by the objectives."""
     signs = np.array([o.sign for o in task.spec.objectives])
-    costs = good.select([o.quantity for o in task.spec.objectives]).to_numpy() * signs
-    best = non_dominated(costs)
-    best = best[np.lexsort(costs[best].T[::-1])]
-    is_distinct = np.append(True, (np.diff(costs[best], axis=0) != 0.0).any(axis=1))
-    rows: pl.DataFrame = good[best[is_distinct]]
+    costs = designs.select([o.quantity for o in task.spec.objectives]).to_numpy() * signs
+    rows: pl.DataFrame = designs[pareto_front(costs)]
     return rows
 
 

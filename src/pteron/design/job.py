@@ -11,23 +11,21 @@ import numpy as np
 from pydantic import Field, PrivateAttr, field_validator, model_validator
 
 from pteron.bodies.tables import TomlTable, key
-from pteron.design.job_tables import (
+from pteron.design.known_kinds import KINDS
+from pteron.design.load_tables import Names, default_table
+from pteron.design.requirement_tables import (
     AccuracyTable,
+    BodyFloorsTable,
     BoundTable,
-    CellTable,
-    CycleTable,
-    FloorsTable,
-    KeepOutTable,
+    DriveListsTable,
+    KindSearchTable,
     LinksTable,
     LoadTable,
-    MotionTable,
-    MotorsTable,
-    Names,
-    SearchTable,
+    RequiredMotionTable,
     StiffnessTable,
-    WorkspaceTable,
+    ToolCycleTable,
 )
-from pteron.design.known_kinds import KINDS
+from pteron.design.workspace_tables import CellTable, KeepOutTable, ToolWorkspaceTable
 from pteron.errors import DataError, shown
 from pteron.toml import read_toml, to_model
 
@@ -58,21 +56,23 @@ def _expect_names_once(names: list[str], known: Collection[str]) -> list[str]:
 class Job(TomlTable):
     """A job that a machine must do, as its file has it."""
 
-    workspace: WorkspaceTable
-    payload: LoadTable = Field(default_factory=lambda: LoadTable.model_validate({}))
-    cycles: list[CycleTable] = Field(default_factory=list)
-    motion: MotionTable = Field(default_factory=lambda: MotionTable.model_validate({}))
+    workspace: ToolWorkspaceTable
+    payload: LoadTable = default_table(LoadTable)
+    cycles: list[ToolCycleTable] = Field(default_factory=list)
+    motion: RequiredMotionTable = Field(
+        default_factory=lambda: RequiredMotionTable.model_validate({})
+    )
     accuracy: AccuracyTable | None = None
     stiffness: StiffnessTable | None = None
-    cell: CellTable = Field(default_factory=lambda: CellTable.model_validate({}))
+    cell: CellTable = default_table(CellTable)
     keep_out: list[KeepOutTable] = Field(default_factory=list)
-    motors: MotorsTable = Field(default_factory=lambda: MotorsTable.model_validate({}))
-    links: LinksTable = Field(default_factory=lambda: LinksTable.model_validate({}))
-    floors: FloorsTable = Field(default_factory=lambda: FloorsTable.model_validate({}))
-    most: BoundTable = Field(default_factory=lambda: BoundTable.model_validate({}))
+    motors: DriveListsTable = default_table(DriveListsTable)
+    links: LinksTable = default_table(LinksTable)
+    floors: BodyFloorsTable = default_table(BodyFloorsTable)
+    most: BoundTable = default_table(BoundTable)
     kinds: Names | None = key("to choose from; else all that can do it", None)
     objectives: Names = key(f"what is to be small: {', '.join(OBJECTIVES)}", ["price"])
-    search: SearchTable = Field(default_factory=lambda: SearchTable.model_validate({}))
+    search: KindSearchTable = default_table(KindSearchTable)
 
     _folder: Path = PrivateAttr(Path())
 
@@ -145,7 +145,7 @@ class Job(TomlTable):
             if space.meets(np.array(box.low) - at, np.array(box.high) - at):
                 yield f"keep_out[{k}]: it is in the workspace, where the tool must be"
 
-    def _cycle_faults(self, cycle: CycleTable) -> Iterator[str]:
+    def _cycle_faults(self, cycle: ToolCycleTable) -> Iterator[str]:
         space, k = self.workspace, self.lengths
         sizes = {len(point) for point in cycle.points}
         known = {2: "x y", 3: "x y z"}[k]

@@ -8,6 +8,7 @@ from itertools import islice, product
 import numpy as np
 import scipy  # type: ignore[import-untyped]
 
+from pteron.design.evolution import latin_hypercube, pareto_front
 from pteron.design.rating import KindEvaluator, Rating
 from pteron.kernels import Array, alike
 
@@ -73,8 +74,7 @@ def _evolve(
     size = len(ranges[0])
     count = _POPULATION * size
     first = min(_SPREAD * count, (end - len(ratings)) // 2)
-    strata = rng.permuted(np.tile(np.arange(max(first, 1)), (size, 1)), axis=1).T
-    for units in (strata + rng.random(strata.shape)) / max(first, 1):
+    for units in latin_hypercube(rng, max(first, 1), size):
         rate(units)
     # The best so far, whichever objective they were sought for.
     known = sorted(ratings, key=lambda rating: rating.cost(objective))[:count]
@@ -147,9 +147,4 @@ def front(ratings: list[Rating], objectives: list[str]) -> list[Rating]:
     """Return the Pareto front: designs that keep all requirements and that no other dominates."""
     good = [rating for rating in ratings if not rating.misses]
     costs = np.array([[rating.figures[name] for name in objectives] for rating in good])
-    _, first = np.unique(costs, axis=0, return_index=True)
-    return [
-        good[k]
-        for k in first
-        if not ((costs <= costs[k]).all(axis=1) & (costs < costs[k]).any(axis=1)).any()
-    ]
+    return [good[k] for k in pareto_front(costs)]

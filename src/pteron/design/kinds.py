@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from pteron.bodies.vectors import Vector
-from pteron.design.job_tables import LinksTable
 from pteron.design.known_kinds import KINDS
+from pteron.design.requirement_tables import LinksTable
 from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.kinematics.sampling import search_ball

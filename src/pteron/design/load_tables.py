@@ -19,22 +19,34 @@ from pteron.motion.trajectories.time_law import sample_curve
 from pteron.motion.trajectories.time_polynomials import polynomial
 from pteron.motion.trajectories.timed_path import timed_path
 
+
+def default_table(table: type[TomlTable]) -> Any:
+    """Return the field of a table that may be left out: all its keys have defaults."""
+    return Field(default_factory=lambda: table.model_validate({}))
+
+
+def as_list(names: Any) -> Any:
+    """Return what may be one name or several as a list."""
+    return [names] if isinstance(names, str) else names
+
+
 Positive = Annotated[Number, Field(gt=0.0)]
 """A number above 0."""
 
 Least = Annotated[Number, Field(ge=0.0)]
 """A number of 0 or more."""
 
+Floor = Annotated[Number, Field(ge=0.0, lt=1.0)]
+"""Type of the least value of a measure that is 1 at best."""
+
+Names = Annotated[list[str], BeforeValidator(as_list), Field(min_length=1)]
+"""One name, or a list of names."""
+
 SAMPLES = 121
 """Samples of a cycle; forces are taken between them too."""
 
 _PEAK = 10.0 / sqrt(3.0)
 """Greatest acceleration of a quintic from rest to rest over its length and inverse squared time."""
-
-
-def as_list(names: Any) -> Any:
-    """Return what may be one name or several as a list."""
-    return [names] if isinstance(names, str) else names
 
 
 def _numbers(numbers: Any) -> Any:

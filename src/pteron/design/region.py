@@ -6,7 +6,7 @@ from itertools import product
 
 import numpy as np
 
-from pteron.design.spec import WorkspaceTable
+from pteron.design.workspace_tables import WorkspaceTable
 from pteron.kernels import Array
 from pteron.workspace import Box, Cylinder, Region
 from pteron.workspace.shape_samples import Shape

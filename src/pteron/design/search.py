@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pteron.design.evolution import Evolution
+from pteron.design.evolution import Evolution, latin_hypercube
 from pteron.design.front import Front, ProvedRows
 from pteron.design.improvement import improve_design
 from pteron.design.rows import FAILED, MISSES, design_table
@@ -194,9 +194,8 @@ def swept_proofs(
 def first_designs(task: Task, count: int, seed: int) -> Array:
     """Return a Latin hypercube of designs (count, V), the first the machine to begin with."""
     low, high = task.ranges
-    rng = np.random.default_rng(seed)
-    rows = rng.permuted(np.tile(np.arange(count)[:, None], len(low)), axis=0)
-    designs: Array = low + (rows + rng.random(rows.shape)) / count * (high - low)
+    units = latin_hypercube(np.random.default_rng(seed), count, len(low))
+    designs: Array = low + units * (high - low)
     designs[0] = task.start
     return designs
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from itertools import chain
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
@@ -15,12 +14,15 @@ from pteron.design.load_tables import (
     CycleTable,
     ElasticityTable,
     ErrorsTable,
+    Floor,
     MotorsTable,
     PayloadTable,
     Positive,
     as_list,
+    default_table,
 )
 from pteron.design.quantities import expect_quantity
+from pteron.design.workspace_tables import WorkspaceTable
 from pteron.errors import DataError, shown
 from pteron.renamed import former_attribute
 from pteron.toml import read_toml, to_model
@@ -30,9 +32,6 @@ _ABSENT = "no such file; it should describe a search for a design"
 
 ROUNDING = 1e-9
 """Share of a bound by which it may be missed."""
-
-Floor = Annotated[Number, Field(ge=0.0, lt=1.0)]
-"""Type of the least value of a measure that is 1 at best."""
 
 
 def _expect_rising(pair: tuple[float, float]) -> tuple[float, float]:
@@ -58,91 +57,6 @@ class VariableTable(TomlTable):
     name: str | None = key("what tables call it; its first path if left out", None)
 
     _rises = field_validator("range")(_expect_rising)
-
-
-class WorkspaceTable(TomlTable):
-    """`[workspace]`: the region in which the machine must work.
-
-    A box given by its sides, a cube or a cylinder may have no center: then it floats, and each
-    design has it where the machine's margins are largest.
-    """
-
-    low: tuple[Number, ...] | None = key("a box's least x, y, z, m", None)
-    high: tuple[Number, ...] | None = key("a box's greatest x, y, z, m", None)
-    sides: tuple[Positive, ...] | None = key("of a box, in place of these, m", None)
-    center: tuple[Number, ...] | None = key(
-        "of a box of sides, a cube or a cylinder, m; left out, it floats", None
-    )
-    edge: Positive | None = key("of a cube, m", None)
-    radius: Positive | None = key("of a cylinder, m", None)
-    height: Positive | None = key("of a cylinder, m", None)
-    axis: Literal["x", "y", "z"] = key("of a cylinder", "z")
-    samples: Annotated[int, Field(ge=2, le=41, strict=True)] = key(
-        "poses along each of its sides", 5
-    )
-
-    @model_validator(mode="after")
-    def _one_shape(self) -> Self:
-        keys = ("low", "high", "sides", "center", "edge", "radius", "height")
-        keys_present = {key for key in keys if getattr(self, key) is not None}
-        valid_sets = ({"low", "high"}, {"sides"}, {"edge"}, {"radius", "height"})
-        if keys_present not in valid_sets and keys_present - {"center"} not in valid_sets[1:]:
-            raise ValueError(
-                f"{', '.join(sorted(keys_present)) or 'nothing'} given; a box has low and high, or "
-                "sides, a cube edge, a cylinder radius and height; these three have a center, or "
-                "float"
-            )
-        pairs = ((self.low, self.high), (self.sides, self.center))
-        if any(a is not None and b is not None and len(a) != len(b) for a, b in pairs):
-            raise ValueError("unlike numbers of coordinates given")
-        if self.low is not None and not all(
-            a < b for a, b in zip(self.low, self.high or (), strict=True)
-        ):
-            raise ValueError(f"low {list(self.low)} is not below high {list(self.high or ())}")
-        return self
-
-    @property
-    def shape(self) -> Literal["box", "cube", "cylinder"]:
-        """The kind of workspace."""
-        if self.radius is not None:
-            return "cylinder"
-        return "cube" if self.edge is not None else "box"
-
-    @property
-    def floats(self) -> bool:
-        """Whether it has no given place."""
-        return self.low is None and self.center is None
-
-    def with_center(self, center: Iterable[float]) -> Self:
-        """Return the same workspace at a given center, m."""
-        return self.model_copy(update={"center": tuple(map(float, center))})
-
-    def dimensions(self, count: int) -> tuple[float, ...]:
-        """Return the sides (count,) of the box around it, m."""
-        if self.low is not None and self.high is not None:
-            return tuple(b - a for a, b in zip(self.low, self.high, strict=True))
-        if self.radius is not None and self.height is not None:
-            return tuple(
-                self.height if letter == self.axis else 2.0 * self.radius for letter in "xyz"
-            )
-        return self.sides or (self.edge or 0.0,) * count
-
-    @property
-    def ends(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """Least and greatest coordinates of the box around a placed workspace, m."""
-        if self.low is not None and self.high is not None:
-            return self.low, self.high
-        center = self.center or ()
-        halves = [side / 2.0 for side in self.dimensions(len(center))]
-        ends = tuple(
-            zip(*((x - h, x + h) for x, h in zip(center, halves, strict=True)), strict=True)
-        )
-        return ends[0], ends[1]
-
-    @property
-    def lengths(self) -> int | None:
-        """Number of its coordinates; None if it fits any number."""
-        return len(self.low or self.sides or self.center or ()) or (3 if self.radius else None)
 
 
 class FloorsTable(TomlTable):
@@ -255,14 +169,14 @@ class Spec(TomlTable):
     objectives: Annotated[list[ObjectiveTable], Field(min_length=1)]
     requirements: list[RequirementTable] = Field(default_factory=list)
     workspace: WorkspaceTable | None = None
-    floors: FloorsTable = Field(default_factory=lambda: FloorsTable.model_validate({}))
-    motion: MotionTable = Field(default_factory=lambda: MotionTable.model_validate({}))
+    floors: FloorsTable = default_table(FloorsTable)
+    motion: MotionTable = default_table(MotionTable)
     payload: PayloadTable | None = None
     cycles: list[CycleTable] = Field(default_factory=list)
     errors: ErrorsTable | None = None
     elasticity: ElasticityTable | None = None
     motors: MotorsTable | None = None
-    search: SearchTable = Field(default_factory=lambda: SearchTable.model_validate({}))
+    search: SearchTable = default_table(SearchTable)
 
     _source: str = PrivateAttr("")
 

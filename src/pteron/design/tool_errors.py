@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from pteron.design.job_tables import AccuracyTable
+from pteron.design.requirement_tables import AccuracyTable
 from pteron.design.worst_cases import worst_position_errors
 from pteron.indices import (
     ALUMINIUM,
