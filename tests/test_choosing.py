@@ -134,7 +134,7 @@ def test_a_finished_kind_is_not_searched_again(chosen, tmp_path):
     first, folder = chosen
     again = choose_machine(of(), folder=folder)
     assert again.resumed == ("linear-delta",)
-    assert again.data() == first.data()
+    assert again.as_dict() == first.as_dict()
     other = choose_machine(of(search={"evaluations": 6, "seed": 3}), folder=folder)
     assert other.resumed == ()
 
@@ -274,7 +274,7 @@ def test_rounded_corners_of_a_cycle_are_seen_in_time():
     cycle = {"points": points, "corner": 0.015, "duration": 0.4}
     (evaluator,) = evaluators_of(of(cycles=[cycle])).values()
     (places,) = evaluator.every_cycle
-    fine = replace(places.at(np.array([0])), samples=5001).states[2]
+    fine = replace(places.select_places(np.array([0])), samples=5001).states[2]
     seen = places.both_ways().states[2]
     assert np.linalg.norm(seen, axis=-1).max() > 0.98 * np.linalg.norm(fine, axis=-1).max()
 

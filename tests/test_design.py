@@ -23,6 +23,7 @@ import pteron
 from pteron.design import (
     Change,
     Design,
+    DesignQuantity,
     FrontReport,
     Spec,
     Task,
@@ -87,6 +88,93 @@ def test_a_path_names_numbers_of_the_file():
     (one,) = named_numbers(robot, "-legs[2].guide_point.x")
     assert (one.sign, one.part, one.read(robot)) == (-1, 0, -0.26)
     assert len(named_numbers(robot, "legs[1,3].platform_point")) == 6
+
+
+def crank_area(robot):
+    """Sum of the squares of all links, m^2."""
+    return sum(leg.upper_length**2 + leg.lower_length**2 for leg in robot.legs)
+
+
+def widest_pose(design):
+    """Largest coordinate of a sampled pose, m."""
+    return float(np.abs(design.poses).max())
+
+
+def functions_spec():
+    reach = DesignQuantity("m", "largest coordinate", widest_pose, name="widest_pose")
+    spec = spec_of(objectives=[{"minimise": "links"}], requirements=[])
+    spec = spec.with_objectives(minimise=[crank_area], maximise=["cube", reach])
+    return spec.with_requirement(crank_area, most=0.6)
+
+
+def test_functions_of_a_user_are_objectives_and_requirements(tmp_path):
+    front = search(functions_spec(), folder=tmp_path)
+    assert [o.quantity for o in front.task.spec.objectives] == ["crank_area", "cube", "widest_pose"]
+    for k in range(len(front)):
+        assert front.objectives[k, 0] == crank_area(front.robot(k)) <= 0.6
+    assert (front.objectives[:, 2] > 0.0).all()
+    page = FrontReport(front).page()
+    assert "crank_area as small as can be" in page
+    assert "crank_area at most 0.6" in page
+    # The folder is of these functions: it is gone on with them, and refused with others.
+    assert search(functions_spec(), folder=tmp_path).designs.equals(front.designs)
+    other = eval("lambda robot: 2.0 * len(robot.legs)")
+    other.__name__ = "crank_area"
+    spec = spec_of(objectives=[{"minimise": "links"}]).with_objectives(minimise=[other])
+    with pytest.raises(OutputError, match="holds results of another plan"):
+        search(spec, folder=tmp_path)
+    with pytest.raises(DataError, match=r"^crank_area: other processes cannot import it"):
+        search(spec, workers=2)
+
+
+@CLIENTS
+def test_functions_of_a_user_cross_to_other_processes():
+    front, shared = search(functions_spec()), search(functions_spec(), workers=2)
+    assert shared.designs.equals(front.designs)
+
+
+def test_a_function_that_gives_no_number_says_why():
+    def none_at_all(robot):
+        raise ModelError("nothing to measure")
+
+    spec = spec_of(objectives=[{"minimise": "links"}]).with_objectives(minimise=[none_at_all])
+    design = Design(Task.from_spec(spec), pteron.load("quadrupteron"))
+    assert np.isnan(design.quantity("none_at_all"))
+    assert design.missing_reason("none_at_all") == "nothing to measure"
+    with pytest.raises(DataError, match=r"^links: is a quantity already"):
+        spec.with_objectives(minimise=[DesignQuantity("m", "", len, name="links")])
+    with pytest.raises(DataError, match=r"^name: '' given to a quantity, an identifier expected"):
+        spec.with_requirement(DesignQuantity("m", "", len), most=1.0)
+    with pytest.raises(DataError, match=r'^"?.kube.? is no quantity'):
+        spec.with_objectives(maximise=["kube"])
+    with pytest.raises(DataError, match=r"^none_at_all: neither least nor most given"):
+        spec.with_requirement(none_at_all)
+
+
+def test_a_package_brings_quantities_to_files_and_processes(tmp_path):
+    (tmp_path / "own_quantities.py").write_text(
+        'def leg_count(robot):\n    """Number of legs."""\n    return len(robot.legs)\n'
+    )
+    info = tmp_path / "own_quantities-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: own-quantities\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text("[pteron.design]\nleg_count=own_quantities:leg_count\n")
+    code = (
+        "import pteron.design as d; s = d.Spec.model_validate({'robot': 'delta', 'variables': "
+        "[{'moves': 'legs.upper_length', 'range': (0.1, 0.2)}], 'objectives': [{'minimise': "
+        "'leg_count'}]}); t = d.Task.from_spec(s); "
+        "print(d.Design(t, t.robot).quantity('leg_count')); "
+        "print(d.quantities()['leg_count'].about)"
+    )
+    path = os.pathsep.join([str(tmp_path), *filter(None, [os.environ.get("PYTHONPATH")])])
+    run = subprocess.run(
+        [sys.executable, "-c", code],
+        env=os.environ | {"PYTHONPATH": path},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert run.stdout.split("\n")[:2] == ["3.0", "Number of legs."]
 
 
 @pytest.mark.parametrize("name", [*CATALOG, "ball-table", "stewart"])
@@ -201,7 +289,7 @@ def test_what_the_points_miss_goes_back_to_the_search():
 def test_every_design_of_a_front_is_proved(found, threads):
     """Also in a process whose linear algebra adds up in another order than the search's."""
     front, _ = found
-    for k, edge in enumerate(front.table["cube"]):
+    for k, edge in enumerate(front.designs["cube"]):
         with threadpool_limits(threads):
             told = prove_design(Design(front.task, front.robot(k)))
         assert told.cube.edge == edge == told.design.cube.edge
@@ -248,7 +336,7 @@ def test_a_search_that_was_ended_goes_on_to_the_same_front(found, tmp_path):
     shutil.copytree(folder, again)
     for chunk in sorted(again.glob("*/0*.parquet"))[2:]:
         chunk.unlink()
-    assert search(spec_of(), folder=again).table.equals(front.table)
+    assert search(spec_of(), folder=again).designs.equals(front.designs)
     with pytest.raises(OutputError, match=r"another plan \(spec.search.seed 0, not 1; "):
         search(spec_of(), folder=again, seed=1)
     heavy = pteron.save(replace(pteron.load("quadrupteron"), gravity=(0, 0, -1.6)), tmp_path / "r")
@@ -263,7 +351,7 @@ def test_processes_find_the_same_front_and_go_on_where_one_ended(found, tmp_path
     shutil.copytree(folder, again)
     for chunk in sorted(again.glob("*/0*.parquet"))[1:]:
         chunk.unlink()
-    assert search(spec_of(), folder=again, workers=2).table.equals(front.table)
+    assert search(spec_of(), folder=again, workers=2).designs.equals(front.designs)
     written = {file.relative_to(folder): file.read_bytes() for file in folder.rglob("*.parquet")}
     assert written == {f.relative_to(again): f.read_bytes() for f in again.rglob("*.parquet")}
 
@@ -279,7 +367,7 @@ def test_a_checkpoint_that_is_damaged_is_computed_again(found, tmp_path):
     first.write_bytes(data)
     second.write_bytes(second.read_bytes()[:-100])
     third.write_bytes(second.read_bytes())
-    assert search(spec_of(), folder=again).table.equals(front.table)
+    assert search(spec_of(), folder=again).designs.equals(front.designs)
 
 
 def test_what_changed_is_told_in_words(found):
@@ -318,10 +406,10 @@ def test_a_survey_streams_and_goes_on(tmp_path):
     assert front.evaluated == 512
     table = pl.read_parquet(tmp_path / "survey" / "*.parquet")
     good = table.filter(pl.col("misses workspace") == 0.0)
-    assert front.table["links"][0] == good["links"].min()
+    assert front.designs["links"][0] == good["links"].min()
     next((tmp_path / "survey").glob("00000001-*.parquet")).unlink()
     again = survey(asked, 500, tmp_path / "survey")
-    assert again.table.equals(front.table)
+    assert again.designs.equals(front.designs)
     design = FrontReport(front).selection[0]
     assert [proof.holds for proof in design.workspace] == [True, True]
 
@@ -453,7 +541,7 @@ def loaded():
 @CLIENTS
 def test_no_state_of_a_machine_designed_for_loads_breaks_a_bound(loaded):
     """A workspace that floats has its place in the results; everywhere in it what is told holds."""
-    data = loaded.data()
+    data = loaded.as_dict()
     for one in loaded.selection:
         machine, told = one.design.robot, data["chosen"][one.name]
         rng, half = np.random.default_rng(0), np.array([0.025, 0.015])

@@ -6,7 +6,17 @@ from types import SimpleNamespace
 import pytest
 
 import pteron
-from pteron.design import Change, Design, Front, FrontReport, ReportedDesign, Spec, Task
+from pteron.design import (
+    Candidate,
+    Change,
+    Choice,
+    Design,
+    Front,
+    FrontReport,
+    ReportedDesign,
+    Spec,
+    Task,
+)
 from pteron.identification import FaultIsolation, Identification, Payload
 from pteron.maps import Grid, Map, TableStore
 from pteron.motion import DriveMargin, Motor, Sizing, Span
@@ -71,6 +81,9 @@ def test_a_former_method_of_a_class_answers_too():
         (Change, "told", "format_value"),
         (Front, "chosen", "selection"),
         (FrontReport, "chosen", "selection"),
+        (FrontReport, "data", "as_dict"),
+        (Choice, "data", "as_dict"),
+        (Candidate, "data", "as_dict"),
         (ReportedDesign, "lacking", "missing_quantities"),
         (Spec, "asked", "quantity_names"),
         (Task, "asked", "quantity_names"),

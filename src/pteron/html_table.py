@@ -7,14 +7,20 @@ it loads nothing from the network.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from markupsafe import Markup
 
 from pteron.templates import template
 
+if TYPE_CHECKING:
+    import polars as pl
+
 _DIGITS = 5
 """Significant digits of a number."""
+
+_ROWS = 12
+"""Rows of a longer table that are shown."""
 
 
 class Column(NamedTuple):
@@ -62,6 +68,14 @@ def html_table(
     page = template("", "html_table.html.j2", cell=_cell, kind=_kind)
     cells = [list(zip(columns, row, strict=True)) for row in rows]
     return page.render(title=title, about=about, columns=columns, rows=cells, notes=notes)
+
+
+def frame_html(title: str, about: str, frame: pl.DataFrame, notes: Iterable[str] = ()) -> str:
+    """Return the first rows of a table as `html_table` does, with a note on those left out."""
+    columns = [Column(c.name, "number" if c.dtype.is_numeric() else "") for c in frame]
+    hidden = len(frame) - _ROWS
+    more = [f"{hidden} more rows: see table()"] if hidden > 0 else []
+    return html_table(title, about, columns, frame.head(_ROWS).iter_rows(), [*notes, *more])
 
 
 def _kind(kind: str) -> Markup:

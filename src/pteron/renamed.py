@@ -7,6 +7,7 @@ class: ``old = former_attribute("old", "new")``.
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable
 from importlib import import_module
 from typing import Any
 
@@ -140,3 +141,31 @@ def former_attribute(former: str, present: str) -> property:
         return getattr(own, present)
 
     return FormerAttribute(attribute)
+
+
+class FormerTable:
+    """A method `table` that was a property until version 0.1: what is read of it is the table."""
+
+    def __init__(self, owner: str, frame: Any, table: Callable[[], Any]) -> None:
+        self._owner, self._frame, self._table = owner, frame, table
+
+    def __call__(self) -> Any:
+        """Return the table."""
+        return self._table()
+
+    def _former(self) -> Any:
+        warnings.warn(
+            f"{self._owner}.table is a method from version {UNTIL} on; write .designs",
+            DeprecationWarning,
+            stacklevel=3,
+        )
+        return self._frame
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._former(), name)
+
+    def __getitem__(self, key: Any) -> Any:
+        return self._former()[key]
+
+    def __len__(self) -> int:
+        return len(self._former())

@@ -81,7 +81,7 @@ def choose(
         from pteron.report.choice.write import write_choice
 
         files = write_choice(choice, out)
-    data = choice.data() | ({"files": [str(file) for file in files]} if files else {})
+    data = choice.as_dict() | ({"files": [str(file) for file in files]} if files else {})
     return Result(data, partial(_show, choice), files, _NONE if choice.best is None else 0)
 
 
@@ -142,7 +142,7 @@ def _show(choice: Choice) -> None:
         )
     for candidate in choice.candidates:
         if not candidate.serves:
-            near = plain("; ".join(candidate.why))
-            show(f"[bold]{candidate.kind}[/bold] falls out: the nearest design has {near}")
+            verdict = candidate.summary().removeprefix(candidate.kind)
+            show(f"[bold]{candidate.kind}[/bold]{plain(verdict)}")
     if serving:
         show(*(f"[dim]{plain(line)}[/dim]" for line in assumption_lines(choice)))

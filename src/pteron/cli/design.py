@@ -83,7 +83,7 @@ def design(
     front = _search_front(requirements, out, sweep, workers, scheduler)
     summary = FrontReport(front)
     files = [] if out is None else _write(summary, Path(out))
-    data = summary.data() | ({"files": [str(file) for file in files]} if files else {})
+    data = summary.as_dict() | ({"files": [str(file) for file in files]} if files else {})
     return Result(data, partial(_show, summary), files)
 
 
@@ -120,7 +120,7 @@ def _write(summary: FrontReport, folder: Path) -> list[Path]:
     from pteron.tables import write_table
 
     rows = summary.table()
-    figures = json_text(summary.data())
+    figures = json_text(summary.as_dict())
     texts = {"report.md": summary.page(), "design.json": figures, **summary.robots()}
     return [
         *write_texts(folder, texts),
@@ -149,10 +149,8 @@ def _show(summary: FrontReport) -> None:
     from pteron.design.spec import asked_words
 
     front = summary.front
-    show(
-        f"[bold]{plain(front.task.robot.name)}[/bold]: {front.evaluated} designs evaluated, "
-        f"{front.kept} keep all that is asked, {len(front)} on the front"
-    )
+    name, _, counts = front.summary().partition(": ")
+    show(f"[bold]{plain(name)}[/bold]: {counts}")
     show(*(f"Asked for: {plain(line)}" for line in asked_words(front.task.spec)))
     lines = (*summary.start.proofs, *summary.start.missing_quantities)
     show(*(f"To begin with: {plain(line)}" for line in lines))

@@ -23,6 +23,7 @@ from pteron.kernels import Array
 from pteron.manipulator import Manipulator
 from pteron.manipulator.saving import text_of
 from pteron.motion import Path, limits_of, time_optimal
+from pteron.renamed import former_attribute
 from pteron.workspace import Proof, clearance
 
 _WORST = 8
@@ -90,7 +91,15 @@ class Candidate:
         """The least of the drives' margins."""
         return min(self.figures.get(f"{name}_margin", np.inf) for name in MARGINS)
 
-    def data(self) -> dict[str, Any]:
+    def summary(self) -> str:
+        """Return in a line how many designs keep all that is asked, or what the nearest misses."""
+        if not self.serves:
+            return f"{self.kind} falls out: the nearest design has {'; '.join(self.why)}"
+        return f"{self.kind}: {self.kept} of {self.evaluated} designs keep all that is asked"
+
+    data = former_attribute("data", "as_dict")
+
+    def as_dict(self) -> dict[str, Any]:
         """Return it as plain data."""
         return asdict(self)
 

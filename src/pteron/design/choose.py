@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,12 +19,17 @@ from pteron.design.kind_search import search_kind
 from pteron.design.kinds import Kind, fitting_kinds
 from pteron.design.rating import KindEvaluator
 from pteron.errors import DataError, PteronError
+from pteron.html_table import frame_html
 from pteron.json_values import json_ready
 from pteron.kernels.one_thread import one_thread
 from pteron.kernels.program_cache import EQUATIONS, name_of
 from pteron.manipulator import load
 from pteron.manipulator.saving import text_of
 from pteron.processes import WorkerPool
+from pteron.renamed import former_attribute
+
+if TYPE_CHECKING:
+    import polars as pl
 
 _SEARCH = 0.9
 """Share of a kind's work that is its search."""
@@ -63,6 +68,21 @@ class Choice:
         """The best kind by the first objective; None where none serves."""
         return self.candidates[0] if self.candidates and self.candidates[0].serves else None
 
+    def summary(self) -> str:
+        """Return the verdict on each kind, for people, as lines of text."""
+        return "\n".join(candidate.summary() for candidate in self.candidates)
+
+    def table(self) -> pl.DataFrame:
+        """Return a table, a row for each kind: whether it serves, and its figures in SI units."""
+        import polars as pl
+
+        rows = [{"kind": c.kind, "serves": c.serves, **c.figures} for c in self.candidates]
+        return pl.DataFrame(rows, infer_schema_length=None)
+
+    def _repr_html_(self) -> str:
+        best = "no kind does what is asked" if self.best is None else f"{self.best.kind} is best"
+        return frame_html("Kinds of machines", best, self.table(), self.summary().splitlines())
+
     def robots(self) -> dict[str, str]:
         """Return the machines' files by their names."""
         return {
@@ -71,11 +91,13 @@ class Choice:
             if candidate.serves
         }
 
-    def data(self) -> dict[str, Any]:
+    data = former_attribute("data", "as_dict")
+
+    def as_dict(self) -> dict[str, Any]:
         """Return everything as plain data, SI units."""
         contents = {
             "objectives": list(self.job.objectives),
-            "kinds": [candidate.data() for candidate in self.candidates],
+            "kinds": [candidate.as_dict() for candidate in self.candidates],
             "job": self.job.model_dump(mode="json", exclude_none=True),
         }
         return dict(json_ready(contents))
@@ -252,6 +274,6 @@ class _CandidateStore:
     def keep(self, candidate: Candidate) -> None:
         """Keep a finished kind."""
         if self._folder is not None:
-            data = json_ready(candidate.data() | {"digest": self._digest(candidate.kind)})
+            data = json_ready(candidate.as_dict() | {"digest": self._digest(candidate.kind)})
             self._folder.mkdir(parents=True, exist_ok=True)
             write_text(self._folder / f"{candidate.kind}.json", json.dumps(data, indent=1) + "\n")

@@ -9,7 +9,7 @@ from itertools import product
 
 import numpy as np
 
-from pteron.design.quantities import COVERS, quantities
+from pteron.design.quantities import COVERS
 from pteron.design.region import placed_pose, workspace_poses, workspace_region
 from pteron.design.spec import ROUNDING
 from pteron.design.task import Task
@@ -254,7 +254,7 @@ class Design:
 
     def cover(self, name: str) -> str:
         """Return over what one of its quantities is known, in words."""
-        kind = quantities()[name].cover
+        kind = self.task.quantities[name].cover
         times, places = 0, str(len(self.fine_poses if kind == "fine" else self.poses))
         if kind == "cycles":
             times = sum(2 * len(motion.time) - 1 for motion in self.cycles)
@@ -280,9 +280,9 @@ class Design:
 
     def _evaluate_quantity(self, name: str) -> tuple[float, str]:
         """Return a quantity and, where there is none, why."""
-        quantity = quantities()[name]
+        quantity = self.task.quantities[name]
         if quantity.of_machine is not None:
-            return float(quantity.of_machine(self.robot)), ""
+            return self._evaluate_machine(quantity.of_machine)
         if name in ("cube", "scale"):
             return float(quantity.of(self)), ""
         nowhere = self.cube.edge <= 0.0 if self.task.seeks_place else False
@@ -299,6 +299,13 @@ class Design:
         out = int((~np.isfinite(self.joints).all(axis=-1)).sum())
         where = f"{out} of {len(self.poses)} sampled poses are out of reach"
         return np.nan, where if out else "it has none at some sampled pose: a singularity"
+
+    def _evaluate_machine(self, of_machine: Callable[[Manipulator], float]) -> tuple[float, str]:
+        try:
+            amount = float(of_machine(self.robot))
+        except PteronError as error:
+            return np.nan, str(error)
+        return amount, "" if np.isfinite(amount) else f"its function gives {amount}"
 
     @cached_property
     def strokes(self) -> Array:

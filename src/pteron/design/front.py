@@ -15,9 +15,10 @@ from pteron.design.proofs import counterexamples
 from pteron.design.rows import FAILED, MISSES, places
 from pteron.design.task import Task
 from pteron.errors import ModelError
+from pteron.html_table import frame_html
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
-from pteron.renamed import former_attribute
+from pteron.renamed import FormerTable, former_attribute
 
 if TYPE_CHECKING:
     import polars as pl
@@ -31,7 +32,7 @@ class Front:
     ----------
     task : Task
         The task of the search.
-    table : polars.DataFrame
+    designs : polars.DataFrame
         A row for each design of the front: its variables, the quantities asked for, and misses of
         requirements, which are 0; the best of the first objective comes first.
     evaluated : int
@@ -41,31 +42,59 @@ class Front:
     """
 
     task: Task
-    table: pl.DataFrame
+    designs: pl.DataFrame
     evaluated: int
     kept: int
+
+    @property
+    def table(self) -> FormerTable:
+        """Called, it returns the designs with units in the headings of the columns."""
+        return FormerTable("Front", self.designs, self._headed_designs)
+
+    def _headed_designs(self) -> pl.DataFrame:
+        return self.designs.select(list(self.headings)).rename(self.headings)
+
+    def summary(self) -> str:
+        """Return the counts of designs, for people, in a line."""
+        return (
+            f"{self.task.robot.name}: {self.evaluated} designs evaluated, {self.kept} keep all "
+            f"that is asked, {len(self)} on the front"
+        )
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the front as plain data, SI units."""
+        return {
+            "evaluated": self.evaluated,
+            "kept": self.kept,
+            "objectives": [o.quantity for o in self.task.spec.objectives],
+            "front": self.designs.select(list(self.headings)).to_dicts(),
+        }
+
+    def _repr_html_(self) -> str:
+        title, _, about = self.summary().partition(": ")
+        return frame_html(title, about, self.table())
 
     def __repr__(self) -> str:
         """Return the front in a line."""
         return (
-            f"<Front of {self.task.robot.name!r}: {len(self.table)} designs of {self.evaluated} "
+            f"<Front of {self.task.robot.name!r}: {len(self.designs)} designs of {self.evaluated} "
             "evaluated>"
         )
 
     def __len__(self) -> int:
         """Return the number of its designs."""
-        return len(self.table)
+        return len(self.designs)
 
     @cached_property
     def values(self) -> Array:
         """The variables (K, V)."""
-        return np.asarray(self.table.select([v.name for v in self.task.variables]).to_numpy())
+        return np.asarray(self.designs.select([v.name for v in self.task.variables]).to_numpy())
 
     @cached_property
     def objectives(self) -> Array:
         """The objectives (K, M), in their units."""
         names = [o.quantity for o in self.task.spec.objectives]
-        return np.asarray(self.table.select(names).to_numpy())
+        return np.asarray(self.designs.select(names).to_numpy())
 
     def robot(self, index: int) -> Manipulator:
         """Return the machine of one of its designs."""
@@ -130,7 +159,7 @@ class ProvedRows:
         while True:
             front = front_of_parts(self._task, map(self.replace_rows, parts()))
             values = front.values.tolist()
-            keys = self._keys(front.table)
+            keys = self._keys(front.designs)
             unproved = [v for v, key in zip(values, keys, strict=True) if key not in self._rows]
             if not unproved:
                 return front

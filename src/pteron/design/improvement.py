@@ -9,7 +9,6 @@ import numpy as np
 
 from pteron.design.design import Design
 from pteron.design.proofs import counterexamples, prove_design
-from pteron.design.quantities import quantities
 from pteron.design.spec import ROUNDING
 from pteron.design.task import Task
 from pteron.design.variables import geometry_slopes, slopes_of
@@ -106,7 +105,7 @@ class _Slopes:
         if name in ("cube", "scale"):
             edge = task.shape[1] if name == "scale" else 1.0
             return np.append(np.zeros(len(self.start) + tail - 1), 1.0 / edge)
-        alone = quantities()[name].of_machine
+        alone = task.quantities[name].of_machine
         if alone is None:
             return None
         slopes = slopes_of(

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from difflib import get_close_matches
-from functools import lru_cache
+from functools import lru_cache, partial
+from importlib.metadata import entry_points
+from inspect import getdoc
 from typing import Any, Literal
 
 import numpy as np
@@ -39,6 +41,9 @@ COVERS: dict[Cover, str] = {
 }
 """How far a quantity is known, in words."""
 
+GROUP = "pteron.design"
+"""Group of the entry points of other packages' quantities."""
+
 
 @dataclass(frozen=True)
 class DesignQuantity:
@@ -56,6 +61,8 @@ class DesignQuantity:
         The same from the machine alone, where its poses do not matter: then gradients are known.
     cover : str
         How far it is known, a key of `COVERS`.
+    name : str
+        Its name in tables; of those of `quantities` it is their key.
     """
 
     unit: str
@@ -63,6 +70,7 @@ class DesignQuantity:
     of: Callable[[Any], float]
     of_machine: Callable[[Manipulator], float] | None = None
     cover: Cover = "lattice"
+    name: str = ""
 
 
 def _sample_cover(
@@ -79,8 +87,25 @@ def _sample_cover(
     return DesignQuantity(unit, about, lambda d: d.worst(at, sign, fine=fine), cover=cover)
 
 
-def _simple(unit: str, about: str, of: Callable[[Manipulator], float]) -> DesignQuantity:
-    return DesignQuantity(unit, about, lambda design: of(design.robot), of, "machine")
+def machine_quantity(
+    unit: str, about: str, of_machine: Callable[[Manipulator], float], name: str = ""
+) -> DesignQuantity:
+    """Return the quantity of a design that is a function of its machine alone."""
+    of = partial(_evaluate_machine, of_machine)
+    return DesignQuantity(unit, about, of, of_machine, "machine", name)
+
+
+def _evaluate_machine(of_machine: Callable[[Manipulator], float], design: Any) -> float:
+    return of_machine(design.robot)
+
+
+def quantity_of(
+    quantity: DesignQuantity | Callable[[Manipulator], float], name: str
+) -> DesignQuantity:
+    """Return the quantity that a function of the machine gives; a quantity as it is."""
+    if isinstance(quantity, DesignQuantity):
+        return quantity
+    return machine_quantity("", (getdoc(quantity) or "").partition("\n")[0], quantity, name)
 
 
 def _links(robot: Manipulator) -> float:
@@ -139,7 +164,7 @@ def _cycle_time(design: Any) -> float:
     return float(rests) + sum(shortest_time(robot, motion) for motion in design.cycles)
 
 
-_OWN = {
+_BUILT_IN = {
     "cube": DesignQuantity(
         "m",
         "edge of the largest cube that keeps the floors and limits",
@@ -152,8 +177,8 @@ _OWN = {
         lambda d: d.scale,
         cover="proved",
     ),
-    "links": _simple("m", "sum of the links' lengths", _links),
-    "moving_mass": _simple("kg", "mass of all that moves", moving_mass),
+    "links": machine_quantity("m", "sum of the links' lengths", _links),
+    "moving_mass": machine_quantity("kg", "mass of all that moves", moving_mass),
     "size": DesignQuantity(
         "m", "diagonal of the box that holds all joints at the poses of the workspace", _size
     ),
@@ -243,8 +268,15 @@ _OWN = {
 
 @lru_cache(maxsize=1)
 def quantities() -> dict[str, DesignQuantity]:
-    """Return the quantities by name: those of this page, and the worst of each index."""
-    return _OWN | {name: _worst(index) for name, index in INDICES.items()}
+    """Return the quantities by name: those of this page, the worst of each index, and packages'.
+
+    A package names its own as entry points of the group `pteron.design`: a function of the machine
+    or a `DesignQuantity`.
+    """
+    known = _BUILT_IN | {name: _worst(index) for name, index in INDICES.items()}
+    for entry in entry_points(group=GROUP):
+        known.setdefault(entry.name, quantity_of(entry.load(), entry.name))
+    return known
 
 
 def _worst(index: Index) -> DesignQuantity:

@@ -154,24 +154,28 @@ class FrontReport:
 
     def table(self) -> pl.DataFrame:
         """Return the front as a table, with units in the headings."""
-        shown = self.front.table.select(list(self.front.headings))
-        return shown.rename(self.front.headings)
+        frame: pl.DataFrame = self.front.table()
+        return frame
 
-    def data(self) -> dict[str, Any]:
+    def summary(self) -> str:
+        """Return the report, for people, as lines of text: that of `page`."""
+        return self.page()
+
+    data = former_attribute("data", "as_dict")
+
+    def as_dict(self) -> dict[str, Any]:
         """Return everything as plain data, SI units."""
-        front = self.front
+        front, task = self.front.as_dict(), self.front.task
         return {
-            "robot": front.task.robot.name,
-            "machine": machine_record(front.task.robot),
-            "evaluated": front.evaluated,
-            "kept": front.kept,
-            "variables": [
-                vars(v) | {"places": [p.path for p in v.places]} for v in front.task.variables
-            ],
-            "objectives": [o.quantity for o in front.task.spec.objectives],
+            "robot": task.robot.name,
+            "machine": machine_record(task.robot),
+            "evaluated": front["evaluated"],
+            "kept": front["kept"],
+            "variables": [vars(v) | {"places": [p.path for p in v.places]} for v in task.variables],
+            "objectives": front["objectives"],
             "start": _data(self.start),
             "chosen": {reported.name: _data(reported) for reported in self.selection},
-            "front": front.table.select(list(front.headings)).to_dicts(),
+            "front": front["front"],
         }
 
     def page(self) -> str:

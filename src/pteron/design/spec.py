@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from itertools import chain
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, Self, TypeAlias
 
 from pydantic import BeforeValidator, Field, PrivateAttr, field_validator, model_validator
 
@@ -21,9 +22,11 @@ from pteron.design.load_tables import (
     as_list,
     default_table,
 )
-from pteron.design.quantities import expect_quantity
+from pteron.design.quantities import DesignQuantity, expect_quantity
+from pteron.design.user_quantities import function_of, named_quantity
 from pteron.design.workspace_tables import WorkspaceTable
 from pteron.errors import DataError, shown
+from pteron.manipulator import Manipulator
 from pteron.renamed import former_attribute
 from pteron.toml import read_toml, to_model
 
@@ -152,6 +155,23 @@ class SearchTable(TomlTable):
     seed: Annotated[int, Field(ge=0, strict=True)] = key("of all chance", 0)
 
 
+Quantitative: TypeAlias = str | DesignQuantity | Callable[[Manipulator], float]
+"""A quantity by its name, or a user's own."""
+
+
+def _note_quantity(quantity: Quantitative, functions: dict[str, DesignQuantity]) -> str:
+    """Return a quantity's name; add a user's own to those that a search has."""
+    if not isinstance(quantity, str):
+        named = named_quantity(quantity)
+        if function_of(functions.setdefault(named.name, named)) != function_of(named):
+            raise DataError(f"{named.name}: two quantities of this name; give one another name")
+        return named.name
+    try:
+        return quantity if quantity in functions else expect_quantity(quantity)
+    except ValueError as error:
+        raise DataError(str(error)) from None
+
+
 class Spec(TomlTable):
     """A search for a design, as in its TOML file."""
 
@@ -179,6 +199,7 @@ class Spec(TomlTable):
     search: SearchTable = default_table(SearchTable)
 
     _source: str = PrivateAttr("")
+    _user_quantities: dict[str, DesignQuantity] = PrivateAttr(default_factory=dict)
 
     @property
     def source(self) -> str:
@@ -192,6 +213,59 @@ class Spec(TomlTable):
         return tuple(dict.fromkeys(chain(*named)))
 
     asked = former_attribute("asked", "quantity_names")
+
+    @property
+    def user_quantities(self) -> dict[str, DesignQuantity]:
+        """The quantities that `with_objectives` and `with_requirement` have brought, by name."""
+        return dict(self._user_quantities)
+
+    def with_objectives(
+        self, *, minimise: Sequence[Quantitative] = (), maximise: Sequence[Quantitative] = ()
+    ) -> Spec:
+        """Return the same search with other objectives.
+
+        Parameters
+        ----------
+        minimise, maximise : sequence of str, callable or DesignQuantity
+            What is to be small, and large: names of quantities; functions of the machine, which
+            take a `Manipulator` and return a number; or, of what needs more than the machine,
+            `DesignQuantity`, whose `of` takes the `Design`. Processes import functions by module
+            and name.
+
+        Raises
+        ------
+        DataError
+            If there is no such quantity, or a function has the name of another quantity.
+        """
+        functions = dict(self._user_quantities)
+        tables = [
+            ObjectiveTable.model_construct(minimise=_note_quantity(quantity, functions))
+            for quantity in minimise
+        ] + [
+            ObjectiveTable.model_construct(maximise=_note_quantity(quantity, functions))
+            for quantity in maximise
+        ]
+        if not tables:
+            raise DataError("objectives: none given; give minimise or maximise")
+        return self._with_functions(functions, objectives=tables)
+
+    def with_requirement(
+        self, quantity: Quantitative, *, least: float | None = None, most: float | None = None
+    ) -> Spec:
+        """Return the same search with one more requirement, of a quantity as `with_objectives`."""
+        functions = dict(self._user_quantities)
+        name = _note_quantity(quantity, functions)
+        table = RequirementTable.model_construct(quantity=name, least=least, most=most)
+        try:
+            table._expect_bound()  # type: ignore[operator]
+        except ValueError as error:
+            raise DataError(str(error)) from None
+        return self._with_functions(functions, requirements=[*self.requirements, table])
+
+    def _with_functions(self, functions: dict[str, DesignQuantity], **update: Any) -> Spec:
+        spec = self.model_copy(update=update)
+        spec._user_quantities = functions
+        return spec
 
     def with_seed(self, seed: int) -> Spec:
         """Return the same search with another seed of the random numbers."""

@@ -61,7 +61,9 @@ def misfits(spec: Spec, robot: Manipulator) -> Iterator[str]:
     named = [o.quantity for o in spec.objectives]
     for name in sorted({name for name in named if named.count(name) > 1}):
         yield f"objectives: {name} given more than once"
-    assert quantities_asked <= quantities().keys()  # the spec has checked them
+    assert (
+        quantities_asked <= quantities().keys() | spec.user_quantities.keys()
+    )  # the spec has checked them
     yield from _missing_tables(spec, robot, quantities_asked)
     yield from _loads(spec, robot)
 

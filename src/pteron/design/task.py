@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from pteron.design.quantities import quantities
+from pteron.design.quantities import DesignQuantity, quantities
 from pteron.design.region import workspace_shape
 from pteron.design.spec import FloorsTable, Spec
 from pteron.design.spec_faults import misfits
+from pteron.design.user_quantities import code_digest
 from pteron.design.variables import Variable, move_variables, variables_of
 from pteron.errors import DataError, ModelError, warn_unlikely
 from pteron.kernels import Array, Kernel, compile
@@ -105,10 +106,17 @@ class Task:
         plan: dict[str, Any] = {"robot": text_of(self.robot), "spec": spec, "pteron": RESULTS}
         if self.motors:
             plan["motors"] = [vars(motor) for motor in self.motors]
-        covers = {quantities()[name].cover for name in self.quantity_names}
+        if quantities := self.spec.user_quantities:
+            plan["user's quantities"] = {name: code_digest(q) for name, q in quantities.items()}
+        covers = {self.quantities[name].cover for name in self.quantity_names}
         if covers & {"places", "fine", "directions", "bound"}:
             plan["definition of its quantities"] = _WORST
         return plan
+
+    @cached_property
+    def quantities(self) -> dict[str, DesignQuantity]:
+        """The quantities that a search may name, the user's own among them."""
+        return quantities() | self.spec.user_quantities
 
     @cached_property
     def floors(self) -> FloorsTable:
@@ -190,7 +198,7 @@ class Task:
         joint = self.robot.legs[0].joint
         force, speed = joint.force_unit, f"{joint.unit}/s"
         units = {"force": force, "cycle_force": force, "speed": speed, "cycle_speed": speed}
-        return units.get(name, quantities()[name].unit)
+        return units.get(name, self.quantities[name].unit)
 
     def function(self, what: str) -> Kernel:
         """Return a function of the machines' topology, whose geometry a call gives."""

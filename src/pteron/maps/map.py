@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pteron.errors import DataError
+from pteron.html_table import frame_html
 from pteron.indices import INDICES, Index
 from pteron.kernels import Array
 from pteron.maps.grid import Grid
@@ -192,6 +193,10 @@ class Map:
         return Map(self.robot, grid, values, np.take(self.status, i, axis=k), self.machine)
 
     at = former_attribute("at", "slice_at")
+
+    def _repr_html_(self) -> str:
+        about = f"{self.share:.1%} of {self.status.size} poses in reach"
+        return frame_html(self.robot, about, self.table())
 
 
 def column_heading(index: Index) -> str:

@@ -38,7 +38,7 @@ def write_choice(choice: Choice, folder: str | Path) -> list[Path]:
     OutputError
         If the folder cannot be written.
     """
-    texts = {"choose.html": page(choice), "choose.json": json_text(choice.data())}
+    texts = {"choose.html": page(choice), "choose.json": json_text(choice.as_dict())}
     earlier = _machines(Path(folder) / "choose.json")
     written = write_texts(folder, texts | choice.robots())
     for name, robot in earlier.items():
