@@ -205,7 +205,7 @@ def _candidate(
         proof_sentence(evaluator, proofs),
         _clear_words(evaluator, robot, rating.middle),
         _dimensions(robot),
-        {name: value for name, value in (figures | times).items() if np.isfinite(value)},
+        {name: figure for name, figure in (figures | times).items() if np.isfinite(figure)},
         tuple(option.name for option in rating.options),
         margins.worst,
         tuple({name: r.figures[name] for name in objectives} for r in best),

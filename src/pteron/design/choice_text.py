@@ -26,8 +26,8 @@ def cells(candidate: Candidate) -> dict[str, str]:
     """Return a row's numbers by their headings, rounded; of a machine that serves."""
     row = {"margin": _ratio(candidate.least_margin)}
     for name, (heading, factor) in _FIGURES.items():
-        if (value := candidate.figures.get(name)) is not None and (name != "cycle_time" or value):
-            row[heading] = f"{factor * value:.0f}" if value > 1e3 else f"{factor * value:.3g}"
+        if (figure := candidate.figures.get(name)) is not None and (name != "cycle_time" or figure):
+            row[heading] = f"{factor * figure:.0f}" if figure > 1e3 else f"{factor * figure:.3g}"
     return row
 
 
@@ -38,7 +38,9 @@ def drives(candidate: Candidate) -> str:
 
 def dimensions(candidate: Candidate) -> str:
     """Return the dimensions of a machine in a line, mm."""
-    lengths = ", ".join(f"{name} {1e3 * value:.0f}" for name, value in candidate.dimensions.items())
+    lengths = ", ".join(
+        f"{name} {1e3 * length:.0f}" for name, length in candidate.dimensions.items()
+    )
     extents = (f"{1e3 * candidate.figures[name]:.0f}" for name in ("width", "depth", "height"))
     return f"{lengths}; it moves within {' x '.join(extents)}"
 
@@ -49,13 +51,13 @@ def margins(candidate: Candidate) -> str:
     known = {
         word: candidate.figures[name] for name, word in names.items() if name in candidate.figures
     }
-    ratios = ", ".join(f"{word} {_ratio(value)}" for word, value in known.items())
+    ratios = ", ".join(f"{word} {_ratio(margin)}" for word, margin in known.items())
     return f"{ratios}; least at {candidate.worst}" if candidate.worst else ratios
 
 
-def _ratio(value: float) -> str:
+def _ratio(margin: float) -> str:
     """Return a margin, of which three digits mean something."""
-    return f"{value:.{2 if value < 10.0 else 1 if value < 100.0 else 0}f}"
+    return f"{margin:.{2 if margin < 10.0 else 1 if margin < 100.0 else 0}f}"
 
 
 def requirement_lines(job: Job) -> list[str]:
@@ -100,7 +102,7 @@ def requirement_lines(job: Job) -> list[str]:
     for name in sorted(job.floors.model_fields_set):
         lines.append(f"{floors[name]} at least {getattr(job.floors, name):g}")
     bounds = job.most.model_dump(exclude_none=True)
-    lines += [f"{name.replace('_', ' ')} at most {value:g}" for name, value in bounds.items()]
+    lines += [f"{name.replace('_', ' ')} at most {bound:g}" for name, bound in bounds.items()]
     return [*lines, f"least {' and '.join(name.replace('_', ' ') for name in job.objectives)}"]
 
 

@@ -263,17 +263,17 @@ class _CandidateStore:
         if self._folder is None or not (file := self._folder / f"{name}.json").is_file():
             return None
         try:
-            data = json.loads(file.read_text(encoding="utf-8"))
-            if data.pop("digest", None) != self._digest(name):
+            record = json.loads(file.read_text(encoding="utf-8"))
+            if record.pop("digest", None) != self._digest(name):
                 return None
-            lists = {key: tuple(data[key]) for key in ("why", "drives", "front", "middle")}
-            return Candidate(**data | lists)
+            lists = {key: tuple(record[key]) for key in ("why", "drives", "front", "middle")}
+            return Candidate(**record | lists)
         except (ValueError, TypeError, KeyError):
             return None
 
     def keep(self, candidate: Candidate) -> None:
         """Keep a finished kind."""
         if self._folder is not None:
-            data = json_ready(candidate.as_dict() | {"digest": self._digest(candidate.kind)})
+            record = json_ready(candidate.as_dict() | {"digest": self._digest(candidate.kind)})
             self._folder.mkdir(parents=True, exist_ok=True)
-            write_text(self._folder / f"{candidate.kind}.json", json.dumps(data, indent=1) + "\n")
+            write_text(self._folder / f"{candidate.kind}.json", json.dumps(record, indent=1) + "\n")

@@ -66,7 +66,7 @@ class Design:
         """Return a function's first output at poses, those of `poses` if none are given."""
         function = self.task.function(what)
         numbers = {"geometry": self.geometry, "parameters": parameters(self.robot)}
-        fixed = {name: value for name, value in numbers.items() if name in function.fixed}
+        fixed = {name: part for name, part in numbers.items() if name in function.fixed}
         outputs = function(self.poses if poses is None else poses, **fixed)
         return np.asarray(outputs[0] if isinstance(outputs, tuple) else outputs)
 
@@ -147,14 +147,14 @@ class Design:
         one of them has none.
         """
         poses = self.fine_poses if fine else self.poses
-        values = sign * of(self, poses)
-        if np.isnan(values).any():
+        signed = sign * of(self, poses)
+        if np.isnan(signed).any():
             return np.nan
         lengths = len(self.robot.platform.lengths)
         offsets = np.zeros((3**lengths, self.robot.freedom))
         offsets[:, :lengths] = list(product((-1.0, 0.0, 1.0), repeat=lengths))
-        starts = np.argsort(values, kind="stable")[-_STARTS:]
-        worst, most = poses[starts], values[starts]
+        starts = np.argsort(signed, kind="stable")[-_STARTS:]
+        worst, most = poses[starts], signed[starts]
         regions = [self.region(pose) for pose in worst]
         low, high = np.stack([region.box for region in regions], axis=1)
         step = (high - low) / self._samples

@@ -41,14 +41,14 @@ class Change:
     @property
     def words(self) -> str:
         """The change as a clause: "upper length of legs 2 and 4 154.0 mm -> 246.0 mm (+59.7 %)"."""
-        what, before, after, change = self.cells
-        return f"{what} {before} -> {after} ({change})"
+        what, start, end, change = self.cells
+        return f"{what} {start} -> {end} ({change})"
 
     @property
     def cells(self) -> tuple[str, str, str, str]:
         """What changes, both values with their unit, and by how much it grows."""
-        before, after = self.format_value(self.before), self.format_value(self.after)
-        return self.what, before, after, self.relative_change
+        start, end = self.format_value(self.before), self.format_value(self.after)
+        return self.what, start, end, self.relative_change
 
     @property
     def relative_change(self) -> str:
@@ -68,13 +68,13 @@ class Change:
 
     told = former_attribute("told", "format_value")
 
-    def format_value(self, value: float) -> str:
+    def format_value(self, number: float) -> str:
         """Return a value with its unit; lengths in millimetres."""
-        if math.isnan(value):
+        if math.isnan(number):
             return "none"
         if self.unit == "m":
-            return f"{1000.0 * value:{'.1f' if abs(value) >= _SMALL else '.3g'}} mm"
-        return f"{value:.4g} {self.unit}".rstrip()
+            return f"{1000.0 * number:{'.1f' if abs(number) >= _SMALL else '.3g'}} mm"
+        return f"{number:.4g} {self.unit}".rstrip()
 
 
 def geometry_changes(task: Task, robot: Manipulator) -> list[Change]:

@@ -158,17 +158,17 @@ class ProvedRows:
         """
         while True:
             front = front_of_parts(self._task, map(self.replace_rows, parts()))
-            values = front.values.tolist()
+            points = front.values.tolist()
             keys = self._keys(front.designs)
-            unproved = [v for v, key in zip(values, keys, strict=True) if key not in self._rows]
+            unproved = [v for v, key in zip(points, keys, strict=True) if key not in self._rows]
             if not unproved:
                 return front
             proved = self._prove(unproved)
             self._rows |= zip(self._keys(proved), proved.rows(), strict=True)
 
     def _keys(self, designs: pl.DataFrame) -> list[bytes]:
-        values = designs.select([v.name for v in self._task.variables]).to_numpy()
-        return [np.ascontiguousarray(row).tobytes() for row in values]
+        points = designs.select([v.name for v in self._task.variables]).to_numpy()
+        return [np.ascontiguousarray(row).tobytes() for row in points]
 
 
 def front_of_parts(task: Task, parts: Iterable[pl.DataFrame]) -> Front:

@@ -29,7 +29,7 @@ _FIRST = 5
 """Points along a cube's edge at which its conditions are evaluated at first."""
 
 
-def improve_design(task: Task, values: Sequence[float], objective: int) -> list[float]:
+def improve_design(task: Task, point: Sequence[float], objective: int) -> list[float]:
     """Return a design with a better objective, or the same where none is found.
 
     The unknowns are the variables together with the cube's centre and edge. Quantities of the
@@ -37,17 +37,17 @@ def improve_design(task: Task, values: Sequence[float], objective: int) -> list[
     design again. Where a proof of the workspace or the cube fails, the design is sought once more,
     with the counterexample among its conditions.
     """
-    spec, start = task.spec, np.array(values)
+    spec, start = task.spec, np.array(point)
     target = spec.objectives[objective]
     try:
-        design = prove_design(Design(task, task.machine(values))).design
+        design = prove_design(Design(task, task.machine(point))).design
         slopes = _Slopes(task, design, start)
         target_slopes = slopes.slopes_of_quantity(target.quantity)
         if target_slopes is None or not target_slopes.any() or design.margin < -ROUNDING:
-            return list(values)
-        geometry = geometry_slopes(task.robot, task.variables, values)
+            return list(point)
+        geometry = geometry_slopes(task.robot, task.variables, point)
     except ModelError:  # at the end of what can be made
-        return list(values)
+        return list(point)
     center, radius = search_ball(design.robot)
     lengths = len(center)
     seeks = task.seeks_place

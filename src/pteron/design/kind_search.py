@@ -118,8 +118,8 @@ def _refine(
     for choice in islice(product(*stocks), max(end - len(ratings), 0)):
         trial = start.copy()
         trial[~free] = choice
-        if (value := cost(trial)) < least:
-            least, best = value, trial
+        if (trial_cost := cost(trial)) < least:
+            least, best = trial_cost, trial
     while len(ratings) < end:
         simplex = best[free] + np.vstack(
             [

@@ -114,14 +114,14 @@ class Kind:
         """Numbers of things to choose from (V,); 0 of a measure."""
         return np.array([len(self._choices.get(name, ())) for name in self.variables])
 
-    def numbers(self, values: Array) -> dict[str, float]:
+    def numbers(self, point: Array) -> dict[str, float]:
         """Return numbers by name, as they are meant: sizes over the catalog's, times in s."""
         return {
-            name: float(value if name in "xyz" or name in self._choices else np.exp(value))
-            for name, value in zip(self.variables, values, strict=True)
+            name: float(setting if name in "xyz" or name in self._choices else np.exp(setting))
+            for name, setting in zip(self.variables, point, strict=True)
         }
 
-    def machine(self, values: Array) -> tuple[Manipulator, Array]:
+    def machine(self, point: Array) -> tuple[Manipulator, Array]:
         """Return the machine of a design, and the pose in the middle of its workspace.
 
         Raises
@@ -129,7 +129,7 @@ class Kind:
         ModelError
             If there is no such machine.
         """
-        numbers = self.numbers(values)
+        numbers = self.numbers(point)
         size, (home, reach) = numbers["size"], self.reach
         middle = np.where(self.robot.platform.angular, 0.0, size * home)
         for i, letter in enumerate(self.robot.coordinates):
@@ -137,22 +137,22 @@ class Kind:
                 middle[i] += numbers[letter] * size * reach
             elif letter == "x" or (letter == "y" and "z" in KINDS[self.name][1]):
                 middle[i] = 0.0
-        return _build_machine(self.robot, numbers, self._stock(values), self.links), middle
+        return _build_machine(self.robot, numbers, self._stock(point), self.links), middle
 
-    def link_stocks(self, values: Array) -> dict[str, str]:
+    def link_stocks(self, point: Array) -> dict[str, str]:
         """Return what a design's upper and lower links are cut from."""
-        numbers = self.numbers(values)
+        numbers = self.numbers(point)
         return {key: names[int(numbers.get(key, 0.0))] for key, names in self.stocks.items()}
 
-    def _stock(self, values: Array) -> dict[str, Stock]:
-        return {key: Stock.parse(name) for key, name in self.link_stocks(values).items()}
+    def _stock(self, point: Array) -> dict[str, Stock]:
+        return {key: Stock.parse(name) for key, name in self.link_stocks(point).items()}
 
-    def with_travel(self, leg: Any, travel: tuple[float, float], values: Array) -> Any:
+    def with_travel(self, leg: Any, travel: tuple[float, float], point: Array) -> Any:
         """Return a leg whose joint goes from one end to another, m; a ram's tubes are as long."""
         limited = replace(leg, limits=travel)
         if slides(leg):
             return limited
-        return limited.with_bodies(_bodies(limited, 1.0, self._stock(values), self.links))
+        return limited.with_bodies(_bodies(limited, 1.0, self._stock(point), self.links))
 
 
 def slides(leg: Any) -> bool:
@@ -183,8 +183,8 @@ def _build_machine(
     for leg in robot.legs:
         dimensions: dict[str, Any] = {}
         lengths = _lengths(leg)
-        for key, values in leg.metres.items():
-            parts = np.array(values)
+        for key, lengths_of_key in leg.metres.items():
+            parts = np.array(lengths_of_key)
             if key == "guide_point":
                 parts = about + wider @ (parts - about)
             elif key == "platform_point":

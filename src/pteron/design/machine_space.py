@@ -119,8 +119,8 @@ class MachineSpace:
         radii, distances = robot.radii, [np.inf]
         assert radii is not None  # every design has them
         known = np.asarray(numeric(robot, "least_clearances")(poses)[0])
-        for (a, b), values in zip(self._meetings, known.reshape(len(poses), -1).T, strict=True):
-            distances.append(values.min() - getattr(radii, a) - getattr(radii, b))
+        for (a, b), clearances in zip(self._meetings, known.reshape(len(poses), -1).T, strict=True):
+            distances.append(clearances.min() - getattr(radii, a) - getattr(radii, b))
         thick = radii.guide + max(radii.upper, radii.lower)
         for i, low, high in _guides(robot):
             others = np.delete(points, i, axis=-3)

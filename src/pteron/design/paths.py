@@ -53,8 +53,8 @@ class GeometryNumber:
 
     def read(self, robot: Manipulator) -> float:
         """Return the number as it is in a machine."""
-        value = getattr(robot.legs[self.leg - 1], self.key)
-        return float(value if self.part is None else value[self.part])
+        numbers = getattr(robot.legs[self.leg - 1], self.key)
+        return float(numbers if self.part is None else numbers[self.part])
 
 
 def named_numbers(robot: Manipulator, path: str) -> list[GeometryNumber]:

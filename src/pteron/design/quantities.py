@@ -274,8 +274,8 @@ def quantities() -> dict[str, DesignQuantity]:
     or a `DesignQuantity`.
     """
     known = _BUILT_IN | {name: _worst(index) for name, index in INDICES.items()}
-    for entry in entry_points(group=GROUP):
-        known.setdefault(entry.name, quantity_of(entry.load(), entry.name))
+    for point in entry_points(group=GROUP):
+        known.setdefault(point.name, quantity_of(point.load(), point.name))
     return known
 
 

@@ -90,9 +90,9 @@ class Rating:
         """Return what a search makes small."""
         if self.misses:
             return _BY_STAGE * (6 - self.stage) + min(sum(self.misses.values()), 0.9 * _BY_STAGE)
-        value = self.figures[objective]
+        cost = self.figures[objective]
         # A price has steps: along one the design is the better whose next step down is nearer.
-        return float(np.log(value) + 0.01 * min(self.near, 1.0)) if value > 0.0 else 0.0
+        return float(np.log(cost) + 0.01 * min(self.near, 1.0)) if cost > 0.0 else 0.0
 
 
 class KindEvaluator:
@@ -129,11 +129,11 @@ class KindEvaluator:
         kinds = dict.fromkeys((leg.type, leg.joint.unit) for leg in legs)
         return [[i for i, g in enumerate(legs) if (g.type, g.joint.unit) == k] for k in kinds]
 
-    def rate(self, values: Array) -> Rating:
+    def rate(self, point: Array) -> Rating:
         """Return how the machine of a design does the job; call it within `alike(kind.like)`."""
-        rating = Rating(np.asarray(values, dtype=float))
+        rating = Rating(np.asarray(point, dtype=float))
         try:
-            robot, rating.middle = self.kind.machine(values)
+            robot, rating.middle = self.kind.machine(point)
         except ModelError:
             rating.stage = 1
             _miss(rating, "machine", 1.0, "numbers that no machine has")
@@ -280,11 +280,11 @@ class KindEvaluator:
         self,
         robot: Manipulator,
         values_of: Callable[[Array], Array],
-        along: int | None = None,
+        samples: int | None = None,
         keep: int = 1,
     ) -> tuple[Array, Array]:
         """Return least values over workspace and cycles, as `refine_worst_values` has them."""
-        return refine_worst_values(self.job, robot, values_of, along, keep, self.between)
+        return refine_worst_values(self.job, robot, values_of, samples, keep, self.between)
 
     def shares(self, time: float | None) -> Array:
         """Return how much of a duty cycle's time each cycle has; none if each counts by itself."""
@@ -385,14 +385,14 @@ def _miss_parts(rating: Rating, parts: Mapping[str, float], option: str) -> None
             _miss(rating, name, 1.0 / max(part, 1e-3) - 1.0, words)
 
 
-def _judge_least(rating: Rating, name: str, value: float, least: float, unit: str = "") -> None:
-    if not value >= least:
-        share = least - value if np.isfinite(value) else 1.0
-        _miss(rating, name, share, f"{name} {value:.3g}{unit}, at least {least:.3g}{unit} asked")
+def _judge_least(rating: Rating, name: str, quantity: float, least: float, unit: str = "") -> None:
+    if not quantity >= least:
+        share = least - quantity if np.isfinite(quantity) else 1.0
+        _miss(rating, name, share, f"{name} {quantity:.3g}{unit}, at least {least:.3g}{unit} asked")
 
 
-def _judge_most(rating: Rating, name: str, value: float, most: float | None, unit: str) -> None:
-    if most is not None and not value <= most:
-        share = value / most - 1.0 if np.isfinite(value) else 1.0
+def _judge_most(rating: Rating, name: str, quantity: float, most: float | None, unit: str) -> None:
+    if most is not None and not quantity <= most:
+        share = quantity / most - 1.0 if np.isfinite(quantity) else 1.0
         words = name.replace("_", " ")
-        _miss(rating, name, share, f"{words} {value:.4g}{unit}, at most {most:g}{unit} asked")
+        _miss(rating, name, share, f"{words} {quantity:.4g}{unit}, at most {most:g}{unit} asked")

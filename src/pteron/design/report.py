@@ -94,9 +94,9 @@ class ReportedDesign(Proved):
         design, task = self.design, self.design.task
         known: dict[str, list[str]] = {}
         for name in task.quantity_names:
-            value = design.quantity(name)
+            amount = design.quantity(name)
             if not design.missing_reason(name):
-                text = Change(name, value, value, task.unit(name)).format_value(value)
+                text = Change(name, amount, amount, task.unit(name)).format_value(amount)
                 known.setdefault(design.cover(name), []).append(f"{name} {text}")
         lines = [
             *self.missing_quantities,

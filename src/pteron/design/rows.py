@@ -26,7 +26,7 @@ FAILED = 1e6
 
 
 def evaluate_design(
-    task: Task, values: Sequence[float], *, proofs: bool = False
+    task: Task, point: Sequence[float], *, proofs: bool = False
 ) -> dict[str, float]:
     """Return the row of a design: quantities, and by how much it misses what is asked.
 
@@ -35,7 +35,7 @@ def evaluate_design(
     cube is the proved one, and a workspace that is not proved is missed.
     """
     try:
-        design = Design(task, task.machine(values))
+        design = Design(task, task.machine(point))
         if proofs:
             design = prove_design(design).design
         row = {name: design.quantity(name) for name in task.quantity_names}
@@ -60,8 +60,8 @@ def design_table(task: Task, designs: ArrayLike, *, proofs: bool = False) -> pl.
     """Return a table of designs (N, V), a row each: variables, then quantities and misses."""
     import polars as pl
 
-    values = np.asarray(designs)
+    points = np.asarray(designs)
     with one_thread():
-        rows = [evaluate_design(task, row, proofs=proofs) for row in values.tolist()]
-    columns = {v.name: values[:, k].tolist() for k, v in enumerate(task.variables)}
+        rows = [evaluate_design(task, row, proofs=proofs) for row in points.tolist()]
+    columns = {v.name: points[:, k].tolist() for k, v in enumerate(task.variables)}
     return pl.DataFrame(columns | {name: [row[name] for row in rows] for name in rows[0]})

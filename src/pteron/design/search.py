@@ -122,7 +122,7 @@ def _generations(
     used: set[tuple[bytes, int]] = set()
     for number in range(1, settings.generations + 1):
         designs = low + evolution.ask() * (high - low)
-        jobs = [(values, -1) for values in designs.tolist()]
+        jobs = [(points, -1) for points in designs.tolist()]
         if front is not None:
             jobs += _designs_to_improve(front, number, used)
         plan = {**task.plan, "generation": number, "designs": _digest(designs)}
@@ -133,8 +133,8 @@ def _generations(
         tables.append(store.scan().collect())
         front = _proved_front(proofs, tables)
         proved_rows = proofs.replace_rows(tables[-1])
-        values = np.asarray(proved_rows.select([v.name for v in task.variables]).to_numpy())
-        evolution.tell((values - low) / (high - low), *_costs(task, proved_rows))
+        points = np.asarray(proved_rows.select([v.name for v in task.variables]).to_numpy())
+        evolution.tell((points - low) / (high - low), *_costs(task, proved_rows))
     return proofs.front(lambda: tables)
 
 
@@ -205,7 +205,7 @@ def first_designs(task: Task, count: int, seed: int) -> Array:
 def evaluate_designs(task: Task, jobs: Sequence[tuple[list[float], int]]) -> pl.DataFrame:
     """Return the rows of designs; one whose number is an objective is improved in it first."""
     with one_thread():
-        designs = [values if k < 0 else improve_design(task, values, k) for values, k in jobs]
+        designs = [point if k < 0 else improve_design(task, point, k) for point, k in jobs]
     return design_table(task, designs)
 
 

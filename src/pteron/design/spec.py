@@ -127,12 +127,12 @@ class RequirementTable(TomlTable):
             )
         return self
 
-    def violation(self, value: float, failed: float) -> float:
+    def violation(self, amount: float, failed: float) -> float:
         """Return the violation by a value over the bound, 0 if met; `failed` for a value of NaN."""
-        if math.isnan(value):
+        if math.isnan(amount):
             return failed
-        missing = 0.0 if self.least is None else (self.least - value) / (abs(self.least) or 1.0)
-        beyond = 0.0 if self.most is None else (value - self.most) / (abs(self.most) or 1.0)
+        missing = 0.0 if self.least is None else (self.least - amount) / (abs(self.least) or 1.0)
+        beyond = 0.0 if self.most is None else (amount - self.most) / (abs(self.most) or 1.0)
         gap = max(missing, beyond)
         return gap if gap > ROUNDING else 0.0
 
@@ -313,8 +313,8 @@ def asked_words(spec: Spec) -> list[str]:
     ]
     lines += [part.words for part in spec.requirements]
     lines += [
-        f"{name} at least {value:.12g} everywhere"
-        for name, value in spec.floors
+        f"{name} at least {floor:.12g} everywhere"
+        for name, floor in spec.floors
         if not any(r.quantity == name and r.least is not None for r in spec.requirements)
     ]
     if spec.payload is not None:

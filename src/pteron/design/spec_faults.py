@@ -131,6 +131,6 @@ def _loads(spec: Spec, robot: Manipulator) -> Iterator[str]:
         "errors: backlash": spec.errors and spec.errors.backlash,
         "elasticity: actuators": spec.elasticity and spec.elasticity.actuators,
     }
-    for name, values in numbers.items():
-        if values and len(values) not in (1, robot.joint_count):
-            yield f"{name}: {len(values)} numbers given, 1 or {robot.joint_count} expected"
+    for name, entries in numbers.items():
+        if entries and len(entries) not in (1, robot.joint_count):
+            yield f"{name}: {len(entries)} numbers given, 1 or {robot.joint_count} expected"

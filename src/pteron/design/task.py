@@ -204,7 +204,7 @@ class Task:
         """Return a function of the machines' topology, whose geometry a call gives."""
         return compile(self.robot, what, grade="general")
 
-    def machine(self, values: Sequence[float]) -> Manipulator:
+    def machine(self, point: Sequence[float]) -> Manipulator:
         """Return the machine of a design.
 
         Raises
@@ -213,4 +213,4 @@ class Task:
             If there can be none.
         """
         stretch = self.spec.masses == "per length"
-        return move_variables(self.robot, self.variables, values, stretch=stretch)
+        return move_variables(self.robot, self.variables, point, stretch=stretch)

@@ -56,7 +56,7 @@ def refine_worst_values(
     job: Job,
     robot: Manipulator,
     values_of: Callable[[Array], Array],
-    along: int | None = None,
+    samples: int | None = None,
     keep: int = 1,
     besides: Array | None = None,
 ) -> tuple[Array, Array]:
@@ -67,11 +67,12 @@ def refine_worst_values(
     what is worst near a singularity is worst in a valley that samples miss. Poses `besides` those
     of the workspace count as they are.
     """
-    along, count, space = along or _positions_along(job), len(robot.platform.lengths), job.workspace
-    places = _places(job, robot, along)
-    values = values_of(_poses_at(job, robot, places))
+    samples, space = samples or _positions_along(job), job.workspace
+    count = len(robot.platform.lengths)
+    places = _places(job, robot, samples)
+    rows = values_of(_poses_at(job, robot, places))
     steps = np.zeros(robot.freedom)
-    steps[:count] = job.workspace.half[:count] / (along - 1)
+    steps[:count] = job.workspace.half[:count] / (samples - 1)
     if space.tilt is not None:
         steps[count : count + 2] = 0.5 * space.tilt
     if space.turn is not None and space.directions is None:
@@ -80,15 +81,15 @@ def refine_worst_values(
         steps[:count] = 0.0
     ways = _neighbour_steps(steps, count)
     for _ in range(_ROUNDS if steps.any() else 0):
-        worst = np.unique(np.argsort(values, axis=0)[:keep])
+        worst = np.unique(np.argsort(rows, axis=0)[:keep])
         near = (places[worst][:, None] + steps * ways).reshape(-1, robot.freedom)
         places = _clip_to_workspace(job, near, count)
-        values = values_of(_poses_at(job, robot, places))
+        rows = values_of(_poses_at(job, robot, places))
         steps /= 2.0
     poses = _poses_at(job, robot, places)
     if besides is not None and len(besides):
-        poses, values = np.vstack([poses, besides]), np.vstack([values, values_of(besides)])
-    return values.min(axis=0), poses[values.argmin(axis=0)]
+        poses, rows = np.vstack([poses, besides]), np.vstack([rows, values_of(besides)])
+    return rows.min(axis=0), poses[rows.argmin(axis=0)]
 
 
 def _neighbour_steps(steps: Array, count: int) -> Array:

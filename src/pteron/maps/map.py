@@ -134,21 +134,21 @@ class Map:
         """
         if name not in self.values:
             raise DataError(f"{name}: is not in this map; it has {', '.join(self.values)}")
-        index, values, serves = ALL[name], self.values[name], self.reachable
-        known = serves & np.isfinite(values)
+        index, amounts, serves = ALL[name], self.values[name], self.reachable
+        known = serves & np.isfinite(amounts)
         if not known.any():
             raise DataError(f"{name}: determined at no pose of this map that serves")
         sign = 1.0 if index.better == "more" else -1.0
         low, high = (
-            int(np.argmin(np.where(known, side * sign * values, np.inf))) for side in (1.0, -1.0)
+            int(np.argmin(np.where(known, side * sign * amounts, np.inf))) for side in (1.0, -1.0)
         )
-        chosen = values[known]
+        chosen = amounts[known]
         return Summary(
             name,
             index.unit,
-            float(values.flat[high]),
+            float(amounts.flat[high]),
             self._pose(high),
-            float(values.flat[low]),
+            float(amounts.flat[low]),
             self._pose(low),
             float(chosen.mean()),
             float(np.median(chosen)),
@@ -188,9 +188,9 @@ class Map:
         i = int(np.abs(steps - coordinate).argmin())
         pose = list(self.grid.pose)
         pose[self.grid.coordinates.index(name)] = float(steps[i])
-        values = {index: np.take(array, i, axis=k) for index, array in self.values.items()}
+        indices = {index: np.take(array, i, axis=k) for index, array in self.values.items()}
         grid = Grid(self.grid.coordinates, tuple(pose), tuple(axes))
-        return Map(self.robot, grid, values, np.take(self.status, i, axis=k), self.machine)
+        return Map(self.robot, grid, indices, np.take(self.status, i, axis=k), self.machine)
 
     at = former_attribute("at", "slice_at")
 

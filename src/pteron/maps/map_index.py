@@ -165,7 +165,7 @@ def _compute_region(
             outputs[name][part] = (
                 margin if name == MARGIN.name else evaluate_kernel(robot, name, "nan", rows[part])
             )
-    return {name: values.reshape(poses.shape[:-1]) for name, values in outputs.items()}
+    return {name: array.reshape(poses.shape[:-1]) for name, array in outputs.items()}
 
 
 @lru_cache(maxsize=64)

@@ -50,7 +50,7 @@ class Store(Protocol[_Written]):
     def finished_chunks(self) -> Collection[int]:
         """Return the numbers of the chunks that are written."""
 
-    def write(self, number: int, result: _Written) -> None:
+    def write(self, number: int, rows: _Written) -> None:
         """Write what a chunk gave: when it returns the chunk is finished, before it is not."""
 
 

@@ -71,11 +71,11 @@ class TableStore:
 
     finished = former_attribute("finished", "finished_chunks")
 
-    def write(self, number: int, result: pl.DataFrame) -> None:
+    def write(self, number: int, rows: pl.DataFrame) -> None:
         """Write a chunk's rows, through a temporary file and a rename."""
-        data = table_bytes(result, self.folder / f"{number}{_ENDING}")
-        name = f"{number:08d}-{self._checksum(number, data)}{_ENDING}"
-        write_bytes(self.folder / name, data)
+        contents = table_bytes(rows, self.folder / f"{number}{_ENDING}")
+        name = f"{number:08d}-{self._checksum(number, contents)}{_ENDING}"
+        write_bytes(self.folder / name, contents)
 
     def scan(self) -> pl.LazyFrame:
         """Return all rows that are written, in the plan's order, read only as far as asked for.
@@ -110,5 +110,5 @@ class TableStore:
         except OSError:  # gone meanwhile, or it cannot be read
             return False
 
-    def _checksum(self, number: int, data: bytes) -> str:
-        return hashlib.sha256(f"{self._plan} {number} ".encode() + data).hexdigest()[:16]
+    def _checksum(self, number: int, contents: bytes) -> str:
+        return hashlib.sha256(f"{self._plan} {number} ".encode() + contents).hexdigest()[:16]

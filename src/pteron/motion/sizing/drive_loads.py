@@ -151,15 +151,15 @@ class Sizing:
     def _greatest(self, quantity: str) -> PerJoint:
         return np.asarray(self._quantities_at_places[quantity].max(axis=0))
 
-    def integral(self, values: Array) -> Array:
+    def integral(self, samples: Array) -> Array:
         """Return the integral over the cycle, by Simpson's rule, of values (K, ...) at `time`."""
         spans = (self.time[2::2] - self.time[:-2:2]) / 6.0
-        ends = values[:-2:2] + 4.0 * values[1::2] + values[2::2]
+        ends = samples[:-2:2] + 4.0 * samples[1::2] + samples[2::2]
         return np.asarray(np.tensordot(spans, ends, axes=1))
 
-    def mean(self, values: Array) -> Array:
+    def mean(self, samples: Array) -> Array:
         """Return the mean over the cycle of values (K, ...) at `time`."""
-        return np.asarray(self.integral(values) / self.duration)
+        return np.asarray(self.integral(samples) / self.duration)
 
     @property
     def peak_forces(self) -> PerJoint:
