@@ -20,11 +20,12 @@ from test_cli import refused, run
 import pteron
 from pteron.design import Job, choose_machine
 from pteron.design.choose import evaluators_of
-from pteron.design.kind_proofs import proof_sentence, regions
 from pteron.design.kind_search import search_kind
 from pteron.design.load_margins import margins_of
 from pteron.design.machine_space import tool_places
+from pteron.design.proofs import proof_sentence
 from pteron.design.rating import Rating
+from pteron.design.regions import kind_regions
 from pteron.design.workspace_samples import (
     poses_about_tool,
     refine_worst_values,
@@ -160,7 +161,7 @@ def test_the_tool_stays_in_the_workspace_while_the_platform_turns():
     away = tool_places(robot, middle + pose.reshape(-1, 4)) - center
     assert np.abs(away).max(axis=0) == pytest.approx([0.1, 0.1, 0.025])
     assert (pose[..., 3].min(), pose[..., 3].max()) == pytest.approx((-1.0, 1.0))
-    (region,) = regions(evaluator, robot, middle)
+    (region,) = kind_regions(evaluator, robot, middle)
     assert region.holds(middle + 0.99 * evaluator.poses)[evaluator.poses[:, 3] == 0.0].all()
     # No box that holds a pose of the region is said to miss it.
     poses = np.random.default_rng(0).uniform(*region.box, (2000, 4))

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pteron.design.cycle_places import Places
-from pteron.design.kind_proofs import is_clear, proof_sentence, proofs_of
 from pteron.design.kind_search import front
 from pteron.design.load_margins import DENSE, margins_of
+from pteron.design.proofs import is_clear, kind_proofs, proof_sentence
 from pteron.design.rating import KindEvaluator, Rating
 from pteron.design.tool_errors import elasticity, greatest_errors, joint_errors, tolerances
 from pteron.design.workspace_samples import sample_poses
@@ -117,7 +117,7 @@ def prove_best_design(evaluator: KindEvaluator, ratings: list[Rating]) -> Candid
         return Candidate(evaluator.kind.name, False, tuple(nearest.shortfalls.values()), *counts)
     why, tight = "", None
     for rating in (good[2**k - 1] for k in range(_TRIED) if 2**k <= len(good)):
-        proofs, rating.robot = proofs_of(evaluator, rating)
+        proofs, rating.robot = kind_proofs(evaluator, rating)
         bad = next((p for p in proofs if p.counterexample is not None), None)
         why = str(bad) if bad is not None else _cell_violation(evaluator, rating)
         if not why:

@@ -10,7 +10,7 @@ from itertools import product
 import numpy as np
 
 from pteron.design.quantities import COVERS
-from pteron.design.region import placed_pose, workspace_poses, workspace_region
+from pteron.design.regions import placed_pose, workspace_poses, workspace_region
 from pteron.design.spec import ROUNDING
 from pteron.design.task import Task
 from pteron.design.workspace_tables import WorkspaceTable

@@ -88,7 +88,7 @@ class Front:
     @cached_property
     def values(self) -> Array:
         """The variables (K, V)."""
-        return np.asarray(self.designs.select([v.name for v in self.task.variables]).to_numpy())
+        return self.task.points(self.designs)
 
     @cached_property
     def objectives(self) -> Array:
@@ -107,15 +107,12 @@ class Front:
         The compromise is nearest to the best of all objectives at once, each measured by its range
         over the front; of one objective there is none.
         """
-        signs = np.array([o.sign for o in self.task.spec.objectives])
-        costs = self.objectives * signs
-        best_designs = {
-            f"best-{o.quantity}": int(costs[:, k].argmin())
-            for k, o in enumerate(self.task.spec.objectives)
-        }
+        costs, objectives = self.task.costs(self.designs), self.task.spec.objectives
+        best = zip(objectives, costs.argmin(axis=0).tolist(), strict=True)
+        best_designs = {f"best-{objective.quantity}": at for objective, at in best}
         spans = np.ptp(costs, axis=0)
         shares = (costs - costs.min(axis=0)) / np.where(spans > 0.0, spans, 1.0)
-        if len(signs) > 1:
+        if len(objectives) > 1:
             best_designs["compromise"] = int(np.linalg.norm(shares, axis=1).argmin())
         return best_designs
 
@@ -167,8 +164,7 @@ class ProvedRows:
             self._rows |= zip(self._keys(proved), proved.rows(), strict=True)
 
     def _keys(self, designs: pl.DataFrame) -> list[bytes]:
-        points = designs.select([v.name for v in self._task.variables]).to_numpy()
-        return [np.ascontiguousarray(row).tobytes() for row in points]
+        return [np.ascontiguousarray(row).tobytes() for row in self._task.points(designs)]
 
 
 def front_of_parts(task: Task, parts: Iterable[pl.DataFrame]) -> Front:
@@ -197,16 +193,13 @@ def front_of_parts(task: Task, parts: Iterable[pl.DataFrame]) -> Front:
 def _misses_of(task: Task, designs: pl.DataFrame) -> Array:
     """Return how much each design misses, all in all; one without an objective misses it."""
     names = [name for name in designs.columns if name.startswith(MISSES)]
-    objectives = designs.select([o.quantity for o in task.spec.objectives]).to_numpy()
     missed = designs.select(names).to_numpy().sum(axis=1)
-    return np.asarray(missed + FAILED * (~np.isfinite(objectives)).sum(axis=1))
+    return np.asarray(missed + FAILED * (~np.isfinite(task.costs(designs))).sum(axis=1))
 
 
 def _pareto_rows(task: Task, designs: pl.DataFrame) -> pl.DataFrame:
     """Return the distinct non-dominated rows, sorted by the objectives."""
-    signs = np.array([o.sign for o in task.spec.objectives])
-    costs = designs.select([o.quantity for o in task.spec.objectives]).to_numpy() * signs
-    rows: pl.DataFrame = designs[pareto_front(costs)]
+    rows: pl.DataFrame = designs[pareto_front(task.costs(designs))]
     return rows
 
 

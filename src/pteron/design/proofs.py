@@ -1,4 +1,4 @@
-"""Proofs that all poses of a design's largest cube, or of its required workspace, can be used.
+"""Proofs that all poses of a design's workspace, or of its largest cube, can be used.
 
 A search tests points; here interval arithmetic (`pteron.workspace.prove`) covers all poses between
 them, under the floors (least measures) of the search. A counterexample is excluded from the cube,
@@ -7,17 +7,20 @@ which is sought anew until it is proved.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
 
 from pteron.design.design import Design
-from pteron.design.region import placed_pose, workspace_region
+from pteron.design.rating import KindEvaluator, Rating
+from pteron.design.regions import kind_regions, placed_pose, workspace_region
 from pteron.design.spec import ROUNDING
 from pteron.design.task import Task
 from pteron.kernels import Array, alike
-from pteron.workspace import Box, Proof, Region, prove
+from pteron.manipulator import Manipulator, Radii
+from pteron.workspace import Box, Proof, Region, interference, prove
 from pteron.workspace.fit import UNKNOWN, Fit, proved_fit
 from pteron.workspace.shape_samples import Samples, fixed_samples
 
@@ -30,6 +33,13 @@ _PLACED = (1.0, 0.9999)
 
 _MOST = 200_000
 """Boxes after which a proof is given up."""
+
+_BOXES, _BOXES_CLEAR = 60_000, 1_000
+"""Boxes after which a proof of reach is given up, and a proof that no two bodies touch, whose
+boxes take longer."""
+
+_LONGER = 0.05
+"""Share of its travel by which a guide or ram is lengthened where a proof fails at its end."""
 
 
 @dataclass(frozen=True)
@@ -226,3 +236,58 @@ def _least(design: Design, proof: Proof) -> float:
         return UNKNOWN
     rows = design.task.conditions.rows(design.geometry, proof.counterexample, design.side)
     return min(UNKNOWN, float(np.nan_to_num(rows, nan=UNKNOWN).min()))
+
+
+def kind_proofs(evaluator: KindEvaluator, rating: Rating) -> tuple[list[Proof], Manipulator]:
+    """Return proofs of the workspace, and the machine, its guides and rams lengthened if needed."""
+    robot, floors = rating.robot, evaluator.job.floors
+    assert robot is not None  # a design that keeps all requirements has one
+    proofs: list[Proof] = []
+    for _ in range(4):
+        proofs = [
+            prove(robot, region, type_i=floors.type_i, type_ii=floors.type_ii, most=_BOXES)
+            for region in kind_regions(evaluator, robot, rating.middle)
+        ]
+        causes = {c.leg for proof in proofs if not proof.holds for c in proof.causes}
+        ended = {i for i in causes if i and robot.legs[i - 1].joint.unit == "m"}
+        if not ended:
+            break
+        legs = list(robot.legs)
+        for i in ended:
+            low, high = legs[i - 1].limits or (0.0, 0.0)
+            spare = _LONGER * (high - low)
+            travel = low - spare, high + spare
+            legs[i - 1] = evaluator.kind.with_travel(legs[i - 1], travel, rating.values)
+        robot = replace(robot, legs=tuple(legs))
+    return proofs, robot
+
+
+def proof_sentence(evaluator: KindEvaluator, proofs: Sequence[Proof]) -> str:
+    """Return what is proved of the workspace, in words."""
+    space, boxes = evaluator.job.workspace, sum(proof.boxes for proof in proofs)
+    if not all(proof.holds for proof in proofs):
+        return (
+            f"kept at {len(evaluator.poses)} sample poses; intervals over {boxes} boxes do not "
+            "decide of all"
+        )
+    if space.poses is not None:
+        statement = (
+            f"every one of {len(proofs)} poses and orientations keeps reach, limits and floors"
+        )
+        between = f"; so do the cycles between them at {len(evaluator.between)} samples"
+        return statement + (between if len(evaluator.between) else "")
+    noun = "pose" if len(proofs) == 1 else f"position, at {len(proofs)} orientations,"
+    statement = f"every {noun} keeps reach, limits and floors, by intervals over {boxes} boxes"
+    return (
+        f"proved at the sampled tilts alone: {statement}" if space.tilt else f"proved: {statement}"
+    )
+
+
+def is_clear(evaluator: KindEvaluator, robot: Manipulator, middle: Array) -> bool:
+    """Say whether it is proved that no two bodies come nearer than the least clearance."""
+    radii, least = robot.radii or Radii(), evaluator.job.floors.clearance / 2.0
+    parts = (radii.guide, radii.upper, radii.lower, radii.platform)
+    required = interference(robot, Radii(*(part + least for part in parts)))
+    workspace = kind_regions(evaluator, robot, middle)
+    most = _BOXES_CLEAR // len(workspace)
+    return all(prove(robot, region, given=required, most=most).holds for region in workspace)

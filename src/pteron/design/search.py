@@ -122,7 +122,7 @@ def _generations(
     used: set[tuple[bytes, int]] = set()
     for number in range(1, settings.generations + 1):
         designs = low + evolution.ask() * (high - low)
-        jobs = [(points, -1) for points in designs.tolist()]
+        jobs = [(point, -1) for point in designs.tolist()]
         if front is not None:
             jobs += _designs_to_improve(front, number, used)
         plan = {**task.plan, "generation": number, "designs": _digest(designs)}
@@ -133,7 +133,7 @@ def _generations(
         tables.append(store.scan().collect())
         front = _proved_front(proofs, tables)
         proved_rows = proofs.replace_rows(tables[-1])
-        points = np.asarray(proved_rows.select([v.name for v in task.variables]).to_numpy())
+        points = task.points(proved_rows)
         evolution.tell((points - low) / (high - low), *_costs(task, proved_rows))
     return proofs.front(lambda: tables)
 
@@ -235,8 +235,7 @@ def _designs_to_improve(
 
 def _costs(task: Task, table: pl.DataFrame) -> tuple[Array, Array]:
     """Return what is minimised (N, M), and what must not be above zero (N, C)."""
-    signs = np.array([o.sign for o in task.spec.objectives])
-    costs = table.select([o.quantity for o in task.spec.objectives]).to_numpy() * signs
+    costs = task.costs(table)
     misses = table.select([c for c in table.columns if c.startswith(MISSES)]).to_numpy()
     return np.where(np.isfinite(costs), costs, FAILED), misses
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from pteron.design.quantities import quantities
-from pteron.design.region import workspace_poses
+from pteron.design.regions import workspace_poses
 from pteron.design.spec import Spec
 from pteron.errors import PteronError
 from pteron.indices import INDICES

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from pteron.design.quantities import DesignQuantity, quantities
-from pteron.design.region import workspace_shape
+from pteron.design.regions import workspace_shape
 from pteron.design.spec import FloorsTable, Spec
 from pteron.design.spec_faults import misfits
 from pteron.design.user_quantities import code_digest
@@ -27,6 +27,9 @@ from pteron.toml import joined_faults
 from pteron.workspace.conditions import conditions
 from pteron.workspace.shape_samples import Shape, cube
 from pteron.workspace.smooth_conditions import SmoothConditions, smooth_conditions
+
+if TYPE_CHECKING:
+    import polars as pl
 
 _WORST = "about the worst sampled poses too, forces and speeds over all directions"
 """Where quantities are taken, in the plan of a search that asks for sampled ones: earlier searches,
@@ -192,6 +195,16 @@ class Task:
     def start(self) -> Array:
         """The variables' values in the machine to begin with (V,), moved into their ranges."""
         return np.clip([v.start for v in self.variables], *self.ranges)
+
+    def costs(self, designs: pl.DataFrame) -> Array:
+        """Return what is minimised in a table of designs (N, M): objectives times their signs."""
+        signs = [o.sign for o in self.spec.objectives]
+        names = [o.quantity for o in self.spec.objectives]
+        return np.asarray(designs.select(names).to_numpy() * signs)
+
+    def points(self, designs: pl.DataFrame) -> Array:
+        """Return the variables of a table of designs (N, V)."""
+        return np.asarray(designs.select([v.name for v in self.variables]).to_numpy())
 
     def unit(self, name: str) -> str:
         """Return the unit of a quantity, for this machine's joints."""
