@@ -27,14 +27,13 @@ from pteron.renamed import former_attribute
 from pteron.workspace import Proof, clearance
 
 _WORST = 8
-"""Worst sample poses about which worse ones are sought."""
+"""Number of worst sample poses that local refinement starts from."""
 
 MARGINS = {"rated": "rated torque", "peak": "peak torque", "speed": "speed"}
 """The margins of drives, in words."""
 
 _TRIED = 9
-"""Designs of which a proof is tried: the best, and then ever further behind, as neighbours fail
-alike."""
+"""Number of designs that are proved in turn: ranks 1, 2, 4, 8, ..., as neighbours fail alike."""
 
 
 @dataclass(frozen=True)
@@ -133,7 +132,7 @@ def prove_best_design(evaluator: KindEvaluator, ratings: list[Rating]) -> Candid
 
 
 def _cell_violation(evaluator: KindEvaluator, rating: Rating) -> str:
-    """Return in words where a design leaves its room between the poses of its search; note it."""
+    """Return the bound of the cell that a design violates between samples, in words; else empty."""
     robot = rating.robot
     assert robot is not None  # it keeps all that is asked
 
@@ -146,7 +145,7 @@ def _cell_violation(evaluator: KindEvaluator, rating: Rating) -> str:
 
 
 def _exceeded_limit(evaluator: KindEvaluator, candidate: Candidate) -> str:
-    """Return in words what a design exceeds between the poses of its search; empty for nothing."""
+    """Return the limit that a design exceeds between its sample poses, in words; else empty."""
     job, figures = evaluator.job, candidate.figures
     bounds = {"error": job.accuracy, "deflection": job.stiffness}
     for name, limit in bounds.items():

@@ -56,12 +56,12 @@ def margins(candidate: Candidate) -> str:
 
 
 def _ratio(margin: float) -> str:
-    """Return a margin, of which three digits mean something."""
+    """Return a margin with three significant digits."""
     return f"{margin:.{2 if margin < 10.0 else 1 if margin < 100.0 else 0}f}"
 
 
 def requirement_lines(job: Job) -> list[str]:
-    """Return what a job asks for, a line each, as it was asked."""
+    """Return the requirements of a task, a line each."""
     space, lines = job.workspace, []
     lines.append(space.words)
     if space.turn is not None:
@@ -111,7 +111,7 @@ def _box(low: Sequence[float], high: Sequence[float]) -> str:
 
 
 def assumption_lines(choice: Choice) -> list[str]:
-    """Return what was assumed, a line each."""
+    """Return the assumptions behind a choice, a line each."""
     motors, links = choice.job.motors, choice.job.links
     examples = [] if motors.list else ["The motors are the package's examples, not products."]
     stocks = ", ".join(dict.fromkeys([*links.upper, *links.lower]))

@@ -47,7 +47,7 @@ _KEPT = "kinds"
 
 @dataclass(frozen=True)
 class Choice:
-    """The kinds of machines tried for a job, each judged by what it can do.
+    """The kinds of machines searched for a task, each with its best design.
 
     Attributes
     ----------
@@ -207,7 +207,7 @@ def evaluators_of(job: Job) -> dict[str, KindEvaluator]:
 
 
 def _has_drives(name: str, options: Mapping[str, Options], job: Job) -> bool:
-    """Say whether there are gearboxes for a kind's joints; refuse a kind that is asked for."""
+    """Return whether all joints of a kind have gearboxes; refuse a kind that the task names."""
     units = {leg.joint.unit for leg in load(name).legs}
     lacking = [unit for unit in sorted(units) if not options[unit].all]
     if lacking and job.kinds is not None:
@@ -228,7 +228,7 @@ def _candidate(evaluator: KindEvaluator, progress: Callable[[float], None]) -> C
 def _search_kinds(
     evaluators: Mapping[str, KindEvaluator], workers: int, tell: Callable[[str, float], None]
 ) -> Iterator[tuple[str, Candidate]]:
-    """Yield the candidates as they are found, in as many processes."""
+    """Yield kinds and candidates in the order in which their searches end."""
     if workers < 2 or len(evaluators) < 2:
         for name, evaluator in evaluators.items():
             yield name, _candidate(evaluator, partial(tell, name))

@@ -33,7 +33,7 @@ _IN_CYCLE, _IN_CYCLE_LAST = 49, 129
 """Samples of a cycle in the search, and in the final check: peaks at a rounded corner are short."""
 
 _SHARES = np.linspace(1.0, 0.0, 21)
-"""Shares of the way to a corner at which a cycle is tried."""
+"""Shares of the shift to a corner that are tried until the cycle fits."""
 
 
 @dataclass(frozen=True)

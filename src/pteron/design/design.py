@@ -1,4 +1,4 @@
-"""One design of a search: a machine with its quantities, such as workspace, margins and forces."""
+"""One design of a search: a machine with its workspace, margins, forces and other quantities."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ from pteron.workspace.fit import UNKNOWN, Fit, largest_fit
 from pteron.workspace.shape_samples import cube, shape_samples
 
 _STARTS = 8
-"""Worst sampled poses about which a worse one is sought."""
+"""Number of worst sample poses that local refinement starts from."""
 
 _ROUNDS = 4
-"""Halvings of the distance at which it is sought."""
+"""Halvings of the refinement's step."""
 
 _IN_CUBE = 5
 """Sample poses along each edge of the largest cube, where that stands for the workspace."""
@@ -38,7 +38,7 @@ _IN_CUBE = 5
 
 @dataclass(frozen=True)
 class Design:
-    """A machine of a search, and its quantities, each worked out when it is asked for.
+    """A machine of a search, with quantities that are computed lazily.
 
     Attributes
     ----------
@@ -63,7 +63,7 @@ class Design:
         return np.array(numbers(self.robot))
 
     def values(self, what: str, poses: Array | None = None) -> Array:
-        """Return a function's first output at poses, those of `poses` if none are given."""
+        """Return a kernel's first output at poses; by default at `self.poses`."""
         function = self.task.function(what)
         numbers = {"geometry": self.geometry, "parameters": parameters(self.robot)}
         fixed = {name: part for name, part in numbers.items() if name in function.fixed}
@@ -78,7 +78,7 @@ class Design:
         return self.cube_without(np.empty((0, self.robot.freedom)))
 
     def cube_without(self, failing: Array) -> Fit:
-        """Return the same that holds none of the poses (F, m), which are known to fail."""
+        """Return the largest cube that excludes the poses (F, m), which are infeasible."""
         task, ball = self.task, search_ball(self.robot)
         shape, _ = task.shape
         return largest_fit(task.conditions, self.geometry, task.orientations, ball, failing, shape)
@@ -96,7 +96,7 @@ class Design:
 
     @cached_property
     def fine_poses(self) -> Array:
-        """Poses of the same half as far apart, for what has many local extremes."""
+        """Poses at half the spacing, for quantities with many local extremes."""
         return self.lattice(2 * self._samples - 1)
 
     @property
@@ -221,7 +221,7 @@ class Design:
 
     @property
     def scale(self) -> float:
-        """The largest factor at which the floating workspace is found to fit."""
+        """Largest factor by which the floating workspace can be scaled."""
         return self.cube.edge / self.task.shape[1]
 
     @property
@@ -249,11 +249,11 @@ class Design:
         return self._quantities(name)[0]
 
     def missing_reason(self, name: str) -> str:
-        """Return why it has no such quantity; empty where it has it."""
+        """Return the reason why a quantity is undefined; empty where it is defined."""
         return self._quantities(name)[1]
 
     def cover(self, name: str) -> str:
-        """Return over what one of its quantities is known, in words."""
+        """Return the poses or proofs behind a quantity, in words."""
         kind = self.task.quantities[name].cover
         times, places = 0, str(len(self.fine_poses if kind == "fine" else self.poses))
         if kind == "cycles":
@@ -314,7 +314,7 @@ class Design:
 
     @property
     def reference_strokes(self) -> Array:
-        """Travels (n,) over which `stroke` is a share: the limits' width, or those at the start."""
+        """Reference travels (n,) of `stroke`: the limits' width, or the start design's travel."""
         widths = np.ptp(joint_limits(self.task.robot), axis=0)
         endless = np.isinf(widths)
         return np.where(endless, _start(self.task).strokes, widths) if endless.any() else widths

@@ -52,7 +52,7 @@ class Change:
 
     @property
     def relative_change(self) -> str:
-        """By how much the size grows, in %; what is new or turns its sign, as a difference."""
+        """Relative change in %; the difference where the value was zero or changes its sign."""
         if math.isnan(self.before) or math.isnan(self.after):
             return ""
         if abs(self.before) > _NONE and self.before * self.after > 0.0:
@@ -112,7 +112,7 @@ def mass_changes(task: Task, robot: Manipulator) -> list[Change]:
 
 
 def quantity_changes(design: Design) -> list[Change]:
-    """Return the quantities that were asked for, of the machine to begin with and of a design."""
+    """Return the changes of objectives and required quantities from the start to a design."""
     task = design.task
     return [
         Change(name, start_design(task).quantity(name), design.quantity(name), task.unit(name))

@@ -23,7 +23,7 @@ GEARBOXES = Path(__file__).parent / "gearboxes.csv"
 with prices of their order of magnitude."""
 
 _REST_SPEED = 5e-3
-"""Speed, rad/s or m/s, within which dry friction changes its sign in the files."""
+"""Speed, rad/s or m/s, below which dry friction is regularised in the files."""
 
 _NUMBERS = ("ratio", "inertia", "backlash", "stiffness")
 
@@ -228,7 +228,7 @@ class JointLoads:
     everywhere: Array
 
     def margins(self, options: Options, legs: Sequence[int]) -> Array:
-        """Return what options can do over what legs ask: rated, peak torque, speed, (3, O)."""
+        """Return margins of rated torque, peak torque and speed of all options, (3, O)."""
         ratio, inertia, rated, peak, speed, *_ = options.numbers
         chosen, i, j = list(legs), ratio[:, None], inertia[:, None]
         worst_squares = []

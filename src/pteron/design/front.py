@@ -168,7 +168,7 @@ class ProvedRows:
 
 
 def front_of_parts(task: Task, parts: Iterable[pl.DataFrame]) -> Front:
-    """Return the front of designs that come in parts, of which only the front so far is held."""
+    """Return the front of designs that come in parts; only the current front stays in memory."""
     import polars as pl
 
     best: pl.DataFrame | None = None
@@ -204,7 +204,7 @@ def _pareto_rows(task: Task, designs: pl.DataFrame) -> pl.DataFrame:
 
 
 def _impossible(task: Task, nearest: pl.DataFrame, evaluated: int) -> ModelError:
-    """Return what is said where no design keeps all that is asked."""
+    """Return the error of a search without a feasible design; it names the nearest one."""
     row = nearest.row(0, named=True)
     design = Design(task, task.machine([row[v.name] for v in task.variables]))
     reasons = []
@@ -239,7 +239,7 @@ def _value(design: Design, name: str, row: dict[str, Any]) -> str:
 
 
 def _worst_condition(design: Design) -> str:
-    """Return which condition a machine misses most in the workspace, and where."""
+    """Return the condition that a machine violates most in the workspace, and its pose."""
     task = design.task
     if task.spec.workspace is None or task.floats:
         center = design.cube.center

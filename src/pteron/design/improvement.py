@@ -1,4 +1,4 @@
-"""Refinement of a design by gradients: one objective improves, everything else asked is kept."""
+"""Refinement of a design by gradients: one objective improves under all other requirements."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _SPARE = 1e-4
 and not all but its rim."""
 
 _FIRST = 5
-"""Points along a cube's edge at which its conditions are evaluated at first."""
+"""Points along a cube's edge in the first program."""
 
 
 def improve_design(task: Task, point: Sequence[float], objective: int) -> list[float]:
@@ -114,7 +114,7 @@ class _Slopes:
         return np.append(slopes, np.zeros(tail))
 
     def bounds(self, objective: int, z0: Array) -> list[tuple[Array, float]]:
-        """Return what holds the other objectives, and what is asked of quantities with slopes."""
+        """Return linear bounds that hold other objectives and requirements with known slopes."""
         bounds = []
         for k, target in enumerate(self.task.spec.objectives):
             row = self.slopes_of_quantity(target.quantity)

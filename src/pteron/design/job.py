@@ -1,4 +1,4 @@
-"""A job for which `choose_machine` seeks a machine: its TOML file, checked as a whole."""
+"""The file of a task for `choose_machine`, with the checks across its tables."""
 
 from __future__ import annotations
 
@@ -193,7 +193,7 @@ class Job(TomlTable):
 
 
 def read_job(path: str | Path) -> Job:
-    """Read what a machine must do from a TOML file.
+    """Read a task for a machine from a TOML file.
 
     Raises
     ------

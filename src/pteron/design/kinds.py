@@ -21,7 +21,7 @@ from pteron.toml import joined_faults
 from pteron.workspace import home_pose
 
 _POWERS = {"m": 3, "g": 4, "I": 5}
-"""Powers of the size with which masses, first and second moments grow."""
+"""Exponents of the size by which masses, first and second moments scale."""
 
 _RATIO = 0.4, 2.5
 """Least and greatest dimension over that of the catalog's machine of the same size."""
@@ -59,7 +59,7 @@ class Kind:
 
     @cached_property
     def robot(self) -> Manipulator:
-        """The catalog's machine; what slides is without limits, for they follow from the job.
+        """The catalog's machine; sliders have no limits, as these follow from the task.
 
         So are ball joints, whose cones follow from a machine's proportions.
         """
@@ -115,7 +115,7 @@ class Kind:
         return np.array([len(self._choices.get(name, ())) for name in self.variables])
 
     def numbers(self, point: Array) -> dict[str, float]:
-        """Return numbers by name, as they are meant: sizes over the catalog's, times in s."""
+        """Return the numbers by name: sizes relative to the catalog's, times in s."""
         return {
             name: float(setting if name in "xyz" or name in self._choices else np.exp(setting))
             for name, setting in zip(self.variables, point, strict=True)
@@ -140,7 +140,7 @@ class Kind:
         return _build_machine(self.robot, numbers, self._stock(point), self.links), middle
 
     def link_stocks(self, point: Array) -> dict[str, str]:
-        """Return what a design's upper and lower links are cut from."""
+        """Return the names of the stock of upper and lower links."""
         numbers = self.numbers(point)
         return {key: names[int(numbers.get(key, 0.0))] for key, names in self.stocks.items()}
 
@@ -156,7 +156,7 @@ class Kind:
 
 
 def slides(leg: Any) -> bool:
-    """Return whether a leg's joint slides on a guide, whose length follows from what it must do."""
+    """Return whether a leg's joint slides on a guide, whose length follows from the travel."""
     return leg.joint.unit == "m" and bool(_lengths(leg))
 
 
@@ -227,7 +227,7 @@ def _bodies(
 
 
 def fitting_kinds(names: Sequence[str] | None, lengths: int, turn: bool, tilt: bool) -> list[str]:
-    """Return the kinds that can do a motion; of those asked for all must.
+    """Return the kinds that have the freedoms of a task; all that the task names must have them.
 
     Raises
     ------

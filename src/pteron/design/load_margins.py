@@ -18,13 +18,13 @@ from pteron.kinematics import jacobian
 from pteron.manipulator import Manipulator
 
 DENSE = 7
-"""Poses along each side of the box at which a design is last evaluated, before refinement."""
+"""Poses along each side of the box in the final evaluation of a design."""
 
 _ROUNDS, _KEPT = 4, 3
-"""Rounds of refinement of a cycle's places, each about so many of the worst ones."""
+"""Rounds of refinement of a cycle's places, and number of worst ones kept in each."""
 
 _NOTHING = 1e-9
-"""Least force, speed or torque by which a limit is divided, against 0/0."""
+"""Lower bound of loads by which limits are divided, against 0/0."""
 
 
 @dataclass

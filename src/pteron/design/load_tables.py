@@ -26,7 +26,7 @@ def default_table(table: type[TomlTable]) -> Any:
 
 
 def as_list(names: Any) -> Any:
-    """Return what may be one name or several as a list."""
+    """Return a name as a list of one; a list as it is."""
     return [names] if isinstance(names, str) else names
 
 
@@ -130,7 +130,7 @@ class CycleTable(TomlTable):
         return f"{what} {time}{dwell}{', anywhere in the workspace' if self.anywhere else ''}"
 
     def motion(self, robot: Manipulator, middle: Array, acceleration: float) -> Motion:
-        """Return the motion of a machine about a pose, at this acceleration if no time is given."""
+        """Return the motion about a pose; without a duration at the given acceleration."""
         if self.points is None:
             return pick_and_place(
                 robot,

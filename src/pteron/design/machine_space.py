@@ -1,4 +1,4 @@
-"""The room of a machine over its workspace: its cell, what is kept out of, and links that touch."""
+"""The space that a machine takes over its workspace: cell, keep-out boxes, clearances."""
 
 from __future__ import annotations
 
@@ -16,23 +16,23 @@ from pteron.kernels import Array, numeric
 from pteron.manipulator import Manipulator
 
 _HALVINGS = 24
-"""Steps towards the point of a line that is deepest in a box, each of which leaves 2/3."""
+"""Steps of the ternary search for a line's deepest point in a box; each keeps 2/3."""
 
 _SPARE = 1e-3
-"""Metres by which links are farther apart in a search than is asked at last."""
+"""Additional clearance of a search over the requirement, m."""
 
 _TIGHT = 2e-3
-"""Metres by which a cell is smaller, and what is kept out larger, in a search than at last."""
+"""Length by which a search shrinks the cell and grows keep-out boxes, m."""
 
 _CLOSE = 0.01
-"""Metres of clearance whose lack counts as much as another bound missed by the whole."""
+"""Missing clearance, m, that costs as much as a bound violated by 100 %."""
 
 Misses = dict[str, tuple[float, str]]
 """By how much bounds are missed, as a share of them, and in words."""
 
 
 class MachineSpace:
-    """The room that a job leaves machines of a kind."""
+    """The space that a task allows machines of a kind."""
 
     def __init__(self, job: Job, robot: Manipulator) -> None:
         self._job, self._robot = job, robot
@@ -40,7 +40,7 @@ class MachineSpace:
     def evaluate(
         self, robot: Manipulator, poses: Array, middle: Array
     ) -> tuple[dict[str, float], Misses]:
-        """Return the sizes of a machine at poses (N, m), m, and what it misses.
+        """Return the sizes of a machine over poses (N, m), m, and the bounds it violates.
 
         `middle` is the pose with the tool in the middle of the workspace.
         """
@@ -57,7 +57,7 @@ class MachineSpace:
         return figures, misses
 
     def extents(self, robot: Manipulator, poses: Array, middle: Array) -> Array:
-        """Return the room that a machine takes at poses (N, 6 + boxes), from the tool's middle, m.
+        """Return a machine's extents at poses (N, 6 + boxes), from the tool's middle, m.
 
         The least coordinates, minus the greatest, and how far it stays outside each keep-out box.
         """
@@ -81,7 +81,7 @@ class MachineSpace:
         return np.column_stack([low, -high, *(-depth - margin for depth in depths)])
 
     def judge_extents(self, extents: Array, tight: float = 0.0) -> tuple[dict[str, float], Misses]:
-        """Return the sizes of a machine with extents (6 + boxes,), and what it misses.
+        """Return the sizes of a machine with extents (6 + boxes,), and the bounds it violates.
 
         Bounds are tighter by a length, m.
         """
@@ -147,7 +147,7 @@ def tool_places(robot: Manipulator, poses: Array) -> Array:
 
 
 def _lines(robot: Manipulator, poses: Array, points: Array) -> tuple[Array, Array]:
-    """Return starts and ends (N, L, 3) of links, guides, and what leads from P to legs and tool."""
+    """Return ends (N, L, 3) of links, guides and the lines from P to legs and tool."""
     count, place = len(poses), robot.platform.at(poses)[0]
     legs = points.reshape(count, -1, *points.shape[-2:])
     tips = np.concatenate([legs[:, :, -1], tool_places(robot, poses)[:, None]], axis=1)

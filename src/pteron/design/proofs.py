@@ -32,14 +32,14 @@ _PLACED = (1.0, 0.9999)
 """Shares of a workspace that floats, at the place that is found for it."""
 
 _MOST = 200_000
-"""Boxes after which a proof is given up."""
+"""Greatest number of boxes of a proof."""
 
 _BOXES, _BOXES_CLEAR = 60_000, 1_000
 """Boxes after which a proof of reach is given up, and a proof that no two bodies touch, whose
 boxes take longer."""
 
 _LONGER = 0.05
-"""Share of its travel by which a guide or ram is lengthened where a proof fails at its end."""
+"""Share of its travel by which a guide or ram grows where a proof fails at its end."""
 
 
 @dataclass(frozen=True)
@@ -179,7 +179,7 @@ def cube_proofs(design: Design, center: Array, edge: float) -> tuple[Proof, ...]
 
 
 def workspace_proofs(design: Design) -> tuple[Proof, ...]:
-    """Return what is proved of the required workspace, a proof for each orientation.
+    """Return the proofs of the required workspace, one for each orientation.
 
     Where it touches the boundary it is undecided; the proof is then of 0.9999 of it, about its
     middle, if that can be proved: its region tells, and `workspace_share`.
@@ -214,7 +214,7 @@ def counterexamples(design: Design, center: Array, edge: float) -> Samples:
 
 
 def workspace_share(design: Design, proof: Proof) -> float:
-    """Return which share of the required workspace a proof is of."""
+    """Return the share of the required workspace that a proof covers."""
     required = design.workspace
     assert required is not None  # who asks has one
     if design.task.floats:
@@ -263,7 +263,7 @@ def kind_proofs(evaluator: KindEvaluator, rating: Rating) -> tuple[list[Proof], 
 
 
 def proof_sentence(evaluator: KindEvaluator, proofs: Sequence[Proof]) -> str:
-    """Return what is proved of the workspace, in words."""
+    """Return the proved statement about the workspace, a sentence."""
     space, boxes = evaluator.job.workspace, sum(proof.boxes for proof in proofs)
     if not all(proof.holds for proof in proofs):
         return (
@@ -284,7 +284,7 @@ def proof_sentence(evaluator: KindEvaluator, proofs: Sequence[Proof]) -> str:
 
 
 def is_clear(evaluator: KindEvaluator, robot: Manipulator, middle: Array) -> bool:
-    """Say whether it is proved that no two bodies come nearer than the least clearance."""
+    """Return whether the least clearance of all bodies is proved."""
     radii, least = robot.radii or Radii(), evaluator.job.floors.clearance / 2.0
     parts = (radii.guide, radii.upper, radii.lower, radii.platform)
     required = interference(robot, Radii(*(part + least for part in parts)))

@@ -144,7 +144,7 @@ def _stroke(design: Any) -> float:
 
 
 def _drive_load(design: Any, poses: Array) -> Array:
-    """Return the greatest share of what drives can do, force or speed."""
+    """Return the greatest ratio of a drive's force or speed to its limit (N,)."""
     limits = limits_of(design.robot)
     shares = design.forces(poses) / limits.force, design.speeds(poses) / limits.speed
     return np.asarray(np.maximum(*shares).max(axis=-1))

@@ -32,7 +32,7 @@ from pteron.legs import Drive
 from pteron.manipulator import Manipulator
 
 _STROKE = 0.03
-"""Share of a slider's travel by which its guide is longer at each end."""
+"""Share of a slider's travel that is added to its guide at each end."""
 
 _TELESCOPE = 1.7
 """Greatest length of a ram over its least."""
@@ -87,7 +87,7 @@ class Rating:
     near: float = 1.0
 
     def cost(self, objective: str) -> float:
-        """Return what a search makes small."""
+        """Return the cost that a search minimises."""
         if self.misses:
             return _BY_STAGE * (6 - self.stage) + min(sum(self.misses.values()), 0.9 * _BY_STAGE)
         cost = self.figures[objective]
@@ -207,7 +207,7 @@ class KindEvaluator:
         rating.robot = replace(robot, legs=tuple(legs))
 
     def _judge_room(self, rating: Rating) -> None:
-        """Judge the footprint, the height, what is to be kept out of, and whether links touch."""
+        """Judge footprint, height, keep-out boxes and clearances."""
         figures, misses = self.machine_space.evaluate(
             _robot_of(rating), rating.middle + self.visited, rating.middle
         )
@@ -299,7 +299,7 @@ class KindEvaluator:
         return float(np.average(worst, weights=shares))
 
     def _judge_bounds(self, rating: Rating) -> None:
-        """Judge what else has a greatest value."""
+        """Judge the bounds of `[most]`."""
         for name, most in self.job.most.model_dump().items():
             _judge_most(rating, name, rating.figures[name], most, f" {OBJECTIVES[name]}".rstrip())
 
@@ -377,7 +377,7 @@ def _miss(rating: Rating, name: str, share: float, words: str) -> None:
 
 
 def _miss_parts(rating: Rating, parts: Mapping[str, float], option: str) -> None:
-    """Note the requirements that the best drive meets in part alone."""
+    """Note the requirements that the best drive meets only in part."""
     for name, part in parts.items():
         if part < 1.0:
             much = f"{part:.0%}" if part >= 0.01 else "less than 1%"

@@ -179,7 +179,7 @@ class FrontReport:
         }
 
     def page(self) -> str:
-        """Return the report in Markdown: what changed, in words with units, and what is proved."""
+        """Return the report in Markdown: changes with units, proofs, basis of each number."""
         front = self.front
         lines = [
             f"# Designs of {front.task.robot.name}",

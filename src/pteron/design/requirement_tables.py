@@ -1,4 +1,4 @@
-"""Tables of a task's file: what the machine must carry, do and keep, and what it is made of."""
+"""Tables of a task's file: payload, cycles, accuracy, drives, links and bounds."""
 
 from __future__ import annotations
 

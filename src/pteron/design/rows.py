@@ -19,16 +19,16 @@ if TYPE_CHECKING:
     import polars as pl
 
 MISSES = "misses "
-"""Prefix of the columns with the amounts by which requirements are missed."""
+"""Prefix of the columns with violations."""
 
 FAILED = 1e6
-"""Amount for a design that is no possible machine, or has no such quantity."""
+"""Violation of a design that is no possible machine, or lacks a quantity."""
 
 
 def evaluate_design(
     task: Task, point: Sequence[float], *, proofs: bool = False
 ) -> dict[str, float]:
-    """Return the row of a design: quantities, and by how much it misses what is asked.
+    """Return the row of a design: quantities, and violations of the requirements.
 
     "misses workspace" is how far the least condition is below 0, and "misses 1 links" how far
     the first requirement, of `links`, is missed over its bound; 0 where it is kept. With proofs the

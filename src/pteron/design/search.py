@@ -146,7 +146,7 @@ def _swept(
     pool: WorkerPool | None,
     **options: Any,
 ) -> None:
-    """Compute the chunks of designs that a store has not yet; processes share them."""
+    """Compute the missing chunks of a store, in the pool's processes if there is one."""
     if pool is None:
         sweep(partial(function, task), chunks, store, **options)
         return
@@ -164,12 +164,12 @@ def _concatenate(tables: Iterable[pl.DataFrame]) -> pl.DataFrame:
 
 
 def _tell(progress: Callable[[float], None], number: int, count: int, share: float) -> None:
-    """Tell how much of all generations is done, from the share of one of them."""
+    """Report the share of all generations that is done."""
     progress((number - 1 + share) / count)
 
 
 def _proved_front(proofs: ProvedRows, tables: list[pl.DataFrame]) -> Front | None:
-    """Return the front so far, if any design keeps all that is asked."""
+    """Return the current front; None without a feasible design."""
     try:
         return proofs.front(lambda: tables)
     except ModelError:
@@ -185,7 +185,7 @@ def swept_proofs(
     workers: int | None = None,
     pool: WorkerPool | None = None,
 ) -> pl.DataFrame:
-    """Return the rows of designs, as far as they are proved, kept in a folder as the others are."""
+    """Return the rows of designs after their proofs, which are stored in a folder."""
     digest = _digest(np.array(designs))
     store = TableStore(folder / f"proofs-{digest}", {**task.plan, "designs": digest})
     chunks = [designs[k : k + _CHUNK] for k in range(0, len(designs), _CHUNK)]
@@ -203,21 +203,21 @@ def first_designs(task: Task, count: int, seed: int) -> Array:
 
 
 def evaluate_designs(task: Task, jobs: Sequence[tuple[list[float], int]]) -> pl.DataFrame:
-    """Return the rows of designs; one whose number is an objective is improved in it first."""
+    """Return the rows of designs, of which those with an objective are improved in it first."""
     with one_thread():
         designs = [point if k < 0 else improve_design(task, point, k) for point, k in jobs]
     return design_table(task, designs)
 
 
 def proved_table(task: Task, designs: Sequence[list[float]]) -> pl.DataFrame:
-    """Return the rows of designs, as far as they are proved."""
+    """Return the rows of designs after their proofs."""
     return design_table(task, designs, proofs=True)
 
 
 def _designs_to_improve(
     front: Front, number: int, used: set[tuple[bytes, int]]
 ) -> list[tuple[list[float], int]]:
-    """Return designs of the front so far to improve, spread over it, each in one objective."""
+    """Return designs to improve, spread over the current front, each in one objective."""
     spec = front.task.spec
     settings, objectives = spec.search, len(spec.objectives)
     count = settings.refined
@@ -234,7 +234,7 @@ def _designs_to_improve(
 
 
 def _costs(task: Task, table: pl.DataFrame) -> tuple[Array, Array]:
-    """Return what is minimised (N, M), and what must not be above zero (N, C)."""
+    """Return costs (N, M) and violations (N, C) of designs."""
     costs = task.costs(table)
     misses = table.select([c for c in table.columns if c.startswith(MISSES)]).to_numpy()
     return np.where(np.isfinite(costs), costs, FAILED), misses

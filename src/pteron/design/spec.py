@@ -34,7 +34,7 @@ _ABSENT = "no such file; it should describe a search for a design"
 """The end of the message for a missing file."""
 
 ROUNDING = 1e-9
-"""Share of a bound by which it may be missed."""
+"""Relative tolerance of bounds."""
 
 
 def _expect_rising(pair: tuple[float, float]) -> tuple[float, float]:

@@ -1,4 +1,4 @@
-"""Faults for which a search's file does not suit the machine that it begins with."""
+"""Contradictions between a search's file and its machine."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from pteron.motion import limits_of
 
 
 def misfits(spec: Spec, robot: Manipulator) -> Iterator[str]:
-    """Yield the faults for which a search does not suit its machine."""
+    """Yield the contradictions between a search and its machine, a line each."""
     if spec.pose is not None and len(spec.pose) != robot.freedom:
         yield f"pose: {len(spec.pose)} numbers given, {' '.join(robot.coordinates)} expected"
     if spec.angles is not None and len(robot.platform.angles) != 1:
@@ -84,7 +84,7 @@ def _has_drive_limits(robot: Manipulator) -> bool:
 
 
 def _missing_tables(spec: Spec, robot: Manipulator, quantities_asked: set[str]) -> Iterator[str]:
-    """Yield what quantities need and the file does not have."""
+    """Yield the tables that quantities need and the file lacks."""
     for name, table in _NEEDS.items():
         if name in quantities_asked and getattr(spec, table) is None:
             yield f"{name}: needs a table [{table}]"

@@ -123,7 +123,7 @@ class Task:
 
     @cached_property
     def floors(self) -> FloorsTable:
-        """The least measures of every pose: the file's, or what is required where it is more."""
+        """The least measures of every pose: the greater of `[floors]` and requirements."""
         measures = dict(self.spec.floors)
         for requirement in self.spec.requirements:
             if (
@@ -197,7 +197,7 @@ class Task:
         return np.clip([v.start for v in self.variables], *self.ranges)
 
     def costs(self, designs: pl.DataFrame) -> Array:
-        """Return what is minimised in a table of designs (N, M): objectives times their signs."""
+        """Return the costs of designs (N, M): objectives, negative where they are maximised."""
         signs = [o.sign for o in self.spec.objectives]
         names = [o.quantity for o in self.spec.objectives]
         return np.asarray(designs.select(names).to_numpy() * signs)

@@ -29,11 +29,11 @@ MATERIALS = {"steel": STEEL, "aluminium": ALUMINIUM, "carbon": Material(120e9, 5
 """Moduli of the stock's materials; carbon is fibre in resin, mostly along the tube."""
 
 _SOFT, _HARD = 1e4, 1e7
-"""Two stiffnesses of drives, N/m or N m/rad, from which the line of compliances is found."""
+"""Two stiffnesses of drives, N/m or N m/rad, between which compliance is linear."""
 
 
 def tolerances(accuracy: AccuracyTable, joints: float | Sequence[float]) -> Tolerances:
-    """Return the tolerances of the job's file, with given errors of the joints, m or rad."""
+    """Return the tolerances of a task with these errors of the joints, m or rad."""
     return Tolerances(joints, 0.0, accuracy.point, accuracy.length, accuracy.angle)
 
 

@@ -39,7 +39,7 @@ def function_of(quantity: DesignQuantity) -> Any:
 
 
 def code_digest(quantity: DesignQuantity) -> str:
-    """Return what changes with the code of a user's quantity: results of other code are refused."""
+    """Return a digest of a user's quantity and its code; results of other code are refused."""
     code = getattr(function_of(quantity), "__code__", None)
     parts = () if code is None else (code.co_code, code.co_consts, code.co_names)
     text = repr([quantity.name, quantity.unit, parts])

@@ -27,10 +27,10 @@ _RIM = 6
 """Directions round the rim of a cone of tilts."""
 
 INSIDE = 1e-9
-"""Metres or radians by which a cycle or a place may leave the workspace."""
+"""Tolerance of a place in the workspace, m or rad."""
 
 _ROUNDS = 4
-"""Halvings of the distance at which worse places are looked for about the worst."""
+"""Halvings of the refinement's step."""
 
 
 def platform_curve(robot: Manipulator, *curve: Array) -> Curve:
@@ -41,7 +41,7 @@ def platform_curve(robot: Manipulator, *curve: Array) -> Curve:
 
 
 def poses_about_tool(robot: Manipulator, angles: Array) -> Array:
-    """Return poses (A, m) from the middle at which P is elsewhere, but the tool is there."""
+    """Return poses (A, m) that turn about the tool, relative to the workspace's middle."""
     poses = np.zeros((len(angles), robot.freedom))
     poses[:, len(robot.platform.lengths) :] = angles
     return platform_curve(robot, poses, np.zeros_like(poses), np.zeros_like(poses))[0]
@@ -60,7 +60,7 @@ def refine_worst_values(
     keep: int = 1,
     besides: Array | None = None,
 ) -> tuple[Array, Array]:
-    """Return the least of each column of values (C,), and the poses where they are (C, m).
+    """Return the minimum of each column of values (C,), and its pose (C, m).
 
     `values_of` gives the values (B, C) at poses (B, m), which are from the middle. They are taken
     at `sample_poses`, and then ever nearer about those that are worst in a column, `keep` of each:
@@ -103,7 +103,7 @@ def _neighbour_steps(steps: Array, count: int) -> Array:
 
 
 def _clip_to_workspace(job: Job, places: Array, count: int) -> Array:
-    """Return places (N, m) brought into the workspace where they are outside."""
+    """Return places (N, m) clipped to the workspace."""
     space, half, clipped = job.workspace, job.workspace.half[:count], places.copy()
     if space.poses is None:
         clipped[:, :count] = np.clip(clipped[:, :count], -half, half)

@@ -112,11 +112,11 @@ class WorkspaceTable(TomlTable):
 
     @property
     def floats(self) -> bool:
-        """Whether it has no given place."""
+        """Whether its place is free."""
         return self.low is None and self.center is None
 
     def with_center(self, center: Iterable[float]) -> Self:
-        """Return the same workspace at a given center, m."""
+        """Return the workspace at another center, m."""
         return self.model_copy(update={"center": tuple(map(float, center))})
 
     def dimensions(self, count: int) -> tuple[float, ...]:

@@ -125,7 +125,7 @@ def worst_position_errors(robot: Manipulator, poses: Array, tolerances: Toleranc
 
 @lru_cache(maxsize=4)
 def _directions(count: int) -> tuple[Array, float]:
-    """Return unit vectors (D, count), and the cosine of the angle within which each other has one.
+    """Return unit vectors (D, count), and the cosine of their covering angle.
 
     They lead through the middles of cells on a cube's faces; opposite ones count as one.
     """
