@@ -69,6 +69,17 @@ def loaded(one):
         return pteron.load(file)
 
 
+def test_a_choice_has_a_summary_a_table_and_shows_in_a_notebook(chosen):
+    choice, _ = chosen
+    frame = choice.table()
+    assert frame["kind"].to_list() == [candidate.kind for candidate in choice.candidates]
+    assert frame["price"][0] == choice.best.figures["price"]
+    assert choice.summary().splitlines()[0].startswith(f"{choice.best.kind}: ")
+    assert f"<b>Kinds of machines</b> {choice.best.kind} is best" in choice._repr_html_()
+    nowhere = replace(choice.best, serves=False, why=("no reach",))
+    assert nowhere.summary().endswith("falls out: the nearest design has no reach")
+
+
 def test_a_chosen_machine_keeps_what_was_asked(chosen):
     one = chosen[0].best
     assert one.serves

@@ -16,6 +16,7 @@ import polars as pl
 import pytest
 import tomlkit
 from mechanisms import CATALOG, CLIENTS
+from objectives import crank_area, ends_its_process, widest_pose
 from test_cli import done, refused, run
 from threadpoolctl import threadpool_limits
 
@@ -90,16 +91,6 @@ def test_a_path_names_numbers_of_the_file():
     assert len(named_numbers(robot, "legs[1,3].platform_point")) == 6
 
 
-def crank_area(robot):
-    """Sum of the squares of all links, m^2."""
-    return sum(leg.upper_length**2 + leg.lower_length**2 for leg in robot.legs)
-
-
-def widest_pose(design):
-    """Largest coordinate of a sampled pose, m."""
-    return float(np.abs(design.poses).max())
-
-
 def functions_spec():
     reach = DesignQuantity("m", "largest coordinate", widest_pose, name="widest_pose")
     spec = spec_of(objectives=[{"minimise": "links"}], requirements=[])
@@ -123,8 +114,34 @@ def test_functions_of_a_user_are_objectives_and_requirements(tmp_path):
     spec = spec_of(objectives=[{"minimise": "links"}]).with_objectives(minimise=[other])
     with pytest.raises(OutputError, match="holds results of another plan"):
         search(spec, folder=tmp_path)
-    with pytest.raises(DataError, match=r"^crank_area: other processes cannot import it"):
+    words = (
+        r"^other processes cannot take part: .*define functions and classes at the top of a module"
+    )
+    with pytest.raises(pteron.PteronError, match=words):
         search(spec, workers=2)
+
+
+@CLIENTS
+def test_a_process_that_is_ended_is_named():
+    spec = spec_of(objectives=[{"minimise": "links"}]).with_objectives(minimise=[ends_its_process])
+    with pytest.raises(
+        pteron.PteronError, match=r"^a process that did a part of the work was ended"
+    ):
+        search(spec, workers=2)
+
+
+def test_a_front_has_a_summary_a_table_and_shows_in_a_notebook(found):
+    front, _ = found
+    assert front.summary().startswith("quadrupteron: ")
+    assert front.table().columns == list(front.headings.values())
+    assert front.as_dict()["front"] == front.designs.select(list(front.headings)).to_dicts()
+    html = front._repr_html_()
+    assert "<b>quadrupteron</b>" in html
+    assert "designs evaluated" in html
+    with pytest.warns(DeprecationWarning, match=r"^Front\.table is a method .* write \.designs"):
+        assert front.table["links"].equals(front.designs["links"])
+    with pytest.warns(DeprecationWarning, match=r"^Front\.table is a method"):
+        assert front.table.height == len(front)
 
 
 @CLIENTS

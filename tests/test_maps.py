@@ -475,3 +475,6 @@ def test_a_film_goes_through_the_last_coordinate(whole, tmp_path):
 
 def test_a_map_says_what_it_is(whole):
     assert repr(whole) == "<Map of 'delta': condition, kappa, margin over x 31 x y 31 x z 31>"
+    html = whole._repr_html_()
+    assert f"{whole.share:.1%} of 29791 poses in reach" in html
+    assert "<p>29779 more rows: see table()</p>" in html

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import pickle
 import signal
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -41,12 +42,21 @@ class WorkerPool(ProcessPoolExecutor):
     script : bool
         Whether they run the caller's script, where its functions and classes are. It must then
         ask for them under ``if __name__ == "__main__":``.
+
+    Raises
+    ------
+    PteronError
+        If `shared` cannot cross to other processes; `start` if they cannot import it.
     """
 
     def __init__(self, workers: int, shared: Any = None, *, script: bool = True) -> None:
         context = get_context("spawn")
         self._messages, self._script = context.SimpleQueue(), script
-        super().__init__(workers, context, _initialise_worker, (shared, self._messages))
+        try:
+            pickled = pickle.dumps(shared)
+        except (pickle.PicklingError, AttributeError, TypeError) as error:
+            raise _import_error(error) from None
+        super().__init__(workers, context, _initialise_worker, (pickled, self._messages))
         self._others = set(active_children())
 
     def submit(self, function: Any, /, *arguments: Any, **options: Any) -> Future[Any]:
@@ -117,12 +127,23 @@ _shared: Any = None
 _queue: Any = None
 
 
-def _initialise_worker(shared: Any, messages: Any) -> None:
+def _import_error(error: Exception) -> PteronError:
+    return PteronError(
+        f"other processes cannot take part: {type(error).__name__}: {error}; define functions and "
+        "classes at the top of a module that can be imported, or do the work without workers"
+    )
+
+
+def _initialise_worker(pickled: bytes, messages: Any) -> None:
     """Ignore SIGINT, exit when the parent does, and keep what the calls share."""
     global _shared, _queue
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     Thread(target=_exit_with_parent, daemon=True).start()
-    _shared, _queue = shared, messages
+    _queue = messages
+    try:
+        _shared = pickle.loads(pickled)
+    except Exception as error:  # whatever an import raises is for the caller to see
+        _shared = _import_error(error)
 
 
 def _exit_with_parent() -> None:
@@ -134,6 +155,8 @@ def _exit_with_parent() -> None:
 
 
 def _call_with_shared(function: Callable[..., Any], *arguments: Any) -> Any:
+    if isinstance(_shared, PteronError):
+        raise _shared
     return function(_shared, *arguments)
 
 

@@ -23,7 +23,6 @@ from pteron.design.improvement import improve_design
 from pteron.design.rows import FAILED, MISSES, design_table
 from pteron.design.spec import Spec
 from pteron.design.task import Task
-from pteron.design.user_quantities import expect_importable
 from pteron.errors import DataError, ModelError
 from pteron.kernels import Array
 from pteron.kernels.one_thread import one_thread
@@ -94,7 +93,6 @@ def search(
         )
         pool = None
         if workers is not None and workers > 1:
-            expect_importable(task.spec.user_quantities)
             # The same for all generations: a process compiles what it needs once.
             pool = opened.enter_context(WorkerPool(workers, task))
         return _generations(task, Path(generations_folder), scheduler, pool, progress)

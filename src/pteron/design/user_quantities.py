@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-import pickle
 import re
-import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any
 
 from pteron.design.quantities import DesignQuantity, quantities, quantity_of
@@ -45,25 +43,3 @@ def code_digest(quantity: DesignQuantity) -> str:
     text = repr([quantity.name, quantity.unit, parts])
     # A function within it has its place in memory in its text.
     return hashlib.sha256(re.sub(r" at 0x\w+", "", text).encode()).hexdigest()[:16]
-
-
-def expect_importable(quantities: Mapping[str, DesignQuantity]) -> None:
-    """Refuse quantities that other processes cannot import.
-
-    Raises
-    ------
-    DataError
-        If a function is within another, a lambda, or typed into an interpreter.
-    """
-    for name, quantity in quantities.items():
-        module = getattr(function_of(quantity), "__module__", "")
-        typed = module == "__main__" and not hasattr(sys.modules[module], "__file__")
-        try:
-            pickle.dumps(quantity)
-        except (pickle.PicklingError, AttributeError, TypeError) as error:
-            typed, module = True, str(error)
-        if typed:
-            raise DataError(
-                f"{name}: other processes cannot import it ({module}); define its function at the "
-                "top of a module, or search without workers"
-            )
