@@ -16,7 +16,7 @@ from pteron.manipulator import Manipulator
 from pteron.motion import limits_of
 
 
-def misfits(spec: Spec, robot: Manipulator) -> Iterator[str]:
+def spec_faults(spec: Spec, robot: Manipulator) -> Iterator[str]:
     """Yield the contradictions between a search and its machine, a line each."""
     if spec.pose is not None and len(spec.pose) != robot.freedom:
         yield f"pose: {len(spec.pose)} numbers given, {' '.join(robot.coordinates)} expected"

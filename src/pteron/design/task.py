@@ -12,7 +12,7 @@ import numpy as np
 from pteron.design.quantities import DesignQuantity, quantities
 from pteron.design.regions import workspace_shape
 from pteron.design.spec import FloorsTable, Spec
-from pteron.design.spec_faults import misfits
+from pteron.design.spec_faults import spec_faults
 from pteron.design.user_quantities import code_digest
 from pteron.design.variables import Variable, move_variables, variables_of
 from pteron.errors import DataError, ModelError, warn_unlikely
@@ -78,7 +78,7 @@ class Task:
                 "needs one that moves",
                 subject=robot.name,
             )
-        faults = list(misfits(spec, robot))
+        faults = list(spec_faults(spec, robot))
         variables: tuple[Variable, ...] = ()
         motors: tuple[Motor, ...] = ()
         try:
