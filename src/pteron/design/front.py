@@ -12,7 +12,7 @@ import numpy as np
 from pteron.design.design import Design
 from pteron.design.evolution import pareto_front
 from pteron.design.proofs import counterexamples
-from pteron.design.rows import FAILED, MISSES, places
+from pteron.design.rows import FAILED, MISSES, places, violations
 from pteron.design.task import Task
 from pteron.errors import ModelError
 from pteron.html_table import frame_html
@@ -179,7 +179,8 @@ def front_of_parts(task: Task, parts: Iterable[pl.DataFrame]) -> Front:
         good = part.filter(missed == 0.0)
         evaluated, feasible = evaluated + len(part), feasible + len(good)
         if len(good):
-            best = _pareto_rows(task, good if best is None else pl.concat([best, good]))
+            both = good if best is None else pl.concat([best, good])
+            best = both[pareto_front(task.costs(both))]
         elif best is None:
             near = part[[int(missed.argmin())]]
             both = near if nearest is None else pl.concat([nearest, near])
@@ -192,15 +193,8 @@ def front_of_parts(task: Task, parts: Iterable[pl.DataFrame]) -> Front:
 
 def _misses_of(task: Task, designs: pl.DataFrame) -> Array:
     """Return how much each design misses, all in all; one without an objective misses it."""
-    names = [name for name in designs.columns if name.startswith(MISSES)]
-    missed = designs.select(names).to_numpy().sum(axis=1)
+    missed = violations(designs).sum(axis=1)
     return np.asarray(missed + FAILED * (~np.isfinite(task.costs(designs))).sum(axis=1))
-
-
-def _pareto_rows(task: Task, designs: pl.DataFrame) -> pl.DataFrame:
-    """Return the distinct non-dominated rows, sorted by the objectives."""
-    rows: pl.DataFrame = designs[pareto_front(task.costs(designs))]
-    return rows
 
 
 def _impossible(task: Task, nearest: pl.DataFrame, evaluated: int) -> ModelError:

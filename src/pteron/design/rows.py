@@ -13,6 +13,7 @@ from pteron.design.proofs import prove_design
 from pteron.design.spec import ROUNDING
 from pteron.design.task import Task
 from pteron.errors import ModelError
+from pteron.kernels import Array
 from pteron.kernels.one_thread import one_thread
 
 if TYPE_CHECKING:
@@ -65,3 +66,9 @@ def design_table(task: Task, designs: ArrayLike, *, proofs: bool = False) -> pl.
         rows = [evaluate_design(task, row, proofs=proofs) for row in points.tolist()]
     columns = {v.name: points[:, k].tolist() for k, v in enumerate(task.variables)}
     return pl.DataFrame(columns | {name: [row[name] for row in rows] for name in rows[0]})
+
+
+def violations(designs: pl.DataFrame) -> Array:
+    """Return the violations (N, C) in a table of designs: workspace, then each requirement."""
+    names = [name for name in designs.columns if name.startswith(MISSES)]
+    return np.asarray(designs.select(names).to_numpy())

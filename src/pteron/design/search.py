@@ -8,8 +8,10 @@ and goes on: it ends in the same front as a run that was not interrupted.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterable, Sequence
-from contextlib import ExitStack
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future
+from contextlib import ExitStack, suppress
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -20,8 +22,8 @@ import numpy as np
 from pteron.design.evolution import Evolution, latin_hypercube
 from pteron.design.front import Front, ProvedRows
 from pteron.design.improvement import improve_design
-from pteron.design.rows import FAILED, MISSES, design_table
-from pteron.design.spec import Spec
+from pteron.design.rows import FAILED, design_table, violations
+from pteron.design.spec import SearchTable, Spec
 from pteron.design.task import Task
 from pteron.errors import DataError, ModelError
 from pteron.kernels import Array
@@ -95,19 +97,79 @@ def search(
         if workers is not None and workers > 1:
             # The same for all generations: a process compiles what it needs once.
             pool = opened.enter_context(WorkerPool(workers, task))
-        return _generations(task, Path(generations_folder), scheduler, pool, progress)
+        evaluation = DesignRows(task, Path(generations_folder), scheduler=scheduler, pool=pool)
+        return _generations(evaluation, progress)
 
 
-def _generations(
-    task: Task,
-    folder: Path,
-    scheduler: str | None,
-    pool: WorkerPool | None,
-    progress: Callable[[float], None] | None,
-) -> Front:
+@dataclass(frozen=True)
+class DesignRows:
+    """Evaluates designs by a cluster, by processes or here; the rows stay in a folder.
+
+    Attributes
+    ----------
+    task : Task
+        The search.
+    folder : Path
+        Folder of the folders of rows.
+    scheduler : str, optional
+        Address of a Dask scheduler.
+    workers : int, optional
+        Number of Dask workers of this computer.
+    pool : WorkerPool, optional
+        Processes that share the task.
+    """
+
+    task: Task
+    folder: Path
+    scheduler: str | None = None
+    workers: int | None = None
+    pool: WorkerPool | None = None
+
+    def rows(
+        self,
+        function: Callable[[Task, Sequence[Any]], pl.DataFrame],
+        jobs: Sequence[Any],
+        name: str,
+        plan: dict[str, Any],
+        progress: Callable[[float], None] | None = None,
+    ) -> pl.DataFrame:
+        """Return the rows that a function gives for jobs; those that the folder has stay."""
+        store = TableStore(self.folder / name, {**self.task.plan, **plan})
+        chunks = [jobs[k : k + _CHUNK] for k in range(0, len(jobs), _CHUNK)]
+        if self.pool is None:
+            sweep(
+                partial(function, self.task),
+                chunks,
+                store,
+                scheduler=self.scheduler,
+                workers=self.workers,
+                progress=progress,
+            )
+            return store.scan().collect()
+        # Each job goes to the process that is free next, those of the last chunk first: it has the
+        # designs that take longest.
+        numbers = sorted({*range(len(chunks))} - store.finished_chunks(), reverse=True)
+        pending = {k: [self.pool.start(function, [job]) for job in chunks[k]] for k in numbers}
+        sweep(lambda k: _await_rows(pending[k]), range(len(chunks)), store, progress=progress)
+        return store.scan().collect()
+
+    def prove(self, designs: list[list[float]]) -> pl.DataFrame:
+        """Return the rows of designs after their proofs."""
+        digest = _digest(np.array(designs))
+        return self.rows(proved_table, designs, f"proofs-{digest}", {"designs": digest})
+
+
+def _await_rows(pending: Sequence[Future[pl.DataFrame]]) -> pl.DataFrame:
+    import polars as pl
+
+    rows: pl.DataFrame = pl.concat(map(result_of, pending), rechunk=True)
+    return rows
+
+
+def _generations(evaluation: DesignRows, progress: Callable[[float], None] | None) -> Front:
     """Return the front of all designs that were evaluated, each design of it proved."""
-    settings = task.spec.search
-    low, high = task.ranges
+    task = evaluation.task
+    settings, (low, high) = task.spec.search, task.ranges
     evolution = Evolution(
         (first_designs(task, settings.population, settings.seed) - low) / (high - low),
         len(task.spec.objectives),
@@ -115,7 +177,7 @@ def _generations(
         settings.seed,
     )
     tables: list[pl.DataFrame] = []
-    proofs = ProvedRows(task, partial(swept_proofs, task, folder, scheduler, pool=pool))
+    proofs = ProvedRows(task, evaluation.prove)
     front: Front | None = None
     used: set[tuple[bytes, int]] = set()
     for number in range(1, settings.generations + 1):
@@ -123,72 +185,24 @@ def _generations(
         jobs = [(point, -1) for point in designs.tolist()]
         if front is not None:
             jobs += _designs_to_improve(front, number, used)
-        plan = {**task.plan, "generation": number, "designs": _digest(designs)}
-        store = TableStore(folder / f"{number:04d}", plan)
-        chunks = [jobs[k : k + _CHUNK] for k in range(0, len(jobs), _CHUNK)]
-        tell = None if progress is None else partial(_tell, progress, number, settings.generations)
-        _swept(task, evaluate_designs, chunks, store, pool, scheduler=scheduler, progress=tell)
-        tables.append(store.scan().collect())
-        front = _proved_front(proofs, tables)
-        proved_rows = proofs.replace_rows(tables[-1])
-        points = task.points(proved_rows)
-        evolution.tell((points - low) / (high - low), *_costs(task, proved_rows))
+        plan = {"generation": number, "designs": _digest(designs)}
+        report = None if progress is None else partial(_report, progress, number, settings)
+        tables.append(evaluation.rows(evaluate_designs, jobs, f"{number:04d}", plan, report))
+        front = None
+        with suppress(ModelError):  # until a design keeps all that is asked
+            front = proofs.front(lambda: tables)
+        proved = proofs.replace_rows(tables[-1])
+        costs = task.costs(proved)
+        costs = np.where(np.isfinite(costs), costs, FAILED)
+        evolution.tell((task.points(proved) - low) / (high - low), costs, violations(proved))
     return proofs.front(lambda: tables)
 
 
-def _swept(
-    task: Task,
-    function: Callable[..., pl.DataFrame],
-    chunks: Sequence[Any],
-    store: TableStore,
-    pool: WorkerPool | None,
-    **options: Any,
+def _report(
+    progress: Callable[[float], None], number: int, settings: SearchTable, share: float
 ) -> None:
-    """Compute the missing chunks of a store, in the pool's processes if there is one."""
-    if pool is None:
-        sweep(partial(function, task), chunks, store, **options)
-        return
-    # Each job goes to the process that is free next, those of the last chunk first: it has the
-    # designs that take longest.
-    numbers = sorted({*range(len(chunks))} - store.finished_chunks(), reverse=True)
-    pending = {k: [pool.start(function, [job]) for job in chunks[k]] for k in numbers}
-    sweep(lambda k: _concatenate(map(result_of, pending[k])), range(len(chunks)), store, **options)
-
-
-def _concatenate(tables: Iterable[pl.DataFrame]) -> pl.DataFrame:
-    import polars as pl
-
-    return pl.concat(tables, rechunk=True)
-
-
-def _tell(progress: Callable[[float], None], number: int, count: int, share: float) -> None:
     """Report the share of all generations that is done."""
-    progress((number - 1 + share) / count)
-
-
-def _proved_front(proofs: ProvedRows, tables: list[pl.DataFrame]) -> Front | None:
-    """Return the current front; None without a feasible design."""
-    try:
-        return proofs.front(lambda: tables)
-    except ModelError:
-        return None
-
-
-def swept_proofs(
-    task: Task,
-    folder: Path,
-    scheduler: str | None,
-    designs: list[list[float]],
-    *,
-    workers: int | None = None,
-    pool: WorkerPool | None = None,
-) -> pl.DataFrame:
-    """Return the rows of designs after their proofs, which are stored in a folder."""
-    digest = _digest(np.array(designs))
-    store = TableStore(folder / f"proofs-{digest}", {**task.plan, "designs": digest})
-    chunks = [designs[k : k + _CHUNK] for k in range(0, len(designs), _CHUNK)]
-    _swept(task, proved_table, chunks, store, pool, scheduler=scheduler, workers=workers)
-    return store.scan().collect()
+    progress((number - 1 + share) / settings.generations)
 
 
 def first_designs(task: Task, count: int, seed: int) -> Array:
@@ -229,13 +243,6 @@ def _designs_to_improve(
             used.add(key)
             jobs.append((candidate[0].tolist(), candidate[1]))
     return jobs
-
-
-def _costs(task: Task, table: pl.DataFrame) -> tuple[Array, Array]:
-    """Return costs (N, M) and violations (N, C) of designs."""
-    costs = task.costs(table)
-    misses = table.select([c for c in table.columns if c.startswith(MISSES)]).to_numpy()
-    return np.where(np.isfinite(costs), costs, FAILED), misses
 
 
 def _digest(designs: Array) -> str:

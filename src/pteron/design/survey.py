@@ -12,7 +12,7 @@ import scipy  # type: ignore[import-untyped]
 
 from pteron.design.front import Front, ProvedRows
 from pteron.design.rows import design_table
-from pteron.design.search import swept_proofs
+from pteron.design.search import DesignRows
 from pteron.design.spec import Spec
 from pteron.design.task import Task
 from pteron.errors import DataError
@@ -82,7 +82,8 @@ def survey(
         workers=workers,
         progress=progress,
     )
-    proofs = ProvedRows(task, partial(swept_proofs, task, Path(folder), scheduler, workers=workers))
+    evaluation = DesignRows(task, Path(folder), scheduler, workers)
+    proofs = ProvedRows(task, evaluation.prove)
     return proofs.front(lambda: _parts(store, chunks))
 
 
