@@ -120,9 +120,8 @@ def prove_best_design(evaluator: KindEvaluator, ratings: list[Rating]) -> Candid
         bad = next((p for p in proofs if p.counterexample is not None), None)
         why = str(bad) if bad is not None else _cell_violation(evaluator, rating)
         if not why:
-            candidate = _candidate(
-                evaluator, rating, proofs, counts, front(good, shown_objectives(objectives))
-            )
+            best = front(good, shown_objectives(objectives))
+            candidate = _candidate(evaluator, rating, proofs, counts, best)
             why = _exceeded_limit(evaluator, candidate)
             if not why and candidate.least_margin >= evaluator.job.motors.margin:
                 return candidate
@@ -133,8 +132,7 @@ def prove_best_design(evaluator: KindEvaluator, ratings: list[Rating]) -> Candid
 
 def _cell_violation(evaluator: KindEvaluator, rating: Rating) -> str:
     """Return the bound of the cell that a design violates between samples, in words; else empty."""
-    robot = rating.robot
-    assert robot is not None  # it keeps all that is asked
+    robot = rating.machine
 
     def extents(poses: Array) -> Array:
         return evaluator.machine_space.extents(robot, rating.middle + poses, rating.middle)
@@ -170,8 +168,7 @@ def _candidate(
     counts: tuple[int, int],
     best: list[Rating],
 ) -> Candidate:
-    robot = rating.robot
-    assert robot is not None  # it keeps all that is asked
+    robot = rating.machine
     loaded_robot = evaluator.add_payload(robot)
     figures = dict(rating.figures)
     time = evaluator.kind.numbers(rating.values).get("time")
@@ -189,9 +186,8 @@ def _candidate(
         errors = _tolerances(evaluator, rating)
         figures["error"] = -least(lambda poses: -greatest_errors(accuracy, robot, poses, errors))
     if evaluator.job.stiffness is not None:
-        springs = elasticity(
-            evaluator.sections(rating), [o.gearbox.stiffness for o in rating.options]
-        )
+        gears = [option.gearbox.stiffness for option in rating.options]
+        springs = elasticity(evaluator.sections(rating), gears)
         stiff = least(lambda poses: stiffness(robot, poses, springs).least)
         figures["deflection"] = float(evaluator.job.stiffness.force / stiff)
     times = _shortest_times(evaluator, loaded_robot, rating, margins.place)

@@ -58,6 +58,13 @@ class LoadMargins:
         """Keep a margin if it is the least of its name."""
         self.figures[name] = min(self.figures.get(name, np.inf), margin)
 
+    def note_place(
+        self, margin: float, words: str, place: tuple[Places, int] | None = None
+    ) -> None:
+        """Keep motion and place of a margin if it is the least of all."""
+        if margin < self.least:
+            self.least, self.worst, self.place = margin, words, place or self.place
+
 
 def margins_of(
     evaluator: KindEvaluator, robot: Manipulator, middle: Array, time: float | None
@@ -90,21 +97,15 @@ def margins_of(
             ]
             if not len(shares):
                 every.append(least_margins.take("rated_margin", rated, np.sqrt(means)))
-            if np.min(every) < least_margins.least:
-                k = int(np.min(every, axis=0).argmin())
-                least_margins.least, least_margins.place = float(np.min(every)), (places, k)
-                least_margins.worst = places.words(k)
+            k = int(np.min(every, axis=0).argmin())
+            least_margins.note_place(float(np.min(every)), places.words(k), (places, k))
             worst = np.unique(np.argsort([*every, *-means.T], axis=1)[:, :_KEPT])
             places = neighbour_places(evaluator.job, places, worst, 0.5 ** (step + 1))
         squares.append(greatest)
     if len(shares):
         load = np.sqrt(duty_cycle_mean(np.array(squares), shares))
         least = float(least_margins.take("rated_margin", rated, load[None])[0])
-        if least < least_margins.least:
-            least_margins.least, least_margins.worst = (
-                least,
-                "the rated torque of the whole duty cycle",
-            )
+        least_margins.note_place(least, "the rated torque of the whole duty cycle")
     required = evaluator.job.motion
     if required.acceleration or required.speed:
         speed = max(required.speed, _NOTHING)
@@ -118,10 +119,9 @@ def margins_of(
         margins, where = refine_worst_values(evaluator.job, robot, motion_margins, DENSE, keep=2)
         least_margins.note("peak_margin", float(margins[: len(most)].min()))
         least_margins.note("speed_margin", float(margins[len(most) :].min()))
-        if margins.min() < least_margins.least:
-            worst_pose = middle + where[int(margins.argmin())]
-            place = np.subtract(*tool_places(robot, np.array([worst_pose, middle])))
-            at = ", ".join(f"{1e3 * x:+.0f}" for x in place[: len(robot.platform.lengths)])
-            least_margins.least = float(margins.min())
-            least_margins.worst = f"the motion in any direction, at ({at}) mm"
+        worst_pose = middle + where[int(margins.argmin())]
+        place = np.subtract(*tool_places(robot, np.array([worst_pose, middle])))
+        at = ", ".join(f"{1e3 * x:+.0f}" for x in place[: len(robot.platform.lengths)])
+        words = f"the motion in any direction, at ({at}) mm"
+        least_margins.note_place(float(margins.min()), words)
     return least_margins

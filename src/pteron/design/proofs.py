@@ -240,8 +240,7 @@ def _least(design: Design, proof: Proof) -> float:
 
 def kind_proofs(evaluator: KindEvaluator, rating: Rating) -> tuple[list[Proof], Manipulator]:
     """Return proofs of the workspace, and the machine, its guides and rams lengthened if needed."""
-    robot, floors = rating.robot, evaluator.job.floors
-    assert robot is not None  # a design that keeps all requirements has one
+    robot, floors = rating.machine, evaluator.job.floors
     proofs: list[Proof] = []
     for _ in range(4):
         proofs = [

@@ -86,6 +86,23 @@ class Rating:
     stage: int = 0
     near: float = 1.0
 
+    @property
+    def machine(self) -> Manipulator:
+        """The machine of a design that has one: it did not fail at the first stage."""
+        assert self.robot is not None
+        return self.robot
+
+    def miss(self, name: str, share: float, words: str) -> None:
+        """Note that a bound is violated by a share of it."""
+        if share > self.misses.get(name, 0.0):
+            self.misses[name], self.shortfalls[name] = float(share), words
+
+    def expect_least(self, name: str, figure: float, least: float) -> None:
+        """Note a violation of a lower bound."""
+        if not figure >= least:
+            share = least - figure if np.isfinite(figure) else 1.0
+            self.miss(name, share, f"{name} {figure:.3g}, at least {least:.3g} asked")
+
     def cost(self, objective: str) -> float:
         """Return the cost that a search minimises."""
         if self.misses:
@@ -136,7 +153,7 @@ class KindEvaluator:
             robot, rating.middle = self.kind.machine(point)
         except ModelError:
             rating.stage = 1
-            _miss(rating, "machine", 1.0, "numbers that no machine has")
+            rating.miss("machine", 1.0, "numbers that no machine has")
             return rating
         rating.robot = robot
         for stage, judge in enumerate(
@@ -150,7 +167,7 @@ class KindEvaluator:
 
     def _judge_reach(self, rating: Rating) -> None:
         """Judge reach, floors and limits over the workspace; set the travel of guides and rams."""
-        robot, poses, floors = _robot_of(rating), rating.middle + self.visited, self.job.floors
+        robot, poses, floors = rating.machine, rating.middle + self.visited, self.job.floors
         least = float(np.min(numeric(robot, "squared_type_i")(poses)[0]))
         if least >= 0.0:
             sign = np.sign(np.median(numeric(robot, "type_ii")(poses)[0]))
@@ -170,15 +187,15 @@ class KindEvaluator:
             least = float(legs_least.min())
         rating.figures["type_i"] = float(np.sqrt(max(least, 0.0)))
         if least < 0.0:
-            _miss(rating, "reach", 1.0 - least, "a leg that does not reach the whole workspace")
+            rating.miss("reach", 1.0 - least, "a leg that does not reach the whole workspace")
             return
         rating.figures["type_ii"] = float(type_ii[0])
-        _judge_least(rating, "type-I measure", float(np.sqrt(least)), _FLOOR * floors.type_i)
-        _judge_least(rating, "type-II measure", float(type_ii[0]), _FLOOR * floors.type_ii)
-        _judge_least(rating, "passive joints' margin to their limits", float(room.min()), 0.0)
+        rating.expect_least("type-I measure", float(np.sqrt(least)), _FLOOR * floors.type_i)
+        rating.expect_least("type-II measure", float(type_ii[0]), _FLOOR * floors.type_ii)
+        rating.expect_least("passive joints' margin to their limits", float(room.min()), 0.0)
         joints = inverse_kinematics(robot, poses, on_failure="nan")
         if not np.isfinite(joints).all():
-            _miss(rating, "reach", 1.0, "a leg that does not reach the whole workspace")
+            rating.miss("reach", 1.0, "a leg that does not reach the whole workspace")
             return
         shortest, longest = joints.min(axis=0), joints.max(axis=0)
         if self.job.workspace.tilt is not None:
@@ -196,28 +213,28 @@ class KindEvaluator:
                 travel = float(low - spare), float(high + spare)
                 if not slides(leg):
                     beyond = travel[1] - _TELESCOPE * travel[0]
-                    _judge_least(rating, "rams' margin to their shortest", -beyond / travel[1], 0.0)
+                    rating.expect_least("rams' margin to their shortest", -beyond / travel[1], 0.0)
                 if slides(leg) or not rating.misses:
                     leg = self.kind.with_travel(leg, travel, rating.values)
             elif leg.limits is not None:
                 half = 0.5 * (leg.limits[1] - leg.limits[0])
                 margin = min(low - leg.limits[0], leg.limits[1] - high) / half
-                _judge_least(rating, "joints' margin to their limits", float(margin), 0.01)
+                rating.expect_least("joints' margin to their limits", float(margin), 0.01)
             legs.append(leg)
         rating.robot = replace(robot, legs=tuple(legs))
 
     def _judge_room(self, rating: Rating) -> None:
         """Judge footprint, height, keep-out boxes and clearances."""
         figures, misses = self.machine_space.evaluate(
-            _robot_of(rating), rating.middle + self.visited, rating.middle
+            rating.machine, rating.middle + self.visited, rating.middle
         )
         rating.figures |= figures
         for name, (share, words) in misses.items():
-            _miss(rating, name, share, words)
+            rating.miss(name, share, words)
 
     def _choose_drives(self, rating: Rating) -> None:
         """Choose the drives: the cheapest that serve loads, accuracy and stiffness."""
-        robot = self.add_payload(_robot_of(rating))
+        robot = self.add_payload(rating.machine)
         numbers = self.kind.numbers(rating.values)
         try:
             loads, work = self.loads(robot, rating, numbers.get("time"))
@@ -229,7 +246,7 @@ class KindEvaluator:
                 poses = rating.middle + np.vstack([self.corners, rating.worst])
                 gives = compliances(robot, poses, self.sections(rating))
         except PteronError:
-            _miss(rating, "loads", 1.0, "a singularity or the edge of its reach on a cycle")
+            rating.miss("loads", 1.0, "a singularity or the edge of its reach on a cycle")
             return
         options: list[Option | None] = [None] * robot.joint_count
         margin, near = self.job.motors.margin, 0.0
@@ -252,8 +269,8 @@ class KindEvaluator:
             good = np.flatnonzero(least >= 1.0)
             if not len(good):
                 best = int(least.argmax())
-                parts = {name: float(share[best]) for name, share in shares.items()}
-                _miss_parts(rating, parts, all_.all[best].name)
+                for name, share in shares.items():
+                    _expect_share(rating, name, float(share[best]), all_.all[best].name)
                 return
             first = int(good[0])
             if first:
@@ -262,11 +279,9 @@ class KindEvaluator:
                 options[leg] = all_.all[first]
         rating.near = near / len(self.groups)
         rating.options = tuple(o for o in options if o is not None)
-        legs_with = (
-            replace(leg, drive=option.drive)
-            for leg, option in zip(_robot_of(rating).legs, rating.options, strict=True)
-        )
-        rating.robot = replace(_robot_of(rating), legs=tuple(legs_with))
+        pairs = zip(rating.machine.legs, rating.options, strict=True)
+        legs_with = tuple(replace(leg, drive=option.drive) for leg, option in pairs)
+        rating.robot = replace(rating.machine, legs=legs_with)
         friction = np.array([option.drive.coulomb for option in rating.options])
         rating.figures |= {
             "price": float(sum(o.price for o in rating.options)),
@@ -300,8 +315,11 @@ class KindEvaluator:
 
     def _judge_bounds(self, rating: Rating) -> None:
         """Judge the bounds of `[most]`."""
-        for name, most in self.job.most.model_dump().items():
-            _judge_most(rating, name, rating.figures[name], most, f" {OBJECTIVES[name]}".rstrip())
+        for name, most in self.job.most.model_dump(exclude_none=True).items():
+            figure, unit = rating.figures[name], f" {OBJECTIVES[name]}".rstrip()
+            if not figure <= most:
+                words = f"{name.replace('_', ' ')} {figure:.4g}{unit}, at most {most:g}{unit} asked"
+                rating.miss(name, figure / most - 1.0 if np.isfinite(figure) else 1.0, words)
 
     def add_payload(self, robot: Manipulator) -> Manipulator:
         """Return a machine with the payload."""
@@ -309,7 +327,7 @@ class KindEvaluator:
 
     def sections(self, rating: Rating) -> dict[str, Section]:
         """Return the sections of a design's links."""
-        return link_sections(_robot_of(rating), self.kind.link_stocks(rating.values))
+        return link_sections(rating.machine, self.kind.link_stocks(rating.values))
 
     def loads(
         self, robot: Manipulator, rating: Rating, time: float | None
@@ -341,13 +359,11 @@ class KindEvaluator:
         everywhere = np.zeros((2, n))
         if required.acceleration or required.speed:
             poses = middle + np.vstack([self.outline, rating.worst])
-            heavy = (replace(leg, drive=Drive(rotor_inertia=_HEAVY)) for leg in robot.legs)
-            speed = max(required.speed, 1e-6)
-            everywhere[0] = worst_forces(robot, poses, speed, required.acceleration).max(axis=0)
-            spun = worst_forces(
-                replace(robot, legs=tuple(heavy)), poses, speed, required.acceleration
-            )
-            everywhere[1] = spun.max(axis=0) / _HEAVY
+            legs = tuple(replace(leg, drive=Drive(rotor_inertia=_HEAVY)) for leg in robot.legs)
+            heavy, speed = replace(robot, legs=legs), max(required.speed, 1e-6)
+            rise = required.acceleration
+            everywhere[0] = worst_forces(robot, poses, speed, rise).max(axis=0)
+            everywhere[1] = worst_forces(heavy, poses, speed, rise).max(axis=0) / _HEAVY
             speeds = np.maximum(speeds, worst_speeds(robot, poses, speed).max(axis=0))
         loads = JointLoads(
             tuple(squares) or (np.zeros((1, n, 3)),),
@@ -365,34 +381,9 @@ class KindEvaluator:
         return middle + pose, velocity / duration, acceleration / duration**2
 
 
-def _robot_of(rating: Rating) -> Manipulator:
-    assert rating.robot is not None  # the first stage has made it
-    return rating.robot
-
-
-def _miss(rating: Rating, name: str, share: float, words: str) -> None:
-    """Note that a bound is missed."""
-    if share > rating.misses.get(name, 0.0):
-        rating.misses[name], rating.shortfalls[name] = float(share), words
-
-
-def _miss_parts(rating: Rating, parts: Mapping[str, float], option: str) -> None:
-    """Note the requirements that the best drive meets only in part."""
-    for name, part in parts.items():
-        if part < 1.0:
-            much = f"{part:.0%}" if part >= 0.01 else "less than 1%"
-            words = f"{name} {much} of what is asked, with {option}"
-            _miss(rating, name, 1.0 / max(part, 1e-3) - 1.0, words)
-
-
-def _judge_least(rating: Rating, name: str, quantity: float, least: float, unit: str = "") -> None:
-    if not quantity >= least:
-        share = least - quantity if np.isfinite(quantity) else 1.0
-        _miss(rating, name, share, f"{name} {quantity:.3g}{unit}, at least {least:.3g}{unit} asked")
-
-
-def _judge_most(rating: Rating, name: str, quantity: float, most: float | None, unit: str) -> None:
-    if most is not None and not quantity <= most:
-        share = quantity / most - 1.0 if np.isfinite(quantity) else 1.0
-        words = name.replace("_", " ")
-        _miss(rating, name, share, f"{words} {quantity:.4g}{unit}, at most {most:g}{unit} asked")
+def _expect_share(rating: Rating, name: str, share: float, option: str) -> None:
+    """Note a requirement that the best drive meets only in part."""
+    if share < 1.0:
+        much = f"{share:.0%}" if share >= 0.01 else "less than 1%"
+        words = f"{name} {much} of what is asked, with {option}"
+        rating.miss(name, 1.0 / max(share, 1e-3) - 1.0, words)
