@@ -270,13 +270,13 @@ class Design:
         return bool(np.isfinite(self.joints).all())
 
     @cached_property
-    def _best_cube(self) -> dict[str, tuple[float, str]]:
+    def _known_quantities(self) -> dict[str, tuple[float, str]]:
         return {}
 
     def _quantities(self, name: str) -> tuple[float, str]:
-        if name not in self._best_cube:
-            self._best_cube[name] = self._evaluate_quantity(name)
-        return self._best_cube[name]
+        if name not in self._known_quantities:
+            self._known_quantities[name] = self._evaluate_quantity(name)
+        return self._known_quantities[name]
 
     def _evaluate_quantity(self, name: str) -> tuple[float, str]:
         """Return a quantity and, where there is none, why."""
