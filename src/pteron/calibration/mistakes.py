@@ -36,10 +36,10 @@ _COMMON = 0.1
 
 Chosen: geometry within tolerances moves single scales of small machines by up to 6 %."""
 
-_LARGE_HEIGHTS = 0.05
+_LARGE_HEIGHTS = 0.01
 """Spread of heights, as a share of the machine's size, from which they may be in millimetres.
 
-Chosen: a calibration's heights spread by millimetres, so that mm read as m are 1000 times that."""
+Chosen: heights over a bed spread by 2e-5 of the size and more, which mm read as m make 2e-2."""
 
 _STEPS = (
     (2.0, "half", "as with half the lead or twice the steps"),

@@ -327,16 +327,21 @@ def _scale_trials(test: _ScoreTest) -> Iterator[Trial]:
     for i, name in enumerate(test.start.robot.joint_names):
         fall, amounts = test.score(column := scales[..., i : i + 1])
         text = (
-            f"Joint {i + 1} ({name}) moves {1e2 * amounts[0]:+.3g} % farther than it reads, beyond "
-            "what its tolerance allows: check its lead, gear ratio or steps."
+            f"Joint {i + 1} ({name}) moves {_scale_text(amounts[0])} than it reads, beyond what its "
+            "tolerance allows: check its lead, gear ratio or steps."
         )
         yield Trial("scale", text, 1, fall, column @ amounts)
     fall, amounts = test.score(column := scales.sum(axis=-1, keepdims=True))
     text = (
-        f"All joints move {1e2 * amounts[0]:+.3g} % farther than they read, beyond what tolerances "
-        "allow: check leads, gear ratios or steps, or the unit of what is measured."
+        f"All joints move {_scale_text(amounts[0])} than they read, beyond what tolerances allow: "
+        "check leads, gear ratios or steps, or the unit of what is measured."
     )
     yield Trial("scale", text, 1, fall, column @ amounts)
+
+
+def _scale_text(change: float) -> str:
+    """Return a relative change of scale as words; to first order it has a size below a half."""
+    return f"{1e2 * change:+.3g} % farther" if abs(change) < 0.5 else "by quite another factor"
 
 
 def _order_trials(test: _ScoreTest) -> Iterator[Trial]:
