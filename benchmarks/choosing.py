@@ -35,7 +35,7 @@ from pteron.kernels import Array, alike
 from pteron.kinematics import inverse_kinematics, joint_rates
 from pteron.legs import Drive
 from pteron.manipulator import Manipulator
-from pteron.motion import Sensors, along, limits_of, line_path, simulate, tune
+from pteron.motion import Sensors, limits_of, line_path, polynomial_motion, simulate, tune
 from pteron.workspace import clearance, pose_margins
 
 _FILE = Path(__file__).parent.parent / "examples" / "task.toml"
@@ -180,7 +180,7 @@ def random_cycles(
             continue
         points = path_points(job, robot, rng.uniform(low, np.maximum(low, high)), way)
         path = line_path(robot, carried(robot, one, points), cycle.corner)
-        motion = along(robot, path, duration=cycle.duration, step=0.01)
+        motion = polynomial_motion(robot, path, duration=cycle.duration, step=0.01)
         yield motion.pose, motion.velocity, motion.acceleration
         left -= 1
 
@@ -217,7 +217,7 @@ def driven(job: Job, robot: Manipulator, one: Candidate) -> str:
     cycle = job.cycles[0]
     points = path_points(job, robot, np.zeros(robot.freedom), 0.0)
     path = line_path(robot, carried(robot, one, points), cycle.corner)
-    motion = along(robot, path, duration=cycle.duration)
+    motion = polynomial_motion(robot, path, duration=cycle.duration)
     carrying, limits = job.payload.add_to(robot), limits_of(robot).force
     soft, sensors = as_they_are(carrying), Sensors(1e-6)
     tuned = tune(soft, motion, ComputedTorque(), model=carrying, sensors=sensors).controller
@@ -231,7 +231,7 @@ def driven(job: Job, robot: Manipulator, one: Candidate) -> str:
         behind = np.linalg.norm((found.pose - motion.at(found.time)[0])[:, :3], axis=1)
         assert found.stopped is None
         assert used < 1.0
-        assert not found.saturated.any()
+        assert not found.saturated_share.any()
         told.append(
             f"drives {name}: {used:.0%} of the peak torque, {1e3 * behind.max():.3f} mm behind"
         )

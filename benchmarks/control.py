@@ -85,7 +85,7 @@ def learnt(
 ) -> float:
     """Print a line of what adaptive control makes of ten cycles, and return the ratio."""
     law = controller.law(model)
-    run = tracked(plant, law, cycle.repeated(_CYCLES), 1e-3)
+    run = tracked(plant, law, cycle.repeat(_CYCLES), 1e-3)
     first, *_, last = (part.max() for part in np.array_split(run.distance, _CYCLES))
     count = law.estimates(run.memories[0]).size
     used = float(np.linalg.norm(run.memories[:, -count:], axis=-1).max() / law.gains[-1])

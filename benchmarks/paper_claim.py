@@ -176,7 +176,7 @@ def sparse_kernels(base: BaseParameters) -> dict[str, Kernel]:
         return ca.project(ca.reshape(values, columns, rows).T, like.sparsity())
 
     jacobian = patterned(flat[0], parts.jacobian)
-    factors = regressor.Terms(
+    factors = regressor.RegressorTerms(
         jacobian,
         patterned(flat[1], parts.sliders),
         parts.with_slider,

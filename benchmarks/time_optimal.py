@@ -20,10 +20,10 @@ import pteron
 from pteron.motion import (
     Motion,
     MotionLimits,
-    along,
     cycle_path,
     limits_of,
     pick_and_place,
+    polynomial_motion,
     shortest,
     time_optimal,
 )
@@ -46,7 +46,7 @@ def main() -> None:
         limits = limits_of(robot, speed=4.0 / 3.0 * rates + 0.1, force=4.0 / 3.0 * forces)
         path = cycle_path(found)
         slowed = shortest(robot, found.cycle.at, limits)
-        quintic = along(robot, path, limits=limits)
+        quintic = polynomial_motion(robot, path, limits=limits)
         begin = time.perf_counter()
         fastest = time_optimal(robot, path, limits)
         took = time.perf_counter() - begin

@@ -160,7 +160,7 @@ TOO_MANY = {
         "five-bar", "condition", maps.pose_grid("five-bar", points=10**6)
     ),
     "random_excitation": lambda: identification.random_excitation("delta", harmonics=FAR),
-    "repeated": lambda: motion.pick_and_place("delta", scale=0.5).repeated(FAR),
+    "repeat": lambda: motion.pick_and_place("delta", scale=0.5).repeat(FAR),
 }
 
 

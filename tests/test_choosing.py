@@ -36,7 +36,7 @@ from pteron.dynamics import drive_forces
 from pteron.errors import DataError
 from pteron.kernels import numeric
 from pteron.kinematics import inverse_kinematics, pose_of
-from pteron.motion import along, line_path, with_payload
+from pteron.motion import line_path, polynomial_motion, with_payload
 from pteron.report.choice.write import page, write_choice
 from pteron.workspace import Box, clearance, pose_margins, prove
 
@@ -100,7 +100,9 @@ def test_a_chosen_machine_keeps_what_was_asked(chosen):
     for shift, turn in zip(rng.uniform(-1.0, 1.0, (5, 3)), rng.uniform(0.0, np.pi, 5), strict=True):
         way = 0.08 * np.array([np.cos(turn), np.sin(turn), 0.0])
         at = middle + shift * (half - np.abs(way))
-        motion = along(carrying, line_path(carrying, [at - way, at + way]), duration=0.3)
+        motion = polynomial_motion(
+            carrying, line_path(carrying, [at - way, at + way]), duration=0.3
+        )
         forces = drive_forces(carrying, motion.pose, motion.velocity, motion.acceleration)
         drive = robot.legs[0].drive
         assert np.abs(forces).max() < drive.max_force

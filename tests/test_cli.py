@@ -20,7 +20,7 @@ from mechanisms import CLIENTS, gated
 from typer.testing import CliRunner, Result
 
 import pteron
-from pteron.cli.arguments import regrouped
+from pteron.cli.arguments import group_numbers
 from pteron.cli.main import app
 from pteron.manipulator.machine_warnings import machine_warnings
 from pteron.manipulator.variants import with_elbows
@@ -173,10 +173,10 @@ def test_options_may_stand_anywhere_among_the_numbers():
 
 
 def test_numbers_go_behind_the_other_words():
-    assert regrouped(["r", "--out", "-1", "-2", "--", "-3", "--json"], ["--out"]) == [
+    assert group_numbers(["r", "--out", "-1", "-2", "--", "-3", "--json"], ["--out"]) == [
         *("r", "--out", "-1", "--", "-2", "-3", "--json")
     ]
-    assert regrouped(["r", "--pose", "--json"], ["--pose"]) == ["r", "--pose", "--json"]
+    assert group_numbers(["r", "--pose", "--json"], ["--pose"]) == ["r", "--pose", "--json"]
 
 
 @pytest.mark.parametrize(

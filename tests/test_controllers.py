@@ -275,7 +275,7 @@ def test_adaptive_control_learns_what_the_cycle_shows(name):
     robot, motion = MACHINES[name], cycle(name)
     plant = wrong(robot, 1)
     law = Adaptive(motion=motion).law(robot)
-    run = controlled(plant, law, motion.repeated(6), 1e-3)
+    run = controlled(plant, law, motion.repeat(6), 1e-3)
     largest = run.largest(robot, 6)
     assert 10 * largest[-1] < largest[0]
     count = law.base.rank

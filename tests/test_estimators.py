@@ -23,13 +23,13 @@ from pteron.identification.estimators import (
     ordinary,
     qr_factor,
     total,
-    weighted,
+    weighted_least_squares,
     whiteness,
 )
 from pteron.identification.estimators.covariance import Noise, noise_of
 from pteron.identification.model import identification_model
 from pteron.identification.observation import Observations, observations_of
-from pteron.identification.signals import Processing, preprocessing_of
+from pteron.identification.signals import Processing, preprocessing_for_log
 
 P = 6
 TRUE = np.array([2.0, -1.0, 0.5, 3.0, 0.3, -0.2])
@@ -109,7 +109,7 @@ def test_ordinary_is_that_of_numpy():
 
 def test_weighted_is_that_of_numpy_with_rows_scaled():
     equations = drawn(2, noise=np.array([0.1, 1.0, 5.0]))
-    estimate = weighted(equations)
+    estimate = weighted_least_squares(equations)
     assert estimate.noise == pytest.approx([0.1, 1.0, 5.0], rel=0.2)
     scaled = equations.matrix / estimate.noise[:, None]
     expected = np.linalg.lstsq(
@@ -147,7 +147,7 @@ def test_an_estimate_carries_its_diagnosis(estimator):
     assert np.diag(estimate.correlation) == pytest.approx(1.0)
     assert np.abs(estimate.correlation).max() < 1.0 + 1e-12
     assert estimate.whiteness.white
-    assert not estimate.correlated
+    assert not estimate.has_correlated_residuals
     assert estimate.rows == 360
     assert estimate.noise == pytest.approx(0.3, rel=0.25)
     low, high = estimate.intervals(0.5)
@@ -156,7 +156,7 @@ def test_an_estimate_carries_its_diagnosis(estimator):
     assert estimate.as_dict()["equations"] == 360
 
 
-@pytest.mark.parametrize("estimator", [weighted, huber])
+@pytest.mark.parametrize("estimator", [weighted_least_squares, huber])
 def test_an_estimate_says_whether_its_search_has_settled(estimator):
     equations = drawn(4, noise=np.array([0.1, 1.0, 5.0]))
     settled, hasty = estimator(equations), estimator(equations, iterations=1)
@@ -218,12 +218,14 @@ def test_one_equation_more_than_values_is_enough(estimator):
 # Errors
 
 
-@pytest.mark.parametrize("estimator", gated([ordinary, weighted, huber], [weighted]))
+@pytest.mark.parametrize(
+    "estimator", gated([ordinary, weighted_least_squares, huber], [weighted_least_squares])
+)
 def test_intervals_hold_the_truth(estimator):
     check_coverage(standard_errors(estimator, drawn))
 
 
-@pytest.mark.parametrize("estimator", gated([weighted, huber], [huber]))
+@pytest.mark.parametrize("estimator", gated([weighted_least_squares, huber], [huber]))
 def test_intervals_hold_the_truth_where_actuators_differ(estimator):
     noise = np.array([0.05, 0.5, 3.0])
     check_coverage(standard_errors(estimator, lambda seed: drawn(seed, noise)))
@@ -292,11 +294,13 @@ def coloured(seed, memory=0.8):
     return made(matrix, matrix @ TRUE + 0.3 * noise)
 
 
-@pytest.mark.parametrize("estimator", gated([ordinary, weighted, huber], [weighted]))
+@pytest.mark.parametrize(
+    "estimator", gated([ordinary, weighted_least_squares, huber], [weighted_least_squares])
+)
 def test_coloured_noise_is_seen_and_allowed_for(estimator):
     estimates = [estimator(coloured(seed)) for seed in range(80)]
     assert not any(estimate.whiteness.white for estimate in estimates)
-    assert all(estimate.correlated for estimate in estimates)
+    assert all(estimate.has_correlated_residuals for estimate in estimates)
     assert estimates[0].whiteness.autocorrelation == pytest.approx(0.8, abs=0.1)
     errors = np.array([(e.values - TRUE) / e.deviations for e in estimates])
     # The offset feels it most; what white noise would say of it holds not even two times in three.
@@ -305,7 +309,7 @@ def test_coloured_noise_is_seen_and_allowed_for(estimator):
 
 
 @CLIENTS
-@pytest.mark.parametrize("estimator", [ordinary, weighted, huber])
+@pytest.mark.parametrize("estimator", [ordinary, weighted_least_squares, huber])
 def test_regions_hold_the_truth(estimator):
     # Two pairs of columns are all but the same: what is known of each single one says little.
     for made_by in (partial(drawn, rows=200), coloured):
@@ -322,7 +326,7 @@ def test_noise_that_actuators_share_is_allowed_for():
         rng = np.random.default_rng(seed)
         equations = drawn(seed, noise=0.1)
         shared = rng.normal(size=(len(equations.forces), 1))
-        estimate = weighted(equations.with_forces(equations.forces + shared))
+        estimate = weighted_least_squares(equations.with_forces(equations.forces + shared))
         errors.append((estimate.values - TRUE) / estimate.deviations)
         held.append(estimate.p_value(TRUE) >= 0.05)
     assert (np.abs(errors) < 1.96).mean() == pytest.approx(0.95, abs=0.03)
@@ -446,7 +450,7 @@ def test_total_is_that_of_the_singular_vector():
 def test_exact_columns_are_left_as_they_are():
     equations = drawn(8)
     exact = total(equations, np.zeros(P))
-    assert exact.values == pytest.approx(weighted(equations).values, rel=1e-2)
+    assert exact.values == pytest.approx(weighted_least_squares(equations).values, rel=1e-2)
     noise = np.sqrt(
         ((equations.forces - equations.matrix @ ordinary(equations).values) ** 2).mean(axis=0)
     )
@@ -496,7 +500,7 @@ def test_instruments_take_out_the_bias_of_noisy_columns(mutual):
 
 def test_the_regressor_as_its_own_instrument_is_weighted_least_squares():
     equations = drawn(2, noise=np.array([0.1, 1.0, 5.0]))
-    one, other = instrumental(equations, equations), weighted(equations)
+    one, other = instrumental(equations, equations), weighted_least_squares(equations)
     assert one.values == pytest.approx(other.values, rel=1e-3)
     assert one.covariance == pytest.approx(other.covariance, rel=1e-2, abs=1e-9)
 
@@ -542,13 +546,13 @@ def test_halves_of_the_samples_are_instruments_of_each_other():
     log = replace(plain, joints=plain.joints + 1e-5 * rng.normal(size=plain.joints.shape))
     log = replace(log, forces=log.forces + 0.05 * rng.normal(size=log.forces.shape))
     # A cut-off that lets much noise through to the accelerations.
-    treatment = preprocessing_of(robot, log, Processing(cutoff=40.0, band=20.0))
+    treatment = preprocessing_for_log(robot, log, Processing(cutoff=40.0, band=20.0))
     one, other = halves(model, log, treatment)
     inertia = [k for k, kind in enumerate(model.kinds) if kind == "base"]
     found = instrumental(one, other, mutual=True)
     standard = (found.values - truth(model)) / found.deviations
     assert (np.abs(standard) < 4.0).all()
-    biased = weighted(observations_of(model, log, treatment))
+    biased = weighted_least_squares(observations_of(model, log, treatment))
     off = np.abs((biased.values - truth(model)) / biased.deviations)[inertia]
     assert np.abs(standard[inertia]).max() < 0.5 * off.max()
 
@@ -594,7 +598,9 @@ def test_values_of_zero_are_dropped_and_others_kept():
     for seed in range(60):
         noise = 0.3 * np.random.default_rng(seed).normal(size=(120, 3))
         equations = made(matrix, matrix @ values + noise)
-        found = essential_parameters(equations, weighted(equations), weighted)
+        found = essential_parameters(
+            equations, weighted_least_squares(equations), weighted_least_squares
+        )
         assert found.names == tuple(n for n in NAMES if n not in found.dropped)
         assert set(found.dropped) <= {"a", "Fc1"}
         assert found.estimate.names == found.names
@@ -621,8 +627,8 @@ def test_a_pair_that_only_shows_together_is_kept():
 
 def test_nothing_is_dropped_where_all_is_significant():
     equations = drawn(17, noise=1e-3)
-    estimate = weighted(equations)
-    found = essential_parameters(equations, estimate, weighted)
+    estimate = weighted_least_squares(equations)
+    found = essential_parameters(equations, estimate, weighted_least_squares)
     assert (found.names, found.dropped) == (NAMES, ())
     assert found.estimate is estimate
 
@@ -646,7 +652,9 @@ def experiment(joint_noise, seed=0, derivatives="periodic"):
         seed=2,
     )
     period = 2.0 if derivatives == "periodic" else None
-    treatment = preprocessing_of(robot, log, Processing(derivatives=derivatives, period=period))
+    treatment = preprocessing_for_log(
+        robot, log, Processing(derivatives=derivatives, period=period)
+    )
     return SimpleNamespace(
         model=model,
         log=log,
@@ -671,7 +679,9 @@ def test_intervals_and_regions_of_logs_hold_the_truth(name):
         noise = lfilter([0.8], [1.0, -0.6], rng.normal(size=plain.forces.shape), axis=0)
         positions = plain.joints + 1e-6 * rng.normal(size=plain.joints.shape)
         log = replace(plain, joints=positions, forces=plain.forces + size * noise)
-        estimate = weighted(observations_of(model, log, preprocessing_of(robot, log)))
+        estimate = weighted_least_squares(
+            observations_of(model, log, preprocessing_for_log(robot, log))
+        )
         low, high = estimate.intervals()
         single.append(((low <= values) & (values <= high)).mean())
         distances.append(estimate.distance(values) ** 2)
@@ -699,7 +709,7 @@ def test_likelihood_agrees_with_weights_where_positions_are_good():
     made_by = experiment(1e-8)
     # Likelihood uses every sample, as the others do without a parallel filter.
     plain = replace(made_by.treatment, band=0.45 * made_by.treatment.rate)
-    one = weighted(observations_of(made_by.model, made_by.log, plain))
+    one = weighted_least_squares(observations_of(made_by.model, made_by.log, plain))
     other = maximum_likelihood(made_by.model, made_by.log, plain)
     assert other.names == one.names
     # The other one's band still takes a tenth of the noise away, and of the masked columns.
@@ -718,7 +728,7 @@ def test_likelihood_is_better_where_positions_are_noisy():
         made_by = experiment(1e-3, seed, "central")
         size = np.sqrt((made_by.equations.matrix**2).sum(axis=(0, 1)))
         likely = maximum_likelihood(made_by.model, made_by.log, made_by.treatment)
-        plain = weighted(made_by.equations)
+        plain = weighted_least_squares(made_by.equations)
         worse.append(
             np.linalg.norm(size * (plain.values - made_by.truth))
             / np.linalg.norm(size * (likely.values - made_by.truth))
@@ -739,6 +749,6 @@ def test_motion_along_one_axis_names_what_it_cannot_see():
     log = log_of(robot, size=np.array(0.0), turn=0.0)
     wave = 0.04 * np.sin(2.0 * np.pi * 0.5 * log.time)
     sliders = log.joints + np.outer(wave, [leg.direction[2] for leg in robot.legs])
-    treatment = preprocessing_of(robot, replace(log, joints=sliders), Processing(band=10.0))
+    treatment = preprocessing_for_log(robot, replace(log, joints=sliders), Processing(band=10.0))
     with pytest.raises(DataError, match=r"too little motion: .* values cannot be seen"):
-        weighted(observations_of(model, replace(log, joints=sliders), treatment))
+        weighted_least_squares(observations_of(model, replace(log, joints=sliders), treatment))

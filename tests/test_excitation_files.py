@@ -281,7 +281,7 @@ def test_the_log_of_what_was_written_gives_the_parameters_back(name: str, tmp_pa
     base = result.model.base.values(robot)
     assert result.base_values == pytest.approx(base, abs=1e-6 * np.abs(base).max())
     coulomb = [leg.drive.coulomb for leg in robot.legs]
-    assert result.model.per_joint("coulomb", result.estimate.values) == pytest.approx(
+    assert result.model.joint_values("coulomb", result.estimate.values) == pytest.approx(
         coulomb, rel=1e-5
     )
     assert result.held_out[0].nrms.max() < 0.5

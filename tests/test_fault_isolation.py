@@ -320,7 +320,7 @@ def test_forces_held_from_sample_to_sample_are_no_fault_and_spoil_no_value(name)
     result = found(robot, log)
     assert result.verdict.grade == "trustworthy"
     assert not result.fault_isolation.faults
-    assert not result.understated
+    assert not result.has_understated_errors
     assert result.unknowns.delay == pytest.approx(-0.5 / RATE, rel=1e-3)
     words = f"The positions are half a sample ({500.0 / RATE:.3g} ms) late for the forces"
     assert any(note.startswith(words) for note in result.notes)
@@ -353,7 +353,7 @@ def test_a_delay_of_held_forces_that_is_left_in_marks_the_intervals(name):
     assert "half a sample" in result.fault_isolation.faults[0].message
     assert result.verdict.grade == "trustworthy"
     assert not result.fault_isolation.matters
-    assert result.understated
+    assert result.has_understated_errors
     assert "The stated errors of the values do not allow for that." in result.verdict.reasons
 
 

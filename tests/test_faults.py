@@ -130,7 +130,7 @@ def rigid(robot, log):
     """Return the forces of a machine's bodies at a log's joints."""
     curve = make_interp_spline(log.time, log.joints, k=7)
     motion = tuple(curve(log.time, k) for k in range(3))
-    s = States.of_joints(robot, motion, log.time, home_pose(robot))
+    s = States.from_joints(robot, motion, log.time, home_pose(robot))
     return pteron.inverse_dynamics(robot, s.pose, s.velocity, s.acceleration)
 
 
@@ -167,7 +167,7 @@ def test_friction_that_falls_with_speed_is_named_and_then_identified():
 def test_what_falls_with_speed_is_in_the_model_file():
     robot, log, _ = clean("linear-delta")
     result = identify(robot, noisy(log), terms=Terms(stribeck=0.01))
-    falls = result.model.per_joint("stribeck", result.estimate.values)
+    falls = result.model.joint_values("stribeck", result.estimate.values)
     for leg, force in zip(result.machine.legs, falls, strict=True):
         wanted = Stribeck(force, 0.01) if force > 0.0 else None
         assert isinstance(leg.drive, Drive)
@@ -229,7 +229,7 @@ def test_columns_are_what_a_fault_does_to_the_forces(name):
     part = log.part(100, 140)
     curve = make_interp_spline(log.time, log.joints, k=7)
     motion = tuple(curve(part.time, k) for k in range(3))
-    states = States.of_joints(robot, motion, part.time, home_pose(robot))
+    states = States.from_joints(robot, motion, part.time, home_pose(robot))
     n, rows = len(robot.legs), len(part.time)
     model = identification_model(robot, Terms(coulomb=False, viscous=False, offset=False))
     values = model.base.values(robot)
@@ -243,7 +243,7 @@ def test_columns_are_what_a_fault_does_to_the_forces(name):
     point = (leg.guide_point[0] + step, *leg.guide_point[1:])
     legs = [replace(one, guide_point=point) if one is leg else one for one in robot.legs]
     other = replace(robot, legs=tuple(legs))
-    s = States.of_joints(other, motion, part.time, tuple(states.pose[0]))
+    s = States.from_joints(other, motion, part.time, tuple(states.pose[0]))
     there = pteron.inverse_dynamics(other, s.pose, s.velocity, s.acceleration)
     columns = fitted.length_slopes
     assert columns.shape[-1] == len(lengths_of(robot))
@@ -252,7 +252,7 @@ def test_columns_are_what_a_fault_does_to_the_forces(name):
 
     behind = [np.ones_like(motion[0]), *np.zeros((2, *motion[0].shape))]
     shifted = (motion[0] - step * np.eye(len(robot.legs))[1], *motion[1:])
-    s = States.of_joints(robot, shifted, part.time, tuple(states.pose[0]))
+    s = States.from_joints(robot, shifted, part.time, tuple(states.pose[0]))
     there = pteron.inverse_dynamics(robot, s.pose, s.velocity, s.acceleration)
     wanted = (there - here) / step
     given = fitted.give_slopes(behind)[..., 1]

@@ -166,7 +166,7 @@ def leaning(millimetres):
 
 def test_what_the_firmware_cannot_say_is_told_with_its_effect(tmp_path):
     robot = leaning(0.5)
-    found = LinearDelta.of(robot)
+    found = LinearDelta.from_robot(robot)
     assert 2e-5 < found.deviation < 3e-4
     text = " ".join(export_reprap(robot, tmp_path)[0].read_text().split())
     assert f"up to {1e3 * found.deviation:.3f} mm from where it takes it to be" in text

@@ -17,10 +17,10 @@ import pteron
 from pteron.identification import Terms, identification_model, identify
 from pteron.plots import certainty_figure, comparison_figure, errors_figure, residual_speed_figure
 from pteron.report.identification import (
-    measured,
     model_path,
     numbers,
     parameter_rows,
+    value_with_uncertainty,
     write_identification,
 )
 from pteron.report.identification.contents import contents, short_sources, shorten_sources
@@ -145,7 +145,7 @@ def test_the_page_shows_the_numbers(name):
         for value in np.concatenate(errors):
             assert f"{significant(float(value))} %" in text
     for row in parameter_rows(found):
-        value, half = measured(row.value, row.half)
+        value, half = value_with_uncertainty(row.value, row.half)
         assert f"{value} {half} {row.unit.split()[0]}" in text
     consistency = found.consistency
     if consistency is None:
@@ -285,9 +285,9 @@ def test_names_as_people_read_them():
     names = short_sources(result("hostile"))
     assert shorten_sources(["x/1.csv: row 7, log.csv"], names) == ("x/1.csv: row 7, log.csv",)
     assert short_sources(result("quadrupteron")) == {"/home/someone/logs/a.csv": "a.csv"}
-    assert measured(1234.5, 678.9) == ("1234", "679")
-    assert measured(2.5, 0.0) == ("2.50000", "0")
-    assert measured(2.0, 0.0996) == ("2.00", "0.10")
+    assert value_with_uncertainty(1234.5, 678.9) == ("1234", "679")
+    assert value_with_uncertainty(2.5, 0.0) == ("2.50000", "0")
+    assert value_with_uncertainty(2.0, 0.0996) == ("2.00", "0.10")
 
 
 def test_pictures_show_what_they_are_given():

@@ -62,7 +62,7 @@ def moved(robot, built, seed, rows=1500):
         # Strokes are long or short: the Rubin hexapods' is 3 % of their rams.
         shape = {"period": 3.0, "harmonics": 5, "size": share * size, "turn": 0.15 * share}
         states = motion(robot, time, seed=seed, **shape)
-        joints = FullMotion.of_platform(robot, *states).joints
+        joints = FullMotion.from_platform(robot, *states).joints
         if ((joints > low) & (joints < high)).all():
             break
     forces = pteron.drive_forces(built, *states)
@@ -91,7 +91,7 @@ def test_the_written_file_reproduces_forces_that_were_held_out(name, shared, tmp
     file.write_text(json.dumps(json_ready(result.as_dict())))
     of_base = read_identified(robot, file)
     rigid = base_regressor(of_base.robot, of_base.base, *states) @ of_base.values
-    q = FullMotion.of_platform(robot, *states)
+    q = FullMotion.from_platform(robot, *states)
     for k, leg in enumerate(of_base.robot.legs):
         drive = leg.drive
         rigid[:, k] += drive.inertia * q.accelerations[:, k] + drive.viscous * q.rates[:, k]

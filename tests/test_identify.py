@@ -30,7 +30,7 @@ from pteron.identification.exchanged_columns import ColumnFault
 from pteron.identification.logs import Description
 from pteron.identification.plausibility import has_negative_inertia
 from pteron.identification.prediction import Prediction
-from pteron.identification.recordings import read_recording, split_held_out
+from pteron.identification.recordings import read_recording, split_test_data
 from pteron.identification.verdict import verdict_of
 from pteron.manipulator import parameter_data
 from pteron.workspace import home_pose
@@ -193,7 +193,7 @@ def test_samples_that_are_lost_here_and_there_are_bridged_and_said(share):
     for seed in (0, 1):
         log = log_of(robot, **shape, **noise, seed=seed, noise_seed=seed)
         rows = np.random.default_rng(seed).random(log.rows) < share
-        logs.append(log.without(rows))
+        logs.append(log.drop_samples(rows))
     found = identify(robot, logs[0], held_out=logs[1])
     assert found.verdict.grade == "trustworthy"
     assert any("are bridged by polynomials" in finding.message for finding in found.findings)
@@ -241,7 +241,7 @@ def test_without_other_logs_the_end_is_held_out_and_said():
 
 def test_a_periodic_log_is_divided_at_its_periods():
     log = noisy(QUADRUPTERON, duration=12.0, description=Description(period=4.0))
-    fit, check = split_held_out(read_recording(log), 4.0)
+    fit, check = split_test_data(read_recording(log), 4.0)
     assert (fit.rows, check.rows) == (2400, 1200)
     found = identify(QUADRUPTERON, log)
     assert found.preprocessing[0].derivatives == "periodic"
@@ -311,9 +311,9 @@ def test_passive_joints_are_identified(name):
     robot = machine(name)
     log = log_of(robot, **LARGE) if name in (*RODS, "delta-4") else log_of(robot)
     model = identification_model(robot, Terms(passive="each"))
-    from pteron.identification import observations_of, preprocessing_of
+    from pteron.identification import observations_of, preprocessing_for_log
 
-    equations = observations_of(model, log, preprocessing_of(robot, log))
+    equations = observations_of(model, log, preprocessing_for_log(robot, log))
     # The legs' R3 of rods turns as R2 does; the shaft's two universal joints turn alike.
     passive = model.kinds.count("passive")
     assert passive == {"quadrupteron": 13, "mixed": 9, "delta-4": 12, "3-rrr": 6}[name]

@@ -56,7 +56,7 @@ def test_what_bends_is_found_beside_the_bodies_and_goes_into_the_machine(monkeyp
         np.testing.assert_array_equal(np.isnan(bends.backlash), [False, True, True])
         off = np.abs(bends.backlash - PLAY)[:1]
         assert (off < 4.0 * bends.backlash_deviations[:1] + 0.01 * PLAY).all()
-    elastic = bends.in_drives_of(found.machine).legs[0].drive.elastic
+    elastic = bends.add_to(found.machine).legs[0].drive.elastic
     assert elastic.stiffness == bends.stiffness[0]
     assert elastic.backlash == bends.backlash[0]
     # Another constant between the encoders, and no play, change nothing else.

@@ -26,7 +26,7 @@ from pteron.identification.logs import (
     write_description,
     write_log,
 )
-from pteron.identification.logs.names import called
+from pteron.identification.logs.names import parse_column_name
 
 QUADRUPTERON = CATALOG["quadrupteron"]
 TRIPTERON = CATALOG["tripteron"]
@@ -582,8 +582,8 @@ def test_no_log_and_logs_of_other_machines_are_refused_in_words():
 
 
 def test_a_name_with_thousands_of_digits_is_no_joint():
-    assert called("q12").number == 12
-    assert called("q" + "1" * 5000) is None
+    assert parse_column_name("q12").number == 12
+    assert parse_column_name("q" + "1" * 5000) is None
 
 
 @pytest.mark.parametrize("name", ["time", "joints", "forces", "pose", "payload"])

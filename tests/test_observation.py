@@ -13,8 +13,8 @@ from pteron.errors import DataError, ModelError
 from pteron.identification.estimators import ordinary
 from pteron.identification.logs import Description
 from pteron.identification.model import Terms, identification_model
-from pteron.identification.observation import in_motion, observations_of, stacked
-from pteron.identification.signals import Processing, States, preprocessing_of
+from pteron.identification.observation import motion_mask, observations_of, stack_observations
+from pteron.identification.signals import Processing, States, preprocessing_for_log
 
 KINDS = ["quadrupteron turned", "delta on a wall"]
 each_kind = pytest.mark.parametrize("name", KINDS)
@@ -65,7 +65,7 @@ def test_a_model_names_every_column_once(name, kind):
     n = len(robot.legs)
     joints = {"none": 0, "shared": 3 + robot.platform.turns, "each": 3 * n + robot.platform.turns}
     extra = n * (terms.coulomb + terms.viscous + terms.offset) + joints[terms.passive]
-    assert model.left_out == tuple(f"J_m{i + 1}" for i in range(n) if terms.rotors)
+    assert model.merged_terms == tuple(f"J_m{i + 1}" for i in range(n) if terms.rotors)
     assert len(set(model.names)) == len(model.names) == model.base.rank + extra
     assert len(model.units) == len(model.expressions) == len(model.names)
     assert model.matrix(states_of(robot)).shape == (60, n, len(model.names))
@@ -169,7 +169,7 @@ def test_a_rotor_joins_what_acts_like_it(name):
 
 def test_a_payload_shows_its_mass_only_where_the_platform_does_not_turn():
     model = model_of("tripteron", Terms(payload=True))
-    assert len(model.left_out) == 3
+    assert len(model.merged_terms) == 3
     assert model.matrix(states_of(model.robot, payload=1)).any(axis=(0, 1)).all()
 
 
@@ -190,7 +190,7 @@ def equations_and_truth(name, derivatives="central", *, processing=None, **log):
     made = log_of(MECHANISMS[name], **log)
     period = log.get("period", 4.0) if derivatives == "periodic" else None
     wanted = replace(processing or Processing(), derivatives=derivatives, period=period)
-    treatment = preprocessing_of(MECHANISMS[name], made, wanted)
+    treatment = preprocessing_for_log(MECHANISMS[name], made, wanted)
     return made, treatment, observations_of(model, made, treatment), truth(model)
 
 
@@ -220,7 +220,7 @@ def test_periods_with_uneven_samples_and_a_gap_are_exact(name):
     rng = np.random.default_rng(1)
     time = np.arange(4000) / 500.0 + rng.uniform(-4e-4, 4e-4, 4000)
     log = without(log_of(MECHANISMS[name], time=time), 700, 900)
-    treatment = preprocessing_of(
+    treatment = preprocessing_for_log(
         MECHANISMS[name], log, Processing(derivatives="periodic", period=4.0, cutoff=12.0)
     )
     equations = observations_of(model, log, treatment)
@@ -232,7 +232,7 @@ def test_a_gap_that_no_other_period_fills_is_refused():
     log = without(log_of(CATALOG["quadrupteron"], duration=4.0), 300, 900)
     processing = Processing(derivatives="periodic", period=4.0)
     with pytest.raises(DataError, match="samples leave"):
-        preprocessing_of(CATALOG["quadrupteron"], log, processing)
+        preprocessing_for_log(CATALOG["quadrupteron"], log, processing)
 
 
 # What is left out
@@ -271,22 +271,24 @@ def test_equations_that_are_not_used_are_zero():
     assert 0.05 < unused.mean() < 0.95
     assert not equations.matrix[unused].any()
     assert not equations.forces[unused].any()
-    assert np.array_equal(equations.used, (~unused).sum(axis=0))
+    assert np.array_equal(equations.equation_counts, (~unused).sum(axis=0))
     assert equations.rows == (~unused).sum()
 
 
 def test_rows_near_a_slow_one_are_left_out_as_far_as_the_filter_reaches():
     found = equations_and_truth("tripteron")[1]
     treatment = replace(found, cutoff=30.0, rate=100.0, slow=np.full(1, 0.5), stroke=10.0)
-    assert replace(treatment, stroke=0.12).settling == 3  # a share of the stroke at most
-    assert treatment.settling == 5
-    assert replace(treatment, cutoff=10.0).turning == 1  # less, where the way it moves counts alone
+    assert replace(treatment, stroke=0.12).settling_rows == 3  # a share of the stroke at most
+    assert treatment.settling_rows == 5
+    assert (
+        replace(treatment, cutoff=10.0).turning_rows == 1
+    )  # less, where the way it moves counts alone
     rates = np.ones((50, 1))
     rates[20] = 0.1
     rates[0] = 0.0
-    still = np.flatnonzero(in_motion(rates, treatment.slow, 5)[:, 0] == 0.0)
+    still = np.flatnonzero(motion_mask(rates, treatment.slow, 5)[:, 0] == 0.0)
     assert np.array_equal(still, [0, 1, 2, 3, 4, 5, *range(15, 26)])
-    still = np.flatnonzero(in_motion(rates, treatment.slow, 5, wraps=True)[:, 0] == 0.0)
+    still = np.flatnonzero(motion_mask(rates, treatment.slow, 5, wraps=True)[:, 0] == 0.0)
     assert np.array_equal(still, [0, 1, 2, 3, 4, 5, *range(15, 26), 45, 46, 47, 48, 49])
 
 
@@ -333,8 +335,8 @@ def test_pieces_give_the_equations_of_the_whole(derivatives, size):
     log = without(log, 1200, 1230)
     log = replace(log, payload=(np.arange(log.rows) > 1600).astype(int))
     wanted = Processing(derivatives=derivatives, cutoff=25.0, slow=0.2)
-    treatment = preprocessing_of(CATALOG[name], log, wanted)
-    assert treatment.settling > 5
+    treatment = preprocessing_for_log(CATALOG[name], log, wanted)
+    assert treatment.settling_rows > 5
     whole = observations_of(model_of(name), log, treatment)
     parts = observations_of(model_of(name), pieces(log, size), treatment, block=400)
     assert parts.time == pytest.approx(whole.time, abs=1e-9)
@@ -350,7 +352,7 @@ def test_pieces_give_the_equations_of_the_whole(derivatives, size):
 
 def test_stacked_equations_are_those_of_both():
     _, _, equations, values = equations_and_truth("tripteron")
-    both = stacked([equations, equations])
+    both = stack_observations([equations, equations])
     assert both.rows == 2 * equations.rows
     assert ordinary(both).values == pytest.approx(values, abs=1e-7)
     some = equations.columns([3, 1])
@@ -375,7 +377,7 @@ def test_a_payload_is_found_from_two_phases():
     )
     for derivatives, period in (("central", None), ("periodic", 4.0)):
         wanted = Processing(derivatives=derivatives, period=period)
-        treatment = preprocessing_of(robot, log, wanted)
+        treatment = preprocessing_for_log(robot, log, wanted)
         equations = observations_of(model, log, treatment)
         assert ordinary(equations).values[-4:] == pytest.approx(load, abs=1e-7)
 
@@ -383,7 +385,7 @@ def test_a_payload_is_found_from_two_phases():
 def test_the_period_is_taken_from_the_description():
     robot = CATALOG["tripteron"]
     log = log_of(robot, description=Description(period=4.0), joint_noise=1e-7)
-    treatment = preprocessing_of(robot, log)
+    treatment = preprocessing_for_log(robot, log)
     equations = observations_of(model_of("tripteron"), log, treatment)
     assert treatment.derivatives == "periodic"
     assert equations.time[-1] < 4.0

@@ -27,7 +27,7 @@ from own_plants import (
 import pteron
 from pteron.identification import Log, Processing, States, identify
 from pteron.identification.faults.assumptions import hidden_orders
-from pteron.identification.signals import preprocessing_of
+from pteron.identification.signals import preprocessing_for_log
 
 GATE = [("linear-delta", "lost samples"), ("five-bar", "gravity turned"), ("five-bar", "jitter")]
 EVERY = [(name, fault) for name in ("linear-delta", "five-bar") for fault in FAULTS]
@@ -121,7 +121,7 @@ def test_a_refused_log_names_the_payload():
 def test_orders_of_a_hexapods_legs_that_symmetry_hides_are_said():
     plant = PLANTS["hexapod"]()
     log = own_plants.recorded(own_plants.case_of(plant, "none", 121), "none", "log")
-    said = hidden_orders(plant.drawn, log, preprocessing_of(plant.drawn, log, Processing()))
+    said = hidden_orders(plant.drawn, log, preprocessing_for_log(plant.drawn, log, Processing()))
     assert said.startswith(HIDDEN)
     assert "2-1-6-5-4-3" in said
 
@@ -146,7 +146,7 @@ def test_the_file_of_bodies_that_are_not_quite_real_predicts_as_well_as_the_valu
     third = own_plants.case_of(plant, "none", 2002).motion
     about = third.joints, third.rates, third.accelerations
     start = result.preprocessing[0].start
-    states = States.of_joints(plant.drawn, about, third.time, start)
+    states = States.from_joints(plant.drawn, about, third.time, start)
     by_values = result.model.matrix(states) @ result.estimate.values
     by_file = pteron.drive_forces(result.machine, states.pose, states.velocity, states.acceleration)
     errors = [

@@ -134,7 +134,7 @@ def test_it_is_exact_without_noise(name, processing):
     call = "set_payload({{{}}}, {{{}}}, {{{}}},".format(*texts)
     assert found.call(machine(name)).startswith(call)
     # The machine that carries it has what was found on its platform.
-    carried = found.carried_by(machine(name)).platform.inertia
+    carried = found.add_to(machine(name)).platform.inertia
     own = machine(name).platform.inertia
     more = dict(zip(own.kinds, np.subtract(carried.values, own.values), strict=True))
     felt = [more[kind.removesuffix("_L")] for kind in found.names]
@@ -235,7 +235,7 @@ def test_what_the_residuals_show_is_said_with_the_payload():
     found = identify_payload(
         machine("tripteron"), replace(late, description=Description()), base=base_of("tripteron")
     )
-    assert not found.allowed_for
+    assert not found.has_valid_errors
     assert "late for the positions" in found.summary()
     assert found.as_dict()["trial"]["faults"][0]["fault"] == "delay"
 
@@ -247,7 +247,7 @@ def test_values_of_no_real_body_are_told():
     less = replace(log, payload=1 - log.payload)
     found = identify_payload(machine("quadrupteron"), less, base=base_of("quadrupteron"))
     assert found.mass == pytest.approx(-LOAD.mass, rel=1e-9)
-    assert found.felt
+    assert found.is_significant
     assert not found.real
     assert "is what was called with payload the one without it?" in found.summary()
 
@@ -258,9 +258,11 @@ def test_a_payload_that_was_not_there_is_not_felt(name):
     nothing = pteron.bodies.PlanarInertia(1e-9, (0.0, 0.0), 1e-12)
     log = make_log(name, load=nothing, noise=NOISE)
     found = identify_payload(machine(name), *halves(log), base=base_of(name))
-    assert not found.felt
+    assert not found.is_significant
     assert "No payload is felt" in found.summary()
-    assert identify_payload(machine(name), make_log(name, noise=NOISE), base=base_of(name)).felt
+    assert identify_payload(
+        machine(name), make_log(name, noise=NOISE), base=base_of(name)
+    ).is_significant
 
 
 @CLIENTS

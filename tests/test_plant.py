@@ -14,8 +14,8 @@ from pteron.identification import (
     Processing,
     identification_model,
     observations_of,
-    preprocessing_of,
-    weighted,
+    preprocessing_for_log,
+    weighted_least_squares,
 )
 
 FOLDER = Path(__file__).parent.parent / "benchmarks" / "identification"
@@ -84,8 +84,8 @@ def test_it_is_identified_through_its_sensors():
     seen = plant.measured(recording, encoder=1e-6, force=0.01, jitter=1e-5, seed=0)
     log = Log("plant", seen.time, seen.joints, seen.forces)
     model = identification_model(robot)
-    treatment = preprocessing_of(robot, log, Processing(derivatives="central"))
-    found = weighted(observations_of(model, log, treatment))
+    treatment = preprocessing_for_log(robot, log, Processing(derivatives="central"))
+    found = weighted_least_squares(observations_of(model, log, treatment))
     truth = np.r_[model.base.values(built), friction.coulomb, friction.viscous, friction.offset]
     errors = (found.values - truth) / found.deviations
     assert np.abs(errors).max() < 4.5

@@ -39,7 +39,7 @@ from pteron.plots import (
     power_figure,
     reach_figure,
     regularity_figure,
-    resized,
+    resize,
     robot_figure,
     save_figure,
     singularities_figure,
@@ -521,7 +521,7 @@ def test_a_condition_number_has_its_named_levels_where_it_takes_them():
 @pytest.mark.parametrize("picture", DRAWN)
 def test_in_print_letters_are_legible_and_all_is_on_the_paper(picture):
     make, *arguments = PICTURES[picture]
-    figure = resized(make(*arguments), "column")
+    figure = resize(make(*arguments), "column")
     assert figure.get_size_inches()[0] == WIDTHS["column"]
     figure.canvas.draw()
     words = [text for text in figure.findobj(Text) if text.get_text() and text.get_visible()]
@@ -552,14 +552,14 @@ def test_a_saved_figure_keeps_its_text_and_is_the_same_each_time(tmp_path):
             save_figure(powers(), tmp_path / path)
     for width in ("colum", 0.0, -1, float("nan"), None):
         with pytest.raises(pteron.DataError, match=r'"column".* "page"'):
-            resized(powers(), width)
+            resize(powers(), width)
 
 
 def test_every_figure_is_in_the_page_about_them():
     page = (Path(__file__).parent.parent / "docs" / "plots.md").read_text()
     figures = [name for name in pteron.plots.__all__ if name.endswith("_figure")]
     assert len(figures) > 20
-    assert [name for name in (*figures, "draw", "film", "resized") if name not in page] == []
+    assert [name for name in (*figures, "draw", "film", "resize") if name not in page] == []
 
 
 def titled(title):

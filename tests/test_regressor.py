@@ -9,7 +9,7 @@ import pytest
 from mechanisms import CLIENTS
 
 from pteron.errors import DataError, ModelError
-from pteron.identification import estimate, ordinary, reduced, weighted
+from pteron.identification import estimate, independent_columns, ordinary, weighted_least_squares
 from pteron.identification.checked_regressor import checked_observations
 
 ARM = Path(__file__).parent.parent / "examples" / "serial_arm.py"
@@ -128,10 +128,10 @@ def test_dependent_columns_are_found_and_named():
 
 def test_independent_columns_stay_as_they_are():
     w, f = made()
-    found = reduced(checked_observations(w, f))
+    found = independent_columns(checked_observations(w, f))
     assert (found.kept, found.dependent, found.gap) == ((0, 1, 2), (), float("inf"))
     with pytest.raises(DataError, match="every column of the regressor is zero"):
-        reduced(checked_observations(0.0 * w, f))
+        independent_columns(checked_observations(0.0 * w, f))
 
 
 # Refusals
@@ -220,6 +220,6 @@ def test_a_serial_arm_without_friction_in_its_model_is_not_trusted():
     )
     fit = estimate(
         w[..., :60], f, used=used, held_out=(w2[..., :60], f2, used2), reduce=True,
-        estimator=weighted,
+        estimator=weighted_least_squares,
     )  # fmt: skip
     assert fit.verdict.grade == "not trustworthy"

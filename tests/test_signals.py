@@ -19,10 +19,10 @@ from pteron.identification.signals import (
     central_differences,
     cutoff_of,
     fitted_series,
+    lowpass,
     position_noise,
-    preprocessing_of,
+    preprocessing_for_log,
     samples,
-    smoothed,
     spline_motion,
     start_pose,
     uniform,
@@ -96,7 +96,7 @@ def test_a_cutoff_makes_the_error_of_the_acceleration_least(size, steady):
     signal = waves(TIME) + (noise if steady else jittered(size))
 
     def error(cutoff):
-        found = central_differences(smoothed(signal, RATE, cutoff), RATE)[1]
+        found = central_differences(lowpass(signal, RATE, cutoff), RATE)[1]
         off = (found - waves(TIME, 2)[LOST:-LOST])[2000:-2000]
         return np.sqrt((off**2).mean())
 
@@ -120,11 +120,11 @@ def test_the_filter_shifts_nothing_and_has_the_gain_that_it_says():
     for frequency in (1.0, 4.0, 8.0):
         wave = np.cos(2.0 * np.pi * frequency * TIME)[:, None]
         gain = 1.0 / (1.0 + (frequency / 4.0) ** 8)
-        error = smoothed(wave, RATE, 4.0) - gain * wave
+        error = lowpass(wave, RATE, 4.0) - gain * wave
         # The bilinear transform bends frequencies by (pi f / rate)^2 / 3.
         assert np.abs(error[inside]).max() < 2e-3
-    turned = smoothed(waves(TIME)[::-1], RATE, 4.0)[::-1]
-    assert np.abs(turned - smoothed(waves(TIME), RATE, 4.0))[inside].max() < 1e-9
+    turned = lowpass(waves(TIME)[::-1], RATE, 4.0)[::-1]
+    assert np.abs(turned - lowpass(waves(TIME), RATE, 4.0))[inside].max() < 1e-9
 
 
 # Derivatives
@@ -358,7 +358,7 @@ def test_states_are_those_of_the_motion(name):
     accelerations = pteron.kinematics.joint_accelerations(robot, pose, velocity, acceleration)
     sliders = pteron.inverse_kinematics(robot, pose)
     log = Log("log.csv", np.arange(200.0), sliders, sliders)
-    found = States.of_joints(
+    found = States.from_joints(
         robot,
         (sliders, rates.actuated, accelerations.actuated),
         log.time,
@@ -429,7 +429,7 @@ def par4_log(mode=0, **more):
 def test_a_machine_without_closed_form_is_followed_in_the_mode_of_a_pose(mode):
     robot, log = par4_log(mode)
     still = (log.joints, np.zeros_like(log.joints), np.zeros_like(log.joints))
-    found = States.of_joints(robot, still, log.time, start_pose(robot, log))
+    found = States.from_joints(robot, still, log.time, start_pose(robot, log))
     assert found.pose == pytest.approx(log.pose, abs=1e-11)
     rows = pteron.direct_kinematics(robot, log.joints[0])
     row = np.nanargmin(np.abs(rows - log.pose[0]).max(axis=-1))
@@ -438,7 +438,7 @@ def test_a_machine_without_closed_form_is_followed_in_the_mode_of_a_pose(mode):
     assert declared == pytest.approx(log.pose[0], abs=1e-11)
     if mode == 0:
         unsaid = start_pose(robot, replace(log, pose=None))
-        found = States.of_joints(robot, still, log.time, unsaid)
+        found = States.from_joints(robot, still, log.time, unsaid)
         assert found.pose == pytest.approx(log.pose, abs=1e-11)
     with pytest.raises(DataError, match="assembly_mode = 5 is no pose that its joints have"):
         start_pose(robot, replace(log, description=Description(assembly_mode=5)))
@@ -446,7 +446,7 @@ def test_a_machine_without_closed_form_is_followed_in_the_mode_of_a_pose(mode):
 
 def test_blocks_of_a_followed_motion_continue_each_other():
     robot, log = par4_log(1)
-    treatment = preprocessing_of(robot, log, Processing(derivatives="central", band=100.0))
+    treatment = preprocessing_for_log(robot, log, Processing(derivatives="central", band=100.0))
     found = [part.states.pose[part.fresh] for part in samples(robot, log, treatment, block=300)]
     assert len(found) > 2
     lost = (log.rows - sum(map(len, found))) // 2
@@ -460,7 +460,7 @@ def test_a_followed_log_names_the_sample_that_it_does_not_come_to():
     wild = log.joints.copy()
     wild[700] += [1.5, 0.0, -1.5, 0.0]
     with pytest.raises(LogError, match=r"row 701: no pose of par4 has the joints .*zeros$"):
-        States.of_joints(robot, (wild, still, still), log.time, start)
+        States.from_joints(robot, (wild, still, still), log.time, start)
 
 
 def unreachable(log, row):
@@ -474,7 +474,7 @@ def unreachable(log, row):
 def test_a_sample_without_a_pose_is_named_in_any_block(row, first):
     robot = CATALOG["quadrupteron"]
     log = replace(log_of(robot, duration=4.0), first_row=first)
-    treatment = preprocessing_of(robot, log)
+    treatment = preprocessing_for_log(robot, log)
     treatment = replace(treatment, derivatives="central", cutoff=None, band=100.0)
     broken = unreachable(log, row)
     for given in (broken, pieces(broken, 333)):
@@ -488,7 +488,7 @@ def test_a_wrong_mode_is_told_from_a_wrong_machine():
     # A pose that is lost in one mode only does not exist here: both fail, and the hint is general.
     robot = CATALOG["quadrupteron"]
     log = unreachable(log_of(robot, duration=1.0), 100)
-    treatment = preprocessing_of(robot, log, Processing(derivatives="central"))
+    treatment = preprocessing_for_log(robot, log, Processing(derivatives="central"))
     with pytest.raises(DataError, match="another machine"):
         list(samples(robot, log, replace(treatment, cutoff=None)))
 
@@ -512,7 +512,7 @@ def test_a_singular_sample_is_named():
     assert margin.min() > 0.0
     sliders[17] = pteron.inverse_kinematics(robot, pose[17] + low * across)
     with pytest.raises(DataError, match="row 1018: a leg is all but stretched or folded"):
-        States.of_joints(robot, tuple(motion_of), np.arange(30.0), pose[0], first_row=1000)
+        States.from_joints(robot, tuple(motion_of), np.arange(30.0), pose[0], first_row=1000)
 
 
 @pytest.mark.parametrize(("derivatives", "margin"), [("central", 0), ("spline", 37)])
@@ -520,7 +520,7 @@ def test_fresh_samples_of_blocks_tile_a_log(derivatives, margin):
     robot = CATALOG["tripteron"]
     # The knots of a spline are where a block says: noise falls on them in other ways.
     log = log_of(robot, duration=4.0, joint_noise=1e-6 * (derivatives == "central"))
-    treatment = preprocessing_of(robot, log, Processing(derivatives=derivatives, cutoff=20.0))
+    treatment = preprocessing_for_log(robot, log, Processing(derivatives=derivatives, cutoff=20.0))
     whole = list(samples(robot, log, treatment, margin=margin))
     assert len(whole) == 1
     found = list(samples(robot, pieces(log, 123), treatment, margin=margin, block=300))
@@ -542,7 +542,7 @@ def test_fresh_samples_of_blocks_tile_a_log(derivatives, margin):
 def test_a_log_shorter_than_the_edges_is_refused():
     robot = CATALOG["tripteron"]
     log = log_of(robot, duration=8.0)
-    treatment = preprocessing_of(robot, log, Processing(derivatives="central", cutoff=5.0))
+    treatment = preprocessing_for_log(robot, log, Processing(derivatives="central", cutoff=5.0))
     with pytest.raises(DataError, match="shorter than the"):
         list(samples(robot, log.part(0, 900), treatment))
 
@@ -570,7 +570,7 @@ def test_uneven_samples_give_the_motion(derivatives):
     rng = np.random.default_rng(13)
     time = np.arange(4000) / 500.0 + rng.uniform(-4e-4, 4e-4, 4000)
     log = log_of(robot, time=time)
-    treatment = preprocessing_of(robot, log, Processing(derivatives=derivatives))
+    treatment = preprocessing_for_log(robot, log, Processing(derivatives=derivatives))
     (found,) = samples(robot, log, replace(treatment, cutoff=None))
     expected = motion(robot, found.states.time)
     assert found.states.pose == pytest.approx(expected[0], abs=1e-8)
@@ -580,13 +580,13 @@ def test_uneven_samples_give_the_motion(derivatives):
 def test_the_data_choose_the_treatment():
     robot = CATALOG["quadrupteron"]
     clean, noisy = log_of(robot), log_of(robot, joint_noise=1e-5)
-    assert preprocessing_of(robot, clean).derivatives == "spline"
-    assert preprocessing_of(robot, noisy).derivatives == "central"
+    assert preprocessing_for_log(robot, clean).derivatives == "spline"
+    assert preprocessing_for_log(robot, noisy).derivatives == "central"
     known = replace(noisy, description=Description(period=4.0))
-    periodic = preprocessing_of(robot, known)
+    periodic = preprocessing_for_log(robot, known)
     assert (periodic.derivatives, periodic.period) == ("periodic", 4.0)
-    assert preprocessing_of(robot, known, rows=10**8).derivatives == "central"
-    assert preprocessing_of(robot, noisy).joint_noise == pytest.approx(1e-5, rel=0.1)
+    assert preprocessing_for_log(robot, known, rows=10**8).derivatives == "central"
+    assert preprocessing_for_log(robot, noisy).joint_noise == pytest.approx(1e-5, rel=0.1)
 
 
 def test_speeds_that_count_as_slow_are_a_share_of_the_usual_ones():
@@ -597,7 +597,7 @@ def test_speeds_that_count_as_slow_are_a_share_of_the_usual_ones():
         (pteron.kinematics.joint_rates(robot, pose, velocity).actuated ** 2).mean(axis=0)
     )
     for share in (0.0, 0.02, 0.3):
-        slow = preprocessing_of(robot, log, Processing(slow=share)).slow
+        slow = preprocessing_for_log(robot, log, Processing(slow=share)).slow
         assert slow == pytest.approx(share * usual, rel=0.01, abs=1e-15)
 
 
@@ -620,13 +620,16 @@ def test_a_treatment_that_cannot_be_is_refused(case):
     robot = CATALOG["tripteron"]
     log = log_of(robot)
     with pytest.raises(DataError, match=message):
-        preprocessing_of(robot, log, Processing(**given))
+        preprocessing_for_log(robot, log, Processing(**given))
 
 
 def test_the_longest_stretch_decides_the_treatment():
     robot = CATALOG["tripteron"]
     log = log_of(robot, joint_noise=1e-5)
-    whole, cut = preprocessing_of(robot, log), preprocessing_of(robot, without(log, 400, 700))
+    whole, cut = (
+        preprocessing_for_log(robot, log),
+        preprocessing_for_log(robot, without(log, 400, 700)),
+    )
     assert cut.rate == pytest.approx(whole.rate, rel=1e-9)
     assert cut.cutoff == pytest.approx(whole.cutoff, rel=0.5)
 

@@ -155,7 +155,7 @@ def test_forces_are_limited_delayed_and_held():
     np.testing.assert_array_equal(found.asked[:, 0], np.arange(11.0))
     # A force acts 2.5 ms after it was asked for: right after a sample, that of three before.
     np.testing.assert_array_equal(found.forces[:, 0], np.clip(np.arange(11.0) - 3.0, 0.0, 4.0))
-    np.testing.assert_allclose(found.saturated, 6.0 / 11.0)
+    np.testing.assert_allclose(found.saturated_share, 6.0 / 11.0)
     # What half a sample late does is between what none and a whole one do: masses hardly change.
     robot = pteron.load("tripteron")
     given = {"start": (home, rest), "duration": 0.005}
@@ -385,13 +385,13 @@ def test_a_motion_between_its_samples():
     assert not velocity.any()
     assert not acceleration.any()
     cycle = pick_and_place(pteron.load("tripteron"), [0.0, 0.0, 0.0], duration=1.0, samples=101)
-    twice = cycle.repeated(2)
+    twice = cycle.repeat(2)
     assert twice.duration == 2.0
     np.testing.assert_allclose(twice.at(1.25)[0], cycle.at(0.25)[0], atol=1e-12)
     with pytest.raises(pteron.DataError, match="cannot be repeated"):
-        motion.repeated(2)
+        motion.repeat(2)
     with pytest.raises(pteron.DataError, match="a whole number of 1 or more"):
-        cycle.repeated(1.5)
+        cycle.repeat(1.5)
 
 
 def test_a_motion_of_lists_and_of_wrong_shapes():

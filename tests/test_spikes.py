@@ -13,11 +13,11 @@ from logs_of_motions import Friction, log_of, machine, motion, truth
 
 import pteron
 from pteron.identification import Processing, Terms, identification_model
-from pteron.identification.estimators import weighted
+from pteron.identification.estimators import weighted_least_squares
 from pteron.identification.logs import Log, open_log, read_log, write_log
 from pteron.identification.logs.spikes import force_spikes, joint_spikes
 from pteron.identification.observation import observations_of
-from pteron.identification.signals import preprocessing_of
+from pteron.identification.signals import preprocessing_for_log
 
 log_of = partial(log_of, rate=500.0)  # rows are counted here
 
@@ -190,8 +190,8 @@ def test_what_is_identified_does_not_suffer(tmp_path, period):
     model = identification_model(robot, Terms())
 
     def worst(one):
-        preprocessing = preprocessing_of(robot, one, Processing(period=period))
-        found = weighted(observations_of(model, one, preprocessing))
+        preprocessing = preprocessing_for_log(robot, one, Processing(period=period))
+        found = weighted_least_squares(observations_of(model, one, preprocessing))
         return np.abs(found.values - truth(model)).max(), np.abs(
             (found.values - truth(model)) / found.deviations
         ).max()

@@ -13,7 +13,7 @@ import polars as pl
 import pytest
 
 from pteron.errors import DataError, OutputError
-from pteron.tables import CsvFile, Table, check_output, in_si, read_table, write_table
+from pteron.tables import CsvFile, Table, check_output, convert_to_si, read_table, write_table
 
 
 @pytest.fixture
@@ -117,19 +117,19 @@ def test_a_missing_column_is_named_with_those_found(given, content: bytes, words
 
 def test_columns_that_are_not_needed_come_back_as_they_were(given, tmp_path: Path):
     table = given(b'id,x,note\n007,1.50,"a,b"\n008,-0,\n')
-    result = table.extended({"rho1": [0.25, np.nan]})
+    result = table.with_columns({"rho1": [0.25, np.nan]})
     write_table(result.frame, tmp_path / "out.csv")
     assert (tmp_path / "out.csv").read_text() == ('id,x,note,rho1\n007,1.50,"a,b",0.25\n008,-0,,\n')
 
 
 def test_a_result_replaces_the_column_of_its_name(given):
-    table = given(b"rho1,x\n5,1\n").extended({"rho1": [0.5]})
+    table = given(b"rho1,x\n5,1\n").with_columns({"rho1": [0.5]})
     assert table.columns == ("x", "rho1")
     assert table.numbers(["rho1"]).tolist() == [[0.5]]
 
 
 def test_json_has_numbers_and_null(given):
-    table = given(b"x,t,note\n1.5,2,a\nnan,3,\n").extended({"rho1": [np.nan, 0.1]})
+    table = given(b"x,t,note\n1.5,2,a\nnan,3,\n").with_columns({"rho1": [np.nan, 0.1]})
     assert json.loads(table.json()) == [
         {"x": 1.5, "t": 2, "note": "a", "rho1": None},
         {"x": None, "t": 3, "note": None, "rho1": 0.1},
@@ -219,7 +219,7 @@ def test_units_in_names_are_converted(given):
     table = given(
         b"t (ms),x[mm],dx (mm/s),roll (deg),fx [N],note (mm)\n500,2,3,180,4,a\n,1,1,1,1,b\n"
     )
-    table = in_si(table, units)
+    table = convert_to_si(table, units)
     assert table.columns == ("t", "x", "dx", "roll", "fx", "note (mm)")
     found = table.numbers(list(units), "nan")
     np.testing.assert_allclose(found[0], [0.5, 0.002, 0.003, np.pi, 4.0], rtol=1e-15)
@@ -231,7 +231,7 @@ def test_units_in_names_are_converted(given):
         (b"x,x (mm)\n1,2\n", r"x and x \(mm\) given; keep one of them"),
     ):
         with pytest.raises(DataError, match=words):
-            in_si(given(content), units)
+            convert_to_si(given(content), units)
 
 
 def test_a_table_that_a_file_cannot_hold_leaves_the_old_file(tmp_path: Path):

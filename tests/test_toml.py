@@ -10,7 +10,7 @@ import pytest
 from pydantic import BaseModel, Field
 
 import pteron
-from pteron.errors import DataError, ModelError, shown
+from pteron.errors import DataError, ModelError, shorten
 from pteron.export import from_klipper
 from pteron.toml import parsed_toml, read_toml, to_model
 
@@ -162,4 +162,4 @@ def test_all_faults_are_told_each_on_a_line_and_none_at_length():
     ids=["text", "lists", "integer", "table"],
 )
 def test_no_value_is_shown_at_length(value):
-    assert len(shown(value)) < 300
+    assert len(shorten(value)) < 300

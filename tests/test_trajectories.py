@@ -19,7 +19,6 @@ from pteron.legs.motor_limits import speed_lines
 from pteron.motion import (
     FourierSeries,
     Motion,
-    along,
     check_motion,
     cycle_path,
     fourier_motion,
@@ -29,10 +28,11 @@ from pteron.motion import (
     peaks,
     pick_and_place,
     point_to_point,
+    polynomial_motion,
     replay,
+    return_path,
     shortest,
     simulate,
-    there_and_back,
     time_optimal,
     with_payload,
 )
@@ -176,7 +176,7 @@ PATHS = ("quadrupteron", "3-rrr", "random PRR 0", "sliding", "par4")
 def paths(name):
     """Return a cornered path with its way back, and that of a pick-and-place cycle."""
     robot = MACHINES[name]
-    lines = there_and_back(line_path(robot, around(name), 0.005))
+    lines = return_path(line_path(robot, around(name), 0.005))
     return lines, cycle_path(pick_and_place(robot, home(name)))
 
 
@@ -276,14 +276,16 @@ def test_a_cycles_path_is_that_of_the_cycle(name):
 def test_a_motion_takes_the_shortest_time_within_the_limits(name, drive):
     robot = driven(MACHINES[name], drive)
     path = line_path(robot, around(name), 0.01)
-    free = along(robot, path, duration=1.0, limits=limits_of(replace(robot), speed=np.inf))
+    free = polynomial_motion(
+        robot, path, duration=1.0, limits=limits_of(replace(robot), speed=np.inf)
+    )
     _, accelerations, forces = sides(robot, free)
     for limits in (
         limits_of(robot, acceleration=3.0 * np.abs(accelerations).max(), speed=100.0),
         limits_of(robot, force=1.5 * np.abs(forces).max(axis=0) + 1.0, speed=100.0),
         limits_of(robot, speed=np.abs(sides(robot, free)[0]).max(axis=0)),
     ):
-        found = along(robot, path, limits=limits)
+        found = polynomial_motion(robot, path, limits=limits)
         assert used(robot, found, limits) <= 1.0 + 1e-8
         # Samples are whole steps: a step less is too short.
         faster = Motion(
@@ -292,12 +294,12 @@ def test_a_motion_takes_the_shortest_time_within_the_limits(name, drive):
         # Dry friction counts in full, at rest and moving.
         assert used(robot, faster, limits) > (1.0 if drive is DRIVE else 0.97)
         with pytest.raises(pteron.DataError, match=r"too short: leg .* its limit is .* shortest"):
-            along(robot, path, limits=limits, duration=0.9 * found.duration)
+            polynomial_motion(robot, path, limits=limits, duration=0.9 * found.duration)
 
 
 def test_peaks_are_those_of_the_motion():
     robot = driven(MACHINES["random 3T1R 0"])
-    motion = along(
+    motion = polynomial_motion(
         robot, line_path(robot, around("random 3T1R 0"), 0.01), duration=0.5, law="seventh"
     )
     found = peaks(robot, motion.pose, motion.velocity, motion.acceleration, limits_of(robot))
@@ -319,7 +321,7 @@ def test_the_fastest_motion_keeps_every_limit_and_is_never_slower(name):
     path = cycle_path(cycle)
     fastest = time_optimal(robot, path, limits)
     assert used(robot, fastest, limits) <= 1.0 + 1e-8
-    assert fastest.duration < along(robot, path, limits=limits).duration
+    assert fastest.duration < polynomial_motion(robot, path, limits=limits).duration
     assert fastest.duration < shortest(robot, cycle.cycle.at, limits).duration
     assert fastest.duration < 1.08 * fastest.bound
     np.testing.assert_allclose(fastest.pose[[0, -1]], cycle.pose[[0, -1]], atol=1e-9)
@@ -338,7 +340,7 @@ def test_a_force_keeps_its_limit_where_a_joint_reverses_between_samples(name):
     held = max(float(np.abs(pteron.inverse_dynamics(robot, pose, still, still)).max()), 1.0)
     robot = driven(robot, pteron.legs.Drive(coulomb=0.3 * held, viscous=0.02 * held))
     path = cycle_path(pick_and_place(robot, pose))
-    slow = along(robot, path, duration=1.0)
+    slow = polynomial_motion(robot, path, duration=1.0)
     forces = np.abs(pteron.drive_forces(robot, slow.pose, slow.velocity, slow.acceleration))
     limits = limits_of(robot, force=STRENGTHS[name] * forces.max(axis=0))
     fastest = time_optimal(robot, path, limits)
@@ -474,7 +476,11 @@ def test_no_motion_asks_more_than_the_motor_gives_at_its_speed(name):
     limits = limits_of(robot)
     assert not np.isfinite(limits.force).any()
     path = cycle_path(cycle)
-    planned = along(robot, path), shortest(robot, cycle.cycle.at, limits), time_optimal(robot, path)
+    planned = (
+        polynomial_motion(robot, path),
+        shortest(robot, cycle.cycle.at, limits),
+        time_optimal(robot, path),
+    )
     for motion in planned:
         assert 0.98 < of_motor(robot, motion) <= 1.0 + 1e-8
     start, end = cycle.pose[0], cycle.pose[len(cycle.pose) // 2]
@@ -482,7 +488,7 @@ def test_no_motion_asks_more_than_the_motor_gives_at_its_speed(name):
     assert of_motor(robot, jerk_limited(robot, start, end, 1e6, quick)) <= 1.0 + 1e-8
     # A little faster is refused, and by whom it is refused is told.
     with pytest.raises(pteron.DataError, match=r"leg \d takes .* its limit at that speed is"):
-        along(robot, path, duration=0.97 * planned[0].duration)
+        polynomial_motion(robot, path, duration=0.97 * planned[0].duration)
     fast = cycle.at(np.linspace(0.0, cycle.duration, 1001))
     told = {peak.leg: peak for peak in peaks(robot, *fast, limits) if peak.name == "force_at_speed"}
     assert set(told) == set(range(1, robot.joint_count + 1))
@@ -497,19 +503,21 @@ def test_a_plan_leaves_a_simulated_motor_within_what_it_gives(name):
     """A controller that follows the plan asks for no more; 1.3 times as fast it does."""
     robot, cycle = with_motors(name)
     path = cycle_path(cycle)
-    planned = along(robot, path, duration=1.03 * along(robot, path).duration)
+    planned = polynomial_motion(
+        robot, path, duration=1.03 * polynomial_motion(robot, path).duration
+    )
     parts = planned.pose, 1.3 * planned.velocity, 1.3**2 * planned.acceleration
     for motion, kept in ((planned, True), (Motion(planned.time / 1.3, *parts), False)):
         found = simulate(robot, motion, ComputedTorque(), limits=False)
         assert found.stopped is None
-        assert (found.saturated == 0.0).all() == kept
+        assert (found.saturated_share == 0.0).all() == kept
         assert (np.abs(found.error).max() < 1e-4) == kept
 
 
 def test_a_hollow_curve_is_kept_by_less_and_a_time_that_it_allows_is_not_refused():
     hollow = pteron.legs.Drive(curve=((0.0, 60.0), (0.3, 30.0), (0.6, 15.0), (3.0, 15.0)))
     robot, path, _ = axis_move(curve=hollow.curve)
-    found = along(robot, path)
+    found = polynomial_motion(robot, path)
     assert of_motor(robot, found) <= 1.0 + 1e-8
     shorter = next(share for share in np.arange(0.5, 1.0, 0.01) if fits(robot, path, share, found))
     assert shorter < 0.95
@@ -529,7 +537,7 @@ def test_a_hollow_curve_is_kept_by_less_and_a_time_that_it_allows_is_not_refused
 def fits(robot, path, share, found):
     """Say whether a share of a motion's time is taken; what is taken keeps what motors give."""
     try:
-        faster = along(robot, path, duration=share * found.duration)
+        faster = polynomial_motion(robot, path, duration=share * found.duration)
     except pteron.DataError:
         return False
     assert of_motor(robot, faster) <= 1.0 + 1e-6
@@ -567,7 +575,7 @@ def test_a_fourier_series_has_its_own_derivatives_and_repeats():
     for order in range(2):
         found = derivative(lambda t, k=order: np.array([series.at(time + u)[k] for u in t]), 1e-3)
         np.testing.assert_allclose(found, series.at(time)[order + 1], rtol=1e-9, atol=1e-9)
-    assert motion.repeated(2).duration == 3.0
+    assert motion.repeat(2).duration == 3.0
     with pytest.raises(pteron.DataError, match=r"shapes .* expected"):
         FourierSeries((0.0,), ((1.0, 2.0),), ((1.0,),), 1.0)
     with pytest.raises(pteron.DataError, match="period"):
@@ -577,7 +585,7 @@ def test_a_fourier_series_has_its_own_derivatives_and_repeats():
 def test_a_table_is_replayed_by_poses_or_by_joints():
     robot = MACHINES["3-rrr"]
     poses = around("3-rrr")
-    motion = along(robot, line_path(robot, poses, 0.01), duration=0.8, law="seventh")
+    motion = polynomial_motion(robot, line_path(robot, poses, 0.01), duration=0.8, law="seventh")
     joints = pteron.inverse_kinematics(robot, motion.pose)
     columns = {"t": motion.time}
     pose = columns | dict(zip(robot.coordinates, motion.pose.T, strict=True))

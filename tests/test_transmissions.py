@@ -201,8 +201,8 @@ def test_forces_are_what_motors_give_and_not_what_is_asked_of_them():
     found = simulate(robot, motion, ComputedTorque(), limits=False, **given)
     most = np.interp(np.abs(found.motor_rates[:, 2]), *np.array(curve).T)
     assert (np.abs(found.forces[:, 2]) <= most + 1e-12).all()
-    assert (found.saturated[:3] > 0.2).all()
-    assert found.saturated[3] == 0.0
+    assert (found.saturated_share[:3] > 0.2).all()
+    assert found.saturated_share[3] == 0.0
     stiff = driven(drawn, *drives[:2], limited, free)
     found = simulate(stiff, motion, ComputedTorque(), limits=False, **given)
     own = pteron.drive_forces(stiff, found.pose, found.velocity, found.acceleration)

@@ -30,10 +30,10 @@ from pteron.kinematics import jacobian
 from pteron.legs import Drive, Elastic
 from pteron.manipulator import Manipulator
 from pteron.motion import (
-    Margins,
+    LoopMargins,
     Required,
     Sensors,
-    linearised,
+    linearise,
     modes,
     pick_and_place,
     simulate,
@@ -120,7 +120,7 @@ def test_poles_of_drives_that_bend_are_the_machines_modes(encoder: str) -> None:
     ]
     pairs = zip(robot.legs, drives, strict=True)
     robot = replace(robot, legs=tuple(replace(leg, drive=drive) for leg, drive in pairs))
-    plant = linearised(robot, home_pose(robot))
+    plant = linearise(robot, home_pose(robot))
     expected = modes(robot, home_pose(robot))[0]
     fast = expected[np.abs(expected) > 1e-6]
     assert np.abs(plant.poles[:, None] - fast).min(axis=0).max() < 1e-9 * np.abs(fast).max()
@@ -178,7 +178,7 @@ def test_each_rate_lags_as_its_own_encoder_has_it(encoder: str, sensors: Sensors
     tuned = tune(robot, controller=FeedForwardPD(), poses=home[None], **given)
     late = tuned.margins[0].common_delay
     loop = replace(tuned.loops[0], share=None)
-    assert encoder == "joint" or Margins(loop).common_delay > 1.1 * late
+    assert encoder == "joint" or LoopMargins(loop).common_delay > 1.1 * late
     duration = 0.6 if encoder == "rigid" else 3.0
     for share, sign in ((0.95, -1.0), (1.05, 1.0)):
         given["delay"] = 3e-4 + share * late
@@ -215,7 +215,7 @@ def test_the_plant_is_the_derivative_of_the_equations_of_motion(name: str, speed
     robot = driven(name)
     home = home_pose(robot)
     velocity = speed * np.linspace(1.0, -0.5, len(home))
-    plant = linearised(robot, home, velocity, 3.0 * velocity)
+    plant = linearise(robot, home, velocity, 3.0 * velocity)
     forces = drive_forces(robot, home, velocity, 3.0 * velocity)
     m, state = len(home), np.concatenate([home, velocity])
 

@@ -31,7 +31,7 @@ def test_numbers_have_the_text_that_tables_have():
 
 def test_results_stand_behind_what_was_typed():
     for part in both({"x": [0.5], "rho1": [0.25], "y": [-2.0]}):
-        found = part.extended({"rho1": np.array([1e-5]), "rho2": np.array([np.nan])})
+        found = part.with_columns({"rho1": np.array([1e-5]), "rho2": np.array([np.nan])})
         assert found.columns == ("x", "y", "rho1", "rho2")
         assert "".join(found.text()) == "x,y,rho1,rho2\n0.5,-2.0,0.00001,\n"
         assert found.json() == '[{"x":0.5,"y":-2.0,"rho1":0.00001,"rho2":null}]'
@@ -46,7 +46,7 @@ def test_results_stand_behind_what_was_typed():
 def test_a_row_is_repeated_for_each_assembly_mode(modes):
     row, _ = both({"rho1": [0.5], "z": [9.0]})
     poses = [math.nan if mode is None else 0.25 * mode for mode in modes]
-    found = row.repeated(modes, ["z"]).extended({"z": poses})
+    found = row.repeat_modes(modes, ["z"]).with_columns({"z": poses})
     told = ["1,0.5,,"] if modes == [None] else ["1,0.5,1,0.25", "1,0.5,2,0.5"]
     assert "".join(found.text()).splitlines() == ["row,rho1,mode,z", *told]
     assert found.frame["mode"].null_count() == modes.count(None)

@@ -28,7 +28,7 @@ from pteron.thresholds import (
     LEAST_SINGULAR_VALUE,
     SAME_PLACE,
     STOUT_LINK,
-    rounding_of,
+    rounding_tolerance,
 )
 from pteron.workspace import home_pose, home_poses, pose_margins
 from pteron.workspace.holding import holding_warnings, measure_holding
@@ -454,7 +454,7 @@ def test_the_page_of_verdicts_has_the_thresholds_as_they_are():
     shown = {
         "singular everywhere within": (
             "0.1 mm, or L/1000",
-            (rounding_of(1.0), rounding_of(1e-3)) == (1e-4, 1e-6),
+            (rounding_tolerance(1.0), rounding_tolerance(1e-3)) == (1e-4, 1e-6),
         ),
         "coordinates that differ by ... make the machine": ("ten times that", INACCURATE == 10.0),
         "least singular value": ("0.02", LEAST_SINGULAR_VALUE == 0.02),

@@ -32,7 +32,7 @@ from pteron.viewer.boundary import is_allowed
 from pteron.viewer.guard import is_here
 from pteron.viewer.motion_files import motion_of_file
 from pteron.viewer.panel import action, activity_text, values
-from pteron.viewer.picture import Picture
+from pteron.viewer.picture import ViewerPicture
 from pteron.viewer.pushing import DRIVES
 from pteron.viewer.readings import readings
 from pteron.viewer.readout import readout
@@ -207,7 +207,7 @@ def test_the_numbers_are_the_librarys(homes, name):
 
 def test_a_torques_arrow_goes_round_its_axis_from_the_crank_on(homes):
     state = homes["3-rrr"]
-    picture = Picture(state.robot, state.pose[None], None)
+    picture = ViewerPicture(state.robot, state.pose[None], None)
     forces = np.array([1.0, -0.5, 0.25])
     moment = picture.moment(state, forces, np.full(3, 0.5), screws=False)
     for i, (points, leg, _) in enumerate(moment["forces"]):

@@ -28,9 +28,9 @@ import numpy as np
 import plant
 
 import pteron
-from pteron.identification import Identification, Log, Processing, identify, preprocessing_of
+from pteron.identification import Identification, Log, Processing, identify, preprocessing_for_log
 from pteron.identification.excitation import FourierMotion, Limits, optimal_excitation
-from pteron.identification.observation import in_motion
+from pteron.identification.observation import motion_mask
 from pteron.identification.signals import samples
 from pteron.kernels import Array
 from pteron.kernels.c import compiler
@@ -243,13 +243,15 @@ def run(
 
     # Export, and predict the held-out cycle
     controller, noise = Controller(drawn, path, folder), seen["pick-and-place cycle"].noise
-    preprocessing = replace(preprocessing_of(drawn, held_out), delay=found.preprocessing[0].delay)
+    preprocessing = replace(
+        preprocessing_for_log(drawn, held_out), delay=found.preprocessing[0].delay
+    )
     true = recordings["pick-and-place cycle"]
-    moving = in_motion(true.rates, preprocessing.slow, preprocessing.turning)
+    moving = motion_mask(true.rates, preprocessing.slow, preprocessing.turning_rows)
     off = (controller(true.joints, true.rates, true.accelerations) - held_out.forces) / noise
     (block,) = samples(drawn, held_out, preprocessing)
     states, forces = block.states.part(block.fresh), block.forces[block.fresh]
-    known = in_motion(states.joint_rates, preprocessing.slow, preprocessing.turning)
+    known = motion_mask(states.joint_rates, preprocessing.slow, preprocessing.turning_rows)
     by_encoders = controller(states.joints, states.joint_rates, states.joint_accelerations)
 
     # Run the machine with it

@@ -338,7 +338,7 @@ def commanded(case: Case) -> tuple[Array, Array, Array]:
 
 def states_of(robot: pteron.Manipulator, case: Case) -> tuple[Array, Array, Array]:
     """Return the platform's motion on a machine whose joints move as commanded."""
-    states = States.of_joints(robot, commanded(case), case.time, home_pose(robot))
+    states = States.from_joints(robot, commanded(case), case.time, home_pose(robot))
     return states.pose, states.velocity, states.acceleration
 
 
@@ -407,11 +407,11 @@ def judged(name: str, fault: str, seed: int) -> Said:
     _, rates, seconds = commanded(case)
     pose = case.motion.at(case.time).pose.mean(axis=0)
     extent = Extent(pose, np.abs(rates).max(axis=0), np.abs(seconds).max(axis=0))
-    cycle = ReferenceCycle.within(case.motion.robot, extent, size=_SIZE)
+    cycle = ReferenceCycle.about_mean_pose(case.motion.robot, extent, size=_SIZE)
     assert cycle is not None
     s = cycle.states
     joints = s.joints, s.joint_rates, s.joint_accelerations
-    true = States.of_joints(case.robot, joints, s.time, home_pose(case.robot))
+    true = States.from_joints(case.robot, joints, s.time, home_pose(case.robot))
     forces = pteron.drive_forces(case.robot, true.pose, true.velocity, true.acceleration)
     off = np.nan
     if found.machine is not None:
@@ -474,7 +474,7 @@ def simulated(name: str, play: float | None = None) -> Said:
     return Said(
         result.verdict.grade,
         named,
-        float(result.fault_isolation.off.max()),
+        float(result.fault_isolation.expected_error.max()),
         result.fault_isolation.hidden,
     )
 

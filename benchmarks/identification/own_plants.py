@@ -730,7 +730,7 @@ def answered(plant: Plant, fault: str, seed: int, **options: Any) -> Answer:
         return Answer("refused", said, (said,), np.nan)
     verdict = result.verdict
     off = error_of(result, plant, fault, seed)
-    shown = result.fault_isolation.off
+    shown = result.fault_isolation.expected_error
     expected = float(np.max(shown)) if len(shown) else np.nan
     return Answer(
         verdict.grade, verdict.reasons[0], result.causes, off, expected, verdict.next_steps
@@ -748,7 +748,7 @@ def error_of(result: Identification, plant: Plant, fault: str, seed: int) -> flo
     about = motion.joints, motion.rates, motion.accelerations
     try:
         start = result.preprocessing[0].start
-        s = States.of_joints(result.machine, about, motion.time, start)
+        s = States.from_joints(result.machine, about, motion.time, start)
     except pteron.PteronError:
         return float("inf")
     forces = pteron.drive_forces(result.machine, s.pose, s.velocity, s.acceleration)

@@ -27,7 +27,7 @@ from pteron.identification import (
     Model,
     identification_model,
     observations_of,
-    preprocessing_of,
+    preprocessing_for_log,
 )
 from pteron.identification.estimators import ESTIMATORS
 from pteron.kernels import Array
@@ -112,7 +112,7 @@ class Bench:
 
     def estimate(self, log: Log, estimator: str) -> Estimate:
         """Identify by the default path."""
-        preprocessing = preprocessing_of(self.model.robot, log)
+        preprocessing = preprocessing_for_log(self.model.robot, log)
         return ESTIMATORS[estimator](observations_of(self.model, log, preprocessing))
 
 

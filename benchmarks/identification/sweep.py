@@ -38,9 +38,9 @@ from pteron.identification import (
     maximum_likelihood,
     observations_of,
     ordinary,
-    preprocessing_of,
+    preprocessing_for_log,
     total,
-    weighted,
+    weighted_least_squares,
 )
 from pteron.identification.plausibility import usual_sizes
 from pteron.identification.prediction import predict
@@ -126,7 +126,7 @@ Estimator = Callable[[Model, Log, Preprocessing, Observations], Estimate]
 
 ESTIMATORS: dict[str, Estimator] = {
     "ordinary": lambda model, log, treatment, equations: ordinary(equations),
-    "weighted": lambda model, log, treatment, equations: weighted(equations),
+    "weighted": lambda model, log, treatment, equations: weighted_least_squares(equations),
     "huber": lambda model, log, treatment, equations: huber(equations),
     "total": lambda model, log, treatment, equations: total(
         equations, column_errors(model, log, treatment)
@@ -235,7 +235,7 @@ def score(
     held: dict[str, list[tuple[float, float, float]]] = {name: [] for name in names}
     for seed in range(repetitions):
         log = bench.log(noise, seed)
-        treatment = preprocessing_of(bench.robot, log)
+        treatment = preprocessing_for_log(bench.robot, log)
         equations = observations_of(bench.model, log, treatment)
         for name in names:
             found = ESTIMATORS[name](bench.model, log, treatment, equations)
@@ -248,7 +248,7 @@ def score(
                     bench.model,
                     found.values,
                     read_recording(other),
-                    preprocessing_of(bench.robot, other),
+                    preprocessing_for_log(bench.robot, other),
                 )
                 true_floor = noise[1] * np.sqrt((bench.other.forces**2).mean(axis=0))
                 held[name].append(

@@ -100,5 +100,5 @@ CODE: dict[str, tuple[str, ...]] = {
     "D2": (f"{_E}.drives.drive_accelerations",),
     "D3": (f"{_E}.laws.adaptive", f"{_E}.mixed.mixed_forces"),
     "I1": ("pteron.identification.observations_of",),
-    "I2": ("pteron.identification.weighted",),
+    "I2": ("pteron.identification.weighted_least_squares",),
 }

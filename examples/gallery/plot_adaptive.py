@@ -14,7 +14,7 @@ robot = pteron.load("delta")
 believed = pteron.with_parameters(robot, 0.7 * pteron.parameters(robot))
 cycle = pick_and_place(robot, duration=0.5, samples=251)
 found = simulate(
-    robot, cycle.repeated(4), Adaptive(period=1e-3, motion=cycle), model=believed, step=2e-4
+    robot, cycle.repeat(4), Adaptive(period=1e-3, motion=cycle), model=believed, step=2e-4
 )
 
 # %%

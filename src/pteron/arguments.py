@@ -22,7 +22,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pteron.errors import DataError, PteronError, shown
+from pteron.errors import DataError, PteronError, shorten
 
 _CHECKED_LATER = {
     *("RobotLike", "PoseLike", "PoseLike | None", "JointsLike", "JointsLike | None"),
@@ -54,7 +54,7 @@ class _Kind(NamedTuple):
     holds: Callable[[Any], bool]
 
 
-def checking(function: types.FunctionType) -> types.FunctionType:
+def with_checked_arguments(function: types.FunctionType) -> types.FunctionType:
     """Return a function that first refuses arguments of another kind than its type hints say."""
     hints = {hint for key, hint in function.__annotations__.items() if key != "return"}
     return _add_check(function) if hints - _CHECKED_LATER - {"bool"} else function
@@ -87,7 +87,7 @@ def expect_kinds(
     for name, argument in arguments:
         kind, default = kinds.get(name, (None, None))
         if kind is not None and argument is not default and not kind.holds(argument):
-            wrong.append(f"{name}: {shown(argument)} given, {kind.words} expected")
+            wrong.append(f"{name}: {shorten(argument)} given, {kind.words} expected")
     if wrong:
         raise DataError("; ".join(wrong))
 

@@ -145,7 +145,7 @@ class SingularPose(PteronError):
         self.leg = leg
 
 
-def shown(value: object, *, bare: bool = False, longest: int = _LONGEST) -> str:
+def shorten(value: object, *, bare: bool = False, longest: int = _LONGEST) -> str:
     r"""Return a value as messages show it: short, on one line, without control characters.
 
     Parameters

@@ -23,7 +23,7 @@ def json_text(data: Any) -> str:
     return json.dumps(json_ready(data), indent=1, allow_nan=False) + "\n"
 
 
-def picked(owner: object, *names: str) -> dict[str, Any]:
+def fields_as_json(owner: object, *names: str) -> dict[str, Any]:
     """Return attributes of an object as plain data, by their names.
 
     A name may hold several words, each "attribute" or "key=attribute", where the key is another.

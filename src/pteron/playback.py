@@ -13,9 +13,9 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from pteron.errors import DataError, shown, warn_unlikely
+from pteron.errors import DataError, shorten, warn_unlikely
 from pteron.identification.logs import Description, Log, LogFile, find_description, read_log
-from pteron.identification.signals import States, preprocessing_of, samples, spline_motion
+from pteron.identification.signals import States, preprocessing_for_log, samples, spline_motion
 from pteron.kernels import Array
 from pteron.kinematics.unlikely_values import warn_of_unlikely
 from pteron.manipulator import Manipulator
@@ -27,7 +27,7 @@ from pteron.tables import (
     Dialect,
     ParquetFile,
     Table,
-    in_si,
+    convert_to_si,
     open_table,
     read_table,
     whole_table,
@@ -110,13 +110,13 @@ def playback(robot: Manipulator, motion: Given, start: PoseLike | None = None) -
     if isinstance(motion, str | Path):
         motion = read_motion(robot, motion)
     if isinstance(motion, Log):
-        return of_log(robot, motion)
+        return playback_of_log(robot, motion)
     if not isinstance(motion, Table):
         raise DataError(
-            f"motion: {shown(motion)} given; a Motion, a Simulation, a Table, a Log or a file's "
+            f"motion: {shorten(motion)} given; a Motion, a Simulation, a Table, a Log or a file's "
             "path expected"
         )
-    return of_table(robot, motion, start)
+    return playback_of_table(robot, motion, start)
 
 
 def read_motion(robot: Manipulator, path: str | Path) -> Table | Log:
@@ -170,9 +170,9 @@ def is_table(robot: Manipulator, columns: Sequence[str]) -> bool:
     return bare.issuperset(robot.coordinates) and bare.isdisjoint(robot.joint_names)
 
 
-def of_table(robot: Manipulator, rows: Table, start: PoseLike | None = None) -> Playback:
+def playback_of_table(robot: Manipulator, rows: Table, start: PoseLike | None = None) -> Playback:
     """Return the motion of a table, with its forces where it has them all."""
-    rows = in_si(rows, {**robot.column_units, "t": "s"})
+    rows = convert_to_si(rows, {**robot.column_units, "t": "s"})
     if start is None and not set(rows.columns) >= set(robot.coordinates):
         start = home_pose(robot)
     motion = replay(robot, rows, start=start)
@@ -187,16 +187,16 @@ def of_table(robot: Manipulator, rows: Table, start: PoseLike | None = None) -> 
     return Playback(motion, forces, Path(rows.source).name, payload=heaviest)
 
 
-def of_log(robot: Manipulator, log: Log) -> Playback:
+def playback_of_log(robot: Manipulator, log: Log) -> Playback:
     """Return the motion of a log's joints, smoothed, with its forces where they are N or N m."""
     # All of it is to be seen, and not the part alone that repeats.
     whole_log = replace(
         log, description=replace(log.description, period=None, start=None, end=None)
     )
-    how = preprocessing_of(robot, whole_log)
+    how = preprocessing_for_log(robot, whole_log)
     if len(log.segments) == 1:
         moves = spline_motion(log.time, log.joints, how.cutoff)
-        states = [States.of_joints(robot, moves, log.time, how.start, source=log.source)]
+        states = [States.from_joints(robot, moves, log.time, how.start, source=log.source)]
         forces = log.forces
     else:
         # Filters lose what is next to a gap, where a spline would invent a motion.
@@ -204,11 +204,13 @@ def of_log(robot: Manipulator, log: Log) -> Playback:
         states = [part.states for part in parts]
         forces = np.concatenate([part.forces for part in parts])
 
-    def joined(name: str) -> Array:
+    def join_columns(name: str) -> Array:
         return np.concatenate([getattr(state, name) for state in states])
 
-    time = joined("time")
-    motion = Motion(time - time[0], joined("pose"), joined("velocity"), joined("acceleration"))
+    time = join_columns("time")
+    motion = Motion(
+        time - time[0], join_columns("pose"), join_columns("velocity"), join_columns("acceleration")
+    )
     check_motion(robot, motion)
     # Else they are in a drive's own unit, such as A.
     known = log.description.force_unit == "N"

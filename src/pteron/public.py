@@ -66,9 +66,9 @@ def publish(
 
     def public(name: str, value: Any) -> Any:
         if isinstance(value, FunctionType) and (checked is True or name in (checked or ())):
-            from pteron.arguments import checking  # NumPy
+            from pteron.arguments import with_checked_arguments  # NumPy
 
-            value = checking(value)
+            value = with_checked_arguments(value)
             # Pickles and doctests look for a function where it says that it is from.
             setattr(sys.modules[value.__module__], value.__name__, value)
         names[name] = value

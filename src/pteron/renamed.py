@@ -40,6 +40,11 @@ RENAMED = {
     },
     "pteron.export.engines": {"Motor": "pteron.export.engines.TreeMotor"},
     "pteron.identification": {
+        "weighted": "pteron.identification.weighted_least_squares",
+        "reduced": "pteron.identification.independent_columns",
+        "stacked": "pteron.identification.stack_observations",
+        "preprocessing_of": "pteron.identification.preprocessing_for_log",
+        "Fit": "pteron.identification.RegressorFit",
         "Suspicion": "pteron.identification.IsolatedFault",
         "Trial": "pteron.identification.FaultIsolation",
         "playback": "pteron.playback",
@@ -50,6 +55,8 @@ RENAMED = {
         "trial": "pteron.identification.faults.isolate_faults",
     },
     "pteron.identification.signals": {
+        "smoothed": "pteron.identification.signals.lowpass",
+        "preprocessing_of": "pteron.identification.signals.preprocessing_for_log",
         "FourierSeries": "pteron.identification.signals.FittedSeries",
     },
     "pteron.motion": {
@@ -57,11 +64,41 @@ RENAMED = {
         "Place": "pteron.motion.CyclePlace",
         "least_reserve": "pteron.motion.least_margin",
         "placed": "pteron.motion.motion_at_place",
+        "there_and_back": "pteron.motion.return_path",
+        "along": "pteron.motion.polynomial_motion",
+        "linearised": "pteron.motion.linearise",
+        "Margins": "pteron.motion.LoopMargins",
+        "Trial": "pteron.motion.GainTrial",
     },
     "pteron.motion.simulation": {"Law": "pteron.motion.simulation.ControlLaw"},
     "pteron.workspace": {
         "Reserve": "pteron.workspace.PoseMargins",
         "reserve": "pteron.workspace.pose_margins",
+    },
+    "pteron.identification.estimators": {
+        "weighted": "pteron.identification.estimators.weighted_least_squares",
+        "reduced": "pteron.identification.estimators.independent_columns",
+    },
+    "pteron.identification.logs": {
+        "joined": "pteron.identification.logs.join_logs",
+    },
+    "pteron.motion.tuning": {
+        "linearised": "pteron.motion.tuning.linearise",
+        "Margins": "pteron.motion.tuning.LoopMargins",
+        "Trial": "pteron.motion.tuning.GainTrial",
+    },
+    "pteron.plots": {
+        "resized": "pteron.plots.resize",
+    },
+    "pteron.report.identification": {
+        "measured": "pteron.report.identification.value_with_uncertainty",
+    },
+    "pteron.tables": {
+        "listed": "pteron.tables.join_names",
+        "in_si": "pteron.tables.convert_to_si",
+    },
+    "pteron.calibration": {
+        "Finding": "pteron.calibration.CalibrationFinding",
     },
 }
 """Names of version 0.1 by package, and where each of them is now."""

@@ -57,6 +57,6 @@ if it is heavier than the platform too. Links of the catalog's machines have up 
 platform that is heavier."""
 
 
-def rounding_of(length: float) -> float:
+def rounding_tolerance(length: float) -> float:
     """Return the rounding of coordinates, m, of a machine whose unit rows have a length, m."""
     return min(ROUNDING_OF_FILES, SMALL_MACHINES * length)

@@ -15,7 +15,7 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from pteron.errors import ModelError, PteronError, shown
+from pteron.errors import ModelError, PteronError, shorten
 
 if TYPE_CHECKING:
     from pydantic import ValidationError
@@ -99,7 +99,7 @@ def toml_bytes(path: str | Path, error: type[PteronError], absent: str) -> tuple
     PteronError
         If the file cannot be read; see `read_toml`.
     """
-    source = shown(str(path), bare=True, longest=1000) or "''"
+    source = shorten(str(path), bare=True, longest=1000) or "''"
     try:
         expect_regular(Path(path))
         with Path(path).open("rb") as file:
@@ -170,7 +170,7 @@ def parsed_toml(content: bytes, source: str, error: type[PteronError]) -> dict[s
         raise error("not a TOML file (it is not UTF-8 text)", subject=source) from None
     # The parser's time and memory grow with the square of a dotted key's length.
     if long := _LONG_KEY.search(_STRING_OR_COMMENT.sub("_", text)):
-        start = shown(long[0], bare=True, longest=20)
+        start = shorten(long[0], bare=True, longest=20)
         raise error(
             f"not a file of settings (the key {start} has over {_PARTS} parts); mend it",
             subject=source,
@@ -183,7 +183,7 @@ def parsed_toml(content: bytes, source: str, error: type[PteronError]) -> dict[s
     try:
         document = tomllib.loads(text)
     except tomllib.TOMLDecodeError as fault:
-        reason = shown(str(fault), bare=True, longest=200)
+        reason = shorten(str(fault), bare=True, longest=200)
         if comma := _DECIMAL_COMMA.search(text):
             reason += f"; {comma[1]} has a decimal comma, write a point"
     except RecursionError:
@@ -305,7 +305,7 @@ def _key(location: tuple[int | str, ...]) -> str:
             key += f"{link.replace('.', ', ')}item {part + 1}"
             link = ": "
         else:
-            key += link + shown(part, bare=True)
+            key += link + shorten(part, bare=True)
             link = "."
     return key
 
@@ -326,7 +326,7 @@ def _nearest_key(location: tuple[int | str, ...], schema: _Node) -> tuple[int | 
 def _fault(
     fault: Any, schema: _Node, location: tuple[int | str, ...], listed: set[tuple[str, ...]]
 ) -> str:
-    kind, shown_input, context = fault["type"], shown(fault["input"]), fault.get("ctx", {})
+    kind, shown_input, context = fault["type"], shorten(fault["input"]), fault.get("ctx", {})
     if kind == "value_error":
         return str(context["error"])
     if kind in _UNKNOWN:
@@ -372,19 +372,19 @@ def _schema(model: Any) -> _Node:
 
     schema = TypeAdapter(model).json_schema(by_alias=True)
 
-    def resolved(node: Any) -> Any:
+    def resolve_reference(node: Any) -> Any:
         if isinstance(node, list):
-            return [resolved(member) for member in node]
+            return [resolve_reference(member) for member in node]
         if not isinstance(node, dict):
             return node
         if "$ref" in node:
-            return resolved(schema["$defs"][node["$ref"].rpartition("/")[2]])
+            return resolve_reference(schema["$defs"][node["$ref"].rpartition("/")[2]])
         others = [member for member in node.get("anyOf", []) if member.get("type") != "null"]
         if len(others) == 1:
-            return resolved(others[0])
-        return {key: resolved(member) for key, member in node.items() if key != "$defs"}
+            return resolve_reference(others[0])
+        return {key: resolve_reference(member) for key, member in node.items() if key != "$defs"}
 
-    expanded: _Node = resolved(schema)
+    expanded: _Node = resolve_reference(schema)
     return expanded
 
 

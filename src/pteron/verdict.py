@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any, Literal, get_args
 
-from pteron.json_values import picked
+from pteron.json_values import fields_as_json
 
 Grade = Literal["trustworthy", "usable with care", "not trustworthy"]
 """The grades of a verdict, best first."""
@@ -38,7 +38,7 @@ class Verdict:
 
     def as_dict(self) -> dict[str, Any]:
         """Return the verdict as plain data."""
-        return picked(self, "grade reasons next_steps")
+        return fields_as_json(self, "grade reasons next_steps")
 
 
 @dataclass

@@ -12,7 +12,7 @@ from typing import Annotated, Any, ClassVar
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from pteron.bodies.inertia import PlanarInertia, RodInertia, SpatialInertia
-from pteron.errors import ModelError, shown
+from pteron.errors import ModelError, shorten
 
 Number = Annotated[float, Field(allow_inf_nan=False, strict=True)]
 Count = Annotated[int, Field(ge=1, strict=True)]
@@ -20,7 +20,7 @@ Count = Annotated[int, Field(ge=1, strict=True)]
 
 def _only_x(entries: Any) -> Any:
     if isinstance(entries, list) and len(entries) > 1:
-        raise ValueError(f"{shown(entries)} given, a list of 1 number expected: a rod has x only")
+        raise ValueError(f"{shorten(entries)} given, a list of 1 number expected: a rod has x only")
     return entries
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pteron.errors import ModelError, shown
+from pteron.errors import ModelError, shorten
 
 Vector = tuple[float, float, float]
 
@@ -36,7 +36,7 @@ def number(value: object, key: str) -> float:
     except (TypeError, ValueError):
         raise ModelError(f"{key}: {value!r} is not a number") from None
     except OverflowError:
-        raise ModelError(f"{key}: {shown(value)} is too large a number") from None
+        raise ModelError(f"{key}: {shorten(value)} is too large a number") from None
     if not math.isfinite(converted):
         raise ModelError(f"{key}: {converted} is not a finite number")
     return converted

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from pteron.calibration.plan import Plan as Plan, plan as plan
     from pteron.calibration.result import (
         Calibration as Calibration,
-        Finding as Finding,
+        CalibrationFinding as CalibrationFinding,
         HeldOut as HeldOut,
         HiddenOrder as HiddenOrder,
         Value as Value,

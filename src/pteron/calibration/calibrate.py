@@ -8,15 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pteron.arguments import expect
-from pteron.calibration.fit import Fit, Fitter
-from pteron.calibration.guess import Block, Guess, tolerances_of
+from pteron.calibration.fit import CalibrationFit, Fitter
+from pteron.calibration.guess import Guess, UnknownBlock, tolerances_of
 from pteron.calibration.measurements import Measurements, spread_rows
 from pteron.calibration.observability import observability_of
 from pteron.calibration.raw_faults import describe_mistake, hidden_order, raw_mistake
 from pteron.calibration.residual_faults import hidden_tilt, residual_faults, zero_faults
 from pteron.calibration.result import (
     Calibration,
-    Finding,
+    CalibrationFinding,
     HeldOut,
     calibrated_robot,
     open_errors,
@@ -131,10 +131,10 @@ def calibrate(
 def _calibrate(
     robot: Manipulator,
     measurements: Measurements,
-    blocks: tuple[Block, ...],
+    blocks: tuple[UnknownBlock, ...],
     held_out: Measurements | None,
     seed: int,
-    mistakes: Sequence[Finding] = (),
+    mistakes: Sequence[CalibrationFinding] = (),
 ) -> Calibration:
     """Return the calibration of a log that has no mistakes, or with `mistakes` undone."""
     start = Guess.drawn(robot, measurements)
@@ -191,9 +191,9 @@ def _calibrate(
 def _partial_fit(
     start: Guess,
     measurements: Measurements,
-    blocks: tuple[Block, ...],
+    blocks: tuple[UnknownBlock, ...],
     fitted_rows: NDArray[np.bool_],
-) -> Fit:
+) -> CalibrationFit:
     """Return a fit of at most `_TRIED_ROWS` of the fitted rows, to predict held-out rows."""
     sampled_rows = np.zeros_like(fitted_rows)
     sampled_rows[np.flatnonzero(fitted_rows)[:: -(-int(fitted_rows.sum()) // _TRIED_ROWS)]] = True
@@ -203,7 +203,7 @@ def _partial_fit(
     return Fitter(rows, blocks, start, poses, aside.aside, aside.barred).run()
 
 
-def _exceeds_ordinary_error(fit: Fit, measurements: Measurements) -> bool:
+def _exceeds_ordinary_error(fit: CalibrationFit, measurements: Measurements) -> bool:
     """Return whether the error of some kind of measurement exceeds ordinary tolerances."""
     stated = measurements.setup.noise
     return not fit.settled or any(
@@ -213,7 +213,7 @@ def _exceeds_ordinary_error(fit: Fit, measurements: Measurements) -> bool:
 
 
 def _select_fitting_rows(
-    measurements: Measurements, fit: Fit, chosen: NDArray[np.bool_]
+    measurements: Measurements, fit: CalibrationFit, chosen: NDArray[np.bool_]
 ) -> Measurements:
     """Return chosen rows without outliers of the fit of all rows, where these are few."""
     few = (~fit.kept).sum() <= FEW_LEFT_OUT * len(fit.kept)
@@ -232,7 +232,7 @@ def _check_readings(joints: int, measurements: Measurements) -> None:
 
 
 def _held_out_errors(
-    start: Guess, fit: Fit, blocks: tuple[Block, ...], other: Measurements
+    start: Guess, fit: CalibrationFit, blocks: tuple[UnknownBlock, ...], other: Measurements
 ) -> HeldOut:
     """Return RMS errors by kind at held-out rows, with the drawn and the fitted machine."""
     fitter = Fitter(other, blocks, start, starting_poses(start, other))
@@ -256,7 +256,7 @@ def _held_out_errors(
     return HeldOut(int(fitted.measured.any(axis=1).sum()), *errors)
 
 
-def _scaled_slopes(fitter: Fitter, fit: Fit) -> Array:
+def _scaled_slopes(fitter: Fitter, fit: CalibrationFit) -> Array:
     """Return slopes (K, p) on the machine as drawn, scaled by noise and tolerance."""
     slopes, start, measurements = fitter.slopes, fitter.begin, fitter.measurements
     chosen = spread_rows(len(measurements), _RANK_ROWS)

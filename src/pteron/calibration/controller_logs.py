@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pteron.calibration.measurements import Measurements
-from pteron.errors import DataError, shown, warn_unlikely
+from pteron.errors import DataError, shorten, warn_unlikely
 from pteron.export.linuxcnc import linuxcnc_axes
 from pteron.export.printers.printer_cfg import printer_cfg, setting, way_a_step
 from pteron.kinematics import inverse_kinematics
@@ -78,7 +78,7 @@ def read_controller_log(
     DataError
         If it cannot be read, or it is one of these and something is missing in it.
     """
-    file, source = Path(path), shown(str(path), bare=True, longest=1000)
+    file, source = Path(path), shorten(str(path), bare=True, longest=1000)
     if file.suffix.lower() == ".parquet" or not file.is_file():
         return None  # reported where tables are opened
     with file.open("rb") as opened:
@@ -137,7 +137,7 @@ def _read_stable_positions(robot: Manipulator, text: str, source: str) -> Measur
             if len(counts) != 3 or not np.isfinite(counts).all():
                 raise ValueError
         except ValueError:
-            faults.append(f"[delta_calibrate] {key}: {shown(words)} given, steps a,b,c expected")
+            faults.append(f"[delta_calibrate] {key}: {shorten(words)} given, steps a,b,c expected")
             return [0.0] * 3
         return counts
 
@@ -185,7 +185,7 @@ def _read_height_map(text: str, source: str) -> Iterator[_Touch]:
         (x, dx), (y, dy) = ([float(header[key]) for key in pair] for pair in axes)
     except (KeyError, ValueError):
         raise DataError(
-            f"line 3: {shown(lines[2])} given, the grid of a height map expected"
+            f"line 3: {shorten(lines[2])} given, the grid of a height map expected"
         ) from None
     for j, line in enumerate(lines[3:]):
         for i, cell in enumerate(line.split(",")):
@@ -195,7 +195,7 @@ def _read_height_map(text: str, source: str) -> Iterator[_Touch]:
             try:
                 z = float(cell)
             except ValueError:
-                raise DataError(f"line {j + 4}: {shown(cell)} given, a height expected") from None
+                raise DataError(f"line {j + 4}: {shorten(cell)} given, a height expected") from None
             yield _Touch(
                 f"{source}, line {j + 4}, column {i + 1}", _xyz(x + i * dx, y + j * dy, z), 0.0
             )
@@ -277,7 +277,7 @@ def _read_linuxcnc(text: str, source: str) -> Iterator[_Touch]:
         if all(re.fullmatch(_NUMBER, cell) for cell in cells) and 6 <= len(cells) <= 9:
             rows.append((k, [float(cell) for cell in cells]))
         else:
-            faults.append(f"line {k}: {shown(line.strip())} given, 6 to 9 numbers expected")
+            faults.append(f"line {k}: {shorten(line.strip())} given, 6 to 9 numbers expected")
     if not rows or len(faults) > len(rows):
         return
     if faults:

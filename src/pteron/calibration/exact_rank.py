@@ -15,7 +15,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from pteron.calibration.guess import Block, Guess
+from pteron.calibration.guess import Guess, UnknownBlock
 from pteron.calibration.measurements import Measurements
 from pteron.calibration.residuals import MachineSlopes
 from pteron.equations.variations import slope_matrix
@@ -47,7 +47,7 @@ _FINE = 10**6
 
 
 def exact_rank(
-    start: Guess, blocks: Sequence[Block], measurements: Measurements, seed: int
+    start: Guess, blocks: Sequence[UnknownBlock], measurements: Measurements, seed: int
 ) -> tuple[int | None, tuple[int, ...], int]:
     """Return rank, primes and number of rows; None for a rank where something has no exact form.
 
@@ -106,7 +106,7 @@ class _ModularSlopes(MachineSlopes):
     def __init__(
         self,
         start: Guess,
-        blocks: Sequence[Block],
+        blocks: Sequence[UnknownBlock],
         measurements: Measurements,
         prime: int,
         rng: random.Random,

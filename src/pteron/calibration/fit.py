@@ -14,9 +14,9 @@ import numpy as np
 import scipy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
-from pteron.calibration.guess import Block, Guess, tolerances_of
+from pteron.calibration.guess import Guess, UnknownBlock, tolerances_of
 from pteron.calibration.measurements import KINDS, Measurements, spread_rows
-from pteron.calibration.residuals import MachineSlopes, Rows
+from pteron.calibration.residuals import MachineSlopes, ResidualRows
 from pteron.errors import DataError
 from pteron.kinematics import direct_kinematics
 
@@ -58,7 +58,7 @@ _ROUNDS = 12
 
 
 @dataclass(frozen=True)
-class Fit:
+class CalibrationFit:
     """Values, the rows' residuals there, and the normal equations; at best the most probable ones.
 
     Attributes
@@ -149,7 +149,7 @@ class Fitter:
     def __init__(
         self,
         measurements: Measurements,
-        blocks: tuple[Block, ...],
+        blocks: tuple[UnknownBlock, ...],
         guess: Guess,
         poses: Array,
         aside: NDArray[np.bool_] | None = None,
@@ -169,7 +169,7 @@ class Fitter:
         self.kind_of = measurements.kind_of
         self.readings_noise = measurements.setup.noise.get("readings", 0.0)
 
-    def run(self, initial: Fit | None = None) -> Fit:
+    def run(self, initial: CalibrationFit | None = None) -> CalibrationFit:
         """Return the most probable fit; the search begins at `initial`, such as a fit of some rows.
 
         Raises
@@ -186,7 +186,7 @@ class Fitter:
         fitted_rows, none = ~self.aside, np.empty(0)
         begin = guess, total, noise, fitted_rows, self.begin_poses, self.prior
         try:
-            at = self._evaluate(Fit(*begin, none, none > 0.0, none, none, none))
+            at = self._evaluate(CalibrationFit(*begin, none, none > 0.0, none, none, none))
         except ValueError:
             raise DataError(
                 "most readings lead to no pose of the machine as drawn; check their units, zeros "
@@ -212,7 +212,7 @@ class Fitter:
                 return replace(at, settled=False, shared=self._shared_information(at))
         return replace(at, shared=self._shared_information(at))
 
-    def _prediction_distances(self, at: Fit) -> Array:
+    def _prediction_distances(self, at: CalibrationFit) -> Array:
         """Return the distances (N,) of rows; left-out rows with the fit's uncertainty added.
 
         Next to a singularity a fit without a row is less sure of its pose than an instrument.
@@ -227,7 +227,7 @@ class Fitter:
             distances[rows] = np.sqrt(np.maximum(np.einsum("nk,nk->n", r, solved), 0.0))
         return distances
 
-    def _recover_poses(self, at: Fit) -> Fit:
+    def _recover_poses(self, at: CalibrationFit) -> CalibrationFit:
         """Return the fit with the poses of rows recovered at which Newton's method diverged."""
         lost = np.flatnonzero(at.distances == BEYOND)
         if not len(lost):
@@ -239,7 +239,7 @@ class Fitter:
                 poses[i] = modes[np.nanargmin(off)]
         return self._evaluate(at, poses=poses)
 
-    def _minimise_cost(self, begin: Fit) -> Fit:
+    def _minimise_cost(self, begin: CalibrationFit) -> CalibrationFit:
         """Return the fit of least cost at fixed noise and rows, by damped Gauss-Newton steps."""
         at, fitted_rows = begin, begin.kept
         for taken in range(1, _STEPS + 1):  # noqa: B007 (told in the result)
@@ -274,7 +274,7 @@ class Fitter:
         return replace(at, kept=begin.kept, steps=begin.steps + taken)
 
     def _find_strays(
-        self, old_fit: Fit, new_fit: Fit, fitted_rows: NDArray[np.bool_]
+        self, old_fit: CalibrationFit, new_fit: CalibrationFit, fitted_rows: NDArray[np.bool_]
     ) -> NDArray[np.bool_] | None:
         """Return the few rows (N,) without which a step lowers the cost tenfold; None for none.
 
@@ -287,14 +287,14 @@ class Fitter:
         squares = [float((fit.distances[others] ** 2).sum()) for fit in (old_fit, new_fit)]
         return strays if squares[1] < 0.1 * squares[0] else None
 
-    def cost(self, guess: Guess, total: Array, fit: Fit) -> float:
+    def cost(self, guess: Guess, total: Array, fit: CalibrationFit) -> float:
         """Return the cost of a guess: squared residuals and tolerances, in variances; inf: lost."""
         try:
             return self._evaluate(fit, guess=guess, total=total).cost
         except ValueError:
             return float(np.inf)
 
-    def _evaluate(self, fit: Fit, **changed: Any) -> Fit:
+    def _evaluate(self, fit: CalibrationFit, **changed: Any) -> CalibrationFit:
         """Return a fit with changed values, its residuals and normal equations evaluated there.
 
         ValueError where they have no poses.
@@ -343,10 +343,10 @@ class Fitter:
         distances[lost] = BEYOND
         values = guess, fit.total, fit.noise, fitted_rows, new_poses, self.prior
         ends = matrix, right, cost, fit.steps, 0.0, fit.settled
-        return Fit(*values, residuals, measured, distances, *ends)
+        return CalibrationFit(*values, residuals, measured, distances, *ends)
 
     def whiten_rows(
-        self, at: Rows, guess: Guess, noise: dict[str, float]
+        self, at: ResidualRows, guess: Guess, noise: dict[str, float]
     ) -> tuple[Array, Array, Array]:
         """Return residuals and slopes in standard deviations, independent within a row.
 
@@ -363,7 +363,7 @@ class Fitter:
         count = at.slopes.shape[-1]
         return white[..., 0], white[..., 1 : 1 + count], white[..., 1 + count :]
 
-    def _shared_information(self, fit: Fit) -> Array | float:
+    def _shared_information(self, fit: CalibrationFit) -> Array | float:
         """Return a fit's `shared` (p, p), or 0 where no distances share a row's readings."""
         origins = self.measurements.origins
         ends = np.unique(origins[origins >= 0])
@@ -383,7 +383,7 @@ class Fitter:
         both, each = (part.reshape(-1, pulls.shape[-1]) for part in (sums, parts))
         return np.asarray(both.T @ both - each.T @ each)
 
-    def _estimate_noise(self, fit: Fit, sought: list[str]) -> dict[str, float]:
+    def _estimate_noise(self, fit: CalibrationFit, sought: list[str]) -> dict[str, float]:
         """Return the noise by kind, from the residuals over their degrees of freedom."""
         if not sought:
             return {}

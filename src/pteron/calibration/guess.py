@@ -102,7 +102,7 @@ class Guess:
         place, axes = self.robot.platform.at(poses)
         return np.asarray(place + np.einsum("nij,ni->nj", axes, self.mark_points(marks)))
 
-    def apply_step(self, blocks: Sequence[Block], step: Array) -> Guess:
+    def apply_step(self, blocks: Sequence[UnknownBlock], step: Array) -> Guess:
         """Return the guess after a step in all unknowns."""
         guess = self
         for block in blocks:
@@ -111,7 +111,7 @@ class Guess:
 
 
 @dataclass(frozen=True)
-class Block:
+class UnknownBlock:
     """Unknowns of one kind, and their slice of the vector of all unknowns."""
 
     kind: str
@@ -155,7 +155,7 @@ class Block:
         return np.array([change.value(guess.robot) for change in self.changes])
 
 
-def number_unknowns(blocks: Iterable[Block], start: int = 0) -> tuple[Block, ...]:
+def number_unknowns(blocks: Iterable[UnknownBlock], start: int = 0) -> tuple[UnknownBlock, ...]:
     """Return blocks with consecutive slices of the unknowns, from `start` on."""
     placed_blocks = []
     for block in blocks:
@@ -165,7 +165,7 @@ def number_unknowns(blocks: Iterable[Block], start: int = 0) -> tuple[Block, ...
     return tuple(placed_blocks)
 
 
-def tolerances_of(blocks: Sequence[Block]) -> Array:
+def tolerances_of(blocks: Sequence[UnknownBlock]) -> Array:
     """Return the tolerances (p,) of all unknowns; inf where there is none."""
     return np.array([unknown.tolerance for block in blocks for unknown in block.unknowns])
 

@@ -19,11 +19,11 @@ from numpy.typing import NDArray
 from pteron.calibration.controller_logs import read_controller_log
 from pteron.calibration.measurements import TEXTS, TOOL, VALUES, Measurements, Setup
 from pteron.calibration.setup_file import join_setups, read_setup_file
-from pteron.errors import DataError, shown, warn_unlikely
+from pteron.errors import DataError, shorten, warn_unlikely
 from pteron.kinematics.unlikely_values import unlikely_length, unlikely_values
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.manipulator.readings import from_readings
-from pteron.tables import Dialect, Table, listed, open_table, whole_table
+from pteron.tables import Dialect, Table, join_names, open_table, whole_table
 from pteron.tables.units import FACTORS
 from pteron.toml import joined_faults
 
@@ -89,7 +89,7 @@ def _read(robot: Manipulator, path: str | Path) -> Measurements:
     if measurements is None:
         measurements = _read_rows(robot, _open_table(robot, path, setup_file.csv), Path(path).name)
     measurements = replace(measurements, setup=setup_file.setup())
-    source = shown(str(path), bare=True, longest=1000)
+    source = shorten(str(path), bare=True, longest=1000)
     faults = [*_missing_descriptions(measurements)]
     if faults:
         raise DataError(joined_faults(faults), subject=source)
@@ -127,18 +127,20 @@ def _open_table(robot: Manipulator, path: str | Path, dialect: Dialect | None) -
         factor = FACTORS.get(units[name], {}).get(unit.strip("[]() ") or units[name])
         if factor is None and units[name]:
             valid = ", ".join(FACTORS[units[name]])
-            faults.append(f"column {shown(column, bare=True)}: its unit is none of {valid}")
+            faults.append(f"column {shorten(column, bare=True)}: its unit is none of {valid}")
         elif name in columns:
-            faults.append(f"two columns are {name}: {listed([columns[name][0], column])}")
+            faults.append(f"two columns are {name}: {join_names([columns[name][0], column])}")
         columns.setdefault(name, (column, factor or 1.0))
     if missing := [name for name in robot.joint_names if name not in columns]:
-        faults.append(f"no column {listed(missing)} (found: {listed(file.columns)}); {file.hint}")
+        faults.append(
+            f"no column {join_names(missing)} (found: {join_names(file.columns)}); {file.hint}"
+        )
     if faults:
         raise DataError(joined_faults(faults), subject=file.source)
     others = {*robot.force_names, *(f"{d}{name}" for d in ("d", "dd") for name in units)}
     if unread := [name for name in unread if name not in others]:
-        text = f"{file.source}: {listed(unread)}: not read; what is measured is called "
-        text += listed([*dict.fromkeys((*_POSITION, *robot.coordinates)), "height", "distance"])
+        text = f"{file.source}: {join_names(unread)}: not read; what is measured is called "
+        text += join_names([*dict.fromkeys((*_POSITION, *robot.coordinates)), "height", "distance"])
         warn_unlikely(text)
     table = whole_table(file)
     first = _first_line(table)
@@ -247,7 +249,7 @@ def _missing_descriptions(measurements: Measurements) -> Iterator[str]:
         for name in sorted({*getattr(measurements, part)} - {TOOL, *described}):
             row = getattr(measurements, part).index(name)
             yield (
-                f"{measurements.places[row]}: {part[:-1]} {shown(name)} is not described; give "
+                f"{measurements.places[row]}: {part[:-1]} {shorten(name)} is not described; give "
                 f"[{part}.{name}] in the TOML file beside it"
             )
 
@@ -284,14 +286,14 @@ def _unlikely_readings(
                 f"{size:.3g} m: is it in mm? m are expected"
             )
     if len(none := np.flatnonzero(measurements.distances == 0.0)):
-        yield f"{listed([places[row] for row in none])}: a distance of 0: was it measured?"
+        yield f"{join_names([places[row] for row in none])}: a distance of 0: was it measured?"
     seen = ~np.isnan(np.column_stack([measured, measurements.heights, measurements.distances])).all(
         axis=1
     )
     seen[measurements.origins[measurements.origins >= 0]] = True
     if not seen.all() and robot.joint_count == robot.freedom:
         rows = [places[row] for row in np.flatnonzero(~seen)]
-        yield f"{listed(rows)}: nothing is measured there"
+        yield f"{join_names(rows)}: nothing is measured there"
 
 
 def _join_logs(parts: Sequence[Measurements], sources: Sequence[str]) -> Measurements:

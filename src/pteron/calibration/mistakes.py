@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pteron.calibration.fit import Fitter
-from pteron.calibration.guess import Block, Guess, Unknown, number_unknowns
+from pteron.calibration.guess import Guess, Unknown, UnknownBlock, number_unknowns
 from pteron.calibration.measurements import VALUES, Measurements
 from pteron.calibration.start import starting_poses
 from pteron.calibration.thresholds import OFF_TOLERANCES
@@ -367,7 +367,7 @@ def _fit_readings(
     travel = [_WIDE_ZERO * leg.size if leg.joint.unit == "m" else _WIDE_ANGLE for leg in legs]
     widths = {"zeros": travel, "scales": [_WIDE_SCALE] * len(legs)}
     blocks = number_unknowns(
-        Block(
+        UnknownBlock(
             kind,
             "",
             tuple(Unknown("", kind, "", widths[kind][i]) for i in chosen),

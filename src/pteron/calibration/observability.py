@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pteron.calibration.exact_rank import exact_rank
-from pteron.calibration.guess import Block, Guess, tolerances_of
+from pteron.calibration.guess import Guess, UnknownBlock, tolerances_of
 from pteron.calibration.measurements import Measurements
 from pteron.calibration.unseen import combination_text, unseen_combinations
+from pteron.renamed import former_attribute
 
 Array = NDArray[np.float64]
 
@@ -62,7 +63,7 @@ class Observability:
     weak: tuple[str, ...]
 
     @property
-    def shown(self) -> int:
+    def determined_count(self) -> int:
         """The number of combinations that these rows show."""
         return min(self.rank, self.at_poses)
 
@@ -81,9 +82,15 @@ class Observability:
             here += " More, or other, poses would show more."
         return f"{exact} {here}"
 
+    shown = former_attribute("shown", "determined_count")
+
 
 def observability_of(
-    start: Guess, measurements: Measurements, blocks: Sequence[Block], slopes: Array, seed: int = 0
+    start: Guess,
+    measurements: Measurements,
+    blocks: Sequence[UnknownBlock],
+    slopes: Array,
+    seed: int = 0,
 ) -> Observability:
     """Return the combinations of values that measurements show.
 

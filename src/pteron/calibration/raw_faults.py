@@ -13,8 +13,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pteron.calibration.fit import Fit, Fitter
-from pteron.calibration.guess import Block, Guess, tolerances_of
+from pteron.calibration.fit import CalibrationFit, Fitter
+from pteron.calibration.guess import Guess, UnknownBlock, tolerances_of
 from pteron.calibration.measurements import Measurements
 from pteron.calibration.mistakes import (
     QUICK_MODES,
@@ -24,7 +24,7 @@ from pteron.calibration.mistakes import (
     reorder_readings,
 )
 from pteron.calibration.residuals import MachineSlopes
-from pteron.calibration.result import Finding, HiddenOrder
+from pteron.calibration.result import CalibrationFinding, HiddenOrder
 from pteron.calibration.start import place_surroundings, starting_poses
 from pteron.errors import DataError, UnlikelyValue
 
@@ -77,7 +77,11 @@ _NOISE = 1e-4
 
 
 def raw_mistake(
-    measurements: Measurements, blocks: Sequence[Block], robot_guess: Guess, *, fitted: bool = False
+    measurements: Measurements,
+    blocks: Sequence[UnknownBlock],
+    robot_guess: Guess,
+    *,
+    fitted: bool = False,
 ) -> Mistake | None:
     """Return the mistake that explains measurements far from the drawing; else None.
 
@@ -91,7 +95,9 @@ def raw_mistake(
         return _best_mistake(measurements, blocks, robot_guess, min(_NEAR, _FALLEN * misfit))
 
 
-def describe_mistake(mistake: Mistake, measurements: Measurements, guess: Guess) -> Finding:
+def describe_mistake(
+    mistake: Mistake, measurements: Measurements, guess: Guess
+) -> CalibrationFinding:
     """Return the finding of a mistake: its cause, what to do, and its size on the drawn machine."""
     logged_errors, errors = (
         _drawing_errors(rows, guess) for rows in (measurements, mistake.undo(measurements))
@@ -110,7 +116,7 @@ def describe_mistake(mistake: Mistake, measurements: Measurements, guess: Guess)
         f" With this undone, as in what follows, {' and '.join(sizes)} of the machine as "
         f"drawn{none}."
     )
-    return Finding("mistake", text, effect=float("inf"))
+    return CalibrationFinding("mistake", text, effect=float("inf"))
 
 
 def _size_text(error: float, kind: str) -> str:
@@ -146,7 +152,10 @@ def _drawing_residuals(guess: Guess, rows: Measurements) -> tuple[Array, NDArray
 
 
 def hidden_order(
-    measurements: Measurements, blocks: Sequence[Block], robot_guess: Guess, fit: Fit
+    measurements: Measurements,
+    blocks: Sequence[UnknownBlock],
+    robot_guess: Guess,
+    fit: CalibrationFit,
 ) -> HiddenOrder | None:
     """Return the legs whose readings could be exchanged and nothing would show; None for none.
 
@@ -166,7 +175,7 @@ def hidden_order(
 
 
 def _change_by_order(
-    measurements: Measurements, start: Guess, fit: Fit, order: tuple[int, ...]
+    measurements: Measurements, start: Guess, fit: CalibrationFit, order: tuple[int, ...]
 ) -> float:
     """Return the greatest change of the tool's place in another order of the readings, m.
 
@@ -197,7 +206,7 @@ def _sample_rows(measurements: Measurements) -> Measurements:
 
 
 def _best_mistake(
-    measurements: Measurements, blocks: Sequence[Block], guess: Guess, most: float
+    measurements: Measurements, blocks: Sequence[UnknownBlock], guess: Guess, most: float
 ) -> Mistake | None:
     """Return the mistake of least cost once undone; among those about as good, the likeliest.
 
@@ -228,7 +237,9 @@ def _best_mistake(
     return next(mistake for mistake, cost in pairs if cost <= least + _ALIKE)
 
 
-def _cost_together(measurements: Measurements, blocks: Sequence[Block], guess: Guess) -> float:
+def _cost_together(
+    measurements: Measurements, blocks: Sequence[UnknownBlock], guess: Guess
+) -> float:
     """Return the cost of a fit of all rows: squared residuals and tolerances, in variances.
 
     inf where the rows have no poses.
@@ -247,7 +258,9 @@ def _cost_together(measurements: Measurements, blocks: Sequence[Block], guess: G
     return float(squares.sum() + fit.prior @ fit.total**2)
 
 
-def _quick_misfit(rows: Measurements, blocks: Sequence[Block], guess: Guess, most: float) -> float:
+def _quick_misfit(
+    rows: Measurements, blocks: Sequence[UnknownBlock], guess: Guess, most: float
+) -> float:
     """Return `_misfit`, or inf where the first few rows are already far above the most that counts.
 
     Of these no other assembly modes are sought: of readings that lead to no pose that takes long.
@@ -263,7 +276,7 @@ def _quick_misfit(rows: Measurements, blocks: Sequence[Block], guess: Guess, mos
 
 
 def _misfit(
-    rows: Measurements, blocks: Sequence[Block], guess: Guess, *, modes: bool = True
+    rows: Measurements, blocks: Sequence[UnknownBlock], guess: Guess, *, modes: bool = True
 ) -> float:
     """Return the rows' median of the mean squared residual, in variances; inf: no pose."""
     try:
@@ -284,7 +297,9 @@ def _trial_poses(guess: Guess, rows: Measurements, *, modes: bool = True) -> Arr
         return starting_poses(guess, rows, modes=modes and guess.robot.freedom <= QUICK_MODES)
 
 
-def row_misfits(guess: Guess, rows: Measurements, blocks: Sequence[Block], poses: Array) -> Array:
+def row_misfits(
+    guess: Guess, rows: Measurements, blocks: Sequence[UnknownBlock], poses: Array
+) -> Array:
     """Return each row's mean squared residual (N,), in variances of noise and tolerances.
 
     inf where it has no pose.

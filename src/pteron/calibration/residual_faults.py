@@ -14,12 +14,12 @@ import numpy as np
 import scipy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
-from pteron.calibration.fit import BEYOND, FLOOR, Fit, Fitter
-from pteron.calibration.guess import Block, Unknown, number_unknowns
+from pteron.calibration.fit import BEYOND, FLOOR, CalibrationFit, Fitter
+from pteron.calibration.guess import Unknown, UnknownBlock, number_unknowns
 from pteron.calibration.measurements import Measurements, spread_rows
 from pteron.calibration.mistakes import order_mistakes
 from pteron.calibration.residuals import MachineSlopes
-from pteron.calibration.result import Finding
+from pteron.calibration.result import CalibrationFinding
 from pteron.calibration.thresholds import OFF_TOLERANCES, ORDINARY_ERROR
 from pteron.kinematics.evaluate import evaluate_kernel
 
@@ -59,7 +59,7 @@ _LISTED = 8
 """Most outlying rows that are named."""
 
 
-class Trial(NamedTuple):
+class FaultTrial(NamedTuple):
     """A candidate fault: its text, its shift of the residuals, and the fall of their squares."""
 
     kind: str
@@ -71,8 +71,8 @@ class Trial(NamedTuple):
 
 
 def residual_faults(
-    fitter: Fitter, fit: Fit, reasons: Mapping[int, str] | None = None
-) -> tuple[Finding, ...]:
+    fitter: Fitter, fit: CalibrationFit, reasons: Mapping[int, str] | None = None
+) -> tuple[CalibrationFinding, ...]:
     """Return the fault that explains most residuals, and the rows that do not fit even so.
 
     `reasons` say by row why it was set aside before the fit.
@@ -82,7 +82,7 @@ def residual_faults(
     return *findings, *_outliers(fit, fitter.measurements, ~fit.kept & ~explained, reasons or {})
 
 
-def zero_faults(fitter: Fitter, fit: Fit) -> tuple[Finding, ...]:
+def zero_faults(fitter: Fitter, fit: CalibrationFit) -> tuple[CalibrationFinding, ...]:
     """Return the joints whose zeros are beyond their tolerances, with sizes.
 
     A size is the median difference of joint coordinates, as a guide point takes part of a zero.
@@ -108,13 +108,16 @@ def zero_faults(fitter: Fitter, fit: Fit) -> tuple[Finding, ...]:
                 f"The zero of joint {i + 1} ({name}) is off by about {size}: home it, or check "
                 "where its end stop is."
             )
-            findings.append(Finding("zero", text))
+            findings.append(CalibrationFinding("zero", text))
     return tuple(findings)
 
 
 def _outliers(
-    fit: Fit, measurements: Measurements, out: NDArray[np.bool_], reasons: Mapping[int, str]
-) -> tuple[Finding, ...]:
+    fit: CalibrationFit,
+    measurements: Measurements,
+    out: NDArray[np.bool_],
+    reasons: Mapping[int, str],
+) -> tuple[CalibrationFinding, ...]:
     rows = np.flatnonzero(out)
     if not len(rows):
         return ()
@@ -124,10 +127,10 @@ def _outliers(
     )
     others = f" and {len(rows) - len(worst)} more" if len(rows) > len(worst) else ""
     text = f"Left out, as {'they do' if len(rows) > 1 else 'it does'} not fit: {named}{others}."
-    return (Finding("outlier", text, float((fit.distances[rows] ** 2).sum())),)
+    return (CalibrationFinding("outlier", text, float((fit.distances[rows] ** 2).sum())),)
 
 
-def _residual_text(fit: Fit, row: int) -> str:
+def _residual_text(fit: CalibrationFit, row: int) -> str:
     if fit.distances[row] == BEYOND:
         return "its readings lead to no pose"
     residuals = fit.residuals[row]
@@ -157,7 +160,7 @@ class _ScoreTest:
         Rounding in them, as a variance.
     """
 
-    def __init__(self, fitter: Fitter, fit: Fit) -> None:
+    def __init__(self, fitter: Fitter, fit: CalibrationFit) -> None:
         start, blocks, measurements = fitter.begin, fitter.blocks, fitter.measurements
         self.start, self.measurements, self.fit = start, measurements, fit
         count = blocks[-1].where.stop
@@ -221,7 +224,7 @@ class _ScoreTest:
         columns[between] += self._joints[between, :, count:] * values[origins[between]][:, None]
         return columns
 
-    def chance(self, trial: Trial) -> float:
+    def chance(self, trial: FaultTrial) -> float:
         """Return the p-value of a trial: the probability of its fall in a faultless log."""
         chance = float(scipy.stats.chi2.sf(trial.fall, trial.freedom))
         if not set(self.measurements.kinds) <= set(self.measurements.setup.noise):
@@ -234,7 +237,9 @@ class _ScoreTest:
         return chance
 
 
-def _find_fault(fitter: Fitter, fit: Fit) -> tuple[tuple[Finding, ...], NDArray[np.bool_]]:
+def _find_fault(
+    fitter: Fitter, fit: CalibrationFit
+) -> tuple[tuple[CalibrationFinding, ...], NDArray[np.bool_]]:
     """Return the best-explaining fault, if significant, and the rows (N,) it explains."""
     test = _ScoreTest(fitter, fit)
     tried, best, gain = 0, None, -np.inf
@@ -256,10 +261,10 @@ def _find_fault(fitter: Fitter, fit: Fit) -> tuple[tuple[Finding, ...], NDArray[
     kinds = [str(kind) for kind in fitter.measurements.kind_of]
     limits = np.array([ORDINARY_ERROR[kind] / fit.noise[kind] for kind in kinds])
     effect = float((np.abs(moved) / limits)[fit.kept[test.rows]].max(initial=0.0))
-    return (Finding(best.kind, best.text, gain, effect),), explained
+    return (CalibrationFinding(best.kind, best.text, gain, effect),), explained
 
 
-def _trials(test: _ScoreTest) -> Iterator[Trial]:
+def _trials(test: _ScoreTest) -> Iterator[FaultTrial]:
     """Try zeros that slipped, backlash, drift, and marks or instruments that moved."""
     measurements, rows = test.measurements, test.rows
     places = [measurements.places[i] for i in rows]
@@ -280,7 +285,7 @@ def _trials(test: _ScoreTest) -> Iterator[Trial]:
                 f"The zero of joint {i + 1} ({name}) slipped by {1e3 * amounts[0]:+.3g} {unit} "
                 f"before {places[t]}: home it again, and measure anew from there."
             )
-            yield Trial("slipped zero", text, 1, fall, column @ amounts)
+            yield FaultTrial("slipped zero", text, 1, fall, column @ amounts)
     approach = np.sign(np.diff(measurements.readings, axis=0, prepend=measurements.readings[:1]))
     columns = test.joint_columns(approach)
     for i, (leg, name) in enumerate(zip(legs, test.start.robot.joint_names, strict=True)):
@@ -291,7 +296,7 @@ def _trials(test: _ScoreTest) -> Iterator[Trial]:
             f"Joint {i + 1} ({name}) stops {2e3 * abs(amounts[0]):.3g} {unit} apart by its "
             "direction of approach: approach poses from one side, or take up its play."
         )
-        yield Trial("backlash", text, 1, fall, column @ amounts)
+        yield FaultTrial("backlash", text, 1, fall, column @ amounts)
     times = (
         measurements.times
         if measurements.times is not None
@@ -305,7 +310,7 @@ def _trials(test: _ScoreTest) -> Iterator[Trial]:
             f"{1e3 * np.abs(amounts).max():.3g} mm or mrad, as a machine's do that grows warm: let "
             "it warm up, and measure quickly."
         )
-        yield Trial("drift", text, len(amounts), fall, columns @ amounts)
+        yield FaultTrial("drift", text, len(amounts), fall, columns @ amounts)
     for block in (*test.extra_blocks[1:], *test.frame):
         what, alike = "instrument", ""
         if block.kind == "mark":
@@ -318,25 +323,25 @@ def _trials(test: _ScoreTest) -> Iterator[Trial]:
                 f"The {what} moved by {1e3 * np.linalg.norm(amounts[:3]):.3g} mm before "
                 f"{places[t]}{alike}: fix it, and measure anew from there."
             )
-            yield Trial(f"moved {block.kind}", text, len(amounts), fall, part @ amounts)
+            yield FaultTrial(f"moved {block.kind}", text, len(amounts), fall, part @ amounts)
 
 
-def _scale_trials(test: _ScoreTest) -> Iterator[Trial]:
+def _scale_trials(test: _ScoreTest) -> Iterator[FaultTrial]:
     """Try a scale of each joint, and one of all."""
     scales = test.joint_columns(test.measurements.readings)
     for i, name in enumerate(test.start.robot.joint_names):
         fall, amounts = test.score(column := scales[..., i : i + 1])
         text = (
-            f"Joint {i + 1} ({name}) moves {_scale_text(amounts[0])} than it reads, beyond what its "
-            "tolerance allows: check its lead, gear ratio or steps."
+            f"Joint {i + 1} ({name}) moves {_scale_text(amounts[0])} than it reads, beyond what "
+            "its tolerance allows: check its lead, gear ratio or steps."
         )
-        yield Trial("scale", text, 1, fall, column @ amounts)
+        yield FaultTrial("scale", text, 1, fall, column @ amounts)
     fall, amounts = test.score(column := scales.sum(axis=-1, keepdims=True))
     text = (
         f"All joints move {_scale_text(amounts[0])} than they read, beyond what tolerances allow: "
         "check leads, gear ratios or steps, or the unit of what is measured."
     )
-    yield Trial("scale", text, 1, fall, column @ amounts)
+    yield FaultTrial("scale", text, 1, fall, column @ amounts)
 
 
 def _scale_text(change: float) -> str:
@@ -344,7 +349,7 @@ def _scale_text(change: float) -> str:
     return f"{1e2 * change:+.3g} % farther" if abs(change) < 0.5 else "by quite another factor"
 
 
-def _order_trials(test: _ScoreTest) -> Iterator[Trial]:
+def _order_trials(test: _ScoreTest) -> Iterator[FaultTrial]:
     """Try measurements that stand beside their readings, and heights of the other sign."""
     measurements, noise = test.measurements, test.fit.noise
     sizes = np.array([noise[str(kind)] for kind in measurements.kind_of])
@@ -354,10 +359,10 @@ def _order_trials(test: _ScoreTest) -> Iterator[Trial]:
         moved = test.weights[:, None] * np.nan_to_num(change / sizes)[test.rows]
         after = test.residuals + test.refit_residuals(moved)
         fall = float((test.residuals**2).sum() - (after**2).sum()) / test.variance
-        yield Trial("order", f"{mistake.text[0].upper()}{mistake.text[1:]}.", 1, fall, moved)
+        yield FaultTrial("order", f"{mistake.text[0].upper()}{mistake.text[1:]}.", 1, fall, moved)
 
 
-def hidden_tilt(fitter: Fitter, fit: Fit) -> float | None:
+def hidden_tilt(fitter: Fitter, fit: CalibrationFit) -> float | None:
     """Return the greatest tilt by unequal rods of a pair that does not show, rad; None: no pairs.
 
     Two machines, one of which has such rods and the geometry that hides them best, give the same
@@ -375,7 +380,7 @@ def hidden_tilt(fitter: Fitter, fit: Fit) -> float | None:
     return max(tilts)
 
 
-def _rod_trials(test: _ScoreTest) -> Iterator[Trial]:
+def _rod_trials(test: _ScoreTest) -> Iterator[FaultTrial]:
     """Try parallel rods of one leg that differ in length, and so tilt the platform."""
     robot = test.fit.guess.robot
     for i, (column, _) in enumerate(_rod_columns(test)):
@@ -389,7 +394,7 @@ def _rod_trials(test: _ScoreTest) -> Iterator[Trial]:
             f"The parallel rods of leg {i + 1} ({robot.joint_names[i]}) differ in length, by about "
             f"{difference}, and tilt the platform: measure both, and fit a pair of equal ones."
         )
-        yield Trial("unequal rods", text, 1, fall, column @ amounts)
+        yield FaultTrial("unequal rods", text, 1, fall, column @ amounts)
 
 
 def _rod_columns(test: _ScoreTest) -> list[tuple[Array, float]]:
@@ -419,7 +424,7 @@ def _rod_columns(test: _ScoreTest) -> list[tuple[Array, float]]:
     return columns
 
 
-def _tilt_trials(test: _ScoreTest) -> Iterator[Trial]:
+def _tilt_trials(test: _ScoreTest) -> Iterator[FaultTrial]:
     """Try a platform that is held by pairs of rods and stands tilted against the drawing."""
     if not _rod_columns(test):
         return
@@ -435,7 +440,7 @@ def _tilt_trials(test: _ScoreTest) -> Iterator[Trial]:
         f"The platform stands tilted against the drawing ({angles}), as with a bent joint or rods "
         "of all pairs that differ: level it, and measure anew."
     )
-    yield Trial("tilted platform", text, 3, fall, columns @ amounts)
+    yield FaultTrial("tilted platform", text, 3, fall, columns @ amounts)
 
 
 def _turned_column(test: _ScoreTest, turn: Array) -> Array:
@@ -460,7 +465,7 @@ def _turned_column(test: _ScoreTest, turn: Array) -> Array:
     return column
 
 
-def _bad_leg(fitter: Fitter, fit: Fit) -> Iterator[Finding]:
+def _bad_leg(fitter: Fitter, fit: CalibrationFit) -> Iterator[CalibrationFinding]:
     """Yield a finding for the leg whose coordinate alone explains residuals beyond noise."""
     if not set(fitter.measurements.setup.noise) - {"readings"}:
         return  # noise that was found explains everything
@@ -480,18 +485,18 @@ def _bad_leg(fitter: Fitter, fit: Fit) -> Iterator[Finding]:
             f"{np.sqrt(mean[first]):.2g} times the noise: look for play, bending, or joints whose "
             "axes do not meet."
         )
-        yield Finding("wrong model", text, float(squares[:, first].sum()))
+        yield CalibrationFinding("wrong model", text, float(squares[:, first].sum()))
 
 
 def _extra_blocks(
-    blocks: tuple[Block, ...], measurements: Measurements, joints: int
-) -> tuple[Block, ...]:
+    blocks: tuple[UnknownBlock, ...], measurements: Measurements, joints: int
+) -> tuple[UnknownBlock, ...]:
     """Return further blocks: every joint's zero, each mark, and the instrument's frame."""
     unknown = Unknown("", "", "", np.inf)
-    extra_blocks = [Block("zeros", "", (unknown,) * joints, legs=tuple(range(joints)))]
+    extra_blocks = [UnknownBlock("zeros", "", (unknown,) * joints, legs=tuple(range(joints)))]
     extra_blocks += [
-        Block("mark", name, (unknown,) * 3) for name in sorted(set(measurements.marks))
+        UnknownBlock("mark", name, (unknown,) * 3) for name in sorted(set(measurements.marks))
     ]
     if not any(block.kind == "frame" for block in blocks):
-        extra_blocks.append(Block("frame", "", (unknown,) * 6))
+        extra_blocks.append(UnknownBlock("frame", "", (unknown,) * 6))
     return number_unknowns(extra_blocks, blocks[-1].where.stop)

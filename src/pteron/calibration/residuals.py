@@ -14,7 +14,7 @@ import numpy as np
 import scipy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
-from pteron.calibration.guess import Block, Guess, plane_axes
+from pteron.calibration.guess import Guess, UnknownBlock, plane_axes
 from pteron.calibration.measurements import Measurements, length_columns, position_axes
 from pteron.equations.machine import numbers
 from pteron.equations.variations import slope_matrix, slope_terms
@@ -31,7 +31,7 @@ _CLOSED = 1e-12
 """Newton's step, as a share of the machine's size, below which the pose is found."""
 
 
-class Rows(NamedTuple):
+class ResidualRows(NamedTuple):
     """Residuals (N, K) of N rows: three of position, k of angles, one of height, one of distance.
 
     What was not measured has a residual and slopes of zero.
@@ -58,7 +58,7 @@ class MachineSlopes:
         What is sought.
     """
 
-    def __init__(self, robot: Manipulator, blocks: Sequence[Block]) -> None:
+    def __init__(self, robot: Manipulator, blocks: Sequence[UnknownBlock]) -> None:
         self.blocks = blocks
         self.count = blocks[-1].where.stop if blocks else 0
         self._kernel = slopes_kernel(robot)
@@ -110,7 +110,9 @@ class MachineSlopes:
         turned = (missed + np.pi) % (2.0 * np.pi) - np.pi
         return np.where(self._round, turned, missed)
 
-    def rows(self, guess: Guess, measurements: Measurements, poses: Array, chosen: Numbers) -> Rows:
+    def rows(
+        self, guess: Guess, measurements: Measurements, poses: Array, chosen: Numbers
+    ) -> ResidualRows:
         """Return the residuals of chosen rows (by number) at their poses (N, m), of all rows."""
         measured = ~np.isnan(np.hstack([part[chosen] for part in measurements.parts.values()]))
         point, separations, slopes = self.slopes(guess, measurements, poses, chosen, measured)
@@ -127,7 +129,9 @@ class MachineSlopes:
         if measured[:, -1].any():
             residuals[:, -1] = np.linalg.norm(separations, axis=-1) - measurements.distances[chosen]
         residuals[~measured], slopes[~measured] = 0.0, 0.0
-        return Rows(residuals, slopes[..., : self.count], slopes[..., self.count :], measured)
+        return ResidualRows(
+            residuals, slopes[..., : self.count], slopes[..., self.count :], measured
+        )
 
     def slopes(
         self,

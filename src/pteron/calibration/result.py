@@ -10,8 +10,8 @@ import numpy as np
 import scipy  # type: ignore[import-untyped]
 from numpy.typing import ArrayLike, NDArray
 
-from pteron.calibration.fit import Fit
-from pteron.calibration.guess import Block, Guess, Unknown, tolerances_of, variances
+from pteron.calibration.fit import CalibrationFit
+from pteron.calibration.guess import Guess, Unknown, UnknownBlock, tolerances_of, variances
 from pteron.calibration.measurements import (
     TOOL,
     Measurements,
@@ -22,7 +22,7 @@ from pteron.calibration.measurements import (
 from pteron.calibration.observability import Observability
 from pteron.calibration.residuals import MachineSlopes
 from pteron.calibration.thresholds import OFF_TOLERANCES
-from pteron.json_values import picked
+from pteron.json_values import fields_as_json
 from pteron.legs import Reading
 from pteron.manipulator import Manipulator
 from pteron.manipulator.machine_record import machine_record
@@ -92,7 +92,7 @@ class HeldOut:
 
 
 @dataclass(frozen=True)
-class Finding:
+class CalibrationFinding:
     """A fault that the measurements show: its kind, and a sentence that says where it is."""
 
     kind: str
@@ -159,11 +159,11 @@ class Calibration:
     noise: dict[str, float]
     observability: Observability
     held_out: HeldOut | None
-    findings: tuple[Finding, ...]
+    findings: tuple[CalibrationFinding, ...]
     verdict: Verdict
     measurements: Measurements
-    fit: Fit
-    blocks: tuple[Block, ...]
+    fit: CalibrationFit
+    blocks: tuple[UnknownBlock, ...]
     start: Guess
     open_errors: dict[str, float]
     hidden_order: HiddenOrder | None = None
@@ -230,17 +230,19 @@ class Calibration:
             "machine": machine_record(self.drawn),
             "calibrated_geometry": machine_record(self.robot)["geometry"],
             "values": values,
-            **picked(self.fit.guess, "zeros scales"),
+            **fields_as_json(self.fit.guess, "zeros scales"),
             "noise": self.noise,
-            **picked(self.observability, "rank shown columns"),
+            **fields_as_json(self.observability, "rank shown columns"),
             "certificate": self.observability.summary(),
-            **picked(self.observability, "unseen weak"),
-            **picked(self, "held_out findings verdict open_errors hidden_order"),
+            **fields_as_json(self.observability, "unseen weak"),
+            **fields_as_json(self, "held_out findings verdict open_errors hidden_order"),
             "outliers": outliers,
         }
 
 
-def open_errors(measurements: Measurements, fit: Fit, blocks: Sequence[Block]) -> dict[str, float]:
+def open_errors(
+    measurements: Measurements, fit: CalibrationFit, blocks: Sequence[UnknownBlock]
+) -> dict[str, float]:
     """Return the possible error (95 %) of each coordinate at the measured poses, m and rad."""
     robot = fit.guess.robot
     slopes = MachineSlopes(robot, blocks)
@@ -260,7 +262,7 @@ def open_errors(measurements: Measurements, fit: Fit, blocks: Sequence[Block]) -
     return possible
 
 
-def _contradicted_covariance(fit: Fit, blocks: Sequence[Block]) -> Array:
+def _contradicted_covariance(fit: CalibrationFit, blocks: Sequence[UnknownBlock]) -> Array:
     """Return the covariance (p, p) with tolerances as wide as the values that were found.
 
     Where a value is far beyond its group's tolerance, measurements contradict that tolerance: its
@@ -281,7 +283,9 @@ def _contradicted_covariance(fit: Fit, blocks: Sequence[Block]) -> Array:
     return fit.covariance if (prior == fit.prior).all() else replace(fit, prior=prior).covariance
 
 
-def values_of(start: Guess, fit: Fit, blocks: Sequence[Block]) -> tuple[Value, ...]:
+def values_of(
+    start: Guess, fit: CalibrationFit, blocks: Sequence[UnknownBlock]
+) -> tuple[Value, ...]:
     """Return all values of a fit."""
     drawn = np.concatenate([block.values(start) for block in blocks])
     deviations = np.sqrt(np.diag(fit.covariance))

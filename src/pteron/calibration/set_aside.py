@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pteron.calibration import thresholds
-from pteron.calibration.guess import Block, Guess
+from pteron.calibration.guess import Guess, UnknownBlock
 from pteron.calibration.measurements import Measurements
 from pteron.calibration.raw_faults import row_misfits
 from pteron.calibration.residuals import MachineSlopes
@@ -53,7 +53,7 @@ class SetAside(NamedTuple):
 
 
 def rows_set_aside(
-    start: Guess, measurements: Measurements, blocks: Sequence[Block], poses: Array
+    start: Guess, measurements: Measurements, blocks: Sequence[UnknownBlock], poses: Array
 ) -> SetAside:
     """Return the rows that the drawn machine does not reach, that lie beyond limits, or far off."""
     reasons: dict[int, str] = {}
@@ -126,7 +126,7 @@ class _Factors:
         self,
         start: Guess,
         measurements: Measurements,
-        blocks: Sequence[Block],
+        blocks: Sequence[UnknownBlock],
         poses: Array,
         squares: Array,
     ) -> None:

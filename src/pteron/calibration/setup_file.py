@@ -12,7 +12,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 from pteron.bodies.tables import Number, Three, TomlTable
 from pteron.bodies.vectors import unit_vector
 from pteron.calibration.measurements import KINDS, Place, Plane, Setup
-from pteron.errors import DataError, shown
+from pteron.errors import DataError, shorten
 from pteron.tables import Dialect
 from pteron.toml import read_toml, to_model
 
@@ -128,7 +128,7 @@ def read_setup_file(log: str | Path) -> MeasuredLog:
     document = read_toml(path, DataError, _ABSENT)
     if document.keys() >= _OF_A_MANIPULATOR:
         return MeasuredLog()
-    return to_model(MeasuredLog, document, shown(str(path), bare=True, longest=1000), DataError)
+    return to_model(MeasuredLog, document, shorten(str(path), bare=True, longest=1000), DataError)
 
 
 def join_setups(setups: Sequence[Setup], sources: Sequence[str]) -> Setup:
@@ -148,7 +148,7 @@ def join_setups(setups: Sequence[Setup], sources: Sequence[str]) -> Setup:
             for name in old.keys() & new.keys():
                 if old[name] != new[name]:
                     raise DataError(
-                        f"{source}: {part}.{shown(name, bare=True)}: another than in an earlier "
+                        f"{source}: {part}.{shorten(name, bare=True)}: another than in an earlier "
                         "log; make them one, or rename one"
                     )
             changed: dict[str, Any] = {part: {**old, **new}}

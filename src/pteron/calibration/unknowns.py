@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import get_args
 
-from pteron.calibration.guess import Block, Unknown, number_unknowns
+from pteron.calibration.guess import Unknown, UnknownBlock, number_unknowns
 from pteron.calibration.measurements import TOOL, Measurements
 from pteron.equations.variations import AXIAL, Group, axial_variations, variations
 from pteron.errors import DataError
@@ -37,7 +37,7 @@ def blocks_of(
     measured: Measurements,
     free: Sequence[str] | None = None,
     prior: Mapping[str, float] | None = None,
-) -> tuple[Block, ...]:
+) -> tuple[UnknownBlock, ...]:
     """Return the unknowns of a calibration, in blocks.
 
     Parameters
@@ -90,16 +90,18 @@ def blocks_of(
     for name, value in tolerances.items():
         if not value > 0.0:
             raise DataError(f"prior: {name} = {value:g}: a standard deviation above 0 expected")
-    blocks: list[Block] = []
+    blocks: list[UnknownBlock] = []
     if at := free_indices(geometry):
         free_geometry = tuple(geometry[i] for i in at)
-        blocks.append(Block("geometry", "", free_geometry, changes=tuple(varying[i] for i in at)))
+        blocks.append(
+            UnknownBlock("geometry", "", free_geometry, changes=tuple(varying[i] for i in at))
+        )
     for kind, unknowns in (("zeros", zeros), ("scales", scales)):
         if at := free_indices(unknowns):
-            blocks.append(Block(kind, "", tuple(unknowns[i] for i in at), legs=at))
+            blocks.append(UnknownBlock(kind, "", tuple(unknowns[i] for i in at), legs=at))
     if "tool" in names_free and TOOL in measured.marks:
         tolerance = float(tolerances.get("tool", TOLERANCES["tool"]))
-        blocks.append(Block("mark", TOOL, _point_unknowns("tool", tolerance, "tool")))
+        blocks.append(UnknownBlock("mark", TOOL, _point_unknowns("tool", tolerance, "tool")))
     blocks += _surrounding_blocks(measured)
     if not blocks:
         raise DataError("free: nothing is free; name a group")
@@ -112,21 +114,21 @@ def _point_unknowns(
     return tuple(Unknown(f"{name}.{axis}", group, "m", tolerance) for axis in "xyz")
 
 
-def _surrounding_blocks(measured: Measurements) -> Iterator[Block]:
+def _surrounding_blocks(measured: Measurements) -> Iterator[UnknownBlock]:
     """Yield the blocks of what measurements refer to and nobody knows."""
     setup = measured.setup
     for name, mark in setup.marks.items():
         if not mark.known and name in measured.marks:
-            yield Block("mark", name, _point_unknowns(f"marks.{name}"))
+            yield UnknownBlock("mark", name, _point_unknowns(f"marks.{name}"))
     for name, plane in setup.planes.items():
         if not plane.known and name in measured.planes:
             label = f"planes.{name or 'plane'}"
             tilts = [Unknown(f"{label}.tilt {k}", "setup", "rad", _WIDE) for k in (1, 2)]
             offset = Unknown(f"{label}.offset", "setup", "m", _WIDE)
-            yield Block("plane", name, (*tilts, offset))
+            yield UnknownBlock("plane", name, (*tilts, offset))
     for name, anchor in setup.anchors.items():
         if not anchor.known and name in measured.anchors:
-            yield Block("anchor", name, _point_unknowns(f"anchors.{name}"))
+            yield UnknownBlock("anchor", name, _point_unknowns(f"anchors.{name}"))
     if not setup.frame_known:
         turns = [Unknown(f"instrument about {a}", "setup", "rad", _WIDE) for a in "xyz"]
-        yield Block("frame", "", (*_point_unknowns("instrument"), *turns))
+        yield UnknownBlock("frame", "", (*_point_unknowns("instrument"), *turns))

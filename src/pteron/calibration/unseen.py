@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pteron.calibration.guess import Block, Guess
+from pteron.calibration.guess import Guess, UnknownBlock
 from pteron.equations.variations import AXIAL
 from pteron.reduction.numerical import independent
 
@@ -28,7 +28,7 @@ _INSIDE = 1e-5
 
 
 def unseen_combinations(
-    start: Guess, blocks: Sequence[Block], axes: Array, tolerances: Array
+    start: Guess, blocks: Sequence[UnknownBlock], axes: Array, tolerances: Array
 ) -> tuple[str, ...]:
     """Return the combinations that the rows of `axes` span, as texts.
 
@@ -91,7 +91,9 @@ def combination_text(vector: Array, names: Sequence[str]) -> str:
     return text + (f" and {excess} more" if excess > 0 else "")
 
 
-def _named_combinations(start: Guess, blocks: Sequence[Block]) -> Iterator[tuple[str, str, Array]]:
+def _named_combinations(
+    start: Guess, blocks: Sequence[UnknownBlock]
+) -> Iterator[tuple[str, str, Array]]:
     """Yield the combinations that have a name: its text, its owner, and the vector (p,)."""
     robot = start.robot
     names = [unknown.name for block in blocks for unknown in block.unknowns]
@@ -148,7 +150,7 @@ def _is_on_platform(name: str) -> bool:
 
 
 def _rigid_motions(
-    start: Guess, blocks: Sequence[Block], names: Sequence[str]
+    start: Guess, blocks: Sequence[UnknownBlock], names: Sequence[str]
 ) -> Iterator[tuple[str, str, Array]]:
     """Yield motions of the whole machine against an instrument whose frame is not known."""
     text = "where the machine's own frame stands in the base"
@@ -175,7 +177,7 @@ def _rigid_motions(
         yield text, "", combination
 
 
-def _uniform_growth(start: Guess, blocks: Sequence[Block]) -> Array:
+def _uniform_growth(start: Guess, blocks: Sequence[UnknownBlock]) -> Array:
     """Return the vector (p,) of a uniform scaling of all lengths."""
     legs = start.robot.legs
     lengths = [

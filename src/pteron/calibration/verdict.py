@@ -9,11 +9,11 @@ import numpy as np
 import scipy  # type: ignore[import-untyped]
 
 from pteron.calibration import thresholds
-from pteron.calibration.fit import BEYOND, Fit
-from pteron.calibration.guess import Block
+from pteron.calibration.fit import BEYOND, CalibrationFit
+from pteron.calibration.guess import UnknownBlock
 from pteron.calibration.measurements import Measurements
 from pteron.calibration.observability import Observability
-from pteron.calibration.result import Finding, HeldOut, HiddenOrder
+from pteron.calibration.result import CalibrationFinding, HeldOut, HiddenOrder
 from pteron.verdict import Grade, Opinion, Verdict
 
 EVERY = 5
@@ -44,11 +44,11 @@ class Evidence(NamedTuple):
     """The results from which a verdict is derived."""
 
     measurements: Measurements
-    fit: Fit
-    blocks: Sequence[Block]
+    fit: CalibrationFit
+    blocks: Sequence[UnknownBlock]
     observability: Observability
     held_out: HeldOut | None
-    findings: Sequence[Finding]
+    findings: Sequence[CalibrationFinding]
     open_errors: Mapping[str, float]
     """Possible error of each coordinate (95 %), m and rad."""
     hidden_order: HiddenOrder | None
@@ -64,7 +64,7 @@ class _Reason(NamedTuple):
     grade: Grade = "trustworthy"
 
 
-def rows_for_check(measurements: Measurements, blocks: Sequence[Block]) -> int:
+def rows_for_check(measurements: Measurements, blocks: Sequence[UnknownBlock]) -> int:
     """Return the least number of such rows from which some are held out of the fit."""
     counted = sum(int((~np.isnan(values)).sum()) for values in measurements.parts.values())
     least = (
@@ -158,7 +158,7 @@ def _error_reasons(evidence: Evidence) -> Iterator[_Reason]:
         )
 
 
-def fitted_errors(fit: Fit, measurements: Measurements) -> dict[str, float]:
+def fitted_errors(fit: CalibrationFit, measurements: Measurements) -> dict[str, float]:
     """Return the root mean square residual of each kind, m and rad, at the fitted rows."""
     counted = fit.measured & (fit.kept & (fit.distances != BEYOND))[:, None]
     kinds = {kind: counted & (measurements.kind_of == kind) for kind in measurements.kinds}
@@ -241,7 +241,7 @@ def _far_value_reasons(evidence: Evidence) -> Iterator[_Reason]:
         )
 
 
-def _outlier_reasons(fit: Fit) -> Iterator[_Reason]:
+def _outlier_reasons(fit: CalibrationFit) -> Iterator[_Reason]:
     out, count = int((~fit.kept).sum()), len(fit.kept)
     if out > thresholds.FEW_LEFT_OUT * count:
         many = out > thresholds.MANY_LEFT_OUT * count
@@ -253,12 +253,14 @@ def _outlier_reasons(fit: Fit) -> Iterator[_Reason]:
 
 
 def _unseen_reasons(shown: Observability) -> Iterator[_Reason]:
-    open_values = shown.columns - shown.shown
+    open_values = shown.columns - shown.determined_count
     if open_values:
-        potential = f"; at more poses {shown.rank} would" if shown.rank > shown.shown else ""
+        potential = (
+            f"; at more poses {shown.rank} would" if shown.rank > shown.determined_count else ""
+        )
         yield _Reason(
-            f"{shown.shown} of {shown.columns} combinations show in these measurements, the other "
-            f"{open_values} are kept at the drawing{potential}."
+            f"{shown.determined_count} of {shown.columns} combinations show in these measurements, "
+            f"the other {open_values} are kept at the drawing{potential}."
         )
 
 

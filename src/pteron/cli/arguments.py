@@ -15,10 +15,10 @@ from pteron.errors import DataError
 if TYPE_CHECKING:
     from pteron.manipulator import Manipulator
 
-    Machine = Manipulator
+    MachineArgument = Manipulator
 else:
 
-    class Machine:
+    class MachineArgument:
         """The machine that a command is about, loaded from its ROBOT and --elbows."""
 
 
@@ -40,10 +40,10 @@ class Command(TyperCommand):
 
     def get_params(self, ctx: Any) -> list[Any]:
         """Return the parameters; a flag is ``--json``, not ``--json <bool>``."""
-        return without_types(super().get_params(ctx))
+        return hide_flag_types(super().get_params(ctx))
 
 
-def without_types(parameters: list[Any]) -> list[Any]:
+def hide_flag_types(parameters: list[Any]) -> list[Any]:
     """Return a command's parameters; flags get no type in the help."""
     for parameter in parameters:
         if getattr(parameter, "is_flag", False):
@@ -62,10 +62,10 @@ class NumbersCommand(Command):
             if parameter.param_type_name == "option" and not getattr(parameter, "is_flag", False)
             for name in parameter.opts
         ]
-        return super().parse_args(ctx, regrouped(args, valued))
+        return super().parse_args(ctx, group_numbers(args, valued))
 
 
-def regrouped(args: Sequence[str], valued: Collection[str]) -> list[str]:
+def group_numbers(args: Sequence[str], valued: Collection[str]) -> list[str]:
     """Return arguments with each option's numbers joined by commas, and the others behind ``--``.
 
     `valued` are the options that take a value.

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Literal
 
 from typer import echo
 
-from pteron.cli.arguments import Machine
+from pteron.cli.arguments import MachineArgument
 from pteron.cli.progress import spinner
 from pteron.cli.result import Result
 from pteron.cli.terminal import is_terminal, plain, show, show_json, table
-from pteron.json_values import picked
+from pteron.json_values import fields_as_json
 
 if TYPE_CHECKING:
     from pteron.reduction import BaseParameters
@@ -26,7 +26,7 @@ _COMMENTS = {"sympy": "#", "latex": "%", "booktabs": "%"}
 
 
 def base(
-    machine: Machine,
+    machine: MachineArgument,
     *,
     method: Literal["exact", "svd", "qr"] = "exact",
     keep: str | None = None,
@@ -137,7 +137,9 @@ def table1() -> Result:
 
         computed_rows = computed()
     wrong = sum(not row.agrees for row in computed_rows)
-    data = [picked(r, "parameter kept printed computed agrees restored") for r in computed_rows]
+    data = [
+        fields_as_json(r, "parameter kept printed computed agrees restored") for r in computed_rows
+    ]
     verdicts = {True: "yes", False: "[bold red]NO[/bold red]"}
     rows = (
         (r.parameter, plain(r.printed), plain(r.computed), verdicts[r.agrees] + " *" * r.restored)

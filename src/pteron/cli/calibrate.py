@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from pteron.cli.arguments import Machine
+from pteron.cli.arguments import MachineArgument
 from pteron.cli.progress import spinner
 from pteron.cli.result import Result
 from pteron.cli.terminal import GRADE_COLORS, ascii_number, plain, show, table
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from pteron.calibration import Calibration, Plan, Setup
     from pteron.manipulator import Manipulator
-    from pteron.report.calibration import FirmwareFit, Row
+    from pteron.report.calibration import CalibrationRow, FirmwareFit
 
 _MOST = 12
 """Values that the terminal shows, those that changed most; the page has them all."""
@@ -30,7 +30,7 @@ Measure = Literal["positions", "heights", "poses", "distances"]
 def calibrate(
     log: list[str] | None = None,
     *,
-    machine: Machine,
+    machine: MachineArgument,
     robot: str,
     out: str,
     held_out: list[str] | None = None,
@@ -206,7 +206,7 @@ def _show(result: Calibration, firmware: FirmwareFit | None, left_out: str) -> N
         lines += [_table(firmware.rows), plain(firmware.sentence)]
     show(
         f"[bold {color}]{plain(result.drawn.name)}: {verdict.grade}[/bold {color}], "
-        f"{shown.shown} of {shown.columns} combinations shown",
+        f"{shown.determined_count} of {shown.columns} combinations shown",
         *lines,
         _values(result),
         *_errors(result),
@@ -229,7 +229,7 @@ def _values(result: Calibration) -> Table:
     )
 
 
-def _table(rows: Sequence[Row], caption: str | None = None) -> Table:
+def _table(rows: Sequence[CalibrationRow], caption: str | None = None) -> Table:
     numbers = ("drawn", "change", "+- 95 %")
     return table(
         *("value", *numbers, "unit", "made by"),

@@ -13,7 +13,7 @@ from pteron.cli.progress import spinner
 from pteron.cli.result import Result
 from pteron.cli.terminal import note, percent, plain, show, table, warn
 from pteron.errors import DataError, ModelError
-from pteron.json_values import picked
+from pteron.json_values import fields_as_json
 
 if TYPE_CHECKING:
     from pteron.kernels import Array
@@ -36,7 +36,7 @@ _MAY_BE_SINGULAR = (
 
 
 @dataclass(frozen=True)
-class Proofs:
+class RequestedProofs:
     """The proofs that the options ask for.
 
     Parameters
@@ -58,7 +58,7 @@ class Proofs:
     type_ii: float | None
 
     @property
-    def asked(self) -> bool:
+    def any_requested(self) -> bool:
         """Whether there is anything to prove."""
         return self.certify or self.prove is not None
 
@@ -175,12 +175,12 @@ def _paving_data(
         "robot": paved.robot.name,
         "held": _angles(paved.robot, pose),
         "floors": floors,
-        **picked(paved, "inner=inner_volume outer=outer_volume unit"),
+        **fields_as_json(paved, "inner=inner_volume outer=outer_volume unit"),
         "gap": paved.gap if paved.inner_volume else None,
         "complete": paved.complete,
         "boxes": {"inner": len(paved.inner), "undecided": len(paved.boundary)},
         "boundary": paved.boundary_shares,
-        "cube": cube and {**picked(cube, "edge center"), "proved": True},
+        "cube": cube and {**fields_as_json(cube, "edge center"), "proved": True},
     }
 
 

@@ -6,7 +6,7 @@ import math
 from dataclasses import fields
 from typing import TYPE_CHECKING
 
-from pteron.cli.arguments import Machine
+from pteron.cli.arguments import MachineArgument
 from pteron.cli.motion_table import motion_frame, peaks_table
 from pteron.cli.progress import spinner
 from pteron.cli.result import Result
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 def cue(
     motion: str,
     *,
-    machine: Machine,
+    machine: MachineArgument,
     out: str | None = None,
     page: str | None = None,
     type_ii: float = 0.0,
@@ -88,7 +88,7 @@ def cue(
         files = _write(machine, cued, out, page)
     for peak in largest:
         if peak.share > 1.0:
-            note(f"Note: {peak.told()}; a smaller --scale asks less")
+            note(f"Note: {peak.phrase()}; a smaller --scale asks less")
     low, high = cued.region.box
     box = np.stack([low, high], axis=-1).tolist()
     data = {

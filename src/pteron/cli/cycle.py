@@ -7,15 +7,15 @@ from dataclasses import asdict
 from functools import partial
 from typing import TYPE_CHECKING, Literal
 
-from pteron.cli.arguments import Machine, check_rate, parsed_list
-from pteron.cli.motion_argument import Carried, given_pose, replayed
+from pteron.cli.arguments import MachineArgument, check_rate, parsed_list
+from pteron.cli.motion_argument import Carried, given_pose, read_motion
 from pteron.cli.motion_table import motion_frame, peaks_table
 from pteron.cli.planned_motions import joint_motion, line_motion, standard_motion
 from pteron.cli.progress import spinner
 from pteron.cli.result import Result
 from pteron.cli.terminal import note, show
 from pteron.errors import DataError
-from pteron.json_values import picked
+from pteron.json_values import fields_as_json
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -49,7 +49,7 @@ _DENSE = 10
 
 
 def cycle(
-    machine: Machine,
+    machine: MachineArgument,
     *,
     kind: Kind | None = None,
     from_: str | None = None,
@@ -126,7 +126,7 @@ def cycle(
     """
     from pteron.motion import limits_of
 
-    machine = carried.on(machine)
+    machine = carried.load_machine(machine)
     check_rate(rate)
     if out is not None:
         from pteron.tables import check_output
@@ -146,7 +146,7 @@ def cycle(
         step = 1.0 / rate
         if table is not None:
             start = None if from_ is None else given_pose(machine, from_, "--from")
-            motion = replayed(machine, table, start)
+            motion = read_motion(machine, table, start)
         elif way == "joints":
             motion = joint_motion(machine, from_, to, parsed_list(jerk, "--jerk"), limits, step)
         elif way == "line":
@@ -190,7 +190,7 @@ def _result(
     largest = peaks(machine, *motion.at(fine), limits)
     for peak in largest:
         if peak.share > 1.0 + _ROUNDING:  # of a motion that came in a table
-            note(f"Note: {peak.told()}")
+            note(f"Note: {peak.phrase()}")
     if out is not None:
         from pteron.tables import write_table
 
@@ -207,7 +207,7 @@ def _result(
         "quintic_duration": bound,
         "scale": getattr(motion, "scale", None),
         "peaks": [
-            picked(p, "quantity=name leg size unit limit share") | {"leg": p.leg or None}
+            fields_as_json(p, "quantity=name leg size unit limit share") | {"leg": p.leg or None}
             for p in largest
         ],
         "file": out,

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
-from pteron.cli.arguments import Machine
+from pteron.cli.arguments import MachineArgument
 from pteron.cli.progress import progress_bar
 from pteron.cli.result import Result
 from pteron.cli.terminal import note, table
@@ -115,7 +115,7 @@ class _SearchOptions:
 
 
 def excite(
-    machine: Machine,
+    machine: MachineArgument,
     *,
     out: str | None = None,
     series: _SeriesOptions,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import Any, Literal
 
-from pteron.cli.arguments import Machine
+from pteron.cli.arguments import MachineArgument
 from pteron.cli.motion_argument import Carried
 from pteron.cli.progress import spinner
 from pteron.cli.result import Result
@@ -26,7 +26,7 @@ _TARGETS = (
 
 
 def export(
-    machine: Machine,
+    machine: MachineArgument,
     *,
     c: str | None = None,
     st: str | None = None,
@@ -106,7 +106,7 @@ def export(
             f"--tool {tool}: not with --base, whose values are of the machine without it; leave it "
             "out, and let the controller call set_payload_base"
         )
-    machine = Carried(tool=tool).mounted(machine)
+    machine = Carried(tool=tool).mount_tool(machine)
     files = []
     with spinner(f"Writing code for {machine.name}"):
         from pteron.controllers import Controller, read_gains

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from typing import Any
 
-from pteron.cli.arguments import STANDARD, Machine
+from pteron.cli.arguments import STANDARD, MachineArgument
 from pteron.cli.motion_argument import Carried, cycle_of
 from pteron.cli.progress import progress_bar, spinner
 from pteron.cli.result import Result
 from pteron.cli.terminal import plain
 from pteron.errors import DataError
 from pteron.extras import expect_extra
-from pteron.json_values import picked
+from pteron.json_values import fields_as_json
 
 
 def film(
-    machine: Machine,
+    machine: MachineArgument,
     *,
     out: str,
     cycle: str = STANDARD,
@@ -55,7 +55,7 @@ def film(
 
     checked_film(out)
     sides = _sides(size)
-    machine, carrying = carried.mounted(machine), carried.on(machine)
+    machine, carrying = carried.mount_tool(machine), carried.load_machine(machine)
     with spinner(f"A cycle of {machine.name}"):
         motion = cycle_of(machine, cycle, duration)
         state = motion.pose, motion.velocity, motion.acceleration
@@ -66,7 +66,7 @@ def film(
     data = {
         "robot": machine.name,
         "cycle": cycle,
-        **picked(written, "duration speed frames fps size"),
+        **fields_as_json(written, "duration speed frames fps size"),
         "file": str(written.path),
     }
     pace = "in real time" if written.speed == 1.0 else f"at {written.speed:.3g} times its speed"

@@ -7,7 +7,7 @@ from pathlib import Path
 from shutil import get_terminal_size
 from typing import TYPE_CHECKING, Any, Literal
 
-from pteron.cli.arguments import Machine, load_robot, split_numbers
+from pteron.cli.arguments import MachineArgument, load_robot, split_numbers
 from pteron.cli.progress import Times, spinner, stages
 from pteron.cli.result import Result
 from pteron.cli.terminal import (
@@ -48,7 +48,7 @@ Derivatives = Literal["periodic", "central", "spline"]
 def identify(
     log: list[str],
     *,
-    machine: Machine,
+    machine: MachineArgument,
     robot: str,
     out: str,
     held_out: list[str] | None = None,
@@ -137,7 +137,7 @@ def identify(
         times("Drawing the report", 0, 0)
         files = write_identification(result, folder, sources=sources)
     if is_terminal():
-        note(times.told())
+        note(times.summary())
     data = {"files": [str(path) for path in files.paths], **numbers(result)}
     return Result(data, partial(_show, result), files.paths)
 
@@ -227,10 +227,10 @@ def _errors(result: Identification) -> Table:
 
 
 def _values(result: Identification) -> Table:
-    from pteron.report.identification import measured, parameter_rows
+    from pteron.report.identification import parameter_rows, value_with_uncertainty
     from pteron.report.typeset import significant
 
-    short = result.understated
+    short = result.has_understated_errors
     headings = ("value", "+- 95 % (!)" if short else "+- 95 %", "rel. (%)")
     numbers = headings[: 2 if _narrow() else 3]
     columns = ["parameter", *numbers, *(() if _narrow() else ("unit",)), ""]
@@ -243,7 +243,7 @@ def _values(result: Identification) -> Table:
     value_table = table(*columns, numbers=numbers, caption=caption)
     marks = {"essential": "", "dropped": "[yellow]weak[/]", "unseen": "[yellow]unseen[/]"}
     for row in parameter_rows(result):
-        value, half = map(ascii_number, measured(row.value, row.half))
+        value, half = map(ascii_number, value_with_uncertainty(row.value, row.half))
         relative = (
             ">999" if row.relative >= 9.995 else ascii_number(significant(100.0 * row.relative, 2))
         )
@@ -259,7 +259,7 @@ def _payload(result: Identification) -> list[str]:
     payload = payload_in(result)
     if payload is None:
         return []
-    if not (payload.real and payload.felt):
+    if not (payload.real and payload.is_significant):
         return ["The payload is no real body's, or is not felt: record it longer, or faster."]
     return [plain(f"The payload: {payload.call(result.robot)}")]
 

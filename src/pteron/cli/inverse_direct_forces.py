@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from pteron.cli.arguments import MOTION, Failure, Machine, parsed_numbers
+from pteron.cli.arguments import MOTION, Failure, MachineArgument, parsed_numbers
 from pteron.cli.table_rows import (
-    Rows,
+    TableRows,
     check_destination,
     deliver,
     given_rows,
@@ -28,7 +28,7 @@ _ROUNDING = 1e-9
 
 
 def inverse(
-    machine: Machine,
+    machine: MachineArgument,
     pose: list[str] | None = None,
     *,
     table: str | None = None,
@@ -60,7 +60,7 @@ def inverse(
     rows = given_rows(machine, table, pose, "pose", columns)
     added = machine.joint_names
     check_destination(out, table, rows.table, added)
-    joints = rows.served(
+    joints = rows.evaluate(
         machine,
         lambda poses: to_readings(
             machine, inverse_kinematics(machine, poses, on_failure=on_failure)
@@ -69,12 +69,12 @@ def inverse(
         on_failure,
     )
     _note_limits(machine, from_readings(machine, joints))
-    result = rows.table.extended(dict(zip(added, joints.T, strict=True)))
+    result = rows.table.with_columns(dict(zip(added, joints.T, strict=True)))
     deliver(machine, result, added, out=out, as_json=json, single=rows.single)
 
 
 def direct(
-    machine: Machine,
+    machine: MachineArgument,
     joints: list[str] | None = None,
     *,
     table: str | None = None,
@@ -110,7 +110,7 @@ def direct(
     failure: Failure = on_failure or ("raise" if rows.single else "nan")
     added = ["row", "mode", *machine.coordinates]
     check_destination(out, table, rows.table, added)
-    poses = rows.served(
+    poses = rows.evaluate(
         machine,
         lambda values: direct_kinematics(
             machine, from_readings(machine, values), on_failure=failure
@@ -161,18 +161,18 @@ def _modes(
     columns = dict(zip(coordinates, poses[row, mode].T, strict=True))
     if isinstance(table, TypedRow):
         numbers = [None] if lost.any() else (mode + 1).tolist()
-        return table.repeated(numbers, coordinates).extended(columns)
+        return table.repeat_modes(numbers, coordinates).with_columns(columns)
     import polars as pl
 
     frame = table.frame.drop("row", "mode", *coordinates, strict=False)[row]
     frame.insert_column(0, pl.Series("row", row + 1))
     modes = pl.Series("mode", mode + 1, dtype=pl.Int64)
     frame = frame.hstack([modes.zip_with(~pl.Series(lost[row]), pl.Series([None], dtype=pl.Int64))])
-    return replace(table, frame=frame).extended(columns)
+    return replace(table, frame=frame).with_columns(columns)
 
 
 def forces(
-    machine: Machine,
+    machine: MachineArgument,
     *,
     pose: str | None = None,
     velocity: str | None = None,
@@ -242,17 +242,17 @@ def forces(
         rates = joint_rates(machine, *parts[:2], on_failure=on_failure).actuated
         return np.concatenate([requested, driven, rates], axis=-1)
 
-    served = rows.served(machine, serve, columns, on_failure)
+    served = rows.evaluate(machine, serve, columns, on_failure)
     delivered = served[:, :n] * reading_scales(machine)
     poses = rows.table.numbers(columns[:m], on_failure)
     _note_limits(machine, inverse_kinematics(machine, poses, on_failure="nan"))
     for text in overloads(machine, served[:, n : 2 * n], served[:, 2 * n :]) if limited else ():
         note(f"Note: {text}")
-    result = rows.table.extended(dict(zip(added, delivered.T, strict=True)))
+    result = rows.table.with_columns(dict(zip(added, delivered.T, strict=True)))
     deliver(machine, result, added, out=out, as_json=json, single=rows.single)
 
 
-def _typed_row(typed: list[str | None], motion: list[str], loads: tuple[str, ...]) -> Rows:
+def _typed_row(typed: list[str | None], motion: list[str], loads: tuple[str, ...]) -> TableRows:
     m = len(motion) // 3
     if typed[0] is None:
         raise DataError(f"no pose given; give --pose with {' '.join(motion[:m])}, or --table FILE")

@@ -15,7 +15,7 @@ from pteron.cli.progress import spinner
 from pteron.cli.result import Result
 from pteron.cli.terminal import complain, plain, show, table, warn, write
 from pteron.errors import ModelError, OutputError, PteronError
-from pteron.json_values import picked
+from pteron.json_values import fields_as_json
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -207,7 +207,7 @@ def _findings(robot: Manipulator) -> dict[str, Any]:
         "mirror_pose": None if both.mirror is None else list(both.mirror),
         "holding": asdict(examination.holding),
         "working_modes": [
-            picked(mode, "elbows=signs place depth pose margin named likely")
+            fields_as_json(mode, "elbows=signs place depth pose margin named likely")
             for mode in examination.modes
         ],
         "limited_joints": [asdict(joint) for joint in limited_joints(robot, home)],
@@ -222,11 +222,11 @@ def _leg(leg: LegKind) -> dict[str, Any]:
     return {
         "type": leg.type,
         "joint": leg.joint.noun,
-        **picked(leg, "axis=joint_axis"),
+        **fields_as_json(leg, "axis=joint_axis"),
         "lengths": {q.name: q.value[0] for q in leg.quantities if q.role == "length"},
-        **picked(leg, "elbow limits"),
-        **picked(leg.joint, "unit force_unit"),
-        **picked(leg, "drive reading"),
+        **fields_as_json(leg, "elbow limits"),
+        **fields_as_json(leg.joint, "unit force_unit"),
+        **fields_as_json(leg, "drive reading"),
     }
 
 

@@ -15,7 +15,7 @@ from typer import Abort, Context, Exit, Typer, echo
 from typer.core import TyperGroup
 from typer.main import get_command
 
-from pteron.cli.arguments import Command, NumbersCommand, without_types
+from pteron.cli.arguments import Command, NumbersCommand, hide_flag_types
 from pteron.cli.base_parameters import base, table1
 from pteron.cli.calibrate import calibrate
 from pteron.cli.choose import choose
@@ -29,7 +29,7 @@ from pteron.cli.identify import identify
 from pteron.cli.interrupts import ended_with_compilers, insistent_interrupts
 from pteron.cli.inverse_direct_forces import direct, forces, inverse
 from pteron.cli.machines import catalog, check, new
-from pteron.cli.options import help_of, typed
+from pteron.cli.options import help_of, parsed_command
 from pteron.cli.play import play
 from pteron.cli.report import report
 from pteron.cli.result import Result
@@ -59,7 +59,7 @@ class CommandGroup(TyperGroup):
 
     def get_params(self, ctx: Any) -> list[Any]:
         """Return the parameters, flags without a type in the help."""
-        return without_types(super().get_params(ctx))
+        return hide_flag_types(super().get_params(ctx))
 
     def main(self, *args: Any, **extra: Any) -> Any:
         """Run a subcommand and exit."""
@@ -170,7 +170,10 @@ class Commands(Mapping[str, Any]):
     def __getitem__(self, name: str) -> Any:
         if name not in self._made:
             panel, function = self._panels[name]
-            cls, command = NumbersCommand if function in _NUMERIC else Command, typed(function)
+            cls, command = (
+                NumbersCommand if function in _NUMERIC else Command,
+                parsed_command(function),
+            )
             alone = Typer(add_completion=False, **_LOOKS)
             alone.command(cls=cls, rich_help_panel=panel, **help_of(command))(command)
             self._made[name] = get_command(alone)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from pteron.cli.pose_ranges import pose_text, span_text
 from pteron.cli.terminal import percent, plain, show, table
 from pteron.errors import DataError
-from pteron.json_values import picked
+from pteron.json_values import fields_as_json
 
 if TYPE_CHECKING:
     import rich.table
@@ -34,11 +34,11 @@ def map_data(
     return {
         "robot": index_map.robot,
         "held": grid.fixed_coordinates,
-        "varies": [picked(axis, _AXIS) for axis in grid.axes],
+        "varies": [fields_as_json(axis, _AXIS) for axis in grid.axes],
         "poses": grid.size,
         "in_reach": index_map.share,
         "causes": index_map.causes,
-        "reach": volume and picked(volume, "box volume standard_error unit"),
+        "reach": volume and fields_as_json(volume, "box volume standard_error unit"),
         "indices": [_index_data(index_map, index.name) for index in index_map.indices],
         "warnings": warnings,
         **({"files": [out]} if out is not None else {}),
@@ -49,7 +49,7 @@ def _index_data(index_map: Map, name: str) -> dict[str, Any]:
     from pteron.maps.map import ALL
 
     index = ALL[name]
-    about = picked(index, "index=name title unit better")
+    about = fields_as_json(index, "index=name title unit better")
     try:
         summary = index_map.summary(name)
     except DataError:
@@ -60,7 +60,7 @@ def _index_data(index_map: Map, name: str) -> dict[str, Any]:
             "poses": 0,
             "undetermined": undetermined,
         }
-    return about | picked(summary, _SUMMARY, "poses=count undetermined=infinite")
+    return about | fields_as_json(summary, _SUMMARY, "poses=count undetermined=infinite")
 
 
 def map_rows(data: Mapping[str, Any]) -> Any:

@@ -31,10 +31,10 @@ def cycle_of(robot: Manipulator, cycle: str, duration: float | None) -> Motion:
         return pick_and_place(robot, duration=duration)
     if duration is not None:
         raise DataError(f"--duration is for --cycle {STANDARD}; a table has its own time")
-    return replayed(robot, cycle)
+    return read_motion(robot, cycle)
 
 
-def replayed(robot: Manipulator, file: str, start: PoseLike | None = None) -> Motion:
+def read_motion(robot: Manipulator, file: str, start: PoseLike | None = None) -> Motion:
     """Return a motion from a table.
 
     A table of joints alone is followed from a pose to start from, the home pose if none is given.
@@ -44,7 +44,7 @@ def replayed(robot: Manipulator, file: str, start: PoseLike | None = None) -> Mo
     return _playback_of_table(robot, read_table(file), start).motion
 
 
-def played(robot: Manipulator, file: str) -> Playback:
+def read_playback(robot: Manipulator, file: str) -> Playback:
     """Return a motion from a table, or a log, as it is shown."""
     from pteron.playback import playback, read_motion
     from pteron.tables import Table
@@ -58,14 +58,14 @@ def played(robot: Manipulator, file: str) -> Playback:
 def _playback_of_table(robot: Manipulator, rows: Table, start: PoseLike | None = None) -> Playback:
     """Return the motion of a table; what it cannot do may be in another unit."""
     from pteron.kinematics.unlikely_values import unlikely_values
-    from pteron.playback import of_table
+    from pteron.playback import playback_of_table
 
     file = rows.source
     _check_rates(robot, rows)
     names = [n for n in (*robot.coordinates, *robot.joint_names) if n in rows.columns]
     values = rows.numbers(names)
     try:
-        return of_table(robot, rows, start)
+        return playback_of_table(robot, rows, start)
     except (UnreachablePose, SingularPose) as error:
         unlikely = "; ".join(unlikely_values(robot, names, values))
         if not unlikely or (isinstance(error, UnreachablePose) and error.millimetres):
@@ -96,7 +96,7 @@ class Carried:
     tool: str | None = None
 
     @classmethod
-    def of(cls, payload: str | None, tool: str | None) -> Carried:
+    def from_options(cls, payload: str | None, tool: str | None) -> Carried:
         """Read the options: a mass, perhaps its centre, and perhaps its inertia."""
         if payload is None:
             return cls(tool=tool)
@@ -121,15 +121,15 @@ class Carried:
         words = [*tool, *([f"{self.payload:g} kg{at}"] if self.payload else [])]
         return f" with {' and '.join(words)}" if words else ""
 
-    def on(self, robot: Manipulator) -> Manipulator:
+    def load_machine(self, robot: Manipulator) -> Manipulator:
         """Return the machine with it."""
         from pteron.motion import with_payload
 
-        robot = self.mounted(robot)
+        robot = self.mount_tool(robot)
         body = self.payload, self.payload_center, self.payload_inertia or 0.0
         return with_payload(robot, *body)
 
-    def mounted(self, robot: Manipulator) -> Manipulator:
+    def mount_tool(self, robot: Manipulator) -> Manipulator:
         """Return the machine with the tool alone."""
         from pteron.motion import with_tool
 

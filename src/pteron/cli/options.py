@@ -21,7 +21,7 @@ from typing import Annotated, Any, get_type_hints
 from typer import Argument, Context, Option
 
 from pteron.cli import completion
-from pteron.cli.arguments import Machine, load_robot
+from pteron.cli.arguments import MachineArgument, load_robot
 from pteron.cli.exported_functions import FUNCTIONS
 from pteron.cli.motion_argument import Carried
 from pteron.cli.result import Result
@@ -58,7 +58,7 @@ _COMPLETION = {
 }
 
 
-def typed(command: Callable[..., Result | None]) -> Callable[..., None]:
+def parsed_command(command: Callable[..., Result | None]) -> Callable[..., None]:
     """Return a command as it is typed.
 
     Its `machine` is loaded from ROBOT in the working mode of --elbows, what it carries is read from
@@ -69,7 +69,7 @@ def typed(command: Callable[..., Result | None]) -> Callable[..., None]:
     options: dict[str, Parameter] = {}
     groups = {name: hints[name] for name in arguments if _is_group(hints[name])}
     for name, argument in arguments.items():
-        if hints[name] is Machine:
+        if hints[name] is MachineArgument:
             options["robot"] = argument.replace(name="robot", annotation=str)
         elif hints[name] is Carried:
             options |= {each: _option(each, str | None) for each in ("payload", "tool")}
@@ -91,7 +91,7 @@ def typed(command: Callable[..., Result | None]) -> Callable[..., None]:
         if "before" in vars(command):  # a missing extra is told before a machine is read
             vars(command)["before"](passed)
         if "carried" in arguments:
-            passed["carried"] = Carried.of(values["payload"], values["tool"])
+            passed["carried"] = Carried.from_options(values["payload"], values["tool"])
         for name, group in groups.items():
             passed[name] = group(**{field.name: values[field.name] for field in fields(group)})
         if "machine" in arguments:
@@ -108,7 +108,7 @@ def typed(command: Callable[..., Result | None]) -> Callable[..., None]:
 
 def _is_group(hint: Any) -> bool:
     """Say whether a parameter's type is a group of options."""
-    return isinstance(hint, type) and is_dataclass(hint) and hint not in (Machine, Carried)
+    return isinstance(hint, type) and is_dataclass(hint) and hint not in (MachineArgument, Carried)
 
 
 def _option(name: str, kind: Any, *, default: Any = None) -> Parameter:

@@ -36,7 +36,7 @@ def standard_motion(
     if optimal:
         return time_optimal(machine, path, limits, step=step)
     check_path(machine, path)
-    if duration is None and not limits.any:
+    if duration is None and not limits.is_limited:
         tilts = machine.platform.tilts
         beside = f", and of a point {1e3 * farthest_point(machine):.0f} mm from P as it turns,"
         note(
@@ -66,25 +66,25 @@ def line_motion(
     """Return the motion on straight lines from a pose, through a table's poses, to a pose."""
     import numpy as np
 
-    from pteron.motion import along, line_path, there_and_back, time_optimal
+    from pteron.motion import line_path, polynomial_motion, return_path, time_optimal
 
     if to is None and via is None:
         raise DataError(f"no way given; give --to with {' '.join(machine.coordinates)}, or --via")
     poses = [] if via is not None and from_ is None else [given_pose(machine, from_, "--from")]
     if via is not None:
-        from pteron.tables import in_si, read_table
+        from pteron.tables import convert_to_si, read_table
 
-        passed = in_si(read_table(via), machine.column_units).numbers(machine.coordinates)
+        passed = convert_to_si(read_table(via), machine.column_units).numbers(machine.coordinates)
         note_unlikely(machine, machine.coordinates, passed, via)
         poses += list(passed)
     if to is not None:
         poses.append(given_pose(machine, to, "--to"))
     path: Any = line_path(machine, np.array(poses), corner)
     if back:
-        path = there_and_back(path)
+        path = return_path(path)
     if optimal:
         return time_optimal(machine, path, limits, step=step)
-    return along(machine, path, duration=duration, limits=limits, law=law, step=step)
+    return polynomial_motion(machine, path, duration=duration, limits=limits, law=law, step=step)
 
 
 def joint_motion(

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pteron.cli.arguments import STANDARD, Machine
-from pteron.cli.motion_argument import Carried, played
+from pteron.cli.arguments import STANDARD, MachineArgument
+from pteron.cli.motion_argument import Carried, read_playback
 from pteron.cli.progress import spinner
 from pteron.cli.result import Result
 from pteron.cli.terminal import plain
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def play(
-    machine: Machine,
+    machine: MachineArgument,
     motion: str | None = None,
     *,
     out: str = "motion.html",
@@ -50,7 +50,7 @@ def play(
     """
     from pteron.report.write import checked_page, write_motion_page
 
-    machine = carried.on(machine)
+    machine = carried.load_machine(machine)
     if motion is not None and cycle is not None:
         raise DataError("MOTION and --cycle given; give one of them")
     checked_page(out)
@@ -77,4 +77,4 @@ def _playback(machine: Manipulator, motion: str) -> Playback:
 
     if motion == STANDARD and not Path(motion).exists():
         return Playback(pick_and_place(machine))
-    return played(machine, motion)
+    return read_playback(machine, motion)

@@ -182,7 +182,7 @@ class Times:
         self._stage = "" if done else name
         self._tell(name, done, total)
 
-    def told(self) -> str:
+    def summary(self) -> str:
         """Return the stages with their times, in a line."""
         self._end("")
         spans = ((name, spent) for name, spent in self._spent.items() if name and spent > _SHORT)

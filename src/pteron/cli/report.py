@@ -7,8 +7,8 @@ import math
 from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any
 
-from pteron.cli.arguments import Machine
-from pteron.cli.motion_argument import Carried, played
+from pteron.cli.arguments import MachineArgument
+from pteron.cli.motion_argument import Carried, read_playback
 from pteron.cli.progress import spinner
 from pteron.cli.result import Result
 from pteron.cli.terminal import plain, table, warn
@@ -21,7 +21,7 @@ _SERIES = ("time", "pose", "velocity", "acceleration", "forces")
 
 
 def report(
-    machine: Machine,
+    machine: MachineArgument,
     *,
     out: str,
     motion: str | None = None,
@@ -43,11 +43,11 @@ def report(
     pteron report quadrupteron --motion motion.csv --payload 0.5 --out report
     """
     # The name is the page's heading: it says which payload the forces are computed with.
-    machine = replace(carried.on(machine), name=f"{machine.name}{carried}")
+    machine = replace(carried.load_machine(machine), name=f"{machine.name}{carried}")
     with spinner(f"Writing the report on {machine.name}"):
         from pteron.report import write_report
 
-        shown = None if motion is None else played(machine, motion)
+        shown = None if motion is None else read_playback(machine, motion)
         page = write_report(machine, out, motion=shown)
     contents = json.loads((page.parent / "report.json").read_text(encoding="utf-8"))
     warn([*contents["doubts"], *contents["cycle"]["overloads"]])

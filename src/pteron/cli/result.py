@@ -8,7 +8,7 @@ from typing import Any
 
 from typer import Exit
 
-from pteron.cli.terminal import show, show_json, written
+from pteron.cli.terminal import file_lines, show, show_json
 
 
 @dataclass(frozen=True)
@@ -38,8 +38,8 @@ class Result:
             show_json(self.data)
         elif callable(self.told):
             self.told()
-            show(*written(*self.files))
+            show(*file_lines(*self.files))
         else:
-            show(*self.told, *written(*self.files))
+            show(*self.told, *file_lines(*self.files))
         if self.code:
             raise Exit(self.code)

@@ -7,7 +7,7 @@ from dataclasses import asdict, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
 
-from pteron.cli.arguments import STANDARD, Machine, check_rate, load_robot
+from pteron.cli.arguments import STANDARD, MachineArgument, check_rate, load_robot
 from pteron.cli.destination import Destination
 from pteron.cli.motion_argument import Carried, cycle_of
 from pteron.cli.motion_table import force_word
@@ -29,7 +29,7 @@ Name = Literal["computed-torque", "feed-forward", "pd", "adaptive", "adaptive-dr
 
 
 def simulate(
-    machine: Machine,
+    machine: MachineArgument,
     *,
     cycle: str = STANDARD,
     controller: Name = "computed-torque",
@@ -92,16 +92,16 @@ def simulate(
     check_rate(rate)
     destination = Destination(out, "simulation")
     destination.check()
-    carrying = carried.on(machine)
+    carrying = carried.load_machine(machine)
     at_tool = carried.payload_center is None
-    machine = carried.mounted(machine) if at_tool else carrying
+    machine = carried.mount_tool(machine) if at_tool else carrying
     believed = None if model is None else _model(machine, model, elbows)
     with spinner(f"Simulating {machine.name}"):
         motion = cycle_of(machine, cycle, duration)
         acts, law_name = controller_of(controller, motion, 1.0 / rate, bandwidth), str(controller)
         if gains is not None:
             acts, law_name = read_gains(carrying, gains), gains
-        motion = motion if cycles == 1 else motion.repeated(cycles)
+        motion = motion if cycles == 1 else motion.repeat(cycles)
         overloads = overloads_of(carrying, motion)
         if overloads and not anyway:
             raise DataError(
@@ -163,7 +163,7 @@ def _data(simulation: Simulation, controller: str, cycle: str, carried: Carried)
         "rms_force": [np.sqrt(np.mean(force**2)) for force in simulation.forces.T],
         "peak_speed": np.abs(simulation.joint_rates).max(axis=0),
         "peak_power": np.abs(power).max(axis=0),
-        "at_its_limit": simulation.saturated,
+        "at_its_limit": simulation.saturated_share,
     }
     tracking = {
         "largest": np.abs(error).max(axis=0),

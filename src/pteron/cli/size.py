@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from pteron.cli.arguments import STANDARD, Machine
+from pteron.cli.arguments import STANDARD, MachineArgument
 from pteron.cli.destination import Destination
 from pteron.cli.motion_argument import Carried, cycle_of
 from pteron.cli.motion_table import force_word
@@ -38,7 +38,7 @@ _ROUNDING = 1e-9
 
 
 def size(
-    machine: Machine,
+    machine: MachineArgument,
     *,
     cycle: list[str] | None = None,
     carried: Carried,
@@ -102,7 +102,7 @@ def size(
     places: Any = {"workspace": "workspace", "here": None}
     example = ", such as x=-0.1:0.1,y=-0.1:0.1"
     spans = {} if where in places else pose_spans(machine, where, "--within", example)
-    carrying = carried.on(machine)
+    carrying = carried.load_machine(machine)
     with spinner(f"Sizing the drives of {machine.name}"):
         motions = [cycle_of(carrying, name, duration) for name in cycles]
         region = _box(machine, spans, motions) if spans else places[where]

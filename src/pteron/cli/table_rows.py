@@ -32,7 +32,7 @@ _DECIMALS = {"m": 6, "rad": 6, "N": 4, "N m": 4}
 
 
 @dataclass(frozen=True)
-class Rows:
+class TableRows:
     """A table, or a single row that was typed: messages about it speak of no rows."""
 
     table: Table | TypedRow
@@ -44,7 +44,7 @@ class Rows:
 
         return isinstance(self.table, TypedRow)
 
-    def served(
+    def evaluate(
         self,
         robot: Manipulator,
         serve: Callable[[NDArray[Any]], NDArray[Any]],
@@ -112,7 +112,7 @@ def given_rows(
     typed: Sequence[str] | None,
     what: str,
     names: Sequence[str],
-) -> Rows:
+) -> TableRows:
     """Return the rows of a table's file, or the one that was typed; `names` are its columns."""
     if not typed:
         return rows_of_table(robot, file, what, names)
@@ -121,23 +121,25 @@ def given_rows(
     return single_row(names, parsed_numbers(typed, names, what))
 
 
-def single_row(columns: Sequence[str], values: Sequence[float]) -> Rows:
+def single_row(columns: Sequence[str], values: Sequence[float]) -> TableRows:
     """Return the row that was typed."""
     from pteron.cli.typed_row import TypedRow
 
-    return Rows(TypedRow({name: [value] for name, value in zip(columns, values, strict=True)}))
+    return TableRows(TypedRow({name: [value] for name, value in zip(columns, values, strict=True)}))
 
 
-def rows_of_table(robot: Manipulator, file: str | None, what: str, names: Sequence[str]) -> Rows:
+def rows_of_table(
+    robot: Manipulator, file: str | None, what: str, names: Sequence[str]
+) -> TableRows:
     """Return the rows of a table's file, in SI units."""
     if file is None:
         raise DataError(f"no {what} given; give {' '.join(names)}, or --table FILE")
-    from pteron.tables import in_si, read_table
+    from pteron.tables import convert_to_si, read_table
 
     if hasattr(signal, "siginterrupt"):
         # Polars, once imported, lets a read of standard input go on through Ctrl-C.
         signal.siginterrupt(signal.SIGINT, True)
-    return Rows(in_si(read_table(file), robot.column_units))
+    return TableRows(convert_to_si(read_table(file), robot.column_units))
 
 
 def check_destination(

@@ -120,7 +120,7 @@ def table(
     return shown_table
 
 
-def written(*paths: object) -> list[str]:
+def file_lines(*paths: object) -> list[str]:
     """Return a line for each file that was written."""
     return [f"Written: {plain(str(path))}" for path in paths]
 

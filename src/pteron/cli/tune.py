@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from pteron.cli.arguments import STANDARD, Machine, check_rate, parsed_list
+from pteron.cli.arguments import STANDARD, MachineArgument, check_rate, parsed_list
 from pteron.cli.destination import Destination
 from pteron.cli.motion_argument import Carried, cycle_of
 from pteron.cli.progress import spinner
@@ -32,7 +32,7 @@ _ENCODERS = "0,1e-6,1e-5,1e-4"
 
 
 def tune(
-    machine: Machine,
+    machine: MachineArgument,
     *,
     cycle: str = STANDARD,
     controller: Name = "feed-forward",
@@ -93,7 +93,7 @@ def tune(
     sensors = Sensors(encoder=encoder, cutoff=cutoff)
     destination = Destination(out, "tuning")
     destination.check()
-    machine = carried.on(machine)
+    machine = carried.load_machine(machine)
     how: dict[str, Any] = {"sensors": sensors, "delay": delay}
     with spinner(f"Tuning {machine.name}"):
         motion = cycle_of(machine, cycle, duration)

@@ -50,12 +50,12 @@ class TypedRow:
         """Return columns as an array of floats (rows, columns); typed numbers are finite."""
         return np.array([self.cells[name] for name in columns], dtype=float).T
 
-    def extended(self, results: Mapping[str, ArrayLike]) -> TypedRow:
+    def with_columns(self, results: Mapping[str, ArrayLike]) -> TypedRow:
         """Return the rows with columns of results added, as `Table.extended` does."""
         added = {name: _column(values) for name, values in results.items()}
         return replace(self, cells=self._drop_columns(results) | added)
 
-    def repeated(self, modes: Sequence[int | None], replaced: Collection[str]) -> TypedRow:
+    def repeat_modes(self, modes: Sequence[int | None], replaced: Collection[str]) -> TypedRow:
         """Return the row once for each mode, with a first column `row` and a last one `mode`.
 
         Columns that are `replaced` are left out.

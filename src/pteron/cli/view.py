@@ -11,7 +11,7 @@ from typing import Any
 
 from typer import echo
 
-from pteron.cli.arguments import Machine, load_robot
+from pteron.cli.arguments import MachineArgument, load_robot
 from pteron.cli.motion_argument import Carried
 from pteron.cli.progress import spinner
 from pteron.cli.terminal import note, show_json
@@ -21,7 +21,7 @@ _TICK = 0.5
 
 
 def view(
-    machine: Machine,
+    machine: MachineArgument,
     *,
     motion: str | None = None,
     carried: Carried,
@@ -60,9 +60,9 @@ def view(
     pteron view delta --beside par4 --beside hexa --motion adept
     """
     if carried.payload_center is None:
-        machine = carried.mounted(machine)
+        machine = carried.mount_tool(machine)
     else:  # the page's own payload is at the tool
-        machine, carried = carried.on(machine), Carried()
+        machine, carried = carried.load_machine(machine), Carried()
     with spinner(f"Preparing {machine.name}"):
         from pteron.viewer import view as opened
         from pteron.viewer.guard import is_here

@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from pteron.atomic import checked_file
-from pteron.cli.arguments import Machine
-from pteron.cli.certify import Proofs
+from pteron.cli.arguments import MachineArgument
+from pteron.cli.certify import RequestedProofs
 from pteron.cli.map_summary import map_data, map_rows, show_map
 from pteron.cli.pose_ranges import pose_ranges, pose_text
 from pteron.cli.progress import progress_bar, spinner
 from pteron.cli.result import Result
-from pteron.cli.terminal import is_terminal, note, show, warn, write, written
+from pteron.cli.terminal import file_lines, is_terminal, note, show, warn, write
 from pteron.errors import DataError, ModelError, OutputError
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ _DPI = 200.0
 
 
 def workspace(
-    machine: Machine,
+    machine: MachineArgument,
     *,
     index: list[str] | None = None,
     slice_: str | None = None,
@@ -107,12 +107,12 @@ def workspace(
     pteron workspace delta --certify
     pteron workspace delta --prove x=-0.2:0.2,y=-0.2:0.2,z=-1.0:-0.8
     """
-    proofs = Proofs(certify, prove, tolerance, type_i, type_ii)
+    proofs = RequestedProofs(certify, prove, tolerance, type_i, type_ii)
     maps = {"index": index, "points": points, "out": out, "workers": workers}
     other = {"scheduler": scheduler, "engine": None if engine == "auto" else engine}
     proofs.check({**maps, **other}, slice_)
     warnings = _warnings(machine)
-    if proofs.asked:
+    if proofs.any_requested:
         return proofs.result(machine, slice_, warnings)
     from pteron.maps import map_index
 
@@ -130,7 +130,7 @@ def workspace(
     warn(warnings)
     with spinner(f"The reach of {machine.name}"):
         volume = _volume(machine, grid)
-    warn(outside := _outside_warnings(grid, volume))
+    warn(outside := _unreachable_slice_warnings(grid, volume))
     with progress_bar(f"Mapping {machine.name}") as tell:
         index_map = map_index(
             machine,
@@ -156,7 +156,7 @@ def _show(
     else:
         write(map_rows(data).write_csv())
     if out is not None:
-        (show if is_terminal() else note)(*written(out))
+        (show if is_terminal() else note)(*file_lines(out))
 
 
 def _checked_indices(robot: Manipulator, names: list[str]) -> tuple[str, ...]:
@@ -259,7 +259,7 @@ def _volume(robot: Manipulator, grid: Grid) -> ReachVolume | None:
         return None
 
 
-def _outside_warnings(grid: Grid, volume: ReachVolume | None) -> list[str]:
+def _unreachable_slice_warnings(grid: Grid, volume: ReachVolume | None) -> list[str]:
     """Return the held lengths at which nothing is in reach."""
     from pteron.platforms.coordinates import coordinate
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pteron.controllers.joint_numbers import period_of
-from pteron.errors import DataError, shown
+from pteron.errors import DataError, shorten
 from pteron.kernels import Array, Port, Program, as_array
 from pteron.kernels.code import C
 from pteron.kernels.exponential import with_lowered_exponentials
@@ -74,7 +74,7 @@ class Custom:
 
     def __post_init__(self) -> None:
         if not isinstance(self.function, ca.Function):
-            raise DataError(f"function: {shown(self.function)} given, a casadi.Function expected")
+            raise DataError(f"function: {shorten(self.function)} given, a casadi.Function expected")
         object.__setattr__(self, "period", period_of(self.period))
         parameter_names, faults = set(self.parameters), []
         names = self.function.name_in(), self.function.name_out()
@@ -202,6 +202,6 @@ def _port_numbers(array: ArrayLike, port: Port) -> Array:
     column = as_array(array, port.name, ()).ravel("F")
     if column.size != port.size or not np.isfinite(column).all():
         raise DataError(
-            f"controller: {port.name}: {shown(array)} given, {port.size} finite numbers expected"
+            f"controller: {port.name}: {shorten(array)} given, {port.size} finite numbers expected"
         )
     return column.reshape(1, 1, -1)

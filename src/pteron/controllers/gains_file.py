@@ -13,7 +13,7 @@ from pteron.controllers.computed_torque import ComputedTorque
 from pteron.controllers.controller import Controller
 from pteron.controllers.feed_forward_pd import FeedForwardPD
 from pteron.controllers.pd_gravity import PDGravity
-from pteron.errors import DataError, shown
+from pteron.errors import DataError, shorten
 from pteron.manipulator import RobotLike, as_manipulator
 from pteron.manipulator.machine_record import expect_machine, machine_record
 from pteron.toml import read_toml
@@ -107,13 +107,13 @@ def read_gains(robot: RobotLike, path: str | Path) -> Controller:
     kind = _KINDS.get(str(record.get("controller")))
     if kind is None:
         raise DataError(
-            f"{path}: controller: {shown(record.get('controller'))} given, one of "
+            f"{path}: controller: {shorten(record.get('controller'))} given, one of "
             f"{', '.join(_KINDS)} expected"
         )
     joints = record.get("joints", list(robot.joint_names))
     if joints != list(robot.joint_names):
         raise DataError(
-            f"{path}: its joints are {shown(joints)}, of {robot.name} they are "
+            f"{path}: its joints are {shorten(joints)}, of {robot.name} they are "
             f"{' '.join(robot.joint_names)}; tune this machine"
         )
     expect_machine(record.get("machine"), robot, path)

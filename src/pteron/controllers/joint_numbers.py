@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from pteron.arguments import number_or_nan
-from pteron.errors import DataError, shown
+from pteron.errors import DataError, shorten
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
 
@@ -36,7 +36,7 @@ def positive_numbers(name: str, numbers: PerJoint | None) -> float | tuple[float
 def _positive_number(message: str, argument: object) -> float:
     number = number_or_nan(argument)
     if isinstance(argument, str | bool) or not (np.isfinite(number) and number > 0.0):
-        raise DataError(message.format(shown(argument)))
+        raise DataError(message.format(shorten(argument)))
     return number
 
 

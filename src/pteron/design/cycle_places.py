@@ -18,7 +18,7 @@ from pteron.design.workspace_samples import INSIDE, pad_to_xyz, platform_curve, 
 from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
-from pteron.motion import Path, line_path, there_and_back
+from pteron.motion import Path, line_path, return_path
 from pteron.motion.trajectories.time_polynomials import polynomial
 from pteron.motion.trajectories.timed_path import timed_path
 from pteron.motion.trajectories.tool import Curve
@@ -142,7 +142,7 @@ def _cycle_places(job: Job, robot: Manipulator, cycle: ToolCycleTable, k: int) -
     # The path is that of the tool, which is at P of this machine.
     bare = replace(robot, platform=replace(robot.platform, tool=(0.0, 0.0, 0.0)))
     path: Path = line_path(bare, points, cycle.corner)
-    path = there_and_back(path) if cycle.back else path
+    path = return_path(path) if cycle.back else path
     poses = path.at(np.linspace(0.0, path.length, _IN_CYCLE))[0]
     fitting = list(_fitting_shifts(job, robot, poses, cycle.anywhere))
     if not fitting:

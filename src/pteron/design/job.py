@@ -26,7 +26,7 @@ from pteron.design.requirement_tables import (
     ToolCycleTable,
 )
 from pteron.design.workspace_tables import CellTable, KeepOutTable, ToolWorkspaceTable
-from pteron.errors import DataError, shown
+from pteron.errors import DataError, shorten
 from pteron.toml import read_toml, to_model
 
 _ABSENT = "no such file; it should describe what a machine must do"
@@ -47,9 +47,9 @@ OBJECTIVES = {
 def _expect_names_once(names: list[str], known: Collection[str]) -> list[str]:
     for k, name in enumerate(names):
         if name not in known:
-            raise ValueError(f"{shown(name)} is none of {', '.join(known)}")
+            raise ValueError(f"{shorten(name)} is none of {', '.join(known)}")
         if name in names[:k]:
-            raise ValueError(f"{shown(name)} given twice")
+            raise ValueError(f"{shorten(name)} given twice")
     return names
 
 
@@ -200,7 +200,7 @@ def read_job(path: str | Path) -> Job:
     DataError
         If it cannot be read, has unknown keys or contradicts itself; all its faults are listed.
     """
-    source = shown(str(path), bare=True, longest=1000)
+    source = shorten(str(path), bare=True, longest=1000)
     job = to_model(Job, read_toml(path, DataError, _ABSENT), source, DataError)
     job._folder = Path(path).parent
     return job

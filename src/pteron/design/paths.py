@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from difflib import get_close_matches
 
-from pteron.errors import ModelError, shown
+from pteron.errors import ModelError, shorten
 from pteron.legs import LegKind
 from pteron.manipulator import Manipulator
 
@@ -61,20 +61,20 @@ def named_numbers(robot: Manipulator, path: str) -> list[GeometryNumber]:
     """Return the numbers that a path names."""
     match = _WRITTEN.fullmatch(path.strip())
     if match is None:
-        raise ModelError(f"{shown(path)} is not {_SHAPE}")
+        raise ModelError(f"{shorten(path)} is not {_SHAPE}")
     minus, numbers, key, part = match.groups()
     legs = range(1, robot.joint_count + 1)
     if numbers is not None:
         try:
             named = [int(word) for word in numbers.split(",") if word.strip()]
         except ValueError:  # blanks within a number, or thousands of digits
-            raise ModelError(f"{shown(path)} is not {_SHAPE}") from None
-        if wrong := [shown(i) for i in named if i not in legs]:
+            raise ModelError(f"{shorten(path)} is not {_SHAPE}") from None
+        if wrong := [shorten(i) for i in named if i not in legs]:
             raise ModelError(
-                f"{shown(path)}: no leg {', '.join(wrong)}; {robot.name} has legs 1 to {legs[-1]}"
+                f"{shorten(path)}: no leg {', '.join(wrong)}; {robot.name} has legs 1 to {legs[-1]}"
             )
         if not named:
-            raise ModelError(f"{shown(path)}: names no leg; write legs[1] or legs")
+            raise ModelError(f"{shorten(path)}: names no leg; write legs[1] or legs")
         legs_named = named
     else:
         legs_named = [i for i in legs if key in geometric_keys(robot.legs[i - 1])]
@@ -104,15 +104,15 @@ def _places_in_leg(
         close = get_close_matches(key, known, n=1)
         guess = f'; did you mean "{close[0]}"?' if close else ""
         raise ModelError(
-            f"{shown(path)}: leg {i}, a {leg.type}, has no number {shown(key)}; it has "
+            f"{shorten(path)}: leg {i}, a {leg.type}, has no number {shorten(key)}; it has "
             f"{', '.join(known)}{guess}"
         )
     role = leg.every_key()[key].role
     scalar = role in ("length", "number")
     if scalar and part is not None:
-        raise ModelError(f"{shown(path)}: {key} is one number; leave out .{part}")
+        raise ModelError(f"{shorten(path)}: {key} is one number; leave out .{part}")
     if part is not None and part not in ("x", "y", "z"):
-        raise ModelError(f"{shown(path)}: .{part} is none of .x, .y and .z")
+        raise ModelError(f"{shorten(path)}: .{part} is none of .x, .y and .z")
     if scalar:
         yield GeometryNumber(i, key, None, sign, role)
     else:

@@ -14,7 +14,7 @@ import numpy as np
 
 from pteron.design.cycle_loads import best_motors, shortest_time
 from pteron.design.worst_cases import worst_position_errors
-from pteron.errors import shown
+from pteron.errors import shorten
 from pteron.indices import INDICES, Index, stiffness
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
@@ -297,4 +297,4 @@ def expect_quantity(name: str) -> str:
         return name
     close = get_close_matches(name, names, n=1)
     guess = f'; did you mean "{close[0]}"?' if close else ""
-    raise ValueError(f"{shown(name)} is no quantity: {', '.join(names)}{guess}")
+    raise ValueError(f"{shorten(name)} is no quantity: {', '.join(names)}{guess}")

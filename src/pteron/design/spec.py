@@ -25,7 +25,7 @@ from pteron.design.load_tables import (
 from pteron.design.quantities import DesignQuantity, expect_quantity
 from pteron.design.user_quantities import function_of, named_quantity
 from pteron.design.workspace_tables import WorkspaceTable
-from pteron.errors import DataError, shown
+from pteron.errors import DataError, shorten
 from pteron.manipulator import Manipulator
 from pteron.renamed import former_attribute
 from pteron.toml import read_toml, to_model
@@ -292,7 +292,7 @@ def read_spec(path: str | Path) -> Spec:
         If it cannot be read, has unknown keys, or asks for the impossible; all its faults are
         listed.
     """
-    source = shown(str(path), bare=True, longest=1000)
+    source = shorten(str(path), bare=True, longest=1000)
     spec = to_model(Spec, read_toml(path, DataError, _ABSENT), source, DataError)
     folder = Path(path).parent
     update: dict[str, Any] = {}

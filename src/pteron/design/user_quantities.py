@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 from pteron.design.quantities import DesignQuantity, quantities, quantity_of
-from pteron.errors import DataError, shown
+from pteron.errors import DataError, shorten
 from pteron.manipulator import Manipulator
 
 
@@ -23,7 +23,7 @@ def named_quantity(quantity: DesignQuantity | Callable[[Manipulator], float]) ->
     quantity = quantity_of(quantity, getattr(quantity, "__name__", ""))
     if not quantity.name.isidentifier():
         raise DataError(
-            f"name: {shown(quantity.name)} given to a quantity, an identifier expected: give a "
+            f"name: {shorten(quantity.name)} given to a quantity, an identifier expected: give a "
             "function that has a name, or a DesignQuantity with name"
         )
     if quantity.name in quantities():

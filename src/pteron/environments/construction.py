@@ -68,7 +68,7 @@ def world_of(
                 f"motion: {motion!r} given, a Motion expected, such as pteron.motion.replay makes "
                 "of a table"
             )
-        motion.repeated(2)
+        motion.repeat(2)
         low = world.margin_of(motion.pose) <= ENDS
         if low.any():
             at = float(motion.time[int(low.argmax())])

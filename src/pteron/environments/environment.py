@@ -99,18 +99,18 @@ class PteronEnv(gymnasium.Env[Numbers, Numbers]):
     ) -> tuple[Numbers, dict[str, Any]]:
         """Start an episode; `options` may have a "pose" to start in at rest, and a "target"."""
         super().reset(seed=seed)
-        self._state = self.world.started([self.np_random], options).row(0)
-        return self.world.observed(self._state), self._info(self.world.distance(self._state))
+        self._state = self.world.start_episodes([self.np_random], options).row(0)
+        return self.world.observations(self._state), self._info(self.world.distance(self._state))
 
     def step(self, action: Numbers) -> tuple[Numbers, float, bool, bool, dict[str, Any]]:
         """Let the machine go on for a period under the drives' forces."""
         if self._state is None:
             raise DataError("step before reset; call reset first")
-        self._state, distance, reward, ended = self.world.after(self._state, action)
+        self._state, distance, reward, ended = self.world.advance(self._state, action)
         info = self._info(distance)
         if ended:
-            info["stopped"] = self.world.why(self._state.pose, self._state.velocity)
-        return self.world.observed(self._state), float(reward), bool(ended), False, info
+            info["stopped"] = self.world.end_reason(self._state.pose, self._state.velocity)
+        return self.world.observations(self._state), float(reward), bool(ended), False, info
 
     def _info(self, distance: Any) -> dict[str, Any]:
         return {"distance": float(distance), "is_success": bool(distance < self.world.tolerance)}
@@ -121,7 +121,7 @@ class PteronEnv(gymnasium.Env[Numbers, Numbers]):
             return None
         if self._state is None:
             raise DataError("render before reset; call reset first")
-        return self._picture.of(self._state)
+        return self._picture.render(self._state)
 
 
 def spaces(bounds: Array, count: int) -> tuple[gymnasium.Space[Any], gymnasium.Space[Any]]:

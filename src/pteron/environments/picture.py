@@ -29,9 +29,9 @@ class EnvironmentPicture:
     @cached_property
     def _guides(self) -> tuple[Guide, ...]:
         generators = [np.random.default_rng(seed) for seed in range(_POSES)]
-        return joint_guides(self._world.robot, self._world.started(generators, None).pose)
+        return joint_guides(self._world.robot, self._world.start_episodes(generators, None).pose)
 
-    def of(self, state: EpisodeState) -> NDArray[np.uint8]:
+    def render(self, state: EpisodeState) -> NDArray[np.uint8]:
         """Return pixels (height, width, 3) of a state (m,), with a line from tool to target.
 
         All pictures have the size of the one in which the machine is at home.

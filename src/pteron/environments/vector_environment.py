@@ -122,7 +122,7 @@ class PteronVectorEnv(VectorEnv[Numbers, Numbers, Numbers]):
                 self._generators[i] = seeding.np_random(seeds[i])[0]
         self._start(chosen, options)
         assert self._state is not None
-        return self.world.observed(self._state), self._infos(
+        return self.world.observations(self._state), self._infos(
             self.world.distance(self._state), chosen
         )
 
@@ -151,7 +151,7 @@ class PteronVectorEnv(VectorEnv[Numbers, Numbers, Numbers]):
 
     def _start(self, chosen: Bools, options: dict[str, Any] | None) -> None:
         generators = [self._generators[i] for i in np.flatnonzero(chosen).tolist()]
-        new = self.world.started([rng for rng in generators if rng is not None], options)
+        new = self.world.start_episodes([rng for rng in generators if rng is not None], options)
         self._state = new if self._state is None else self._state.put(chosen, new)
         self._done = self._done & ~chosen
         self._steps = np.where(chosen, 0, self._steps)
@@ -162,7 +162,7 @@ class PteronVectorEnv(VectorEnv[Numbers, Numbers, Numbers]):
             raise DataError("step before reset; call reset first")
         starting = self._done
         last_state = self._state
-        self._state, distance, reward, ended = self.world.after(last_state, actions)
+        self._state, distance, reward, ended = self.world.advance(last_state, actions)
         self._steps = self._steps + 1
         if starting.any():
             self._start(starting, None)
@@ -176,9 +176,9 @@ class PteronVectorEnv(VectorEnv[Numbers, Numbers, Numbers]):
         if ended.any():
             reasons = np.full(self.num_envs, None, dtype=object)
             for i in np.flatnonzero(ended).tolist():
-                reasons[i] = self.world.why(self._state.pose[i], self._state.velocity[i])
+                reasons[i] = self.world.end_reason(self._state.pose[i], self._state.velocity[i])
             infos |= {"stopped": reasons, "_stopped": ended.copy()}
-        return self.world.observed(self._state), reward, ended, late, infos
+        return self.world.observations(self._state), reward, ended, late, infos
 
     def _infos(self, distance: NDArray[Any], known: Bools) -> dict[str, Any]:
         return {
@@ -194,4 +194,4 @@ class PteronVectorEnv(VectorEnv[Numbers, Numbers, Numbers]):
             return None
         if self._state is None:
             raise DataError("render before reset; call reset first")
-        return tuple(self._picture.of(self._state.row(i)) for i in range(self.num_envs))
+        return tuple(self._picture.render(self._state.row(i)) for i in range(self.num_envs))

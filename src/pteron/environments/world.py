@@ -123,7 +123,7 @@ class World:
         rate = np.full(robot.freedom, _GREATEST)
         return np.concatenate([most, rate, most, rate])
 
-    def observed(self, state: EpisodeState) -> NDArray[np.float32]:
+    def observations(self, state: EpisodeState) -> NDArray[np.float32]:
         """Return observations (..., 4 m): pose, velocity, the target's pose and velocity."""
         parts = [state.pose, state.velocity, *self.target(state)]
         bounds = self.bounds
@@ -158,7 +158,7 @@ class World:
         last = np.logical_and.accumulate(keeps, axis=-1).sum(axis=-1) - 1
         return np.asarray(signs[:, None] * shares[np.maximum(last, 0)] * most)
 
-    def started(
+    def start_episodes(
         self, generators: Sequence[np.random.Generator], options: Mapping[str, Any] | None
     ) -> EpisodeState:
         """Return the states at the start of episodes, (B, m), one for each generator.
@@ -240,7 +240,9 @@ class World:
             )
         return pose
 
-    def after(self, state: EpisodeState, action: Array) -> tuple[EpisodeState, Array, Array, Bools]:
+    def advance(
+        self, state: EpisodeState, action: Array
+    ) -> tuple[EpisodeState, Array, Array, Bools]:
         """Return states after an action (..., n), the distances, the rewards, and what has ended.
 
         reward = 1 - tanh(2 distance / spread) - 0.01 mean(action^2), at most 1; -1 where the
@@ -279,7 +281,7 @@ class World:
             raise DataError("action: not finite numbers given; numbers from -1 to 1 expected")
         return action_array
 
-    def why(self, pose: Array, velocity: Array) -> str:
+    def end_reason(self, pose: Array, velocity: Array) -> str:
         """Return why the episode of a machine ended, in its last state (m,)."""
         if (np.abs(velocity) > self._speeds).any():
             return f"faster than {SPEED:g} m/s or {TURN:g} rad/s"

@@ -19,7 +19,7 @@ from pteron.equations.machine import Machine, State
 
 
 @dataclass(frozen=True)
-class Terms:
+class RegressorTerms:
     """The factors of Eq. (15), for one state."""
 
     jacobian: Expression
@@ -52,7 +52,7 @@ class Terms:
         return ca.horzcat(sliders, *links, self.platform)  # Eq. (15)
 
 
-def terms(machine: Machine, state: State) -> Terms:
+def terms(machine: Machine, state: State) -> RegressorTerms:
     """Return the factors of Eq. (15)."""
     slider, *links = LEG_BODIES
     n = len(machine.legs)
@@ -65,7 +65,7 @@ def terms(machine: Machine, state: State) -> Terms:
     places = [(i, link) for link in links for i in range(n) if link in state.legs[i].bodies]
     jacobians = [body_jacobian(state, i, link) for i, link in places]
     matrices = [wrench_matrix(state.legs[i].bodies[link], machine.gravity) for i, link in places]
-    return Terms(
+    return RegressorTerms(
         jacobian(state),
         ca.diag(ca.vertcat(*forces)),
         with_slider,

@@ -20,7 +20,7 @@ from pteron.atomic import write_texts
 from pteron.errors import ModelError
 from pteron.export.command_units import Output
 from pteron.export.descriptions import banner
-from pteron.export.exported_function import Exported
+from pteron.export.exported_function import ExportedFunction
 from pteron.export.functions import PLACES, FunctionChoice, exported_functions
 from pteron.export.names import prefix_of
 from pteron.kernels import Array
@@ -127,7 +127,7 @@ def export_c(
 
 
 def c_texts(
-    robot: Manipulator, exported: Sequence[Exported], real: Real = "double"
+    robot: Manipulator, exported: Sequence[ExportedFunction], real: Real = "double"
 ) -> dict[str, str]:
     """Return the files of `export_c` by their names: header, source, test, CMakeLists.txt."""
     prefix, single = prefix_of(robot), real == "float"
@@ -182,7 +182,7 @@ class CPrinter:
         rows = [", ".join(texts[k : k + 4]) for k in range(0, len(texts), 4)]
         return ",\n    ".join(rows)
 
-    def comment(self, item: Exported) -> list[str]:
+    def comment(self, item: ExportedFunction) -> list[str]:
         """Return the lines over a function's declaration."""
         lines = [*textwrap.wrap(item.summary, _WIDTH), ""]
         for direction, ports in (("in", item.inputs), ("out", item.outputs)):
@@ -193,7 +193,7 @@ class CPrinter:
                 lines += textwrap.wrap(text.rstrip(": "), _WIDTH, subsequent_indent="      ")
         return [*lines, "", f"{item.operations} arithmetic operations."]
 
-    def prototype(self, item: Exported) -> str:
+    def prototype(self, item: ExportedFunction) -> str:
         """Return a function's declaration."""
         head = f"int {self.prefix}_{item.name}("
         pointer = f"{self.real} *{self.prefix.upper()}_RESTRICT"
@@ -217,7 +217,7 @@ class CPrinter:
             "div": f"{self.prefix}_ratio({{0}}, {{1}})",
         }
 
-    def body(self, item: Exported) -> tuple[list[str], list[tuple[str, str]]]:
+    def body(self, item: ExportedFunction) -> tuple[list[str], list[tuple[str, str]]]:
         """Return the statements of a function, and its conditions with the failures they mean."""
         graph, nodes = item.graph, item.graph.nodes
         names = names_of(graph, lambda i, j: f"{item.inputs[i].name}[{j}]", self.number)
@@ -264,7 +264,7 @@ class CPrinter:
             failures.append((f"!({regular})", "NOT_FINITE"))
         return lines, failures
 
-    def _no_pose(self, item: Exported) -> str:
+    def _no_pose(self, item: ExportedFunction) -> str:
         """Return the condition that no row of an output is a pose of finite numbers."""
         (port,) = item.outputs
         rows, columns = port.shape

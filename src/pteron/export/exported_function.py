@@ -75,7 +75,7 @@ class Example:
 
 
 @dataclass(frozen=True)
-class Exported:
+class ExportedFunction:
     """One function: its graph with names, its inputs and outputs, and its test vectors."""
 
     name: str
@@ -140,16 +140,16 @@ class ExportRequest:
         return isinstance(self.controller, Custom)
 
     @property
-    def what(self) -> str:
+    def function_name(self) -> str:
         """The function's name without the suffix of base parameters."""
         return self.name if self.is_custom else self.name.removesuffix(BASE)
 
     @property
     def base(self) -> Identified | None:
         """The base parameters that it takes, if it takes any."""
-        if self.name == self.what:
+        if self.name == self.function_name:
             return None
-        return self.identified or Identified.of(self.robot)
+        return self.identified or Identified.from_robot(self.robot)
 
     def program(self) -> Program:
         """Return its program with joints as drives read them and forces in the drives' units.
@@ -162,7 +162,7 @@ class ExportRequest:
         function = self._library_program()
         takes_bodies = "parameters" in {port.name for port in function.inputs}
         if self.identified and not self.is_custom and (takes_bodies or self.name in SELECTED):
-            what, based = self.what, self.what in (*REDUCIBLE, PAYLOAD)
+            what, based = self.function_name, self.function_name in (*REDUCIBLE, PAYLOAD)
             other = f"ask for {what + BASE}" if based else "leave it out"
             raise ModelError(
                 f"functions: {self.name!r} takes every body's parameters, which identified base "
@@ -170,22 +170,22 @@ class ExportRequest:
                 "wrote"
             )
         function = convert_joints(function, self.robot)
-        if self.is_custom or self.what in DRIVEN:
+        if self.is_custom or self.function_name in DRIVEN:
             function = convert_forces(function, self.robot, self.output)
         return function
 
     def _library_program(self) -> Program:
-        loaded, base = self.wrench and self.what in LOADED, self.base
+        loaded, base = self.wrench and self.function_name in LOADED, self.base
         if isinstance(self.controller, Custom):
             return self.controller.law(self.robot).program
         if base:
-            return base_program(self.what, base, wrench=loaded, folded=self.specialised)
+            return base_program(self.function_name, base, wrench=loaded, folded=self.specialised)
         if self.controller:
             return _drop_status(self.controller.law(self.robot).program)
-        return program(self.robot, self.what, wrench=loaded, named=True)
+        return program(self.robot, self.function_name, wrench=loaded, named=True)
 
 
-def exported_function(request: ExportRequest) -> Exported:
+def exported_function(request: ExportRequest) -> ExportedFunction:
     """Return a function with all that its code needs."""
     robot, controller = request.robot, request.controller
     function = request.program()
@@ -198,7 +198,7 @@ def exported_function(request: ExportRequest) -> Exported:
         arguments = {port.name for port in function.inputs} & {"parameters", "base_parameters"}
         folded = {key: numbers[key] for key in shared if key not in arguments}
         function, tables = with_values(function, folded), ()
-    elif request.what == PAYLOAD:
+    elif request.function_name == PAYLOAD:
         tables += tuple(NumberTable(*table) for table in tool_tables(robot))
     graph = graph_of(function.function, function.inputs)
     states = _states(robot, function.inputs, numbers, controller)
@@ -209,7 +209,7 @@ def exported_function(request: ExportRequest) -> Exported:
         for port in function.outputs
     )
     machine = Machine.numeric(robot)
-    return Exported(
+    return ExportedFunction(
         request.name,
         _summary(request, machine, taken, graph),
         graph,
@@ -225,7 +225,7 @@ def exported_function(request: ExportRequest) -> Exported:
 
 def _summary(request: ExportRequest, machine: Machine, taken: set[str], graph: Graph) -> str:
     """Return a line on what the function computes, and notes on its results."""
-    what = request.what
+    what = request.function_name
     if request.is_custom:
         return f"{what}, a control law of one's own."
     summary = TEXTS["summaries"].get(
@@ -245,7 +245,7 @@ def _meanings(
     request: ExportRequest, ports: Sequence[Port], shared: Sequence[str], taken: set[str]
 ) -> dict[str, str]:
     """Return the meanings of inputs and outputs, with their units."""
-    robot, what, output = request.robot, request.what, request.output
+    robot, what, output = request.robot, request.function_name, request.output
     meanings: dict[str, str] = {port.name: port_meaning(robot, port, output) for port in ports}
     if request.is_custom:
         readings = {name: port_meaning(robot, Port(name, (1,)), output) for name in TEXTS["law"]}

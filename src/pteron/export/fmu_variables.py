@@ -32,7 +32,7 @@ class FmuVariable:
 
 
 @dataclass(frozen=True)
-class Block:
+class VariableBlock:
     """Variables whose numbers stand behind each other in the C code."""
 
     name: str
@@ -60,7 +60,7 @@ class Block:
 class FmuVariables:
     """All variables of an FMU."""
 
-    blocks: tuple[Block, ...]
+    blocks: tuple[VariableBlock, ...]
 
     def __getitem__(self, name: str) -> tuple[int, ...]:
         """Return the value references of a block."""
@@ -131,13 +131,13 @@ class FmuVariables:
 
 def fmu_variables(robot: Manipulator, pose: Array, forces: Array) -> FmuVariables:
     """Return the variables of a machine that starts at rest at a pose, held by forces."""
-    words, blocks, first = _words(robot, pose, forces), list[Block](), 0
+    words, blocks, first = _words(robot, pose, forces), list[VariableBlock](), 0
     for row in _TABLE["blocks"]:
         variables = tuple(_variable(row, {**each, "zero": 0.0}) for each in words[row["each"]])
         relations = row.get("rate_of", ""), row.get("like", ""), tuple(row.get("depends", ()))
         if variables:
             blocks.append(
-                Block(row["name"], first, row["kind"], row["place"], variables, *relations)
+                VariableBlock(row["name"], first, row["kind"], row["place"], variables, *relations)
             )
         first += len(variables)
     return FmuVariables(tuple(blocks))

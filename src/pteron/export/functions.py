@@ -12,7 +12,7 @@ from pteron.export.command_units import DRIVEN, Output, factors
 from pteron.export.exported_function import (
     BASE,
     PAYLOAD,
-    Exported,
+    ExportedFunction,
     ExportRequest,
     exported_function,
 )
@@ -65,7 +65,7 @@ def exported_functions(
     output: Output = "force",
     base: str | Path | None = None,
     tables: bool = True,
-) -> tuple[Exported, ...]:
+) -> tuple[ExportedFunction, ...]:
     """Return the functions to export: the `usual` unless a choice is given.
 
     `tables` says whether the code can have tables of the machine's own values. Where not, they are

@@ -49,7 +49,7 @@ class Identified:
     """The verdict of the identification."""
 
     @classmethod
-    def of(cls, robot: Manipulator) -> Identified:
+    def from_robot(cls, robot: Manipulator) -> Identified:
         """Return a machine's own base parameters, with the values of its file."""
         base = base_parameters(robot)
         return cls(robot, base, base.values(), _comments(base, base.expressions()))

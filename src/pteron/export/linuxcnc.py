@@ -88,7 +88,7 @@ class _Arm:
     sine: Array
 
     @classmethod
-    def of(cls, platform: Platform) -> _Arm:
+    def from_platform(cls, platform: Platform) -> _Arm:
         x, y, z = (platform.directions @ axis for axis in platform.frame)
         a, b, c = platform.tool
         if not platform.angles:
@@ -123,7 +123,7 @@ class _TurnedArm:
     directions: Array
 
     @classmethod
-    def of(cls, platform: Platform, pose: Array) -> _TurnedArm:
+    def from_platform(cls, platform: Platform, pose: Array) -> _TurnedArm:
         places = {name: k for k, name in enumerate(platform.coordinates)}
         # A tripod's yaw, which is none of the pose, does not move the tool along its z.
         chain = platform_joints(platform, pose)
@@ -190,8 +190,8 @@ def export_linuxcnc(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
     axes, joints = linuxcnc_axes(robot), tuple(_joints(machine, home))
     platform, seen = robot.platform, home.copy()
     seen[~platform.angular] += platform.directions @ (platform.tool @ platform.at(home)[1])
-    tilted = _TurnedArm.of(platform, home) if platform.tilts else None
-    arm = None if tilted else _Arm.of(platform)
+    tilted = _TurnedArm.from_platform(platform, home) if platform.tilts else None
+    arm = None if tilted else _Arm.from_platform(platform)
     places = {a.letter: f"{a.scale * at:.6f}" for a, at in zip(axes, seen, strict=True)}
     values = {
         "banner": [line for line in banner(robot, "LinuxCNC") if "SI units" not in line],

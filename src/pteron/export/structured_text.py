@@ -16,7 +16,7 @@ from pteron.equations.machine import closure_of
 from pteron.errors import ModelError
 from pteron.export.command_units import Output
 from pteron.export.descriptions import banner
-from pteron.export.exported_function import Exported
+from pteron.export.exported_function import ExportedFunction
 from pteron.export.functions import FunctionChoice, choice_list, exported_functions
 from pteron.export.guards import INPUT_POWER, Names, Statements, element, power
 from pteron.export.names import prefix_of
@@ -131,7 +131,7 @@ def export_st(
     )
 
 
-def _block(robot: Manipulator, name: str, item: Exported) -> str:
+def _block(robot: Manipulator, name: str, item: ExportedFunction) -> str:
     comments = [*banner(robot, "Structured Text"), "", item.summary]
     comments.append(f"{item.operations} arithmetic operations.")
     if item.name.startswith("set_payload"):

@@ -36,12 +36,12 @@ if TYPE_CHECKING:
         essential_parameters as essential_parameters,
         halves as halves,
         huber as huber,
+        independent_columns as independent_columns,
         instrumental as instrumental,
         maximum_likelihood as maximum_likelihood,
         ordinary as ordinary,
-        reduced as reduced,
         total as total,
-        weighted as weighted,
+        weighted_least_squares as weighted_least_squares,
     )
     from pteron.identification.excitation import (
         Excitation as Excitation,
@@ -70,9 +70,12 @@ if TYPE_CHECKING:
     from pteron.identification.observation import (
         Observations as Observations,
         observations_of as observations_of,
-        stacked as stacked,
+        stack_observations as stack_observations,
     )
-    from pteron.identification.own_regressor import Fit as Fit, estimate as estimate
+    from pteron.identification.own_regressor import (
+        RegressorFit as RegressorFit,
+        estimate as estimate,
+    )
     from pteron.identification.payload import (
         Payload as Payload,
         identify_payload as identify_payload,
@@ -83,7 +86,7 @@ if TYPE_CHECKING:
         Preprocessing as Preprocessing,
         Processing as Processing,
         States as States,
-        preprocessing_of as preprocessing_of,
+        preprocessing_for_log as preprocessing_for_log,
     )
     from pteron.identification.transmissions import (
         Transmissions as Transmissions,

@@ -43,7 +43,7 @@ class DrawnValues:
     deviations: Array
 
     @classmethod
-    def of(cls, model: Model, estimate: Estimate, known: Array) -> DrawnValues:
+    def from_estimate(cls, model: Model, estimate: Estimate, known: Array) -> DrawnValues:
         """Return those that a fit leaves open; `known` (p,) is the rotors' part of the values."""
         names = unseen_names(model, estimate.deviations)
         places = np.array([model.names.index(name) for name in names], dtype=np.int64)
@@ -52,7 +52,7 @@ class DrawnValues:
         return cls(names, places, values, usual_sizes(model.base, drawn)[places])
 
     @classmethod
-    def of_all(cls, model: Model, known: Array) -> DrawnValues:
+    def from_model(cls, model: Model, known: Array) -> DrawnValues:
         """Return the drawn values of all base parameters, for a log that does not determine them.
 
         `known` (p,) is the rotors' part of the values.

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from pteron.identification.estimators import Estimate, qr_factor, weighted
+from pteron.identification.estimators import Estimate, qr_factor, weighted_least_squares
 from pteron.identification.estimators.least_squares import actuator_noise
 from pteron.identification.estimators.total import smallest_corrections
 from pteron.identification.logs import Log
@@ -18,7 +18,7 @@ from pteron.identification.model import Model, Terms, identification_model
 from pteron.identification.observation import Observations
 from pteron.identification.payload import observations_with_payload
 from pteron.identification.signals import Processing
-from pteron.json_values import picked
+from pteron.json_values import fields_as_json
 from pteron.kernels import Array
 from pteron.manipulator import RobotLike, as_manipulator
 from pteron.reduction import BaseParameters
@@ -97,9 +97,9 @@ class DriveGains:
     def as_dict(self) -> dict[str, Any]:
         """Return everything but the residuals as plain data."""
         units = {"units": list(self.estimate.units[: len(self.gains)])}
-        return picked(self, "gains standard_deviations=deviations total_least_squares") | {
+        return fields_as_json(self, "gains standard_deviations=deviations total_least_squares") | {
             **units,
-            **picked(self, "residual condition_number=condition gap estimate"),
+            **fields_as_json(self, "residual condition_number=condition gap estimate"),
         }
 
 
@@ -271,7 +271,7 @@ def _fit_likelihood(
                 "unsettled",
                 "the gains do not settle; record longer, or carry a heavier payload",
             )
-    estimate = weighted(linear)
+    estimate = weighted_least_squares(linear)
     values = estimate.values
     slopes = np.r_[-1.0 / values[:n] ** 2, np.ones(len(values) - n)]
     return replace(

@@ -9,10 +9,15 @@ from itertools import combinations, permutations, product
 import numpy as np
 
 from pteron.errors import DataError
-from pteron.identification.estimators import weighted
+from pteron.identification.estimators import weighted_least_squares
 from pteron.identification.logs import Log
 from pteron.identification.model import Model
-from pteron.identification.observation import LinearModel, Observations, observations_of, scaled
+from pteron.identification.observation import (
+    LinearModel,
+    Observations,
+    observations_of,
+    scale_columns,
+)
 from pteron.identification.plausibility import unphysical
 from pteron.identification.signals import Preprocessing
 
@@ -243,7 +248,7 @@ def _with_errors(observations: Observations, faults: Sequence[ColumnFault]) -> l
     step = max(len(observations.forces) // _ROWS, 1)
     matrix, forces = observations.matrix[::step], observations.forces[::step]
     rows, n, p = matrix.shape
-    basis = np.linalg.qr(scaled(matrix.reshape(-1, p))[0])[0].reshape(rows, n, -1)
+    basis = np.linalg.qr(scale_columns(matrix.reshape(-1, p))[0])[0].reshape(rows, n, -1)
     # The projection of each column, given to each actuator: orders and signs add these up.
     parts = np.einsum("rnk,rj->njk", basis, forces)
     power = float((forces**2).sum())
@@ -259,7 +264,7 @@ def _unphysical(fault: ColumnFault, observations: Observations, model: Model) ->
     """Return the number of unphysical values that the corrected forces give."""
     forces = observations.forces[:, list(fault.order)] * np.array(fault.signs)
     mended = observations.with_forces(forces)
-    return unphysical(model, mended, weighted(mended))
+    return unphysical(model, mended, weighted_least_squares(mended))
 
 
 def _join_names(names: Sequence[str]) -> str:

@@ -13,7 +13,7 @@ import numpy as np
 
 from pteron.identification.drawn_values import DrawnValues
 from pteron.identification.errors import LogError, name_cause
-from pteron.identification.estimators import Estimate, weighted
+from pteron.identification.estimators import Estimate, weighted_least_squares
 from pteron.identification.faults import FaultIsolation, delay_of, isolate_faults
 from pteron.identification.faults.assumptions import find_contradiction
 from pteron.identification.faults.log_faults import LogFault, log_faults, lost_share
@@ -175,7 +175,7 @@ def _distort(faults: tuple[LogFault, ...]) -> bool:
 def _fit_unknowns(task: FitTask, equations: FitEquations, *, fits_delay: bool) -> FitEquations:
     """Return the equations with the speeds, and the delay where it is fitted, that suit best."""
     model, preprocessing = equations.model, equations.preprocessing
-    first = weighted(equations.observations)
+    first = weighted_least_squares(equations.observations)
     if fits_delay:
         begin = delay_of(model, first, task.motions.fit, preprocessing)
     else:
@@ -207,7 +207,7 @@ def _fit_values(task: FitTask, equations: FitEquations, known: Array) -> FittedV
     except LogError as error:
         # The log does not determine all values: with those of the drawing it may.
         noise = np.mean([how.force_noise for how in preprocessing], axis=0)
-        drawn_values = DrawnValues.of_all(model, known)
+        drawn_values = DrawnValues.from_model(model, known)
         observations = drawn_values.rows_beside(observations, noise)
         estimate = _estimate_with_drawing(solve, observations, error)
         equations = replace(equations, observations=observations)
@@ -215,7 +215,7 @@ def _fit_values(task: FitTask, equations: FitEquations, known: Array) -> FittedV
             equations, known, estimate, estimate, drawn_values.name_undetermined(estimate)
         )
     alone = replace(alone, covariance=alone.covariance + equations.covariance)
-    drawn_values = DrawnValues.of(model, alone, known)
+    drawn_values = DrawnValues.from_estimate(model, alone, known)
     estimate = drawn_values.update_estimate(alone, observations)
     return FittedValues(equations, known, alone, estimate, drawn_values)
 

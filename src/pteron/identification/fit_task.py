@@ -19,7 +19,7 @@ from pteron.identification.fitting import (
 from pteron.identification.logs import Finding, Log, LogFile
 from pteron.identification.model import Model, Terms, identification_model
 from pteron.identification.observation import LinearModel, Observations
-from pteron.identification.recordings import Recording, read_recording, split_held_out
+from pteron.identification.recordings import Recording, read_recording, split_test_data
 from pteron.identification.result import reflected_inertia
 from pteron.identification.signals import Preprocessing, Processing
 from pteron.legs import Drive
@@ -152,7 +152,7 @@ def _read_motions(
     originals = _originals(logs)
     if separate:
         return Motions(recordings, separate, recordings, separate, originals)
-    parts = [split_held_out(log, processing.period) for log in recordings]
+    parts = [split_test_data(log, processing.period) for log in recordings]
     beginnings, ends = [first for first, _ in parts], [second for _, second in parts]
     return Motions(recordings, separate, beginnings, ends, originals)
 

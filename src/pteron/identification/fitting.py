@@ -19,18 +19,23 @@ from pteron.identification.estimators import (
     instrumental,
     maximum_likelihood,
     total,
-    weighted,
+    weighted_least_squares,
 )
 from pteron.identification.estimators.least_squares import median_noise
 from pteron.identification.exchanged_columns import DECISIVE, column_fault, exchanged_joints
 from pteron.identification.logs import Log
-from pteron.identification.logs.at_motor import AnyLog, by_rated_torque, per_cent_advice
-from pteron.identification.logs.recorded import at_limits, check_forces, check_recorded
+from pteron.identification.logs.at_motor import AnyLog, apply_rated_torque, percent_advice
+from pteron.identification.logs.recorded import check_forces, check_recorded, saturation_sentences
 from pteron.identification.model import Model, identification_model
-from pteron.identification.observation import LinearModel, Observations, observations_of, stacked
+from pteron.identification.observation import (
+    LinearModel,
+    Observations,
+    observations_of,
+    stack_observations,
+)
 from pteron.identification.plausibility import excess_residual_cause, unseen_shares
 from pteron.identification.recordings import Recording, hold_same_samples
-from pteron.identification.signals import Preprocessing, Processing, preprocessing_of
+from pteron.identification.signals import Preprocessing, Processing, preprocessing_for_log
 from pteron.manipulator import Manipulator
 
 METHODS = (*ESTIMATORS, "instrumental", "likelihood")
@@ -58,7 +63,7 @@ _NOISELESS = 1e-10
 
 def convert_to_newtons(log: AnyLog, robot: Manipulator) -> AnyLog:
     """Return a log; if its forces are in per cent of rated torque, by the machine's drives."""
-    return by_rated_torque(log, robot) if log.description.force_unit == "%" else log
+    return apply_rated_torque(log, robot) if log.description.force_unit == "%" else log
 
 
 def check_recordings(
@@ -86,7 +91,7 @@ def check_recordings(
             )
         unit = recording.head().description.force_unit
         if unit != "N":
-            other = f", {per_cent_advice(robot)}" if unit == "%" else ""
+            other = f", {percent_advice(robot)}" if unit == "%" else ""
             raise recording.log.fault(
                 "currents",
                 f"its forces are in {unit}; declare gains (N, at a crank N m, per {unit}) in its "
@@ -145,7 +150,7 @@ def choose_preprocessing(
         processing = replace(processing, period=None)
     # A file that is read in pieces is never fitted in one.
     rows = recording.rows if isinstance(recording.log, Log) else 1 << 30
-    return preprocessing_of(robot, head, processing, rows=rows, start=start)
+    return preprocessing_for_log(robot, head, processing, rows=rows, start=start)
 
 
 def fit_observations(
@@ -172,8 +177,8 @@ def stack_balanced(parts: Sequence[Observations]) -> Observations:
     """
     if len(parts) == 1:
         return parts[0]
-    unscaled = stacked(parts)
-    estimate = weighted(unscaled)
+    unscaled = stack_observations(parts)
+    estimate = weighted_least_squares(unscaled)
     ends = np.cumsum([len(part.forces) for part in parts])[:-1]
     noises = [
         median_noise(part, residuals)
@@ -187,7 +192,7 @@ def stack_balanced(parts: Sequence[Observations]) -> Observations:
         factor = np.clip(usual / np.maximum(noise, 1e-300), 1.0 / _MOST, _MOST)
         rows, forces = part.matrix * factor[:, None], part.forces * factor
         scaled.append(replace(part, matrix=rows, forces=forces, gain=part.gain / factor))
-    return stacked(scaled)
+    return stack_observations(scaled)
 
 
 def estimate_values(
@@ -211,7 +216,7 @@ def estimate_values(
         )
     if estimator == "instrumental":
         pairs = [halves(model, log, how) for log, how in zip(logs, preprocessing, strict=True)]
-        first, second = (stacked(half) for half in zip(*pairs, strict=True))
+        first, second = (stack_observations(half) for half in zip(*pairs, strict=True))
         return instrumental(first, second, mutual=True)
     if estimator == "likelihood":
         return maximum_likelihood(model, logs[0], preprocessing[0])
@@ -225,7 +230,9 @@ def append_findings(recordings: Sequence[Recording]) -> Iterator[None]:
         yield
     except PteronError as error:
         findings = [
-            said.rstrip(".") for recording in recordings for said in at_limits(recording.head())
+            said.rstrip(".")
+            for recording in recordings
+            for said in saturation_sentences(recording.head())
         ]
         findings += [finding.message for recording in recordings for finding in recording.findings]
         if findings:

@@ -22,7 +22,7 @@ from pteron.identification.estimators import (
     Essential,
     Estimate,
     essential_parameters,
-    weighted,
+    weighted_least_squares,
 )
 from pteron.identification.faults.assumptions import find_contradiction, hidden_orders
 from pteron.identification.faults.fault import is_half
@@ -42,7 +42,7 @@ from pteron.identification.plausibility import (
 from pteron.identification.prediction import Prediction, predict
 from pteron.identification.recordings import read_recording
 from pteron.identification.result import Identification
-from pteron.identification.signals import Processing, preprocessing_of
+from pteron.identification.signals import Processing, preprocessing_for_log
 from pteron.identification.verdict import verdict_of, with_bodies, with_hidden_first
 from pteron.legs import Drive
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
@@ -140,7 +140,7 @@ def _refusal_cause(
     try:
         log = read_recording(logs_in_newtons(logs, robot)[0]).head()
         start = (0.0,) * robot.freedom if of_poses else None
-        how = preprocessing_of(robot, log, processing, start=start)
+        how = preprocessing_for_log(robot, log, processing, start=start)
         reflected = np.array([(leg.drive or Drive()).inertia for leg in robot.legs])
         assumption = find_contradiction(robot, log, how, reflected)
     except PteronError:
@@ -207,7 +207,7 @@ def _fit_essential(task: FitTask, fit: FittedValues) -> Essential:
     """Return the values that the data show, fitted alone; weighted where no such fit is known."""
     estimator = task.estimator
     if isinstance(estimator, str):
-        estimator = ESTIMATORS.get(estimator, weighted)
+        estimator = ESTIMATORS.get(estimator, weighted_least_squares)
     return essential_parameters(fit.equations.observations, fit.estimate, estimator)
 
 

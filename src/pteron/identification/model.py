@@ -16,7 +16,7 @@ from pteron.arguments import checked_arguments, expect_one_of
 from pteron.bodies.parameters import unit_of
 from pteron.equations.friction import PassiveJoint, passive_joints
 from pteron.errors import ModelError
-from pteron.identification.observation import scaled
+from pteron.identification.observation import scale_columns
 from pteron.identification.signals import States
 from pteron.identification.signals.states import FullMotion
 from pteron.kernels import Array
@@ -24,6 +24,7 @@ from pteron.kinematics import random_poses
 from pteron.kinematics.evaluate import evaluate_unchecked
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.reduction import BaseParameters, base_parameters, base_regressor
+from pteron.renamed import former_attribute
 
 Passive = Literal["none", "shared", "each"]
 """Viscous friction in the passive joints: none, one coefficient a kind of joint, or one each."""
@@ -113,7 +114,7 @@ class Model:
     speeds: tuple[float, ...] | None = None
 
     @property
-    def left_out(self) -> tuple[str, ...]:
+    def merged_terms(self) -> tuple[str, ...]:
         """Terms that join others."""
         return tuple(self.joins)
 
@@ -165,12 +166,12 @@ class Model:
     @cached_property
     def kept_terms(self) -> tuple[Term, ...]:
         """The terms that are values of their own, after the base parameters."""
-        return tuple(term for term in self.all_terms if term.name not in self.left_out)
+        return tuple(term for term in self.all_terms if term.name not in self.merged_terms)
 
     @cached_property
     def joining_terms(self) -> tuple[Term, ...]:
         """The terms that join others."""
-        return tuple(term for term in self.all_terms if term.name in self.left_out)
+        return tuple(term for term in self.all_terms if term.name in self.merged_terms)
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -221,7 +222,7 @@ class Model:
         parts = [self.share_of(name, value) for name, value in known.items()]
         return np.asarray(np.sum([np.zeros(len(self.names)), *parts], axis=0))
 
-    def per_joint(self, kind: str, values: Array) -> Array | None:
+    def joint_values(self, kind: str, values: Array) -> Array | None:
         """Return a kind of term (n,) of values (p,); 0 where it joins others, None if it is none.
 
         A term that joins others is in their values already.
@@ -283,6 +284,9 @@ class Model:
             parts.append(carried * (states.payload != 0)[:, None, None])
         return np.concatenate(parts, axis=-1)
 
+    left_out = former_attribute("left_out", "merged_terms")
+    per_joint = former_attribute("per_joint", "joint_values")
+
 
 def identification_model(
     robot: RobotLike, terms: Terms | None = None, *, base: BaseParameters | None = None
@@ -327,7 +331,7 @@ def _independent(model: Model) -> Model:
     """Return a model without the terms whose columns depend on others at every state."""
     names = model.names
     flat = model._all_columns(_probes(model.robot)).reshape(-1, len(names))
-    columns, lengths = scaled(flat)
+    columns, lengths = scale_columns(flat)
     factor: Array = np.linalg.qr(columns)[1]
     # The diagonal of R is what is left of each column once those before it are taken out of it.
     remainders = np.abs(np.diag(factor))
@@ -352,8 +356,8 @@ def _probes(robot: Manipulator) -> States:
     pose = random_poses(robot, _PROBES, seed=rng)
     velocity, acceleration = rng.normal(size=pose.shape), 10.0 * rng.normal(size=pose.shape)
     # Every other one carries a payload, else its columns would be those of the platform.
-    motion = FullMotion.of_platform(robot, pose, velocity, acceleration)
-    return States.of(np.zeros(_PROBES), motion, np.arange(_PROBES) % 2)
+    motion = FullMotion.from_platform(robot, pose, velocity, acceleration)
+    return States.from_motion(np.zeros(_PROBES), motion, np.arange(_PROBES) % 2)
 
 
 def diagonal(values: Array) -> Array:

@@ -22,6 +22,7 @@ from pteron.identification.signals.samples import BLOCK, SampleBlock, samples
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
 from pteron.motion.trajectories.fourier import fourier_basis
+from pteron.renamed import former_attribute
 
 
 class LinearModel(Protocol):
@@ -93,14 +94,14 @@ class Observations(OfLog):
     kinds: tuple[str, ...] = ()
 
     @property
-    def used(self) -> Array:
+    def equation_counts(self) -> Array:
         """Number of equations of each actuator that are used, (n,)."""
         return np.asarray((self.gain > 0.0).sum(axis=0))
 
     @property
     def rows(self) -> int:
         """Number of equations that are used."""
-        return int(self.used.sum())
+        return int(self.equation_counts.sum())
 
     @property
     def actuators(self) -> int:
@@ -131,6 +132,8 @@ class Observations(OfLog):
         parts: dict[str, Any] = {name: getattr(self, name)[rows] for name in _ROWS}
         return replace(self, **parts)
 
+    used = former_attribute("used", "equation_counts")
+
 
 def observations_of(
     model: LinearModel,
@@ -148,7 +151,7 @@ def observations_of(
     log : Log or iterable of Log
         The log, or its pieces in order, read one at a time.
     preprocessing : Preprocessing
-        Its preprocessing, from `preprocessing_of`.
+        Its preprocessing, from `preprocessing_for_log`.
     block : int
         Number of rows filtered at a time, about.
 
@@ -159,22 +162,22 @@ def observations_of(
     """
     fit = preprocessing.differentiator
     if isinstance(fit, FourierFit):
-        assert isinstance(log, Log)  # `preprocessing_of` takes no other for periodic
+        assert isinstance(log, Log)  # `preprocessing_for_log` takes no other for periodic
         parts = [
             _periodic(model, part, preprocessing, fit)
             for part in _phases(log, preprocessing.rate, fit)
         ]
-        return replace(stacked(parts), source=log.source)
+        return replace(stack_observations(parts), source=log.source)
     # The mask of a row depends on the rows around it, in the next block too.
-    margin = preprocessing.decimation.margin + preprocessing.settling
+    margin = preprocessing.decimation.margin + preprocessing.settling_rows
     observations, source = [], "the log"
     for sample_block in samples(model.robot, log, preprocessing, margin=margin, block=block):
         observations.append(_filter_block(model, sample_block, preprocessing))
         source = sample_block.source
-    return replace(stacked(observations), source=source)
+    return replace(stack_observations(observations), source=source)
 
 
-def stacked(parts: Sequence[Observations]) -> Observations:
+def stack_observations(parts: Sequence[Observations]) -> Observations:
     """Return the observations of several logs, or parts of one, as one."""
     first = parts[0]
     if len(parts) == 1:
@@ -185,7 +188,7 @@ def stacked(parts: Sequence[Observations]) -> Observations:
     return replace(first, **joined)
 
 
-def in_motion(rates: Array, slow: Array, rows: int, *, wraps: bool = False) -> Array:
+def motion_mask(rates: Array, slow: Array, rows: int, *, wraps: bool = False) -> Array:
     """Return a mask (R, n): 1 where a joint moves, 0 where it is `slow`, and `rows` rows around.
 
     Both sides of F = W beta are multiplied with it before the parallel filter.
@@ -199,13 +202,13 @@ def _filter_block(
     model: LinearModel, block: SampleBlock, preprocessing: Preprocessing
 ) -> Observations:
     decimation = preprocessing.decimation
-    settling = preprocessing.settling
+    settling = preprocessing.settling_rows
     inner = slice(settling, len(block.states) - settling)
-    moving = in_motion(block.states.joint_rates, preprocessing.slow, settling)
+    moving = motion_mask(block.states.joint_rates, preprocessing.slow, settling)
     moving = (moving * block.smooth[:, None])[inner]
     states, forces = block.states.part(inner), block.forces[inner]
     centers = decimation.centers(len(states))
-    return assembled(
+    return assemble_observations(
         model,
         decimation(moving[..., None] * model.matrix(states)),
         decimation(moving * forces),
@@ -216,7 +219,7 @@ def _filter_block(
     )
 
 
-def assembled(
+def assemble_observations(
     model: LinearModel,
     matrix: Array,
     forces: Array,
@@ -273,7 +276,9 @@ def _periodic(
     harmonics = max(min(int(preprocessing.band * period), most_harmonics(log.time, period)), 1)
     series = fit.series(log)
     fine = np.linspace(start, start + period, per_period, endpoint=False)
-    moving = in_motion(series.at(fine)[1], preprocessing.slow, preprocessing.settling, wraps=True)
+    moving = motion_mask(
+        series.at(fine)[1], preprocessing.slow, preprocessing.settling_rows, wraps=True
+    )
     count = 2 * harmonics + 1
     instants = np.linspace(start, start + period, count, endpoint=False)
 
@@ -288,7 +293,7 @@ def _periodic(
         phases = None if log.payload is None else np.full(len(time[part]), log.payload[0])
         about: dict[str, Any] = {"source": log.source, "first_row": log.first_row + part.start}
         motion, start = series.at(time[part]), preprocessing.start
-        states = States.of_joints(model.robot, motion, time[part], start, payload=phases, **about)
+        states = States.from_joints(model.robot, motion, time[part], start, payload=phases, **about)
         return np.asarray(shown[part][..., None] * model.matrix(states)).reshape(len(states), -1)
 
     n, p = used.shape[1], len(model.names)
@@ -300,10 +305,12 @@ def _periodic(
     rows = basis @ force_projection.coefficients(lambda part: used[part] * log.forces[part], n)
     noise = projection.noise(shown, instants) * np.sqrt(len(time) / log.rows)
     payload = np.full(count, 0 if log.payload is None else log.payload[0], dtype=np.int64)
-    return assembled(model, matrix, rows, noise, instants, payload, np.sqrt(count / log.rows))
+    return assemble_observations(
+        model, matrix, rows, noise, instants, payload, np.sqrt(count / log.rows)
+    )
 
 
-def scaled(columns: Array) -> tuple[Array, Array]:
+def scale_columns(columns: Array) -> tuple[Array, Array]:
     """Return columns (R, k) divided by their lengths, and these (k,); 1 for a column of zeros."""
     lengths = np.linalg.norm(columns, axis=0)
     lengths = np.where(lengths > 0.0, lengths, 1.0)

@@ -19,9 +19,9 @@ from pteron.identification.estimators import (
     Estimate,
     essential_parameters,
     instrumental,
-    weighted,
+    weighted_least_squares,
 )
-from pteron.identification.estimators.reduction import Reduced, reduced
+from pteron.identification.estimators.reduction import Reduced, independent_columns
 from pteron.identification.observation import Observations
 from pteron.identification.prediction import FRICTION, Prediction
 from pteron.identification.recordings import FITTED
@@ -38,7 +38,7 @@ _ESTIMATORS = (*ESTIMATORS, "instrumental")
 
 
 @dataclass(frozen=True)
-class Fit:
+class RegressorFit:
     """The values of a model with a regressor of the user's own, and a verdict on them.
 
     Attributes
@@ -75,7 +75,7 @@ def estimate(
     held_out: tuple[ArrayLike, ...] | None = None,
     instruments: ArrayLike | Callable[[Array], ArrayLike] | None = None,
     reduce: bool = False,
-) -> Fit:
+) -> RegressorFit:
     """Estimate the values of a model whose forces are `regressor` @ values, and judge them.
 
     Parameters
@@ -139,10 +139,14 @@ def estimate(
         regressor, forces, names=names, units=units, kinds=kinds, time=time, used=used
     )
     fit, check = _hold_out(observations, held_out, kinds)
-    independent = reduced(fit) if reduce else None
+    independent = independent_columns(fit) if reduce else None
     if independent is not None:
         fit, check = fit.columns(independent.kept), check.columns(independent.kept)
-    solve = ESTIMATORS.get(estimator, weighted) if isinstance(estimator, str) else estimator
+    solve = (
+        ESTIMATORS.get(estimator, weighted_least_squares)
+        if isinstance(estimator, str)
+        else estimator
+    )
     try:
         if instruments is None:
             values = solve(fit)
@@ -154,7 +158,7 @@ def estimate(
             error.args = (f"{error}; or give reduce=True, which leaves out dependent columns",)
         raise
     prediction = _prediction(check, values, repeats=held_out is None)
-    return Fit(
+    return RegressorFit(
         values,
         essential_parameters(fit, values, solve),
         prediction,
@@ -222,7 +226,7 @@ def _prediction(check: Observations, estimate: Estimate, *, repeats: bool) -> Pr
     if check.kinds:
         without = check.matrix @ np.where(np.isin(check.kinds, FRICTION), 0.0, estimate.values)
     # Equations that do not count are zero on both sides.
-    used, counts = check.gain > 0.0, np.maximum(check.used, 1)
+    used, counts = check.gain > 0.0, np.maximum(check.equation_counts, 1)
     error, error_without_friction = (
         np.sqrt(((check.forces - forces) ** 2).sum(axis=0) / counts)
         for forces in (predicted, without)

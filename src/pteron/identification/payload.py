@@ -14,7 +14,7 @@ from pteron.bodies.inertia import PlanarInertia, SpatialInertia, inertia_count
 from pteron.bodies.parameters import LENGTH_POWERS
 from pteron.errors import ModelError
 from pteron.identification.errors import LogError
-from pteron.identification.estimators import Estimate, weighted
+from pteron.identification.estimators import Estimate, weighted_least_squares
 from pteron.identification.faults import FaultIsolation, isolate_faults
 from pteron.identification.fitting import (
     NO_COLUMN,
@@ -27,7 +27,7 @@ from pteron.identification.fitting import (
 )
 from pteron.identification.logs import Finding, Log
 from pteron.identification.model import Model, Terms, identification_model
-from pteron.identification.observation import Observations, observations_of, stacked
+from pteron.identification.observation import Observations, observations_of, stack_observations
 from pteron.identification.plausibility import (
     CHANCE,
     excess_residual_cause,
@@ -35,8 +35,8 @@ from pteron.identification.plausibility import (
     unseen_names,
 )
 from pteron.identification.recordings import Recording, read_recording
-from pteron.identification.signals import Preprocessing, Processing, preprocessing_of
-from pteron.json_values import picked
+from pteron.identification.signals import Preprocessing, Processing, preprocessing_for_log
+from pteron.json_values import fields_as_json
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.payload import with_payload
@@ -122,7 +122,7 @@ class Payload:
         shares = list(kind.shares_of_point(x, y, z).values())[-len(about) :]
         return tuple((about - self.mass * np.array(shares)).tolist())
 
-    def carried_by(self, robot: RobotLike) -> Manipulator:
+    def add_to(self, robot: RobotLike) -> Manipulator:
         """Return the machine with the payload, as `set_payload` of exported code makes it.
 
         These are `mass`, `center_of_mass` and `central_inertia`; what the forces do not show is 0.
@@ -170,7 +170,7 @@ class Payload:
         return True
 
     @property
-    def felt(self) -> bool:
+    def is_significant(self) -> bool:
         """Whether the values differ significantly from zero (Wald's test, 0.1 %)."""
         chosen = [self.estimate.names.index(name) for name in self.names]
         return self.estimate.wald(self.values, chosen) > float(
@@ -178,7 +178,7 @@ class Payload:
         )
 
     @property
-    def allowed_for(self) -> bool:
+    def has_valid_errors(self) -> bool:
         """Whether the stated errors of the values hold: no fault shows that lowers the grade."""
         return not self.fault_isolation.matters
 
@@ -198,7 +198,7 @@ class Payload:
             lines.append(f"Not felt by the actuators: {', '.join(hidden)}.")
         lines.append(self._opinion())
         lines += [fault.message for fault in self.fault_isolation.faults if fault.matters]
-        if not self.allowed_for:
+        if not self.has_valid_errors:
             lines.append("The stated errors do not allow for that.")
         lines += [f"Note: {finding.message}" for finding in self.findings]
         residuals = ", ".join(f"{value:.2g}" for value in self.residual)
@@ -208,7 +208,7 @@ class Payload:
         return "\n".join(lines)
 
     def _opinion(self) -> str:
-        if not self.felt:
+        if not self.is_significant:
             return "No payload is felt: the values are zero within their certainty."
         if self.real:
             return "A real body has these values."
@@ -218,12 +218,16 @@ class Payload:
 
     def as_dict(self) -> dict[str, Any]:
         """Return the payload as plain data, without the other values of the fit."""
-        return picked(
+        return fields_as_json(
             self,
             "mass first_moment inertia center_of_mass central_inertia names",
             "standard_deviations=deviations covariance felt real residual trial=fault_isolation",
             "findings",
         )
+
+    carried_by = former_attribute("carried_by", "add_to")
+    felt = former_attribute("felt", "is_significant")
+    allowed_for = former_attribute("allowed_for", "has_valid_errors")
 
 
 def identify_payload(
@@ -233,7 +237,7 @@ def identify_payload(
     *,
     terms: Terms | None = None,
     processing: Processing | None = None,
-    estimator: Callable[[Observations], Estimate] = weighted,
+    estimator: Callable[[Observations], Estimate] = weighted_least_squares,
     base: BaseParameters | None = None,
 ) -> Payload:
     """Return a payload's inertia from motions with and without it.
@@ -340,7 +344,7 @@ def observations_with_payload(
     """Return the observations of a log with both phases, or of two logs, as one."""
     fit = _phases(without, with_payload, processing)
     with append_findings(fit):
-        return stacked(_observe_phases(model, fit, processing)[0])
+        return stack_observations(_observe_phases(model, fit, processing)[0])
 
 
 def _phases(
@@ -361,9 +365,9 @@ def _observe_phases(
 ) -> tuple[list[Observations], list[Preprocessing]]:
     """Return observations and preprocessing of each recording; both phases must be in them."""
     logs = [recording.head() for recording in fit]
-    plans = [preprocessing_of(model.robot, log, processing) for log in logs]
+    plans = [preprocessing_for_log(model.robot, log, processing) for log in logs]
     parts = [observations_of(model, *pair) for pair in zip(logs, plans, strict=True)]
-    observations = stacked(parts)
+    observations = stack_observations(parts)
     seen = (observations.gain > 0.0).any(axis=1)
     for phase, called in ((0, "without payload"), (1, "with payload")):
         if not (seen & ((observations.payload != 0) == phase)).any():

@@ -10,11 +10,12 @@ import scipy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
 from pteron.identification.model import Model
-from pteron.identification.observation import in_motion
+from pteron.identification.observation import motion_mask
 from pteron.identification.recordings import Recording
 from pteron.identification.signals import Preprocessing, samples
-from pteron.json_values import picked
+from pteron.json_values import fields_as_json
 from pteron.kernels import Array
+from pteron.renamed import former_attribute
 
 _KEPT = 6000
 """Samples, about, that are kept for pictures."""
@@ -111,14 +112,14 @@ class Prediction:
         return np.asarray(100.0 * self.noise / self.size)
 
     @property
-    def unexplained(self) -> Array:
+    def unexplained_error(self) -> Array:
         """Error beyond the noise in percent (n,), without the samples that stand out."""
         beyond = np.sqrt(np.maximum(self.robust_error**2 - self.noise**2, 0.0))
         return np.asarray(100.0 * beyond / self.size)
 
     def as_dict(self) -> dict[str, Any]:
         """Return everything but the samples as plain data."""
-        return picked(
+        return fields_as_json(
             self,
             "source samples left_out force_standard_deviation=size rms_error=error",
             "rms_error_of_all_samples=error_of_all nrms_percent=nrms",
@@ -126,6 +127,8 @@ class Prediction:
             "nrms_percent_without_friction=nrms_without_friction",
             "noise_floor_percent=floor unexplained_percent=unexplained",
         )
+
+    unexplained = former_attribute("unexplained", "unexplained_error")
 
 
 def predict(
@@ -141,7 +144,7 @@ def predict(
         states, measured = block.states.part(block.fresh), block.forces[block.fresh]
         matrix = model.matrix(states)
         predicted, without = matrix @ values, matrix @ plain
-        used = in_motion(states.joint_rates, preprocessing.slow, preprocessing.turning)
+        used = motion_mask(states.joint_rates, preprocessing.slow, preprocessing.turning_rows)
         error, bare = measured - predicted, measured - without
         least = _LEAST_NOISE * np.sqrt((measured**2).mean(axis=0))
         out = used * _stands_out(error, np.maximum(preprocessing.force_noise, least))

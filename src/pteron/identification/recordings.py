@@ -13,7 +13,7 @@ import numpy as np
 
 from pteron.errors import DataError
 from pteron.identification.logs import Finding, Log, LogFile
-from pteron.identification.logs.bridging import bridged
+from pteron.identification.logs.bridging import fill_gaps
 from pteron.identification.logs.log import TimeStamps
 from pteron.identification.signals.repetition import repeating_rows
 from pteron.kernels import Array
@@ -106,7 +106,7 @@ def read_recording(
     if isinstance(log, LogFile) and (log.rows_estimate or 0) <= log.rows_in_memory:
         log = log.read(progress)
     if isinstance(log, Log):
-        log = bridged(replace(log, time=_rebase_times(log.time), findings=_stamp_findings(log)))
+        log = fill_gaps(replace(log, time=_rebase_times(log.time), findings=_stamp_findings(log)))
         log = periodic_part(log, period)
         return Recording(log, 0, log.rows)
     return Recording(log, 0, _END)
@@ -183,7 +183,7 @@ def _rebase_times(time: Array) -> Array:
     return steady if np.abs(since - steady).max() <= _ROUNDINGS * rounding else since
 
 
-def split_held_out(recording: Recording, period: float | None) -> tuple[Recording, Recording]:
+def split_test_data(recording: Recording, period: float | None) -> tuple[Recording, Recording]:
     """Return the part of a recording to fit, and the part to hold out: its end.
 
     At a whole number of periods, where the motion is periodic: with `period`, or as it is declared.
@@ -197,7 +197,7 @@ def split_held_out(recording: Recording, period: float | None) -> tuple[Recordin
             out[start + _count_fitted_rows(log.part(start, stop), stop - start, period) : stop] = (
                 True
             )
-        parts = log.without(out), log.without(~out)
+        parts = log.drop_samples(out), log.drop_samples(~out)
         first, second = (Recording(part, 0, part.rows) for part in parts)
         return first, second
     cut = recording.start + _count_fitted_rows(log, recording.rows, period)

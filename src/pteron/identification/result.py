@@ -19,7 +19,7 @@ from pteron.identification.model import Model
 from pteron.identification.prediction import Prediction
 from pteron.identification.signals import Preprocessing
 from pteron.identification.unknowns import Unknowns
-from pteron.json_values import picked
+from pteron.json_values import fields_as_json
 from pteron.kernels import Array
 from pteron.legs import Drive, Stribeck
 from pteron.manipulator import Manipulator
@@ -108,7 +108,7 @@ class Identification:
         )
         columns = [Column("value", "long"), Column("identified", "number")]
         columns += [
-            Column("\u00b1 95 %" + " (too short)" * self.understated, "number"),
+            Column("\u00b1 95 %" + " (too short)" * self.has_understated_errors, "number"),
             Column("drawn", "number"),
             Column("unit"),
         ]
@@ -121,7 +121,7 @@ class Identification:
         return self.fault_isolation.causes
 
     @property
-    def understated(self) -> bool:
+    def has_understated_errors(self) -> bool:
         """Whether a fault shows for which the values' stated errors do not allow."""
         return self.fault_isolation.understates
 
@@ -182,7 +182,7 @@ class Identification:
         Known rotors count, with what the forces say beside them; what joins bodies is theirs.
         """
         known = [j * r**2 for j, r in self.rotors] if self.rotors else [0.0] * len(self.robot.legs)
-        beside = self.model.per_joint("rotor", self.file_values)
+        beside = self.model.joint_values("rotor", self.file_values)
         return np.maximum(np.array(known) + (0.0 if beside is None else beside), 0.0)
 
     @property
@@ -215,7 +215,7 @@ class Identification:
 
         Friction and inertia below zero are noise: no joint pushes itself.
         """
-        terms = self.model.per_joint(kind, values)
+        terms = self.model.joint_values(kind, values)
         return np.maximum(np.zeros(len(self.robot.legs)) if terms is None else terms, least)
 
     @property
@@ -231,7 +231,7 @@ class Identification:
         joins, others are lighter than that by the fit, and no drive has less inertia than none:
         then rotors are taken out of the values.
         """
-        beside = self.model.per_joint("rotor", self.estimate.values)
+        beside = self.model.joint_values("rotor", self.estimate.values)
         if self.rotors is None or beside is None or not (beside < 0.0).any():
             inertia = self._terms_per_joint("rotor", self.estimate.values)
             return self.estimate.values, inertia, self.model.expressions
@@ -243,18 +243,18 @@ class Identification:
         consistency, base = self.consistency, self.model.base
         exported, inertia, expressions = self._export_values
         bodies = consistency and {
-            **picked(consistency, "feasible distance p_value at_border cad_feasible"),
-            **picked(consistency, "cad_violations"),
+            **fields_as_json(consistency, "feasible distance p_value at_border cad_feasible"),
+            **fields_as_json(consistency, "cad_violations"),
             "share_of_residual": self.consistency_share,
-            **picked(consistency, "parameters"),
+            **fields_as_json(consistency, "parameters"),
             "summary": consistency.summary().splitlines(),
         }
         return {
             "robot": self.robot.name,
             "machine": machine_record(self.robot),
-            **picked(self, "verdict"),
+            **fields_as_json(self, "verdict"),
             "expressions": [*expressions],
-            **picked(self.model, "kinds left_out"),
+            **fields_as_json(self.model, "kinds left_out"),
             "base_parameters": {
                 "names": list(base.names),
                 "expressions": list(base.expressions(digits=12)),
@@ -270,16 +270,20 @@ class Identification:
                 }
                 for friction, inertia in zip(self._friction(exported), inertia, strict=True)
             ],
-            **picked(self, "estimate unknowns"),
-            "essential": picked(self.essential, "names dropped p_value level")
-            | picked(self.essential.estimate, "values standard_deviations=deviations"),
-            **picked(self, "unseen"),
+            **fields_as_json(self, "estimate unknowns"),
+            "essential": fields_as_json(self.essential, "names dropped p_value level")
+            | fields_as_json(self.essential.estimate, "values standard_deviations=deviations"),
+            **fields_as_json(self, "unseen"),
             "real_bodies": bodies,
-            **picked(self, "trial=fault_isolation fitted held_out"),
-            "preprocessing": [picked(how, *vars(how)) for how in self.preprocessing],
-            "findings": [picked(finding, "kind row column message") for finding in self.findings],
-            **picked(self, "notes"),
+            **fields_as_json(self, "trial=fault_isolation fitted held_out"),
+            "preprocessing": [fields_as_json(how, *vars(how)) for how in self.preprocessing],
+            "findings": [
+                fields_as_json(finding, "kind row column message") for finding in self.findings
+            ],
+            **fields_as_json(self, "notes"),
         }
+
+    understated = former_attribute("understated", "has_understated_errors")
 
 
 def reflected_inertia(rotors: tuple[tuple[float, float], ...] | None) -> dict[str, float]:

@@ -10,11 +10,12 @@ from numpy.typing import ArrayLike, NDArray
 from pteron.dynamics import inverse_dynamics
 from pteron.errors import DataError
 from pteron.identification.logs import Log
-from pteron.identification.signals import Processing, preprocessing_of, samples
-from pteron.identification.signals.filters import SETTLING, smoothed
+from pteron.identification.signals import Processing, preprocessing_for_log, samples
+from pteron.identification.signals.filters import SETTLING, lowpass
 from pteron.kernels import Array
 from pteron.legs import Drive, Elastic
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.renamed import former_attribute
 from pteron.shapes import PerJoint
 
 _BLOCKS = 25
@@ -57,7 +58,7 @@ class Transmissions:
     damping_deviations: PerJoint
     backlash_deviations: PerJoint
 
-    def in_drives_of(self, robot: RobotLike) -> Manipulator:
+    def add_to(self, robot: RobotLike) -> Manipulator:
         """Return a machine whose drives bend so; damping and play that are not clear are 0."""
         robot = as_manipulator(robot)
         damping = _clear(self.damping, self.damping_deviations)
@@ -71,6 +72,8 @@ class Transmissions:
                 for leg, *elasticity in legs
             ),
         )
+
+    in_drives_of = former_attribute("in_drives_of", "add_to")
 
 
 def _clear(values: Array, deviations: Array) -> Array:
@@ -126,16 +129,16 @@ def identify_transmissions(
         raise DataError(f"{log.source}: a payload is carried; take the rows without (`Log.part`)")
     if motors.shape != log.joints.shape:
         raise DataError(f"motors: shape {motors.shape} given, {log.joints.shape} expected")
-    how = preprocessing_of(robot, log, processing or Processing(derivatives="central"))
+    how = preprocessing_for_log(robot, log, processing or Processing(derivatives="central"))
     how = replace(how, cutoff=min(how.cutoff or np.inf, _SLOW * how.rate))
     blocks = [block.states.part(block.fresh) for block in samples(robot, log, how)]
     time = np.concatenate([block.time for block in blocks])
     load = np.concatenate(
         [inverse_dynamics(robot, s.pose, s.velocity, s.acceleration) for s in blocks]
     )
-    bent = smoothed(motors - log.joints, log.rate, how.cutoff)
+    bent = lowpass(motors - log.joints, log.rate, how.cutoff)
     rate = np.gradient(bent, log.time, axis=0)
-    side = smoothed(np.sign(_interpolate(time, load, log.time)), log.rate, how.cutoff)
+    side = lowpass(np.sign(_interpolate(time, load, log.time)), log.rate, how.cutoff)
     bent, rate, side = (_interpolate(log.time, signal, time) for signal in (bent, rate, side))
     edge = SETTLING / (how.cutoff or log.rate)
     inner = (time > time[0] + edge) & (time < time[-1] - edge)

@@ -18,10 +18,10 @@ import numpy as np
 import scipy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
-from pteron.identification.estimators import weighted
+from pteron.identification.estimators import weighted_least_squares
 from pteron.identification.estimators.least_squares import actuator_noise
 from pteron.identification.model import Model, diagonal, extend_model
-from pteron.identification.observation import LinearModel, Observations, scaled
+from pteron.identification.observation import LinearModel, Observations, scale_columns
 from pteron.identification.signals import States
 from pteron.identification.signals.preprocessing import LATEST
 from pteron.kernels import Array
@@ -136,7 +136,7 @@ def fit_nonlinear_terms(
         columns = partial(_slopes, model, seen, values, late)
         rows = observe(extend_model(model, len(seen) + late, columns), unknowns.delay)
         plain = rows.columns(range(p))
-        extended_fit, part = weighted(rows), weighted(plain)
+        extended_fit, part = weighted_least_squares(rows), weighted_least_squares(plain)
         values, covariance = part.values, extended_fit.covariance[:p, :p] - part.covariance
         step, deviations = extended_fit.values[p:], extended_fit.deviations[p:]
         if speeds is not None:
@@ -175,7 +175,7 @@ def search_speeds(model: Model, observe: Observe, usual: Array) -> Array:
 
     rows = observe(extend_model(model, _COLUMNS, columns))
     plain = rows.columns(range(p))
-    noise = weighted(plain).noise
+    noise = weighted_least_squares(plain).noise
     tried = np.geomspace(_SLOWEST, _FASTEST, _FINE)
     spline = scipy.interpolate.make_interp_spline(np.log(shares), np.eye(_COLUMNS), k=5)(
         np.log(tried)
@@ -184,7 +184,7 @@ def search_speeds(model: Model, observe: Observe, usual: Array) -> Array:
     for _ in range(2):
         # Of all columns, and the forces, what the others leave; the noise is that of the last fit.
         weighed = plain.matrix / noise[:, None]
-        basis = np.linalg.qr(scaled(weighed.reshape(-1, p))[0])[0]
+        basis = np.linalg.qr(scale_columns(weighed.reshape(-1, p))[0])[0]
         forces = (plain.forces / noise).ravel()
         each = rows.matrix[..., p:] / noise[:, None]
         joint_columns = np.einsum("ric,ij->rijc", each, np.eye(n)).reshape(len(forces), -1)
@@ -196,7 +196,7 @@ def search_speeds(model: Model, observe: Observe, usual: Array) -> Array:
         falls = np.einsum("ric,ic->ri", rows.matrix[..., p:], spline[chosen])
         extra = diagonal(falls)[..., chosen >= 0]
         with_friction = plain.with_matrix(np.concatenate([plain.matrix, extra], axis=-1))
-        noise = actuator_noise(with_friction, weighted(with_friction).values)
+        noise = actuator_noise(with_friction, weighted_least_squares(with_friction).values)
     return speeds
 
 

@@ -237,7 +237,7 @@ def _grade_error(percent: float, small: float) -> Grade:
 
 def _judge_prediction(prediction: Prediction) -> Opinion:
     ratio = prediction.robust_nrms / np.maximum(prediction.floor, 1e-12)
-    missed = prediction.unexplained
+    missed = prediction.unexplained_error
     # The worst actuator is the one farthest beyond both limits.
     worst = int(np.argmax(np.where(ratio <= AT_THE_FLOOR, 0.0, missed)))
     opinion = Opinion()
@@ -290,10 +290,10 @@ def _judge_faults(shown: FaultIsolation) -> Opinion:
         opinion.add(f"No fault shows in the residuals; tried: {', '.join(shown.tried)}.")
     for fault in shown.hidden:
         opinion.add(*_HIDDEN[fault])
-    if np.isnan(shown.off).any():
+    if np.isnan(shown.expected_error).any():
         return opinion
-    worst = int(np.argmax(shown.off))
-    off = float(shown.off[worst])
+    worst = int(np.argmax(shown.expected_error))
+    off = float(shown.expected_error[worst])
     opinion.add(
         f"A pick-and-place cycle, or another motion as fast as this one, is expected to be up to "
         f"{percentages([off]) if off < 0.01 else f'{off:.2g} %'} off "

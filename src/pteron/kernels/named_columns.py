@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from pteron.errors import DataError, shown
+from pteron.errors import DataError, shorten
 
 _MANY = 12
 """Columns of a table that a message lists."""
@@ -52,7 +52,7 @@ def pick_columns(table: Any, columns: Sequence[str], name: str) -> Any:
         raise DataError(f"{name}: the table's columns have names of two levels; keep one")
     if missing := [column for column in columns if column not in column_names]:
         remaining = f" and {len(column_names) - _MANY} more" if len(column_names) > _MANY else ""
-        listed = ", ".join(shown(column_name, bare=True) for column_name in column_names[:_MANY])
+        listed = ", ".join(shorten(column_name, bare=True) for column_name in column_names[:_MANY])
         raise DataError(
             f"{name}: no column {', '.join(missing)} in a table of {listed}{remaining}; name its "
             "columns so, in SI units and radians, or give an array"

@@ -8,7 +8,7 @@ from math import isfinite
 from typing import Literal
 
 from pteron.bodies.vectors import number
-from pteron.errors import ModelError, shown
+from pteron.errors import ModelError, shorten
 from pteron.toml import keep_checked, raise_faults
 
 
@@ -235,7 +235,7 @@ class Drive:
             part = getattr(self, name)
             if part is not None and not isinstance(part, kind):
                 article = "an" if name == "elastic" else "a"
-                faults.append(f"{name}: {shown(part)} given, {article} {kind.__name__} expected")
+                faults.append(f"{name}: {shorten(part)} given, {article} {kind.__name__} expected")
         for name in ("curve", "ripple", "cogging"):
             part = getattr(self, name)
             try:
@@ -253,7 +253,7 @@ class Drive:
                 expectation = (
                     "pairs of numbers, speed and force," if name == "curve" else "a list of Wave"
                 )
-                faults.append(f"{name}: {shown(part)} given, {expectation} expected")
+                faults.append(f"{name}: {shorten(part)} given, {expectation} expected")
         return faults
 
     def _contradictions(self, wrong: set[str]) -> list[str]:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from pteron.errors import shown
+from pteron.errors import shorten
 from pteron.manipulator.dimensions import with_dimensions
 from pteron.manipulator.files import DEFAULT_KIND, document, load
 from pteron.manipulator.manipulator import Manipulator
@@ -48,7 +48,7 @@ def commented_text(name_or_path: str | Path, dimensions: Mapping[str, Any] | Non
     """
     robot, tables = load(name_or_path), document(name_or_path)
     name = robot.name
-    about = [f"Made after {shown(name, bare=True)}. Put in your numbers, then: pteron check FILE"]
+    about = [f"Made after {shorten(name, bare=True)}. Put in your numbers, then: pteron check FILE"]
     if dimensions:
         tables = document_of(with_dimensions(robot, **dimensions))
         about += [
@@ -100,7 +100,9 @@ def kept_numbers_sentence(robot: Manipulator, dimensions: Mapping[str, Any]) -> 
         phrases.append("the joints' limits (--limits)")
     if zero not in ("", LEVEL):
         phrases.append(f"where a crank is at 0, {zero}")
-    return [f"As in {shown(robot.name, bare=True)} still: {'; '.join(phrases)}."] if phrases else []
+    return (
+        [f"As in {shorten(robot.name, bare=True)} still: {'; '.join(phrases)}."] if phrases else []
+    )
 
 
 def _masses(robot: Manipulator, stock: Mapping[str, Any]) -> str:

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from pteron.bodies.vectors import unit_vector, vector
-from pteron.errors import ModelError, shown, warn_unlikely
+from pteron.errors import ModelError, shorten, warn_unlikely
 from pteron.legs import LegKind
 from pteron.legs.circles import perpendicular_to
 from pteron.legs.installed import kind_named, kind_names
@@ -135,7 +135,7 @@ def _similar_files(path: Path) -> list[str]:
         if not path.exists():
             names = [file.name for file in path.parent.iterdir() if file.suffix == ".toml"]
             similar = get_close_matches(path.name, names, n=1, cutoff=0.75)
-            return [shown(str(path.parent / name), bare=True, longest=1000) for name in similar]
+            return [shorten(str(path.parent / name), bare=True, longest=1000) for name in similar]
     return []
 
 
@@ -176,7 +176,7 @@ def _machine(document: dict[str, Any], source: str) -> Manipulator:
             return Manipulator(
                 name, platform, tuple(built), machine.gravity, radii, tuple(tools), home
             )
-    subject = shown(source, bare=True, longest=1000)
+    subject = shorten(source, bare=True, longest=1000)
     raise ModelError(joined_faults(reading.faults), subject=subject, faults=reading.faults)
 
 
@@ -271,17 +271,17 @@ class _FileReader:
 
         prefix = f"leg {i}: "
         if not isinstance(raw_table, dict):
-            self.faults.append(f"{prefix}{shown(raw_table)} given, a table [[legs]] expected")
+            self.faults.append(f"{prefix}{shorten(raw_table)} given, a table [[legs]] expected")
             return None
         name = raw_table.get("type", DEFAULT_KIND)
         try:
             kind = kind_named(name) if isinstance(name, str) else None
         except ModelError as error:
-            self.faults.append(f"{prefix}type: {shown(name)} cannot be loaded: {error}")
+            self.faults.append(f"{prefix}type: {shorten(name)} cannot be loaded: {error}")
             return None
         if kind is None:
             valid = ", ".join(kind_names())
-            self.faults.append(f"{prefix}type: {shown(name)} is not one of {valid}")
+            self.faults.append(f"{prefix}type: {shorten(name)} is not one of {valid}")
             return None
         for key, former in FORMER.items():
             if key in raw_table and former in raw_table:

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pteron.errors import DataError, shown, warn_unlikely
+from pteron.errors import DataError, shorten, warn_unlikely
 from pteron.manipulator.manipulator import Manipulator
 
 MOST_DIFFERENCE = 0.01
@@ -68,13 +68,13 @@ def expect_machine(record: object, robot: Manipulator, source: object) -> None:
     if record is None:
         return
     if not isinstance(record, Mapping):
-        raise DataError(f"{source}: machine: {shown(record)} given, a table expected")
+        raise DataError(f"{source}: machine: {shorten(record)} given, a table expected")
     expected = machine_record(robot)
-    name = shown(record.get("name"))
+    name = shorten(record.get("name"))
     if record.get("topology") != expected["topology"]:
         raise DataError(
             f"{source}: belongs to {name}, a machine of another topology "
-            f"({shown(record.get('layout'))}) than {robot.name} ({expected['layout']}); give the "
+            f"({shorten(record.get('layout'))}) than {robot.name} ({expected['layout']}); give the "
             "machine that it was made for"
         )
     if record.get("geometry") == expected["geometry"]:

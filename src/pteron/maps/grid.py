@@ -14,7 +14,7 @@ from typing import Any, Self
 import numpy as np
 
 from pteron.arguments import checked_arguments
-from pteron.errors import DataError, ModelError, shown
+from pteron.errors import DataError, ModelError, shorten
 from pteron.kernels import Array
 from pteron.kinematics.evaluate import finite_pose
 from pteron.kinematics.unlikely_values import unlikely_values
@@ -67,7 +67,7 @@ class Axis:
     def __post_init__(self) -> None:
         if self.name not in COORDINATES:
             raise DataError(
-                f"name: {shown(self.name)} given, one of {', '.join(COORDINATES)} expected"
+                f"name: {shorten(self.name)} given, one of {', '.join(COORDINATES)} expected"
             )
         least, greatest = (
             _number(f"{self.name}: {key}", getattr(self, key)) for key in ("least", "greatest")
@@ -78,7 +78,7 @@ class Axis:
             )
         if isinstance(self.count, bool) or not isinstance(self.count, Integral):
             raise DataError(
-                f"{self.name}: {shown(self.count)} points given, a whole number expected"
+                f"{self.name}: {shorten(self.count)} points given, a whole number expected"
             )
         if self.count < 2:
             raise DataError(f"{self.name}: {self.count} points given, at least 2 expected")
@@ -126,13 +126,13 @@ class Grid:
         names, varying = list(self.coordinates), [axis.name for axis in self.axes]
         if not names or names != [name for name in COORDINATES if name in names]:
             raise DataError(
-                f"coordinates: {shown(names)} given, some of {', '.join(COORDINATES)} expected, "
+                f"coordinates: {shorten(names)} given, some of {', '.join(COORDINATES)} expected, "
                 "each once and in this order"
             )
         if varying != [name for name in names if name in varying]:
             raise DataError(
-                f"axes: {shown(varying)} given, some of {', '.join(names)} expected, each once and "
-                "in this order"
+                f"axes: {shorten(varying)} given, some of {', '.join(names)} expected, each once "
+                "and in this order"
             )
         if len(self.pose) != len(names):
             raise DataError(f"pose: {len(self.pose)} numbers given, {' '.join(names)} expected")
@@ -318,7 +318,7 @@ def _number(key: str, number: object) -> float:
         and -_HUGE <= number <= _HUGE
     ):
         return float(number)
-    raise DataError(f"{key}: {shown(number)} given, a finite number expected")
+    raise DataError(f"{key}: {shorten(number)} given, a finite number expected")
 
 
 def expect_coordinates(

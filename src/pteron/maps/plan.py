@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from pteron.errors import OutputError, shown
+from pteron.errors import OutputError, shorten
 
 RESULTS = "0.1.0"
 """The first version of Pteron whose maps and searches give the same numbers as this one: their
@@ -34,7 +34,7 @@ def expect_same(path: str | Path, stored: Any, plan: Mapping[str, Any]) -> None:
         lines = list(_differences(str(key), stored.get(key), plan.get(key)))
         differences += lines[:_MANY]
         if len(lines) > _MANY:
-            differences.append(f"and {len(lines) - _MANY} more of the {shown(key, bare=True)}")
+            differences.append(f"and {len(lines) - _MANY} more of the {shorten(key, bare=True)}")
     if differences:
         raise OutputError(
             f"{path}: holds results of another plan ({'; '.join(differences)}); name another "
@@ -47,7 +47,7 @@ def _differences(name: str, stored: Any, plan: Any) -> Iterator[str]:
     label = f"{name}."
     if name == "robot":
         stored, plan = _machine(stored), _machine(plan)
-        label = f"robot {shown(plan.get('name'), bare=True)}: "
+        label = f"robot {shorten(plan.get('name'), bare=True)}: "
     if isinstance(stored, Mapping) and isinstance(plan, Mapping):
         for key in {**plan, **stored}:
             yield from _differences(f"{label}{key}", stored.get(key), plan.get(key))
@@ -74,8 +74,8 @@ def _is_table_list(part: Any) -> bool:
 
 
 def _difference_text(name: str, stored: Any, plan: Any) -> str:
-    texts = ["none" if plan_value is None else shown(plan_value) for plan_value in (stored, plan)]
-    name = shown(name, bare=True, longest=2 * _LONG)
+    texts = ["none" if plan_value is None else shorten(plan_value) for plan_value in (stored, plan)]
+    name = shorten(name, bare=True, longest=2 * _LONG)
     if any(len(text) > _LONG for text in texts):
         return f"another {name}"
     return f"{name} {texts[0]}, not {texts[1]}"

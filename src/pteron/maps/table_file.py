@@ -17,7 +17,7 @@ from pteron.maps.checksums import checksum
 from pteron.maps.grid import Axis, Grid
 from pteron.maps.map import ALL, Map, column_heading
 from pteron.platforms.coordinates import COORDINATES
-from pteron.tables import Table, listed, read_table, write_table
+from pteron.tables import Table, join_names, read_table, write_table
 from pteron.workspace import BEYOND_LIMITS
 
 _STATUS = "status"
@@ -73,9 +73,9 @@ def _column(table: Table, name: str, heading: str) -> str:
     """Return the column of a coordinate or an index; empty where there is none."""
     columns = [column for column in table.columns if column.partition(" [")[0] == name]
     if len(columns) > 1:
-        raise DataError(f"{table.source}: columns {listed(columns)} are all {name}; keep one")
+        raise DataError(f"{table.source}: columns {join_names(columns)} are all {name}; keep one")
     if columns and columns[0] not in (name, heading):
-        raise DataError(f"{table.source}: column {listed(columns)} given, {heading} expected")
+        raise DataError(f"{table.source}: column {join_names(columns)} given, {heading} expected")
     return columns[0] if columns else ""
 
 

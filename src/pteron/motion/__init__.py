@@ -69,7 +69,7 @@ if TYPE_CHECKING:
         LinePath as LinePath,
         Path as Path,
         line_path as line_path,
-        there_and_back as there_and_back,
+        return_path as return_path,
     )
     from pteron.motion.trajectories.pick_and_place import (
         PickAndPlace as PickAndPlace,
@@ -82,19 +82,22 @@ if TYPE_CHECKING:
         least_margin as least_margin,
         scaled_to_reach as scaled_to_reach,
     )
-    from pteron.motion.trajectories.time_law import along as along, shortest as shortest
+    from pteron.motion.trajectories.time_law import (
+        polynomial_motion as polynomial_motion,
+        shortest as shortest,
+    )
     from pteron.motion.trajectories.time_optimal import (
         TimeOptimal as TimeOptimal,
         time_optimal as time_optimal,
     )
     from pteron.motion.tuning import (
+        GainTrial as GainTrial,
         LinearPlant as LinearPlant,
-        Margins as Margins,
+        LoopMargins as LoopMargins,
         Required as Required,
         SampledLoop as SampledLoop,
-        Trial as Trial,
         Tuning as Tuning,
-        linearised as linearised,
+        linearise as linearise,
         trial as trial,
         trials as trials,
         tune as tune,

@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pteron.arguments import expect_to_fit
-from pteron.errors import DataError, shown
+from pteron.errors import DataError, shorten
 from pteron.html_table import Column, html_table
 from pteron.kernels import Array, as_array
+from pteron.renamed import former_attribute
 
 
 @dataclass(frozen=True, repr=False)
@@ -130,7 +131,7 @@ class Motion:
         moving = (times == clipped)[..., None]
         return pose, np.where(moving, velocity, 0.0), np.where(moving, acceleration, 0.0)
 
-    def repeated(self, count: int) -> Motion:
+    def repeat(self, count: int) -> Motion:
         """Return the motion repeated `count` times without a pause; it must end where it begins.
 
         Raises
@@ -140,7 +141,7 @@ class Motion:
         """
         number: object = count
         if not isinstance(number, int | np.integer) or count < 1:
-            raise DataError(f"count: {shown(number)} given, a whole number of 1 or more expected")
+            raise DataError(f"count: {shorten(number)} given, a whole number of 1 or more expected")
         ends = [np.abs(part[-1] - part[0]).max() for part in (self.pose, self.velocity)]
         if max(ends) > 1e-9:
             raise DataError(
@@ -155,6 +156,8 @@ class Motion:
             for part in (self.pose, self.velocity, self.acceleration)
         )
         return Motion(np.append(time, count * self.duration), *parts)
+
+    repeated = former_attribute("repeated", "repeat")
 
 
 def pose_text(pose: Array) -> str:

@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from pteron.plots.map_films import map_film as map_film
     from pteron.plots.printing import (
         WIDTHS as WIDTHS,
-        resized as resized,
+        resize as resize,
         save_figure as save_figure,
         svg as svg,
         svg_file as svg_file,

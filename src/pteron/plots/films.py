@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from pteron.arguments import expect
 from pteron.atomic import checked_file, write_bytes
-from pteron.errors import DataError, OutputError, shown
+from pteron.errors import DataError, OutputError, shorten
 from pteron.kernels import Array, as_array
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion import Motion
@@ -152,7 +152,7 @@ def film(
     ):
         low, high = _SIZES
         raise DataError(
-            f"size: {shown(size)} given, two even numbers from {low} to {high} expected, pixels"
+            f"size: {shorten(size)} given, two even numbers from {low} to {high} expected, pixels"
         )
     if robot.platform.planar and turns:
         raise DataError(

@@ -11,7 +11,7 @@ from matplotlib import font_manager
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from pteron.errors import shown
+from pteron.errors import shorten
 
 _NO_LETTERS = ("Last Resort", "STIXNonUnicode", "STIXSize", "cm")
 """Families of fonts not to use: their letters are boxes, or mathematical signs."""
@@ -38,7 +38,7 @@ def take_fonts(figure: Figure) -> str:
 def warn_of_absent(letters: str) -> None:
     """Issue one warning of letters that are drawn as boxes, if there are any."""
     if letters:
-        some = shown(letters, bare=True, longest=8)
+        some = shorten(letters, bare=True, longest=8)
         warnings.warn(
             f"no font on this machine has {some}: boxes stand for them in the picture; install "
             "one that has, such as Noto Sans, or write an .svg, which takes the reader's fonts",

@@ -17,7 +17,7 @@ from matplotlib.text import Text
 from matplotlib.ticker import MultipleLocator
 
 from pteron.atomic import write_bytes
-from pteron.errors import DataError, OutputError, shown
+from pteron.errors import DataError, OutputError, shorten
 from pteron.plots.canvas import (
     FONT_SIZE,
     GRID,
@@ -70,7 +70,7 @@ _METADATA: dict[str, dict[str, Any]] = {
 """Metadata by the ending of the file: without a date a figure makes the same file on every run."""
 
 
-def resized(figure: Figure, width: Width | float) -> Figure:
+def resize(figure: Figure, width: Width | float) -> Figure:
     """Return the same figure for print, with letters of 8 points.
 
     Maps and machines keep their shape; curves keep more of their height.
@@ -103,7 +103,8 @@ def resized(figure: Figure, width: Width | float) -> Figure:
     if not isinstance(inches, int | float) or not _NARROWEST <= inches <= _WIDEST:
         names = ", ".join(f'"{name}"' for name in WIDTHS)
         raise DataError(
-            f"width: {shown(width)} given; {names} or {_NARROWEST:g} to {_WIDEST:g} inches expected"
+            f"width: {shorten(width)} given; {names} or {_NARROWEST:g} to {_WIDEST:g} inches "
+            "expected"
         )
     for text in figure.findobj(Text):
         assert isinstance(text, Text)
@@ -198,7 +199,7 @@ def save_figure(
     if ending not in _METADATA:
         raise OutputError(f"{path}: {ending or 'no'} ending, {', '.join(_METADATA)} expected")
     if width is not None:
-        resized(figure, width)
+        resize(figure, width)
     buffer = BytesIO()
     with mpl.rc_context(TEXT):
         figure.savefig(buffer, format=ending[1:], dpi=dpi, metadata=_METADATA[ending])

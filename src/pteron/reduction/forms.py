@@ -14,19 +14,19 @@ import casadi as ca
 
 from pteron.bodies.motion import Expression
 from pteron.equations.machine import Machine
-from pteron.equations.regressor import Terms, terms
+from pteron.equations.regressor import RegressorTerms, terms
 from pteron.kernels import TARGETS, Kernel, Port, compile
 from pteron.kernels.passes import optimise_function
 from pteron.manipulator import parameters
 from pteron.reduction.cheapest import cheapest_parameters
 from pteron.reduction.result import BaseParameters
 
-Form = Callable[[Expression, Terms, Expression, Expression], Expression]
+Form = Callable[[Expression, RegressorTerms, Expression, Expression], Expression]
 """Forces from J^-T (n, m), the factors of Eq. (15), columns (N, K), parameters (K, 1)."""
 
 
 def _virtual_work(
-    inverse: Expression, factors: Terms, selection: Expression, values: Expression
+    inverse: Expression, factors: RegressorTerms, selection: Expression, values: Expression
 ) -> Expression:
     """Return F_a = -F_p - J^-T (sum J_b^T F_b + F_e), each F_b = Om_b p_b."""
     sliders, *links, platform = factors.columns
@@ -39,14 +39,14 @@ def _virtual_work(
 
 
 def _regressor(
-    inverse: Expression, factors: Terms, selection: Expression, values: Expression
+    inverse: Expression, factors: RegressorTerms, selection: Expression, values: Expression
 ) -> Expression:
     """Return (J^-T [...]) P: the dynamic matrix is formed, then multiplied."""
     return ca.mtimes(ca.mtimes(inverse, ca.mtimes(factors.bracket, selection)), values)
 
 
 def _regressor_inverse_last(
-    inverse: Expression, factors: Terms, selection: Expression, values: Expression
+    inverse: Expression, factors: RegressorTerms, selection: Expression, values: Expression
 ) -> Expression:
     """Return J^-T ([...] P): one vector is multiplied by J^-T."""
     return ca.mtimes(inverse, ca.mtimes(ca.mtimes(factors.bracket, selection), values))

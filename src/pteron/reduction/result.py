@@ -15,7 +15,7 @@ from pteron.arguments import expect_one_of
 from pteron.bodies.parameters import Parameter
 from pteron.errors import ModelError
 from pteron.html_table import Column, html_table
-from pteron.json_values import picked
+from pteron.json_values import fields_as_json
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator, parameters as values_of
 from pteron.reduction.certificate import Certificate, ExactCertificate
@@ -264,7 +264,7 @@ class BaseParameters:
         """Return everything as plain data, fractions as text."""
         return {
             "robot": self.robot.name,
-            **picked(self, "rank names columns"),
+            **fields_as_json(self, "rank names columns"),
             "expressions": list(self.expressions(digits=12)),
             "grouping": self.grouping.tolist(),
             "shares": {

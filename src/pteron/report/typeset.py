@@ -93,7 +93,7 @@ def format_fixed(value: float, places: int = 1) -> str:
     return text.replace("-", _MINUS)
 
 
-def measured(value: float, half: float) -> tuple[str, str]:
+def value_with_uncertainty(value: float, half: float) -> tuple[str, str]:
     """Return a value and half its interval as texts, both rounded to two digits of the half.
 
     Examples

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pteron.atomic import checked_file, write_text, write_texts
-from pteron.errors import OutputError, shown
-from pteron.json_values import json_text, picked
+from pteron.errors import OutputError, shorten
+from pteron.json_values import fields_as_json, json_text
 from pteron.manipulator import RobotLike, as_manipulator
 
 if TYPE_CHECKING:
@@ -129,8 +129,8 @@ def checked_page(path: str | Path) -> Path:
     target = Path(path)
     if target.suffix.lower() not in _PAGES:
         raise OutputError(
-            f"{shown(str(path), bare=True) or 'the name is empty'}: a page is written, whose name "
-            "ends in .html"
+            f"{shorten(str(path), bare=True) or 'the name is empty'}: a page is written, whose "
+            "name ends in .html"
         )
     checked_file(target)
     try:
@@ -187,33 +187,33 @@ def numbers(report: Report) -> dict[str, Any]:
     return {
         "robot": robot.name,
         "motion": robot.platform.motion,
-        **picked(robot, "coordinates"),
+        **fields_as_json(robot, "coordinates"),
         "joints": [vars(leg.joint) for leg in robot.legs],
         "drives": [asdict(leg.drive) if leg.drive else None for leg in robot.legs],
         "elbows": [leg.elbow for leg in robot.legs],
-        **picked(robot, "gravity"),
-        **picked(robot.platform, "tool"),
-        **picked(report, "doubts"),
+        **fields_as_json(robot, "gravity"),
+        **fields_as_json(robot.platform, "tool"),
+        **fields_as_json(report, "doubts"),
         "home": {
             "pose": report.home.tolist(),
-            **picked(report.margins, "type_i type_ii clearances=joints reserve=least"),
+            **fields_as_json(report.margins, "type_i type_ii clearances=joints reserve=least"),
             "passive_joints": [vars(joint) for joint in report.passive],
-            **picked(report.jacobian, "jacobian=matrix condition_number=condition"),
+            **fields_as_json(report.jacobian, "jacobian=matrix condition_number=condition"),
             "condition_radius": report.jacobian.radius,
         },
         "singular_orientations": None if orientations is None else orientations.singular.tolist(),
-        "reach": volume and picked(volume, "volume standard_error unit samples=count box"),
+        "reach": volume and fields_as_json(volume, "volume standard_error unit samples=count box"),
         "largest_tilt": report.tilt,
         "cycle": {
             "standard": standard is not None,
             "source": report.source or None,
             "scale": None if standard is None else standard.scale,
             "duration": cycle.duration,
-            **(picked(standard, _WAY) if standard else dict.fromkeys(_WAY.split())),
-            **picked(cycle, "time pose velocity acceleration"),
-            **picked(report, "forces with_drives=has_drives"),
-            **picked(sizing, "overloads peak_forces rms_forces peak_speeds"),
-            "joints": picked(report.joints, "least greatest limits within"),
+            **(fields_as_json(standard, _WAY) if standard else dict.fromkeys(_WAY.split())),
+            **fields_as_json(cycle, "time pose velocity acceleration"),
+            **fields_as_json(report, "forces with_drives=has_drives"),
+            **fields_as_json(sizing, "overloads peak_forces rms_forces peak_speeds"),
+            "joints": fields_as_json(report.joints, "least greatest limits within"),
         },
         "motors": sizing.table().to_dicts(),
         "base_parameters": {

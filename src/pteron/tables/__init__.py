@@ -23,7 +23,7 @@ if TYPE_CHECKING:
         write_table as write_table,
     )
     from pteron.tables.parquet_file import ParquetFile as ParquetFile
-    from pteron.tables.table import Table as Table, listed as listed
-    from pteron.tables.units import in_si as in_si
+    from pteron.tables.table import Table as Table, join_names as join_names
+    from pteron.tables.units import convert_to_si as convert_to_si
 
 _publish(__name__)

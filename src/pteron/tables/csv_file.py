@@ -13,11 +13,11 @@ from pathlib import Path
 
 import polars as pl
 
-from pteron.errors import DataError, shown
+from pteron.errors import DataError, shorten
 from pteron.tables.cells import single_blanks
 from pteron.tables.dialect import PLAIN, SEPARATORS, Dialect, declaration
 from pteron.tables.layout import find_encoding, find_layout
-from pteron.tables.table import Table, listed
+from pteron.tables.table import Table, join_names
 
 BLOCK = 16 << 20
 """Bytes read at a time: large enough for Polars to be fast, small beside any memory."""
@@ -180,7 +180,7 @@ class CsvFile:
             raise DataError(f"{self.source}: is empty; its first line must name the columns")
         twice = next((name for i, name in enumerate(names) if name in names[:i]), None)
         if twice is not None:
-            fault = f"two columns are called {shown(twice)}; rename or remove one"
+            fault = f"two columns are called {shorten(twice)}; rename or remove one"
             if all(_NUMBER.fullmatch(name) for name in names):
                 fault = "its first line has numbers; it must name the columns"
             raise DataError(f"{self.source}: {fault}")
@@ -228,7 +228,7 @@ class CsvFile:
                     raise DataError(
                         f"{self.source}: row {row + len(rows) + 1} (line {begins}) has "
                         f"{len(cells)} cells, but the header names {len(names)} columns "
-                        f"({listed(names)}); {self._mend}"
+                        f"({join_names(names)}); {self._mend}"
                     )
                 rows.append([cell or None for cell in cells])
         except csv.Error as error:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from pteron.errors import DataError, shown
+from pteron.errors import DataError, shorten
 
 Separator = Literal[",", ";", "\t", "|", " "]
 """Characters between cells."""
@@ -54,7 +54,7 @@ class Dialect:
             "".encode(self.encoding or "utf-8")
         except (LookupError, ValueError):
             raise DataError(
-                f"encoding: {shown(self.encoding)} is no text encoding that Python knows"
+                f"encoding: {shorten(self.encoding)} is no text encoding that Python knows"
             ) from None
 
 

@@ -12,12 +12,12 @@ from pathlib import Path
 import polars as pl
 
 from pteron.atomic import checked_file, write_bytes
-from pteron.errors import DataError, OutputError, shown
+from pteron.errors import DataError, OutputError, shorten
 from pteron.tables.csv_file import CsvFile
 from pteron.tables.dialect import PLAIN, Dialect
 from pteron.tables.parquet_file import ParquetFile
 from pteron.tables.stacked import side_by_side
-from pteron.tables.table import Table, listed, typed
+from pteron.tables.table import Table, join_names, parse_numeric_columns
 
 STANDARD_INPUT = "-"
 """The path that stands for CSV on standard input."""
@@ -49,7 +49,7 @@ def open_table(
     DataError
         If there is no such file, or if it is empty or of another kind.
     """
-    source = shown(str(path), bare=True, longest=_LONGEST_PATH)
+    source = shorten(str(path), bare=True, longest=_LONGEST_PATH)
     file = Path(path)
     with _name_in_errors(source):
         if file.is_dir():
@@ -90,7 +90,7 @@ def read_table(path: str | Path) -> Table:
     DataError
         If there is no such file, or if it is empty, ragged or of another kind.
     """
-    source = shown(str(path), bare=True, longest=_LONGEST_PATH)
+    source = shorten(str(path), bare=True, longest=_LONGEST_PATH)
     special = Path(path)
     file: CsvFile | ParquetFile
     with _name_in_errors(source):
@@ -120,7 +120,7 @@ def whole_table(file: CsvFile | ParquetFile) -> Table:
     """
     tables = list(file.tables())
     if not tables:
-        below = f" below its header; the names are {listed(file.columns)}"
+        below = f" below its header; the names are {join_names(file.columns)}"
         raise DataError(f"{file.source}: has no rows{below if isinstance(file, CsvFile) else ''}")
     return _join_tables(tables)
 
@@ -203,11 +203,11 @@ ENDINGS: dict[str, Callable[[pl.DataFrame, io.BytesIO, Dialect], None]] = {
     ".csv": lambda frame, buffer, how: frame.write_csv(
         buffer, separator=how.separator or ",", decimal_comma=how.decimal == ","
     ),
-    ".parquet": lambda frame, buffer, how: typed(frame).write_parquet(buffer),
+    ".parquet": lambda frame, buffer, how: parse_numeric_columns(frame).write_parquet(buffer),
 }
 """The endings of the files that hold tables, each with what writes one."""
 
 
 def _ending_fault(file: Path, noun: str) -> str:
-    fault = f"unknown ending {shown(file.suffix)}" if file.suffix else "no ending"
+    fault = f"unknown ending {shorten(file.suffix)}" if file.suffix else "no ending"
     return f"{fault}; a {noun}'s file ends in {' or '.join(ENDINGS)}"

@@ -13,10 +13,10 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from pteron.errors import DataError, shown
+from pteron.errors import DataError, shorten
 from pteron.tables.cells import Cut, Record, best_cut, single_blanks
 from pteron.tables.dialect import SEPARATORS, Dialect, declaration
-from pteron.tables.table import listed
+from pteron.tables.table import join_names
 
 _LINES = 1000
 """Number of lines of a file from which its layout is found."""
@@ -138,9 +138,9 @@ def _check_commas(rows: Cut, source: str) -> None:
     commas = [cell for cell in cells if _WITH_COMMA.fullmatch(cell)]
     if commas and all(map(_OF_THOUSANDS.fullmatch, commas)):
         raise DataError(
-            f"{source}: {shown(commas[0])} may have a decimal comma or a mark of thousands; export "
-            "it without marks of thousands, or if these are decimal commas, say so in a TOML file "
-            "beside it:" + declaration("csv", decimal=",")
+            f"{source}: {shorten(commas[0])} may have a decimal comma or a mark of thousands; "
+            "export it without marks of thousands, or if these are decimal commas, say so in a "
+            "TOML file beside it:" + declaration("csv", decimal=",")
         )
 
 
@@ -219,8 +219,8 @@ def _nameless(rows: Cut, above: Sequence[Record], source: str) -> DataError:
     if rows.separator == ",":
         why += " (commas cannot separate cells and be decimal signs too)"
     return DataError(
-        f"{source}: line {last.line + 1} has {len(last.cells)} cells ({listed(last.cells)}), but "
-        f"the rows below have {rows.width}, separated by {SEPARATORS[rows.separator]}: {why}; "
+        f"{source}: line {last.line + 1} has {len(last.cells)} cells ({join_names(last.cells)}), "
+        f"but the rows below have {rows.width}, separated by {SEPARATORS[rows.separator]}: {why}; "
         "export it with another separator, or say in a TOML file beside it which line names the "
         "columns:" + declaration("csv", separator=rows.separator, header_lines=last.line + 1)
     )

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from pteron.errors import DataError
 from pteron.tables.layout import find_encoding
-from pteron.tables.table import listed
+from pteron.tables.table import join_names
 
 _VALUE_HEADER = re.compile(r'^"?VarName"? *(?P<separator>[;,\t])', re.MULTILINE)
 """The header of a log of WinCC, which has a row for each value."""
@@ -76,8 +76,8 @@ def _columns_of_values(rows: list[list[str]], source: str) -> _Columns:
     needed = ["VarName", "VarValue", "Time_ms"]
     if missing := [name for name in needed if name not in names]:
         raise DataError(
-            f"{source}: has a row for each value, but no column {listed(missing)} (found: "
-            f"{listed(names)}); export it with {listed(needed)}"
+            f"{source}: has a row for each value, but no column {join_names(missing)} (found: "
+            f"{join_names(names)}); export it with {join_names(needed)}"
         )
     name_column, value_column, time_column = (names.index(column) for column in needed)
     columns: _Columns = {}

@@ -10,7 +10,8 @@ import numpy as np
 import polars as pl
 from numpy.typing import ArrayLike, NDArray
 
-from pteron.errors import DataError, shown
+from pteron.errors import DataError, shorten
+from pteron.renamed import former_attribute
 from pteron.shapes import OnFailure
 
 _ROWS_AT_A_TIME = 10_000
@@ -102,7 +103,7 @@ class Table:
             array[missing] = np.nan
         return array
 
-    def extended(self, results: Mapping[str, ArrayLike]) -> Table:
+    def with_columns(self, results: Mapping[str, ArrayLike]) -> Table:
         """Return the table with columns added behind its own; one of the same name is replaced.
 
         NaN becomes an empty cell.
@@ -127,7 +128,7 @@ class Table:
             # Polars would panic, which nobody can catch quietly.
             if any(word in str(kind) for word in ("Binary", "Object")):
                 raise self._unfit("JSON", f"column {name} holds {kind}")
-        return typed(self.frame).write_json()
+        return parse_numeric_columns(self.frame).write_json()
 
     def text(self) -> Iterator[str]:
         """Yield the rows as CSV, some at a time, the header first."""
@@ -147,7 +148,7 @@ class Table:
             return
         noun = "column" if len(missing) == 1 else "columns"
         raise DataError(
-            f"{self.source}: no {noun} {', '.join(missing)} (found: {listed(self.columns)}; "
+            f"{self.source}: no {noun} {', '.join(missing)} (found: {join_names(self.columns)}; "
             f"needed: {', '.join(columns)}); {self.hint}"
         )
 
@@ -159,8 +160,8 @@ class Table:
             cells = cells.set(cells == "", None)
         elif not (cells.dtype.is_numeric() or cells.dtype == pl.Null):
             raise DataError(
-                f"{self.source}: column {shown(name, bare=True)} holds {cells.dtype}; numbers were "
-                "expected"
+                f"{self.source}: column {shorten(name, bare=True)} holds {cells.dtype}; numbers "
+                "were expected"
             )
         signs = cells
         if cells.dtype == pl.String and self.decimal == ",":
@@ -171,23 +172,25 @@ class Table:
 
     def _fault(self, row: int, column: str, *, is_text: bool, choice: bool) -> str:
         cell = self.frame[column][row]
-        name = shown(column, bare=True)
+        name = shorten(column, bare=True)
         fault = f"the cell is empty; {name} needs a number"
         if cell is not None and str(cell).strip():
             expected = "a number" if is_text else "a finite number"
             comma = " with a decimal comma" if is_text and self.decimal == "," else ""
-            fault = f"{shown(str(cell).strip())} given, {expected}{comma} expected"
+            fault = f"{shorten(str(cell).strip())} given, {expected}{comma} expected"
         leave = ", or leave such rows empty with --on-failure nan" if choice else ""
         return f"{self.place_in_file(row)}, column {name}: {fault}; correct the cell{leave}"
 
+    extended = former_attribute("extended", "with_columns")
 
-def listed(names: Sequence[str]) -> str:
+
+def join_names(names: Sequence[str]) -> str:
     """Return names as a message lists them: not all of very many, and none at full length."""
-    some = ", ".join(shown(name, bare=True) for name in names[:20])
+    some = ", ".join(shorten(name, bare=True) for name in names[:20])
     return some + (", ..." if len(names) > 20 else "")
 
 
-def typed(frame: pl.DataFrame) -> pl.DataFrame:
+def parse_numeric_columns(frame: pl.DataFrame) -> pl.DataFrame:
     """Return the frame with each column of text that holds numbers only made numeric."""
     columns = [_number_column(column) for column in frame.get_columns()]
     return pl.DataFrame(columns)

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import polars as pl
 
-from pteron.errors import DataError, shown
+from pteron.errors import DataError, shorten
 from pteron.tables.table import Table
 
 FACTORS = {
@@ -22,7 +22,7 @@ FACTORS = {
 _NAMED = re.compile(r"(?P<name>[^\s(\[]+)\s*[\[(]\s*(?P<unit>[^\])]+?)\s*[\])]")
 
 
-def in_si(table: Table, units: Mapping[str, str]) -> Table:
+def convert_to_si(table: Table, units: Mapping[str, str]) -> Table:
     """Return the table with columns such as ``x (mm)`` in SI units, named without their unit.
 
     Parameters
@@ -51,8 +51,8 @@ def in_si(table: Table, units: Mapping[str, str]) -> Table:
             si, _, per = units[name].partition("/")
             known = ", ".join(f"{unit}/{per}" if per else unit for unit in FACTORS.get(si, (si,)))
             raise DataError(
-                f"{table.source}: column {shown(column, bare=True)}: the unit of {name} is one of "
-                f"{known}"
+                f"{table.source}: column {shorten(column, bare=True)}: the unit of {name} is one "
+                f"of {known}"
             )
         if factor != 1.0:
             si_values = factor * table.numbers([column], "nan")[:, 0]

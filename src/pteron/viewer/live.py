@@ -18,7 +18,7 @@ from pteron.manipulator import Manipulator
 from pteron.report.motion_frames import picture_points
 from pteron.report.typeset import resource, template
 from pteron.viewer import panel
-from pteron.viewer.picture import Picture
+from pteron.viewer.picture import ViewerPicture
 from pteron.viewer.readings import readings
 from pteron.viewer.readout import readout
 from pteron.viewer.server import Tab
@@ -242,7 +242,7 @@ class Live:
         state, push = session.state, session.push
         if state.robot != self._robot:
             self._robot, self._sliced = state.robot, ()
-            self._picture = Picture(state.robot, session.examples, self._compared)
+            self._picture = ViewerPicture(state.robot, session.examples, self._compared)
             drawn = {"still": self._picture.still, "cloud": self._picture.cloud}
             self._send("machine", panel.controls(session) | drawn | {"run": self._run_name})
         scaled = state.robot, state.payload, session.title

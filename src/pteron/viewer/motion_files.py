@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import PurePath
 
-from pteron.errors import DataError, shown
+from pteron.errors import DataError, shorten
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
 from pteron.motion import Motion
@@ -21,7 +21,7 @@ def motion_of_file(robot: Manipulator, name: str, data: bytes, start: Array) -> 
     The ending of its name says whether it is CSV or Parquet; `start` is a pose of the assembly mode
     that is meant where the file gives joints alone.
     """
-    source = shown(PurePath(name).name, bare=True) or "the file"
+    source = shorten(PurePath(name).name, bare=True) or "the file"
     ending = PurePath(name).suffix.lower()
     if ending not in ENDINGS:
         raise DataError(f"{source}: a motion's file ends in {' or '.join(ENDINGS)}")

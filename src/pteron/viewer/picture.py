@@ -44,7 +44,7 @@ Arrow = tuple[Any, str | int, float]
 """Points from start to tip, colour by name or by leg from 0, radius over the machine's size."""
 
 
-class Picture:
+class ViewerPicture:
     """The picture of one machine in one working mode; guides are as long as poses (K, m) need.
 
     The compared machine stands there too, so many times as far from the first one.

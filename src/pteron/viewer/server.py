@@ -14,7 +14,7 @@ import threading
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, Protocol
 
-from pteron.errors import DataError, shown
+from pteron.errors import DataError, shorten
 from pteron.viewer.guard import is_here, refusal
 
 if TYPE_CHECKING:
@@ -189,14 +189,14 @@ def free_port(host: str, port: int) -> int:
     """Return the first free port of a host from a given one on; 0 means any."""
     if not 0 <= port <= _LAST_PORT:
         raise DataError(
-            f"port: {shown(port)} given, a whole number from 0 to {_LAST_PORT} expected"
+            f"port: {shorten(port)} given, a whole number from 0 to {_LAST_PORT} expected"
         )
     try:
         addresses = socket.getaddrinfo(host, None, type=socket.SOCK_STREAM)
     except (OSError, UnicodeError):
         raise DataError(
-            f"host: {shown(host)} is no address; give 127.0.0.1 for this machine alone, or 0.0.0.0 "
-            "for all who can reach it"
+            f"host: {shorten(host)} is no address; give 127.0.0.1 for this machine alone, or "
+            "0.0.0.0 for all who can reach it"
         ) from None
     if port == 0:
         return 0
@@ -219,8 +219,8 @@ def _is_free(family: int, address: Any, port: int) -> bool:
         except OSError as error:
             if error.errno in _NOT_OURS:
                 raise DataError(
-                    f"host: {shown(address)} is no address of this machine; give 127.0.0.1 for it "
-                    "alone, or 0.0.0.0 for all who can reach it"
+                    f"host: {shorten(address)} is no address of this machine; give 127.0.0.1 for "
+                    "it alone, or 0.0.0.0 for all who can reach it"
                 ) from None
             return False
     return True

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pteron.errors import DataError, PteronError, shown
+from pteron.errors import DataError, PteronError, shorten
 from pteron.kernels import Array
 from pteron.kinematics import direct_kinematics, inverse_kinematics
 from pteron.manipulator import Manipulator
@@ -213,7 +213,7 @@ def _number(text: str, name: str, expected: str) -> float:
         value = math.nan
     if not math.isfinite(value):
         comma = "; write the decimal sign as a point" if "," in text else ""
-        raise DataError(f"{name}: {shown(text)} given, {expected} expected{comma}")
+        raise DataError(f"{name}: {shorten(text)} given, {expected} expected{comma}")
     return value
 
 

@@ -9,7 +9,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from pteron.errors import DataError, shown
+from pteron.errors import DataError, shorten
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion import Motion, Simulation, joint_guides, joint_points
@@ -229,5 +229,5 @@ def read_bytes(path: str | Path) -> bytes:
     try:
         return Path(path).read_bytes()
     except OSError as error:
-        name = shown(str(path), bare=True)
+        name = shorten(str(path), bare=True)
         raise DataError(f"{name}: cannot be read ({error.strerror or error})") from None

@@ -21,7 +21,7 @@ from pteron.thresholds import (
     INACCURATE,
     LEAST_SINGULAR_VALUE,
     NEARBY,
-    rounding_of,
+    rounding_tolerance,
 )
 from pteron.workspace.margins import pose_margins
 
@@ -83,7 +83,7 @@ def measure_holding(robot: Manipulator, home: Array) -> Holding:
         float(least_singular_values(robot, poses)[0]),
         distance,
         everywhere,
-        rounding_of(length),
+        rounding_tolerance(length),
         weight,
         float(relative_forces[0]),
         float(np.nanmax(relative_forces)) if weight > 0.0 else np.nan,
@@ -131,7 +131,7 @@ def expect_regular(robot: Manipulator, home: Array) -> None:
         If no pose is farther from singular coordinates than files are rounded to.
     """
     length, _, everywhere = _singular_distances(bare(robot), tuple(home.tolist()))
-    rounding = rounding_of(length)
+    rounding = rounding_tolerance(length)
     if everywhere > rounding:
         return
     similar = similarity(robot)

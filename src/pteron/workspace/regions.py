@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pteron.arguments import expect
-from pteron.errors import DataError, shown
+from pteron.errors import DataError, shorten
 from pteron.kernels import Array
 
 _FARTHEST = 1e70
@@ -161,6 +161,6 @@ def _checked_numbers(numbers: object, name: str) -> tuple[float, ...]:
         array = np.array(np.nan)
     if array.ndim != 1 or not (np.abs(array) < _FARTHEST).all():
         raise DataError(
-            f"{name}: {shown(numbers)} given, a row of numbers of sensible size expected"
+            f"{name}: {shorten(numbers)} given, a row of numbers of sensible size expected"
         )
     return tuple(array.tolist())

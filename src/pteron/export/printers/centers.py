@@ -38,7 +38,7 @@ class Center:
         return self.across is None
 
     @classmethod
-    def of(cls, machine: Machine, leg: int) -> Center | None:
+    def from_leg(cls, machine: Machine, leg: int) -> Center | None:
         """Return the centre for a leg; None if P moves on no sphere while its joint is held."""
         q = ca.SX.sym("q")
         locus, offset = machine.legs[leg].locus(q), machine.platform.offsets[leg]

@@ -83,7 +83,7 @@ def _values(robot: Manipulator) -> dict[str, Any]:
     machine = Machine.numeric(robot)
     if all(leg.row_is_constant for leg in machine.legs):
         return cartesian(robot)
-    centers = [Center.of(machine, i) for i in range(3)]
+    centers = [Center.from_leg(machine, i) for i in range(3)]
     if all(center is not None for center in centers):
         known_centers = [center for center in centers if center is not None]
         if all(center.slides for center in known_centers):

@@ -134,7 +134,7 @@ def _write(robot: RobotLike, folder: str | Path, firmware: str, lines: Sequence[
 
 def _numbers(robot: Manipulator) -> tuple[LinearDelta, list[int]]:
     """Return a machine's numbers, and its leg, from 0, at each of the firmware's towers."""
-    numbers = LinearDelta.of(robot)
+    numbers = LinearDelta.from_robot(robot)
     beside = np.abs(_wrap_degrees(np.subtract.outer(_TOWERS, numbers.angles)))
     order = [int(row.argmin()) for row in beside]
     if sorted(order) != [0, 1, 2] or beside.min(axis=1).max() > _MOST_TURN:

@@ -84,7 +84,7 @@ class LinearDelta:
         )
 
     @classmethod
-    def of(cls, robot: Manipulator) -> LinearDelta:
+    def from_robot(cls, robot: Manipulator) -> LinearDelta:
         """Return the numbers of a machine.
 
         Raises
@@ -93,7 +93,7 @@ class LinearDelta:
             If it is no linear Delta with three upright guides, its carriages above the platform.
         """
         machine = Machine.numeric(robot)
-        centers = [Center.of(machine, i) for i in range(len(robot.legs))]
+        centers = [Center.from_leg(machine, i) for i in range(len(robot.legs))]
         sliding_centers = [center for center in centers if center is not None and center.slides]
         if robot.platform.coordinates != ("x", "y", "z") or len(sliding_centers) != 3:
             raise ModelError(

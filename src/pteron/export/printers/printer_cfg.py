@@ -13,7 +13,7 @@ import numpy as np
 
 from pteron.arguments import expect
 from pteron.bodies.vectors import Vector, vector
-from pteron.errors import DataError, ModelError, shown
+from pteron.errors import DataError, ModelError, shorten
 from pteron.legs import Drive, LegKind
 from pteron.manipulator import Manipulator, load
 from pteron.toml import expect_regular
@@ -101,8 +101,8 @@ def setting(config: configparser.RawConfigParser, section: str, key: str) -> flo
     try:
         value = float(text)
     except ValueError:
-        raise DataError(f"[{section}] {key}: {shown(text)} given, a number expected") from None
-    expect(math.isfinite(value), f"[{section}] {key}", shown(text), "a finite number")
+        raise DataError(f"[{section}] {key}: {shorten(text)} given, a number expected") from None
+    expect(math.isfinite(value), f"[{section}] {key}", shorten(text), "a finite number")
     return value
 
 
@@ -118,7 +118,7 @@ def _way_a_turn(config: configparser.RawConfigParser, tower: str) -> float | Non
         try:
             turn = None if turn is None else turn * float(driving) / float(driven)
         except (ValueError, ZeroDivisionError):
-            raise DataError(f"[{section}] gear_ratio: {shown(pair)} given, such as 5:1") from None
+            raise DataError(f"[{section}] gear_ratio: {shorten(pair)} given, such as 5:1") from None
     return turn
 
 
@@ -173,7 +173,7 @@ def from_klipper(config: str | Path, *, name: str = "printer") -> Manipulator:
     """
     source = "printer.cfg"
     if isinstance(config, Path) or "\n" not in config:
-        source = shown(str(config), bare=True, longest=1000)
+        source = shorten(str(config), bare=True, longest=1000)
         try:
             expect_regular(Path(config))
             text = Path(config).read_text(encoding="utf-8", errors="replace")
@@ -186,8 +186,8 @@ def from_klipper(config: str | Path, *, name: str = "printer") -> Manipulator:
     kind = _KINDS.get(name_of or "")
     if kind is None:
         raise DataError(
-            f"{source}: its [printer] kinematics are {shown(name_of)}; {' and '.join(_KINDS)} are "
-            "read, Deltas with sliders and with cranks"
+            f"{source}: its [printer] kinematics are {shorten(name_of)}; {' and '.join(_KINDS)} "
+            "are read, Deltas with sliders and with cranks"
         )
 
     def length(section: str, key: str, default: float | None = None) -> float:

@@ -43,7 +43,7 @@ class _Arm(NamedTuple):
     lower: float
 
     @classmethod
-    def of(cls, robot: Manipulator, center: Center) -> _Arm:
+    def from_center(cls, robot: Manipulator, center: Center) -> _Arm:
         """Return the arm of a leg whose crank turns in a vertical plane through z."""
         assert center.across is not None  # it turns
         out = np.array([*center.at[:2], 0.0]) / np.hypot(*center.at[:2])
@@ -73,7 +73,7 @@ class _Arm(NamedTuple):
 
 def rotary(robot: Manipulator, centers: Sequence[Center]) -> dict[str, Any]:
     """Return the values of `rotary_delta`: arms that turn in vertical planes through z."""
-    arms = [_Arm.of(robot, center) for center in centers]
+    arms = [_Arm.from_center(robot, center) for center in centers]
     radii = [float(np.hypot(*arm.shoulder[:2])) for arm in arms]
     radius = common(robot, radii, "has its shoulder {:.6g} mm from the z axis", _TAKER)
     heights = [float(arm.shoulder[2]) for arm in arms]

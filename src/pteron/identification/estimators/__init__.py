@@ -18,18 +18,21 @@ from pteron.identification.estimators.instrumental import (
 from pteron.identification.estimators.least_squares import (
     huber as huber,
     ordinary as ordinary,
-    weighted as weighted,
+    weighted_least_squares as weighted_least_squares,
 )
 from pteron.identification.estimators.likelihood import maximum_likelihood as maximum_likelihood
 from pteron.identification.estimators.qr import QrFactor as QrFactor, qr_factor as qr_factor
-from pteron.identification.estimators.reduction import Reduced as Reduced, reduced as reduced
+from pteron.identification.estimators.reduction import (
+    Reduced as Reduced,
+    independent_columns as independent_columns,
+)
 from pteron.identification.estimators.total import column_errors as column_errors, total as total
 from pteron.identification.observation import Observations as _Observations
 from pteron.public import publish as _publish
 
 ESTIMATORS: dict[str, _Callable[[_Observations], Estimate]] = {
     "ordinary": ordinary,
-    "weighted": weighted,
+    "weighted": weighted_least_squares,
     "huber": huber,
     "total": total,
 }

@@ -72,10 +72,10 @@ class Noise:
 
     def times(self, matrix: Array) -> Array:
         """Return the covariance of the noise of all rows times columns (R, n, p)."""
-        backwards = self._filtered(matrix[::-1])[::-1]
-        return self._filtered(np.einsum("ij,rjp->rip", self.root @ self.root.T, backwards))
+        backwards = self._apply_whitening(matrix[::-1])[::-1]
+        return self._apply_whitening(np.einsum("ij,rjp->rip", self.root @ self.root.T, backwards))
 
-    def _filtered(self, matrix: Array) -> Array:
+    def _apply_whitening(self, matrix: Array) -> Array:
         columns = [
             scipy.signal.lfilter([1.0], polynomial, matrix[:, i], axis=0)
             for i, polynomial in enumerate(self.polynomials)
@@ -109,11 +109,13 @@ def noise_of(
         What makes orthonormal columns of the weighted rows, where that is known: else they are
         decomposed.
     """
-    counts = np.maximum(_lagged(used[..., None].astype(float)), 1.0)
-    autocovariances = _lagged(residuals[..., None])
+    counts = np.maximum(_lagged_products(used[..., None].astype(float)), 1.0)
+    autocovariances = _lagged_products(residuals[..., None])
     rows, n, p = matrix.shape
     if used.sum() >= _FEW * p:
-        return _shared(_autoregression(autocovariances / counts, rows), residuals, used)
+        return _with_actuator_correlation(
+            _autoregression(autocovariances / counts, rows), residuals, used
+        )
     factors = np.broadcast_to(weights, used.shape)
     weighted = (matrix * factors[..., None]).reshape(-1, p)
     orthonormal = np.linalg.qr(weighted)[0] if whitened is None else weighted @ whitened
@@ -122,12 +124,16 @@ def noise_of(
     for _ in range(_ROUNDS):
         times = noise.times(columns) * used[..., None]
         taken = columns @ np.einsum("rip,riq->pq", columns, times)
-        missing = _lagged(columns, times) + _lagged(times, columns) - _lagged(taken, columns)
+        missing = (
+            _lagged_products(columns, times)
+            + _lagged_products(times, columns)
+            - _lagged_products(taken, columns)
+        )
         noise = _autoregression((autocovariances + missing) / counts, rows)
-    return _shared(noise, residuals, used)
+    return _with_actuator_correlation(noise, residuals, used)
 
 
-def _lagged(first: Array, second: Array | None = None) -> Array:
+def _lagged_products(first: Array, second: Array | None = None) -> Array:
     """Return the sums (K, n) over rows and columns of (R, n, p) times (R, n, p), k rows apart."""
     second = first if second is None else second
     rows, n = first.shape[:2]
@@ -153,7 +159,7 @@ def _autoregression(lagged: Array, rows: int) -> Noise:
         prewhitened = (1.0 + memory**2) * g[:-1] - memory * (previous_lag + g[1:])
         # ... and fit an autoregression to the rest, seen through Parzen's window.
         polynomial, variance = _levinson(
-            prewhitened * _parzen(np.arange(len(prewhitened)) / len(prewhitened))
+            prewhitened * _parzen_window(np.arange(len(prewhitened)) / len(prewhitened))
         )
         polynomials.append(np.convolve([1.0, -memory], polynomial))
         sizes.append(np.sqrt(variance))
@@ -173,12 +179,12 @@ def _levinson(autocovariances: Array) -> tuple[Array, float]:
     return polynomial, variance
 
 
-def _parzen(share: Array) -> Array:
+def _parzen_window(share: Array) -> Array:
     near = 1.0 - 6.0 * share**2 * (1.0 - share)
     return np.asarray(np.where(share < 0.5, near, 2.0 * (1.0 - share) ** 3))
 
 
-def _shared(noise: Noise, residuals: Array, used: NDArray[np.bool_]) -> Noise:
+def _with_actuator_correlation(noise: Noise, residuals: Array, used: NDArray[np.bool_]) -> Noise:
     """Return the noise with the correlation between actuators of the residuals' innovations."""
     parts = [
         scipy.signal.lfilter(polynomial, [1.0], residuals[:, i])

@@ -14,8 +14,9 @@ from numpy.typing import ArrayLike, NDArray
 from pteron.identification.estimators.covariance import noise_of
 from pteron.identification.estimators.qr import QrFactor
 from pteron.identification.observation import Observations
-from pteron.json_values import picked
+from pteron.json_values import fields_as_json
 from pteron.kernels import Array
+from pteron.renamed import former_attribute
 
 _LAGS = 20
 """Lags of the residuals' autocorrelation that are tested."""
@@ -89,7 +90,7 @@ class Estimate:
     residuals: Array = field(repr=False, default_factory=lambda: np.empty((0, 0)))
 
     @property
-    def correlated(self) -> bool:
+    def has_correlated_residuals(self) -> bool:
         """Whether residuals are not white; the covariance allows for it anyway."""
         return not self.whiteness.white
 
@@ -147,14 +148,18 @@ class Estimate:
     def as_dict(self) -> dict[str, Any]:
         """Return everything but the residuals as plain data."""
         return {
-            **picked(self, "method names units values standard_deviations=deviations"),
-            **picked(self, "relative_deviations"),
+            **fields_as_json(self, "method names units values standard_deviations=deviations"),
+            **fields_as_json(self, "relative_deviations"),
             "intervals_95": [end.tolist() for end in self.intervals()],
-            **picked(self, "correlation noise"),
-            "residuals": picked(self.whiteness, "white autocorrelation p_values")
-            | {"correlated": self.correlated},
-            **picked(self, "condition_number=condition equations=rows iterations converged"),
+            **fields_as_json(self, "correlation noise"),
+            "residuals": fields_as_json(self.whiteness, "white autocorrelation p_values")
+            | {"correlated": self.has_correlated_residuals},
+            **fields_as_json(
+                self, "condition_number=condition equations=rows iterations converged"
+            ),
         }
+
+    correlated = former_attribute("correlated", "has_correlated_residuals")
 
 
 def wald(shift: Array, covariance: Array) -> float:
@@ -172,7 +177,7 @@ def residuals_of(observations: Observations, values: Array) -> Array:
 
 
 @dataclass
-class Search:
+class SearchRecord:
     """An estimator's search: its method, how many iterations it took, and whether it settled."""
 
     method: str
@@ -188,7 +193,7 @@ class Search:
 
 
 def estimate_of(
-    search: Search,
+    search: SearchRecord,
     observations: Observations,
     factor: QrFactor,
     values: Array,
@@ -208,11 +213,13 @@ def estimate_of(
     """
     residuals = residuals_of(observations, values)
     share = factor.degrees / factor.rows
-    noise = np.sqrt((residuals**2).sum(axis=0) / np.maximum(observations.used, 1) / share)
+    noise = np.sqrt(
+        (residuals**2).sum(axis=0) / np.maximum(observations.equation_counts, 1) / share
+    )
     bread = factor.inverse() if inverse is None else inverse
     rows = observations.matrix if instruments is None else instruments
     pulled = weights * residuals if pull is None else pull
-    whitened = factor.whitening() if instruments is None else None
+    whitened = factor.inverse_triangle() if instruments is None else None
     noise_model = noise_of(rows, pulled, observations.gain > 0.0, weights, whitened)
     middle = noise_model.sum_covariance(rows, weights)
     covariance = bread @ (middle + beside) @ bread.T

@@ -9,7 +9,7 @@ import numpy as np
 import scipy  # type: ignore[import-untyped]
 
 from pteron.errors import DataError
-from pteron.identification.estimators.estimate import Estimate, Search, estimate_of
+from pteron.identification.estimators.estimate import Estimate, SearchRecord, estimate_of
 from pteron.identification.estimators.least_squares import actuator_noise
 from pteron.identification.estimators.qr import qr_factor
 from pteron.identification.logs import Log
@@ -72,7 +72,7 @@ def instrumental(
     factor = qr_factor(observations).check_seen()
     values = factor.values()
     noise = actuator_noise(observations, values)
-    search = Search("instrumental")
+    search = SearchRecord("instrumental")
     for _ in search.steps(iterations):
         if callable(instruments) or search.iterations == 1:
             instrument_rows = instruments(values) if callable(instruments) else instruments

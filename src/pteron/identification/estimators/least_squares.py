@@ -5,7 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from pteron.arguments import expect
-from pteron.identification.estimators.estimate import Estimate, Search, estimate_of, residuals_of
+from pteron.identification.estimators.estimate import (
+    Estimate,
+    SearchRecord,
+    estimate_of,
+    residuals_of,
+)
 from pteron.identification.estimators.qr import actuator_factors, qr_factor
 from pteron.identification.observation import Observations
 from pteron.identification.signals.filters import MEDIAN_SIZE
@@ -35,11 +40,11 @@ def ordinary(observations: Observations) -> Estimate:
         If the observations do not determine the values.
     """
     factor = qr_factor(observations).check_seen()
-    weights, search = np.ones(observations.actuators), Search("ordinary")
+    weights, search = np.ones(observations.actuators), SearchRecord("ordinary")
     return estimate_of(search, observations, factor, factor.values(), weights=weights)
 
 
-def weighted(
+def weighted_least_squares(
     observations: Observations, *, iterations: int = 20, triangles: Observations | None = None
 ) -> Estimate:
     """Return the values of weighted least squares, iterated: weights are 1 / variance an actuator.
@@ -64,7 +69,7 @@ def weighted(
     triangles = triangles or actuator_factors(observations)
     factor = qr_factor(triangles).check_seen()
     noise = actuator_noise(observations, factor.values())
-    search = Search("weighted")
+    search = SearchRecord("weighted")
     for _ in search.steps(iterations):
         factor = qr_factor(triangles, 1.0 / noise)
         values = factor.values()
@@ -99,7 +104,7 @@ def huber(
     expect(threshold > 0.0, "threshold", threshold, "a number above 0")
     factor = qr_factor(observations).check_seen()
     values = factor.values()
-    search = Search("huber")
+    search = SearchRecord("huber")
     for _ in search.steps(iterations):
         residuals = residuals_of(observations, values)
         scale = median_noise(observations, residuals)
@@ -126,7 +131,7 @@ def actuator_noise(observations: Observations, values: Array) -> Array:
     """Return the standard deviation (n,) of the residuals of fitted values, N or N m."""
     residuals = residuals_of(observations, values)
     spent = len(values) / observations.rows
-    used = np.maximum(observations.used, 1)
+    used = np.maximum(observations.equation_counts, 1)
     noise = np.sqrt((residuals**2).sum(axis=0) / used / (1.0 - spent))
     size = np.sqrt((observations.forces**2).sum(axis=0) / used)
     if (noise <= _NOISELESS * size).all():

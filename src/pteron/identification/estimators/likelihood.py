@@ -7,12 +7,17 @@ from dataclasses import replace
 import numpy as np
 import scipy  # type: ignore[import-untyped]
 
-from pteron.identification.estimators.estimate import Estimate, Search, estimate_of
-from pteron.identification.estimators.least_squares import weighted
+from pteron.identification.estimators.estimate import Estimate, SearchRecord, estimate_of
+from pteron.identification.estimators.least_squares import weighted_least_squares
 from pteron.identification.estimators.qr import qr_factor
 from pteron.identification.logs import Log
 from pteron.identification.model import Model
-from pteron.identification.observation import Observations, assembled, in_motion, observations_of
+from pteron.identification.observation import (
+    Observations,
+    assemble_observations,
+    motion_mask,
+    observations_of,
+)
 from pteron.identification.signals import Preprocessing, States
 from pteron.identification.signals.derivatives import Curve
 from pteron.kernels import Array
@@ -67,7 +72,7 @@ def maximum_likelihood(
     LogError
         If the log has gaps, is too long to be fitted at once, or does not determine the values.
     """
-    estimate = weighted(observations_of(model, log, preprocessing))
+    estimate = weighted_least_squares(observations_of(model, log, preprocessing))
     if preprocessing.cutoff is None:
         return replace(estimate, method=_NAME)  # positions carry no noise
     _check(log)
@@ -82,9 +87,9 @@ def maximum_likelihood(
     # known without a model, and they are not to be followed closer than that.
     least = np.maximum(preprocessing.force_noise, _LEAST_NOISE * estimate.noise.max())
     noise = np.maximum(estimate.noise, least)
-    search = Search(_NAME)
+    search = SearchRecord(_NAME)
     for _ in search.steps(iterations):
-        observations = _sampled(model, log, curve, preprocessing)
+        observations = _sample_observations(model, log, curve, preprocessing)
         if search.iterations <= _RENEWED:
             used, start = observations.gain, preprocessing.start
             slopes = _slopes(model, values, log, curve, used, start)
@@ -109,13 +114,15 @@ def maximum_likelihood(
         # What is left of the forces, less what the values and the motion took.
         remainder = (residuals - w @ step - s @ motion_step).reshape(weights.shape) * noise
         spent = 1.0 - len(values) / observations.rows
-        noise = np.sqrt((remainder**2).sum(axis=0) / np.maximum(observations.used, 1) / spent)
+        noise = np.sqrt(
+            (remainder**2).sum(axis=0) / np.maximum(observations.equation_counts, 1) / spent
+        )
         noise = np.maximum(noise, least)
         search.converged = bool((np.abs(step) <= _SETTLED * np.sqrt(np.diag(inverse))).all())
     # The values' own part of the forces: what the motion could do as well is taken out of it.
     moved = solved[:, :-1]
     own_rows = (w - s @ moved).reshape(observations.matrix.shape) * noise[:, None]
-    observations = _sampled(model, log, curve, preprocessing)
+    observations = _sample_observations(model, log, curve, preprocessing)
     beside, factor = moved.T @ (information @ moved), qr_factor(observations, 1.0 / noise)
     solution, weights = (search, observations, factor, values), 1.0 / noise
     return estimate_of(
@@ -142,13 +149,15 @@ def _expect_small(log: Log, coefficients: int) -> None:
         )
 
 
-def _sampled(model: Model, log: Log, curve: Curve, preprocessing: Preprocessing) -> Observations:
+def _sample_observations(
+    model: Model, log: Log, curve: Curve, preprocessing: Preprocessing
+) -> Observations:
     """Return the observations of a motion at the log's own samples, which no filter has touched."""
-    states = States.of_log(model.robot, log, curve.motion, preprocessing.start)
-    used = in_motion(states.joint_rates, preprocessing.slow, preprocessing.settling)
+    states = States.from_log(model.robot, log, curve.motion, preprocessing.start)
+    used = motion_mask(states.joint_rates, preprocessing.slow, preprocessing.settling_rows)
     used[: curve.ends] = used[len(used) - curve.ends :] = 0.0
     rows = used[..., None] * model.matrix(states), used * log.forces
-    observations = assembled(model, *rows, used, log.time, states.payload, 1.0)
+    observations = assemble_observations(model, *rows, used, log.time, states.payload, 1.0)
     return replace(observations, source=log.source)
 
 
@@ -165,7 +174,7 @@ def _slopes(
     def forces(k: int, shift: Array) -> Array:
         """Return the forces (T, n) with one derivative of the motion shifted."""
         q, dq, ddq = (part + shift if i == k else part for i, part in enumerate(motion))
-        states = States.of_log(model.robot, log, (q, dq, ddq), start)
+        states = States.from_log(model.robot, log, (q, dq, ddq), start)
         return np.asarray(model.matrix(states) @ smooth)
 
     for k, size in enumerate(_STEPS):

@@ -62,7 +62,7 @@ class QrFactor(OfLog):
         inverse = scipy.linalg.solve_triangular(self.factor, np.eye(len(self.names)))
         return np.asarray((inverse @ inverse.T) / np.outer(self.scale, self.scale))
 
-    def whitening(self) -> Array | None:
+    def inverse_triangle(self) -> Array | None:
         """Return what makes orthonormal columns of W (p, p); None where it would lose digits."""
         if not self.condition < _PLAIN:
             return None

@@ -63,7 +63,7 @@ class Reduced:
         return np.asarray(independent + self.shares @ joined)
 
 
-def reduced(observations: Observations, *, tolerance: float = TOLERANCE) -> Reduced:
+def independent_columns(observations: Observations, *, tolerance: float = TOLERANCE) -> Reduced:
     """Return the independent columns of observations, by a QR factor with pivots.
 
     The columns, scaled to length one, are taken in the order of what they have of their own; those

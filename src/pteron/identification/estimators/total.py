@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pteron.identification.estimators.estimate import Estimate, Search, estimate_of
+from pteron.identification.estimators.estimate import Estimate, SearchRecord, estimate_of
 from pteron.identification.estimators.least_squares import actuator_noise
 from pteron.identification.estimators.qr import qr_factor
 from pteron.identification.logs import Log
@@ -89,7 +89,7 @@ def total(
             errors[np.isin(observations.kinds, _CONSTANT)] = 0.0
     else:
         # On average over the equations that there are: an actuator without any has no noise.
-        weight = (observations.used / noise**2).sum() / observations.rows
+        weight = (observations.equation_counts / noise**2).sum() / observations.rows
         errors = np.asarray(given_errors, dtype=float) * np.sqrt(weight)
     order = np.argsort(errors > 0.0, kind="stable")
     exact = int((errors == 0.0).sum())
@@ -97,7 +97,7 @@ def total(
     stack = np.column_stack([factor.factor * factor.scale, factor.image])
     stack = np.vstack([stack, np.r_[np.zeros(p), np.sqrt(factor.rest)]])
     upper = np.asarray(np.linalg.qr(stack[:, [*order, p]], mode="r"))
-    forces, search = 1.0, Search("total")
+    forces, search = 1.0, SearchRecord("total")
     values = np.empty(p)
     for _ in search.steps(iterations):
         corrections = smallest_corrections(upper, exact, np.r_[errors[order[exact:]], forces])

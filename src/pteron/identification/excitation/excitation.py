@@ -21,7 +21,7 @@ from pteron.identification.excitation.motion_files import motion_paths, write_mo
 from pteron.identification.excitation.movement import Movement
 from pteron.identification.excitation.search_program import Criterion
 from pteron.identification.logs import Description, write_description
-from pteron.json_values import picked
+from pteron.json_values import fields_as_json
 from pteron.kinematics import assembly_mode
 from pteron.manipulator.machine_record import machine_record
 from pteron.tables import write_table
@@ -234,15 +234,17 @@ class Excitation:
         return {
             "robot": motion.robot.name,
             "machine": machine_record(motion.robot),
-            **picked(self, "criterion seed seconds interrupted conditioning random draws gain"),
-            **picked(self, "limits"),
-            **picked(self.margins, "margins=each"),
-            **picked(self, "starts"),
+            **fields_as_json(
+                self, "criterion seed seconds interrupted conditioning random draws gain"
+            ),
+            **fields_as_json(self, "limits"),
+            **fields_as_json(self.margins, "margins=each"),
+            **fields_as_json(self, "starts"),
             "motion": {
-                **picked(motion, "space period"),
+                **fields_as_json(motion, "space period"),
                 "lead": self.lead._asdict(),
                 "assembly_mode": _mode_of(motion),
-                **picked(motion, "center cosines sines"),
+                **fields_as_json(motion, "center cosines sines"),
             },
         }
 

@@ -156,7 +156,7 @@ class FourierMotion:
         rate, gain = np.reshape(rate, (-1, 1)), np.reshape(gain, (-1, 1))
         dq, ddq = first * rate, second * rate**2 + first * gain
         if self.space == "platform":
-            return FullMotion.of_platform(robot, q, dq, ddq)
+            return FullMotion.from_platform(robot, q, dq, ddq)
         poses: Array = evaluate_unchecked(robot, "closure_poses", np.vstack([self.center, q]))
         center, pose = poses[0, self.mode], poses[1:, self.mode]
         # Within a mode angles stay on one side of the singular orientations, half a turn at most.

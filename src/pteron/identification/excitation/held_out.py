@@ -13,7 +13,7 @@ from pteron.identification.excitation.limits import Limits
 from pteron.identification.excitation.margins import Margins, margins
 from pteron.identification.excitation.random_motions import is_clear, sizes
 from pteron.identification.signals.states import FullMotion, home
-from pteron.json_values import picked
+from pteron.json_values import fields_as_json
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
 from pteron.motion import pick_and_place
@@ -77,7 +77,7 @@ class RepeatedCycle:
         """Return the motion of platform and joints at times (T,), s."""
         pose, first, second = self.cycle.at(np.remainder(times / self.length, 1.0))
         rates = first / self.length, second / self.length**2
-        return FullMotion.of_platform(self.robot, pose, *rates)
+        return FullMotion.from_platform(self.robot, pose, *rates)
 
     def margins(self, limits: Limits, rate: float = 1000.0) -> Margins:
         """Return the margins of a cycle, at ten times as many samples a second."""
@@ -87,8 +87,10 @@ class RepeatedCycle:
     def as_dict(self) -> dict[str, Any]:
         """Return everything but the machine as plain data."""
         cycle = self.cycle
-        cycle_data = picked(cycle, "scale around across up") | {"turn": cycle.scale * cycle.turn}
-        return picked(self, "count length") | cycle_data
+        cycle_data = fields_as_json(cycle, "scale around across up") | {
+            "turn": cycle.scale * cycle.turn
+        }
+        return fields_as_json(self, "count length") | cycle_data
 
 
 def held_out_cycle(

@@ -12,7 +12,7 @@ import polars as pl
 
 from pteron.arguments import expect, expect_one_of, expect_to_fit
 from pteron.dynamics import drive_forces
-from pteron.errors import DataError, shown
+from pteron.errors import DataError, shorten
 from pteron.identification.excitation.movement import Movement
 from pteron.identification.logs import Description
 from pteron.identification.logs.clock import PER_SECOND
@@ -111,7 +111,7 @@ class Layout:
         twice = next((name for k, name in enumerate(names) if name in names[:k]), None)
         if twice is not None:
             raise DataError(
-                f"columns: {shown(twice)} would be the name of two columns; choose another"
+                f"columns: {shorten(twice)} would be the name of two columns; choose another"
             )
         return description
 

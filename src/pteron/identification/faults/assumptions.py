@@ -18,9 +18,9 @@ import numpy as np
 from pteron.equations.machine import closure_of
 from pteron.errors import PteronError, UnlikelyValue
 from pteron.identification.logs import Log
-from pteron.identification.observation import scaled
+from pteron.identification.observation import scale_columns
 from pteron.identification.signals import Preprocessing
-from pteron.json_values import picked
+from pteron.json_values import fields_as_json
 from pteron.kernels import Array
 from pteron.kinematics import assembly_modes, direct_kinematics, follow
 from pteron.kinematics.evaluate import evaluate_unchecked
@@ -96,7 +96,7 @@ class Assumption:
 
     def as_dict(self) -> dict[str, object]:
         """Return it as plain data."""
-        return picked(self, "fault message before after")
+        return fields_as_json(self, "fault message before after")
 
 
 @dataclass(frozen=True)
@@ -216,7 +216,7 @@ def _samples(log: Log, how: Preprocessing, rotors: Array) -> _Samples | None:
     edge = how.differentiator.edge
     if part.rows <= 2 * edge + _SAMPLES // 4:
         return None
-    moved = how.differentiator.differentiated(part, edge)
+    moved = how.differentiator.differentiate(part, edge)
     q, rates, accelerations = moved.motion
     rows = np.unique(np.linspace(0, len(q) - 1, _SAMPLES).astype(int))
     forces = moved.forces - rotors * accelerations
@@ -342,7 +342,7 @@ def _residual(robot: Manipulator, pose: Array, s: _Samples) -> float:
     flat, forces = (matrix / spread[:, None])[used], (s.forces[good] / spread)[used]
     if len(flat) < 2 * flat.shape[1]:
         return np.inf
-    columns = scaled(flat)[0]
+    columns = scale_columns(flat)[0]
     basis, sizes, _ = np.linalg.svd(columns, full_matrices=False)
     basis = basis[:, sizes > 1e-9 * sizes[0]]
     residuals = forces - basis @ (basis.T @ forces)

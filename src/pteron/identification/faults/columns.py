@@ -19,7 +19,7 @@ from pteron.identification.faults.fault import FaultName
 from pteron.identification.faults.fitted_motion import FittedMotion, lengths_of
 from pteron.identification.model import Model, diagonal, extend_model, identification_model
 from pteron.identification.signals import States
-from pteron.identification.signals.filters import smoothed
+from pteron.identification.signals.filters import lowpass
 from pteron.kernels import Array
 from pteron.kinematics.evaluate import evaluate_unchecked
 from pteron.manipulator import Manipulator
@@ -137,7 +137,7 @@ def _elasticity(m: FittedMotion) -> Array:
     pace = (len(load) - 1) / float(np.ptp(m.states.time))
     if m.cutoff is not None and 2.0 * m.cutoff < pace:
         # Noise of the accelerations would be in both, the residuals and the column.
-        load = smoothed(load, pace, m.cutoff)
+        load = lowpass(load, pace, m.cutoff)
     rate = m.rate(load)
     return m.give_slopes([load, rate, m.rate(rate)])
 

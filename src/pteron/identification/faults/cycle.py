@@ -36,7 +36,7 @@ class Extent(NamedTuple):
     accelerations: Array
 
     @classmethod
-    def of(cls, states: list[States]) -> Extent:
+    def from_states(cls, states: list[States]) -> Extent:
         """Return the extent of a motion in blocks."""
         return cls(
             np.mean([s.pose.mean(axis=0) for s in states], axis=0),
@@ -57,7 +57,7 @@ class ReferenceCycle:
     in_order: bool = True
 
     @classmethod
-    def within(
+    def about_mean_pose(
         cls, robot: Manipulator, extent: Extent, *, size: float = 1.0
     ) -> ReferenceCycle | None:
         """Return the cycle about a motion's mean pose, or home, as fast as the motion itself.
@@ -77,11 +77,11 @@ class ReferenceCycle:
             motion = within(scale=size * slow.scale, direction=slow.across, duration=duration)
             gone = _complete_motion(robot, motion)
             rates = np.abs(gone.rates)
-            return cls(States.of(motion.time, gone), rates > _MOVES * rates.max(axis=0))
+            return cls(States.from_motion(motion.time, gone), rates > _MOVES * rates.max(axis=0))
         return None
 
     @classmethod
-    def shuffled(cls, robot: Manipulator, states: list[States]) -> ReferenceCycle:
+    def from_range(cls, robot: Manipulator, states: list[States]) -> ReferenceCycle:
         """Return states of another motion with the range, speeds and accelerations of a log's.
 
         Each coordinate is that of another sample, and so is its rate. Poses out of the legs' reach
@@ -93,7 +93,7 @@ class ReferenceCycle:
             log = np.concatenate([getattr(s, name) for s in states])
             rows = rng.integers(len(log), size=(_SAMPLES, log.shape[1]))
             motion.append(np.take_along_axis(log, rows, axis=0))
-        full_motion = FullMotion.of_platform(robot, *motion)
+        full_motion = FullMotion.from_platform(robot, *motion)
         # A slider's motion is finite out of the legs' reach too; that of the links is not.
         within = np.isfinite(evaluate_unchecked(robot, "regressor", *motion)).all(axis=(1, 2))
         within &= np.isfinite(np.hstack(full_motion)).all(axis=1)
@@ -101,7 +101,7 @@ class ReferenceCycle:
         rates = np.abs(full_motion.rates)
         time = np.arange(len(rates), dtype=float)
         moves = rates > _MOVES * rates.max(axis=0, initial=0.0)
-        return cls(States.of(time, full_motion), moves, in_order=False)
+        return cls(States.from_motion(time, full_motion), moves, in_order=False)
 
     def share(self, error: Array, forces: Array) -> Array:
         """Return the size of an error (R, n), percent of the forces' standard deviation (n,)."""
@@ -112,4 +112,4 @@ class ReferenceCycle:
 
 
 def _complete_motion(robot: Manipulator, motion: Motion) -> FullMotion:
-    return FullMotion.of_platform(robot, motion.pose, motion.velocity, motion.acceleration)
+    return FullMotion.from_platform(robot, motion.pose, motion.velocity, motion.acceleration)

@@ -7,8 +7,9 @@ from typing import Any, Literal
 
 import numpy as np
 
-from pteron.json_values import picked
+from pteron.json_values import fields_as_json
 from pteron.kernels import Array
+from pteron.renamed import former_attribute
 
 FaultName = Literal[
     "delay",
@@ -189,7 +190,7 @@ class IsolatedFault:
     as_well: tuple[FaultName, ...] = ()
 
     @property
-    def of_sampling(self) -> bool:
+    def is_half_sample_delay(self) -> bool:
         """Whether it is the half step by which forces that are held differ from positions."""
         return self.fault == "delay" and abs(self.sizes[0]) <= _HALF_STEP[1] * self.step
 
@@ -201,7 +202,7 @@ class IsolatedFault:
     @property
     def matters(self) -> bool:
         """Whether that lowers the grade: a delay of sampling hardly changes a machine's forces."""
-        if self.of_sampling:
+        if self.is_half_sample_delay:
             return bool((self.cycle > _CYCLE_OF_SAMPLING).any())
         # Play is no error of a value: what it makes is in the residuals, wherever it is.
         return self.fault == "play" or self.shift > _SHIFT or bool((self.cycle > _CYCLE).any())
@@ -212,7 +213,7 @@ class IsolatedFault:
         return f"{self._sentence()}{self._equivalents()}; {_REMEDY[self.fault]}."
 
     @property
-    def beside_another(self) -> str:
+    def text_without_remedy(self) -> str:
         """The fault without a remedy: another one, which is mended first, may be all there is."""
         return (
             f"{self._sentence()}{self._equivalents()}, or what is named before looks so: mend that."
@@ -221,11 +222,11 @@ class IsolatedFault:
     def as_dict(self) -> dict[str, Any]:
         """Return it as plain data."""
         return {
-            **picked(self, "fault message labels sizes"),
+            **fields_as_json(self, "fault message labels sizes"),
             "standard_deviations": [None if np.isnan(v) else float(v) for v in self.deviations],
-            **picked(self, "chance shift matters as_well"),
+            **fields_as_json(self, "chance shift matters as_well"),
             "cycle_percent": [None if np.isnan(v) else float(v) for v in self.cycle],
-            **picked(self, "speeds"),
+            **fields_as_json(self, "speeds"),
         }
 
     def _equivalents(self) -> str:
@@ -240,7 +241,10 @@ class IsolatedFault:
         return float(np.linalg.norm(parts))
 
     def _sentence(self) -> str:
-        first, key = float(self.sizes[0]), "sampling" if self.of_sampling else str(self.fault)
+        first, key = (
+            float(self.sizes[0]),
+            "sampling" if self.is_half_sample_delay else str(self.fault),
+        )
         if key == "clock" and first <= -1.0:
             key = "sign"
         size, error = abs(first), float(self.deviations[0])
@@ -274,3 +278,6 @@ class IsolatedFault:
             clock=100.0 * abs(clock),
             pace="slow" if clock < 0.0 else "fast",
         )
+
+    of_sampling = former_attribute("of_sampling", "is_half_sample_delay")
+    beside_another = former_attribute("beside_another", "text_without_remedy")

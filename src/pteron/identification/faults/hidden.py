@@ -8,7 +8,7 @@ from pteron.identification.faults.columns import Family, FaultColumns
 from pteron.identification.faults.cycle import ReferenceCycle
 from pteron.identification.faults.fault import FaultName
 from pteron.identification.faults.fitted_motion import FittedMotion
-from pteron.identification.observation import Observations, scaled
+from pteron.identification.observation import Observations, scale_columns
 from pteron.identification.plausibility import CLEAR, WANTED
 from pteron.kernels import Array
 
@@ -46,7 +46,7 @@ def hidden_faults(
     weights = 1.0 / np.maximum(noise, _NOISELESS * noise.max() + 1e-300)
     flat = (weights[:, None] * observations.matrix).reshape(-1, observations.matrix.shape[-1])
     p = len(columns.model.names)
-    known, lengths = scaled(flat[:, :p])
+    known, lengths = scale_columns(flat[:, :p])
     basis, triangle = np.linalg.qr(known)
     back = np.linalg.pinv(triangle) / lengths[:, None]
     hidden: dict[FaultName, None] = {}

@@ -18,16 +18,16 @@ from pteron.identification.faults.cycle_errors import expected_errors
 from pteron.identification.faults.fault import ORDER, FaultName, IsolatedFault
 from pteron.identification.faults.hidden import hidden_faults
 from pteron.identification.faults.log_faults import LogFault
-from pteron.identification.faults.play import Record, backlash_signature
+from pteron.identification.faults.play import PlayRecord, backlash_signature
 from pteron.identification.faults.search import FoundFault, search_faults
 from pteron.identification.faults.searched_parts import SearchedPart, choose_parts, observe_parts
 from pteron.identification.model import Model
-from pteron.identification.observation import Observations, in_motion
+from pteron.identification.observation import Observations, motion_mask
 from pteron.identification.plausibility import Factor, factor_of_forces, known_values
 from pteron.identification.recordings import Recording
 from pteron.identification.signals import Preprocessing, samples
 from pteron.identification.signals.preprocessing import LATEST
-from pteron.json_values import picked
+from pteron.json_values import fields_as_json
 from pteron.kernels import Array
 from pteron.renamed import former_attribute
 
@@ -106,13 +106,13 @@ class FaultIsolation:
         ranked = sorted(self.faults, key=lambda fault: ORDER.index(fault.fault))
         # What comes first may look like what comes later: only the first gets a remedy.
         machine = [
-            fault.message if k == 0 and not distorted else fault.beside_another
+            fault.message if k == 0 and not distorted else fault.text_without_remedy
             for k, fault in enumerate(ranked)
         ]
         return (*(fault.message for fault in self.log), *of_file, *machine)
 
     @property
-    def off(self) -> Array:
+    def expected_error(self) -> Array:
         """Expected error of such a cycle's forces, in percent (n,)."""
         return np.asarray(np.hypot(self.uncertain, self.spoiled))
 
@@ -128,14 +128,16 @@ class FaultIsolation:
 
     def as_dict(self) -> dict[str, Any]:
         """Return it as plain data."""
-        shares = {"uncertain": self.uncertain, "spoiled": self.spoiled, "off": self.off}
-        return picked(self, "tried why_not cannot_be_told=hidden faults") | {
+        shares = {"uncertain": self.uncertain, "spoiled": self.spoiled, "off": self.expected_error}
+        return fields_as_json(self, "tried why_not cannot_be_told=hidden faults") | {
             "log": [fault.as_dict() for fault in self.log],
             "cycle_percent": {
                 name: None if np.isnan(values).any() else values.tolist()
                 for name, values in shares.items()
             },
         }
+
+    off = former_attribute("off", "expected_error")
 
 
 def isolate_faults(
@@ -197,7 +199,7 @@ def _isolate_in_parts(
     observations = observe(parts)
     plain, found_faults = _found_faults(parts, observations, observe, estimate, noise)
     states = [s for part in parts for s in part.states]
-    other = ReferenceCycle.shuffled(model.robot, states)
+    other = ReferenceCycle.from_range(model.robot, states)
     uncertain, spoiled, each = expected_errors(
         columns, states, other, estimate, plain, found_faults
     )
@@ -313,10 +315,10 @@ def _play(
         carried = np.isin(model.kinds, ("base", "payload"))
         for block in samples(model.robot, part.log, how):
             matrix = model.matrix(block.states)
-            moving = in_motion(block.states.joint_rates, how.slow, how.turning) > 0.0
+            moving = motion_mask(block.states.joint_rates, how.slow, how.turning_rows) > 0.0
             residual = block.forces - matrix @ values
             load = matrix @ np.where(carried, values, 0.0)
-            records.append(Record(block.states.time, load, residual, moving))
+            records.append(PlayRecord(block.states.time, load, residual, moving))
     signature = backlash_signature(records, band)
     looked = bool(signature.looked.any())
     if np.isnan(signature.times).all():

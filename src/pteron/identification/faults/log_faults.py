@@ -14,11 +14,11 @@ import numpy as np
 
 from pteron.identification.logs import Log
 from pteron.identification.logs.log import gaps
-from pteron.identification.logs.recorded import at_limits
+from pteron.identification.logs.recorded import saturation_sentences
 from pteron.identification.signals import Preprocessing
 from pteron.identification.signals.derivatives import uniform
-from pteron.identification.signals.filters import DIFFERENCE, force_steps, smoothed
-from pteron.json_values import picked
+from pteron.identification.signals.filters import DIFFERENCE, force_steps, lowpass
+from pteron.json_values import fields_as_json
 from pteron.kernels import Array
 
 _LOST = 0.01
@@ -84,7 +84,7 @@ class LogFault:
 
     def as_dict(self) -> dict[str, object]:
         """Return it as plain data."""
-        return picked(self, "fault message size distorts")
+        return fields_as_json(self, "fault message size distorts")
 
 
 def log_faults(
@@ -121,7 +121,7 @@ def log_faults(
             faults.append(LogFault("jitter", f"{message}.", jitter, True))
             break
     for log, how in zip(logs, preprocessing, strict=True):
-        said = at_limits(log) or (() if fits else _plateaus(log, how.force_noise))
+        said = saturation_sentences(log) or (() if fits else _plateaus(log, how.force_noise))
         if said:
             message = _merge_limit_sentences(said)
             faults.append(LogFault("saturation", message, float("nan"), True))
@@ -211,7 +211,7 @@ def sampling_jitter(log: Log, how: Preprocessing) -> tuple[float, float, float]:
         return 0.0, 0.0, 0.0
     rate = (len(time) - 1) / float(time[-1] - time[0])
     noise = np.maximum(how.joint_noise, 1e-300)
-    rates = np.gradient(smoothed(joints, rate, how.cutoff), 1.0 / rate, axis=0)[edge:-edge] / noise
+    rates = np.gradient(lowpass(joints, rate, how.cutoff), 1.0 / rate, axis=0)[edge:-edge] / noise
     rough = (
         np.diff(joints, n=DIFFERENCE, axis=0) / np.sqrt(comb(2 * DIFFERENCE, DIFFERENCE)) / noise
     )

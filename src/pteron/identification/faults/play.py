@@ -32,7 +32,7 @@ _FEWEST = 4
 """Least number of windows of a joint, with changes of direction and without."""
 
 
-class Record(NamedTuple):
+class PlayRecord(NamedTuple):
     """Load, residual and motion of each joint in a part of a log, (T, n), at even times."""
 
     time: Array
@@ -55,7 +55,7 @@ class Knocks(NamedTuple):
     """Mean square (n,) that this adds to the residuals, over all samples."""
 
 
-def backlash_signature(records: Sequence[Record], band: float) -> Knocks:
+def backlash_signature(records: Sequence[PlayRecord], band: float) -> Knocks:
     """Return what shows play in joints' drives, and of which of them enough is seen to tell.
 
     Windows' mean squares are ranked (Mann and Whitney's test, over all joints, each in units of its
@@ -83,7 +83,7 @@ def backlash_signature(records: Sequence[Record], band: float) -> Knocks:
     return Knocks(looked, np.where(shows, times, np.nan), chance, np.where(shows, power, 0.0))
 
 
-def _windows(records: Sequence[Record], band: float, joint: int) -> tuple[Array, Array, float]:
+def _windows(records: Sequence[PlayRecord], band: float, joint: int) -> tuple[Array, Array, float]:
     """Return mean squares of windows as a load changes direction, of others, and the first's share.
 
     A joint moves all through a window.

@@ -9,12 +9,12 @@ from itertools import pairwise
 import numpy as np
 import scipy  # type: ignore[import-untyped]
 
-from pteron.identification.estimators import Estimate, weighted
+from pteron.identification.estimators import Estimate, weighted_least_squares
 from pteron.identification.estimators.estimate import wald
 from pteron.identification.estimators.qr import actuator_factors
 from pteron.identification.faults.columns import Family, FaultColumns, length_tolerance
 from pteron.identification.faults.fault import ORDER, FaultName
-from pteron.identification.observation import Observations, scaled
+from pteron.identification.observation import Observations, scale_columns
 from pteron.kernels import Array
 
 _CHANCE = 1e-6
@@ -111,7 +111,9 @@ def search_faults(
     sought = model.families if families is None else families
     # A fit needs products of columns only, which are the same for their triangular factors.
     triangles = actuator_factors(observations)
-    plain = weighted(observations.columns(range(p)), triangles=triangles.columns(range(p)))
+    plain = weighted_least_squares(
+        observations.columns(range(p)), triangles=triangles.columns(range(p))
+    )
     while len(found_faults) < _MOST:
         clear = []
         fit_noise = found_faults[-1].fit.noise if found_faults else plain.noise
@@ -123,6 +125,9 @@ def search_faults(
             fault = _fit_fault(model, observations, triangles, found_faults, k)
             if fault is None or not fault.chance < _CHANCE:
                 continue
+            # Beside a fault that explains most, a second one can fit worse than none.
+            if not _likelihood_gain(fault, fit_noise, observations.equation_counts) > 0:
+                continue
             if _is_possible(fault, model, fit_noise, floor):
                 clear.append(fault)
         best = max((fault.statistic for fault in clear), default=0.0)
@@ -130,8 +135,14 @@ def search_faults(
         # Residuals beside a clear fault may come from its shape, which no column has exactly.
         if not best > _BESIDE * first:
             break
-        found_faults.append(_likeliest(clear, fit_noise, observations.used, floor))
+        found_faults.append(_likeliest(clear, fit_noise, observations.equation_counts, floor))
     return plain, found_faults
+
+
+def _likelihood_gain(fault: FoundFault, fit_noise: Array, rows: Array) -> float:
+    """Return by how much a fault raises the log-likelihood of so many rows (n,) of forces."""
+    noise = np.maximum(fault.fit.noise, 1e-300)
+    return float(rows @ np.log(np.maximum(fit_noise, 1e-300) / noise))
 
 
 def _likeliest(
@@ -143,10 +154,7 @@ def _likeliest(
     explain as much the one of fewest sizes. Else the fault is large, its columns hold to first
     order only, and what comes first among those that explain nearly as much is taken.
     """
-    gains = [
-        float(rows @ np.log(np.maximum(fit_noise, 1e-300) / np.maximum(fault.fit.noise, 1e-300)))
-        for fault in faults
-    ]
+    gains = [_likelihood_gain(fault, fit_noise, rows) for fault in faults]
     most = int(np.argmax(gains))
     clearest = faults[most]
     as_well = _AS_WELL * gains[most]
@@ -185,8 +193,10 @@ def _fit_fault(
     mixes = [fault.mix for fault in known_faults]
     flat = triangles.matrix.reshape(-1, triangles.matrix.shape[-1])
     fault_columns = [flat[:, place] @ mix for place, mix in zip(places, mixes, strict=True)]
-    known = np.linalg.qr(np.hstack([scaled(part)[0] for part in (flat[:, :p], *fault_columns)]))[0]
-    columns, lengths = scaled(flat[:, model.places[k]])
+    known = np.linalg.qr(
+        np.hstack([scale_columns(part)[0] for part in (flat[:, :p], *fault_columns)])
+    )[0]
+    columns, lengths = scale_columns(flat[:, model.places[k]])
     _, seen, right = np.linalg.svd(columns - known @ (known.T @ columns), full_matrices=False)
     mix = right[seen > _SEEN].T / lengths[:, None]
     q = mix.shape[1]
@@ -201,7 +211,9 @@ def _fit_fault(
             parts = [rows.matrix[..., place] @ combination for place, combination in chosen]
             return rows.with_matrix(np.concatenate([rows.matrix[..., :p], *parts], axis=-1))
 
-        fit = weighted(append_combinations(observations), triangles=append_combinations(triangles))
+        fit = weighted_least_squares(
+            append_combinations(observations), triangles=append_combinations(triangles)
+        )
         last = slice(len(fit.values) - mix.shape[1], None)
         return fit, fit.values[last], fit.covariance[last, last]
 
@@ -249,7 +261,7 @@ def _is_possible(fault: FoundFault, model: FaultColumns, fit_noise: Array, floor
         return False
     largest = family.largest
     if family.speed is not None:
-        dry = model.model.per_joint("coulomb", np.abs(model.values))
+        dry = model.model.joint_values("coulomb", np.abs(model.values))
         largest = np.inf if dry is None else _TIMES * float(dry.max())
     if family.positive and not (fault.sizes / np.maximum(fault.deviations, 1e-300)).sum() > 0.0:
         return False

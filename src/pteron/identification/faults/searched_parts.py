@@ -14,13 +14,13 @@ from pteron.identification.estimators import Estimate
 from pteron.identification.faults.columns import FaultColumns, families_of
 from pteron.identification.logs import Log
 from pteron.identification.model import Model
-from pteron.identification.observation import Observations, observations_of, stacked
+from pteron.identification.observation import Observations, observations_of, stack_observations
 from pteron.identification.recordings import Recording
 from pteron.identification.signals import (
     Preprocessing,
     Processing,
     States,
-    preprocessing_of,
+    preprocessing_for_log,
     samples,
 )
 
@@ -100,12 +100,12 @@ def _plan_single_periods(model: Model, log: Log, how: Preprocessing) -> Preproce
     if how.derivatives != "periodic":
         return how
     processing = Processing(derivatives="central")
-    again = preprocessing_of(model.robot, log, processing, start=how.start)
+    again = preprocessing_for_log(model.robot, log, processing, start=how.start)
     return replace(again, slow=how.slow, delay=how.delay)
 
 
 def observe_parts(parts: Sequence[SearchedPart]) -> Observations:
     """Return the observations of parts, with the columns of all faults."""
-    return stacked(
+    return stack_observations(
         [observations_of(part.model.extended_model, part.log, part.how) for part in parts]
     )

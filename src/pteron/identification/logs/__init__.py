@@ -19,7 +19,11 @@ if TYPE_CHECKING:
         read_description as read_description,
         write_description as write_description,
     )
-    from pteron.identification.logs.log import Finding as Finding, Log as Log, joined as joined
+    from pteron.identification.logs.log import (
+        Finding as Finding,
+        Log as Log,
+        join_logs as join_logs,
+    )
     from pteron.identification.logs.log_file import (
         LogFile as LogFile,
         open_log as open_log,

@@ -55,7 +55,7 @@ def joint_factors(joints: Group, robot: Manipulator, source: str) -> NDArray[np.
         If the drives do not tell how a motor moves its joint.
     """
     needed = _NEEDS.get(joints.units[0], ())
-    lacking = _lacking(robot, needed)
+    lacking = _missing_drive_values(robot, needed)
     if lacking:
         raise DataError(
             f"{source}: the joints are in {joints.units[0]} of the motors, but the drives of "
@@ -70,13 +70,13 @@ def joint_factors(joints: Group, robot: Manipulator, source: str) -> NDArray[np.
     return 2.0 * np.pi / (np.array(counts) * [d.gear for d in drives])
 
 
-def by_rated_torque(log: AnyLog, robot: Manipulator) -> AnyLog:
+def apply_rated_torque(log: AnyLog, robot: Manipulator) -> AnyLog:
     """Return a log of forces in per cent of rated torque with gains that make N or N m of them.
 
     Where a drive lacks a value for that, the log is returned as it is.
     """
     about = log.description
-    if _lacking(robot, _RATED):
+    if _missing_drive_values(robot, _RATED):
         return log
     drives = [leg.drive or Drive() for leg in robot.legs]
     gains = tuple(drive.gear * (drive.rated_torque or 0.0) / 100.0 for drive in drives)
@@ -92,16 +92,16 @@ def by_rated_torque(log: AnyLog, robot: Manipulator) -> AnyLog:
     return log.with_gains(replace(about, gains=gains), finding)
 
 
-def per_cent_advice(robot: Manipulator) -> str:
+def percent_advice(robot: Manipulator) -> str:
     """Return how forces in per cent become forces at the joints, for a message."""
-    lacking = _lacking(robot, _RATED)
+    lacking = _missing_drive_values(robot, _RATED)
     return (
         f"or give {lacking} in the drives of {robot.name}'s file, such as drive = {{ ratio = 50.0, "
         "rated_torque = 1.27 }: a force is per cent / 100 times rated_torque times ratio"
     )
 
 
-def _lacking(robot: Manipulator, names: tuple[str, ...]) -> str:
+def _missing_drive_values(robot: Manipulator, names: tuple[str, ...]) -> str:
     """Return which of a drive's values some leg has not, with the legs; empty if none."""
     known = [[getattr(leg.drive, name, None) is not None for name in names] for leg in robot.legs]
     legs = [str(i) for i, flags in enumerate(known, start=1) if not all(flags)]

@@ -31,7 +31,7 @@ _AROUND = 40
 """Rows of a stretch, at least, that is filled: shorter ones are left to the filters' edges."""
 
 
-def bridged(log: Log) -> Log:
+def fill_gaps(log: Log) -> Log:
     """Return a log with short gaps filled and a finding; unchanged if they are rare.
 
     Positions get polynomials of degree 5, forces of degree 3, which passes on less noise.
@@ -50,7 +50,7 @@ def bridged(log: Log) -> Log:
     for start, stop in stretches(is_gap & ~short):
         part = log.part(start, stop)
         lost = (missing * short)[start : stop - 1]
-        parts.append(part if part.rows < _AROUND else _filled(part, lost))
+        parts.append(part if part.rows < _AROUND else _insert_samples(part, lost))
     if any(part.rows_in_file is not None for part in parts):
         parts = [replace(part, rows_in_file=rows_of(part)) for part in parts]
     count = int(missing[short].sum())
@@ -68,7 +68,7 @@ def bridged(log: Log) -> Log:
     return replace(log, **joined, findings=(*log.findings, finding), step=step)
 
 
-def _filled(log: Log, missing: NDArray[np.int64]) -> Log:
+def _insert_samples(log: Log, missing: NDArray[np.int64]) -> Log:
     """Return a stretch with `missing` (T - 1,) samples put in between its rows."""
     places = np.repeat(np.arange(log.rows - 1), missing)
     nth = np.concatenate([np.arange(1, k + 1) for k in missing[missing > 0]] or [np.zeros(0)])
@@ -78,22 +78,22 @@ def _filled(log: Log, missing: NDArray[np.int64]) -> Log:
     order = np.argsort(time, kind="stable")
     rows = rows_of(log)
 
-    def between(values: Array, degree: int) -> Array:
-        filled = _fitted(log.time, values, places, instants, degree)
+    def interpolate(values: Array, degree: int) -> Array:
+        filled = _interpolate_locally(log.time, values, places, instants, degree)
         return np.asarray(np.concatenate([values, filled])[order])
 
     return replace(
         log,
         time=time[order],
-        joints=between(log.joints, 5),
-        forces=between(log.forces, 3),
-        pose=None if log.pose is None else between(log.pose, 5),
+        joints=interpolate(log.joints, 5),
+        forces=interpolate(log.forces, 3),
+        pose=None if log.pose is None else interpolate(log.pose, 5),
         payload=None if log.payload is None else np.r_[log.payload, log.payload[places]][order],
         rows_in_file=np.concatenate([rows, rows[places]])[order],
     )
 
 
-def _fitted(
+def _interpolate_locally(
     time: Array, values: Array, places: NDArray[np.int64], instants: Array, degree: int
 ) -> Array:
     """Return values (K, n) at instants behind rows `places` (K,), of polynomials fitted around.

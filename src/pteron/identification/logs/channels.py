@@ -124,14 +124,16 @@ class Channel:
                 f"{column} holds {first.value:g} in rows {first.start + 1} to {first.stop} while "
                 f"other joints move: frozen channel{count_text * (len(frozen) > 1)}"
             )
-            findings.append(self._finding("frozen", message, first.start, len(frozen)))
+            findings.append(self._make_finding("frozen", message, first.start, len(frozen)))
         if self._limits is not None and self._beyond:
             low, high = self._limits
             message = (
                 f"{column} is at or beyond its limits {low:g} and {high:g} in "
                 f"{self._beyond} rows, first in row {self._first_beyond + 1}: clipped"
             )
-            findings.append(self._finding("clipped", message, self._first_beyond, self._beyond))
+            findings.append(
+                self._make_finding("clipped", message, self._first_beyond, self._beyond)
+            )
         for word, value in (("greatest", self._greatest), ("least", self._least)):
             extreme_runs = [run for run in runs if run.value == value and run.rows >= _CLIPPED_ROWS]
             if self._limits is None and self._is_force and len(extreme_runs) >= _CLIPPED_RUNS:
@@ -140,7 +142,7 @@ class Channel:
                     f"{column} holds its {word} value {value:g} in {len(extreme_runs)} stretches, "
                     f"{rows} rows in all, first from row {start + 1}: clipped"
                 )
-                findings.append(self._finding("clipped", message, start, rows))
+                findings.append(self._make_finding("clipped", message, start, rows))
         return tuple(findings)
 
     def _is_frozen(self, run: _Run) -> bool:
@@ -148,5 +150,5 @@ class Channel:
         moved = self._moved * (_RESTED if at_the_end else 1.0)
         return bool((run.greatest - run.least > moved).any())
 
-    def _finding(self, kind: Kind, message: str, start: int, count: int) -> Finding:
+    def _make_finding(self, kind: Kind, message: str, start: int, count: int) -> Finding:
         return Finding(kind, f"{self._source}: {message}", start + 1, self._column, count)

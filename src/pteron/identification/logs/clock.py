@@ -10,7 +10,7 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from pteron.errors import DataError, shown
+from pteron.errors import DataError, shorten
 from pteron.identification.logs.description import TimeFormat, TimeUnit
 from pteron.tables import Table, declaration
 
@@ -98,30 +98,34 @@ class Clock:
             If a cell holds no time; the message names the row.
         """
         if len(self.columns) == 2:
-            seconds_part, nanoseconds_part = (self._whole(table, name) for name in self.columns)
+            seconds_part, nanoseconds_part = (
+                self._integer_column(table, name) for name in self.columns
+            )
             if seconds_part is not None and nanoseconds_part is not None:
-                return self._since(seconds_part * _NANO + nanoseconds_part, _NANO)
+                return self._seconds_of_counts(seconds_part * _NANO + nanoseconds_part, _NANO)
             numbers = table.numbers(self.columns)
             return np.asarray(numbers[:, 0] + numbers[:, 1] / _NANO)
         name = self.columns[0]
         if table.frame[name].dtype.is_temporal():
-            return self._since(table.frame[name].cast(pl.Datetime("ns")).cast(pl.Int64), _NANO)
+            return self._seconds_of_counts(
+                table.frame[name].cast(pl.Datetime("ns")).cast(pl.Int64), _NANO
+            )
         if self.format is not None:
-            return self._of_text(table, name)
+            return self._parse_timestamps(table, name)
         numbers = table.numbers(self.columns)[:, 0]
         if np.abs(numbers).max(initial=0.0) >= _EXACT:
-            exact = self._whole(table, name)
+            exact = self._integer_column(table, name)
             if exact is not None:
-                return self._since(exact, PER_SECOND[self.unit])
+                return self._seconds_of_counts(exact, PER_SECOND[self.unit])
         return numbers / PER_SECOND[self.unit]
 
-    def _since(self, counts: pl.Series, per_second: float) -> Values:
+    def _seconds_of_counts(self, counts: pl.Series, per_second: float) -> Values:
         """Return whole counts, too large for floats, in seconds since the first row."""
         if self._origin is None:
             self._origin = int(counts[0]) if len(counts) else 0
         return np.asarray((counts - self._origin).to_numpy() / per_second)
 
-    def _whole(self, table: Table, name: str) -> pl.Series | None:
+    def _integer_column(self, table: Table, name: str) -> pl.Series | None:
         """Return a column of whole numbers, or None where it has others."""
         table.numbers([name])  # raises, with the row of a cell that is no number
         cells = table.frame[name]
@@ -129,15 +133,15 @@ class Clock:
             cells = cells.str.strip_chars().cast(pl.Int64, strict=False)
         return None if cells.has_nulls() or not cells.dtype.is_integer() else cells
 
-    def _of_text(self, table: Table, name: str) -> Values:
+    def _parse_timestamps(self, table: Table, name: str) -> Values:
         assert self.format is not None
         stamps = _nanoseconds(table.frame[name], self.format)
         if stamps.has_nulls():
             row = int(np.argmax(stamps.is_null().to_numpy()))
             cell = str(table.frame[name][row] or "").strip()
-            cell_text = f"{shown(cell)} given" if cell else "the cell is empty"
+            cell_text = f"{shorten(cell)} given" if cell else "the cell is empty"
             raise DataError(
-                f"{table.place(row)}, column {shown(name, bare=True)}: {cell_text}, a time like "
+                f"{table.place(row)}, column {shorten(name, bare=True)}: {cell_text}, a time like "
                 f"{self.format} expected; correct the cell"
             )
         counts = stamps.to_numpy().astype(np.int64)
@@ -203,8 +207,8 @@ def _format_of(table: Table, name: str) -> TimeFormat | None:
     form = next((f for p, f in _DATES.items() if dates.str.contains(f"^(?:{p})$").all()), None)
     if form is None:
         raise DataError(
-            f"{table.source}: column {shown(name, bare=True)} has dates in several formats; write "
-            "them all like 2026-11-22"
+            f"{table.source}: column {shorten(name, bare=True)} has dates in several formats; "
+            "write them all like 2026-11-22"
         )
     if form != "DD/MM/YYYY hh:mm:ss":
         return form
@@ -212,9 +216,9 @@ def _format_of(table: Table, name: str) -> TimeFormat | None:
     if (first > 12).any() or (second > 12).any():
         return form if (first > 12).any() else _MONTH_FIRST
     raise DataError(
-        f"{table.source}: column {shown(name, bare=True)}: {shown(str(cells[0]))} may have the day "
-        f"or the month first; if the month, declare {_MONTH_FIRST}, else say in a TOML file beside "
-        "it:" + declaration("time", format=form)
+        f"{table.source}: column {shorten(name, bare=True)}: {shorten(str(cells[0]))} may have the "
+        f"day or the month first; if the month, declare {_MONTH_FIRST}, else say in a TOML file "
+        "beside it:" + declaration("time", format=form)
     )
 
 

@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 from pteron.errors import DataError
 from pteron.identification.logs.log import Finding
-from pteron.identification.logs.names import called, means
-from pteron.tables import declaration, listed
+from pteron.identification.logs.names import means, parse_column_name
+from pteron.tables import declaration, join_names
 
 _LONGEST = 60
 """Characters of a name beyond which it is not shown as an example."""
@@ -49,22 +49,22 @@ class ColumnNames:
         `families` are columns that are called alike, by number.
         """
         example = self._example(kind)
-        needed = listed(self.needed)
+        needed = join_names(self.needed)
         others = next((family for family in families if numbers[0] in family), None)
         if others is None:
             return DataError(
-                f"{self.source}: no columns for the {kind.noun} (found: {listed(self.names)}; "
+                f"{self.source}: no columns for the {kind.noun} (found: {join_names(self.names)}; "
                 f"needed: {needed}); {self.hint}, or declare the file's own names in a TOML file "
                 f"beside it{example}"
             )
         present = [others[i] for i in sorted(others)]
         word = others[numbers[0]].removesuffix(str(numbers[0]))
         absent = [f"{word}{i}" for i in numbers if i not in others]
-        fault = f"without {listed(absent)}, or " if absent else ""
+        fault = f"without {join_names(absent)}, or " if absent else ""
         return DataError(
-            f"{self.source}: the columns {listed(present)} are for {len(present)} {kind.noun}, but "
-            f"the machine has {self.legs} legs (needed: {needed}); {fault}perhaps it is the log of "
-            f"another machine; else declare the columns in a TOML file beside it{example}"
+            f"{self.source}: the columns {join_names(present)} are for {len(present)} {kind.noun}, "
+            f"but the machine has {self.legs} legs (needed: {needed}); {fault}perhaps it is the "
+            f"log of another machine; else declare the columns in a TOML file beside it{example}"
         )
 
     def ambiguous(self, kind: Wanted, choices: Sequence[Sequence[str]]) -> DataError:
@@ -77,8 +77,8 @@ class ColumnNames:
         else:
             example = ", such as" + declaration(kind.table, **entry)
         return DataError(
-            f"{self.source}: {listed(names)} could each be meant for the {kind.noun}; say which in "
-            f"a TOML file beside it{example}"
+            f"{self.source}: {join_names(names)} could each be meant for the {kind.noun}; say "
+            f"which in a TOML file beside it{example}"
         )
 
     def _example(self, kind: Wanted) -> str:
@@ -88,7 +88,8 @@ class ColumnNames:
             name
             for name in self.names
             if name not in self.taken and name.isprintable() and len(name) < _LONGEST
-            if (parts := called(name)) is None or not any(means(parts.word, s) for s in others)
+            if (parts := parse_column_name(name)) is None
+            or not any(means(parts.word, s) for s in others)
         ]
         if kind.table == "time":
             return ", such as" + declaration("time", column=free[0]) if free else ""

@@ -11,15 +11,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pteron.errors import DataError, shown
+from pteron.errors import DataError, shorten
 from pteron.identification.logs.clock import Clock
 from pteron.identification.logs.column_names import Wanted
 from pteron.identification.logs.description import Description, joint_symbols
 from pteron.identification.logs.log import Finding
-from pteron.identification.logs.names import called, means
+from pteron.identification.logs.names import means, parse_column_name
 from pteron.identification.logs.search import ColumnSearch, Group
 from pteron.manipulator import Manipulator
-from pteron.tables import Table, listed
+from pteron.tables import Table, join_names
 
 _ONCE = ("rho", "theta", "force", "torque")
 """Documented words of columns of which a leg has one."""
@@ -75,8 +75,8 @@ def find_columns(
     forces = search.group(actuators, d.force_columns, numbers)
     if len({unit if unit not in ("N", "N m") else "SI" for unit in forces.units}) > 1:
         raise DataError(
-            f"{source}: {listed(forces.names)} are in {', '.join(forces.units)}; give all in their "
-            "SI units, or all in one unit of the drives"
+            f"{source}: {join_names(forces.names)} are in {', '.join(forces.units)}; give all in "
+            "their SI units, or all in one unit of the drives"
         )
     declared = {"m": d.length_unit, "rad": d.angle_unit}
     pose = [
@@ -90,7 +90,7 @@ def find_columns(
 def check_names(repeated: Mapping[str, str], source: str) -> None:
     """Raise a `DataError` where a file has a column of a joint or a force twice."""
     for name in repeated.values():
-        parts = called(name)
+        parts = parse_column_name(name)
         if parts and any(means(parts.word, stem) for stem in _ONCE):
             raise _twice(name, source)
 
@@ -118,7 +118,7 @@ def check_times(table: Table, first: str, others: Sequence[str]) -> None:
         differs = (table.frame[name] != table.frame[first]).fill_null(value=True)
         if differs.any():
             row = int(np.argmax(differs.to_numpy()))
-            first_time, other_time = (shown(str(table.frame[key][row])) for key in (first, name))
+            first_time, other_time = (shorten(str(table.frame[key][row])) for key in (first, name))
             raise DataError(
                 f"{table.place(row)}: its channels were not sampled at one time: {first} is "
                 f"{first_time}, {name} is {other_time}; record all channels with one sample time, "
@@ -139,7 +139,7 @@ def as_read(
     `found` is what is unlike a plain CSV file, `again` are the `repeated_times`.
     """
     parts = list(found)
-    time = columns.time.in_words("time")
+    time = columns.time.phrase("time")
     if clock.format is not None:
         time = f"{time.removesuffix(' in s')} as text, {clock.format}"
     elif clock.guessed:
@@ -149,7 +149,7 @@ def as_read(
     if again:
         parts.append(f"{len(again) + 1} equal columns of times")
     groups = {"joints": columns.joints, "forces": columns.forces, "pose": columns.pose}
-    parts += [group.in_words(noun) for noun, group in groups.items() if group.told]
+    parts += [group.phrase(noun) for noun, group in groups.items() if group.told]
     if not parts:
         return ()
     guessed = any(group.guessed for group in (columns.time, *groups.values()))
@@ -158,4 +158,4 @@ def as_read(
 
 
 def _twice(name: str, source: str) -> DataError:
-    return DataError(f"{source}: two columns are called {shown(name)}; rename or remove one")
+    return DataError(f"{source}: two columns are called {shorten(name)}; rename or remove one")

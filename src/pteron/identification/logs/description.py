@@ -19,7 +19,7 @@ from pydantic import (
 from pydantic.dataclasses import dataclass
 
 from pteron.bodies.inertia import PlanarInertia, SpatialInertia
-from pteron.errors import DataError, shown
+from pteron.errors import DataError, shorten
 from pteron.legs.kind import ActuatedJoint
 from pteron.manipulator import Manipulator
 from pteron.tables import Dialect
@@ -65,7 +65,7 @@ def _not_zero(value: float) -> float:
     return value
 
 
-def _rising(pair: tuple[float, float]) -> tuple[float, float]:
+def _check_rising(pair: tuple[float, float]) -> tuple[float, float]:
     low, high = pair
     if not low < high:
         raise ValueError(f"{low:g} is not below {high:g}; give [low, high]")
@@ -85,7 +85,7 @@ Factor = Annotated[Number, AfterValidator(_not_zero)]
 Two = tuple[Number, Number]
 Three = tuple[Number, Number, Number]
 Six = tuple[Number, Number, Number, Number, Number, Number]
-Pair = Annotated[Two, AfterValidator(_rising)]
+Pair = Annotated[Two, AfterValidator(_check_rising)]
 Names = Annotated[tuple[str, ...], Field(min_length=1)]
 
 
@@ -276,7 +276,9 @@ class Description:
         columns = [name for name in named if name is not None]
         twice = next((name for i, name in enumerate(columns) if name in columns[:i]), None)
         if twice is not None:
-            raise ValueError(f"columns: {shown(twice)} is named twice; each column has one meaning")
+            raise ValueError(
+                f"columns: {shorten(twice)} is named twice; each column has one meaning"
+            )
         if self.end is not None and not (self.start or 0.0) < self.end:
             raise ValueError(f"motion.end: {self.end:g} s is not behind motion.start")
         if self.period is None and (self.start is not None or self.end is not None):

@@ -11,7 +11,7 @@ from typing import Any
 from pydantic import TypeAdapter
 
 from pteron.atomic import write_text
-from pteron.errors import DataError, shown
+from pteron.errors import DataError, shorten
 from pteron.identification.logs.description import Description
 from pteron.legs.kind import ActuatedJoint
 from pteron.toml import read_toml, table_keys, to_model
@@ -70,7 +70,7 @@ def read_description(path: str | Path) -> Description:
         If there is no such file, or if it is not TOML, has unknown keys or values that cannot be;
         the message names each such key, and the valid ones.
     """
-    source = shown(str(path), bare=True, longest=1000)
+    source = shorten(str(path), bare=True, longest=1000)
     document = read_toml(path, DataError, _ABSENT)
     if document.keys() >= _OF_A_MANIPULATOR:
         raise DataError(f"{source}: describes a manipulator; the description of a log was expected")
@@ -116,7 +116,7 @@ def description_text(description: Description) -> str:
     return tomlkit.dumps(document)
 
 
-def told_at_once(
+def collect_undeclared(
     first: DataError,
     about: Description,
     opened: Callable[[Description], object],
@@ -137,7 +137,7 @@ def told_at_once(
             break
         source, _, reason = text.partition(": ")
         reasons.append(re.split(r" \(found|; ", reason)[0].removesuffix(":"))
-        about = _with(about, added)
+        about = _add_tables(about, added)
         try:
             opened(about)
         except DataError as next_one:
@@ -147,9 +147,9 @@ def told_at_once(
     if len(reasons) < 2:
         return first
     if about.joint_columns and not (about.joint_unit or about.joint_angle_unit):
-        about = _with(about, {"joints": {"unit": joint.unit}})
+        about = _add_tables(about, {"joints": {"unit": joint.unit}})
     if about.force_columns and not about.column_force_unit:
-        about = _with(about, {"forces": {"unit": joint.force_unit}})
+        about = _add_tables(about, {"forces": {"unit": joint.force_unit}})
     numbered = "; ".join(f"({i}) {reason}" for i, reason in enumerate(reasons, start=1))
     lines = description_text(about).partition("\n\n")[2]
     return DataError(
@@ -167,7 +167,7 @@ def _tables(lines: str) -> dict[str, Any]:
         return {}
 
 
-def _with(about: Description, added: dict[str, Any]) -> Description:
+def _add_tables(about: Description, added: dict[str, Any]) -> Description:
     """Return a description with more tables, as its file has them."""
     tables = _plain(about)
     for table, entries in added.items():

@@ -16,6 +16,7 @@ from pteron.identification.logs.description import Description
 from pteron.kernels import as_array
 from pteron.legs.kind import SLIDER, ActuatedJoint
 from pteron.legs.reading import Reading
+from pteron.renamed import former_attribute
 from pteron.shapes import Int, PerCoordinate, PerJoint, Series
 
 _WIDE = 1.5
@@ -239,7 +240,7 @@ class Log(OfLog):
         first = self.first_row + start
         if self.rows_in_file is not None and start < self.rows:
             first = int(self.rows_in_file[start])
-        return replace(self._taken(slice(start, stop)), first_row=first)
+        return replace(self._take_samples(slice(start, stop)), first_row=first)
 
     def with_gains(self, description: Description, finding: Finding) -> Log:
         """Return the log with the gains of a description, which a finding tells."""
@@ -247,19 +248,21 @@ class Log(OfLog):
         findings = (*self.findings, finding)
         return replace(self, forces=forces, description=description, findings=findings)
 
-    def without(self, rows: NDArray[np.bool_]) -> Log:
+    def drop_samples(self, rows: NDArray[np.bool_]) -> Log:
         """Return the samples without some, (T,): where they were is a gap."""
-        return replace(self, rows_in_file=rows_of(self))._taken(np.flatnonzero(~rows))
+        return replace(self, rows_in_file=rows_of(self))._take_samples(np.flatnonzero(~rows))
 
-    def _taken(self, rows: slice | NDArray[np.int64]) -> Log:
+    def _take_samples(self, rows: slice | NDArray[np.int64]) -> Log:
         arrays = {name: getattr(self, name) for name in _ARRAYS}
         changed: dict[str, Any] = {
             name: values[rows] for name, values in arrays.items() if values is not None
         }
         return replace(self, **changed)
 
+    without = former_attribute("without", "drop_samples")
 
-def joined(pieces: Sequence[Log]) -> Log:
+
+def join_logs(pieces: Sequence[Log]) -> Log:
     """Return pieces that follow each other as one log, with what is said of the first."""
     if len(pieces) > 1 and any(piece.rows_in_file is not None for piece in pieces):
         pieces = [replace(piece, rows_in_file=rows_of(piece)) for piece in pieces]

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pteron.errors import DataError, shown
+from pteron.errors import DataError, shorten
 from pteron.identification.errors import OfLog
 from pteron.identification.logs.at_motor import joint_factors
 from pteron.identification.logs.channels import Channel
@@ -26,11 +26,11 @@ from pteron.identification.logs.columns import (
 )
 from pteron.identification.logs.description import Description, joint_symbols
 from pteron.identification.logs.description_file import (
+    collect_undeclared,
     find_description,
     read_description,
-    told_at_once,
 )
-from pteron.identification.logs.log import Finding, Log, TimeStamps, joined
+from pteron.identification.logs.log import Finding, Log, TimeStamps, join_logs
 from pteron.identification.logs.recorded import check_forces
 from pteron.identification.logs.sizes import (
     check_bounds,
@@ -136,20 +136,20 @@ class LogFile(OfLog):
         if rows < 1:
             raise DataError(f"rows: {rows} given; a piece has at least 1 row")
         buffer: Log | None = None
-        for piece in self._without_spikes(progress):
-            buffer = piece if buffer is None else joined([buffer, piece])
+        for piece in self._remove_spikes(progress):
+            buffer = piece if buffer is None else join_logs([buffer, piece])
             while buffer.rows >= rows:
                 yield buffer.part(0, rows)
                 buffer = buffer.part(rows, buffer.rows)
         if buffer is not None and buffer.rows:
             yield buffer
 
-    def _without_spikes(self, progress: Callable[[int], None] | None) -> Iterator[Log]:
+    def _remove_spikes(self, progress: Callable[[int], None] | None) -> Iterator[Log]:
         """Yield pieces without spikes; whether a row is one, its neighbours' piece may tell."""
         c = self._columns
-        spikes = Spikes((*c.joints.shown, *c.forces.shown), self.source)
+        spikes = Spikes((*c.joints.printable_names, *c.forces.printable_names), self.source)
         previous: Log | None = None
-        for piece, following in pairwise(chain(self._checked(), [None])):
+        for piece, following in pairwise(chain(self._check_pieces(), [None])):
             assert piece is not None
             around = [previous, piece, following and following.part(0, MARGIN)]
             parts = [part for part in around if part is not None]
@@ -163,12 +163,12 @@ class LogFile(OfLog):
             previous = piece.part(max(piece.rows - MARGIN, 0), piece.rows)
             if progress is not None:
                 progress(piece.rows)
-            yield piece.without(out) if out.any() else piece
+            yield piece.drop_samples(out) if out.any() else piece
         self.findings += spikes.findings()
 
-    def _checked(self) -> Iterator[Log]:
+    def _check_pieces(self) -> Iterator[Log]:
         """Yield the file in pieces, in SI units; all findings but spikes stand behind the last."""
-        stamps = TimeStamps(self._step, self._columns.time.shown[0], self.source)
+        stamps = TimeStamps(self._step, self._columns.time.printable_names[0], self.source)
         channels = self._channels()
         n = self._robot.joint_count
         low, high = np.full(n, np.inf), np.full(n, -np.inf)
@@ -192,7 +192,7 @@ class LogFile(OfLog):
 
     def read(self, progress: Callable[[int], None] | None = None) -> Log:
         """Return the whole log, with all findings."""
-        return replace(joined(list(self.pieces(progress=progress))), findings=self.findings)
+        return replace(join_logs(list(self.pieces(progress=progress))), findings=self.findings)
 
     def _values(self, rows: int) -> Iterator[Values]:
         """Yield the file's numbers in arrays of so many rows: the time in s, then `_names`."""
@@ -216,7 +216,7 @@ class LogFile(OfLog):
         edges = np.cumsum([len(group.names) for group in self._groups])[:-1]
         joints, forces, pose, payload = (
             np.ascontiguousarray(
-                np.transpose([_in_si(*both) for both in zip(part.T, group.units, strict=True)])
+                np.transpose([_to_si(*both) for both in zip(part.T, group.units, strict=True)])
             )
             for group, part in zip(
                 self._groups, np.split(values[:, 1:], edges, axis=1), strict=True
@@ -228,7 +228,7 @@ class LogFile(OfLog):
         if self.description.gains is not None:
             forces = forces * np.array(self.description.gains)
         forces = forces / reading_scales(self._robot)
-        check_forces(forces, c.forces.shown, source, first)
+        check_forces(forces, c.forces.printable_names, source, first)
         if c.pose.names:
             check_bounds(pose, of_pose, c.pose, source, first)
         return Log(
@@ -256,16 +256,17 @@ class LogFile(OfLog):
         if bad.any():
             i = int(np.argmax(bad))
             raise DataError(
-                f"{self.source}: row {first + i + 1}, column {self._columns.payload.shown[0]}: "
-                f"{values[i]:g} given; 0 (without payload) or 1 (with) was expected, or one "
-                "mass in kg; give each payload its own log"
+                f"{self.source}: row {first + i + 1}, column "
+                f"{self._columns.payload.printable_names[0]}: {values[i]:g} given; 0 (without "
+                "payload) or 1 (with) was expected, or one mass in kg; give each payload its own "
+                "log"
             )
         return np.asarray(values != 0.0, dtype=np.int64)
 
     def _usual_step(self) -> tuple[Clock, float]:
         """Return how times are written, and their median step, s."""
         c, about = self._columns, self.description
-        column, names = c.time.shown[0], c.time.names
+        column, names = c.time.printable_names[0], c.time.names
         table = next(self._file.tables((*names, *self._names)), None)
         count = 0 if table is None else len(table)
         if table is None or count < _FEWEST:
@@ -287,15 +288,19 @@ class LogFile(OfLog):
     def _channels(self) -> list[Channel]:
         spans, source, c = joint_spans(self._robot), self.source, self._columns
         limits = self.description.limits or (None,)
-        joints = [Channel(name, source, spans, joint=j) for j, name in enumerate(c.joints.shown)]
-        forces = zip(c.forces.shown, cycle(limits), reading_scales(self._robot), strict=False)
+        joints = [
+            Channel(name, source, spans, joint=j) for j, name in enumerate(c.joints.printable_names)
+        ]
+        forces = zip(
+            c.forces.printable_names, cycle(limits), reading_scales(self._robot), strict=False
+        )
         return joints + [
             Channel(name, source, spans, limits=pair and (pair[0] / scale, pair[1] / scale))
             for name, pair, scale in forces
         ]
 
 
-def _in_si(values: Values, unit: str) -> Values:
+def _to_si(values: Values, unit: str) -> Values:
     """Return lengths in m, angles in rad, anything else as it is."""
     return np.radians(values) if unit == "deg" else values / _PER_METRE.get(unit, 1.0)
 
@@ -316,19 +321,19 @@ def open_log(
     try:
         about.check(robot)
     except DataError as error:
-        raise DataError(f"{shown(str(origin), bare=True, longest=1000)}: {error}") from None
+        raise DataError(f"{shorten(str(origin), bare=True, longest=1000)}: {error}") from None
 
-    def opened(described: Description) -> LogFile:
+    def open_described(described: Description) -> LogFile:
         dialect = described.csv or Dialect()
         return LogFile(open_table(path, noun="log", dialect=dialect), robot, described)
 
-    def looked_at(described: Description) -> None:
-        next(opened(described).pieces(), None)
+    def check_described(described: Description) -> None:
+        next(open_described(described).pieces(), None)
 
     try:
-        return opened(about)
+        return open_described(about)
     except DataError as error:
-        raise told_at_once(error, about, looked_at, robot.legs[0].joint) from None
+        raise collect_undeclared(error, about, check_described, robot.legs[0].joint) from None
 
 
 def read_log(

@@ -84,7 +84,7 @@ class Called(NamedTuple):
     """In small letters, empty where there is none."""
 
 
-def called(name: str) -> Called | None:
+def parse_column_name(name: str) -> Called | None:
     """Return the parts of a name, or None where it is no word with a number and a unit, or without.
 
     Examples

@@ -83,7 +83,7 @@ def check_recorded(log: Log) -> None:
         )
 
 
-def at_limits(log: Log) -> tuple[str, ...]:
+def saturation_sentences(log: Log) -> tuple[str, ...]:
     """Return a sentence for each force that stays at its largest or least value while it moves."""
     sentences = []
     speeds = np.abs(np.diff(log.joints, axis=0, append=log.joints[-1:]))

@@ -5,19 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from pteron.errors import DataError, shown
+from pteron.errors import DataError, shorten
 from pteron.identification.logs.column_names import ColumnNames, Wanted
 from pteron.identification.logs.log import Finding
 from pteron.identification.logs.names import (
     CURRENTS,
     RATED,
     Called,
-    called,
     means,
+    parse_column_name,
     stamp_columns,
     unit_called,
 )
-from pteron.tables import declaration, listed
+from pteron.tables import declaration, join_names
 
 _NO_UNIT = ("", "-", "1", "none")
 """Cells of a line of units that stand for no unit."""
@@ -36,14 +36,14 @@ class Group(NamedTuple):
     """Whether the columns are taken by names that are not the documented ones."""
 
     @property
-    def shown(self) -> tuple[str, ...]:
+    def printable_names(self) -> tuple[str, ...]:
         """The names as messages may show them: a name may hold anything."""
-        return tuple(shown(name, bare=True) for name in self.names)
+        return tuple(shorten(name, bare=True) for name in self.names)
 
-    def in_words(self, noun: str) -> str:
+    def phrase(self, noun: str) -> str:
         """Return how the columns are read, for a person."""
         unit = " and ".join(dict.fromkeys(self.units))
-        return f"{noun} {listed(self.names)} in {unit}"
+        return f"{noun} {join_names(self.names)} in {unit}"
 
 
 class ColumnSearch(ColumnNames):
@@ -54,7 +54,7 @@ class ColumnSearch(ColumnNames):
         stamps = stamp_columns(self.names)
         if declared is not None:
             columns = next((s for s in stamps if s[0] == declared), (declared,))
-            self.declared("time", columns)
+            self.declared_columns("time", columns)
         elif "t" in self.names:
             columns = ("t",)
         elif len(stamps) == 1:
@@ -64,7 +64,7 @@ class ColumnSearch(ColumnNames):
         else:
             columns = tuple(self.family(kind, [0])[0])
         guessed = declared is None and columns != ("t",)
-        group = self._in_units([kind] * len(columns), columns, guessed=guessed)
+        group = self._group_by_unit([kind] * len(columns), columns, guessed=guessed)
         # What a name says of the time's unit is told, declared or not.
         return group._replace(told=group.told or self.unit_of(columns[0], kind) is not None)
 
@@ -76,8 +76,8 @@ class ColumnSearch(ColumnNames):
     ) -> Group:
         """Return the columns wanted, one for each number, that are declared or called alike."""
         if declared is not None:
-            columns = self.declared(wanted[0].table, declared)
-            return self._in_units(wanted, columns, guessed=False)
+            columns = self.declared_columns(wanted[0].table, declared)
+            return self._group_by_unit(wanted, columns, guessed=False)
         names_by_number, guessed = dict[int, str](), False
         for kind in dict.fromkeys(wanted):
             numbers_of_kind = [
@@ -88,9 +88,9 @@ class ColumnSearch(ColumnNames):
             guessed = guessed or by_name
         columns = [names_by_number[i] for i in numbers]
         # Names that are documented say their units as documented.
-        return self._in_units(wanted, columns, guessed=guessed)._replace(told=guessed)
+        return self._group_by_unit(wanted, columns, guessed=guessed)._replace(told=guessed)
 
-    def _in_units(
+    def _group_by_unit(
         self, wanted: Sequence[Wanted], columns: Sequence[str], *, guessed: bool
     ) -> Group:
         """Return columns of what is wanted with their units; lengths have one, and angles."""
@@ -108,7 +108,7 @@ class ColumnSearch(ColumnNames):
     def matches(self, kind: Wanted) -> Iterator[tuple[str, Called]]:
         """Yield the columns that are called by a word for it, in a unit of it if in any."""
         for name in self.names:
-            parts = called(name)
+            parts = parse_column_name(name)
             if (
                 parts is not None
                 and means(parts.word, kind.stem)
@@ -153,7 +153,7 @@ class ColumnSearch(ColumnNames):
         """Return the columns of a measured pose, none where it is not whole."""
         stems = [member.stem for member in wanted]
         if declared is not None:
-            columns = self.declared("pose", declared)
+            columns = self.declared_columns("pose", declared)
         elif set(stems) <= set(self.names):
             columns = stems
         else:
@@ -161,14 +161,14 @@ class ColumnSearch(ColumnNames):
         if len(columns) < len(wanted):
             if columns:
                 message = (
-                    f"{self.source}: {listed(columns)} alone are no pose ({', '.join(stems)} "
+                    f"{self.source}: {join_names(columns)} alone are no pose ({', '.join(stems)} "
                     "needed), so that no measured pose is read"
                 )
-                first = shown(columns[0], bare=True)
+                first = shorten(columns[0], bare=True)
                 self.findings.append(Finding("guessed", message, column=first, count=len(columns)))
             return Group()
         guessed = declared is None and columns != stems
-        return self._in_units(wanted, columns, guessed=guessed)
+        return self._group_by_unit(wanted, columns, guessed=guessed)
 
     def lone(self, kind: Wanted) -> list[str]:
         """Return the column without a number that may be meant, if any."""
@@ -181,7 +181,7 @@ class ColumnSearch(ColumnNames):
         """Return the column that says when a payload is carried, if any."""
         candidates = [name for name in self.names if name.lower() == "payload"]
         if declared is not None:
-            candidates = self.declared("payload", [declared])
+            candidates = self.declared_columns("payload", [declared])
         if len(candidates) > 1:
             kind = Wanted("payload", "payload", "payload", "", None)
             raise self.ambiguous(kind, [[name] for name in candidates])
@@ -192,15 +192,16 @@ class ColumnSearch(ColumnNames):
 
         A word such as current says another unit than the documented one; rho and force do not.
         """
-        parts = called(name)
+        parts = parse_column_name(name)
         text = self.units.get(name, "")
         if text.lower() not in _NO_UNIT:
             unit = unit_called(text, kind.unit)
             if unit is None and kind.declared is None:
                 raise DataError(
-                    f"{self.source}: column {shown(name, bare=True)} is in {shown(text)}, which is "
-                    f"not known for {kind.noun}; say the unit, with one that is, in a TOML file "
-                    "beside it:" + declaration(kind.table, **{self.unit_key(kind): kind.unit})
+                    f"{self.source}: column {shorten(name, bare=True)} is in {shorten(text)}, "
+                    f"which is not known for {kind.noun}; say the unit, with one that is, in a "
+                    "TOML file beside it:"
+                    + declaration(kind.table, **{self.unit_key(kind): kind.unit})
                 )
             return unit
         if parts is None:
@@ -221,16 +222,16 @@ class ColumnSearch(ColumnNames):
         if len(units) > 1 and kind.declared is None:
             said = ", ".join(unit or "no unit" for unit in units)
             raise DataError(
-                f"{self.source}: {listed(columns)} are in {said}; the {kind.noun} columns have one "
-                "unit: say which in a TOML file beside it:"
+                f"{self.source}: {join_names(columns)} are in {said}; the {kind.noun} columns have "
+                "one unit: say which in a TOML file beside it:"
                 + declaration(kind.table, **{self.unit_key(kind): kind.unit})
             )
-        words = {parts.word for parts in map(called, columns) if parts}
+        words = {parts.word for parts in map(parse_column_name, columns) if parts}
         if kind.declared is None and words & set(RATED) and None in units:
             raise DataError(
-                f"{self.source}: {listed(columns)}: the unit of these torques is not said; drives "
-                "write per cent of the rated torque, or N m; say which in a TOML file beside it, "
-                "with gains where they are no SI unit:" + declaration("forces", unit="%")
+                f"{self.source}: {join_names(columns)}: the unit of these torques is not said; "
+                "drives write per cent of the rated torque, or N m; say which in a TOML file "
+                "beside it, with gains where they are no SI unit:" + declaration("forces", unit="%")
             )
         return next(iter(units))
 
@@ -245,13 +246,13 @@ class ColumnSearch(ColumnNames):
             self.findings.append(Finding("units", message))
         return kind.declared or named or kind.unit
 
-    def declared(self, table: str, columns: Sequence[str]) -> list[str]:
+    def declared_columns(self, table: str, columns: Sequence[str]) -> list[str]:
         """Return columns that the description names, which the file must have."""
         absent = [name for name in columns if name not in self.names]
         if absent:
             raise DataError(
-                f"{self.source}: no column {listed(absent)}, which the description's [{table}] "
-                f"names (found: {listed(self.names)}); correct the description"
+                f"{self.source}: no column {join_names(absent)}, which the description's [{table}] "
+                f"names (found: {join_names(self.names)}); correct the description"
                 + (f"; {self.hint}" if len(self.names) == 1 else "")
             )
         return list(columns)

@@ -83,8 +83,8 @@ def check_bounds(
         beyond = np.abs(values[:, j]) > (_TURNS if usual is None else _BEYOND * usual)
         if not beyond.any():
             continue
-        i, unit = int(np.argmax(beyond)), group.units[j]
-        place = f"{source}: row {first_row + i + 1}, column {group.shown[j]}: {values[i, j]:g}"
+        i, unit, name = int(np.argmax(beyond)), group.units[j], group.printable_names[j]
+        place = f"{source}: row {first_row + i + 1}, column {name}: {values[i, j]:g}"
         if usual is None:
             raise DataError(
                 f"{place} rad, read as {unit}, is over two turns; {_declare('degrees', key, 'deg')}"
@@ -142,7 +142,7 @@ def standstill(
             f"{message}, and say it in a TOML file beside it:"
             + declaration("joints", unit=joint.unit)
         )
-    return (Finding("units", message, column=group.shown[j]),)
+    return (Finding("units", message, column=group.printable_names[j]),)
 
 
 def joint_spans(robot: Manipulator) -> NDArray[np.float64]:

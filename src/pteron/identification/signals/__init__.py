@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from pteron.identification.signals.filters import (
         Decimation as Decimation,
         cutoff_of as cutoff_of,
+        lowpass as lowpass,
         position_noise as position_noise,
-        smoothed as smoothed,
         white_noise as white_noise,
     )
     from pteron.identification.signals.fourier import (
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from pteron.identification.signals.preprocessing import (
         Preprocessing as Preprocessing,
         Processing as Processing,
-        preprocessing_of as preprocessing_of,
+        preprocessing_for_log as preprocessing_for_log,
     )
     from pteron.identification.signals.samples import samples as samples
     from pteron.identification.signals.states import States as States, start_pose as start_pose

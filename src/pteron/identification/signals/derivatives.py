@@ -18,7 +18,7 @@ import scipy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
 from pteron.identification.logs import Log
-from pteron.identification.signals.filters import SETTLING, smoothed
+from pteron.identification.signals.filters import SETTLING, lowpass
 from pteron.identification.signals.fourier import FittedSeries, fitted_series
 from pteron.kernels import Array
 from pteron.motion.trajectories.fourier import fourier_bases
@@ -123,13 +123,13 @@ class CentralDifferences(_Sampled):
         settling = ceil(SETTLING * self.rate / self.cutoff) if self.cutoff else 0
         return LOST + settling + self.shift
 
-    def differentiated(self, block: Log, edge: int) -> Differentiated:
+    def differentiate(self, block: Log, edge: int) -> Differentiated:
         """Return the block at even steps of time."""
         time, joints = uniform(block.time, block.joints)
         even = joints is block.joints
         forces = block.forces if even else uniform(block.time, block.forces)[1]
         rate = (len(time) - 1) / float(time[-1] - time[0])
-        joints = smoothed(joints, rate, self.cutoff)
+        joints = lowpass(joints, rate, self.cutoff)
         first, second = central_differences(joints, rate)
         inner, lost = slice(edge, len(time) - edge), slice(edge - LOST, len(first) - (edge - LOST))
         parts = [joints[LOST:-LOST], first, second]
@@ -151,13 +151,13 @@ class SmoothingSpline(_Sampled):
         knot = 1.0 / (2.0 * self.cutoff) if self.cutoff else 1.0 / self.rate
         return ceil(_SPLINE_SETTLING * knot * self.rate) + self.shift
 
-    def differentiated(self, block: Log, edge: int) -> Differentiated:
+    def differentiate(self, block: Log, edge: int) -> Differentiated:
         """Return the block at its own times."""
         inner = slice(edge, block.rows - edge)
         q, dq, ddq = spline_motion(block.time, block.joints, self.cutoff, self.delay)
         smooth = np.ones(block.rows, dtype=bool)
         if self.cutoff is None:
-            smooth = _without_jumps(block.time, block.joints)
+            smooth = _smooth_sections(block.time, block.joints)
         motion = q[inner], dq[inner], ddq[inner]
         return Differentiated(block.time[inner], motion, block.forces[inner], smooth[inner])
 
@@ -177,7 +177,7 @@ class FourierFit:
         series = fitted_series(log.time, log.joints, self.period, highest=self.cutoff)
         return series.later(self.delay)
 
-    def differentiated(self, block: Log, edge: int) -> Differentiated:
+    def differentiate(self, block: Log, edge: int) -> Differentiated:
         """Return the log at its own times."""
         motion = self.series(block).at(block.time)
         return Differentiated(block.time, motion, block.forces, np.ones(block.rows, dtype=bool))
@@ -267,7 +267,7 @@ def _design(
     return scipy.sparse.csr_matrix(design @ scipy.sparse.csr_matrix(slopes.c[: design.shape[1]]))
 
 
-def _without_jumps(time: Array, joints: Array) -> NDArray[np.bool_]:
+def _smooth_sections(time: Array, joints: Array) -> NDArray[np.bool_]:
     """Return where a spline through samples without noise agrees with central differences."""
     spline = fitted_spline(time, joints, None)
     even = np.linspace(time[0], time[-1], len(time))

@@ -127,7 +127,7 @@ def force_steps(forces: Array) -> Array:
     return _grid(forces)
 
 
-def smoothed(signal: Array, rate: float, cutoff: float | None) -> Array:
+def lowpass(signal: Array, rate: float, cutoff: float | None) -> Array:
     """Return signals (T, k) after a Butterworth filter of order 4 forward and backward.
 
     Its gain is 1 / (1 + (f / cutoff)^8), its phase zero. Without a cut-off there is no filter.
@@ -244,13 +244,13 @@ class Decimation:
 
     def noise(self, used: Array) -> Array:
         """Return the noise left of unit white noise on the samples (T, n) that are 1, not 0."""
-        return np.asarray(np.sqrt(np.maximum(self._filtered(used, self.taps**2), 0.0)))
+        return np.asarray(np.sqrt(np.maximum(self._filter_channel(used, self.taps**2), 0.0)))
 
     def __call__(self, signal: Array) -> Array:
         """Return signals (T, ...) filtered and decimated: one row for each of `centers`."""
-        return self._filtered(signal, self.taps)
+        return self._filter_channel(signal, self.taps)
 
-    def _filtered(self, signal: Array, taps: Array) -> Array:
+    def _filter_channel(self, signal: Array, taps: Array) -> Array:
         if self.factor == 1:
             return signal
         count = len(self.centers(len(signal)))

@@ -129,7 +129,7 @@ def fitted_series(
             f"{period:g} s, too much for its harmonics; record whole periods without a gap, or "
             'choose derivatives "central"'
         )
-    coefficients, squares = _fitted(time, signal, period, most)
+    coefficients, squares = _fit_coefficients(time, signal, period, most)
     noise = np.sqrt(squares / max(len(time) - len(coefficients), 1))
     noise = np.maximum(noise, _ROUNDING * np.abs(signal).max(axis=0))
     if highest is None:
@@ -143,7 +143,7 @@ def fitted_series(
         )
         if last < most:
             # Uneven samples mix harmonics a little: those that are kept are fitted again, alone.
-            coefficients, _ = _fitted(time, signal, period, last)
+            coefficients, _ = _fit_coefficients(time, signal, period, last)
     last = len(coefficients) // 2
     cosines: Any = coefficients[1 : last + 1]
     sines: Any = coefficients[last + 1 :]
@@ -164,17 +164,19 @@ def _largest_hole(time: Array, period: float) -> float:
     return float(np.diff(phase, append=phase[0] + period).max())
 
 
-def _fitted(time: Array, signal: Array, period: float, harmonics: int) -> tuple[Array, Array]:
+def _fit_coefficients(
+    time: Array, signal: Array, period: float, harmonics: int
+) -> tuple[Array, Array]:
     """Return the coefficients of least squares, and the residual sum of squares (k,)."""
     projection = Projection(time, period, harmonics)
     size = signal.shape[1]
     first = projection.coefficients(lambda rows: signal[rows], size)
 
-    def rest(rows: slice) -> Array:
+    def residuals_of(rows: slice) -> Array:
         return np.asarray(signal[rows] - projection.basis(rows) @ first)
 
     # A step of iterative refinement removes the rounding of the first solution.
-    coefficients = first + projection.coefficients(rest, size)
+    coefficients = first + projection.coefficients(residuals_of, size)
     squares = np.zeros(size)
     for rows in row_blocks(len(time)):
         squares += ((signal[rows] - projection.basis(rows) @ coefficients) ** 2).sum(axis=0)

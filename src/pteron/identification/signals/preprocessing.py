@@ -23,14 +23,15 @@ from pteron.identification.signals.filters import (
     Decimation,
     bins_below,
     cutoff_of,
+    lowpass,
     position_noise,
-    smoothed,
     white_noise,
 )
 from pteron.identification.signals.fourier import FittedSeries, fitted_series
 from pteron.identification.signals.states import start_pose
 from pteron.kernels import Array
 from pteron.manipulator import RobotLike, as_manipulator
+from pteron.renamed import former_attribute
 
 _LARGEST_PERIODIC = 4_000_000
 """Rows up to which a periodic log is fitted in one piece."""
@@ -170,7 +171,7 @@ class Preprocessing:
     def differentiator(self) -> Differentiator:
         """The differentiator of the positions."""
         if self.derivatives == "periodic":
-            assert self.period is not None  # `preprocessing_of` sees to it
+            assert self.period is not None  # `preprocessing_for_log` sees to it
             return FourierFit(self.period, self.cutoff, self.delay)
         kind = CentralDifferences if self.derivatives == "central" else SmoothingSpline
         return kind(self.rate, self.cutoff, self.delay)
@@ -181,12 +182,12 @@ class Preprocessing:
         return Decimation.to_band(self.rate, self.band)
 
     @property
-    def settling(self) -> int:
+    def settling_rows(self) -> int:
         """Rows before and after a slow one that the positions' filter has mixed with it."""
         return self._rows(_MIXED)
 
     @property
-    def turning(self) -> int:
+    def turning_rows(self) -> int:
         """Rows before and after a slow one in which the direction of a joint may not be known."""
         return self._rows(_UNSURE)
 
@@ -196,8 +197,11 @@ class Preprocessing:
             return 0
         return round(min(periods / fastest, _SPARED * self.stroke) * self.rate)
 
+    settling = former_attribute("settling", "settling_rows")
+    turning = former_attribute("turning", "turning_rows")
 
-def preprocessing_of(
+
+def preprocessing_for_log(
     robot: RobotLike,
     log: Log,
     processing: Processing | None = None,
@@ -254,7 +258,7 @@ def preprocessing_of(
         derivatives, cutoff = "periodic", series.harmonics / series.period
 
     # How fast the motion is
-    rates, _ = central_differences(smoothed(joints, rate, cutoff), rate)
+    rates, _ = central_differences(lowpass(joints, rate, cutoff), rate)
     frequencies, power = _rate_spectrum(rates, rate, series)
     edge = float(frequencies[min(bins_below(power, _POWER), len(frequencies) - 1)])
     band = settings.band or min(_PRODUCTS * edge, rate / 2.0)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pteron.identification.errors import LogError
-from pteron.identification.logs import Log, joined
+from pteron.identification.logs import Log, join_logs
 from pteron.identification.logs.log import are_apart, gaps, stretches
 from pteron.identification.signals.preprocessing import Preprocessing
 from pteron.identification.signals.states import States
@@ -67,7 +67,7 @@ def samples(
     differentiator = preprocessing.differentiator
     parts: Iterable[Log] = [log] if isinstance(log, Log) else log
     if differentiator.whole:
-        assert isinstance(log, Log)  # `preprocessing_of` takes no other for these
+        assert isinstance(log, Log)  # `preprocessing_for_log` takes no other for these
         edge = margin = 0
     else:
         # Blocks begin at the same phase of the decimation.
@@ -76,9 +76,9 @@ def samples(
         parts = blocks(parts, edge + margin, step * ceil(block / step), preprocessing.rate)
     part, pose = None, preprocessing.start
     for part in parts:
-        derived = differentiator.differentiated(part, edge)
+        derived = differentiator.differentiate(part, edge)
         inner = replace(part.part(edge, part.rows - edge), time=derived.time)
-        states = States.of_log(robot, inner, derived.motion, pose)
+        states = States.from_log(robot, inner, derived.motion, pose)
         # The next block overlaps this one by its margins.
         pose = tuple(states.pose[-1 - 2 * margin].tolist())
         fresh = slice(margin, len(states) - margin)
@@ -103,17 +103,17 @@ def blocks(pieces: Iterable[Log], margin: int, size: int, rate: float) -> Iterat
     for piece in pieces:
         for stretch in _stretches(piece, rate):
             if buffer is not None and _continues(buffer, stretch, rate):
-                buffer = joined([buffer, stretch])
+                buffer = join_logs([buffer, stretch])
             else:
-                yield from _rest(buffer, margin)
+                yield from _flush_buffer(buffer, margin)
                 buffer = stretch
             while buffer.rows >= size + 2 * margin:
                 yield buffer.part(0, size + 2 * margin)
                 buffer = buffer.part(size, buffer.rows)
-    yield from _rest(buffer, margin)
+    yield from _flush_buffer(buffer, margin)
 
 
-def _rest(buffer: Log | None, margin: int) -> Iterator[Log]:
+def _flush_buffer(buffer: Log | None, margin: int) -> Iterator[Log]:
     if buffer is not None and buffer.rows > 2 * margin:
         yield buffer
 

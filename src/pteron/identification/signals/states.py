@@ -43,7 +43,7 @@ class FullMotion(NamedTuple):
     accelerations: Array
 
     @classmethod
-    def of_platform(
+    def from_platform(
         cls, robot: Manipulator, pose: Array, velocity: Array, acceleration: Array
     ) -> FullMotion:
         """Return the motion of platform and joints for a motion of the platform, (T, m) each."""
@@ -80,7 +80,7 @@ class States:
     payload: NDArray[np.int64]
 
     @classmethod
-    def of(
+    def from_motion(
         cls, time: Array, motion: FullMotion, payload: NDArray[np.int64] | None = None
     ) -> States:
         """Return the states of a motion at times (R,), with payload in some phases (R,) or none."""
@@ -88,7 +88,7 @@ class States:
         return cls(time, *motion[3:], *motion[:3], phases)
 
     @classmethod
-    def of_joints(
+    def from_joints(
         cls,
         robot: Manipulator,
         motion: tuple[Array, Array, Array],
@@ -119,15 +119,15 @@ class States:
         velocity, acceleration = evaluate_unchecked(
             robot, "platform_motion", pose, rates, accelerations
         )
-        return cls.of(time, FullMotion(pose, velocity, acceleration, *motion), payload)
+        return cls.from_motion(time, FullMotion(pose, velocity, acceleration, *motion), payload)
 
     @classmethod
-    def of_log(
+    def from_log(
         cls, robot: Manipulator, log: Log, motion: tuple[Array, Array, Array], start: PoseLike
     ) -> States:
         """Return the states at a log's samples of joints that move so; see `of_joints`."""
         about: dict[str, Any] = {"source": log.source, "first_row": log.first_row}
-        return cls.of_joints(robot, motion, log.time, start, payload=log.payload, **about)
+        return cls.from_joints(robot, motion, log.time, start, payload=log.payload, **about)
 
     def __len__(self) -> int:
         return len(self.time)
@@ -170,7 +170,7 @@ def start_pose(robot: Manipulator, log: Log) -> tuple[float, ...]:
     if declared is None:
         assert log.pose is not None
         poses = assembly_modes(robot, log.joints[seen])
-        column = int(np.argmin(np.median(_apart(robot, poses, log.pose[seen]), axis=0)))
+        column = int(np.argmin(np.median(_distances_to(robot, poses, log.pose[seen]), axis=0)))
     else:
         poses, column = direct_kinematics(robot, log.joints[seen]), declared - 1
         if declared > closure.modes:
@@ -188,7 +188,7 @@ def start_pose(robot: Manipulator, log: Log) -> tuple[float, ...]:
     return tuple(shown[0].tolist())
 
 
-def _apart(robot: Manipulator, poses: Poses, measured: Array) -> Array:
+def _distances_to(robot: Manipulator, poses: Poses, measured: Array) -> Array:
     """Return distances of poses (R, k, m) from measured ones (R, m), infinite where there is none.
 
     Of position, and half-chords of the angles, so that whole turns count for nothing.

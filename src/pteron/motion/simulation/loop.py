@@ -11,14 +11,14 @@ import numpy as np
 
 from pteron.dynamics import drive_accelerations
 from pteron.equations.transmissions import DriveKind
-from pteron.errors import DataError, shown
+from pteron.errors import DataError, shorten
 from pteron.kernels import Array, Program, as_array
 from pteron.kernels.loops import Loop, loop, machine_numbers
 from pteron.manipulator import Manipulator
 from pteron.motion.motion import Motion, pose_text
 from pteron.motion.simulation.exported import ExportedCustomLaw, ExportedLaw
 from pteron.motion.simulation.motor_forces import motor_forces
-from pteron.motion.simulation.plant import Adaptive, Method, motor_states
+from pteron.motion.simulation.plant import AdaptivePlant, Method, motor_states
 from pteron.motion.simulation.sensors import (
     Sensors,
     encoder_arrays,
@@ -212,7 +212,7 @@ def _run_segments(
             if inputs[name].shape[1] > 1
         }
         advance_state = (
-            Adaptive(machine, timing.tolerance).go if timing.method == "dop853" else None
+            AdaptivePlant(machine, timing.tolerance).go if timing.method == "dop853" else None
         )
         call_counts = [*counts, first, int(stop == count)]
         simulator.run(inputs, stop - first, times, call_counts, ask, go=advance_state)
@@ -309,7 +309,7 @@ def _callback(
             returned, memory = answer
         except (TypeError, ValueError):
             raise DataError(
-                f"controller: {shown(answer)} returned, forces (n,) and the next memory expected"
+                f"controller: {shorten(answer)} returned, forces (n,) and the next memory expected"
             ) from None
         forces = as_array(returned, "controller: forces", (joints,))
         if forces.ndim > 1:

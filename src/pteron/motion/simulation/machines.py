@@ -97,7 +97,7 @@ class Machines:
         return len(self.payload)
 
     @property
-    def loaded(self) -> Array:
+    def parameters_with_payload(self) -> Array:
         """Inertial parameters with the payload, (B, N)."""
         robot = self.robot
         unit_payload = parameters(with_payload(robot, 1.0)) - parameters(robot)
@@ -113,7 +113,10 @@ class Machines:
     @property
     def numbers(self) -> dict[str, Array]:
         """Their numbers as `pteron.kernels.loops.Loop.run` takes them."""
-        plant_numbers = {"plant_parameters": self.loaded, "plant_drives": self.drives}
+        plant_numbers = {
+            "plant_parameters": self.parameters_with_payload,
+            "plant_drives": self.drives,
+        }
         if self.geometry is not None:
             plant_numbers |= dict.fromkeys(("plant_geometry", "sensed_geometry"), self.geometry)
         return {name: np.ascontiguousarray(rows[:, None]) for name, rows in plant_numbers.items()}

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from pteron.arguments import expect
 from pteron.dynamics import inverse_dynamics
 from pteron.equations.transmissions import DriveKind
-from pteron.errors import DataError, shown
+from pteron.errors import DataError, shorten
 from pteron.kernels import Array, as_array, numeric
 from pteron.kernels.kernel import broadcast_lead
 from pteron.kernels.loops import loop
@@ -95,9 +95,9 @@ def advance(
     """
     robot = as_manipulator(robot)
     span = as_array([step, count], "step, count", (2,))
-    expect(np.isfinite(span[0]), "step", shown(step), "a time in s")
+    expect(np.isfinite(span[0]), "step", shorten(step), "a time in s")
     if not span[1] >= 0.0 or span[1] % 1.0:
-        raise DataError(f"count: {shown(count)} given, a whole number of 0 or more expected")
+        raise DataError(f"count: {shorten(count)} given, a whole number of 0 or more expected")
     inputs = {"pose": pose, "velocity": velocity, "forces": forces}
     sizes = dict.fromkeys(inputs, robot.freedom) | {"forces": robot.joint_count}
     columns = robot.column_names
@@ -182,7 +182,7 @@ _LEAST = 1e-9
 """Adaptive steps shorter than this share of a span count as stuck."""
 
 
-class Adaptive:
+class AdaptivePlant:
     """DOP853 in place of fixed steps, for a machine whose friction is smooth at rest."""
 
     def __init__(self, robot: Manipulator, tolerance: float) -> None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pteron.equations.transmissions import DriveKind
-from pteron.errors import DataError, shown
+from pteron.errors import DataError, shorten
 from pteron.kernels import Array, Program, as_array
 from pteron.kinematics import inverse_kinematics, joint_rates
 from pteron.legs import Drive
@@ -61,7 +61,7 @@ class Sensors:
             samples: object = getattr(self, name)
             if not isinstance(samples, int) or isinstance(samples, bool) or samples < 0:
                 raise DataError(
-                    f"{name}: {shown(samples)} given, a whole number of 0 or more expected"
+                    f"{name}: {shorten(samples)} given, a whole number of 0 or more expected"
                 )
         cutoff = 1.0 if self.cutoff is None else as_array(self.cutoff, "cutoff", ())
         if np.ndim(cutoff) or not (np.isfinite(cutoff) and cutoff > 0.0):

@@ -10,7 +10,7 @@ import numpy as np
 
 from pteron.arguments import expect
 from pteron.equations.transmissions import DriveKind
-from pteron.errors import DataError, shown
+from pteron.errors import DataError, shorten
 from pteron.kernels import Array, as_array
 from pteron.kernels.named_columns import pick_columns
 from pteron.kinematics.evaluate import finite_pose, finite_rows
@@ -235,7 +235,7 @@ def _expect_controller(controller: object, forces: object) -> None:
     period = getattr(controller, "period", None)
     if isinstance(controller, type) or not isinstance(period, float | int):
         raise DataError(
-            f"controller: {shown(controller)} given, one such as ComputedTorque() expected"
+            f"controller: {shorten(controller)} given, one such as ComputedTorque() expected"
         )
     if forces is not None:
         raise DataError("controller and forces given; give one of them")
@@ -243,7 +243,7 @@ def _expect_controller(controller: object, forces: object) -> None:
 
 def check_delay(delay: float) -> None:
     """Refuse a delay that is negative or not finite."""
-    expect(_is_number(delay) and delay >= 0.0, "delay", shown(delay), "0 s or more")
+    expect(_is_number(delay) and delay >= 0.0, "delay", shorten(delay), "0 s or more")
 
 
 def _is_number(number: object) -> bool:
@@ -253,7 +253,7 @@ def _is_number(number: object) -> bool:
 def check_positive(**positive: float) -> None:
     """Refuse a number that is not positive and finite."""
     for name, number in positive.items():
-        expect(_is_number(number) and number > 0.0, name, shown(number), "a number above 0")
+        expect(_is_number(number) and number > 0.0, name, shorten(number), "a number above 0")
 
 
 def _state(robot: Manipulator, start: tuple[PoseLike, PoseLike]) -> tuple[Array, Array]:
@@ -325,7 +325,7 @@ def _sample_source(
     def numbers(row: PoseLike, title: str) -> Array:
         array = as_array(pick_columns(row, columns, title), title, (size,))
         expect(array.ndim == 1, title, f"shape {array.shape}", f"({size},)")
-        expect(np.isfinite(array).all(), title, shown(array.tolist()), "finite numbers")
+        expect(np.isfinite(array).all(), title, shorten(array.tolist()), "finite numbers")
         return array
 
     if callable(source):

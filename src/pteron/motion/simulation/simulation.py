@@ -14,6 +14,7 @@ from pteron.manipulator.readings import reading_scales, to_readings
 from pteron.motion.motion import Motion
 from pteron.motion.simulation.motor_forces import limit_to_motors
 from pteron.motion.trajectories.limits import limits_of
+from pteron.renamed import former_attribute
 
 if TYPE_CHECKING:
     import polars as pl
@@ -89,7 +90,7 @@ class Simulation:
             self.robot.joint_names,
             np.abs(self.joint_rates).max(axis=0),
             np.abs(self.forces).max(axis=0),
-            self.saturated,
+            self.saturated_share,
             (leg.joint for leg in self.robot.legs),
             strict=True,
         )
@@ -116,7 +117,7 @@ class Simulation:
         return Motion(self.time, self.pose, self.velocity, self.acceleration)
 
     @property
-    def saturated(self) -> Array:
+    def saturated_share(self) -> Array:
         """Share of the samples, (n,), in which a drive could not give what was asked for."""
         beyond = np.abs(self.asked) > limits_of(self.robot).force
         beyond |= (
@@ -157,3 +158,5 @@ class Simulation:
         for titles, block in blocks:
             columns |= dict(zip(titles, block.T, strict=True))
         return pl.DataFrame(columns | {"payload": self.payload})
+
+    saturated = former_attribute("saturated", "saturated_share")

@@ -57,7 +57,7 @@ def _longest_stable_step(
             places = as_array(poses, "poses", (robot.freedom,)).reshape(-1, robot.freedom)
             each = Evaluated("mass", program(robot, "mass_matrix"))(
                 {"pose": np.tile(places[index], (len(machines), 1))},
-                {"mass_parameters": machines.loaded[:, None]},
+                {"mass_parameters": machines.parameters_with_payload[:, None]},
             )
             mass = next(iter(each.values())).reshape(-1, *mass.shape[-2:])
         longest = _step_of_drives(robot, rows, mass, drives)

@@ -14,7 +14,7 @@ import numpy as np
 import scipy  # type: ignore[import-untyped]
 
 from pteron.html_table import Column, html_table
-from pteron.json_values import picked
+from pteron.json_values import fields_as_json
 from pteron.kernels import Array
 from pteron.legs import Drive
 from pteron.legs.motor_limits import motor_peak
@@ -305,7 +305,7 @@ class Sizing:
         turning = np.array([drive.ratio is not None for drive in self.drives])
         rms, peak = self.motor_torques
         numbers = {
-            **picked(
+            **fields_as_json(
                 self,
                 "peak_force=peak_forces rms_force=rms_forces peak_speed=peak_speeds",
                 "rms_speed=rms_speeds peak_power mean_power peak_braking mean_braking",

@@ -231,7 +231,7 @@ class Peak(NamedTuple):
         """The size over the limit; 0 without one, infinite where it is 0."""
         return self.size / self.limit if self.limit else math.inf
 
-    def told(self) -> str:
+    def phrase(self) -> str:
         """Return the peak and its limit as words."""
         who = f"leg {self.leg}" if self.leg else "the tool"
         verb, _ = _WORDS[self.name]

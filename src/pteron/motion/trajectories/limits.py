@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pteron.arguments import checked_arguments, number_or_nan
-from pteron.errors import DataError, shown
+from pteron.errors import DataError, shorten
 from pteron.kernels import Array
 from pteron.legs import Drive
 from pteron.legs.motor_limits import SpeedLine, speed_lines
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.renamed import former_attribute
 
 PerJointLimit = float | Sequence[float] | Array | None
 """One number for every joint, or one for each; None for the drives' own, or none."""
@@ -62,9 +63,11 @@ class MotionLimits:
         return joints, force, fall, back
 
     @property
-    def any(self) -> bool:
+    def is_limited(self) -> bool:
         """Whether there is a limit at all."""
         return self.bounds_acceleration or bool(np.isfinite([*self.speed, self.tool_speed]).any())
+
+    any = former_attribute("any", "is_limited")
 
 
 def limits_of(
@@ -137,6 +140,6 @@ def limit_array(
 def _positive_number(name: str, setting: object) -> float:
     number = number_or_nan(setting)
     if not number > 0.0:
-        text = setting if isinstance(setting, float) else shown(setting)
+        text = setting if isinstance(setting, float) else shorten(setting)
         raise DataError(f"{name}: {text} given, a number above 0 expected")
     return number

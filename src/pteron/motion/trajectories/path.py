@@ -225,7 +225,7 @@ class BackPath:
         return f"{self._out.place(self.length - s)}, on the path back"
 
 
-def there_and_back(path: Path) -> BackPath:
+def return_path(path: Path) -> BackPath:
     """Return the path and, after a rest at its end, the same path back."""
     return BackPath(path)
 

@@ -9,7 +9,7 @@ from pteron.manipulator import RobotLike, as_manipulator
 from pteron.motion.motion import Motion
 from pteron.motion.trajectories.limits import MotionLimits
 from pteron.motion.trajectories.path import line_path
-from pteron.motion.trajectories.time_law import STEP, along
+from pteron.motion.trajectories.time_law import STEP, polynomial_motion
 from pteron.motion.trajectories.time_polynomials import PolynomialLaw
 from pteron.shapes import PoseLike
 
@@ -58,4 +58,4 @@ def point_to_point(
     robot = as_manipulator(robot)
     ends = np.stack([finite_pose(robot, start, "start"), finite_pose(robot, end, "end")])
     path = line_path(robot, ends)
-    return along(robot, path, duration=duration, limits=limits, law=law, step=step)
+    return polynomial_motion(robot, path, duration=duration, limits=limits, law=law, step=step)

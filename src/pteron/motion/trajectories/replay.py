@@ -20,7 +20,7 @@ from pteron.manipulator.readings import from_readings
 from pteron.motion.motion import Motion
 from pteron.motion.trajectories.checks import check_motion
 from pteron.shapes import Columns, PoseLike
-from pteron.tables import Table, in_si, listed, read_table
+from pteron.tables import Table, convert_to_si, join_names, read_table
 
 TIME = "t"
 """The column of the time, s."""
@@ -73,7 +73,7 @@ def replay(
     poses, joints = names["pose"], names["joints"]
     motion_columns = [*poses, *names["velocity"], *names["acceleration"]]
     rows = rows_of(table, [TIME, *motion_columns, *joints])
-    rows = in_si(rows, {**robot.column_units, TIME: "s"})
+    rows = convert_to_si(rows, {**robot.column_units, TIME: "s"})
     has = set(rows.columns)
     m = robot.freedom
     if has.issuperset(motion_columns):
@@ -111,7 +111,7 @@ def rows_of(source: str | File | Table | Columns, useful: Sequence[str]) -> Tabl
         raise DataError("table: columns of numbers expected, as long as each other") from None
     if TIME not in names or not frame.height:
         what = "no rows" if TIME in names else f"no column {TIME}, the time in s"
-        raise DataError(f"table: {what}; its columns are {listed(list(map(str, names)))}")
+        raise DataError(f"table: {what}; its columns are {join_names(list(map(str, names)))}")
     return Table("table", frame)
 
 

@@ -96,7 +96,7 @@ def _no_limit_error() -> DataError:
     )
 
 
-def along(
+def polynomial_motion(
     robot: RobotLike,
     path: Path,
     *,
@@ -153,7 +153,7 @@ def along(
     sizes = np.diff(path.rests)
     # Where nothing limits a motion the stretches have the same peak acceleration.
     shares: Sequence[float] = [float(np.sqrt(size)) for size in sizes]
-    if motion_limits.any:
+    if motion_limits.is_limited:
         shares = stretch_times(robot, path, laws[0], motion_limits)
     elif duration is None:
         raise _no_limit_error()
@@ -162,7 +162,7 @@ def along(
         return limit_motion(robot, course, motion_limits, step)
     _expect_time("duration", duration)
     slowed_course = course.slow_down(duration / course.duration)
-    if motion_limits.any:
+    if motion_limits.is_limited:
         _expect_kept(robot, slowed_course, motion_limits, course.duration)
     return sample_curve(slowed_course.at, duration, step)
 
@@ -198,7 +198,7 @@ def _expect_kept(
         return
     least = shortest or course.duration / curve_rate(robot, curve, limits)
     raise DataError(
-        f"duration: {course.duration:.4g} s given, too short: {worst.told()}; the shortest that "
+        f"duration: {course.duration:.4g} s given, too short: {worst.phrase()}; the shortest that "
         f"keeps every limit is {least:.4g} s"
     )
 

@@ -200,10 +200,10 @@ def _fastest_law(
         progress = profile.smooth(spread)
         # Limits are tightened by what the spread motion exceeds them.
 
-        def at_times(tau: Array, progress: Progress = progress) -> Curve:
+        def evaluate_law(tau: Array, progress: Progress = progress) -> Curve:
             return states(progress(tau)[0])
 
-        tau, needs, _ = demand_between(robot, at_times, np.linspace(0.0, 1.0, _LOOK))
+        tau, needs, _ = demand_between(robot, evaluate_law, np.linspace(0.0, 1.0, _LOOK))
         _, rate, gain = progress(tau)
         stretched_duration = profile.duration + 2.0 * spread
         x, u = (rate / stretched_duration) ** 2, gain / stretched_duration**2

@@ -20,6 +20,7 @@ from pteron.legs import Drive
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator, parameters
 from pteron.motion.simulation.plant import motor_states
 from pteron.motion.simulation.sensors import encoder_of
+from pteron.renamed import former_attribute
 from pteron.shapes import PoseLike
 
 
@@ -58,7 +59,7 @@ class LinearPlant:
         """Eigenvalues of A, (S,), rad/s: the machine's own, its drives' forces held."""
         return np.asarray(np.linalg.eigvals(self.matrix))
 
-    def held(self, span: float) -> tuple[Array, Array]:
+    def zero_order_hold(self, span: float) -> tuple[Array, Array]:
         """Return exp(A t) and the integral of exp(A s) B over the span: forces held, exactly."""
         size, count = self.inputs.shape
         block = np.zeros((size + count, size + count))
@@ -66,8 +67,10 @@ class LinearPlant:
         exponential = scipy.linalg.expm(block)[:size]
         return exponential[:, :size], exponential[:, size:]
 
+    held = former_attribute("held", "zero_order_hold")
 
-def linearised(
+
+def linearise(
     robot: RobotLike,
     pose: PoseLike,
     velocity: PoseLike | None = None,

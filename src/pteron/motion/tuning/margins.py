@@ -31,7 +31,7 @@ _MOST = 60.0, 1000.0
 
 
 @dataclass(frozen=True)
-class Margins:
+class LoopMargins:
     """Gain, phase and delay that a sampled loop bears until it is unstable.
 
     At each drive, the other loops closed: `gain`, the factor on its force above 1, `phase`, rad,
@@ -78,7 +78,7 @@ class Margins:
     @cached_property
     def common_gain(self) -> float:
         """The smallest factor above 1 on all forces for which a pole reaches the unit circle."""
-        matrix, inputs, force_rows = self.loop.opened()
+        matrix, inputs, force_rows = self.loop.open_loop()
         fed_back = inputs @ force_rows
         return self._stable and 1.0 + _smallest_change(
             lambda added: radius(matrix + (1.0 + added) * fed_back), 1.0, 1
@@ -88,7 +88,7 @@ class Margins:
     def common_delay(self) -> float:
         """The smallest further delay of all forces for which one does, s."""
         return self._stable and _smallest_change(
-            lambda added: radius(self.loop.closed(added)), self.loop.period, 0
+            lambda added: radius(self.loop.closed_loop(added)), self.loop.period, 0
         )
 
     @cached_property
@@ -118,7 +118,7 @@ class Margins:
     @cached_property
     def slowest(self) -> float:
         """The rate at which the slowest pole decays, 1/s; negative where it grows."""
-        return float(-np.log(radius(self.loop.closed())) / self.loop.period)
+        return float(-np.log(radius(self.loop.closed_loop())) / self.loop.period)
 
     @cached_property
     def drive_loops(self) -> Array:

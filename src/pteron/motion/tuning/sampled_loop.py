@@ -12,6 +12,7 @@ from pteron.kernels import Array
 from pteron.motion.simulation.loop import split_delay
 from pteron.motion.tuning.linear_law import LinearLaw
 from pteron.motion.tuning.linear_plant import LinearPlant
+from pteron.renamed import former_attribute
 
 
 @dataclass(frozen=True)
@@ -42,7 +43,7 @@ class SampledLoop:
     delay: float = 0.0
     share: float | Array | None = None
 
-    def opened(self, more: float = 0.0) -> tuple[Array, Array, Array]:
+    def open_loop(self, more: float = 0.0) -> tuple[Array, Array, Array]:
         """Return (F, G, H) of s' = F s + G u, asked = H s: the loop opened at all drives.
 
         s are the changes of the plant's state, joints and rates told last, memory, and the forces
@@ -50,8 +51,8 @@ class SampledLoop:
         """
         period, law, n = self.period, self.law, self.plant.inputs.shape[1]
         late, delay_samples = split_delay(self.delay + more, period)
-        late_transition, late_inputs = self.plant.held(period - late)
-        early_transition, early_inputs = self.plant.held(late)
+        late_transition, late_inputs = self.plant.zero_order_hold(period - late)
+        early_transition, early_inputs = self.plant.zero_order_hold(late)
         transition, early_inputs = (
             late_transition @ early_transition,
             late_transition @ early_inputs,
@@ -98,15 +99,15 @@ class SampledLoop:
         inputs[waiting[0]] = np.eye(n)
         return matrix, inputs, force_rows
 
-    def closed(self, more: float = 0.0) -> Array:
+    def closed_loop(self, more: float = 0.0) -> Array:
         """Return the closed loop's matrix, all forces delayed more, s."""
-        matrix, inputs, force_rows = self.opened(more)
+        matrix, inputs, force_rows = self.open_loop(more)
         return matrix + inputs @ force_rows
 
     @cached_property
     def poles(self) -> Array:
         """Poles of the closed loop in the plane of z = exp(s period)."""
-        return np.asarray(np.linalg.eigvals(self.closed()))
+        return np.asarray(np.linalg.eigvals(self.closed_loop()))
 
     def response(self, frequencies: Array) -> Array:
         """Return the loop's frequency response L (W, n, n), from drives to what is asked of them.
@@ -114,6 +115,9 @@ class SampledLoop:
         Opened at all drives; I + L is singular where the closed loop has a pole. In rad/s, at most
         pi / period.
         """
-        matrix, inputs, force_rows = self.opened()
+        matrix, inputs, force_rows = self.open_loop()
         z = np.exp(1j * frequencies * self.period)[:, None, None]
         return -force_rows @ np.linalg.solve(z * np.eye(len(matrix)) - matrix, inputs + 0j * z)
+
+    opened = former_attribute("opened", "open_loop")
+    closed = former_attribute("closed", "closed_loop")

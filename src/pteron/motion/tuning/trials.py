@@ -38,7 +38,7 @@ _UNKNOWN = (float("nan"),) * 7
 
 
 @dataclass(frozen=True)
-class Trial:
+class GainTrial:
     """A machine's motion under a controller, and the rest at its end, in figures.
 
     Attributes
@@ -77,7 +77,7 @@ def trial(
     model: RobotLike | None = None,
     sensors: Sensors | None = None,
     delay: float = 0.0,
-) -> Trial:
+) -> GainTrial:
     """Simulate a motion and the rest at its end, and return its figures.
 
     Parameters are those of `simulate`, and so is what it raises.
@@ -93,14 +93,14 @@ def trial(
         delay=delay,
     )
     if simulation.stopped:
-        return Trial(*_UNKNOWN, simulation.stopped)
+        return GainTrial(*_UNKNOWN, simulation.stopped)
     moving = simulation.time <= motion.duration
     off = _tool_places(robot, simulation.pose) - _tool_places(robot, simulation.reference.pose)
     errors = np.linalg.norm(off, axis=-1)
     most = limits_of(robot).force
     shares = simulation.forces / np.where(np.isfinite(most), most, 1.0)
     power = np.maximum(simulation.forces * simulation.motor_rates, 0.0).sum(axis=-1)
-    return Trial(
+    return GainTrial(
         float(errors[moving].max()),
         float(np.sqrt((errors[moving] ** 2).mean())),
         *_settling_figures(simulation, motion, off, moving),
@@ -182,7 +182,7 @@ def trials(
         try:
             figures = trial(**usual | other)
         except PteronError as error:
-            figures = Trial(*_UNKNOWN, str(error))
+            figures = GainTrial(*_UNKNOWN, str(error))
         rows.append({"changed": changed, "value": float(setting), **asdict(figures)})
     return pl.DataFrame(rows)
 

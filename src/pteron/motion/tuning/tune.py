@@ -12,7 +12,7 @@ from pteron.arguments import expect
 from pteron.controllers import Controller, FeedForwardPD
 from pteron.controllers.feedback import Feedback
 from pteron.controllers.joint_masses import light_poses
-from pteron.errors import DataError, shown
+from pteron.errors import DataError, shorten
 from pteron.kernels import Array
 from pteron.kinematics import inverse_kinematics
 from pteron.kinematics.evaluate import finite_rows
@@ -22,8 +22,8 @@ from pteron.motion.payload import with_payload
 from pteron.motion.simulation import Sensors
 from pteron.motion.simulation.sensors import rate_shares
 from pteron.motion.tuning.linear_law import linearised_law
-from pteron.motion.tuning.linear_plant import linearised
-from pteron.motion.tuning.margins import Margins
+from pteron.motion.tuning.linear_plant import linearise
+from pteron.motion.tuning.margins import LoopMargins
 from pteron.motion.tuning.sampled_loop import SampledLoop
 from pteron.workspace.margins import joint_distances
 
@@ -59,15 +59,15 @@ class Required:
     delay: float = 0.0
 
     def __post_init__(self) -> None:
-        expect(1.0 < self.gain < np.inf, "gain margin", shown(self.gain), "a factor above 1")
+        expect(1.0 < self.gain < np.inf, "gain margin", shorten(self.gain), "a factor above 1")
         if not 0.0 < self.phase < np.pi / 2.0:
             raise DataError(
-                f"phase margin: {shown(self.phase)} rad given, {np.degrees(self.phase):.4g} "
+                f"phase margin: {shorten(self.phase)} rad given, {np.degrees(self.phase):.4g} "
                 "degrees; more than 0 and less than 90 degrees expected"
             )
-        expect(0.0 <= self.delay < np.inf, "delay margin", shown(self.delay), "0 s or more")
+        expect(0.0 <= self.delay < np.inf, "delay margin", shorten(self.delay), "0 s or more")
 
-    def share(self, found: Margins) -> float:
+    def share(self, found: LoopMargins) -> float:
         """Return the least of margin over required margin; a loop serves from 1 on."""
         each = self._share(found.gain.min(), found.delay.min()), found.phase.min() / self.phase
         if min(each) < 1.0:  # those of all drives at once take longer to compute
@@ -108,7 +108,7 @@ class Tuning:
     states: Array
     moments: Array
     loops: tuple[SampledLoop, ...]
-    margins: tuple[Margins, ...]
+    margins: tuple[LoopMargins, ...]
 
     @property
     def worst(self) -> int:
@@ -207,7 +207,7 @@ def tune(
     True
     """
     robot, controller = as_manipulator(robot), controller or FeedForwardPD()
-    expect(0.0 <= delay < np.inf, "delay", shown(delay), "0 s or more")
+    expect(0.0 <= delay < np.inf, "delay", shorten(delay), "0 s or more")
     if payload:
         robot = with_payload(robot, payload)
     required, sensors = required or Required(), sensors or Sensors()
@@ -219,13 +219,13 @@ def tune(
         controller,
         required,
         states,
-        [linearised(robot, *state) for state in states],
+        [linearise(robot, *state) for state in states],
         {"delay": late, "share": rate_shares(sensors, robot, controller.period)},
     )
     chosen = search.choose_controller()
     every = range(len(states))
     loops = tuple(search.loop(chosen, i) for i in every)
-    margins = tuple(Margins(loop) for loop in loops)
+    margins = tuple(LoopMargins(loop) for loop in loops)
     return Tuning(robot, chosen, required, states, moments, loops, margins)
 
 
@@ -264,7 +264,7 @@ class _Search:
 
     def share(self, controller: Controller, which: Sequence[int]) -> tuple[float, int]:
         """Return the least share of the required margins at some states, and the state."""
-        return min((self.required.share(Margins(self.loop(controller, i))), i) for i in which)
+        return min((self.required.share(LoopMargins(self.loop(controller, i))), i) for i in which)
 
     def choose_controller(self) -> Controller:
         """Return the controller with the greatest bandwidth that serves at all states."""
@@ -336,7 +336,7 @@ class _Search:
             high = low
 
     def _margins_text(self, controller: Controller, i: int) -> str:
-        least, required = Margins(self.loop(controller, i)).least, self.required
+        least, required = LoopMargins(self.loop(controller, i)).least, self.required
         delay_text = f", {1e3 * required.delay:.3g} ms" if required.delay else ""
         rate = controller.bandwidth
         with_ = f"with {np.max(rate):.4g} rad/s" if rate is not None else "with these gains"

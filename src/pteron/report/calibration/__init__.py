@@ -9,7 +9,10 @@ if TYPE_CHECKING:
         FirmwareFit as FirmwareFit,
         firmware_fit as firmware_fit,
     )
-    from pteron.report.calibration.values import Row as Row, value_rows as value_rows
+    from pteron.report.calibration.values import (
+        CalibrationRow as CalibrationRow,
+        value_rows as value_rows,
+    )
     from pteron.report.calibration.write import (
         Written as Written,
         numbers as numbers,

@@ -10,8 +10,8 @@ import numpy as np
 from pteron.calibration import Calibration, calibrate
 from pteron.errors import PteronError
 from pteron.export.printers.linear_delta import LinearDelta
-from pteron.report.calibration.values import Row
-from pteron.report.typeset import measured
+from pteron.report.calibration.values import CalibrationRow
+from pteron.report.typeset import value_with_uncertainty
 
 _FREE = ("radius", "legs[1].angle", "legs[2].angle", "zeros")
 """Values that Klipper, Marlin and RepRapFirmware fit: the third tower's angle is the reference."""
@@ -24,7 +24,7 @@ _QUANTILE = 1.96
 class FirmwareFit:
     """A calibration of the firmware's six values, in its own units, and what it leaves."""
 
-    rows: tuple[Row, ...]
+    rows: tuple[CalibrationRow, ...]
     sentence: str
     """The error that it leaves, and the one before."""
     result: Calibration
@@ -41,10 +41,10 @@ class FirmwareFit:
 def firmware_fit(result: Calibration) -> FirmwareFit | None:
     """Return the firmware's values fitted to a calibration's measurements; None for no printer."""
     try:
-        drawn = LinearDelta.of(result.drawn)
+        drawn = LinearDelta.from_robot(result.drawn)
         loose = dict.fromkeys(("radius", "angles", "zeros"), float("inf"))
         fitted = calibrate(result.drawn, result.measurements, free=_FREE, prior=loose)
-        estimated = LinearDelta.of(fitted.robot)
+        estimated = LinearDelta.from_robot(fitted.robot)
     except PteronError:  # another machine, or too few rows
         return None
     names = [unknown.name for block in fitted.blocks for unknown in block.unknowns]
@@ -68,16 +68,23 @@ def firmware_fit(result: Calibration) -> FirmwareFit | None:
     return FirmwareFit(tuple(rows), _sentence(fitted), fitted)
 
 
-def _row(name: str, drawn: float, estimated: float, unit: str, deviation: float) -> Row:
+def _row(name: str, drawn: float, estimated: float, unit: str, deviation: float) -> CalibrationRow:
     half = _QUANTILE * deviation
     change = estimated - drawn
     if unit == "°":
         change = (change + 180.0) % 360.0 - 180.0
     drawn_text, estimated_text, changed = (
-        measured(value, half)[0] for value in (drawn, estimated, change)
+        value_with_uncertainty(value, half)[0] for value in (drawn, estimated, change)
     )
-    return Row(
-        name, drawn_text, estimated_text, changed, measured(0.0, half)[1], unit, "data", abs(change)
+    return CalibrationRow(
+        name,
+        drawn_text,
+        estimated_text,
+        changed,
+        value_with_uncertainty(0.0, half)[1],
+        unit,
+        "data",
+        abs(change),
     )
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from pteron.calibration import Calibration
 from pteron.calibration.result import Origin
-from pteron.report.typeset import measured
+from pteron.report.typeset import value_with_uncertainty
 
 _UNITS = {"m": (1e3, "mm"), "rad": (float(np.degrees(1.0)), "°"), "": (1e2, "%")}
 
@@ -17,7 +17,7 @@ _ORDINARY = {"m": 1e-3, "rad": 0.0035, "": 1e-3}
 
 
 @dataclass(frozen=True)
-class Row:
+class CalibrationRow:
     """One value in mm, degrees or percent: as texts with as many digits as its interval has."""
 
     name: str
@@ -31,7 +31,7 @@ class Row:
     """The size of the change beside an ordinary tolerance."""
 
 
-def value_rows(result: Calibration) -> tuple[Row, ...]:
+def value_rows(result: Calibration) -> tuple[CalibrationRow, ...]:
     """Return the values of a calibration, those that changed most first."""
     rows = []
     for value in result.values:
@@ -39,10 +39,13 @@ def value_rows(result: Calibration) -> tuple[Row, ...]:
         half = factor * 0.5 * (value.interval[1] - value.interval[0])
         change = value.found - value.drawn
         drawn, estimated, changed = (
-            measured(factor * number, half)[0] for number in (value.drawn, value.found, change)
+            value_with_uncertainty(factor * number, half)[0]
+            for number in (value.drawn, value.found, change)
         )
-        size, error = abs(change) / _ORDINARY[value.unit], measured(0.0, half)[1]
-        rows.append(Row(value.name, drawn, estimated, changed, error, unit, value.origin, size))
+        size, error = abs(change) / _ORDINARY[value.unit], value_with_uncertainty(0.0, half)[1]
+        rows.append(
+            CalibrationRow(value.name, drawn, estimated, changed, error, unit, value.origin, size)
+        )
     return tuple(sorted(rows, key=lambda row: -row.size))
 
 

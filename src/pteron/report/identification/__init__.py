@@ -9,7 +9,7 @@ from pteron.public import publish as _publish
 
 if TYPE_CHECKING:
     from pteron.report.identification.values import (
-        Parameter as Parameter,
+        ReportedParameter as ReportedParameter,
         parameter_rows as parameter_rows,
     )
     from pteron.report.identification.write import (
@@ -18,6 +18,6 @@ if TYPE_CHECKING:
         numbers as numbers,
         write_identification as write_identification,
     )
-    from pteron.report.typeset import measured as measured
+    from pteron.report.typeset import value_with_uncertainty as value_with_uncertainty
 
 _publish(__name__)

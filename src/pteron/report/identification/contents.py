@@ -15,7 +15,12 @@ import numpy as np
 from pteron.identification import Identification, Prediction
 from pteron.identification.estimators.estimate import autocorrelations
 from pteron.kernels import Array
-from pteron.report.identification.values import Body, Parameter, body_rows, parameter_rows
+from pteron.report.identification.values import (
+    ReportedBody,
+    ReportedParameter,
+    body_rows,
+    parameter_rows,
+)
 
 _MOST_PICTURES = 3
 """Held-out recordings, the worst ones, that are drawn; the page's table has them all."""
@@ -64,8 +69,8 @@ class Contents:
     fitted: tuple[PageRecording, ...]
     drawn: tuple[PageRecording, ...]
     repeats: bool
-    parameters: tuple[Parameter, ...]
-    bodies: tuple[Body, ...]
+    parameters: tuple[ReportedParameter, ...]
+    bodies: tuple[ReportedBody, ...]
     residuals: Array
     correlations: Array
     bound: Array

@@ -23,14 +23,14 @@ from pteron.plots import (
 )
 from pteron.report.identification.contents import Contents, PageRecording, contents
 from pteron.report.quantities import force, nouns
-from pteron.report.typeset import measured, template
+from pteron.report.typeset import template, value_with_uncertainty
 
 
 def page(result: Identification, model_file: str | None = None) -> str:
     """Return the page as HTML, with a link to the machine's file beside it and to no other."""
     document = template(
         "identification/page.html.j2",
-        measured=lambda row: measured(row.value, row.half),
+        measured=lambda row: value_with_uncertainty(row.value, row.half),
     )
     page_contents = contents(result)
     joints = [leg.joint for leg in result.robot.legs]

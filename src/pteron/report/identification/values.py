@@ -22,7 +22,7 @@ _NORMAL = 1.959963984540054
 
 
 @dataclass(frozen=True)
-class Parameter:
+class ReportedParameter:
     """One value of the model, and whether the data show it.
 
     `half` is half of its 95 % interval, `relative` its standard deviation over its size, `ratio`
@@ -48,7 +48,7 @@ class Parameter:
         return self.status != "essential"
 
 
-def parameter_rows(result: Identification) -> tuple[Parameter, ...]:
+def parameter_rows(result: Identification) -> tuple[ReportedParameter, ...]:
     """Return the values of an identification, in the model's order."""
     estimate, model = result.estimate, result.model
     base = model.base.values(result.robot)
@@ -61,7 +61,7 @@ def parameter_rows(result: Identification) -> tuple[Parameter, ...]:
         if name in (*result.unseen, *result.essential.dropped):
             status = "unseen" if name in result.unseen else "dropped"
         rows.append(
-            Parameter(
+            ReportedParameter(
                 name=name,
                 expression=expressions[k],
                 unit=estimate.units[k],
@@ -87,7 +87,7 @@ def _partners(correlation: Array) -> tuple[Array, Array]:
 
 
 @dataclass(frozen=True)
-class Body:
+class ReportedBody:
     """A body as it was identified and as it was drawn.
 
     Values are the mass, kg; for a body that turns also the centre of mass, m, None where it has no
@@ -102,7 +102,7 @@ class Body:
     border: bool
 
 
-def body_rows(result: Identification) -> tuple[Body, ...]:
+def body_rows(result: Identification) -> tuple[ReportedBody, ...]:
     """Return the bodies of an identification; none where there are no real ones."""
     consistency = result.consistency
     if consistency is None:
@@ -116,14 +116,16 @@ def body_rows(result: Identification) -> tuple[Body, ...]:
     }
     identified, drawn = consistency.robot, result.robot
     rows = [
-        Body(leg.names[letter], i - 1, _values(body_inertia), _values(old), (letter, i) in border)
+        ReportedBody(
+            leg.names[letter], i - 1, _values(body_inertia), _values(old), (letter, i) in border
+        )
         for i, (leg, other) in enumerate(zip(identified.legs, drawn.legs, strict=True), start=1)
         for (letter, body_inertia), old in zip(
             leg.bodies.items(), other.bodies.values(), strict=True
         )
     ]
     body, cad = (_values(robot.platform.joined) for robot in (identified, drawn))
-    return (*rows, Body("platform", None, body, cad, (PLATFORM, None) in border))
+    return (*rows, ReportedBody("platform", None, body, cad, (PLATFORM, None) in border))
 
 
 def _values(inertia: Inertia) -> tuple[float | None, ...]:
