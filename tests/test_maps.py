@@ -184,7 +184,7 @@ def test_the_status_says_which_leg_or_limit_ends_the_reach(name):
 
 def test_the_summary_is_over_poses_that_serve(whole):
     for name, best, worst in (("condition", np.nanmin, np.nanmax), ("margin", np.max, np.min)):
-        found, own = whole.summary(name), whole.values[name][whole.reachable]
+        found, own = whole.statistics(name), whole.values[name][whole.reachable]
         assert (found.best, found.worst) == (best(own), worst(own))
         at = (whole.grid.poses() == found.best_pose).all(axis=-1) & (
             whole.values[name] == found.best
@@ -192,7 +192,7 @@ def test_the_summary_is_over_poses_that_serve(whole):
         assert at.sum() == 1
         assert (found.mean, found.count) == (pytest.approx(own.mean()), len(own))
     with pytest.raises(DataError, match=r"^speed: is not in this map; it has condition, kappa"):
-        whole.summary("speed")
+        whole.statistics("speed")
 
 
 def test_threads_and_chunks_change_no_bit(delta):

@@ -33,6 +33,33 @@ class Column(NamedTuple):
 Cell = str | float | int | None
 
 
+class Overview(NamedTuple):
+    """What `html_table` shows of a result."""
+
+    title: str
+    about: str
+    columns: Sequence[Column]
+    rows: Sequence[Sequence[Cell]]
+    notes: Sequence[str] = ()
+
+    @property
+    def text(self) -> str:
+        """The same as lines of text: one for each row, and one for each note.
+
+        Examples
+        --------
+        >>> from pteron.html_table import Column, Overview
+        >>> print(Overview("A", "two", [Column("sum"), Column("of")], [["3", 2]]).text)
+        A: two
+        sum 3, of 2
+        """
+        lines = [f"{self.title}: {self.about}"]
+        for row in self.rows:
+            cells = zip(self.columns, map(_cell, row), strict=True)
+            lines.append(", ".join(f"{column.heading} {text}".strip() for column, text in cells))
+        return "\n".join([*lines, *self.notes])
+
+
 def html_table(
     title: str,
     about: str,
@@ -70,12 +97,14 @@ def html_table(
     return page.render(title=title, about=about, columns=columns, rows=cells, notes=notes)
 
 
-def frame_html(title: str, about: str, frame: pl.DataFrame, notes: Iterable[str] = ()) -> str:
-    """Return the first rows of a table as `html_table` does, with a note on those left out."""
+def frame_overview(
+    title: str, about: str, frame: pl.DataFrame, notes: Iterable[str] = ()
+) -> Overview:
+    """Return the first rows of a table for `html_table`, with a note on those left out."""
     columns = [Column(c.name, "number" if c.dtype.is_numeric() else "") for c in frame]
     hidden = len(frame) - _ROWS
-    more = [f"{hidden} more rows: see table()"] if hidden > 0 else []
-    return html_table(title, about, columns, frame.head(_ROWS).iter_rows(), [*notes, *more])
+    hint = [f"{hidden} more rows: see table()"] if hidden > 0 else []
+    return Overview(title, about, columns, [*frame.head(_ROWS).iter_rows()], (*notes, *hint))
 
 
 def _kind(kind: str) -> Markup:

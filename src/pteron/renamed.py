@@ -145,6 +145,12 @@ def former_name(package: str, name: str) -> Any:
         return import_module(present)
 
 
+def warn_former(former: str, present: str, *, depth: int = 3) -> None:
+    """Warn that a former way goes, with what to write instead; `depth` calls below the user's."""
+    text = f"{former} goes with version {UNTIL}; write {present}"
+    warnings.warn(text, DeprecationWarning, stacklevel=depth)
+
+
 class FormerAttribute(property):
     """A property of a class and its objects: an attribute under its former name."""
 
@@ -170,11 +176,7 @@ def former_attribute(former: str, present: str) -> property:
 
     def attribute(own: Any) -> Any:
         owner = own if isinstance(own, type) else type(own)
-        warnings.warn(
-            f"{owner.__name__}.{former} goes with version {UNTIL}; write .{present}",
-            DeprecationWarning,
-            stacklevel=3,
-        )
+        warn_former(f"{owner.__name__}.{former}", f".{present}", depth=4)
         return getattr(own, present)
 
     return FormerAttribute(attribute)

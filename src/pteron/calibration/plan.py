@@ -23,6 +23,7 @@ from pteron.errors import DataError, ModelError
 from pteron.kernels import numeric
 from pteron.kinematics import random_poses
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.result import Result
 from pteron.workspace import Box, Cylinder, home_pose, prove
 
 Array = NDArray[np.float64]
@@ -68,8 +69,8 @@ _NOISE = dict.fromkeys(KINDS, 2e-5)
 """Noise that is expected where nobody says it, m and rad."""
 
 
-@dataclass(frozen=True)
-class Plan:
+@dataclass(frozen=True, eq=False, repr=False)
+class Plan(Result):
     """Poses to measure, in the order to go.
 
     Attributes
@@ -92,6 +93,8 @@ class Plan:
     checked : int
         How many poses, or more, leave some to check the calibration by.
     """
+
+    ROWS = "poses:1 readings:1"
 
     robot: Manipulator
     measure: Measure

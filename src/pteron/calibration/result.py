@@ -26,6 +26,7 @@ from pteron.json_values import fields_as_json
 from pteron.legs import Reading
 from pteron.manipulator import Manipulator
 from pteron.manipulator.machine_record import machine_record
+from pteron.result import Result
 from pteron.verdict import Verdict
 
 Array = NDArray[np.float64]
@@ -45,8 +46,8 @@ _OPEN_ROWS = 400
 _QUANTILE = float(scipy.stats.norm.ppf(0.975))
 
 
-@dataclass(frozen=True)
-class Value:
+@dataclass(frozen=True, eq=False, repr=False)
+class Value(Result):
     """One value of a calibration.
 
     Attributes
@@ -77,8 +78,8 @@ class Value:
         return self.found - half, self.found + half
 
 
-@dataclass(frozen=True)
-class HeldOut:
+@dataclass(frozen=True, eq=False, repr=False)
+class HeldOut(Result):
     """Root mean square errors at held-out rows, by kind of measurement, in SI units.
 
     `before` is with the machine as drawn, `after` with the calibrated one.
@@ -91,8 +92,8 @@ class HeldOut:
     """The expected values of `after`, from the noise and the intervals."""
 
 
-@dataclass(frozen=True)
-class CalibrationFinding:
+@dataclass(frozen=True, eq=False, repr=False)
+class CalibrationFinding(Result):
     """A fault that the measurements show: its kind, and a sentence that says where it is."""
 
     kind: str
@@ -103,8 +104,8 @@ class CalibrationFinding:
     """Greatest shift that it makes of a measurement that was fitted, in ordinary errors."""
 
 
-@dataclass(frozen=True)
-class HiddenOrder:
+@dataclass(frozen=True, eq=False, repr=False)
+class HiddenOrder(Result):
     """Legs whose readings could stand in another order and nothing would show.
 
     Attributes
@@ -119,8 +120,8 @@ class HiddenOrder:
     error: float
 
 
-@dataclass(frozen=True)
-class Calibration:
+@dataclass(frozen=True, eq=False, repr=False)
+class Calibration(Result):
     """A machine's geometry from measurements.
 
     Attributes
@@ -152,6 +153,8 @@ class Calibration:
     hidden_order : HiddenOrder or None
         Legs of which the measurements do not show the order.
     """
+
+    ROWS = "values"
 
     drawn: Manipulator
     robot: Manipulator
@@ -221,6 +224,10 @@ class Calibration:
             self.fit.guess, self.fit.total, self.fit
         )
 
+    def summary(self) -> str:
+        """Return the verdict with its reasons and advice, and the rank, for people, as lines."""
+        return f"{self.robot.name}: {self.verdict.summary()}\n{self.observability.summary()}"
+
     def as_dict(self) -> dict[str, Any]:
         """Return the calibration as plain data, as `calibration.json` has it."""
         values = [{**asdict(value), "interval": list(value.interval)} for value in self.values]
@@ -232,7 +239,7 @@ class Calibration:
             "values": values,
             **fields_as_json(self.fit.guess, "zeros scales"),
             "noise": self.noise,
-            **fields_as_json(self.observability, "rank shown columns"),
+            **fields_as_json(self.observability, "rank shown=determined_count columns"),
             "certificate": self.observability.summary(),
             **fields_as_json(self.observability, "unseen weak"),
             **fields_as_json(self, "held_out findings verdict open_errors hidden_order"),

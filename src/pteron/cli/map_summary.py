@@ -51,7 +51,7 @@ def _index_data(index_map: Map, name: str) -> dict[str, Any]:
     index = ALL[name]
     about = fields_as_json(index, "index=name title unit better")
     try:
-        summary = index_map.summary(name)
+        summary = index_map.statistics(name)
     except DataError:
         undetermined = int(index_map.reachable.sum())
         return {

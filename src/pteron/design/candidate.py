@@ -24,6 +24,7 @@ from pteron.manipulator import Manipulator
 from pteron.manipulator.saving import text_of
 from pteron.motion import Path, limits_of, time_optimal
 from pteron.renamed import former_attribute
+from pteron.result import Result
 from pteron.workspace import Proof, clearance
 
 _WORST = 8
@@ -36,8 +37,8 @@ _TRIED = 9
 """Number of designs that are proved in turn: ranks 1, 2, 4, 8, ..., as neighbours fail alike."""
 
 
-@dataclass(frozen=True)
-class Candidate:
+@dataclass(frozen=True, eq=False, repr=False)
+class Candidate(Result):
     """One kind of machine after the search: its best design, or why there is none.
 
     Attributes

@@ -19,7 +19,7 @@ from pteron.design.kind_search import search_kind
 from pteron.design.kinds import Kind, fitting_kinds
 from pteron.design.rating import KindEvaluator
 from pteron.errors import DataError, PteronError
-from pteron.html_table import frame_html
+from pteron.html_table import Overview, frame_overview
 from pteron.json_values import json_ready
 from pteron.kernels.one_thread import one_thread
 from pteron.kernels.program_cache import EQUATIONS, name_of
@@ -27,6 +27,7 @@ from pteron.manipulator import load
 from pteron.manipulator.saving import text_of
 from pteron.processes import WorkerPool
 from pteron.renamed import former_attribute
+from pteron.result import Result
 
 if TYPE_CHECKING:
     import polars as pl
@@ -45,8 +46,8 @@ _KEPT = "kinds"
 """Folder of the kinds that are finished, in that of the results."""
 
 
-@dataclass(frozen=True)
-class Choice:
+@dataclass(frozen=True, eq=False, repr=False)
+class Choice(Result):
     """The kinds of machines searched for a task, each with its best design.
 
     Attributes
@@ -79,9 +80,9 @@ class Choice:
         rows = [{"kind": c.kind, "serves": c.serves, **c.figures} for c in self.candidates]
         return pl.DataFrame(rows, infer_schema_length=None)
 
-    def _repr_html_(self) -> str:
+    def _overview(self) -> Overview:
         best = "no kind does what is asked" if self.best is None else f"{self.best.kind} is best"
-        return frame_html("Kinds of machines", best, self.table(), self.summary().splitlines())
+        return frame_overview("Kinds of machines", best, self.table(), self.summary().splitlines())
 
     def robots(self) -> dict[str, str]:
         """Return the machines' files by their names."""

@@ -22,6 +22,7 @@ from pteron.kinematics.sampling import joint_limits, search_ball
 from pteron.manipulator import Manipulator, parameters
 from pteron.motion import Motion, Sizing, size
 from pteron.renamed import former_attribute
+from pteron.result import Result
 from pteron.workspace import Box, Region
 from pteron.workspace.fit import UNKNOWN, Fit, largest_fit
 from pteron.workspace.shape_samples import cube, shape_samples
@@ -36,8 +37,8 @@ _IN_CUBE = 5
 """Sample poses along each edge of the largest cube, where that stands for the workspace."""
 
 
-@dataclass(frozen=True)
-class Design:
+@dataclass(frozen=True, eq=False, repr=False)
+class Design(Result):
     """A machine of a search, with quantities that are computed lazily.
 
     Attributes
@@ -52,10 +53,21 @@ class Design:
         The least row of the conditions over the required workspace that a proof has shown.
     """
 
+    SHOWN = "robot quantities"
+
     task: Task
     robot: Manipulator
     known: Fit | None = None
     least: float = np.inf
+
+    def __repr__(self) -> str:
+        """Return the design in a line, without what it has yet to compute."""
+        return f"<Design of {self.task.robot.name!r}: {self.robot.name}>"
+
+    @property
+    def quantities(self) -> dict[str, float]:
+        """The quantities of its search, by name; NaN where it has none."""
+        return {name: self.quantity(name) for name in self.task.quantity_names}
 
     @cached_property
     def geometry(self) -> Array:

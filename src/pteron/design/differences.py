@@ -11,6 +11,7 @@ from pteron.design.task import Task
 from pteron.manipulator import Manipulator
 from pteron.manipulator.manipulator import legs_text
 from pteron.renamed import former_attribute
+from pteron.result import Result
 
 _NONE = 1e-9
 """Smaller changes, in m or without unit, count as none."""
@@ -19,8 +20,8 @@ _SMALL = 1e-2
 """Length from which on a tenth of a millimetre is fine enough, m."""
 
 
-@dataclass(frozen=True)
-class Change:
+@dataclass(frozen=True, eq=False, repr=False)
+class Change(Result):
     """One number before and after.
 
     Attributes

@@ -15,17 +15,18 @@ from pteron.design.proofs import counterexamples
 from pteron.design.rows import FAILED, MISSES, places, violations
 from pteron.design.task import Task
 from pteron.errors import ModelError
-from pteron.html_table import frame_html
+from pteron.html_table import Overview, frame_overview
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
 from pteron.renamed import FormerTable, former_attribute
+from pteron.result import Result
 
 if TYPE_CHECKING:
     import polars as pl
 
 
-@dataclass(frozen=True, repr=False)
-class Front:
+@dataclass(frozen=True, eq=False, repr=False)
+class Front(Result):
     """The best designs that a search has found.
 
     Attributes
@@ -70,9 +71,9 @@ class Front:
             "front": self.designs.select(list(self.headings)).to_dicts(),
         }
 
-    def _repr_html_(self) -> str:
+    def _overview(self) -> Overview:
         title, _, about = self.summary().partition(": ")
-        return frame_html(title, about, self.table())
+        return frame_overview(title, about, self.table())
 
     def __repr__(self) -> str:
         """Return the front in a line."""

@@ -20,6 +20,7 @@ from pteron.design.spec import ROUNDING
 from pteron.design.task import Task
 from pteron.kernels import Array, alike
 from pteron.manipulator import Manipulator, Radii
+from pteron.result import Result
 from pteron.workspace import Box, Proof, Region, interference, prove
 from pteron.workspace.fit import UNKNOWN, Fit, proved_fit
 from pteron.workspace.shape_samples import Samples, fixed_samples
@@ -42,8 +43,8 @@ _LONGER = 0.05
 """Share of its travel by which a guide or ram grows where a proof fails at its end."""
 
 
-@dataclass(frozen=True)
-class ProvedCube:
+@dataclass(frozen=True, eq=False, repr=False)
+class ProvedCube(Result):
     """A cube of which every pose keeps reach, limits and floors, at each orientation.
 
     Attributes
@@ -84,8 +85,8 @@ def place_words(center: Array) -> str:
     return f"({numbers}) mm" if len(center) > 1 else f"{numbers} mm"
 
 
-@dataclass(frozen=True)
-class Proved:
+@dataclass(frozen=True, eq=False, repr=False)
+class Proved(Result):
     """A design as far as it is proved.
 
     Attributes

@@ -25,12 +25,13 @@ from pteron.manipulator.names import LONGEST_NAME
 from pteron.manipulator.saving import text_of
 from pteron.motion import MotorFit
 from pteron.renamed import former_attribute
+from pteron.result import Result
 
 if TYPE_CHECKING:
     import polars as pl
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class ReportedDesign(Proved):
     """One machine of a search, with the proofs about it.
 
@@ -39,6 +40,8 @@ class ReportedDesign(Proved):
     name : str
         "start", "best-cube", "compromise", ...
     """
+
+    ROWS = "changes"
 
     name: str
 
@@ -138,11 +141,15 @@ def _motor_words(fit: MotorFit) -> str:
     )
 
 
-@dataclass(frozen=True)
-class FrontReport:
+@dataclass(frozen=True, eq=False, repr=False)
+class FrontReport(Result):
     """A front with the designs that a report shows, and the machine that it began with."""
 
     front: Front
+
+    def __repr__(self) -> str:
+        """Return the report in a line."""
+        return f"<FrontReport of {self.front.task.robot.name!r}: {', '.join(self.front.selection)}>"
 
     @cached_property
     def start(self) -> ReportedDesign:

@@ -56,7 +56,7 @@ _ROWS = ("matrix", "forces", "time", "gain", "payload")
 """Fields of observations with an entry for each row."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Observations(OfLog):
     """Rows of F = W beta, after the parallel filter.
 

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pteron.errors import DataError
-from pteron.html_table import frame_html
+from pteron.html_table import Overview, frame_overview
 from pteron.indices import INDICES, Index
 from pteron.kernels import Array
 from pteron.maps.grid import Grid
 from pteron.platforms.coordinates import coordinate
-from pteron.renamed import former_attribute
+from pteron.renamed import former_attribute, warn_former
+from pteron.result import Result
 from pteron.workspace import BEYOND_LIMITS, REACHABLE
 
 if TYPE_CHECKING:
@@ -35,8 +36,8 @@ ALL = {MARGIN.name: MARGIN, **INDICES}
 """All indices that a map may hold, by name."""
 
 
-@dataclass(frozen=True)
-class Summary:
+@dataclass(frozen=True, eq=False, repr=False)
+class Summary(Result):
     """Statistics of an index over the poses of a map that are in reach and within limits.
 
     Attributes
@@ -67,8 +68,8 @@ class Summary:
     infinite: int
 
 
-@dataclass(frozen=True)
-class Map:
+@dataclass(frozen=True, eq=False, repr=False)
+class Map(Result):
     """Indices over a grid of poses.
 
     Attributes
@@ -124,7 +125,23 @@ class Map:
         shares = zip(codes.tolist(), (counts / self.status.size).tolist(), strict=True)
         return {cause(code): share for code, share in shares if code != REACHABLE}
 
-    def summary(self, name: str) -> Summary:
+    def summary(self, name: str = "") -> Any:
+        """Return the statistics of each index, for people, as lines of text."""
+        if name:
+            warn_former("Map.summary(name)", ".statistics(name)")
+            return self.statistics(name)
+        lines = [f"{self.robot}: {self.share:.1%} of {self.status.size} poses in reach"]
+        lines += [f"{cause}: {share:.1%}" for cause, share in self.causes.items()]
+        for index in self.indices:
+            if np.isfinite(self.values[index.name][self.reachable]).any():
+                figures = self.statistics(index.name)
+                numbers = f"best {figures.best:.4g}, worst {figures.worst:.4g}"
+                lines.append(
+                    f"{index.name}: {numbers}, mean {figures.mean:.4g} {index.unit}".rstrip()
+                )
+        return "\n".join(lines)
+
+    def statistics(self, name: str) -> Summary:
         """Return the best, the worst and the mean of an index over the poses that serve.
 
         Raises
@@ -194,9 +211,9 @@ class Map:
 
     at = former_attribute("at", "slice_at")
 
-    def _repr_html_(self) -> str:
+    def _overview(self) -> Overview:
         about = f"{self.share:.1%} of {self.status.size} poses in reach"
-        return frame_html(self.robot, about, self.table())
+        return frame_overview(self.robot, about, self.table())
 
 
 def column_heading(index: Index) -> str:

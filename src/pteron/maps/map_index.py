@@ -92,7 +92,7 @@ def map_index(
     >>> from pteron.maps import map_index, pose_grid
     >>> robot = pteron.load("quadrupteron")
     >>> found = map_index(robot, "condition", pose_grid(robot, {"z": 0.0, "phi": 0.0}, points=41))
-    >>> found, round(found.summary("condition").best, 3)
+    >>> found, round(found.statistics("condition").best, 3)
     (<Map of 'quadrupteron': condition over x 41 x y 41>, 2.414)
     """
     robot = as_manipulator(robot)

@@ -23,6 +23,7 @@ from pteron.errors import DataError, ModelError
 from pteron.extras import install_command
 from pteron.kernels import Array
 from pteron.maps.map import MARGIN, Map, column_heading
+from pteron.result import Result
 
 ENDINGS = (".vtk", ".vtu", ".ply", ".stl")
 """Endings of files that hold surfaces; STL does not hold the value that a surface belongs to."""
@@ -34,8 +35,8 @@ _BEYOND = 1e-9
 """Places outside of the grid get minus this as margin, m, so that the reach's surface is closed."""
 
 
-@dataclass(frozen=True)
-class Surface:
+@dataclass(frozen=True, eq=False, repr=False)
+class Surface(Result):
     """A surface in three coordinates.
 
     Attributes
@@ -49,6 +50,8 @@ class Surface:
     values : array, shape (P,)
         The index at the points.
     """
+
+    ROWS = "points:1 values"
 
     level: float | None
     points: Array
@@ -90,7 +93,7 @@ def surfaces(
         raise DataError(
             f"surfaces need a map over three coordinates, and here there vary {varying}"
         )
-    index_map.summary(name)  # or says that there is none
+    index_map.statistics(name)  # or says that there is none
     amounts, serves = index_map.values[name], index_map.reachable
     known = serves & np.isfinite(amounts)
     if levels is None:

@@ -200,7 +200,7 @@ def _plane(
         mesh, ax=axes, fraction=0.05, pad=0.02, extend=_colorbar_extension(drawn, scale)
     )
     direction = "bright is better"
-    if drawn.count() and _is_constant(summary := plane.summary(name)):
+    if drawn.count() and _is_constant(summary := plane.statistics(name)):
         bar.set_ticks([factor * summary.best], labels=[f"{factor * summary.best:.4g}"])
         direction = "the same everywhere here"
     elif isinstance(scale, LogNorm):
@@ -271,7 +271,7 @@ def _hatch_unreachable(axes: Axes, plane: Map, name: str, causes: Mapping[str, A
 
 def _mark_best(axes: Axes, plane: Map, name: str, handles: list[Any]) -> None:
     """Mark the best pose of a plane, unless the index is constant."""
-    summary = plane.summary(name)
+    summary = plane.statistics(name)
     if _is_constant(summary):
         return
     factor = shown_unit(summary.unit)[0]

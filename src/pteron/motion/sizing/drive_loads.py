@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import scipy  # type: ignore[import-untyped]
 
-from pteron.html_table import Column, html_table
+from pteron.html_table import Column, Overview
 from pteron.json_values import fields_as_json
 from pteron.kernels import Array
 from pteron.legs import Drive
@@ -22,6 +22,7 @@ from pteron.manipulator import Manipulator
 from pteron.motion.sizing.drive_margins import DriveMargin, drive_margins
 from pteron.motion.sizing.places import CyclePlace
 from pteron.renamed import former_attribute
+from pteron.result import Result
 from pteron.shapes import PerJoint
 
 if TYPE_CHECKING:
@@ -41,8 +42,8 @@ _NONE = 1e-9
 """Share of the drives' energy below which its net sum counts as zero: rounding."""
 
 
-@dataclass(frozen=True, repr=False)
-class Sizing:
+@dataclass(frozen=True, eq=False, repr=False)
+class Sizing(Result):
     """The load on a machine's drives over one cycle: motions and rests, at one place or at several.
 
     Everything is at the joints, per leg: N and m/s of a slider, N m and rad/s of a crank, but for
@@ -85,7 +86,11 @@ class Sizing:
         """Return the sizing in a line; `table` has it all."""
         return f"<Sizing of {self.robot.name!r}: a cycle of {self.duration:.6g} s>"
 
-    def _repr_html_(self) -> str:
+    def summary(self) -> str:
+        """Return the loads of each drive, for people, as lines of text."""
+        return self._overview().text
+
+    def _overview(self) -> Overview:
         headings = ("peak force", "rms force", "peak speed", "peak power", "mean power")
         columns = [Column("joint"), *(Column(name, "number") for name in headings)]
         columns_of_numbers = (
@@ -101,7 +106,7 @@ class Sizing:
             cells = (f"{number:.4g} {unit}" for number, unit in zip(row, units, strict=True))
             rows.append((name, *cells))
         about = f"drives over a cycle of {self.duration:.6g} s"
-        return html_table(self.robot.name, about, columns, rows, self.overloads)
+        return Overview(self.robot.name, about, columns, rows, self.overloads)
 
     @property
     def duration(self) -> float:

@@ -13,13 +13,14 @@ from pteron.arguments import expect
 from pteron.motion.sizing.drive_loads import HOLDING, Sizing, best_ratio, mean_squares
 from pteron.motion.sizing.gearing import Span, peak_span, rated_span, speed_span, torques
 from pteron.motion.sizing.motors import Motor
+from pteron.result import Result
 
 _SAME = 1e-9
 """Relative difference below which ratios are the same."""
 
 
-@dataclass(frozen=True)
-class MotorFit:
+@dataclass(frozen=True, eq=False, repr=False)
+class MotorFit(Result):
     """A motor at a joint over a cycle: the ratios at which it serves, and its margins.
 
     Attributes
@@ -74,8 +75,8 @@ class MotorFit:
         }
 
 
-@dataclass(frozen=True)
-class CommonFit:
+@dataclass(frozen=True, eq=False, repr=False)
+class CommonFit(Result):
     """A motor at several legs over a cycle, behind the same ratio at each.
 
     Attributes
@@ -92,6 +93,8 @@ class CommonFit:
     fits : tuple of MotorFit
         The motor at each leg, at this ratio.
     """
+
+    ROWS = "fits"
 
     legs: tuple[int, ...]
     motor: Motor

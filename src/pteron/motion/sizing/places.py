@@ -24,6 +24,7 @@ from pteron.motion.motion import Motion, pose_text
 from pteron.motion.trajectories.cycle import moves
 from pteron.motion.trajectories.scaling import keeps_margin, least_margin
 from pteron.motion.trajectories.tool import Curve, pose_motion, tool_motion
+from pteron.result import Result
 from pteron.workspace import Box, Region, bounding_box, home_pose
 
 TURNS = 12
@@ -43,8 +44,8 @@ _ROUNDING = 1e-9
 
 
 @checked_arguments
-@dataclass(frozen=True)
-class CyclePlace:
+@dataclass(frozen=True, eq=False, repr=False)
+class CyclePlace(Result):
     """A place of a cycle.
 
     Parameters

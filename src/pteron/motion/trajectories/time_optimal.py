@@ -76,7 +76,7 @@ _SLOWEST = 1e-4
 """Share of the largest s'^2 below which no tangent of its root is taken."""
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class TimeOptimal(Motion):
     """A motion along a path in next to the shortest time.
 
