@@ -48,6 +48,26 @@ def _map():
     return maps.map_index(robot, "condition", maps.pose_grid(robot, points=7))
 
 
+def _surfaces():
+    grid = maps.pose_grid("tripteron", {}, points=5)
+    return maps.surfaces(maps.map_index("tripteron", "margin", grid), "margin")
+
+
+def _fastest():
+    robot = pteron.load("five-bar")
+    path = motion.line_path(robot, [HOME, [0.01, 0.125]])
+    return motion.time_optimal(robot, path, motion.limits_of(robot, force=5.0, speed=1.0))
+
+
+def _observations():
+    robot = pteron.load("five-bar")
+    log = log_of(robot, size=0.01)
+    model = identification.identification_model("five-bar")
+    return identification.observations_of(
+        model, log, identification.preprocessing_for_log(robot, log)
+    )
+
+
 def _calibration():
     robot = pteron.load("linear-delta")
     poses = pteron.random_poses(robot, 40)
@@ -60,7 +80,9 @@ def _fit():
     t = np.linspace(0.0, 10.0, 1000)
     regressor = np.column_stack([np.sin(t), np.cos(3.0 * t)])
     forces = regressor @ [0.2, 0.5] + 0.01 * np.random.default_rng(0).normal(size=t.shape)
-    return identification.estimate(regressor, forces, names=["a", "b"], units=["N", "N"])
+    names, units = ["a", "b", "c"], ["N"] * 3
+    regressor = np.column_stack([regressor, regressor[:, :1]])
+    return identification.estimate(regressor, forces, names=names, units=units, reduce=True)
 
 
 @cache
@@ -98,12 +120,28 @@ def _states():
     return States.from_joints(robot, (joints, rest, rest), _cycle().time, HOME)
 
 
+def _parameters_of_drives():
+    estimate, numbers = _fit().estimate, np.ones(2)
+    return (
+        identification.DriveGains(*[numbers] * 3, "N m/A", estimate, numbers, 1.0, 1.0),
+        identification.Transmissions(*[numbers] * 6),
+    )
+
+
+def _cue():
+    time = np.linspace(0.0, 1.0, 201)
+    columns = {"t": time, "ax": np.sin(time), "ay": 0.0 * time, "az": 0.0 * time}
+    columns |= {name: 0.0 * time for name in ("wx", "wy", "wz")}
+    return motion.cue("stewart", columns)
+
+
 def _payload():
     robot = pteron.load("five-bar")
     logs = (log_of(one, size=0.01) for one in (robot, motion.with_payload(robot, 0.2)))
     return identification.identify_payload(robot, *logs)
 
 
+@cache
 def _excitation():
     return excitation.optimal_excitation("five-bar", period=3.0, harmonics=2, starts=1, seed=1)
 
@@ -125,9 +163,19 @@ MADE = {
     "contacts": lambda: workspace.mode_contacts(
         workspace.mode_pavings("five-bar", HOME, tolerance=0.2)
     ),
+    "cue": _cue,
     "cube": lambda: workspace.largest_cube("five-bar", HOME),
-    "excitation": _excitation,
+    "drives": _parameters_of_drives,
+    "excitation": lambda: (_excitation(), _excitation().with_leads(), _excitation().held_out()),
     "film": lambda: Film(Path("delta.gif"), 3, 25.0, 1.0, (320, 240)),
+    "fault": lambda: identification.IsolatedFault(
+        "delay", ("1",), np.ones(1), np.ones(1), 0.0, 0.1, np.zeros(1)
+    ),
+    "findings": lambda: (
+        calibration.CalibrationFinding("drift", "The readings drift."),
+        calibration.HiddenOrder((1, 2), 1e-3),
+        motion.CyclePlace((0.0, 0.12)),
+    ),
     "fit": _fit,
     "free region": lambda: workspace.free_of_singularities(
         "five-bar", [[0.0, 0.12], [0.005, 0.125]]
@@ -143,13 +191,18 @@ MADE = {
     "margins": lambda: workspace.pose_margins("five-bar", [HOME, [0.01, 0.12]]),
     "motion": _cycle,
     "motor": lambda: motion.choose_common(_sizing(), [_MOTOR]),
+    "observations": _observations,
     "paving": _paving,
     "payload": _payload,
     "plan": lambda: calibration.plan("linear-delta", 8),
     "pose error": lambda: indices.pose_error("five-bar", HOME, indices.Tolerances(joints=1e-4)),
     "proof": lambda: workspace.prove("five-bar", workspace.Box((0.0, 0.12), (0.005, 0.125))),
     "reactions": lambda: indices.reactions("five-bar", HOME),
-    "report": lambda: design.FrontReport(_front()),
+    "report": lambda: (report := design.FrontReport(_front()), report.selection[-1].changes),
+    "reported designs": lambda: [
+        (reported, reported.design) for reported in design.FrontReport(_front()).selection
+    ],
+    "proved": lambda: design.prove_design(design.start_design(_front().task)),
     "sensitivities": lambda: indices.geometric_sensitivities("five-bar", HOME),
     "simulation": lambda: motion.simulate("five-bar", _cycle(), ComputedTorque(), duration=0.01),
     "singularity": lambda: workspace.nearest_singularities("five-bar", HOME),
@@ -159,6 +212,8 @@ MADE = {
     "statistics": lambda: _map().statistics("condition"),
     "stiffness": lambda: indices.stiffness("five-bar", HOME, indices.Elasticity(actuators=1e4)),
     "tilt": lambda: workspace.largest_tilt("stewart", [0.0, 0.0, 0.6, 0, 0, 0], tolerance=0.1),
+    "surfaces": _surfaces,
+    "time-optimal": _fastest,
     "trial": lambda: motion.trial("five-bar", _cycle(), ComputedTorque()),
     "tuning": lambda: motion.tune("five-bar", poses=[HOME]),
     "volume": lambda: workspace.reach_volume("five-bar", HOME, count=500),
@@ -184,7 +239,6 @@ NO_RESULTS = {
         "Dialect",
         "KnownPayload",
         "Log",
-        "Observations",
         "SampleBlock",
         "Table",
     ),  # read from files
@@ -277,6 +331,17 @@ def test_results_compare_hash_print_and_have_tables():
         assert isinstance(table, pl.DataFrame), name
         assert len(set(table.columns)) == len(table.columns) > 0, name
         assert result._repr_html_(), name
+
+
+@CLIENTS
+def test_every_class_of_results_is_among_these():
+    def subclasses(kind):
+        for each in kind.__subclasses__():
+            yield each
+            yield from subclasses(each)
+
+    others = {kind for kind in subclasses(Result) if kind.__module__.startswith("pteron")}
+    assert {kind.__name__ for kind in others - {*_results()}} == {"Certificate"}  # abstract
 
 
 @CLIENTS

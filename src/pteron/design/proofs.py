@@ -99,6 +99,8 @@ class Proved(Result):
         Proofs of the required workspace, one for each orientation; none where none is required.
     """
 
+    ROWS = "design"
+
     design: Design
     cube: ProvedCube | None
     workspace: tuple[Proof, ...]
