@@ -37,7 +37,7 @@ from pteron.errors import DataError
 from pteron.kernels import numeric
 from pteron.kinematics import inverse_kinematics, pose_of
 from pteron.motion import line_path, polynomial_motion, with_payload
-from pteron.report.choice.write import page, write_choice
+from pteron.report.design.choice import page, write_choice
 from pteron.workspace import Box, clearance, pose_margins, prove
 
 JOB = {

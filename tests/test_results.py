@@ -131,7 +131,7 @@ def _parameters_of_drives():
 def _cue():
     time = np.linspace(0.0, 1.0, 201)
     columns = {"t": time, "ax": np.sin(time), "ay": 0.0 * time, "az": 0.0 * time}
-    columns |= {name: 0.0 * time for name in ("wx", "wy", "wz")}
+    columns |= dict.fromkeys(("wx", "wy", "wz"), 0.0 * time)
     return motion.cue("stewart", columns)
 
 

@@ -78,7 +78,7 @@ def choose(
         raise
     files = []
     if out is not None:
-        from pteron.report.choice.write import write_choice
+        from pteron.report.design.choice import write_choice
 
         files = write_choice(choice, out)
     data = choice.as_dict() | ({"files": [str(file) for file in files]} if files else {})
@@ -114,18 +114,9 @@ class _Log:
 
 
 def _show(choice: Choice) -> None:
-    from pteron.design.choice_text import (
-        assumption_lines,
-        cells,
-        dimensions,
-        drives,
-        margins,
-        requirement_lines,
-    )
-
-    show("[bold]Asked[/bold]: " + plain("; ".join(requirement_lines(choice.job))))
+    show("[bold]Asked[/bold]: " + plain("; ".join(choice.job.requirement_lines())))
     serving = [candidate for candidate in choice.candidates if candidate.serves]
-    rows = {candidate.kind: cells(candidate) for candidate in serving}
+    rows = {candidate.kind: candidate.figure_texts for candidate in serving}
     shown = list(dict.fromkeys(key for row in rows.values() for key in row))
     if serving:
         table_rows = (
@@ -134,15 +125,15 @@ def _show(choice: Choice) -> None:
         show(table("kind", *shown, rows=table_rows, numbers=tuple(shown), names=("kind",)))
     for candidate in serving:
         show(
-            f"[bold]{candidate.kind}[/bold]: {plain(drives(candidate))}",
-            f"  mm: {dimensions(candidate)}",
+            f"[bold]{candidate.kind}[/bold]: {plain(candidate.drive_text)}",
+            f"  mm: {candidate.dimension_text}",
             f"  {plain(candidate.proved)}",
             f"  {plain(candidate.clear)}",
-            f"  margins: {plain(margins(candidate))}",
+            f"  margins: {plain(candidate.margin_text)}",
         )
     for candidate in choice.candidates:
         if not candidate.serves:
             verdict = candidate.summary().removeprefix(candidate.kind)
             show(f"[bold]{candidate.kind}[/bold]{plain(verdict)}")
     if serving:
-        show(*(f"[dim]{plain(line)}[/dim]" for line in assumption_lines(choice)))
+        show(*(f"[dim]{plain(line)}[/dim]" for line in choice.assumption_lines()))

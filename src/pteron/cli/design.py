@@ -16,8 +16,6 @@ from pteron.errors import DataError
 from pteron.extras import expect_extra
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from pteron.design import Front, FrontReport, Spec
 
 _GENERATIONS, _SURVEY = "generations", "survey"
@@ -82,7 +80,11 @@ def design(
         _tell_resumed(Path(out))
     front = _search_front(requirements, out, sweep, workers, scheduler)
     summary = FrontReport(front)
-    files = [] if out is None else _write(summary, Path(out))
+    files = []
+    if out is not None:
+        from pteron.report.design.front import write_front
+
+        files = write_front(summary, out)
     data = summary.as_dict() | ({"files": [str(file) for file in files]} if files else {})
     return Result(data, partial(_show, summary), files)
 
@@ -113,45 +115,11 @@ def _search_front(
         return search(spec, folder=None if out is None else Path(out) / _GENERATIONS, **work)
 
 
-def _write(summary: FrontReport, folder: Path) -> list[Path]:
-    from pteron.atomic import write_texts
-    from pteron.json_values import json_text
-    from pteron.plots import save_figure
-    from pteron.tables import write_table
-
-    rows = summary.table()
-    figures = json_text(summary.as_dict())
-    texts = {"report.md": summary.page(), "design.json": figures, **summary.robots()}
-    return [
-        *write_texts(folder, texts),
-        write_table(rows, folder / "front.csv"),
-        write_table(rows, folder / "front.parquet"),
-        save_figure(_figure(summary), folder / "front.png"),
-    ]
-
-
-def _figure(summary: FrontReport) -> Figure:
-    from pteron.design import start_design
-    from pteron.plots import front_figure
-
-    front = summary.front
-    names = [o.quantity for o in front.task.spec.objectives]
-    return front_figure(
-        front.objectives,
-        names,
-        [front.task.unit(name) for name in names],
-        start=[start_design(front.task).quantity(name) for name in names],
-        chosen=front.selection,
-    )
-
-
 def _show(summary: FrontReport) -> None:
-    from pteron.design.spec import asked_words
-
     front = summary.front
     name, _, counts = front.summary().partition(": ")
     show(f"[bold]{plain(name)}[/bold]: {counts}")
-    show(*(f"Asked for: {plain(line)}" for line in asked_words(front.task.spec)))
+    show(*(f"Asked for: {plain(line)}" for line in front.task.spec.requirement_lines()))
     lines = (*summary.start.proofs, *summary.start.missing_quantities)
     show(*(f"To begin with: {plain(line)}" for line in lines))
     numbers = ("to begin with", "now", "change")

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pteron.atomic import write_text
-from pteron.design.candidate import Candidate, prove_best_design
+from pteron.design.best_design import prove_best_design
+from pteron.design.candidate import Candidate
 from pteron.design.drive_options import GEARBOXES, MOTORS, Options, read_lists
 from pteron.design.job import Job
 from pteron.design.kind_search import search_kind
@@ -91,6 +92,30 @@ class Choice(Result):
             for candidate in self.candidates
             if candidate.serves
         }
+
+    def assumption_lines(self) -> list[str]:
+        """Return the assumptions behind the choice, a line each."""
+        motors, links = self.job.motors, self.job.links
+        examples = [] if motors.list else ["The motors are the package's examples, not products."]
+        stocks = ", ".join(dict.fromkeys([*links.upper, *links.lower]))
+        errors = self.job.accuracy
+        left_out = errors is not None and not errors.has_part_errors
+        exact = ["The tool's error is that of encoders and gearboxes: links count as exact."]
+        return [
+            *examples,
+            "A price is the sum of those in the lists of motors and gearboxes, in their currency.",
+            f"Drives are chosen for {motors.margin:g} times what is asked, with dry friction of "
+            f"{motors.friction:.0%} of their rated torque; the least margins are told as they are "
+            "between the places of the search, too.",
+            f"Links are cut from {stocks}; the platform is half of an aluminium disc "
+            f"{1e3 * links.plate:g} mm thick; a carriage has {links.carriage:g} kg.",
+            f"Guides are {2e3 * links.guide:g} mm wide, cylinders of rams as cranks; a ram is "
+            "at most 1.7 times its least length; where links may meet, a pair of rods counts as "
+            "one; ball joints have no cones.",
+            "The shortest time is that of the cycle at its worst place with this margin of peak "
+            "torque and speed; again and again the rated torque may not allow it.",
+            *(exact if left_out else []),
+        ]
 
     data = former_attribute("data", "as_dict")
 

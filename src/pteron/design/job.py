@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Self
@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import Field, PrivateAttr, field_validator, model_validator
 
 from pteron.bodies.tables import TomlTable, key
-from pteron.design.known_kinds import KINDS
+from pteron.design.kinds import KINDS
 from pteron.design.load_tables import Names, default_table
 from pteron.design.requirement_tables import (
     AccuracyTable,
@@ -191,6 +191,52 @@ class Job(TomlTable):
         beside = self._folder / name
         return beside if beside.exists() else Path(name)
 
+    def requirement_lines(self) -> list[str]:
+        """Return the requirements, a line each."""
+        space, lines = self.workspace, []
+        lines.append(space.words)
+        if space.turn is not None:
+            lines.append(f"turn from {space.turn[0]:g} to {space.turn[1]:g} rad")
+        if space.tilt is not None:
+            lines.append(f"tilt of {space.tilt:g} rad to every side")
+        if space.directions is not None:
+            lines.append(f"{len(space.directions)} directions of the platform")
+        if any(self.payload.tool):
+            lines.append(
+                f"tool at {' x '.join(f'{1e3 * x:g}' for x in self.payload.tool)} mm from P"
+            )
+        if self.payload.mass:
+            lines.append(f"payload {self.payload.mass:g} kg")
+        for k, cycle in enumerate(self.cycles, start=1):
+            time = "as fast as can be" if cycle.duration is None else f"in {cycle.duration:g} s"
+            where = ", anywhere in the workspace" if cycle.anywhere else ""
+            share = "" if cycle.share is None else f", {cycle.share:g} in a duty cycle"
+            lines.append(f"{cycle.name or f'cycle {k}'} {time}{where}{share}")
+        if self.motion.acceleration:
+            speed = f"at up to {self.motion.speed:g} m/s in any direction"
+            lines.append(f"{self.motion.acceleration:g} m/s^2 {speed}")
+        if self.accuracy is not None:
+            lines.append(f"tool within {1e3 * self.accuracy.most:g} mm ({self.accuracy.counted})")
+        if self.stiffness is not None:
+            limit = f"{1e3 * self.stiffness.most:g} mm"
+            lines.append(f"gives way {limit} at most under {self.stiffness.force:g} N")
+        if self.cell.footprint is not None:
+            lines.append(f"footprint {' x '.join(f'{x:g}' for x in self.cell.footprint)} m")
+        lines += [f"height {self.cell.height:g} m"] if self.cell.height is not None else []
+        if self.cell.low is not None and self.cell.high is not None:
+            lines.append(f"cell {_box(self.cell.low, self.cell.high)} m")
+        lines += [f"kept out of {_box(box.low, box.high)} m" for box in self.keep_out]
+        floors = {
+            "type_i": "type-I measure",
+            "type_ii": "type-II measure",
+            "clearance": "clearance (m)",
+        }
+        for name in sorted(self.floors.model_fields_set):
+            lines.append(f"{floors[name]} at least {getattr(self.floors, name):g}")
+        bounds = self.most.model_dump(exclude_none=True)
+        lines += [f"{name.replace('_', ' ')} at most {bound:g}" for name, bound in bounds.items()]
+        return [*lines, f"least {' and '.join(name.replace('_', ' ') for name in self.objectives)}"]
+
 
 def read_job(path: str | Path) -> Job:
     """Read a task for a machine from a TOML file.
@@ -204,3 +250,7 @@ def read_job(path: str | Path) -> Job:
     job = to_model(Job, read_toml(path, DataError, _ABSENT), source, DataError)
     job._folder = Path(path).parent
     return job
+
+
+def _box(low: Sequence[float], high: Sequence[float]) -> str:
+    return " x ".join(f"{a:g}..{b:g}" for a, b in zip(low, high, strict=True))

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from pteron.bodies.vectors import Vector
-from pteron.design.known_kinds import KINDS
 from pteron.design.requirement_tables import LinksTable
 from pteron.errors import DataError
 from pteron.kernels import Array
@@ -19,6 +18,26 @@ from pteron.manipulator import Manipulator, Radii, load
 from pteron.manipulator.dimensions import Stock, cut_links
 from pteron.toml import joined_faults
 from pteron.workspace import home_pose
+
+KINDS: dict[str, tuple[str, str]] = {
+    "delta": ("base_radius platform_radius crank", "z"),
+    "linear-delta": ("base_radius platform_radius", "z"),
+    "orthoglide": ("", "xyz"),
+    "tripteron": ("crank", "xyz"),
+    "delta-4": ("base_radius platform_radius crank", "z"),
+    "h4": ("base_radius crank", "yz"),
+    "par4": ("base_radius crank", "z"),
+    "quadrupteron": ("crank", "xyz"),
+    "hexa": ("base_radius platform_radius crank", "z"),
+    "hexaglide": ("base_radius platform_radius", "yz"),
+    "stewart": ("base_radius platform_radius", "z"),
+    "five-bar": ("base_radius crank", "y"),
+    "3-rrr": ("base_radius platform_radius crank", "xy"),
+    "3-prr": ("base_radius platform_radius", "xy"),
+    "3-rpr": ("base_radius platform_radius", "xy"),
+}
+"""The dimensions of each kind that vary beside the size, and the coordinates of its place that do:
+the others are those of its plane or axis of symmetry."""
 
 _POWERS = {"m": 3, "g": 4, "I": 5}
 """Exponents of the size by which masses, first and second moments scale."""

@@ -17,7 +17,6 @@ from pteron.design.differences import (
 )
 from pteron.design.front import Front
 from pteron.design.proofs import Proved, place_words, prove_design, workspace_share
-from pteron.design.spec import asked_words
 from pteron.design.task import Task
 from pteron.manipulator import Manipulator
 from pteron.manipulator.machine_record import machine_record
@@ -219,7 +218,7 @@ class FrontReport(Result):
             "",
             "## Asked for",
             "",
-            *(f"- {line}" for line in asked_words(front.task.spec)),
+            *(f"- {line}" for line in front.task.spec.requirement_lines()),
             "",
             "## To begin with",
             "",

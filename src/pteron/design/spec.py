@@ -271,6 +271,26 @@ class Spec(TomlTable):
         """Return the same search with another seed of the random numbers."""
         return self.model_copy(update={"search": self.search.model_copy(update={"seed": seed})})
 
+    def requirement_lines(self) -> list[str]:
+        """Return the objectives and requirements, a line each."""
+        lines = [
+            f"{part.quantity} as {'small' if part.minimise else 'large'} as can be"
+            for part in self.objectives
+        ]
+        lines += [part.words for part in self.requirements]
+        lines += [
+            f"{name} at least {floor:.12g} everywhere"
+            for name, floor in self.floors
+            if not any(r.quantity == name and r.least is not None for r in self.requirements)
+        ]
+        if self.payload is not None:
+            lines.append(f"a payload of {self.payload.mass:.12g} kg")
+        lines += [f"cycle {k}: {part.words}" for k, part in enumerate(self.cycles, start=1)]
+        speed, acceleration = self.motion.speed, self.motion.acceleration
+        if {"force", "speed", "drive_load"} & set(self.quantity_names):
+            lines.append(f"motion at up to {speed:.12g} m/s and {acceleration:.12g} m/s^2")
+        return lines
+
 
 def read_spec(path: str | Path) -> Spec:
     """Read a search for a design from a TOML file.
@@ -303,24 +323,3 @@ def read_spec(path: str | Path) -> Spec:
     read = spec.model_copy(update=update)
     read._source = source
     return read
-
-
-def asked_words(spec: Spec) -> list[str]:
-    """Return the objectives and requirements of a search in words, one line each."""
-    lines = [
-        f"{part.quantity} as {'small' if part.minimise else 'large'} as can be"
-        for part in spec.objectives
-    ]
-    lines += [part.words for part in spec.requirements]
-    lines += [
-        f"{name} at least {floor:.12g} everywhere"
-        for name, floor in spec.floors
-        if not any(r.quantity == name and r.least is not None for r in spec.requirements)
-    ]
-    if spec.payload is not None:
-        lines.append(f"a payload of {spec.payload.mass:.12g} kg")
-    lines += [f"cycle {k}: {part.words}" for k, part in enumerate(spec.cycles, start=1)]
-    speed, acceleration = spec.motion.speed, spec.motion.acceleration
-    if {"force", "speed", "drive_load"} & set(spec.quantity_names):
-        lines.append(f"motion at up to {speed:.12g} m/s and {acceleration:.12g} m/s^2")
-    return lines
