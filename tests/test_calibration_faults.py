@@ -112,7 +112,7 @@ def test_rows_in_another_assembly_mode_start_where_their_heights_say():
     joints = pteron.inverse_kinematics(robot, poses)
     result = calibrate(robot, Measurements.of(robot, joints, heights=poses[:, 2]))
     assert result.fit.kept.all()
-    assert result.held_out.advance["height"] < 1e-9
+    assert result.held_out.after["height"] < 1e-9
 
 
 def test_a_row_that_the_drawn_machine_does_not_reach_refuses_no_log():
@@ -132,7 +132,7 @@ def test_a_row_that_the_drawn_machine_does_not_reach_refuses_no_log():
     poses = poses[chosen]
     readings = pteron.inverse_kinematics(built, poses) - 2e-3
     result = calibrate(robot, Measurements.of(robot, readings, poses=poses))
-    assert result.held_out.advance["position"] < 1e-5 < 1e-4 < result.held_out.before["position"]
+    assert result.held_out.after["position"] < 1e-5 < 1e-4 < result.held_out.before["position"]
     assert (~result.fit.kept).sum() <= 2
 
 
