@@ -72,7 +72,7 @@ def _calibration():
     robot = pteron.load("linear-delta")
     poses = pteron.random_poses(robot, 40)
     readings = pteron.inverse_kinematics(robot, poses) + np.array([0.001, 0.0, 0.0])
-    measured = calibration.Measurements.of(robot, readings, poses=poses)
+    measured = calibration.Measurements.from_readings(robot, readings, poses=poses)
     return calibration.calibrate(robot, measured, free=["zeros"])
 
 

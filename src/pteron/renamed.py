@@ -99,6 +99,7 @@ RENAMED = {
     },
     "pteron.calibration": {
         "Finding": "pteron.calibration.CalibrationFinding",
+        "Plane": "pteron.calibration.ReferencePlane",
     },
 }
 """Names of version 0.1 by package, and where each of them is now."""

@@ -102,7 +102,8 @@ def calibrate(
     >>> robot = pteron.load("linear-delta")
     >>> poses = pteron.random_poses(robot, 40)
     >>> readings = pteron.inverse_kinematics(robot, poses) + [0.001, 0.0, 0.0]
-    >>> found = calibrate(robot, Measurements.of(robot, readings, poses=poses), free=["zeros"])
+    >>> measurements = Measurements.from_readings(robot, readings, poses=poses)
+    >>> found = calibrate(robot, measurements, free=["zeros"])
     >>> found.fit.guess.zeros.round(6) + 0.0
     array([-0.001,  0.   ,  0.   ])
     """

@@ -159,7 +159,7 @@ def _read_stable_positions(robot: Manipulator, text: str, source: str) -> Measur
     keys, counts, heights, distances, origins = zip(*rows, strict=True)
     readings = to_readings(robot, np.array(ends) + away * np.array(counts))
     return replace(
-        Measurements.of(robot, readings, heights=1e-3 * np.array(heights)),
+        Measurements.from_readings(robot, readings, heights=1e-3 * np.array(heights)),
         distances=1e-3 * np.array(distances),
         origins=np.array(origins),
         places=tuple(f"{source}, {key}" for key in keys),
@@ -322,5 +322,5 @@ def _touched_heights(robot: Manipulator, touched: Sequence[_Touch]) -> Measureme
         touched = [touch for touch, bad in zip(touched, lost, strict=True) if not bad]
         joints = joints[~lost]
     heights = 1e-3 * np.array([touch.height for touch in touched])
-    measurements = Measurements.of(robot, to_readings(robot, joints), heights=heights)
+    measurements = Measurements.from_readings(robot, to_readings(robot, joints), heights=heights)
     return replace(measurements, places=tuple(touch.place for touch in touched))

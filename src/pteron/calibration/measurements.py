@@ -17,6 +17,7 @@ from pteron.bodies.vectors import Vector
 from pteron.errors import DataError
 from pteron.kernels import as_array
 from pteron.manipulator import Manipulator
+from pteron.renamed import former_attribute
 from pteron.shapes import JointsLike, PoseLike
 
 KINDS = ("position", "angle", "height", "distance")
@@ -48,7 +49,7 @@ class Place:
 
 
 @dataclass(frozen=True)
-class Plane:
+class ReferencePlane:
     """The plane normal . p = offset in the base frame, above which heights are counted.
 
     Parameters
@@ -84,7 +85,7 @@ class Setup:
 
     noise: Mapping[str, float] = field(default_factory=dict)
     marks: Mapping[str, Place] = field(default_factory=dict)
-    planes: Mapping[str, Plane] = field(default_factory=dict)
+    planes: Mapping[str, ReferencePlane] = field(default_factory=dict)
     anchors: Mapping[str, Place] = field(default_factory=dict)
     frame_known: bool = True
 
@@ -165,7 +166,7 @@ class Measurements:
     setup: Setup = Setup()
 
     @classmethod
-    def of(
+    def from_readings(
         cls,
         robot: Manipulator,
         readings: JointsLike,
@@ -219,6 +220,8 @@ class Measurements:
             places=tuple(f"row {i + 1}" for i in range(n)),
             setup=setup or Setup(),
         )
+
+    of = former_attribute("of", "from_readings")
 
     def __len__(self) -> int:
         return len(self.readings)

@@ -193,7 +193,9 @@ class Calibration(Result):
         """
         desired = np.atleast_2d(np.asarray(poses, dtype=float))
         slopes = MachineSlopes(self.drawn, self.blocks)
-        measurements = Measurements.of(self.drawn, np.zeros((len(desired), len(self.drawn.legs))))
+        measurements = Measurements.from_readings(
+            self.drawn, np.zeros((len(desired), len(self.drawn.legs)))
+        )
         readings = self.start.readings(slopes.joints(self.start, desired))
         measurements = replace(measurements, readings=readings)
         fitted = self.fit.guess
@@ -254,7 +256,7 @@ def open_errors(
     robot = fit.guess.robot
     slopes = MachineSlopes(robot, blocks)
     rows = spread_rows(len(measurements), _OPEN_ROWS)
-    tools = Measurements.of(robot, measurements.readings[rows])
+    tools = Measurements.from_readings(robot, measurements.readings[rows])
     covariance = _contradicted_covariance(fit, blocks)
     poses, moved = slopes.pose_slopes(fit.guess, tools, fit.poses[rows])
     length_slopes = position_axes(robot)[length_columns(robot)] @ moved

@@ -159,13 +159,13 @@ def _plan(
 
 def _level(text: str) -> Setup:
     """Return a setup with the plane of --plane."""
-    from pteron.calibration import Plane, Setup
+    from pteron.calibration import ReferencePlane, Setup
     from pteron.cli.pose_ranges import pose_ranges
 
     constants, ranges = pose_ranges(text, "--plane")
     if set(constants) != {"z"} or ranges:
         raise DataError(f"--plane: {text!r} given; z=HEIGHT expected, in m, such as z=0")
-    return Setup(planes={"": Plane(offset=constants["z"])})
+    return Setup(planes={"": ReferencePlane(offset=constants["z"])})
 
 
 def _plane_text(planned: Plan) -> str:
