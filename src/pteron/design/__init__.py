@@ -1,4 +1,19 @@
-"""Searches for the best dimensions of a machine, or the best machine, with proofs."""
+"""Searches for the best dimensions of a machine, or the best machine, with proofs.
+
+`search` and `survey` vary one machine as a `Spec` asks, `choose_machine` those of the catalog as a
+`Job` does. Its files, each used by those below it:
+
+- what is asked: load_tables, workspace_tables, requirement_tables; `spec` with user_quantities and
+  spec_faults, and `job`
+- loads and errors: worst_cases, cycle_loads, tool_errors, drive_options; `quantities`, by name
+- a machine that varies: `paths`, `variables` and `task` of a spec; `kinds` of a job
+- what a machine can do: `design` of a task; `rating` of a job, with workspace_samples,
+  cycle_places, machine_space and load_margins
+- proofs of both: `regions`, `proofs`
+- searches: `evolution` has what both share; `rows`, `front`, `improvement`, `search`, `survey` of
+  designs; kind_search, `candidate`, best_design, `choose` of kinds
+- in words: `differences` and `report` of a front; a `Candidate` and a `Choice` have their own
+"""
 
 from typing import TYPE_CHECKING
 

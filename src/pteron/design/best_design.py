@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from pteron.design.candidate import Candidate
 from pteron.design.cycle_places import Places
-from pteron.design.kind_search import front
+from pteron.design.kind_search import pareto_ratings
 from pteron.design.load_margins import DENSE, margins_of
 from pteron.design.proofs import is_clear, kind_proofs, proof_sentence
 from pteron.design.rating import KindEvaluator, Rating
@@ -49,7 +49,7 @@ def prove_best_design(evaluator: KindEvaluator, ratings: list[Rating]) -> Candid
         bad = next((p for p in proofs if p.counterexample is not None), None)
         why = str(bad) if bad is not None else _cell_violation(evaluator, rating)
         if not why:
-            best = front(good, shown_objectives(objectives))
+            best = pareto_ratings(good, shown_objectives(objectives))
             candidate = _candidate(evaluator, rating, proofs, counts, best)
             why = _exceeded_limit(evaluator, candidate)
             if not why and candidate.least_margin >= evaluator.job.motors.margin:

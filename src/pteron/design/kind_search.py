@@ -143,8 +143,8 @@ def _refine(
         best = with_choices(answer.x)
 
 
-def front(ratings: list[Rating], objectives: list[str]) -> list[Rating]:
-    """Return the Pareto front: designs that keep all requirements and that no other dominates."""
+def pareto_ratings(ratings: list[Rating], objectives: list[str]) -> list[Rating]:
+    """Return the Pareto front of ratings: designs that keep all requirements and that no other dominates."""
     good = [rating for rating in ratings if not rating.misses]
     costs = np.array([[rating.figures[name] for name in objectives] for rating in good])
     return [good[k] for k in pareto_front(costs)]
