@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, Literal, get_args
+from typing import Literal, get_args
 
-from pteron.json_values import fields_as_json
 from pteron.result import Result
 
 Grade = Literal["trustworthy", "usable with care", "not trustworthy"]
@@ -42,10 +41,6 @@ class Verdict(Result):
     def summary(self) -> str:
         """Return the grade, the reasons and the advice, for people, as lines of text."""
         return "\n".join([self.grade, *self.reasons, *self.next_steps])
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the verdict as plain data."""
-        return fields_as_json(self, "grade reasons next_steps")
 
 
 @dataclass

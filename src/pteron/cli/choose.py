@@ -7,7 +7,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from pteron.cli.progress import progress_bar
-from pteron.cli.result import Result
+from pteron.cli.result import CommandResult
 from pteron.cli.terminal import note, plain, show, table
 from pteron.errors import DataError
 
@@ -24,7 +24,7 @@ def choose(
     *,
     out: str | None = None,
     workers: int = 1,
-) -> Result:
+) -> CommandResult:
     """Choose a machine for a job: which kind, which dimensions, which motors.
 
     The file says what the machine must do: workspace, payload, cycles, accuracy, stiffness, room,
@@ -82,7 +82,7 @@ def choose(
 
         files = write_choice(choice, out)
     data = choice.as_dict() | ({"files": [str(file) for file in files]} if files else {})
-    return Result(data, partial(_show, choice), files, _NONE if choice.best is None else 0)
+    return CommandResult(data, partial(_show, choice), files, _NONE if choice.best is None else 0)
 
 
 class _Log:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pteron.cli.progress import progress_bar
-from pteron.cli.result import Result
+from pteron.cli.result import CommandResult
 from pteron.cli.terminal import note, plain, show, table
 from pteron.errors import DataError
 from pteron.extras import expect_extra
@@ -33,7 +33,7 @@ def design(
     sweep: int | None = None,
     workers: int | None = None,
     scheduler: str | None = None,
-) -> Result:
+) -> CommandResult:
     """Search for the dimensions of a machine that are best for what is asked of it.
 
     The file names the machine to begin with, the numbers that may change, what must be kept
@@ -86,7 +86,7 @@ def design(
 
         files = write_front(summary, out)
     data = summary.as_dict() | ({"files": [str(file) for file in files]} if files else {})
-    return Result(data, partial(_show, summary), files)
+    return CommandResult(data, partial(_show, summary), files)
 
 
 def _tell_resumed(folder: Path) -> None:

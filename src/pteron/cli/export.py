@@ -8,7 +8,7 @@ from typing import Any, Literal
 from pteron.cli.arguments import MachineArgument
 from pteron.cli.motion_argument import Carried
 from pteron.cli.progress import spinner
-from pteron.cli.result import Result
+from pteron.cli.result import CommandResult
 from pteron.cli.terminal import note
 from pteron.errors import DataError
 
@@ -48,7 +48,7 @@ def export(
     base: str | None = None,
     tool: str | None = None,
     gains: str | None = None,
-) -> Result:
+) -> CommandResult:
     """Write code for a controller, or the machine as another engine or tool wants it.
 
     With --c or --st: kinematics, Jacobian, dynamics and regressor, in functions that return a
@@ -130,7 +130,9 @@ def export(
                 files += getattr(import_module("pteron.export"), f"export_{name}")(machine, folder)
     if grade != _TRUSTED:
         note(f"Warning: {base}: the verdict on these values is: {grade}")
-    return Result({"robot": machine.name, "files": [str(path) for path in files]}, files=files)
+    return CommandResult(
+        {"robot": machine.name, "files": [str(path) for path in files]}, files=files
+    )
 
 
 def _check(targets: dict[str, str], options: list[str]) -> None:

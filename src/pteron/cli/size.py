@@ -16,7 +16,7 @@ from pteron.cli.motion_table import force_word
 from pteron.cli.motor_tables import common_rows, common_table, fits_frame, motors_table
 from pteron.cli.pose_ranges import box_of, pose_spans
 from pteron.cli.progress import spinner
-from pteron.cli.result import Result
+from pteron.cli.result import CommandResult
 from pteron.cli.terminal import plain, show, table, warn
 from pteron.errors import UnlikelyValue
 
@@ -49,7 +49,7 @@ def size(
     motors: str | None = None,
     margin: float = 1.0,
     out: str | None = None,
-) -> Result:
+) -> CommandResult:
     """Size the motors: peak and RMS force, speed, power and energy of each drive over a cycle.
 
     The standard cycle is done at all places of the workspace and at all turns about the vertical,

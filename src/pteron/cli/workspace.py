@@ -14,7 +14,7 @@ from pteron.cli.certify import RequestedProofs
 from pteron.cli.map_summary import map_data, map_rows, show_map
 from pteron.cli.pose_ranges import pose_ranges, pose_text
 from pteron.cli.progress import progress_bar, spinner
-from pteron.cli.result import Result
+from pteron.cli.result import CommandResult
 from pteron.cli.terminal import file_lines, is_terminal, note, show, warn, write
 from pteron.errors import DataError, ModelError, OutputError
 
@@ -63,7 +63,7 @@ def workspace(
     tolerance: float | None = None,
     type_i: float | None = None,
     type_ii: float | None = None,
-) -> Result:
+) -> CommandResult:
     """Map the workspace: where the machine reaches, what ends it, and how good it is there.
 
     An index of performance is mapped over the poses of a grid; with none, the distance to the end
@@ -145,7 +145,7 @@ def workspace(
     if out is not None and ending in (*_PICTURES, *_FILMS):
         _draw(index_map, out, ending)
     data = map_data(index_map, volume, [*warnings, *outside], out)
-    return Result(data, partial(_show, index_map, volume, data, out))
+    return CommandResult(data, partial(_show, index_map, volume, data, out))
 
 
 def _show(
