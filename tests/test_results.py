@@ -135,6 +135,10 @@ def _cue():
     return motion.cue("stewart", columns)
 
 
+def _rest():
+    return np.array([[0.0, 0.0, -0.8]]), np.zeros((1, 3)), np.zeros((1, 3))
+
+
 def _payload():
     robot = pteron.load("five-bar")
     logs = (log_of(one, size=0.01) for one in (robot, motion.with_payload(robot, 0.2)))
@@ -194,6 +198,9 @@ MADE = {
     "observations": _observations,
     "paving": _paving,
     "payload": _payload,
+    "peaks": lambda: motion.peaks(
+        pteron.load("delta"), *_rest(), motion.limits_of(pteron.load("delta"), force=5.0)
+    ),
     "plan": lambda: calibration.plan("linear-delta", 8),
     "pose error": lambda: indices.pose_error("five-bar", HOME, indices.Tolerances(joints=1e-4)),
     "proof": lambda: workspace.prove("five-bar", workspace.Box((0.0, 0.12), (0.005, 0.125))),
@@ -206,7 +213,11 @@ MADE = {
     "sensitivities": lambda: indices.geometric_sensitivities("five-bar", HOME),
     "simulation": lambda: motion.simulate("five-bar", _cycle(), ComputedTorque(), duration=0.01),
     "singularity": lambda: workspace.nearest_singularities("five-bar", HOME),
-    "sizing": _sizing,
+    "quadrature": lambda: workspace.quadrature_volume("five-bar", HOME, lines=20),
+    "sizing": lambda: (
+        _sizing(),
+        motion.DriveMargin(1, "max_force", "peak_force", 2.0, 1.0, "N"),
+    ),
     "slice": lambda: workspace.reach_slice("five-bar", HOME, points=9),
     "states": _states,
     "statistics": lambda: _map().statistics("condition"),

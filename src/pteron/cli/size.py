@@ -196,7 +196,7 @@ def _data(sizing: Sizing, fits: tuple[MotorFit, ...], request: _Asked) -> dict[s
         "places": len(sizing.places) or 1,
         "worst": _worst(sizing),
         "assumed_friction": sizing.assumed_friction.tolist(),
-        "margins": [limit._asdict() | {"margin": limit.margin} for limit in sizing.margins],
+        "margins": [limit.as_dict() | {"margin": limit.margin} for limit in sizing.margins],
         "overloads": list(sizing.overloads),
         "motors": fits_frame(sizing.robot, fits).to_dicts() if fits else [],
     }

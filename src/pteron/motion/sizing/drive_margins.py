@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import NamedTuple
+from dataclasses import dataclass
 
 from pteron.kernels import Array
 from pteron.legs import Drive
 from pteron.legs.motor_limits import motor_peak
 from pteron.manipulator import Manipulator
 from pteron.renamed import former_attribute
+from pteron.result import Result
 from pteron.shapes import PerJoint
 
 
-class DriveMargin(NamedTuple):
+@dataclass(frozen=True, eq=False, repr=False)
+class DriveMargin(Result):
     """A limit of a drive in the machine's file over the cycle's load, at the joint."""
 
     leg: int
@@ -27,6 +29,8 @@ class DriveMargin(NamedTuple):
     most: float
     needed: float
     unit: str
+
+    told = former_attribute("told", "overload_text")
 
     @property
     def margin(self) -> float:
@@ -50,9 +54,6 @@ class DriveMargin(NamedTuple):
             f"leg {self.leg}: the motion takes up to {needed}{where}, but its drive gives "
             f"{self.most:g} {self.unit} ({self.limit})"
         )
-
-
-DriveMargin.told = former_attribute("told", "overload_text")  # type: ignore[attr-defined]
 
 
 def drive_margins(
