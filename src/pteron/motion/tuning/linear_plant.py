@@ -109,8 +109,8 @@ def linearise(
     Examples
     --------
     >>> import pteron
-    >>> from pteron.motion import linearised
-    >>> plant = linearised("tripteron", [0.0, 0.0, 0.0])
+    >>> from pteron.motion import linearise
+    >>> plant = linearise("tripteron", [0.0, 0.0, 0.0])
     >>> plant.matrix.shape, plant.inputs.shape
     ((6, 6), (6, 3))
     """
