@@ -113,13 +113,13 @@ def calibrate(
     start = Guess.drawn(robot, measurements)
     mistake = raw_mistake(measurements, blocks, start)
     if mistake is None:
-        result = _calibrate(robot, measurements, blocks, held_out, seed)
-        explained = any(finding.kind in _IN_TIME for finding in result.findings)
-        if explained or not _exceeds_ordinary_error(result.fit, measurements):
-            return result
+        calibration = _calibrate(robot, measurements, blocks, held_out, seed)
+        explained = any(finding.kind in _IN_TIME for finding in calibration.findings)
+        if explained or not _exceeds_ordinary_error(calibration.fit, measurements):
+            return calibration
         mistake = raw_mistake(measurements, blocks, start, fitted=True)
         if mistake is None:
-            return result
+            return calibration
     finding = describe_mistake(mistake, measurements, start)
     undone = mistake.undo(measurements)
     other = None if held_out is None else mistake.undo(held_out)
@@ -175,7 +175,7 @@ def _calibrate(
         robot,
         calibrated_robot(fit.guess),
         values_of(start, fit, blocks),
-        {kind: value for kind, value in fit.noise.items() if kind in measurements.kinds},
+        {kind: deviation for kind, deviation in fit.noise.items() if kind in measurements.kinds},
         shown,
         judged,
         findings,

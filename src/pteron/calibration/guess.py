@@ -127,9 +127,9 @@ class UnknownBlock:
         if self.kind == "geometry":
             return replace(guess, robot=vary_geometry(guess.robot, self.changes, step))
         if self.kind in ("zeros", "scales"):
-            values = getattr(guess, self.kind).copy()
-            values[list(self.legs)] += step
-            return replace(guess, **{self.kind: values})
+            numbers = getattr(guess, self.kind).copy()
+            numbers[list(self.legs)] += step
+            return replace(guess, **{self.kind: numbers})
         if self.kind in ("mark", "anchor"):
             places = getattr(guess, f"{self.kind}s")
             moved: Any = {**places, self.name: places[self.name] + step}

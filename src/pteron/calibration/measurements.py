@@ -229,18 +229,18 @@ class Measurements:
     @property
     def parts(self) -> dict[str, Array]:
         """All that was measured, (N, K) in all, by kind; NaN where not."""
-        values = self.positions, self.angles, self.heights[:, None], self.distances[:, None]
-        return dict(zip(KINDS, values, strict=True))
+        arrays = self.positions, self.angles, self.heights[:, None], self.distances[:, None]
+        return dict(zip(KINDS, arrays, strict=True))
 
     @property
     def kinds(self) -> list[str]:
         """The kinds of measurements that there are."""
-        return [kind for kind, values in self.parts.items() if not np.isnan(values).all()]
+        return [kind for kind, array in self.parts.items() if not np.isnan(array).all()]
 
     @property
     def kind_of(self) -> NDArray[np.str_]:
         """The kind of each of a row's numbers (K,)."""
-        return np.repeat(KINDS, [values.shape[1] for values in self.parts.values()])
+        return np.repeat(KINDS, [array.shape[1] for array in self.parts.values()])
 
     def rows(self, chosen: NDArray[np.bool_]) -> Measurements:
         """Return rows chosen by a mask, and those that a distance of theirs is measured from."""

@@ -109,8 +109,8 @@ class Plan(Result):
     def columns(self) -> dict[str, Array]:
         """Return the columns of the table that the machine runs: poses, then readings."""
         names = (*self.robot.coordinates, *self.robot.joint_names)
-        values = np.concatenate([self.poses, self.readings], axis=1)
-        return dict(zip(names, values.T, strict=True))
+        columns = np.concatenate([self.poses, self.readings], axis=1)
+        return dict(zip(names, columns.T, strict=True))
 
 
 def plan(

@@ -232,13 +232,16 @@ class Calibration(Result):
 
     def as_dict(self) -> dict[str, Any]:
         """Return the calibration as plain data, as `calibration.json` has it."""
-        values = [{**asdict(value), "interval": list(value.interval)} for value in self.values]
+        value_records = [
+            {**asdict(known_value), "interval": list(known_value.interval)}
+            for known_value in self.values
+        ]
         outliers = [self.measurements.places[i] for i in np.flatnonzero(~self.fit.kept)]
         return {
             "name": self.drawn.name,
             "machine": machine_record(self.drawn),
             "calibrated_geometry": machine_record(self.robot)["geometry"],
-            "values": values,
+            "values": value_records,
             **fields_as_json(self.fit.guess, "zeros scales"),
             "noise": self.noise,
             **fields_as_json(self.observability, "rank shown=determined_count columns"),
