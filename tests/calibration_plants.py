@@ -355,8 +355,8 @@ def trial(case, fault, seed=0, count=60):
         measured["poses"] = angles_of(robot, poses, matrices, rng)
     readings, measured, zeros = spoil(fault, robot, readings, measured, zeros, count)
     distances = measured.pop("distances", None)
-    plane = {"": pteron.calibration.Plane(offset=level)} if heights else {}
-    given = Measurements.of(robot, readings, setup=Setup(planes=plane), **measured)
+    plane = {"": pteron.calibration.ReferencePlane(offset=level)} if heights else {}
+    given = Measurements.from_readings(robot, readings, setup=Setup(planes=plane), **measured)
     if distances is not None:
         given = replace(given, distances=distances, origins=origins_of(count))
     return Trial(given, robot, plant, zeros, desired)

@@ -7,7 +7,7 @@ import polars as pl
 import pytest
 
 import pteron
-from pteron.calibration import Place, Plane, read_measurements
+from pteron.calibration import Place, ReferencePlane, read_measurements
 from pteron.errors import DataError, UnlikelyValue
 from pteron.export import from_klipper
 from pteron.kinematics import random_poses
@@ -58,7 +58,7 @@ def test_every_column_of_a_table_and_of_its_description_is_read(tmp_path):
     setup = found.setup
     assert setup.noise == {"height": 2e-5, "readings": 1e-6}
     assert setup.marks == {"corner": Place((0.02, 0.0, 0.0))}
-    assert setup.planes == {"bed": Plane(offset=-0.001, known=False)}
+    assert setup.planes == {"bed": ReferencePlane(offset=-0.001, known=False)}
     assert setup.anchors == {"post": Place(known=False)}
     assert not setup.frame_known
 

@@ -7,12 +7,23 @@ import pytest
 
 import pteron
 from pteron.controllers import Controller
-from pteron.design import Change, Design
+from pteron.design import (
+    Candidate,
+    Change,
+    Choice,
+    Design,
+    Front,
+    FrontReport,
+    ReportedDesign,
+    Spec,
+    Task,
+)
 from pteron.export.engines import TreeJoint
 from pteron.identification import FaultIsolation, Identification, Payload
 from pteron.indices import Elasticity, Stiffness
 from pteron.legs import LegKind
-from pteron.motion import Guide, Motor
+from pteron.maps import Grid, Map, TableStore
+from pteron.motion import DriveMargin, Guide, Motor, Sizing, Span
 from pteron.platforms import Platform
 from pteron.renamed import RENAMED, UNTIL
 from pteron.workspace import LimitedJoint, PoseMargins
@@ -48,6 +59,13 @@ def test_former_names_are_gone_when_their_release_is_over():
     assert [*map(int, pteron.__version__.split(".")[:2])] < [*map(int, UNTIL.split("."))]
 
 
+def test_a_former_method_of_a_class_answers_too():
+    with pytest.warns(
+        DeprecationWarning, match=r"^Task\.of goes with version .*write \.from_spec$"
+    ):
+        assert Task.of == Task.from_spec
+
+
 @pytest.mark.parametrize(
     ("owner", "old", "new"),
     [
@@ -59,7 +77,28 @@ def test_former_names_are_gone_when_their_release_is_over():
         (PoseMargins, "clearances", "joints"),
         (PoseMargins, "smallest", "least"),
         (LimitedJoint, "told_limits", "limits_text"),
-        (Change, "told", "shown"),
+        (Design, "carrying", "loaded_robot"),
+        (Design, "lack", "missing_reason"),
+        (Design, "reached", "is_reachable"),
+        (Design, "sizing", "cycle_loads"),
+        (Change, "by", "relative_change"),
+        (Change, "shown", "format_value"),
+        (Change, "told", "format_value"),
+        (Front, "chosen", "selection"),
+        (FrontReport, "chosen", "selection"),
+        (FrontReport, "data", "as_dict"),
+        (Choice, "data", "as_dict"),
+        (Candidate, "data", "as_dict"),
+        (ReportedDesign, "lacking", "missing_quantities"),
+        (Spec, "asked", "quantity_names"),
+        (Task, "asked", "quantity_names"),
+        (Grid, "held", "fixed_coordinates"),
+        (Map, "at", "slice_at"),
+        (TableStore, "finished", "finished_chunks"),
+        (Sizing, "at", "select_place"),
+        (Sizing, "where", "place_text"),
+        (Span, "within", "intersect"),
+        (DriveMargin, "told", "overload_text"),
         (Motor, "doubts", "warnings"),
         (Platform, "at", "placement"),
         (Platform, "turned", "map_vectors"),

@@ -7,6 +7,7 @@ class: ``old = former_attribute("old", "new")``.
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable
 from importlib import import_module
 from typing import Any
 
@@ -43,7 +44,12 @@ RENAMED = {
         "Circle": "pteron.legs.leg.CircleLocus",
         "Turned": "pteron.legs.leg.AngleLocus",
     },
-    "pteron.design": {"Told": "pteron.design.ReportedDesign"},
+    "pteron.design": {
+        "Quantity": "pteron.design.DesignQuantity",
+        "Summary": "pteron.design.FrontReport",
+        "Told": "pteron.design.ReportedDesign",
+        "proved": "pteron.design.prove_design",
+    },
     "pteron.export.engines": {"Motor": "pteron.export.engines.TreeMotor"},
     "pteron.identification": {
         "weighted": "pteron.identification.weighted_least_squares",
@@ -66,12 +72,15 @@ RENAMED = {
         "FourierSeries": "pteron.identification.signals.FittedSeries",
     },
     "pteron.motion": {
+        "Fit": "pteron.motion.MotorFit",
+        "Place": "pteron.motion.CyclePlace",
+        "least_reserve": "pteron.motion.least_margin",
+        "placed": "pteron.motion.motion_at_place",
         "there_and_back": "pteron.motion.return_path",
         "along": "pteron.motion.polynomial_motion",
         "linearised": "pteron.motion.linearise",
         "Margins": "pteron.motion.LoopMargins",
         "Trial": "pteron.motion.GainTrial",
-        "least_reserve": "pteron.motion.least_margin",
     },
     "pteron.motion.simulation": {"Law": "pteron.motion.simulation.ControlLaw"},
     "pteron.workspace": {
@@ -102,6 +111,7 @@ RENAMED = {
     },
     "pteron.calibration": {
         "Finding": "pteron.calibration.CalibrationFinding",
+        "Plane": "pteron.calibration.ReferencePlane",
     },
 }
 """Names of version 0.1 by package, and where each of them is now."""
@@ -148,6 +158,21 @@ def former_name(package: str, name: str) -> Any:
         return import_module(present)
 
 
+def warn_former(former: str, present: str, *, depth: int = 3) -> None:
+    """Warn that a former way goes, with what to write instead; `depth` calls below the user's."""
+    text = f"{former} goes with version {UNTIL}; write {present}"
+    warnings.warn(text, DeprecationWarning, stacklevel=depth)
+
+
+class FormerAttribute(property):
+    """A property of a class and its objects: an attribute under its former name."""
+
+    def __get__(self, own: Any, owner: Any = None) -> Any:
+        """Return the attribute of an object, or of the class."""
+        assert self.fget is not None
+        return self.fget(owner if own is None else own)
+
+
 def former_attribute(former: str, present: str) -> property:
     """Return a property for a class's body: an attribute under its former name.
 
@@ -163,14 +188,11 @@ def former_attribute(former: str, present: str) -> property:
     """
 
     def attribute(own: Any) -> Any:
-        warnings.warn(
-            f"{type(own).__name__}.{former} goes with version {UNTIL}; write .{present}",
-            DeprecationWarning,
-            stacklevel=2,
-        )
+        owner = own if isinstance(own, type) else type(own)
+        warn_former(f"{owner.__name__}.{former}", f".{present}", depth=4)
         return getattr(own, present)
 
-    return property(attribute)
+    return FormerAttribute(attribute)
 
 
 def adopt_former_methods(owner: type, **former: str) -> None:
@@ -190,3 +212,31 @@ def adopt_former_methods(owner: type, **former: str) -> None:
             stacklevel=3,
         )
         setattr(owner, former[name], vars(owner)[name])
+
+
+class FormerTable:
+    """A method `table` that was a property until version 0.1: what is read of it is the table."""
+
+    def __init__(self, owner: str, frame: Any, table: Callable[[], Any]) -> None:
+        self._owner, self._frame, self._table = owner, frame, table
+
+    def __call__(self) -> Any:
+        """Return the table."""
+        return self._table()
+
+    def _former(self) -> Any:
+        warnings.warn(
+            f"{self._owner}.table is a method from version {UNTIL} on; write .designs",
+            DeprecationWarning,
+            stacklevel=3,
+        )
+        return self._frame
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._former(), name)
+
+    def __getitem__(self, key: Any) -> Any:
+        return self._former()[key]
+
+    def __len__(self) -> int:
+        return len(self._former())

@@ -111,7 +111,8 @@ def calibrate(
     >>> robot = pteron.load("linear-delta")
     >>> poses = pteron.random_poses(robot, 40)
     >>> readings = pteron.inverse_kinematics(robot, poses) + [0.001, 0.0, 0.0]
-    >>> found = calibrate(robot, Measurements.of(robot, readings, poses=poses), free=["zeros"])
+    >>> measurements = Measurements.from_readings(robot, readings, poses=poses)
+    >>> found = calibrate(robot, measurements, free=["zeros"])
     >>> found.fit.guess.zeros.round(6) + 0.0
     array([-0.001,  0.   ,  0.   ])
     """
@@ -138,13 +139,13 @@ def _undo_mistakes(
     """Return the calibration of a log, of which a mistake that explains it is undone."""
     mistake = raw_mistake(measurements, blocks, start)
     if mistake is None:
-        result = run_calibration(measurements, blocks, held_out)
-        explained = any(finding.kind in _IN_TIME for finding in result.findings)
-        if explained or not _exceeds_ordinary_error(result.fit, measurements):
-            return result
+        calibration = run_calibration(measurements, blocks, held_out)
+        explained = any(finding.kind in _IN_TIME for finding in calibration.findings)
+        if explained or not _exceeds_ordinary_error(calibration.fit, measurements):
+            return calibration
         mistake = raw_mistake(measurements, blocks, start, fitted=True)
         if mistake is None:
-            return result
+            return calibration
     finding = describe_mistake(mistake, measurements, start)
     undone = mistake.undo(measurements)
     other = None if held_out is None else mistake.undo(held_out)
@@ -207,7 +208,7 @@ def _calibrate(
         robot,
         calibrated_robot(fit.guess),
         values_of(start, fit, blocks),
-        {kind: value for kind, value in fit.noise.items() if kind in measurements.kinds},
+        {kind: deviation for kind, deviation in fit.noise.items() if kind in measurements.kinds},
         shown,
         judged,
         findings,

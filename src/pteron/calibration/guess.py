@@ -13,7 +13,7 @@ import numpy as np
 import scipy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
-from pteron.calibration.measurements import TOOL, Measurements, Place, Plane
+from pteron.calibration.measurements import TOOL, Measurements, Place, ReferencePlane
 from pteron.equations.variations import Variation, vary_geometry
 from pteron.manipulator import Manipulator
 
@@ -74,7 +74,7 @@ class Guess:
         """Return the machine as drawn, and its surroundings as described."""
         setup = measured.setup
         marks = {TOOL: Place(robot.platform.tool or (0.0, 0.0, 0.0))} | dict(setup.marks)
-        planes = {TOOL: Plane()} | dict(setup.planes)
+        planes = {TOOL: ReferencePlane()} | dict(setup.planes)
         return cls(
             robot,
             np.array([leg.reading.zero if leg.reading else 0.0 for leg in robot.legs]),
@@ -127,9 +127,9 @@ class UnknownBlock:
         if self.kind == "geometry":
             return replace(guess, robot=vary_geometry(guess.robot, self.changes, step))
         if self.kind in ("zeros", "scales"):
-            values = getattr(guess, self.kind).copy()
-            values[list(self.legs)] += step
-            return replace(guess, **{self.kind: values})
+            numbers = getattr(guess, self.kind).copy()
+            numbers[list(self.legs)] += step
+            return replace(guess, **{self.kind: numbers})
         if self.kind in ("mark", "anchor"):
             places = getattr(guess, f"{self.kind}s")
             moved: Any = {**places, self.name: places[self.name] + step}

@@ -18,6 +18,7 @@ from pteron.calibration.guess import Guess, UnknownBlock, tolerances_of
 from pteron.calibration.measurements import Measurements
 from pteron.calibration.unseen import combination_text, unseen_combinations
 from pteron.renamed import former_attribute
+from pteron.result import Result
 
 Array = NDArray[np.float64]
 
@@ -28,8 +29,8 @@ _NAMED = 6
 """Most weak combinations that are named."""
 
 
-@dataclass(frozen=True)
-class Observability:
+@dataclass(frozen=True, eq=False, repr=False)
+class Observability(Result):
     """The combinations of values that measurements show, and those that they do not.
 
     Attributes

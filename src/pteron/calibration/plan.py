@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from pteron.arguments import expect, expect_one_of
 from pteron.calibration.guess import Guess, tolerances_of, variances
-from pteron.calibration.measurements import KINDS, TOOL, Measurements, Place, Plane, Setup
+from pteron.calibration.measurements import KINDS, TOOL, Measurements, Place, ReferencePlane, Setup
 from pteron.calibration.residuals import MachineSlopes
 from pteron.calibration.unknowns import blocks_of
 from pteron.calibration.verdict import rows_for_check
@@ -23,6 +23,7 @@ from pteron.errors import DataError, ModelError
 from pteron.kernels import numeric
 from pteron.kinematics import random_poses
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.result import Result
 from pteron.shapes import Seed
 from pteron.workspace import Box, Cylinder, home_pose, prove
 
@@ -69,8 +70,8 @@ _NOISE = dict.fromkeys(KINDS, 2e-5)
 """Noise that is expected where nobody says it, m and rad."""
 
 
-@dataclass(frozen=True)
-class Plan:
+@dataclass(frozen=True, eq=False, repr=False)
+class Plan(Result):
     """Poses to measure, in the order to go.
 
     Attributes
@@ -85,7 +86,7 @@ class Plan:
         What the joints read there on the machine as drawn.
     region : Box or Cylinder
         The proved region of poses that holds them, and the straight ways between them.
-    plane : Plane or None
+    plane : ReferencePlane or None
         The plane over which heights are measured.
     before, after : float
         Expected greatest error of the tool's place in that region, as a standard deviation, by
@@ -94,12 +95,14 @@ class Plan:
         How many poses, or more, leave some to check the calibration by.
     """
 
+    ROWS = "poses:1 readings:1"
+
     robot: Manipulator
     measure: Measure
     poses: Array
     readings: Array
     region: Box | Cylinder
-    plane: Plane | None
+    plane: ReferencePlane | None
     before: float
     after: float
     checked: int
@@ -107,8 +110,8 @@ class Plan:
     def columns(self) -> dict[str, Array]:
         """Return the columns of the table that the machine runs: poses, then readings."""
         names = (*self.robot.coordinates, *self.robot.joint_names)
-        values = np.concatenate([self.poses, self.readings], axis=1)
-        return dict(zip(names, values.T, strict=True))
+        columns = np.concatenate([self.poses, self.readings], axis=1)
+        return dict(zip(names, columns.T, strict=True))
 
 
 def plan(
@@ -167,7 +170,7 @@ def plan(
         )
     home = home_pose(robot)
     setup = setup or Setup()
-    drawn = Guess.drawn(robot, Measurements.of(robot, np.zeros((1, robot.joint_count))))
+    drawn = Guess.drawn(robot, Measurements.from_readings(robot, np.zeros((1, robot.joint_count))))
     region: Box | Cylinder
     if measure == "heights":
         home, setup, region = _lower_onto_plane(drawn, home, setup)
@@ -339,7 +342,7 @@ def _lower_onto_plane(
         moved = _lower_home(home, at, point, next(iter(setup.planes.values())))
         return moved, setup, _proved_level(robot, moved)
     if point[2] > 0.0:
-        bed = Plane()
+        bed = ReferencePlane()
         moved = _lower_home(home, at, point, bed)
         try:
             return moved, replace(setup, planes={TOOL: bed}), _proved_level(robot, moved)
@@ -348,11 +351,11 @@ def _lower_onto_plane(
     moved = home.copy()
     below = proved_box(robot, home).box[0, at] - home[at]
     moved[at] += below
-    plane = Plane(offset=float(point[2] + below), known=False)
+    plane = ReferencePlane(offset=float(point[2] + below), known=False)
     return moved, replace(setup, planes={TOOL: plane}), _proved_level(robot, moved)
 
 
-def _lower_home(home: Array, at: int, point: Array, plane: Plane) -> Array:
+def _lower_home(home: Array, at: int, point: Array, plane: ReferencePlane) -> Array:
     """Return home moved along a coordinate so that the tool, at a point (3,), is on a plane."""
     normal = np.array(plane.normal)
     moved = home.copy()
@@ -364,7 +367,7 @@ def _ideal_measurements(drawn: Guess, poses: Array, measure: Measure, setup: Set
     """Return the measurements that a faultless machine would give at poses."""
     robot, n = drawn.robot, len(poses)
     readings = drawn.readings(MachineSlopes(robot, ()).joints(drawn, poses))
-    measurements = Measurements.of(robot, readings, setup=setup)
+    measurements = Measurements.from_readings(robot, readings, setup=setup)
     if measure == "positions":
         return replace(measurements, positions=np.zeros((n, 3)))
     if measure == "poses":

@@ -12,7 +12,7 @@ from pteron.cli.motion_argument import Carried, given_pose, read_motion
 from pteron.cli.motion_table import motion_frame, peaks_table
 from pteron.cli.planned_motions import joint_motion, line_motion, standard_motion
 from pteron.cli.progress import spinner
-from pteron.cli.result import Result
+from pteron.cli.result import CommandResult
 from pteron.cli.terminal import note, show
 from pteron.errors import DataError
 from pteron.json_values import fields_as_json
@@ -72,7 +72,7 @@ def cycle(
     tool_acceleration: float | None = None,
     carried: Carried,
     out: str | None = None,
-) -> Result:
+) -> CommandResult:
     """Make a motion, within the limits, and see what it asks of the drives.
 
     The standard pick-and-place cycle, 25 mm up, 305 mm across, 25 mm down and back; straight lines
@@ -177,7 +177,7 @@ def _result(
     limits: MotionLimits,
     carried: Carried,
     out: str | None,
-) -> Result:
+) -> CommandResult:
     import numpy as np
 
     from pteron.manipulator.template_masses import template_masses
@@ -215,7 +215,9 @@ def _result(
     text = f"{motion.duration:.4g} s, {len(motion.time)} samples"
     if bound is not None:
         text += f"; a polynomial in time along the same path takes {bound:.4g} s"
-    return Result(data, partial(_show, [text, peaks_table(largest)], out), [out] if out else [])
+    return CommandResult(
+        data, partial(_show, [text, peaks_table(largest)], out), [out] if out else []
+    )
 
 
 def _show(lines: list[str | Table], out: str | None) -> None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from pteron.cli.arguments import MachineArgument
 from pteron.cli.motion_argument import Carried
 from pteron.cli.progress import spinner
-from pteron.cli.result import Result
+from pteron.cli.result import CommandResult
 from pteron.cli.terminal import note
 from pteron.errors import DataError
 
@@ -53,7 +53,7 @@ def export(
     base: str | None = None,
     tool: str | None = None,
     gains: str | None = None,
-) -> Result:
+) -> CommandResult:
     """Write code for a controller, or the machine as another engine or tool wants it.
 
     With --c or --st: kinematics, Jacobian, dynamics and regressor, in functions that return a
@@ -140,7 +140,9 @@ def export(
                 files += getattr(import_module("pteron.export"), f"export_{name}")(machine, folder)
     if grade != _TRUSTED:
         note(f"Warning: {base}: the verdict on these values is: {grade}")
-    return Result({"robot": machine.name, "files": [str(path) for path in files]}, files=files)
+    return CommandResult(
+        {"robot": machine.name, "files": [str(path) for path in files]}, files=files
+    )
 
 
 def _export_with_extension(machine: Manipulator, target: str) -> list[Path]:

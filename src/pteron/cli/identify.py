@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from pteron.cli.arguments import MachineArgument, load_robot, split_numbers
 from pteron.cli.progress import Times, progress_bar, spinner
-from pteron.cli.result import Result
+from pteron.cli.result import CommandResult
 from pteron.cli.terminal import (
     GRADE_COLORS,
     ascii_number,
@@ -67,7 +67,7 @@ def identify(
     period: float | None = None,
     cad: str = "robot",
     box: list[str] | None = None,
-) -> Result:
+) -> CommandResult:
     """Identify a machine from recorded motions, and say whether the result can be trusted.
 
     With --payload, the inertia of a payload is found from the motion recorded with it and without:
@@ -138,7 +138,7 @@ def identify(
     if is_terminal():
         note(times.summary())
     data = {"files": [str(path) for path in files.paths], **numbers(result)}
-    return Result(data, partial(_show, result), files.paths)
+    return CommandResult(data, partial(_show, result), files.paths)
 
 
 def _speeds(text: str | None) -> tuple[float, ...] | Literal["auto"] | None:

@@ -33,7 +33,7 @@ def map_data(
     grid = index_map.grid
     return {
         "robot": index_map.robot,
-        "held": grid.held,
+        "held": grid.fixed_coordinates,
         "varies": [fields_as_json(axis, _AXIS) for axis in grid.axes],
         "poses": grid.size,
         "in_reach": index_map.share,
@@ -51,7 +51,7 @@ def _index_data(index_map: Map, name: str) -> dict[str, Any]:
     index = ALL[name]
     about = fields_as_json(index, "index=name title unit better")
     try:
-        summary = index_map.summary(name)
+        summary = index_map.statistics(name)
     except DataError:
         undetermined = int(index_map.reachable.sum())
         return {
@@ -84,7 +84,8 @@ def show_map(index_map: Map, volume: ReachVolume | None, data: Mapping[str, Any]
     """Print for a person: the reach, what ends it, and each index."""
     from pteron.platforms.coordinates import are_angles, coordinate
 
-    constants = ", ".join(pose_text(name, value) for name, value in index_map.grid.held.items())
+    fixed = index_map.grid.fixed_coordinates
+    constants = ", ".join(pose_text(name, coordinate) for name, coordinate in fixed.items())
     lines: list[str | rich.table.Table] = [
         f"[bold]{plain(index_map.robot)}[/bold]{f' at {constants}' if constants else ''}"
     ]
@@ -93,7 +94,7 @@ def show_map(index_map: Map, volume: ReachVolume | None, data: Mapping[str, Any]
         box = zip(names, *volume.box.tolist(), strict=True)
         spans = ", ".join(span_text(name, low, high) for name, low, high in box)
         noun = "area" if volume.unit == "m^2" else "volume"
-        angles = {n: angle for n, angle in index_map.grid.held.items() if n not in names}
+        angles = {n: angle for n, angle in fixed.items() if n not in names}
         at = ", ".join(pose_text(name, angle) for name, angle in angles.items())
         size = f"{noun} {volume.volume:.4g} {volume.unit}"
         lines.append(

@@ -11,6 +11,7 @@ from pteron.design.task import Task
 from pteron.manipulator import Manipulator
 from pteron.manipulator.manipulator import legs_text
 from pteron.renamed import former_attribute
+from pteron.result import Result
 
 _NONE = 1e-9
 """Smaller changes, in m or without unit, count as none."""
@@ -19,8 +20,8 @@ _SMALL = 1e-2
 """Length from which on a tenth of a millimetre is fine enough, m."""
 
 
-@dataclass(frozen=True)
-class Change:
+@dataclass(frozen=True, eq=False, repr=False)
+class Change(Result):
     """One number before and after.
 
     Attributes
@@ -41,11 +42,18 @@ class Change:
     @property
     def words(self) -> str:
         """The change as a clause: "upper length of legs 2 and 4 154.0 mm -> 246.0 mm (+59.7 %)"."""
-        return f"{self.what} {self.shown(self.before)} -> {self.shown(self.after)} ({self.by})"
+        what, start, end, change = self.cells
+        return f"{what} {start} -> {end} ({change})"
 
     @property
-    def by(self) -> str:
-        """By how much the size grows, in %; what is new or turns its sign, as a difference."""
+    def cells(self) -> tuple[str, str, str, str]:
+        """What changes, both values with their unit, and by how much it grows."""
+        start, end = self.format_value(self.before), self.format_value(self.after)
+        return self.what, start, end, self.relative_change
+
+    @property
+    def relative_change(self) -> str:
+        """Relative change in %; the difference where the value was zero or changes its sign."""
         if math.isnan(self.before) or math.isnan(self.after):
             return ""
         if abs(self.before) > _NONE and self.before * self.after > 0.0:
@@ -53,19 +61,21 @@ class Change:
             return "none" if float(text[:-2]) == 0.0 else text
         if abs(self.after - self.before) <= _NONE:
             return "none"
-        return (
-            f"{'+' if self.after > self.before else '-'}{self.shown(abs(self.after - self.before))}"
-        )
+        sign = "+" if self.after > self.before else "-"
+        return f"{sign}{self.format_value(abs(self.after - self.before))}"
 
-    told = former_attribute("told", "shown")
+    by = former_attribute("by", "relative_change")
+    shown = former_attribute("shown", "format_value")
 
-    def shown(self, value: float) -> str:
+    told = former_attribute("told", "format_value")
+
+    def format_value(self, number: float) -> str:
         """Return a value with its unit; lengths in millimetres."""
-        if math.isnan(value):
+        if math.isnan(number):
             return "none"
         if self.unit == "m":
-            return f"{1000.0 * value:{'.1f' if abs(value) >= _SMALL else '.3g'}} mm"
-        return f"{value:.4g} {self.unit}".rstrip()
+            return f"{1000.0 * number:{'.1f' if abs(number) >= _SMALL else '.3g'}} mm"
+        return f"{number:.4g} {self.unit}".rstrip()
 
 
 def geometry_changes(task: Task, robot: Manipulator) -> list[Change]:
@@ -103,11 +113,11 @@ def mass_changes(task: Task, robot: Manipulator) -> list[Change]:
 
 
 def quantity_changes(design: Design) -> list[Change]:
-    """Return the quantities that were asked for, of the machine to begin with and of a design."""
+    """Return the changes of objectives and required quantities from the start to a design."""
     task = design.task
     return [
         Change(name, start_design(task).quantity(name), design.quantity(name), task.unit(name))
-        for name in task.asked
+        for name in task.quantity_names
     ]
 
 

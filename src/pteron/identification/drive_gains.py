@@ -22,6 +22,7 @@ from pteron.json_values import fields_as_json
 from pteron.kernels import Array
 from pteron.manipulator import RobotLike, as_manipulator
 from pteron.reduction import BaseParameters
+from pteron.result import Result
 
 _UNSEEN = 1e-10
 """Singular value, relative to the largest, below which gains cannot be told from inertia."""
@@ -37,8 +38,8 @@ _ROUNDING = 1e-13
 """Change of the predicted currents, over the currents, that counts as rounding."""
 
 
-@dataclass(frozen=True)
-class DriveGains:
+@dataclass(frozen=True, eq=False, repr=False)
+class DriveGains(Result):
     """Gains g of the drives: force_i = g_i current_i.
 
     Attributes
@@ -63,6 +64,8 @@ class DriveGains:
     gap : float
         Ratio of the smallest to the second smallest: 0 without noise, 1 where noise hides it all.
     """
+
+    ROWS = "gains deviations residual"
 
     gains: Array
     deviations: Array

@@ -16,6 +16,7 @@ from pteron.identification.signals import Preprocessing, samples
 from pteron.json_values import fields_as_json
 from pteron.kernels import Array
 from pteron.renamed import former_attribute
+from pteron.result import Result
 
 _KEPT = 6000
 """Samples, about, that are kept for pictures."""
@@ -37,8 +38,8 @@ FRICTION = ("coulomb", "viscous", "stribeck", "offset")
 """Kinds of values that are not the rigid bodies'."""
 
 
-@dataclass(frozen=True)
-class Prediction:
+@dataclass(frozen=True, eq=False, repr=False)
+class Prediction(Result):
     """A model's prediction of the forces of a recording, at its own samples.
 
     Samples of a joint that hardly moves are left out, and those next to them in which its direction
@@ -73,6 +74,8 @@ class Prediction:
     used : array of bool, shape (S, n)
         Whether they count.
     """
+
+    ROWS = "time measured:1 predicted:1 without_friction:1 speed:1"
 
     source: str
     samples: int

@@ -24,6 +24,7 @@ from pteron.kinematics import twist
 from pteron.kinematics.evaluate import evaluate_kernel, finite_rows
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.renamed import former_attribute
+from pteron.result import Result
 from pteron.shapes import Matrices, Numbers, OnFailure, PerCoordinate, PoseLike
 
 _GAUSS = 0.5 - 0.5 / np.sqrt(3.0), 0.5 + 0.5 / np.sqrt(3.0)
@@ -33,8 +34,8 @@ _FREE = 1e-12
 """Compliance to a self-stress, as a share of the largest, below which it counts as none."""
 
 
-@dataclass(frozen=True)
-class Stiffness:
+@dataclass(frozen=True, eq=False, repr=False)
+class Stiffness(Result):
     """Compliance of a machine under a load at its tool, while the actuators hold their joints.
 
     Attributes
@@ -48,6 +49,8 @@ class Stiffness:
     lengths : int
         Number of the rows of C, the first ones, that are lengths.
     """
+
+    ROWS = "compliance:2 frequencies:1"
 
     compliance: Matrices
     frequencies: PerCoordinate

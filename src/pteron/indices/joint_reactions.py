@@ -23,11 +23,12 @@ from pteron.indices.internal_forces import (
 from pteron.kernels import Array, as_array
 from pteron.kinematics.evaluate import evaluate_kernel, finite_rows
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.result import Result
 from pteron.shapes import OnFailure, PoseLike
 
 
-@dataclass(frozen=True)
-class Reactions:
+@dataclass(frozen=True, eq=False, repr=False)
+class Reactions(Result):
     """Forces and moments in the legs' joints: those of the base's side on the platform's side.
 
     Attributes
@@ -51,6 +52,8 @@ class Reactions:
         The part of the load that the legs, as they are modelled, cannot hold, N: moments that would
         tilt the platform count over the legs' mean size. It is 0 where they hold all of it.
     """
+
+    ROWS = "unheld actuators:1 forces:3 moments:3"
 
     names: tuple[tuple[str, ...], ...]
     points: Array

@@ -17,14 +17,15 @@ from pteron.kinematics import twist
 from pteron.kinematics.evaluate import evaluate_kernel, finite_rows
 from pteron.legs.kind import LegKind
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.result import Result
 from pteron.shapes import OnFailure, PoseLike
 
 _UPRIGHT = 1e-9
 """Cosine of the angle below which two directions count as perpendicular."""
 
 
-@dataclass(frozen=True)
-class Sensitivities:
+@dataclass(frozen=True, eq=False, repr=False)
+class Sensitivities(Result):
     """Derivatives of the pose by a machine's dimensions.
 
     Attributes
@@ -42,11 +43,19 @@ class Sensitivities:
         The same, with the position of the tool's centre point.
     """
 
+    ROWS = "names roles units slopes:1"
+
     names: tuple[str, ...]
     roles: tuple[str, ...]
     units: tuple[str, ...]
     matrix: Array
     tool: Array
+
+    @property
+    def slopes(self) -> Array:
+        """The derivatives of `matrix`, shape (p, ... m): a row for each dimension."""
+        columns: Array = np.moveaxis(self.matrix, -1, 0)
+        return columns.reshape(len(self.names), -1)
 
 
 def geometric_sensitivities(

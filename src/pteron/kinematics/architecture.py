@@ -24,6 +24,7 @@ from pteron.kinematics.ram_figures import balance_of_rams
 from pteron.kinematics.ram_motions import self_motions_of_rams
 from pteron.kinematics.sampling import draw_poses, joints_limit_reach, type_ii_sizes
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.result import Result
 
 _VANISHING = 1e-10
 """Type-II measures, or singular values over the largest, below this are rounding."""
@@ -49,8 +50,8 @@ Proof = Literal["closed form", "exact arithmetic", "numerical", "one pose"]
 """Grounds on which a layout is known to be singular everywhere or, by one pose, not to be."""
 
 
-@dataclass(frozen=True)
-class Architecture:
+@dataclass(frozen=True, eq=False, repr=False)
+class Architecture(Result):
     """Properties of a machine's layout, whatever its pose.
 
     Attributes

@@ -17,7 +17,7 @@ from pteron.kernels import Array, numeric
 from pteron.kinematics.evaluate import evaluate_kernel
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.manipulator.saving import text_of
-from pteron.maps.accelerated import accelerated
+from pteron.maps.accelerated import indices_by_jax
 from pteron.maps.files import checked_map_file, save_map
 from pteron.maps.grid import Grid, Region, pose_grid
 from pteron.maps.map import MARGIN, Map
@@ -93,7 +93,7 @@ def map_index(
     >>> from pteron.maps import map_index, pose_grid
     >>> robot = pteron.load("quadrupteron")
     >>> found = map_index(robot, "condition", pose_grid(robot, {"z": 0.0, "phi": 0.0}, points=41))
-    >>> found, round(found.summary("condition").best, 3)
+    >>> found, round(found.statistics("condition").best, 3)
     (<Map of 'quadrupteron': condition over x 41 x y 41>, 2.414)
     """
     robot = as_manipulator(robot)
@@ -119,7 +119,7 @@ def map_index(
             if place is None or not streams:
                 folder = opened.enter_context(TemporaryDirectory(prefix="pteron-map-"))
                 place = Path(folder, "map.zarr")
-            store = MapStore.of(place, robot.name, poses, names, plan)
+            store = MapStore.create(place, robot.name, poses, names, plan)
         else:
             store = MemoryStore(poses, names)
         if engine == "auto":
@@ -153,7 +153,7 @@ def _compute_region(
 ) -> dict[str, Array]:
     """Return the indices of a part of a grid, and `status`."""
     if engine == "jax":
-        return accelerated(robot, names, grid, region)
+        return indices_by_jax(robot, names, grid, region)
     prepare(robot, names, grid.size)
     poses = grid.poses(region)
     rows = poses.reshape(-1, poses.shape[-1])
@@ -166,7 +166,7 @@ def _compute_region(
             outputs[name][part] = (
                 margin if name == MARGIN.name else evaluate_kernel(robot, name, "nan", rows[part])
             )
-    return {name: values.reshape(poses.shape[:-1]) for name, values in outputs.items()}
+    return {name: array.reshape(poses.shape[:-1]) for name, array in outputs.items()}
 
 
 @lru_cache(maxsize=64)

@@ -101,7 +101,7 @@ class Washout:
             expect(0.0 < setting < np.inf, name, repr(setting), "a number above 0")
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Cue(Motion):
     """A motion of the platform that shows a vehicle's, within a proved box of poses.
 

@@ -22,6 +22,7 @@ from pteron.motion import Motion
 from pteron.plots.film_encoders import ENCODERS, Pixels, checked_encoder
 from pteron.plots.film_frames import frames
 from pteron.progress import Progress
+from pteron.result import Result
 
 _SPEEDS = (1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01)
 """Speeds from which one is chosen where none is given; 1 is real time."""
@@ -39,8 +40,8 @@ _MOST = 20_000
 """Most frames of one film; a longer one is refused."""
 
 
-@dataclass(frozen=True)
-class Film:
+@dataclass(frozen=True, eq=False, repr=False)
+class Film(Result):
     """A film that has been written.
 
     Attributes

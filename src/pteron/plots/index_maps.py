@@ -119,7 +119,7 @@ def _planes(volume: Map) -> list[Map]:
     middle = np.unravel_index(int(depth.argmax()), depth.shape)
     places = [axis.values[i] for axis, i in zip(axes, middle, strict=True)]
     return [
-        volume.at(axis.name, float(place))
+        volume.slice_at(axis.name, float(place))
         for axis, place in zip(reversed(axes), reversed(places), strict=True)
     ]
 
@@ -200,7 +200,7 @@ def _plane(
         mesh, ax=axes, fraction=0.05, pad=0.02, extend=_colorbar_extension(drawn, scale)
     )
     direction = "bright is better"
-    if drawn.count() and _is_constant(summary := plane.summary(name)):
+    if drawn.count() and _is_constant(summary := plane.statistics(name)):
         bar.set_ticks([factor * summary.best], labels=[f"{factor * summary.best:.4g}"])
         direction = "the same everywhere here"
     elif isinstance(scale, LogNorm):
@@ -271,7 +271,7 @@ def _hatch_unreachable(axes: Axes, plane: Map, name: str, causes: Mapping[str, A
 
 def _mark_best(axes: Axes, plane: Map, name: str, handles: list[Any]) -> None:
     """Mark the best pose of a plane, unless the index is constant."""
-    summary = plane.summary(name)
+    summary = plane.statistics(name)
     if _is_constant(summary):
         return
     factor = shown_unit(summary.unit)[0]
@@ -332,7 +332,7 @@ def _unit(name: str) -> str:
 
 def _title(shown_map: Map) -> str:
     """Return the machine's name, and the coordinates that are held."""
-    pairs = ((coordinate(name), value) for name, value in shown_map.grid.held.items())
+    pairs = ((coordinate(name), value) for name, value in shown_map.grid.fixed_coordinates.items())
     constants = (
         f"{c.symbol} = {c.shown_factor * value + 0.0:.4g}{' ' * (c.unit == 'm')}{c.shown_unit}"
         for c, value in pairs

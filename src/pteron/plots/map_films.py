@@ -68,7 +68,7 @@ def map_film(
     rate = ENCODERS[target.suffix.lower()].rate(fps)
 
     def drawn(value: float) -> Figure:
-        return map_panels([(index_map.at(last.name, value), name)], scales, index_map.causes)
+        return map_panels([(index_map.slice_at(last.name, value), name)], scales, index_map.causes)
 
     values = last.values.tolist()
     figure = drawn(values[0])

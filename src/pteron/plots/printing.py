@@ -94,9 +94,9 @@ def resize(figure: Figure, width: Width | float) -> Figure:
     Examples
     --------
     >>> import numpy as np
-    >>> from pteron.plots import power_figure, resized
+    >>> from pteron.plots import power_figure, resize
     >>> figure = power_figure(np.linspace(0.0, 1.0, 5), np.ones((5, 3)))
-    >>> [float(side) for side in resized(figure, "column").get_size_inches().round(1)]
+    >>> [float(side) for side in resize(figure, "column").get_size_inches().round(1)]
     [3.5, 2.7]
     """
     inches: Any = WIDTHS.get(width, 0.0) if isinstance(width, str) else width

@@ -11,6 +11,7 @@ import scipy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
 from pteron.kernels import Array
+from pteron.result import Result
 from pteron.workspace.paving import Paving
 
 _CELLS = 1 << 22
@@ -21,8 +22,8 @@ _ROUNDING = 1e-9
 """Share of a cell by which its corners and what fills it may be off, from rounding."""
 
 
-@dataclass(frozen=True)
-class Component:
+@dataclass(frozen=True, eq=False, repr=False)
+class Component(Result):
     """A part of the workspace in which a path leads from any pose to any other.
 
     Attributes
@@ -43,8 +44,8 @@ class Component:
     group: int
 
 
-@dataclass(frozen=True)
-class Components:
+@dataclass(frozen=True, eq=False, repr=False)
+class Components(Result):
     """The parts of a workspace.
 
     Attributes
@@ -60,6 +61,8 @@ class Components:
         Share of the volume proved inside that `parts` hold. The rest is in parts left out, or in
         none where the paving's smallest boxes are finer than the lattice in which parts are sought.
     """
+
+    ROWS = "parts"
 
     parts: tuple[Component, ...] = field(repr=False)
     groups: int

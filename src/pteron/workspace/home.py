@@ -22,6 +22,7 @@ from pteron.kinematics import inverse_kinematics, singular_orientations
 from pteron.kinematics.sampling import search_ball
 from pteron.kinematics.singularities import best_type_ii
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.result import Result
 from pteron.workspace.holding import expect_regular
 from pteron.workspace.home_starts import (
     axis_poses,
@@ -90,8 +91,8 @@ _MIDDLE = 0.9
 """The share that the middle between equals must have: from there the machine moves every way."""
 
 
-@dataclass(frozen=True)
-class HomePoses:
+@dataclass(frozen=True, eq=False, repr=False)
+class HomePoses(Result):
     """The home of a machine, and its image on the other side of the base.
 
     Attributes

@@ -23,6 +23,7 @@ from pteron.kinematics.architecture import architecture, expect_regular
 from pteron.kinematics.evaluate import finite_pose
 from pteron.kinematics.sampling import search_ball
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.result import Result
 from pteron.shapes import PoseLike
 from pteron.workspace.enclosing import enclosing_box
 from pteron.workspace.nearest_vanishing import SINGULAR, Nearest, Search
@@ -35,8 +36,8 @@ By = Literal["translation", "rotation"]
 """The motion that leads to the singular pose, alone."""
 
 
-@dataclass(frozen=True)
-class NearestSingularity:
+@dataclass(frozen=True, eq=False, repr=False)
+class NearestSingularity(Result):
     """The nearest singular pose of one kind.
 
     Attributes

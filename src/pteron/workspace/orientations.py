@@ -11,12 +11,13 @@ from pteron.errors import DataError, ModelError
 from pteron.kernels import Array
 from pteron.kinematics.evaluate import finite_pose
 from pteron.manipulator import RobotLike, as_manipulator, working_modes
+from pteron.result import Result
 from pteron.shapes import PoseLike
 from pteron.workspace.paving import paving
 
 
-@dataclass(frozen=True)
-class VolumesOverAngles:
+@dataclass(frozen=True, eq=False, repr=False)
+class VolumesOverAngles(Result):
     """The volume of the workspace at each of several orientations, in each of several modes.
 
     Attributes
@@ -31,11 +32,23 @@ class VolumesOverAngles:
         Unit of both.
     """
 
+    ROWS = "angles inner_volumes:1 outer_volumes:1"
+
     angles: Array
     elbows: tuple[tuple[int, ...], ...]
     inner: Array
     outer: Array
     unit: str
+
+    @property
+    def inner_volumes(self) -> Array:
+        """`inner`, a row for each angle."""
+        return self.inner.T
+
+    @property
+    def outer_volumes(self) -> Array:
+        """`outer`, a row for each angle."""
+        return self.outer.T
 
 
 def over_angles(

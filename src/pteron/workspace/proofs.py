@@ -14,6 +14,7 @@ from pteron.kernels import Array, numeric
 from pteron.kinematics.architecture import expect_regular
 from pteron.kinematics.limits import limited_joints
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.result import Result
 from pteron.workspace.boxes import halve_boxes
 from pteron.workspace.conditions import (
     Condition,
@@ -34,8 +35,8 @@ _THINNEST = 1e-9
 """Share of the region's sides below which a box is not halved."""
 
 
-@dataclass(frozen=True)
-class Proof:
+@dataclass(frozen=True, eq=False, repr=False)
+class Proof(Result):
     """The proof that a region lies in the workspace, or a pose of it that does not.
 
     Attributes

@@ -13,6 +13,7 @@ from pteron.errors import DataError
 from pteron.kernels import Array, numeric
 from pteron.kinematics.evaluate import finite_pose
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.result import Result
 from pteron.shapes import PoseLike
 from pteron.workspace.boxes import vary_coordinates
 from pteron.workspace.volume import bounding_box
@@ -33,8 +34,8 @@ Plane = str | tuple[str, str]
 """The two coordinates of the pose that vary: "xy", "xz", "yz", or a pair of names."""
 
 
-@dataclass(frozen=True)
-class ReachSlice:
+@dataclass(frozen=True, eq=False, repr=False)
+class ReachSlice(Result):
     """A grid of poses that differ in two of their coordinates.
 
     Attributes
@@ -55,6 +56,8 @@ class ReachSlice:
     places : (int, int)
         Where the two coordinates stand in a pose.
     """
+
+    ROWS = "margin status poses:1 leg_margins:1"
 
     plane: Plane
     center: Array

@@ -16,6 +16,7 @@ from pteron.errors import ModelError
 from pteron.kernels import Array
 from pteron.kinematics.evaluate import finite_pose
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.result import Result
 from pteron.shapes import PoseLike
 from pteron.workspace.conditions import Condition, conditions, keeps
 from pteron.workspace.largest_proved import largest_proved
@@ -113,8 +114,8 @@ class TiltedBall:
         return poses
 
 
-@dataclass(frozen=True)
-class LargestTilt:
+@dataclass(frozen=True, eq=False, repr=False)
+class LargestTilt(Result):
     """The largest tilt, or ball, that is proved to lie in the workspace.
 
     Attributes

@@ -14,6 +14,7 @@ from pteron.kernels import Array, numeric
 from pteron.kinematics.evaluate import finite_pose
 from pteron.kinematics.sampling import search_ball
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.result import Result
 from pteron.shapes import PoseLike, Seed
 from pteron.workspace.boxes import vary_coordinates
 from pteron.workspace.margins import distance_to_limits
@@ -56,8 +57,8 @@ _TOUCH = 1e-9
 """Metres by which the legs' reach must overlap to count as common."""
 
 
-@dataclass(frozen=True)
-class ReachVolume:
+@dataclass(frozen=True, eq=False, repr=False)
+class ReachVolume(Result):
     """The set of positions of P in reach at one orientation, within the joints' limits.
 
     The tool's centre point reaches the same set, moved by where it is from P.

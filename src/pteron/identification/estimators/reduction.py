@@ -11,6 +11,7 @@ from pteron.errors import DataError
 from pteron.identification.estimators.qr import qr_factor
 from pteron.identification.observation import Observations
 from pteron.kernels import Array
+from pteron.result import Result
 
 TOLERANCE = 1e-8
 """Independent part of a column of length one, relative to the first, that counts as rounding."""
@@ -19,8 +20,8 @@ _ROUNDING = 1e-12
 """Length of a column, relative to the longest, that counts as zero."""
 
 
-@dataclass(frozen=True)
-class Reduced:
+@dataclass(frozen=True, eq=False, repr=False)
+class Reduced(Result):
     """The independent columns of a regressor, and the others as combinations of them.
 
     Attributes

@@ -10,6 +10,7 @@ import numpy as np
 from pteron.json_values import fields_as_json
 from pteron.kernels import Array
 from pteron.renamed import former_attribute
+from pteron.result import Result
 
 FaultName = Literal[
     "delay",
@@ -150,8 +151,8 @@ def describe_held_forces(delay: float) -> str:
     return _SAMPLING.format(late=late, early=early, size_ms=1e3 * abs(delay))
 
 
-@dataclass(frozen=True)
-class IsolatedFault:
+@dataclass(frozen=True, eq=False, repr=False)
+class IsolatedFault(Result):
     """A fault that the residuals show.
 
     Attributes
@@ -177,6 +178,8 @@ class IsolatedFault:
     as_well : tuple of str
         Other faults that explain the residuals as well.
     """
+
+    ROWS = "labels sizes deviations"
 
     fault: FaultName
     labels: tuple[str, ...]

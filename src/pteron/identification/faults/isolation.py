@@ -30,6 +30,7 @@ from pteron.identification.signals.preprocessing import LATEST
 from pteron.json_values import fields_as_json
 from pteron.kernels import Array
 from pteron.renamed import former_attribute
+from pteron.result import Result
 
 _ROWS, _MORE = 20_000, 100_000
 """Number of rows of all logs that are searched, those in which the joints move most; and the number
@@ -53,8 +54,8 @@ _NAMED = 0.05
 has no noise, and the sampling itself makes them."""
 
 
-@dataclass(frozen=True)
-class FaultIsolation:
+@dataclass(frozen=True, eq=False, repr=False)
+class FaultIsolation(Result):
     """The faults that a fit's residuals show.
 
     Attributes
@@ -85,6 +86,8 @@ class FaultIsolation:
     factor : float
         Forces of the bodies over those of the drawing, where all have that factor in common.
     """
+
+    ROWS = "faults"
 
     tried: tuple[str, ...]
     faults: tuple[IsolatedFault, ...]

@@ -32,6 +32,7 @@ from pteron.identification.signals.states import start_pose
 from pteron.kernels import Array
 from pteron.manipulator import RobotLike, as_manipulator
 from pteron.renamed import former_attribute
+from pteron.result import Result
 
 _LARGEST_PERIODIC = 4_000_000
 """Rows up to which a periodic log is fitted in one piece."""
@@ -124,8 +125,8 @@ class Processing:
         expect(small, "delay", f"{self.delay} s", f'at most {LATEST:g} s or "auto"')
 
 
-@dataclass(frozen=True)
-class Preprocessing:
+@dataclass(frozen=True, eq=False, repr=False)
+class Preprocessing(Result):
     """The preprocessing of a log.
 
     Attributes

@@ -24,6 +24,7 @@ from pteron.motion.motion import Motion, pose_text
 from pteron.motion.trajectories.cycle import moves
 from pteron.motion.trajectories.scaling import keeps_margin, least_margin
 from pteron.motion.trajectories.tool import Curve, pose_motion, tool_motion
+from pteron.result import Result
 from pteron.workspace import Box, Region, bounding_box, home_pose
 
 TURNS = 12
@@ -43,8 +44,8 @@ _ROUNDING = 1e-9
 
 
 @checked_arguments
-@dataclass(frozen=True)
-class Place:
+@dataclass(frozen=True, eq=False, repr=False)
+class CyclePlace(Result):
     """A place of a cycle.
 
     Parameters
@@ -101,7 +102,7 @@ class Course:
         relative = tuple((c[0] - middle, *c[1:]) for c in curves)
         return cls(robot, middle, relative, axis, _yaw(robot, axis))
 
-    def at(self, places: Sequence[Place]) -> Iterator[Curve]:
+    def curves_at(self, places: Sequence[CyclePlace]) -> Iterator[Curve]:
         """Yield each motion's poses and their derivatives (T, W, m) at places."""
         platform = self.robot.platform
         lengths = ~platform.angular
@@ -157,7 +158,7 @@ def region_fits(course: Course, region: Region | None) -> tuple[Array, Fits]:
     return box, partial(keeps_margin, robot, least=least_margin(robot, home))
 
 
-def places_in(course: Course, box: Array, fits: Fits) -> tuple[Place, ...]:
+def places_in(course: Course, box: Array, fits: Fits) -> tuple[CyclePlace, ...]:
     """Return places at which the whole of a course lies in a region.
 
     They are on a grid that goes to the ends of the region's box, for turns by 30 degrees; the
@@ -173,7 +174,7 @@ def places_in(course: Course, box: Array, fits: Fits) -> tuple[Place, ...]:
         varies = high - low > 2.0 * _ROUNDING
         low, high = low + _ROUNDING * varies, high - _ROUNDING * varies
         counts = np.where(varies, _COUNTS.get(int(varies.sum()), 2), 1)
-        grid = [Place(pose, turn) for pose in product(*map(np.linspace, low, high, counts))]
+        grid = [CyclePlace(pose, turn) for pose in product(*map(np.linspace, low, high, counts))]
         if turn and course.yaw.any() and not (varies & (course.yaw != 0.0)).any():
             candidates += [with_platform(place, course.yaw, turn) for place in grid]
         candidates += grid
@@ -182,7 +183,7 @@ def places_in(course: Course, box: Array, fits: Fits) -> tuple[Place, ...]:
     return (*accepted, *(place for place in others if stays(course, place, fits)))
 
 
-def _quasirandom_places(course: Course, box: Array) -> Iterator[Place]:
+def _quasirandom_places(course: Course, box: Array) -> Iterator[CyclePlace]:
     """Yield places evenly spread over a box and all turns, each other with its platform turned.
 
     They are the quasirandom sequence of M. Roberts, "The unreasonable effectiveness of quasirandom
@@ -197,25 +198,25 @@ def _quasirandom_places(course: Course, box: Array) -> Iterator[Place]:
         turn = 2.0 * np.pi * part if course.axis is not None else 0.0
         low, high = box - course.extent(turn)
         if (low <= high + _ROUNDING).all():
-            place = Place(tuple(map(float, low + units * np.maximum(high - low, 0.0))), turn)
+            place = CyclePlace(tuple(map(float, low + units * np.maximum(high - low, 0.0))), turn)
             turns = k % 2 and not (high - low > 2.0 * _ROUNDING)[course.yaw != 0.0].any()
             yield with_platform(place, course.yaw, turn) if turns else place
 
 
-def stays(course: Course, place: Place, fits: Fits) -> bool:
+def stays(course: Course, place: CyclePlace, fits: Fits) -> bool:
     """Say whether the whole of a course lies in a region at a place."""
-    return all(fits(poses[:, 0]) for poses, *_ in course.at([place]))
+    return all(fits(poses[:, 0]) for poses, *_ in course.curves_at([place]))
 
 
-def with_platform(place: Place, yaw: Array, turn: float) -> Place:
+def with_platform(place: CyclePlace, yaw: Array, turn: float) -> CyclePlace:
     """Return a place whose platform is turned by at most half a turn, as `Course.yaw` has it."""
     pose = np.array(place.pose) + yaw * np.angle(np.exp(1j * turn))
-    return Place(tuple(map(float, pose)), place.turn)
+    return CyclePlace(tuple(map(float, pose)), place.turn)
 
 
 def neighbours(
-    place: Place, steps: Array, turn: float, yaw: Array, *, oblique: bool
-) -> Iterator[Place]:
+    place: CyclePlace, steps: Array, turn: float, yaw: Array, *, oblique: bool
+) -> Iterator[CyclePlace]:
     """Yield a place's neighbours: a step (m,) along each coordinate, and a turn, to both sides.
 
     A turn is that of the path alone, and that of the platform, too. In a region whose boundary is
@@ -223,20 +224,20 @@ def neighbours(
     """
     for side in (1.0, -1.0):
         if turn:
-            turned_place = Place(place.pose, place.turn + side * turn)
+            turned_place = CyclePlace(place.pose, place.turn + side * turn)
             yield turned_place
             if yaw.any():
                 yield with_platform(turned_place, yaw, side * turn)
         for i in np.flatnonzero(steps):
             coordinates = list(place.pose)
             coordinates[i] += side * float(steps[i])
-            yield Place(tuple(coordinates), place.turn)
+            yield CyclePlace(tuple(coordinates), place.turn)
     moving = np.flatnonzero(steps)
     for signs in product((1.0, -1.0), repeat=len(moving)) if oblique and len(moving) < 4 else ():
         pose = np.array(place.pose)
         pose[moving] += signs * steps[moving]
         for side in (0.0, 1.0, -1.0) if turn else (0.0,):
-            neighbour = Place(tuple(map(float, pose)), place.turn + side * turn)
+            neighbour = CyclePlace(tuple(map(float, pose)), place.turn + side * turn)
             yield with_platform(neighbour, yaw, side * turn) if yaw.any() else neighbour
 
 
@@ -271,7 +272,7 @@ def _is_in_box(region: Region, poses: Array) -> NDArray[np.bool_]:
     return np.asarray(((poses >= low - _ROUNDING) & (poses <= high + _ROUNDING)).all(axis=-1))
 
 
-def expect_places_of(robot: Manipulator, places: Sequence[Place]) -> tuple[Place, ...]:
+def expect_places_of(robot: Manipulator, places: Sequence[CyclePlace]) -> tuple[CyclePlace, ...]:
     """Return the places after a check: at least one, each with the machine's coordinates."""
     expect(places, "places", "none", "at least one")
     for i, place in enumerate(places):
@@ -283,7 +284,7 @@ def expect_places_of(robot: Manipulator, places: Sequence[Place]) -> tuple[Place
     return tuple(places)
 
 
-def placed(robot: RobotLike, motion: Motion, place: Place) -> Motion:
+def motion_at_place(robot: RobotLike, motion: Motion, place: CyclePlace) -> Motion:
     """Return a motion at another place: it keeps its shape and its time.
 
     Parameters
@@ -292,7 +293,7 @@ def placed(robot: RobotLike, motion: Motion, place: Place) -> Motion:
         The machine.
     motion : Motion
         The motion.
-    place : Place
+    place : CyclePlace
         Where its middle is to be, and how it is turned.
 
     Returns
@@ -301,11 +302,11 @@ def placed(robot: RobotLike, motion: Motion, place: Place) -> Motion:
 
     Examples
     --------
-    >>> from pteron.motion import Place, pick_and_place, placed
+    >>> from pteron.motion import CyclePlace, motion_at_place, pick_and_place
     >>> cycle = pick_and_place("delta", samples=51)
-    >>> placed("delta", cycle, Place((0.1, 0.0, -0.8))).pose.mean(axis=0).round(2)
+    >>> motion_at_place("delta", cycle, CyclePlace((0.1, 0.0, -0.8))).pose.mean(axis=0).round(2)
     array([ 0.1,  0. , -0.8])
     """
     robot = as_manipulator(robot)
-    (curve,) = Course.from_motions(robot, [motion]).at(expect_places_of(robot, [place]))
+    (curve,) = Course.from_motions(robot, [motion]).curves_at(expect_places_of(robot, [place]))
     return Motion(motion.time, *(part[:, 0] for part in curve))

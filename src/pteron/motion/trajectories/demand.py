@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -24,6 +25,7 @@ from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.motion import pose_text
 from pteron.motion.trajectories.limits import MotionLimits
 from pteron.motion.trajectories.tool import Curve, tool_path
+from pteron.result import Result
 
 _ROUNDING = 1e-12
 """Relative excess over a drive's limit that counts as rounding."""
@@ -210,7 +212,8 @@ def _expect_strength(
     )
 
 
-class Peak(NamedTuple):
+@dataclass(frozen=True, eq=False, repr=False)
+class Peak(Result):
     """The largest size of a quantity in a motion, beside its limit."""
 
     name: str

@@ -26,6 +26,7 @@ from pteron.motion.tuning.linear_plant import linearise
 from pteron.motion.tuning.margins import LoopMargins
 from pteron.motion.tuning.sampled_loop import SampledLoop
 from pteron.progress import Progress, Steps
+from pteron.result import Result
 from pteron.workspace.margins import joint_distances
 
 if TYPE_CHECKING:
@@ -87,8 +88,8 @@ class Required:
         return float(min(factor, delay / self.delay if self.delay else np.inf))
 
 
-@dataclass(frozen=True)
-class Tuning:
+@dataclass(frozen=True, eq=False, repr=False)
+class Tuning(Result):
     """A machine's controller with its stability margins at poses and moments of a motion.
 
     Attributes

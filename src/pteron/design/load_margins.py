@@ -6,11 +6,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from pteron.design.choosing.cycles import Places, near_places
-from pteron.design.choosing.drives import in_duty
-from pteron.design.choosing.rating import Case
-from pteron.design.choosing.room import tool_places
-from pteron.design.choosing.samples import about_the_worst
+from pteron.design.cycle_places import Places, neighbour_places
+from pteron.design.drive_options import duty_cycle_mean
+from pteron.design.machine_space import tool_places
+from pteron.design.rating import KindEvaluator
+from pteron.design.workspace_samples import refine_worst_values
 from pteron.design.worst_cases import worst_forces, worst_speeds
 from pteron.dynamics import drive_forces
 from pteron.kernels import Array
@@ -18,18 +18,18 @@ from pteron.kinematics import jacobian
 from pteron.manipulator import Manipulator
 
 DENSE = 7
-"""Poses along each side of the box at which a design is last evaluated, before refinement."""
+"""Poses along each side of the box in the final evaluation of a design."""
 
 _ROUNDS, _KEPT = 4, 3
-"""Rounds of refinement of a cycle's places, each about so many of the worst ones."""
+"""Rounds of refinement of a cycle's places, and number of worst ones kept in each."""
 
 _NOTHING = 1e-9
-"""Least force, speed or torque by which a limit is divided, against 0/0."""
+"""Lower bound of loads by which limits are divided, against 0/0."""
 
 
 @dataclass
-class Margins:
-    """Margins of drives: their limits over their loads.
+class LoadMargins:
+    """LoadMargins of drives: their limits over their loads.
 
     Attributes
     ----------
@@ -58,8 +58,17 @@ class Margins:
         """Keep a margin if it is the least of its name."""
         self.figures[name] = min(self.figures.get(name, np.inf), margin)
 
+    def note_place(
+        self, margin: float, words: str, place: tuple[Places, int] | None = None
+    ) -> None:
+        """Keep motion and place of a margin if it is the least of all."""
+        if margin < self.least:
+            self.least, self.worst, self.place = margin, words, place or self.place
 
-def margins_of(case: Case, robot: Manipulator, middle: Array, time: float | None) -> Margins:
+
+def margins_of(
+    evaluator: KindEvaluator, robot: Manipulator, middle: Array, time: float | None
+) -> LoadMargins:
     """Return the margins of the drives of a machine that carries the job's payload.
 
     Friction and rotors count, and cycles that may be anywhere are taken at all their outermost
@@ -71,12 +80,12 @@ def margins_of(case: Case, robot: Manipulator, middle: Array, time: float | None
         np.array([getattr(drive, name) or np.inf for drive in drives])
         for name in ("max_force", "rated_force", "max_speed")
     )
-    least_margins, squares, shares = Margins(), [], case.shares(time)
-    for cycle in case.every_cycle:
+    least_margins, squares, shares = LoadMargins(), [], evaluator.shares(time)
+    for cycle in evaluator.every_cycle:
         duration = cycle.duration or time or 1.0
         places, greatest = cycle.both_ways(), np.zeros(robot.joint_count)
         for step in range(_ROUNDS + 1):
-            states = case.states(places, middle, duration)
+            states = evaluator.states(places, middle, duration)
             forces = drive_forces(robot, *states)
             rates = np.einsum("bkij,bkj->bki", jacobian(robot, states[0]), states[1])
             means = np.trapezoid(forces**2, axis=1) / (forces.shape[1] - 1) * duration
@@ -88,38 +97,31 @@ def margins_of(case: Case, robot: Manipulator, middle: Array, time: float | None
             ]
             if not len(shares):
                 every.append(least_margins.take("rated_margin", rated, np.sqrt(means)))
-            if np.min(every) < least_margins.least:
-                k = int(np.min(every, axis=0).argmin())
-                least_margins.least, least_margins.place = float(np.min(every)), (places, k)
-                least_margins.worst = places.words(k)
+            k = int(np.min(every, axis=0).argmin())
+            least_margins.note_place(float(np.min(every)), places.words(k), (places, k))
             worst = np.unique(np.argsort([*every, *-means.T], axis=1)[:, :_KEPT])
-            places = near_places(case.job, places, worst, 0.5 ** (step + 1))
+            places = neighbour_places(evaluator.job, places, worst, 0.5 ** (step + 1))
         squares.append(greatest)
     if len(shares):
-        load = np.sqrt(in_duty(np.array(squares), shares))
+        load = np.sqrt(duty_cycle_mean(np.array(squares), shares))
         least = float(least_margins.take("rated_margin", rated, load[None])[0])
-        if least < least_margins.least:
-            least_margins.least, least_margins.worst = (
-                least,
-                "the rated torque of the whole duty cycle",
-            )
-    required = case.job.motion
+        least_margins.note_place(least, "the rated torque of the whole duty cycle")
+    required = evaluator.job.motion
     if required.acceleration or required.speed:
         speed = max(required.speed, _NOTHING)
 
-        def in_any_direction(places: Array) -> Array:
+        def motion_margins(places: Array) -> Array:
             poses = middle + places
             forces = worst_forces(robot, poses, speed, required.acceleration)
             loads = np.hstack([forces, worst_speeds(robot, poses, speed)])
             return np.append(most, fastest) / np.maximum(loads, _NOTHING)
 
-        margins, where = about_the_worst(case.job, robot, in_any_direction, DENSE, keep=2)
+        margins, where = refine_worst_values(evaluator.job, robot, motion_margins, DENSE, keep=2)
         least_margins.note("peak_margin", float(margins[: len(most)].min()))
         least_margins.note("speed_margin", float(margins[len(most) :].min()))
-        if margins.min() < least_margins.least:
-            worst_pose = middle + where[int(margins.argmin())]
-            place = np.subtract(*tool_places(robot, np.array([worst_pose, middle])))
-            at = ", ".join(f"{1e3 * x:+.0f}" for x in place[: len(robot.platform.lengths)])
-            least_margins.least = float(margins.min())
-            least_margins.worst = f"the motion in any direction, at ({at}) mm"
+        worst_pose = middle + where[int(margins.argmin())]
+        place = np.subtract(*tool_places(robot, np.array([worst_pose, middle])))
+        at = ", ".join(f"{1e3 * x:+.0f}" for x in place[: len(robot.platform.lengths)])
+        words = f"the motion in any direction, at ({at}) mm"
+        least_margins.note_place(float(margins.min()), words)
     return least_margins

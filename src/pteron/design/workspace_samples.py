@@ -11,7 +11,7 @@ from itertools import product
 import numpy as np
 import scipy  # type: ignore[import-untyped]
 
-from pteron.design.choosing.job import Job
+from pteron.design.job import Job
 from pteron.kernels import Array
 from pteron.kinematics import pose_of
 from pteron.manipulator import Manipulator
@@ -27,24 +27,24 @@ _RIM = 6
 """Directions round the rim of a cone of tilts."""
 
 INSIDE = 1e-9
-"""Metres or radians by which a cycle or a place may leave the workspace."""
+"""Tolerance of a place in the workspace, m or rad."""
 
 _ROUNDS = 4
-"""Halvings of the distance at which worse places are looked for about the worst."""
+"""Halvings of the refinement's step."""
 
 
-def of_platform(robot: Manipulator, *curve: Array) -> Curve:
+def platform_curve(robot: Manipulator, *curve: Array) -> Curve:
     """Return places of the tool from the middle, and two derivatives, as those of P."""
     pose, first, second = pose_motion(robot.platform, *curve)
     zeros = np.zeros((1, robot.freedom))
     return pose + tool_motion(robot.platform, zeros, zeros, zeros)[0], first, second
 
 
-def with_tool_in_the_middle(robot: Manipulator, angles: Array) -> Array:
-    """Return poses (A, m) from the middle at which P is elsewhere, but the tool is there."""
+def poses_about_tool(robot: Manipulator, angles: Array) -> Array:
+    """Return poses (A, m) that turn about the tool, relative to the workspace's middle."""
     poses = np.zeros((len(angles), robot.freedom))
     poses[:, len(robot.platform.lengths) :] = angles
-    return of_platform(robot, poses, np.zeros_like(poses), np.zeros_like(poses))[0]
+    return platform_curve(robot, poses, np.zeros_like(poses), np.zeros_like(poses))[0]
 
 
 def sample_poses(job: Job, robot: Manipulator, count: int | None = None) -> Array:
@@ -52,26 +52,27 @@ def sample_poses(job: Job, robot: Manipulator, count: int | None = None) -> Arra
     return _poses_at(job, robot, _places(job, robot, count or _positions_along(job)))
 
 
-def about_the_worst(
+def refine_worst_values(
     job: Job,
     robot: Manipulator,
     values_of: Callable[[Array], Array],
-    along: int | None = None,
+    samples: int | None = None,
     keep: int = 1,
     besides: Array | None = None,
 ) -> tuple[Array, Array]:
-    """Return the least of each column of values (C,), and the poses where they are (C, m).
+    """Return the minimum of each column of values (C,), and its pose (C, m).
 
     `values_of` gives the values (B, C) at poses (B, m), which are from the middle. They are taken
     at `sample_poses`, and then ever nearer about those that are worst in a column, `keep` of each:
     what is worst near a singularity is worst in a valley that samples miss. Poses `besides` those
     of the workspace count as they are.
     """
-    along, count, space = along or _positions_along(job), len(robot.platform.lengths), job.workspace
-    places = _places(job, robot, along)
-    values = values_of(_poses_at(job, robot, places))
+    samples, space = samples or _positions_along(job), job.workspace
+    count = len(robot.platform.lengths)
+    places = _places(job, robot, samples)
+    rows = values_of(_poses_at(job, robot, places))
     steps = np.zeros(robot.freedom)
-    steps[:count] = job.workspace.half[:count] / (along - 1)
+    steps[:count] = job.workspace.half[:count] / (samples - 1)
     if space.tilt is not None:
         steps[count : count + 2] = 0.5 * space.tilt
     if space.turn is not None and space.directions is None:
@@ -80,15 +81,15 @@ def about_the_worst(
         steps[:count] = 0.0
     ways = _neighbour_steps(steps, count)
     for _ in range(_ROUNDS if steps.any() else 0):
-        worst = np.unique(np.argsort(values, axis=0)[:keep])
+        worst = np.unique(np.argsort(rows, axis=0)[:keep])
         near = (places[worst][:, None] + steps * ways).reshape(-1, robot.freedom)
         places = _clip_to_workspace(job, near, count)
-        values = values_of(_poses_at(job, robot, places))
+        rows = values_of(_poses_at(job, robot, places))
         steps /= 2.0
     poses = _poses_at(job, robot, places)
     if besides is not None and len(besides):
-        poses, values = np.vstack([poses, besides]), np.vstack([values, values_of(besides)])
-    return values.min(axis=0), poses[values.argmin(axis=0)]
+        poses, rows = np.vstack([poses, besides]), np.vstack([rows, values_of(besides)])
+    return rows.min(axis=0), poses[rows.argmin(axis=0)]
 
 
 def _neighbour_steps(steps: Array, count: int) -> Array:
@@ -102,7 +103,7 @@ def _neighbour_steps(steps: Array, count: int) -> Array:
 
 
 def _clip_to_workspace(job: Job, places: Array, count: int) -> Array:
-    """Return places (N, m) brought into the workspace where they are outside."""
+    """Return places (N, m) clipped to the workspace."""
     space, half, clipped = job.workspace, job.workspace.half[:count], places.copy()
     if space.poses is None:
         clipped[:, :count] = np.clip(clipped[:, :count], -half, half)
@@ -144,12 +145,12 @@ def _poses_at(job: Job, robot: Manipulator, places: Array) -> Array:
     if job.workspace.tilt is not None:
         angles = _tilted_angles(robot, angles[:, :2])
         angles[:, -1] += places[:, -1]
-    poses = with_tool_in_the_middle(robot, angles)
+    poses = poses_about_tool(robot, angles)
     poses[:, :count] += places[:, :count]
     return poses
 
 
-def wide(rows: object) -> Array:
+def pad_to_xyz(rows: object) -> Array:
     """Return rows of two or three numbers with three."""
     array = np.asarray(rows, dtype=float)
     return np.pad(array, ((0, 0), (0, 3 - array.shape[1])))
@@ -158,7 +159,7 @@ def wide(rows: object) -> Array:
 def _positions(job: Job, count: int) -> Array:
     space, half = job.workspace, job.workspace.half
     if space.poses is not None:
-        points = wide(space.poses)
+        points = pad_to_xyz(space.poses)
         return np.asarray(points - 0.5 * (points.min(axis=0) + points.max(axis=0)))
     line = np.linspace(-1.0, 1.0, count)
     upright = line if half[2] else np.zeros(1)
@@ -172,7 +173,7 @@ def _positions(job: Job, count: int) -> Array:
 
 def orientations(job: Job, robot: Manipulator) -> Array:
     """Return angles (A, a) of the platform that the workspace asks for; tilts at each turn."""
-    return np.concatenate([shifted(tilts(job, robot), angle) for angle in _turns(job)])
+    return np.concatenate([turn_angles(tilts(job, robot), angle) for angle in _turns(job)])
 
 
 def _turns(job: Job) -> list[float]:
@@ -207,7 +208,7 @@ def _tilted_angles(robot: Manipulator, leans: Array) -> Array:
     return np.array(pose_of(robot, np.zeros(3), matrices)[:, -len(robot.platform.angles) :])
 
 
-def shifted(angles: Array, turn: float) -> Array:
+def turn_angles(angles: Array, turn: float) -> Array:
     """Return angles (A, a) turned further about the upright."""
     if not angles.shape[1]:
         return angles

@@ -1,4 +1,4 @@
-"""Refinement of a design by gradients: one objective improves, everything else asked is kept."""
+"""Refinement of a design by gradients: one objective improves under all other requirements."""
 
 from __future__ import annotations
 
@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pteron.design.design import Design
-from pteron.design.proofs import counterexamples, proved
-from pteron.design.quantities import quantities
+from pteron.design.proofs import counterexamples, prove_design
 from pteron.design.spec import ROUNDING
 from pteron.design.task import Task
 from pteron.design.variables import geometry_slopes, slopes_of
@@ -27,10 +26,10 @@ _SPARE = 1e-4
 and not all but its rim."""
 
 _FIRST = 5
-"""Points along a cube's edge at which its conditions are evaluated at first."""
+"""Points along a cube's edge in the first program."""
 
 
-def refined(task: Task, values: Sequence[float], objective: int) -> list[float]:
+def improve_design(task: Task, point: Sequence[float], objective: int) -> list[float]:
     """Return a design with a better objective, or the same where none is found.
 
     The unknowns are the variables together with the cube's centre and edge. Quantities of the
@@ -38,17 +37,17 @@ def refined(task: Task, values: Sequence[float], objective: int) -> list[float]:
     design again. Where a proof of the workspace or the cube fails, the design is sought once more,
     with the counterexample among its conditions.
     """
-    spec, start = task.spec, np.array(values)
+    spec, start = task.spec, np.array(point)
     target = spec.objectives[objective]
     try:
-        design = proved(Design(task, task.machine(values))).design
+        design = prove_design(Design(task, task.machine(point))).design
         slopes = _Slopes(task, design, start)
-        target_slopes = slopes.of(target.quantity)
+        target_slopes = slopes.slopes_of_quantity(target.quantity)
         if target_slopes is None or not target_slopes.any() or design.margin < -ROUNDING:
-            return list(values)
-        geometry = geometry_slopes(task.robot, task.variables, values)
+            return list(point)
+        geometry = geometry_slopes(task.robot, task.variables, point)
     except ModelError:  # at the end of what can be made
-        return list(values)
+        return list(point)
     center, radius = search_ball(design.robot)
     lengths = len(center)
     seeks = task.seeks_place
@@ -100,13 +99,13 @@ class _Slopes:
     design: Design
     start: Array
 
-    def of(self, name: str) -> Array | None:
+    def slopes_of_quantity(self, name: str) -> Array | None:
         """Return a quantity's slopes (V + k + 1,), or None where it has none."""
         task, tail = self.task, len(self.task.robot.platform.lengths) + 1
         if name in ("cube", "scale"):
             edge = task.shape[1] if name == "scale" else 1.0
             return np.append(np.zeros(len(self.start) + tail - 1), 1.0 / edge)
-        alone = quantities()[name].of_machine
+        alone = task.quantities[name].of_machine
         if alone is None:
             return None
         slopes = slopes_of(
@@ -115,14 +114,14 @@ class _Slopes:
         return np.append(slopes, np.zeros(tail))
 
     def bounds(self, objective: int, z0: Array) -> list[tuple[Array, float]]:
-        """Return what holds the other objectives, and what is asked of quantities with slopes."""
+        """Return linear bounds that hold other objectives and requirements with known slopes."""
         bounds = []
         for k, target in enumerate(self.task.spec.objectives):
-            row = self.of(target.quantity)
+            row = self.slopes_of_quantity(target.quantity)
             if k != objective and row is not None:
                 bounds.append((-target.sign * row, float(-target.sign * row @ z0)))
         for requirement in self.task.spec.requirements:
-            row = self.of(requirement.quantity)
+            row = self.slopes_of_quantity(requirement.quantity)
             if row is None:
                 continue
             now = self.design.quantity(requirement.quantity)

@@ -1,4 +1,4 @@
-"""The room of a machine over its workspace: its cell, what is kept out of, and links that touch."""
+"""The space that a machine takes over its workspace: cell, keep-out boxes, clearances."""
 
 from __future__ import annotations
 
@@ -9,45 +9,45 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from pteron.design.choosing.job import Job
-from pteron.design.choosing.kinds import slides
+from pteron.design.job import Job
+from pteron.design.kinds import slides
 from pteron.equations.clearance import meetings, squared_distance
 from pteron.kernels import Array, numeric
 from pteron.manipulator import Manipulator
 
 _HALVINGS = 24
-"""Steps towards the point of a line that is deepest in a box, each of which leaves 2/3."""
+"""Steps of the ternary search for a line's deepest point in a box; each keeps 2/3."""
 
 _SPARE = 1e-3
-"""Metres by which links are farther apart in a search than is asked at last."""
+"""Additional clearance of a search over the requirement, m."""
 
 _TIGHT = 2e-3
-"""Metres by which a cell is smaller, and what is kept out larger, in a search than at last."""
+"""Length by which a search shrinks the cell and grows keep-out boxes, m."""
 
 _CLOSE = 0.01
-"""Metres of clearance whose lack counts as much as another bound missed by the whole."""
+"""Missing clearance, m, that costs as much as a bound violated by 100 %."""
 
 Misses = dict[str, tuple[float, str]]
 """By how much bounds are missed, as a share of them, and in words."""
 
 
-class Room:
-    """The room that a job leaves machines of a kind."""
+class MachineSpace:
+    """The space that a task allows machines of a kind."""
 
     def __init__(self, job: Job, robot: Manipulator) -> None:
         self._job, self._robot = job, robot
 
-    def judged(
+    def evaluate(
         self, robot: Manipulator, poses: Array, middle: Array
     ) -> tuple[dict[str, float], Misses]:
-        """Return the sizes of a machine at poses (N, m), m, and what it misses.
+        """Return the sizes of a machine over poses (N, m), m, and the bounds it violates.
 
         `middle` is the pose with the tool in the middle of the workspace.
         """
         floor = self._job.floors.clearance
         points = np.asarray(numeric(robot, "joint_points")(poses)[0])
-        figures, misses = self.within(
-            self._room_taken(robot, poses, points, middle).min(axis=0), _TIGHT
+        figures, misses = self.judge_extents(
+            self._extents_of_points(robot, poses, points, middle).min(axis=0), _TIGHT
         )
         clear = self._clearance(robot, poses, points)
         if clear < floor + _SPARE:
@@ -56,15 +56,17 @@ class Room:
             misses["clearance"] = (floor + _SPARE - clear) / _CLOSE, words
         return figures, misses
 
-    def taken(self, robot: Manipulator, poses: Array, middle: Array) -> Array:
-        """Return the room that a machine takes at poses (N, 6 + boxes), from the tool's middle, m.
+    def extents(self, robot: Manipulator, poses: Array, middle: Array) -> Array:
+        """Return a machine's extents at poses (N, 6 + boxes), from the tool's middle, m.
 
         The least coordinates, minus the greatest, and how far it stays outside each keep-out box.
         """
         points = np.asarray(numeric(robot, "joint_points")(poses)[0])
-        return self._room_taken(robot, poses, points, middle)
+        return self._extents_of_points(robot, poses, points, middle)
 
-    def _room_taken(self, robot: Manipulator, poses: Array, points: Array, middle: Array) -> Array:
+    def _extents_of_points(
+        self, robot: Manipulator, poses: Array, points: Array, middle: Array
+    ) -> Array:
         margin, center = self._job.cell.margin, tool_places(robot, middle[None])[0]
         starts, ends = (part - center for part in _lines(robot, poses, points))
         both = np.stack([starts, ends])
@@ -78,12 +80,12 @@ class Room:
         ]
         return np.column_stack([low, -high, *(-depth - margin for depth in depths)])
 
-    def within(self, taken: Array, tight: float = 0.0) -> tuple[dict[str, float], Misses]:
-        """Return the sizes of a machine that takes so much room (6 + boxes,), and what it misses.
+    def judge_extents(self, extents: Array, tight: float = 0.0) -> tuple[dict[str, float], Misses]:
+        """Return the sizes of a machine with extents (6 + boxes,), and the bounds it violates.
 
         Bounds are tighter by a length, m.
         """
-        cell, (low, high, outside) = self._job.cell, np.split(taken, [3, 6])
+        cell, (low, high, outside) = self._job.cell, np.split(extents, [3, 6])
         high = -high
         width, depth, height = map(float, high - low)
         figures = {"footprint": width * depth, "width": width, "depth": depth, "height": height}
@@ -117,8 +119,8 @@ class Room:
         radii, distances = robot.radii, [np.inf]
         assert radii is not None  # every design has them
         known = np.asarray(numeric(robot, "least_clearances")(poses)[0])
-        for (a, b), values in zip(self._meetings, known.reshape(len(poses), -1).T, strict=True):
-            distances.append(values.min() - getattr(radii, a) - getattr(radii, b))
+        for (a, b), clearances in zip(self._meetings, known.reshape(len(poses), -1).T, strict=True):
+            distances.append(clearances.min() - getattr(radii, a) - getattr(radii, b))
         thick = radii.guide + max(radii.upper, radii.lower)
         for i, low, high in _guides(robot):
             others = np.delete(points, i, axis=-3)
@@ -145,7 +147,7 @@ def tool_places(robot: Manipulator, poses: Array) -> Array:
 
 
 def _lines(robot: Manipulator, poses: Array, points: Array) -> tuple[Array, Array]:
-    """Return starts and ends (N, L, 3) of links, guides, and what leads from P to legs and tool."""
+    """Return ends (N, L, 3) of links, guides and the lines from P to legs and tool."""
     count, place = len(poses), robot.platform.placement(poses)[0]
     legs = points.reshape(count, -1, *points.shape[-2:])
     tips = np.concatenate([legs[:, :, -1], tool_places(robot, poses)[:, None]], axis=1)

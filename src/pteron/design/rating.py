@@ -8,20 +8,20 @@ from functools import cached_property
 
 import numpy as np
 
-from pteron.design.choosing.cycles import Places, cycles_of
-from pteron.design.choosing.drives import JointLoads, Option, Options, power
-from pteron.design.choosing.job import OBJECTIVES, Job
-from pteron.design.choosing.kinds import Kind, slides
-from pteron.design.choosing.room import Room
-from pteron.design.choosing.samples import about_the_worst, sample_poses
-from pteron.design.choosing.tool import (
+from pteron.design.cycle_places import Places, cycles_of
+from pteron.design.drive_options import JointLoads, Option, Options, power
+from pteron.design.job import OBJECTIVES, Job
+from pteron.design.kinds import Kind, slides
+from pteron.design.machine_space import MachineSpace
+from pteron.design.quantities import moving_mass
+from pteron.design.tool_errors import (
     compliance_with,
     compliances,
     errors_with,
     link_sections,
     unit_errors,
 )
-from pteron.design.quantities import moving_mass
+from pteron.design.workspace_samples import refine_worst_values, sample_poses
 from pteron.design.worst_cases import worst_forces, worst_speeds
 from pteron.dynamics import drive_forces
 from pteron.errors import ModelError, PteronError
@@ -32,7 +32,7 @@ from pteron.legs import Drive
 from pteron.manipulator import Manipulator
 
 _STROKE = 0.03
-"""Share of a slider's travel by which its guide is longer at each end."""
+"""Share of a slider's travel that is added to its guide at each end."""
 
 _TELESCOPE = 1.7
 """Greatest length of a ram over its least."""
@@ -59,7 +59,7 @@ class Rating:
         Quantities by name: objectives, margins, error, deflection.
     misses : dict
         By how much each bound is missed, as a share of it: empty where all is kept.
-    told : dict
+    shortfalls : dict
         The same in words.
     robot : Manipulator or None
         The machine with its drives, without payload.
@@ -78,7 +78,7 @@ class Rating:
     values: Array
     figures: dict[str, float] = field(default_factory=dict)
     misses: dict[str, float] = field(default_factory=dict)
-    told: dict[str, str] = field(default_factory=dict)
+    shortfalls: dict[str, str] = field(default_factory=dict)
     robot: Manipulator | None = None
     middle: Array = field(default_factory=lambda: np.zeros(0))
     options: tuple[Option, ...] = ()
@@ -86,16 +86,33 @@ class Rating:
     stage: int = 0
     near: float = 1.0
 
+    @property
+    def machine(self) -> Manipulator:
+        """The machine of a design that has one: it did not fail at the first stage."""
+        assert self.robot is not None
+        return self.robot
+
+    def miss(self, name: str, share: float, words: str) -> None:
+        """Note that a bound is violated by a share of it."""
+        if share > self.misses.get(name, 0.0):
+            self.misses[name], self.shortfalls[name] = float(share), words
+
+    def expect_least(self, name: str, figure: float, least: float) -> None:
+        """Note a violation of a lower bound."""
+        if not figure >= least:
+            share = least - figure if np.isfinite(figure) else 1.0
+            self.miss(name, share, f"{name} {figure:.3g}, at least {least:.3g} asked")
+
     def cost(self, objective: str) -> float:
-        """Return what a search makes small."""
+        """Return the cost that a search minimises."""
         if self.misses:
             return _BY_STAGE * (6 - self.stage) + min(sum(self.misses.values()), 0.9 * _BY_STAGE)
-        value = self.figures[objective]
+        cost = self.figures[objective]
         # A price has steps: along one the design is the better whose next step down is nearer.
-        return float(np.log(value) + 0.01 * min(self.near, 1.0)) if value > 0.0 else 0.0
+        return float(np.log(cost) + 0.01 * min(self.near, 1.0)) if cost > 0.0 else 0.0
 
 
-class Case:
+class KindEvaluator:
     """A job for one kind of machine.
 
     Parameters
@@ -114,13 +131,13 @@ class Case:
         self.corners = sample_poses(job, kind.robot, 2)
         self.outline = sample_poses(job, kind.robot, 3)
         self.every_cycle = cycles_of(job, kind.robot)
-        self.cycles = [cycle.some() for cycle in self.every_cycle]
+        self.cycles = [cycle.spread_places() for cycle in self.every_cycle]
         # A box holds its cycles; between the poses of a list they go where no pose is.
         states = (c.states[0].reshape(-1, kind.robot.freedom) for c in self.every_cycle)
         self.between = np.vstack([self.poses[:0], *(states if job.workspace.poses else ())])
         self.visited = np.vstack([self.poses, self.between])
         self.half = job.workspace.half
-        self.room = Room(job, kind.robot)
+        self.machine_space = MachineSpace(job, kind.robot)
 
     @cached_property
     def groups(self) -> list[list[int]]:
@@ -129,14 +146,14 @@ class Case:
         kinds = dict.fromkeys((leg.type, leg.joint.unit) for leg in legs)
         return [[i for i, g in enumerate(legs) if (g.type, g.joint.unit) == k] for k in kinds]
 
-    def rate(self, values: Array) -> Rating:
+    def rate(self, point: Array) -> Rating:
         """Return how the machine of a design does the job; call it within `alike(kind.like)`."""
-        rating = Rating(np.asarray(values, dtype=float))
+        rating = Rating(np.asarray(point, dtype=float))
         try:
-            robot, rating.middle = self.kind.machine(values)
+            robot, rating.middle = self.kind.machine(point)
         except ModelError:
             rating.stage = 1
-            _miss(rating, "machine", 1.0, "numbers that no machine has")
+            rating.miss("machine", 1.0, "numbers that no machine has")
             return rating
         rating.robot = robot
         for stage, judge in enumerate(
@@ -150,7 +167,7 @@ class Case:
 
     def _judge_reach(self, rating: Rating) -> None:
         """Judge reach, floors and limits over the workspace; set the travel of guides and rams."""
-        robot, poses, floors = _robot_of(rating), rating.middle + self.visited, self.job.floors
+        robot, poses, floors = rating.machine, rating.middle + self.visited, self.job.floors
         least = float(np.min(numeric(robot, "squared_type_i")(poses)[0]))
         if least >= 0.0:
             sign = np.sign(np.median(numeric(robot, "type_ii")(poses)[0]))
@@ -170,15 +187,15 @@ class Case:
             least = float(legs_least.min())
         rating.figures["type_i"] = float(np.sqrt(max(least, 0.0)))
         if least < 0.0:
-            _miss(rating, "reach", 1.0 - least, "a leg that does not reach the whole workspace")
+            rating.miss("reach", 1.0 - least, "a leg that does not reach the whole workspace")
             return
         rating.figures["type_ii"] = float(type_ii[0])
-        _judge_least(rating, "type-I measure", float(np.sqrt(least)), _FLOOR * floors.type_i)
-        _judge_least(rating, "type-II measure", float(type_ii[0]), _FLOOR * floors.type_ii)
-        _judge_least(rating, "passive joints' margin to their limits", float(room.min()), 0.0)
+        rating.expect_least("type-I measure", float(np.sqrt(least)), _FLOOR * floors.type_i)
+        rating.expect_least("type-II measure", float(type_ii[0]), _FLOOR * floors.type_ii)
+        rating.expect_least("passive joints' margin to their limits", float(room.min()), 0.0)
         joints = inverse_kinematics(robot, poses, on_failure="nan")
         if not np.isfinite(joints).all():
-            _miss(rating, "reach", 1.0, "a leg that does not reach the whole workspace")
+            rating.miss("reach", 1.0, "a leg that does not reach the whole workspace")
             return
         shortest, longest = joints.min(axis=0), joints.max(axis=0)
         if self.job.workspace.tilt is not None:
@@ -196,28 +213,28 @@ class Case:
                 travel = float(low - spare), float(high + spare)
                 if not slides(leg):
                     beyond = travel[1] - _TELESCOPE * travel[0]
-                    _judge_least(rating, "rams' margin to their shortest", -beyond / travel[1], 0.0)
+                    rating.expect_least("rams' margin to their shortest", -beyond / travel[1], 0.0)
                 if slides(leg) or not rating.misses:
                     leg = self.kind.with_travel(leg, travel, rating.values)
             elif leg.limits is not None:
                 half = 0.5 * (leg.limits[1] - leg.limits[0])
                 margin = min(low - leg.limits[0], leg.limits[1] - high) / half
-                _judge_least(rating, "joints' margin to their limits", float(margin), 0.01)
+                rating.expect_least("joints' margin to their limits", float(margin), 0.01)
             legs.append(leg)
         rating.robot = replace(robot, legs=tuple(legs))
 
     def _judge_room(self, rating: Rating) -> None:
-        """Judge the footprint, the height, what is to be kept out of, and whether links touch."""
-        figures, misses = self.room.judged(
-            _robot_of(rating), rating.middle + self.visited, rating.middle
+        """Judge footprint, height, keep-out boxes and clearances."""
+        figures, misses = self.machine_space.evaluate(
+            rating.machine, rating.middle + self.visited, rating.middle
         )
         rating.figures |= figures
         for name, (share, words) in misses.items():
-            _miss(rating, name, share, words)
+            rating.miss(name, share, words)
 
     def _choose_drives(self, rating: Rating) -> None:
         """Choose the drives: the cheapest that serve loads, accuracy and stiffness."""
-        robot = self.loaded(_robot_of(rating))
+        robot = self.add_payload(rating.machine)
         numbers = self.kind.numbers(rating.values)
         try:
             loads, work = self.loads(robot, rating, numbers.get("time"))
@@ -229,7 +246,7 @@ class Case:
                 poses = rating.middle + np.vstack([self.corners, rating.worst])
                 gives = compliances(robot, poses, self.sections(rating))
         except PteronError:
-            _miss(rating, "loads", 1.0, "a singularity or the edge of its reach on a cycle")
+            rating.miss("loads", 1.0, "a singularity or the edge of its reach on a cycle")
             return
         options: list[Option | None] = [None] * robot.joint_count
         margin, near = self.job.motors.margin, 0.0
@@ -252,8 +269,8 @@ class Case:
             good = np.flatnonzero(least >= 1.0)
             if not len(good):
                 best = int(least.argmax())
-                parts = {name: float(share[best]) for name, share in shares.items()}
-                _miss_parts(rating, parts, all_.all[best].name)
+                for name, share in shares.items():
+                    _expect_share(rating, name, float(share[best]), all_.all[best].name)
                 return
             first = int(good[0])
             if first:
@@ -262,11 +279,9 @@ class Case:
                 options[leg] = all_.all[first]
         rating.near = near / len(self.groups)
         rating.options = tuple(o for o in options if o is not None)
-        legs_with = (
-            replace(leg, drive=option.drive)
-            for leg, option in zip(_robot_of(rating).legs, rating.options, strict=True)
-        )
-        rating.robot = replace(_robot_of(rating), legs=tuple(legs_with))
+        pairs = zip(rating.machine.legs, rating.options, strict=True)
+        legs_with = tuple(replace(leg, drive=option.drive) for leg, option in pairs)
+        rating.robot = replace(rating.machine, legs=legs_with)
         friction = np.array([option.drive.coulomb for option in rating.options])
         rating.figures |= {
             "price": float(sum(o.price for o in rating.options)),
@@ -280,11 +295,11 @@ class Case:
         self,
         robot: Manipulator,
         values_of: Callable[[Array], Array],
-        along: int | None = None,
+        samples: int | None = None,
         keep: int = 1,
     ) -> tuple[Array, Array]:
-        """Return least values over the workspace and its cycles, as `about_the_worst` has them."""
-        return about_the_worst(self.job, robot, values_of, along, keep, self.between)
+        """Return least values over workspace and cycles, as `refine_worst_values` has them."""
+        return refine_worst_values(self.job, robot, values_of, samples, keep, self.between)
 
     def shares(self, time: float | None) -> Array:
         """Return how much of a duty cycle's time each cycle has; none if each counts by itself."""
@@ -299,17 +314,20 @@ class Case:
         return float(np.average(worst, weights=shares))
 
     def _judge_bounds(self, rating: Rating) -> None:
-        """Judge what else has a greatest value."""
-        for name, most in self.job.most.model_dump().items():
-            _judge_most(rating, name, rating.figures[name], most, f" {OBJECTIVES[name]}".rstrip())
+        """Judge the bounds of `[most]`."""
+        for name, most in self.job.most.model_dump(exclude_none=True).items():
+            figure, unit = rating.figures[name], f" {OBJECTIVES[name]}".rstrip()
+            if not figure <= most:
+                words = f"{name.replace('_', ' ')} {figure:.4g}{unit}, at most {most:g}{unit} asked"
+                rating.miss(name, figure / most - 1.0 if np.isfinite(figure) else 1.0, words)
 
-    def loaded(self, robot: Manipulator) -> Manipulator:
+    def add_payload(self, robot: Manipulator) -> Manipulator:
         """Return a machine with the payload."""
-        return self.job.payload.on(robot)
+        return self.job.payload.add_to(robot)
 
     def sections(self, rating: Rating) -> dict[str, Section]:
         """Return the sections of a design's links."""
-        return link_sections(_robot_of(rating), self.kind.cut(rating.values))
+        return link_sections(rating.machine, self.kind.link_stocks(rating.values))
 
     def loads(
         self, robot: Manipulator, rating: Rating, time: float | None
@@ -341,13 +359,11 @@ class Case:
         everywhere = np.zeros((2, n))
         if required.acceleration or required.speed:
             poses = middle + np.vstack([self.outline, rating.worst])
-            heavy = (replace(leg, drive=Drive(rotor_inertia=_HEAVY)) for leg in robot.legs)
-            speed = max(required.speed, 1e-6)
-            everywhere[0] = worst_forces(robot, poses, speed, required.acceleration).max(axis=0)
-            spun = worst_forces(
-                replace(robot, legs=tuple(heavy)), poses, speed, required.acceleration
-            )
-            everywhere[1] = spun.max(axis=0) / _HEAVY
+            legs = tuple(replace(leg, drive=Drive(rotor_inertia=_HEAVY)) for leg in robot.legs)
+            heavy, speed = replace(robot, legs=legs), max(required.speed, 1e-6)
+            rise = required.acceleration
+            everywhere[0] = worst_forces(robot, poses, speed, rise).max(axis=0)
+            everywhere[1] = worst_forces(heavy, poses, speed, rise).max(axis=0) / _HEAVY
             speeds = np.maximum(speeds, worst_speeds(robot, poses, speed).max(axis=0))
         loads = JointLoads(
             tuple(squares) or (np.zeros((1, n, 3)),),
@@ -365,34 +381,9 @@ class Case:
         return middle + pose, velocity / duration, acceleration / duration**2
 
 
-def _robot_of(rating: Rating) -> Manipulator:
-    assert rating.robot is not None  # the first stage has made it
-    return rating.robot
-
-
-def _miss(rating: Rating, name: str, share: float, words: str) -> None:
-    """Note that a bound is missed."""
-    if share > rating.misses.get(name, 0.0):
-        rating.misses[name], rating.told[name] = float(share), words
-
-
-def _miss_parts(rating: Rating, parts: Mapping[str, float], option: str) -> None:
-    """Note the requirements that the best drive meets in part alone."""
-    for name, part in parts.items():
-        if part < 1.0:
-            much = f"{part:.0%}" if part >= 0.01 else "less than 1%"
-            words = f"{name} {much} of what is asked, with {option}"
-            _miss(rating, name, 1.0 / max(part, 1e-3) - 1.0, words)
-
-
-def _judge_least(rating: Rating, name: str, value: float, least: float, unit: str = "") -> None:
-    if not value >= least:
-        share = least - value if np.isfinite(value) else 1.0
-        _miss(rating, name, share, f"{name} {value:.3g}{unit}, at least {least:.3g}{unit} asked")
-
-
-def _judge_most(rating: Rating, name: str, value: float, most: float | None, unit: str) -> None:
-    if most is not None and not value <= most:
-        share = value / most - 1.0 if np.isfinite(value) else 1.0
-        words = name.replace("_", " ")
-        _miss(rating, name, share, f"{words} {value:.4g}{unit}, at most {most:g}{unit} asked")
+def _expect_share(rating: Rating, name: str, share: float, option: str) -> None:
+    """Note a requirement that the best drive meets only in part."""
+    if share < 1.0:
+        much = f"{share:.0%}" if share >= 0.01 else "less than 1%"
+        words = f"{name} {much} of what is asked, with {option}"
+        rating.miss(name, 1.0 / max(share, 1e-3) - 1.0, words)

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from pteron.design.choosing.job_tables import AccuracyTable
+from pteron.design.requirement_tables import AccuracyTable
 from pteron.design.worst_cases import worst_position_errors
 from pteron.indices import (
     ALUMINIUM,
@@ -29,11 +29,11 @@ MATERIALS = {"steel": STEEL, "aluminium": ALUMINIUM, "carbon": Material(120e9, 5
 """Moduli of the stock's materials; carbon is fibre in resin, mostly along the tube."""
 
 _SOFT, _HARD = 1e4, 1e7
-"""Two stiffnesses of drives, N/m or N m/rad, from which the line of compliances is found."""
+"""Two stiffnesses of drives, N/m or N m/rad, between which compliance is linear."""
 
 
 def tolerances(accuracy: AccuracyTable, joints: float | Sequence[float]) -> Tolerances:
-    """Return the tolerances of the job's file, with given errors of the joints, m or rad."""
+    """Return the tolerances of a task with these errors of the joints, m or rad."""
     return Tolerances(joints, 0.0, accuracy.point, accuracy.length, accuracy.angle)
 
 
@@ -50,7 +50,7 @@ def joint_errors(accuracy: AccuracyTable, ratios: Array, backlash: Array) -> Arr
 def unit_errors(accuracy: AccuracyTable, robot: Manipulator, poses: Array) -> tuple[Array, Array]:
     """Return the tool's errors at poses, (N,) each, m: by joint errors of 1, and by all else."""
     joints = greatest_errors(accuracy, robot, poses, Tolerances(joints=1.0))
-    if not accuracy.of_parts:
+    if not accuracy.has_part_errors:
         return joints, np.zeros_like(joints)
     return joints, greatest_errors(accuracy, robot, poses, tolerances(accuracy, 0.0))
 
@@ -58,7 +58,7 @@ def unit_errors(accuracy: AccuracyTable, robot: Manipulator, poses: Array) -> tu
 def greatest_errors(
     accuracy: AccuracyTable, robot: Manipulator, poses: Array, errors: Tolerances
 ) -> Array:
-    """Return the tool's error at poses, (N,), m: the worst case or the standard deviation.
+    """Return the tool's error at poses, (N,), m: the worst evaluator or the standard deviation.
 
     `asked.counted` says which of both.
     """

@@ -4,29 +4,34 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, wait
 from dataclasses import dataclass
 from functools import partial
-from multiprocessing import get_context
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from pteron.atomic import write_text
-from pteron.design.choosing.candidate import Candidate, judged
-from pteron.design.choosing.drives import GEARBOXES, MOTORS, Options, read_lists
-from pteron.design.choosing.job import Job
-from pteron.design.choosing.kinds import Kind, fitting_kinds
-from pteron.design.choosing.rating import Case
-from pteron.design.choosing.search import search_kind
-from pteron.design.processes import Pool
+from pteron.design.best_design import prove_best_design
+from pteron.design.candidate import Candidate
+from pteron.design.drive_options import GEARBOXES, MOTORS, Options, read_lists
+from pteron.design.job import Job
+from pteron.design.kind_search import search_kind
+from pteron.design.kinds import Kind, fitting_kinds
+from pteron.design.rating import KindEvaluator
 from pteron.errors import DataError, PteronError
+from pteron.html_table import Overview, frame_overview
 from pteron.json_values import json_ready
 from pteron.kernels.one_thread import one_thread
 from pteron.kernels.program_cache import EQUATIONS, name_of
 from pteron.manipulator import load
 from pteron.manipulator.saving import text_of
+from pteron.processes import WorkerPool
+from pteron.renamed import former_attribute
+from pteron.result import Result
+
+if TYPE_CHECKING:
+    import polars as pl
 
 _SEARCH = 0.9
 """Share of a kind's work that is its search."""
@@ -42,9 +47,9 @@ _KEPT = "kinds"
 """Folder of the kinds that are finished, in that of the results."""
 
 
-@dataclass(frozen=True)
-class Choice:
-    """The kinds of machines tried for a job, each judged by what it can do.
+@dataclass(frozen=True, eq=False, repr=False)
+class Choice(Result):
+    """The kinds of machines searched for a task, each with its best design.
 
     Attributes
     ----------
@@ -65,6 +70,21 @@ class Choice:
         """The best kind by the first objective; None where none serves."""
         return self.candidates[0] if self.candidates and self.candidates[0].serves else None
 
+    def summary(self) -> str:
+        """Return the verdict on each kind, for people, as lines of text."""
+        return "\n".join(candidate.summary() for candidate in self.candidates)
+
+    def table(self) -> pl.DataFrame:
+        """Return a table, a row for each kind: whether it serves, and its figures in SI units."""
+        import polars as pl
+
+        rows = [{"kind": c.kind, "serves": c.serves, **c.figures} for c in self.candidates]
+        return pl.DataFrame(rows, infer_schema_length=None)
+
+    def _overview(self) -> Overview:
+        best = "no kind does what is asked" if self.best is None else f"{self.best.kind} is best"
+        return frame_overview("Kinds of machines", best, self.table(), self.summary().splitlines())
+
     def robots(self) -> dict[str, str]:
         """Return the machines' files by their names."""
         return {
@@ -73,11 +93,37 @@ class Choice:
             if candidate.serves
         }
 
-    def data(self) -> dict[str, Any]:
+    def assumption_lines(self) -> list[str]:
+        """Return the assumptions behind the choice, a line each."""
+        motors, links = self.job.motors, self.job.links
+        examples = [] if motors.list else ["The motors are the package's examples, not products."]
+        stocks = ", ".join(dict.fromkeys([*links.upper, *links.lower]))
+        errors = self.job.accuracy
+        left_out = errors is not None and not errors.has_part_errors
+        exact = ["The tool's error is that of encoders and gearboxes: links count as exact."]
+        return [
+            *examples,
+            "A price is the sum of those in the lists of motors and gearboxes, in their currency.",
+            f"Drives are chosen for {motors.margin:g} times what is asked, with dry friction of "
+            f"{motors.friction:.0%} of their rated torque; the least margins are told as they are "
+            "between the places of the search, too.",
+            f"Links are cut from {stocks}; the platform is half of an aluminium disc "
+            f"{1e3 * links.plate:g} mm thick; a carriage has {links.carriage:g} kg.",
+            f"Guides are {2e3 * links.guide:g} mm wide, cylinders of rams as cranks; a ram is "
+            "at most 1.7 times its least length; where links may meet, a pair of rods counts as "
+            "one; ball joints have no cones.",
+            "The shortest time is that of the cycle at its worst place with this margin of peak "
+            "torque and speed; again and again the rated torque may not allow it.",
+            *(exact if left_out else []),
+        ]
+
+    data = former_attribute("data", "as_dict")
+
+    def as_dict(self) -> dict[str, Any]:
         """Return everything as plain data, SI units."""
         contents = {
             "objectives": list(self.job.objectives),
-            "kinds": [candidate.data() for candidate in self.candidates],
+            "kinds": [candidate.as_dict() for candidate in self.candidates],
             "job": self.job.model_dump(mode="json", exclude_none=True),
         }
         return dict(json_ready(contents))
@@ -124,18 +170,20 @@ def choose_machine(
         If no kind can do the motion, a cycle does not fit into the workspace, a list of motors
         cannot be read, or a price is asked for of motors that have none.
     """
-    cases = cases_of(job)
-    store = _CandidateStore(None if folder is None else Path(folder) / _KEPT, job, cases)
-    candidates = {name: known for name in cases if (known := store.find(name)) is not None}
+    evaluators = evaluators_of(job)
+    store = _CandidateStore(None if folder is None else Path(folder) / _KEPT, job, evaluators)
+    candidates = {name: known for name in evaluators if (known := store.find(name)) is not None}
     resumed = tuple(candidates)
-    shares = {name: float(name in candidates) for name in cases}
+    shares = {name: float(name in candidates) for name in evaluators}
 
     def tell(name: str, share: float) -> None:
         shares[name] = share if name in candidates else _SEARCH * share
         if progress is not None:
             progress(sum(shares.values()) / len(shares), name)
 
-    remaining = {name: case for name, case in cases.items() if name not in candidates}
+    remaining = {
+        name: evaluator for name, evaluator in evaluators.items() if name not in candidates
+    }
     if begun is not None:
         begun(tuple(remaining), resumed)
     if progress is not None and remaining:  # what was done before is not this run's
@@ -153,7 +201,7 @@ def choose_machine(
     return Choice(job, tuple(order), resumed)
 
 
-def cases_of(job: Job) -> dict[str, Case]:
+def evaluators_of(job: Job) -> dict[str, KindEvaluator]:
     """Return the job for each kind that can do the motion."""
     space = job.workspace
     names = fitting_kinds(job.kinds, job.lengths, space.turn is not None, space.tilts)
@@ -163,7 +211,7 @@ def cases_of(job: Job) -> dict[str, Case]:
     )
     motors, gearboxes = read_lists(*files)
     options = {
-        unit: Options.of(motors, gearboxes, unit, job.motors.friction) for unit in ("rad", "m")
+        unit: Options.combine(motors, gearboxes, unit, job.motors.friction) for unit in ("rad", "m")
     }
     unpriced = [o.name for some in options.values() for o in some.all if not np.isfinite(o.price)]
     if unpriced and ("price" in job.objectives or job.most.price is not None):
@@ -175,17 +223,17 @@ def cases_of(job: Job) -> dict[str, Case]:
     needed = 2.0 * float(job.workspace.half.max())
     tool = job.payload.tool
     kinds = (Kind(name, max(needed, _SMALL), job.links, tool, job.free) for name in names)
-    cases = {kind.name: Case(job, kind, options) for kind in kinds}
-    for case in cases.values():
+    evaluators = {kind.name: KindEvaluator(job, kind, options) for kind in kinds}
+    for evaluator in evaluators.values():
         try:
-            case.loaded(case.kind.robot)
+            evaluator.add_payload(evaluator.kind.robot)
         except PteronError as error:
             raise DataError(f"payload: {error}") from None
-    return cases
+    return evaluators
 
 
 def _has_drives(name: str, options: Mapping[str, Options], job: Job) -> bool:
-    """Say whether there are gearboxes for a kind's joints; refuse a kind that is asked for."""
+    """Return whether all joints of a kind have gearboxes; refuse a kind that the task names."""
     units = {leg.joint.unit for leg in load(name).legs}
     lacking = [unit for unit in sorted(units) if not options[unit].all]
     if lacking and job.kinds is not None:
@@ -195,56 +243,38 @@ def _has_drives(name: str, options: Mapping[str, Options], job: Job) -> bool:
     return not lacking
 
 
-def _candidate(case: Case, progress: Callable[[float], None]) -> Candidate:
-    search = case.job.search
+def _candidate(evaluator: KindEvaluator, progress: Callable[[float], None]) -> Candidate:
+    search = evaluator.job.search
     with one_thread():
-        return judged(case, search_kind(case, search.evaluations, search.seed, progress))
+        return prove_best_design(
+            evaluator, search_kind(evaluator, search.evaluations, search.seed, progress)
+        )
 
 
 def _search_kinds(
-    cases: Mapping[str, Case], workers: int, tell: Callable[[str, float], None]
+    evaluators: Mapping[str, KindEvaluator], workers: int, tell: Callable[[str, float], None]
 ) -> Iterator[tuple[str, Candidate]]:
-    """Yield the candidates as they are found, in as many processes."""
-    if workers < 2 or len(cases) < 2:
-        for name, case in cases.items():
-            yield name, _candidate(case, partial(tell, name))
+    """Yield kinds and candidates in the order in which their searches end."""
+    if workers < 2 or len(evaluators) < 2:
+        for name, evaluator in evaluators.items():
+            yield name, _candidate(evaluator, partial(tell, name))
         return
-    done = get_context("spawn").Array("d", len(cases))
-    with Pool(workers, _begin, done) as pool:
-        jobs = {
-            pool.submit(_search_in_process, case, k): name
-            for k, (name, case) in enumerate(cases.items())
-        }
-        names, pending = list(cases), set(jobs)
-        while pending:
-            ready, pending = wait(pending, timeout=0.5, return_when=FIRST_COMPLETED)
-            for name, share in zip(names, done[:], strict=True):
-                if share:
-                    tell(name, share)
-            for future in ready:
-                yield jobs[future], future.result()
-
-
-_shares: Any = None
-
-
-def _begin(shares: Any) -> None:
-    global _shares
-    _shares = shares
-
-
-def _search_in_process(case: Case, k: int) -> Candidate:
-    def tell(share: float) -> None:
-        _shares[k] = share
-
-    return _candidate(case, tell)
+    names = list(evaluators)
+    with WorkerPool(workers) as pool:
+        for k, message in pool.messages(_candidate, list(evaluators.values())):
+            if isinstance(message, Candidate):
+                yield names[k], message
+            else:
+                tell(names[k], message)
 
 
 class _CandidateStore:
     """Finished kinds in a folder, each with a digest of all that it depends on."""
 
-    def __init__(self, folder: Path | None, job: Job, cases: Mapping[str, Case]) -> None:
-        self._folder, self._job, self._cases = folder, job, cases
+    def __init__(
+        self, folder: Path | None, job: Job, evaluators: Mapping[str, KindEvaluator]
+    ) -> None:
+        self._folder, self._job, self._cases = folder, job, evaluators
 
     def _digest(self, name: str) -> str:
         job = self._job.model_dump(mode="json", exclude={"kinds"})
@@ -259,17 +289,17 @@ class _CandidateStore:
         if self._folder is None or not (file := self._folder / f"{name}.json").is_file():
             return None
         try:
-            data = json.loads(file.read_text(encoding="utf-8"))
-            if data.pop("digest", None) != self._digest(name):
+            record = json.loads(file.read_text(encoding="utf-8"))
+            if record.pop("digest", None) != self._digest(name):
                 return None
-            lists = {key: tuple(data[key]) for key in ("why", "drives", "front", "middle")}
-            return Candidate(**data | lists)
+            lists = {key: tuple(record[key]) for key in ("why", "drives", "front", "middle")}
+            return Candidate(**record | lists)
         except (ValueError, TypeError, KeyError):
             return None
 
     def keep(self, candidate: Candidate) -> None:
         """Keep a finished kind."""
         if self._folder is not None:
-            data = json_ready(candidate.data() | {"digest": self._digest(candidate.kind)})
+            record = json_ready(candidate.as_dict() | {"digest": self._digest(candidate.kind)})
             self._folder.mkdir(parents=True, exist_ok=True)
-            write_text(self._folder / f"{candidate.kind}.json", json.dumps(data, indent=1) + "\n")
+            write_text(self._folder / f"{candidate.kind}.json", json.dumps(record, indent=1) + "\n")

@@ -19,22 +19,34 @@ from pteron.motion.trajectories.time_law import sample_curve
 from pteron.motion.trajectories.time_polynomials import polynomial
 from pteron.motion.trajectories.timed_path import timed_path
 
+
+def default_table(table: type[TomlTable]) -> Any:
+    """Return the field of a table that may be left out: all its keys have defaults."""
+    return Field(default_factory=lambda: table.model_validate({}))
+
+
+def as_list(names: Any) -> Any:
+    """Return a name as a list of one; a list as it is."""
+    return [names] if isinstance(names, str) else names
+
+
 Positive = Annotated[Number, Field(gt=0.0)]
 """A number above 0."""
 
 Least = Annotated[Number, Field(ge=0.0)]
 """A number of 0 or more."""
 
+Floor = Annotated[Number, Field(ge=0.0, lt=1.0)]
+"""Type of the least value of a measure that is 1 at best."""
+
+Names = Annotated[list[str], BeforeValidator(as_list), Field(min_length=1)]
+"""One name, or a list of names."""
+
 SAMPLES = 121
 """Samples of a cycle; forces are taken between them too."""
 
 _PEAK = 10.0 / sqrt(3.0)
 """Greatest acceleration of a quintic from rest to rest over its length and inverse squared time."""
-
-
-def listed(names: Any) -> Any:
-    """Return what may be one name or several as a list."""
-    return [names] if isinstance(names, str) else names
 
 
 def _numbers(numbers: Any) -> Any:
@@ -62,7 +74,7 @@ class PayloadTable(TomlTable):
         "about its centre of mass, kg m^2: one number, or the tensor's six", 0.0
     )
 
-    def on(self, robot: Manipulator) -> Manipulator:
+    def add_to(self, robot: Manipulator) -> Manipulator:
         """Return a machine that carries it; a number is of a ball where the platform tilts."""
         inertia = self.inertia
         tensor = (
@@ -118,7 +130,7 @@ class CycleTable(TomlTable):
         return f"{what} {time}{dwell}{', anywhere in the workspace' if self.anywhere else ''}"
 
     def motion(self, robot: Manipulator, middle: Array, acceleration: float) -> Motion:
-        """Return the motion of a machine about a pose, at this acceleration if no time is given."""
+        """Return the motion about a pose; without a duration at the given acceleration."""
         if self.points is None:
             return pick_and_place(
                 robot,

@@ -23,7 +23,7 @@ GEARBOXES = Path(__file__).parent / "gearboxes.csv"
 with prices of their order of magnitude."""
 
 _REST_SPEED = 5e-3
-"""Speed, rad/s or m/s, within which dry friction changes its sign in the files."""
+"""Speed, rad/s or m/s, below which dry friction is regularised in the files."""
 
 _NUMBERS = ("ratio", "inertia", "backlash", "stiffness")
 
@@ -159,7 +159,7 @@ class Options:
     all: tuple[Option, ...]
 
     @classmethod
-    def of(
+    def combine(
         cls,
         motors: Sequence[tuple[Motor, float]],
         gearboxes: Sequence[Gearbox],
@@ -228,7 +228,7 @@ class JointLoads:
     everywhere: Array
 
     def margins(self, options: Options, legs: Sequence[int]) -> Array:
-        """Return what options can do over what legs ask: rated, peak torque, speed, (3, O)."""
+        """Return margins of rated torque, peak torque and speed of all options, (3, O)."""
         ratio, inertia, rated, peak, speed, *_ = options.numbers
         chosen, i, j = list(legs), ratio[:, None], inertia[:, None]
         worst_squares = []
@@ -236,7 +236,7 @@ class JointLoads:
             f, mixed, a = np.moveaxis(part[None, :, chosen], -1, 0)
             square = f / i[..., None] ** 2 + 2.0 * j[..., None] * mixed
             worst_squares.append((square + (j * i)[..., None] ** 2 * a).max(axis=1))
-        square = in_duty(np.array(worst_squares), self.shares).max(axis=1)
+        square = duty_cycle_mean(np.array(worst_squares), self.shares).max(axis=1)
         margins = [rated / np.sqrt(np.maximum(square, 1e-30))]
         force, rise = (part[:, chosen].ravel() for part in (self.forces, self.accelerations))
         force, rise = _outermost(force, rise)
@@ -248,7 +248,7 @@ class JointLoads:
         return np.array([*margins, speed / np.maximum(ratio * fastest, 1e-15)])
 
 
-def in_duty(worst: Array, shares: Array) -> Array:
+def duty_cycle_mean(worst: Array, shares: Array) -> Array:
     """Return worst values of cycles (C, ...) as the mean over a duty cycle, or the greatest."""
     if len(shares):
         return np.tensordot(shares / shares.sum(), worst, axes=1)

@@ -8,7 +8,8 @@ from itertools import islice, product
 import numpy as np
 import scipy  # type: ignore[import-untyped]
 
-from pteron.design.choosing.rating import Case, Rating
+from pteron.design.evolution import latin_hypercube, pareto_front
+from pteron.design.rating import KindEvaluator, Rating
 from pteron.kernels import Array, alike
 
 _POPULATION = 3
@@ -25,7 +26,10 @@ _WEIGHT, _CROSSING = (0.4, 0.9), 0.8
 
 
 def search_kind(
-    case: Case, evaluations: int, seed: int, progress: Callable[[float], None] | None = None
+    evaluator: KindEvaluator,
+    evaluations: int,
+    seed: int,
+    progress: Callable[[float], None] | None = None,
 ) -> list[Rating]:
     """Return all designs that the search rated; each objective gets an equal share of them.
 
@@ -35,28 +39,28 @@ def search_kind(
     with the share of the evaluations that is done.
     """
     ratings: list[Rating] = []
-    low, high = case.kind.ranges
-    counts = case.kind.counts
-    objectives = case.job.objectives
+    low, high = evaluator.kind.ranges
+    counts = evaluator.kind.counts
+    objectives = evaluator.job.objectives
 
-    def rated(units: Array) -> Rating:
-        ratings.append(case.rate(low + np.clip(units, 0.0, 1.0) * (high - low)))
+    def rate(units: Array) -> Rating:
+        ratings.append(evaluator.rate(low + np.clip(units, 0.0, 1.0) * (high - low)))
         if progress is not None:
             progress(len(ratings) / evaluations)
         return ratings[-1]
 
-    with alike(case.kind.like):
+    with alike(evaluator.kind.like):
         for k, objective in enumerate(objectives):
             rng = np.random.default_rng((seed, k))
             end = evaluations * (k + 1) // len(objectives)
-            _evolve(rated, ratings, rng, end, objective, (low, high))
+            _evolve(rate, ratings, rng, end, objective, (low, high))
             start = min(ratings, key=lambda rating: rating.cost(objective))
-            _refine(rated, ratings, (start.values - low) / (high - low), end, objective, counts)
+            _refine(rate, ratings, (start.values - low) / (high - low), end, objective, counts)
     return ratings
 
 
 def _evolve(
-    rated: Callable[[Array], Rating],
+    rate: Callable[[Array], Rating],
     ratings: list[Rating],
     rng: np.random.Generator,
     end: int,
@@ -70,9 +74,8 @@ def _evolve(
     size = len(ranges[0])
     count = _POPULATION * size
     first = min(_SPREAD * count, (end - len(ratings)) // 2)
-    strata = rng.permuted(np.tile(np.arange(max(first, 1)), (size, 1)), axis=1).T
-    for units in (strata + rng.random(strata.shape)) / max(first, 1):
-        rated(units)
+    for units in latin_hypercube(rng, max(first, 1), size):
+        rate(units)
     # The best so far, whichever objective they were sought for.
     known = sorted(ratings, key=lambda rating: rating.cost(objective))[:count]
     low, high = ranges
@@ -88,13 +91,13 @@ def _evolve(
             crossed[rng.integers(size)] = True
             trial = np.where(crossed, trial, units[i])
             trial = np.where((trial < 0.0) | (trial > 1.0), rng.random(size), trial)
-            cost = rated(trial).cost(objective)
+            cost = rate(trial).cost(objective)
             if cost <= costs[i]:
                 units[i], costs[i] = trial, cost
 
 
 def _refine(
-    rated: Callable[[Array], Rating],
+    rate: Callable[[Array], Rating],
     ratings: list[Rating],
     start: Array,
     end: int,
@@ -107,7 +110,7 @@ def _refine(
     """
 
     def cost(units: Array) -> float:
-        return rated(units).cost(objective)
+        return rate(units).cost(objective)
 
     free = counts == 0
     stocks = [(np.arange(count) + 0.5) / count for count in counts[~free]]
@@ -115,8 +118,8 @@ def _refine(
     for choice in islice(product(*stocks), max(end - len(ratings), 0)):
         trial = start.copy()
         trial[~free] = choice
-        if (value := cost(trial)) < least:
-            least, best = value, trial
+        if (trial_cost := cost(trial)) < least:
+            least, best = trial_cost, trial
     while len(ratings) < end:
         simplex = best[free] + np.vstack(
             [
@@ -125,28 +128,23 @@ def _refine(
             ]
         )
 
-        def whole(units: Array, best: Array = best) -> Array:
+        def with_choices(units: Array, best: Array = best) -> Array:
             trial = best.copy()
             trial[free] = np.clip(units, 0.0, 1.0)
             return trial
 
         options = {"maxfev": end - len(ratings), "initial_simplex": simplex, "xatol": 1e-4}
         answer = scipy.optimize.minimize(
-            lambda units, whole=whole: cost(whole(units)),
+            lambda units, with_choices=with_choices: cost(with_choices(units)),
             best[free],
             method="Nelder-Mead",
             options=options | {"fatol": 1e-6},
         )
-        best = whole(answer.x)
+        best = with_choices(answer.x)
 
 
-def front(ratings: list[Rating], objectives: list[str]) -> list[Rating]:
-    """Return the Pareto front: designs that keep all requirements and that no other dominates."""
+def pareto_ratings(ratings: list[Rating], objectives: list[str]) -> list[Rating]:
+    """Return the designs that keep all requirements and that no other of them dominates."""
     good = [rating for rating in ratings if not rating.misses]
     costs = np.array([[rating.figures[name] for name in objectives] for rating in good])
-    _, first = np.unique(costs, axis=0, return_index=True)
-    return [
-        good[k]
-        for k in first
-        if not ((costs <= costs[k]).all(axis=1) & (costs < costs[k]).any(axis=1)).any()
-    ]
+    return [good[k] for k in pareto_front(costs)]

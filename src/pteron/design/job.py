@@ -1,8 +1,8 @@
-"""A job for which `choose_machine` seeks a machine: its TOML file, checked as a whole."""
+"""The file of a task for `choose_machine`, with the checks across its tables."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Self
@@ -11,23 +11,21 @@ import numpy as np
 from pydantic import Field, PrivateAttr, field_validator, model_validator
 
 from pteron.bodies.tables import TomlTable, key
-from pteron.design.choosing.job_tables import (
+from pteron.design.kinds import KINDS
+from pteron.design.load_tables import Names, default_table
+from pteron.design.requirement_tables import (
     AccuracyTable,
+    BodyFloorsTable,
     BoundTable,
-    CellTable,
-    CycleTable,
-    FloorsTable,
-    KeepOutTable,
+    DriveListsTable,
+    KindSearchTable,
     LinksTable,
     LoadTable,
-    MotionTable,
-    MotorsTable,
-    Names,
-    SearchTable,
+    RequiredMotionTable,
     StiffnessTable,
-    WorkspaceTable,
+    ToolCycleTable,
 )
-from pteron.design.choosing.known_kinds import KINDS
+from pteron.design.workspace_tables import CellTable, KeepOutTable, ToolWorkspaceTable
 from pteron.errors import DataError, shorten
 from pteron.toml import read_toml, to_model
 
@@ -58,21 +56,23 @@ def _expect_names_once(names: list[str], known: Collection[str]) -> list[str]:
 class Job(TomlTable):
     """A job that a machine must do, as its file has it."""
 
-    workspace: WorkspaceTable
-    payload: LoadTable = Field(default_factory=lambda: LoadTable.model_validate({}))
-    cycles: list[CycleTable] = Field(default_factory=list)
-    motion: MotionTable = Field(default_factory=lambda: MotionTable.model_validate({}))
+    workspace: ToolWorkspaceTable
+    payload: LoadTable = default_table(LoadTable)
+    cycles: list[ToolCycleTable] = Field(default_factory=list)
+    motion: RequiredMotionTable = Field(
+        default_factory=lambda: RequiredMotionTable.model_validate({})
+    )
     accuracy: AccuracyTable | None = None
     stiffness: StiffnessTable | None = None
-    cell: CellTable = Field(default_factory=lambda: CellTable.model_validate({}))
+    cell: CellTable = default_table(CellTable)
     keep_out: list[KeepOutTable] = Field(default_factory=list)
-    motors: MotorsTable = Field(default_factory=lambda: MotorsTable.model_validate({}))
-    links: LinksTable = Field(default_factory=lambda: LinksTable.model_validate({}))
-    floors: FloorsTable = Field(default_factory=lambda: FloorsTable.model_validate({}))
-    most: BoundTable = Field(default_factory=lambda: BoundTable.model_validate({}))
+    motors: DriveListsTable = default_table(DriveListsTable)
+    links: LinksTable = default_table(LinksTable)
+    floors: BodyFloorsTable = default_table(BodyFloorsTable)
+    most: BoundTable = default_table(BoundTable)
     kinds: Names | None = key("to choose from; else all that can do it", None)
     objectives: Names = key(f"what is to be small: {', '.join(OBJECTIVES)}", ["price"])
-    search: SearchTable = Field(default_factory=lambda: SearchTable.model_validate({}))
+    search: KindSearchTable = default_table(KindSearchTable)
 
     _folder: Path = PrivateAttr(Path())
 
@@ -145,7 +145,7 @@ class Job(TomlTable):
             if space.meets(np.array(box.low) - at, np.array(box.high) - at):
                 yield f"keep_out[{k}]: it is in the workspace, where the tool must be"
 
-    def _cycle_faults(self, cycle: CycleTable) -> Iterator[str]:
+    def _cycle_faults(self, cycle: ToolCycleTable) -> Iterator[str]:
         space, k = self.workspace, self.lengths
         sizes = {len(point) for point in cycle.points}
         known = {2: "x y", 3: "x y z"}[k]
@@ -191,9 +191,55 @@ class Job(TomlTable):
         beside = self._folder / name
         return beside if beside.exists() else Path(name)
 
+    def requirement_lines(self) -> list[str]:
+        """Return the requirements, a line each."""
+        space, lines = self.workspace, []
+        lines.append(space.words)
+        if space.turn is not None:
+            lines.append(f"turn from {space.turn[0]:g} to {space.turn[1]:g} rad")
+        if space.tilt is not None:
+            lines.append(f"tilt of {space.tilt:g} rad to every side")
+        if space.directions is not None:
+            lines.append(f"{len(space.directions)} directions of the platform")
+        if any(self.payload.tool):
+            lines.append(
+                f"tool at {' x '.join(f'{1e3 * x:g}' for x in self.payload.tool)} mm from P"
+            )
+        if self.payload.mass:
+            lines.append(f"payload {self.payload.mass:g} kg")
+        for k, cycle in enumerate(self.cycles, start=1):
+            time = "as fast as can be" if cycle.duration is None else f"in {cycle.duration:g} s"
+            where = ", anywhere in the workspace" if cycle.anywhere else ""
+            share = "" if cycle.share is None else f", {cycle.share:g} in a duty cycle"
+            lines.append(f"{cycle.name or f'cycle {k}'} {time}{where}{share}")
+        if self.motion.acceleration:
+            speed = f"at up to {self.motion.speed:g} m/s in any direction"
+            lines.append(f"{self.motion.acceleration:g} m/s^2 {speed}")
+        if self.accuracy is not None:
+            lines.append(f"tool within {1e3 * self.accuracy.most:g} mm ({self.accuracy.counted})")
+        if self.stiffness is not None:
+            limit = f"{1e3 * self.stiffness.most:g} mm"
+            lines.append(f"gives way {limit} at most under {self.stiffness.force:g} N")
+        if self.cell.footprint is not None:
+            lines.append(f"footprint {' x '.join(f'{x:g}' for x in self.cell.footprint)} m")
+        lines += [f"height {self.cell.height:g} m"] if self.cell.height is not None else []
+        if self.cell.low is not None and self.cell.high is not None:
+            lines.append(f"cell {_box(self.cell.low, self.cell.high)} m")
+        lines += [f"kept out of {_box(box.low, box.high)} m" for box in self.keep_out]
+        floors = {
+            "type_i": "type-I measure",
+            "type_ii": "type-II measure",
+            "clearance": "clearance (m)",
+        }
+        for name in sorted(self.floors.model_fields_set):
+            lines.append(f"{floors[name]} at least {getattr(self.floors, name):g}")
+        bounds = self.most.model_dump(exclude_none=True)
+        lines += [f"{name.replace('_', ' ')} at most {bound:g}" for name, bound in bounds.items()]
+        return [*lines, f"least {' and '.join(name.replace('_', ' ') for name in self.objectives)}"]
+
 
 def read_job(path: str | Path) -> Job:
-    """Read what a machine must do from a TOML file.
+    """Read a task for a machine from a TOML file.
 
     Raises
     ------
@@ -204,3 +250,7 @@ def read_job(path: str | Path) -> Job:
     job = to_model(Job, read_toml(path, DataError, _ABSENT), source, DataError)
     job._folder = Path(path).parent
     return job
+
+
+def _box(low: Sequence[float], high: Sequence[float]) -> str:
+    return " x ".join(f"{a:g}..{b:g}" for a, b in zip(low, high, strict=True))

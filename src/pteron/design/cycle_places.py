@@ -12,9 +12,9 @@ from itertools import product
 
 import numpy as np
 
-from pteron.design.choosing.job import Job
-from pteron.design.choosing.job_tables import CycleTable
-from pteron.design.choosing.samples import INSIDE, of_platform, shifted, tilts, wide
+from pteron.design.job import Job
+from pteron.design.requirement_tables import ToolCycleTable
+from pteron.design.workspace_samples import INSIDE, pad_to_xyz, platform_curve, tilts, turn_angles
 from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
@@ -33,7 +33,7 @@ _IN_CYCLE, _IN_CYCLE_LAST = 49, 129
 """Samples of a cycle in the search, and in the final check: peaks at a rounded corner are short."""
 
 _SHARES = np.linspace(1.0, 0.0, 21)
-"""Shares of the way to a corner at which a cycle is tried."""
+"""Shares of the shift to a corner that are tried until the cycle fits."""
 
 
 @dataclass(frozen=True)
@@ -81,14 +81,14 @@ class Places:
         tilts = "".join(f", {name} {angle:+.0f} deg" for name, angle in angles if angle)
         return f"{self.name} at ({at}) mm{tilts}, turned by {np.degrees(self.turns[k]):.0f} deg"
 
-    def some(self) -> Places:
+    def spread_places(self) -> Places:
         """Return the cycle at the greatest number of places of a search, evenly chosen."""
-        chosen = np.unique(np.linspace(0, len(self.turns) - 1, _PLACES).round().astype(int))
-        return self.at(chosen)
+        indices = np.unique(np.linspace(0, len(self.turns) - 1, _PLACES).round().astype(int))
+        return self.select_places(indices)
 
-    def at(self, chosen: Array) -> Places:
+    def select_places(self, indices: Array) -> Places:
         """Return the cycle at some of its places."""
-        return replace(self, shifts=self.shifts[chosen], turns=self.turns[chosen])
+        return replace(self, shifts=self.shifts[indices], turns=self.turns[indices])
 
     def both_ways(self) -> Places:
         """Return the cycle, finer in time, at its places and, turned by pi, at opposite ones."""
@@ -108,9 +108,9 @@ class Places:
         """
         spans = np.sqrt(np.diff(self.path.rests)).tolist()
         timed = timed_path(self.path, spans, [polynomial("quintic")] * len(spans))
-        return self.moved(*timed.curve(np.linspace(0.0, 1.0, self.samples)))
+        return self.curves(*timed.curve(np.linspace(0.0, 1.0, self.samples)))
 
-    def moved(self, *curve: Array) -> Curve:
+    def curves(self, *curve: Array) -> Curve:
         """Return poses of the tool (K, m) and two derivatives as P's (B, K, m), at all places."""
         parts: list[Array] = []
         for part in curve:
@@ -118,7 +118,7 @@ class Places:
             every[..., :2] = np.einsum("bij,kj->bki", _plane(self.turns), part[:, :2])
             parts.append(every)
         parts[0] += self.shifts[:, None]
-        return of_platform(self.robot, *parts)
+        return platform_curve(self.robot, *parts)
 
 
 def cycles_of(job: Job, robot: Manipulator) -> list[Places]:
@@ -132,7 +132,7 @@ def cycles_of(job: Job, robot: Manipulator) -> list[Places]:
     return [_cycle_places(job, robot, cycle, k) for k, cycle in enumerate(job.cycles, start=1)]
 
 
-def _cycle_places(job: Job, robot: Manipulator, cycle: CycleTable, k: int) -> Places:
+def _cycle_places(job: Job, robot: Manipulator, cycle: ToolCycleTable, k: int) -> Places:
     name = cycle.name or f"cycle {k}"
     points = np.zeros((len(cycle.points), robot.freedom))
     rows = np.array(cycle.points)
@@ -146,7 +146,9 @@ def _cycle_places(job: Job, robot: Manipulator, cycle: CycleTable, k: int) -> Pl
     poses = path.at(np.linspace(0.0, path.length, _IN_CYCLE))[0]
     fitting = list(_fitting_shifts(job, robot, poses, cycle.anywhere))
     if not fitting:
-        size = " x ".join(f"{1e3 * x:.0f}" for x in np.ptp(wide(rows[:, : job.lengths]), axis=0))
+        size = " x ".join(
+            f"{1e3 * x:.0f}" for x in np.ptp(pad_to_xyz(rows[:, : job.lengths]), axis=0)
+        )
         room = " x ".join(f"{2e3 * x:.0f}" for x in job.workspace.half)
         where = "" if cycle.anywhere else " where it is (anywhere = false)"
         raise DataError(
@@ -157,7 +159,7 @@ def _cycle_places(job: Job, robot: Manipulator, cycle: CycleTable, k: int) -> Pl
     return Places(name, robot, path, shifts, turns, *times, cycle.anywhere)
 
 
-def near_places(job: Job, cycle: Places, chosen: Iterable[int], part: float) -> Places:
+def neighbour_places(job: Job, cycle: Places, chosen: Iterable[int], part: float) -> Places:
     """Return a cycle at neighbours of some of its places, these places included.
 
     A neighbour is turned by a part of the angle between directions, or shifted by that part of
@@ -165,7 +167,7 @@ def near_places(job: Job, cycle: Places, chosen: Iterable[int], part: float) -> 
     """
     half, count = job.workspace.half, len(cycle.robot.platform.lengths)
     poses = cycle.path.at(np.linspace(0.0, cycle.path.length, _IN_CYCLE))[0]
-    path, last, neighbours = wide(poses[:, :count]), poses[:, -1], []
+    path, last, neighbours = pad_to_xyz(poses[:, :count]), poses[:, -1], []
     limits = np.full((2, cycle.robot.freedom), np.nan)
     steps = np.zeros(cycle.robot.freedom)
     steps[:count] = part * half[:count]
@@ -185,7 +187,7 @@ def near_places(job: Job, cycle: Places, chosen: Iterable[int], part: float) -> 
             continue
         shifts = cycle.shifts[k] + (ways if cycle.anywhere else 0.0 * ways[:1])
         for shift in np.unique(np.fmax(np.fmin(shifts, limits[1]), limits[0]), axis=0):
-            if (share := _share(job, turned, wide([shift[:count]])[0])) is not None:
+            if (share := _share(job, turned, pad_to_xyz([shift[:count]])[0])) is not None:
                 neighbours.append((np.append(share * shift[:count], shift[count:]), turn))
     return replace(
         cycle,
@@ -209,7 +211,7 @@ def _fitting_shifts(
 ) -> Iterator[tuple[Array, float]]:
     """Yield shifts (m,) and turns of a path (K, m): its outermost places in the workspace."""
     half, count = job.workspace.half, len(robot.platform.lengths)
-    path = wide(poses[:, :count])
+    path = pad_to_xyz(poses[:, :count])
     directions = np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS if anywhere else [0.0]
     angles_of_path = poses[:, count:]
     around = (
@@ -240,7 +242,7 @@ def _angles(job: Job, robot: Manipulator, angles: Array) -> Iterator[Array]:
     if job.workspace.turn is not None:
         ends = {job.workspace.turn[0] - last.min(), job.workspace.turn[1] - last.max()}
     for end in sorted(ends):
-        yield from shifted(tilted, float(end))
+        yield from turn_angles(tilted, float(end))
 
 
 def _share(job: Job, path: Array, shift: Array) -> float | None:

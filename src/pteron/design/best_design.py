@@ -1,22 +1,22 @@
-"""`judged`: the best design of a kind, proved, with margins at the worst place and direction."""
+"""`prove_best_design`: the best design of a kind that can be proved, with its worst margins."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import asdict, dataclass, field, replace
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pteron.design.choosing.cycles import Places
-from pteron.design.choosing.margins import DENSE, margins_of
-from pteron.design.choosing.proofs import is_clear, proofs_of, told
-from pteron.design.choosing.rating import Case, Rating
-from pteron.design.choosing.samples import sample_poses
-from pteron.design.choosing.search import front
-from pteron.design.choosing.tool import elasticity, greatest_errors, joint_errors, tolerances
+from pteron.design.candidate import Candidate
+from pteron.design.cycle_places import Places
+from pteron.design.kind_search import pareto_ratings
+from pteron.design.load_margins import DENSE, margins_of
+from pteron.design.proofs import is_clear, kind_proofs, proof_sentence
+from pteron.design.rating import KindEvaluator, Rating
+from pteron.design.tool_errors import elasticity, greatest_errors, joint_errors, tolerances
+from pteron.design.workspace_samples import sample_poses
 from pteron.errors import PteronError
 from pteron.indices import Tolerances, stiffness
 from pteron.kernels import Array
@@ -26,78 +26,15 @@ from pteron.motion import Path, limits_of, time_optimal
 from pteron.workspace import Proof, clearance
 
 _WORST = 8
-"""Worst sample poses about which worse ones are sought."""
-
-MARGINS = {"rated": "rated torque", "peak": "peak torque", "speed": "speed"}
-"""The margins of drives, in words."""
+"""Number of worst sample poses that local refinement starts from."""
 
 _TRIED = 9
-"""Designs of which a proof is tried: the best, and then ever further behind, as neighbours fail
-alike."""
+"""Number of designs that are proved in turn: ranks 1, 2, 4, 8, ..., as neighbours fail alike."""
 
 
-@dataclass(frozen=True)
-class Candidate:
-    """One kind of machine after the search: its best design, or why there is none.
-
-    Attributes
-    ----------
-    kind : str
-        In the catalog.
-    serves : bool
-        Whether a design keeps all that is asked.
-    why : tuple of str
-        Where none does: what the nearest misses, and how far.
-    evaluated, kept : int
-        Designs that were rated, and those of them that keep all that is asked.
-    proved : str
-        What is proved of the workspace, in words.
-    clear : str
-        Whether it is proved, or sampled, that no two bodies touch.
-    dimensions : dict
-        m, by name.
-    figures : dict
-        Price, masses, energy, margins, error, deflection and times; SI units.
-    drives : tuple of str
-        Motor and gearbox of each leg.
-    worst : str
-        The place and direction at which the drives' margin is least.
-    front : tuple of dict
-        The objectives of designs that no other of the kind betters in everything.
-    robot : str
-        The machine's file, with its drives; empty where there is none.
-    middle : tuple of float
-        The pose in the middle of its workspace.
-    """
-
-    kind: str
-    serves: bool
-    why: tuple[str, ...]
-    evaluated: int
-    kept: int
-    proved: str = ""
-    clear: str = ""
-    dimensions: dict[str, float] = field(default_factory=dict)
-    figures: dict[str, float] = field(default_factory=dict)
-    drives: tuple[str, ...] = ()
-    worst: str = ""
-    front: tuple[dict[str, float], ...] = ()
-    robot: str = ""
-    middle: tuple[float, ...] = ()
-
-    @property
-    def least_margin(self) -> float:
-        """The least of the drives' margins."""
-        return min(self.figures.get(f"{name}_margin", np.inf) for name in MARGINS)
-
-    def data(self) -> dict[str, Any]:
-        """Return it as plain data."""
-        return asdict(self)
-
-
-def judged(case: Case, ratings: list[Rating]) -> Candidate:
+def prove_best_design(evaluator: KindEvaluator, ratings: list[Rating]) -> Candidate:
     """Return the best design of a search that can be proved, or why there is none."""
-    objectives = case.job.objectives
+    objectives = evaluator.job.objectives
     first, second = shown_objectives(objectives)[:2]
     good = sorted(
         (r for r in ratings if not r.misses), key=lambda r: (r.figures[first], r.figures[second])
@@ -105,40 +42,38 @@ def judged(case: Case, ratings: list[Rating]) -> Candidate:
     counts = len(ratings), len(good)
     if not good:
         nearest = min(ratings, key=lambda rating: rating.cost(objectives[0]))
-        return Candidate(case.kind.name, False, tuple(nearest.told.values()), *counts)
+        return Candidate(evaluator.kind.name, False, tuple(nearest.shortfalls.values()), *counts)
     why, tight = "", None
     for rating in (good[2**k - 1] for k in range(_TRIED) if 2**k <= len(good)):
-        proofs, rating.robot = proofs_of(case, rating)
+        proofs, rating.robot = kind_proofs(evaluator, rating)
         bad = next((p for p in proofs if p.counterexample is not None), None)
-        why = str(bad) if bad is not None else _cell_violation(case, rating)
+        why = str(bad) if bad is not None else _cell_violation(evaluator, rating)
         if not why:
-            candidate = _candidate(
-                case, rating, proofs, counts, front(good, shown_objectives(objectives))
-            )
-            why = _exceeded_limit(case, candidate)
-            if not why and candidate.least_margin >= case.job.motors.margin:
+            best = pareto_ratings(good, shown_objectives(objectives))
+            candidate = _candidate(evaluator, rating, proofs, counts, best)
+            why = _exceeded_limit(evaluator, candidate)
+            if not why and candidate.least_margin >= evaluator.job.motors.margin:
                 return candidate
             # Where no design keeps the whole margin between the search's places, the best serves.
             tight = tight or (None if why else candidate)
-    return tight or Candidate(case.kind.name, False, (f"no proof ({why})",), *counts)
+    return tight or Candidate(evaluator.kind.name, False, (f"no proof ({why})",), *counts)
 
 
-def _cell_violation(case: Case, rating: Rating) -> str:
-    """Return in words where a design leaves its room between the poses of its search; note it."""
-    robot = rating.robot
-    assert robot is not None  # it keeps all that is asked
+def _cell_violation(evaluator: KindEvaluator, rating: Rating) -> str:
+    """Return the bound of the cell that a design violates between samples, in words; else empty."""
+    robot = rating.machine
 
-    def taken(poses: Array) -> Array:
-        return case.room.taken(robot, rating.middle + poses, rating.middle)
+    def extents(poses: Array) -> Array:
+        return evaluator.machine_space.extents(robot, rating.middle + poses, rating.middle)
 
-    sizes, misses = case.room.within(case.worst(robot, taken, DENSE)[0])
+    sizes, misses = evaluator.machine_space.judge_extents(evaluator.worst(robot, extents, DENSE)[0])
     rating.figures |= sizes
     return "".join(f"not so: {words}" for _, words in list(misses.values())[:1])
 
 
-def _exceeded_limit(case: Case, candidate: Candidate) -> str:
-    """Return in words what a design exceeds between the poses of its search; empty for nothing."""
-    job, figures = case.job, candidate.figures
+def _exceeded_limit(evaluator: KindEvaluator, candidate: Candidate) -> str:
+    """Return the limit that a design exceeds between its sample poses, in words; else empty."""
+    job, figures = evaluator.job, candidate.figures
     bounds = {"error": job.accuracy, "deflection": job.stiffness}
     for name, limit in bounds.items():
         if limit is not None and figures[name] > limit.most:
@@ -156,54 +91,58 @@ def shown_objectives(objectives: Sequence[str]) -> list[str]:
 
 
 def _candidate(
-    case: Case, rating: Rating, proofs: list[Proof], counts: tuple[int, int], best: list[Rating]
+    evaluator: KindEvaluator,
+    rating: Rating,
+    proofs: list[Proof],
+    counts: tuple[int, int],
+    best: list[Rating],
 ) -> Candidate:
-    robot = rating.robot
-    assert robot is not None  # it keeps all that is asked
-    carrying = case.loaded(robot)
+    robot = rating.machine
+    loaded_robot = evaluator.add_payload(robot)
     figures = dict(rating.figures)
-    time = case.kind.numbers(rating.values).get("time")
-    margins = margins_of(case, carrying, rating.middle, time)
+    time = evaluator.kind.numbers(rating.values).get("time")
+    margins = margins_of(evaluator, loaded_robot, rating.middle, time)
     figures |= margins.figures
 
     def least(values_of: Callable[[Array], ArrayLike]) -> float:
         def column(poses: Array) -> Array:
             return np.reshape(values_of(rating.middle + poses), (-1, 1))
 
-        return float(case.worst(robot, column, DENSE, _WORST)[0][0])
+        return float(evaluator.worst(robot, column, DENSE, _WORST)[0][0])
 
     figures["clearance"] = least(lambda poses: clearance(robot, poses).least)
-    if (accuracy := case.job.accuracy) is not None:
-        errors = _tolerances(case, rating)
+    if (accuracy := evaluator.job.accuracy) is not None:
+        errors = _tolerances(evaluator, rating)
         figures["error"] = -least(lambda poses: -greatest_errors(accuracy, robot, poses, errors))
-    if case.job.stiffness is not None:
-        springs = elasticity(case.sections(rating), [o.gearbox.stiffness for o in rating.options])
+    if evaluator.job.stiffness is not None:
+        gears = [option.gearbox.stiffness for option in rating.options]
+        springs = elasticity(evaluator.sections(rating), gears)
         stiff = least(lambda poses: stiffness(robot, poses, springs).least)
-        figures["deflection"] = float(case.job.stiffness.force / stiff)
-    times = _shortest_times(case, carrying, rating, margins.place)
-    objectives = shown_objectives(case.job.objectives)
+        figures["deflection"] = float(evaluator.job.stiffness.force / stiff)
+    times = _shortest_times(evaluator, loaded_robot, rating, margins.place)
+    objectives = shown_objectives(evaluator.job.objectives)
     return Candidate(
-        case.kind.name,
+        evaluator.kind.name,
         True,
         (),
         *counts,
-        told(case, proofs),
-        _clear_words(case, robot, rating.middle),
+        proof_sentence(evaluator, proofs),
+        _clear_words(evaluator, robot, rating.middle),
         _dimensions(robot),
-        {name: value for name, value in (figures | times).items() if np.isfinite(value)},
+        {name: figure for name, figure in (figures | times).items() if np.isfinite(figure)},
         tuple(option.name for option in rating.options),
         margins.worst,
         tuple({name: r.figures[name] for name in objectives} for r in best),
-        text_of(replace(robot, name=f"{case.kind.name}-chosen")),
+        text_of(replace(robot, name=f"{evaluator.kind.name}-chosen")),
         tuple(rating.middle.tolist()),
     )
 
 
-def _clear_words(case: Case, robot: Manipulator, middle: Array) -> str:
-    least, samples = case.job.floors.clearance, sample_poses(case.job, robot, DENSE)
-    count = len(samples) + len(case.between)
+def _clear_words(evaluator: KindEvaluator, robot: Manipulator, middle: Array) -> str:
+    least, samples = evaluator.job.floors.clearance, sample_poses(evaluator.job, robot, DENSE)
+    count = len(samples) + len(evaluator.between)
     distance_words = f"come nearer than {1e3 * least:g} mm" if least else "touch"
-    if not len(case.between) and is_clear(case, robot, middle):
+    if not len(evaluator.between) and is_clear(evaluator, robot, middle):
         return f"proved: no two links, guides or the platform {distance_words}"
     return (
         f"at {count} sample poses and about the worst of them no two links, guides or the "
@@ -229,24 +168,24 @@ def _dimensions(robot: Manipulator) -> dict[str, float]:
     return sizes | ({"stroke": max(strokes)} if strokes else {})
 
 
-def _tolerances(case: Case, rating: Rating) -> Tolerances:
+def _tolerances(evaluator: KindEvaluator, rating: Rating) -> Tolerances:
     """Return the tolerances of a design with its drives."""
-    accuracy = case.job.accuracy
+    accuracy = evaluator.job.accuracy
     assert accuracy is not None  # who asks has some
     gears = np.array([(o.gearbox.ratio, o.gearbox.backlash) for o in rating.options])
     return tolerances(accuracy, joint_errors(accuracy, *gears.T).tolist())
 
 
 def _shortest_times(
-    case: Case, robot: Manipulator, rating: Rating, place: tuple[Places, int] | None
+    evaluator: KindEvaluator, robot: Manipulator, rating: Rating, place: tuple[Places, int] | None
 ) -> dict[str, float]:
     """Return the shortest time of the cycle at its worst place with these drives, s."""
     if place is None:
         return {}
     cycle, k = place
-    path = _ShiftedPath(cycle.at(np.array([k])), rating.middle)
+    path = _ShiftedPath(cycle.select_places(np.array([k])), rating.middle)
     # Drives are left what the margin asks for.
-    share, drive_limits = case.job.motors.margin, limits_of(robot)
+    share, drive_limits = evaluator.job.motors.margin, limits_of(robot)
     limits = replace(
         drive_limits, force=drive_limits.force / share, speed=drive_limits.speed / share
     )
@@ -270,7 +209,7 @@ class _ShiftedPath(Path):
         return self._path.rests
 
     def at(self, s: Array) -> tuple[Array, Array, Array]:
-        pose, first, second = (part[0] for part in self._place.moved(*self._path.at(s)))
+        pose, first, second = (part[0] for part in self._place.curves(*self._path.at(s)))
         return self._middle + pose, first, second
 
     def place(self, s: float) -> str:

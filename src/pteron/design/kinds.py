@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 
 from pteron.bodies.vectors import Vector
-from pteron.design.choosing.job_tables import LinksTable
-from pteron.design.choosing.known_kinds import KINDS
+from pteron.design.requirement_tables import LinksTable
 from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.kinematics.sampling import search_ball
@@ -20,8 +19,28 @@ from pteron.manipulator.dimensions import Stock, cut_links
 from pteron.toml import joined_faults
 from pteron.workspace import home_pose
 
+KINDS: dict[str, tuple[str, str]] = {
+    "delta": ("base_radius platform_radius crank", "z"),
+    "linear-delta": ("base_radius platform_radius", "z"),
+    "orthoglide": ("", "xyz"),
+    "tripteron": ("crank", "xyz"),
+    "delta-4": ("base_radius platform_radius crank", "z"),
+    "h4": ("base_radius crank", "yz"),
+    "par4": ("base_radius crank", "z"),
+    "quadrupteron": ("crank", "xyz"),
+    "hexa": ("base_radius platform_radius crank", "z"),
+    "hexaglide": ("base_radius platform_radius", "yz"),
+    "stewart": ("base_radius platform_radius", "z"),
+    "five-bar": ("base_radius crank", "y"),
+    "3-rrr": ("base_radius platform_radius crank", "xy"),
+    "3-prr": ("base_radius platform_radius", "xy"),
+    "3-rpr": ("base_radius platform_radius", "xy"),
+}
+"""The dimensions of each kind that vary beside the size, and the coordinates of its place that do:
+the others are those of its plane or axis of symmetry."""
+
 _POWERS = {"m": 3, "g": 4, "I": 5}
-"""Powers of the size with which masses, first and second moments grow."""
+"""Exponents of the size by which masses, first and second moments scale."""
 
 _RATIO = 0.4, 2.5
 """Least and greatest dimension over that of the catalog's machine of the same size."""
@@ -59,7 +78,7 @@ class Kind:
 
     @cached_property
     def robot(self) -> Manipulator:
-        """The catalog's machine; what slides is without limits, for they follow from the job.
+        """The catalog's machine; sliders have no limits, as these follow from the task.
 
         So are ball joints, whose cones follow from a machine's proportions.
         """
@@ -114,14 +133,14 @@ class Kind:
         """Numbers of things to choose from (V,); 0 of a measure."""
         return np.array([len(self._choices.get(name, ())) for name in self.variables])
 
-    def numbers(self, values: Array) -> dict[str, float]:
-        """Return numbers by name, as they are meant: sizes over the catalog's, times in s."""
+    def numbers(self, point: Array) -> dict[str, float]:
+        """Return the numbers by name: sizes relative to the catalog's, times in s."""
         return {
-            name: float(value if name in "xyz" or name in self._choices else np.exp(value))
-            for name, value in zip(self.variables, values, strict=True)
+            name: float(setting if name in "xyz" or name in self._choices else np.exp(setting))
+            for name, setting in zip(self.variables, point, strict=True)
         }
 
-    def machine(self, values: Array) -> tuple[Manipulator, Array]:
+    def machine(self, point: Array) -> tuple[Manipulator, Array]:
         """Return the machine of a design, and the pose in the middle of its workspace.
 
         Raises
@@ -129,7 +148,7 @@ class Kind:
         ModelError
             If there is no such machine.
         """
-        numbers = self.numbers(values)
+        numbers = self.numbers(point)
         size, (home, reach) = numbers["size"], self.reach
         middle = np.where(self.robot.platform.angular, 0.0, size * home)
         for i, letter in enumerate(self.robot.coordinates):
@@ -137,26 +156,26 @@ class Kind:
                 middle[i] += numbers[letter] * size * reach
             elif letter == "x" or (letter == "y" and "z" in KINDS[self.name][1]):
                 middle[i] = 0.0
-        return _build_machine(self.robot, numbers, self._stock(values), self.links), middle
+        return _build_machine(self.robot, numbers, self._stock(point), self.links), middle
 
-    def cut(self, values: Array) -> dict[str, str]:
-        """Return what a design's upper and lower links are cut from."""
-        numbers = self.numbers(values)
+    def link_stocks(self, point: Array) -> dict[str, str]:
+        """Return the names of the stock of upper and lower links."""
+        numbers = self.numbers(point)
         return {key: names[int(numbers.get(key, 0.0))] for key, names in self.stocks.items()}
 
-    def _stock(self, values: Array) -> dict[str, Stock]:
-        return {key: Stock.parse(name) for key, name in self.cut(values).items()}
+    def _stock(self, point: Array) -> dict[str, Stock]:
+        return {key: Stock.parse(name) for key, name in self.link_stocks(point).items()}
 
-    def with_travel(self, leg: Any, travel: tuple[float, float], values: Array) -> Any:
+    def with_travel(self, leg: Any, travel: tuple[float, float], point: Array) -> Any:
         """Return a leg whose joint goes from one end to another, m; a ram's tubes are as long."""
         limited = replace(leg, limits=travel)
         if slides(leg):
             return limited
-        return limited.with_bodies(_bodies(limited, 1.0, self._stock(values), self.links))
+        return limited.with_bodies(_bodies(limited, 1.0, self._stock(point), self.links))
 
 
 def slides(leg: Any) -> bool:
-    """Return whether a leg's joint slides on a guide, whose length follows from what it must do."""
+    """Return whether a leg's joint slides on a guide, whose length follows from the travel."""
     return leg.joint.unit == "m" and bool(_lengths(leg))
 
 
@@ -183,8 +202,8 @@ def _build_machine(
     for leg in robot.legs:
         dimensions: dict[str, Any] = {}
         lengths = _lengths(leg)
-        for key, values in leg.metres.items():
-            parts = np.array(values)
+        for key, lengths_of_key in leg.metres.items():
+            parts = np.array(lengths_of_key)
             if key == "guide_point":
                 parts = about + wider @ (parts - about)
             elif key == "platform_point":
@@ -227,7 +246,7 @@ def _bodies(
 
 
 def fitting_kinds(names: Sequence[str] | None, lengths: int, turn: bool, tilt: bool) -> list[str]:
-    """Return the kinds that can do a motion; of those asked for all must.
+    """Return the kinds that have the freedoms of a task; all that the task names must have them.
 
     Raises
     ------

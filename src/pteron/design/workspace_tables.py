@@ -1,18 +1,16 @@
-"""The tables of a job's TOML file, each checked by itself, as pydantic models."""
+"""Tables of a workspace, and of the cell around it: of a search's file, and of a task's."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import AfterValidator, BeforeValidator, Field, field_validator, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
-from pteron.bodies.tables import Count, Number, Three, TomlTable, Two, key
-from pteron.design.loads import Least, PayloadTable, Positive, listed
-from pteron.design.spec import Floor
-from pteron.errors import ModelError
+from pteron.bodies.tables import Number, Three, TomlTable, Two, key
+from pteron.design.load_tables import Least, Positive
 from pteron.kernels import Array
-from pteron.manipulator.dimensions import Stock
 
 _FAR = 20.0
 """Length, m, from which a workspace or a cell was probably given in millimetres."""
@@ -48,14 +46,11 @@ def _expect_tilt(angle: float) -> float:
     return angle
 
 
-def _expect_near_points(points: list[tuple[float, ...]]) -> list[tuple[float, ...]]:
+def expect_near_points(points: list[tuple[float, ...]]) -> list[tuple[float, ...]]:
     """Refuse points whose first two coordinates, lengths in m, are too large for a cell."""
     _expect_near([point[:2] for point in points])
     return points
 
-
-Names = Annotated[list[str], BeforeValidator(listed), Field(min_length=1)]
-"""One name, or a list of names."""
 
 Near = Annotated[Positive, AfterValidator(_expect_near)]
 """A length above 0 and of a cell's size, m."""
@@ -68,6 +63,91 @@ Place = Annotated[Three, AfterValidator(_expect_near)]
 
 
 class WorkspaceTable(TomlTable):
+    """`[workspace]`: the region in which the machine must work.
+
+    A box given by its sides, a cube or a cylinder may have no center: then it floats, and each
+    design has it where the machine's margins are largest.
+    """
+
+    low: tuple[Number, ...] | None = key("a box's least x, y, z, m", None)
+    high: tuple[Number, ...] | None = key("a box's greatest x, y, z, m", None)
+    sides: tuple[Positive, ...] | None = key("of a box, in place of these, m", None)
+    center: tuple[Number, ...] | None = key(
+        "of a box of sides, a cube or a cylinder, m; left out, it floats", None
+    )
+    edge: Positive | None = key("of a cube, m", None)
+    radius: Positive | None = key("of a cylinder, m", None)
+    height: Positive | None = key("of a cylinder, m", None)
+    axis: Literal["x", "y", "z"] = key("of a cylinder", "z")
+    samples: Annotated[int, Field(ge=2, le=41, strict=True)] = key(
+        "poses along each of its sides", 5
+    )
+
+    @model_validator(mode="after")
+    def _one_shape(self) -> Self:
+        keys = ("low", "high", "sides", "center", "edge", "radius", "height")
+        keys_present = {key for key in keys if getattr(self, key) is not None}
+        valid_sets = ({"low", "high"}, {"sides"}, {"edge"}, {"radius", "height"})
+        if keys_present not in valid_sets and keys_present - {"center"} not in valid_sets[1:]:
+            raise ValueError(
+                f"{', '.join(sorted(keys_present)) or 'nothing'} given; a box has low and high, or "
+                "sides, a cube edge, a cylinder radius and height; these three have a center, or "
+                "float"
+            )
+        pairs = ((self.low, self.high), (self.sides, self.center))
+        if any(a is not None and b is not None and len(a) != len(b) for a, b in pairs):
+            raise ValueError("unlike numbers of coordinates given")
+        if self.low is not None and not all(
+            a < b for a, b in zip(self.low, self.high or (), strict=True)
+        ):
+            raise ValueError(f"low {list(self.low)} is not below high {list(self.high or ())}")
+        return self
+
+    @property
+    def shape(self) -> Literal["box", "cube", "cylinder"]:
+        """The kind of workspace."""
+        if self.radius is not None:
+            return "cylinder"
+        return "cube" if self.edge is not None else "box"
+
+    @property
+    def floats(self) -> bool:
+        """Whether its place is free."""
+        return self.low is None and self.center is None
+
+    def with_center(self, center: Iterable[float]) -> Self:
+        """Return the workspace at another center, m."""
+        return self.model_copy(update={"center": tuple(map(float, center))})
+
+    def dimensions(self, count: int) -> tuple[float, ...]:
+        """Return the sides (count,) of the box around it, m."""
+        if self.low is not None and self.high is not None:
+            return tuple(b - a for a, b in zip(self.low, self.high, strict=True))
+        if self.radius is not None and self.height is not None:
+            return tuple(
+                self.height if letter == self.axis else 2.0 * self.radius for letter in "xyz"
+            )
+        return self.sides or (self.edge or 0.0,) * count
+
+    @property
+    def ends(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Least and greatest coordinates of the box around a placed workspace, m."""
+        if self.low is not None and self.high is not None:
+            return self.low, self.high
+        center = self.center or ()
+        halves = [side / 2.0 for side in self.dimensions(len(center))]
+        ends = tuple(
+            zip(*((x - h, x + h) for x, h in zip(center, halves, strict=True)), strict=True)
+        )
+        return ends[0], ends[1]
+
+    @property
+    def lengths(self) -> int | None:
+        """Number of its coordinates; None if it fits any number."""
+        return len(self.low or self.sides or self.center or ()) or (3 if self.radius else None)
+
+
+class ToolWorkspaceTable(TomlTable):
     """`[workspace]`: the positions of the tool's centre point: a box, a cylinder or a list."""
 
     size: Annotated[tuple[Near, ...], Field(min_length=2, max_length=3)] | None = key(
@@ -147,71 +227,6 @@ class WorkspaceTable(TomlTable):
         return f"workspace: cylinder of radius {self.radius:g} m, height {self.height:g} m"
 
 
-class LoadTable(PayloadTable):
-    """`[payload]`: the body that the platform carries, with the tool's centre point."""
-
-    tool: Place = key(
-        "the tool's centre point in the platform's frame, m: what must reach", (0.0, 0.0, 0.0)
-    )
-
-
-class CycleTable(TomlTable):
-    """`[[cycles]]`: a path of the tool through points, repeated without end."""
-
-    name: str | None = None
-    points: Annotated[
-        list[tuple[Number, ...]], Field(min_length=2), AfterValidator(_expect_near_points)
-    ] = key(
-        "from the middle of the workspace, m; a turn about the upright may follow, or "
-        "roll, pitch and yaw, rad"
-    )
-    corner: Least = key(
-        "metres before and after a point where the path leaves its lines; 0: stop", 0.0
-    )
-    duration: Positive | None = key("of the path, s; left out, as fast as the motors can", None)
-    dwell: Least = key("rest after it, s", 0.0)
-    back: bool = key("whether the path goes back as it came", False)
-    share: Positive | None = key(
-        "how often it is done in a duty cycle of all; without it each counts by itself", None
-    )
-    anywhere: bool = key(
-        "whether it may be at any place and in any direction of the workspace", True
-    )
-
-
-class MotionTable(TomlTable):
-    """`[motion]`: speed and acceleration that are required everywhere, in every direction."""
-
-    speed: Least = key("of P, m/s", 0.0)
-    acceleration: Least = key("of P, m/s^2", 0.0)
-
-
-class AccuracyTable(TomlTable):
-    """`[accuracy]`: the greatest position error of the tool, and the tolerances of parts."""
-
-    most: Fine = key("m")
-    counted: Literal["deviation", "worst"] = key(
-        "root of the sum of squares of all errors, or their sum", "deviation"
-    )
-    counts_per_turn: Positive = key("of the motors' encoders", 20000.0)
-    backlash: bool = key("whether the gearboxes' backlash counts", True)
-    point: Least = key("of joints' places, m", 0.0)
-    length: Least = key("of links, m", 0.0)
-    angle: Least = key("of axes, rad", 0.0)
-
-    @property
-    def of_parts(self) -> bool:
-        """Whether any tolerance of the machine's parts is given, beside errors of its drives."""
-        return bool(self.point or self.length or self.angle)
-
-
-class StiffnessTable(TomlTable):
-    """`[stiffness]`: the greatest deflection of the tool under a force."""
-
-    force: Positive = key("in any direction, N")
-    most: Fine = key("m")
-
-
 class KeepOutTable(TomlTable):
     """`[[keep_out]]`: a box in which no part of the machine may be."""
 
@@ -233,61 +248,3 @@ class CellTable(TomlTable):
     low: Place | None = key("of a cell with a place of its own, m", None)
     high: Place | None = key("m", None)
     margin: Least = key("half the width of bodies about their middle lines, m", 0.03)
-
-
-class MotorsTable(TomlTable):
-    """`[motors]`: the lists of motors and gearboxes to choose from."""
-
-    list: str | None = key("CSV or TOML file; else the package's examples", None)
-    gearboxes: str | None = key("CSV file; else the package's examples", None)
-    margin: Annotated[Number, Field(ge=1.0)] = key(
-        "what a drive must be able to do, over what is asked", 1.2
-    )
-    friction: Annotated[Number, Field(ge=0.0, lt=0.5)] = key(
-        "dry friction as a share of the rated torque", 0.05
-    )
-
-
-class LinksTable(TomlTable):
-    """`[links]`: the materials and sizes of the moving parts."""
-
-    upper: Names = key("stock of cranks, to choose", ["aluminium-tube:40x2", "aluminium-tube:60x3"])
-    lower: Names = key("stock of rods, to choose from", ["carbon-tube:12x1", "carbon-tube:20x1.5"])
-    plate: Positive = key("thickness of an aluminium platform, m", 0.006)
-    carriage: Positive = key("mass of what slides on a guide, kg", 0.4)
-    guide: Positive = key("half the width of a guide, m", 0.015)
-
-    @field_validator("upper", "lower")
-    @classmethod
-    def _expect_known(cls, names: list[str]) -> list[str]:
-        for name in names:
-            try:
-                Stock.parse(name)
-            except ModelError as error:
-                raise ValueError(error.message) from None
-        return names
-
-
-class FloorsTable(TomlTable):
-    """`[floors]`: least measures of every pose of the workspace, each 1 at best."""
-
-    type_i: Floor = 0.1
-    type_ii: Floor = 0.05
-    clearance: Least = key("least distance of two bodies from surface to surface, m", 0.0)
-
-
-class SearchTable(TomlTable):
-    """`[search]`: the length of the search, and its seed of random numbers."""
-
-    evaluations: Count = key("designs of each kind", 800)
-    seed: Annotated[int, Field(ge=0, strict=True)] = 0
-
-
-class BoundTable(TomlTable):
-    """`[most]`: greatest values of other quantities."""
-
-    price: Positive | None = None
-    rated_power: Positive | None = None
-    moving_mass: Positive | None = None
-    energy: Positive | None = None
-    cycle_time: Positive | None = None

@@ -11,9 +11,8 @@ from matplotlib.figure import Figure
 
 from pteron.atomic import write_texts
 from pteron.design import Choice
-from pteron.design.choosing.candidate import Candidate
-from pteron.design.choosing.job import OBJECTIVES
-from pteron.design.choosing.told import asked, assumed, cells, dimensions, drives, margins
+from pteron.design.candidate import Candidate
+from pteron.design.job import OBJECTIVES
 from pteron.json_values import json_text
 from pteron.manipulator import load
 from pteron.plots import draw, fronts_figure
@@ -31,7 +30,7 @@ def write_choice(choice: Choice, folder: str | Path) -> list[Path]:
     OutputError
         If the folder cannot be written.
     """
-    texts = {"choose.html": page(choice), "choose.json": json_text(choice.data())}
+    texts = {"choose.html": page(choice), "choose.json": json_text(choice.as_dict())}
     earlier = _machines(Path(folder) / "choose.json")
     written = write_texts(folder, texts | choice.robots())
     for name, robot in earlier.items():
@@ -74,7 +73,7 @@ def reasons(choice: Choice, serving: list[Candidate]) -> list[str]:
         )
     return [
         does,
-        f"Drives: {drives(best)}. Margins over what is asked: {margins(best)}.",
+        f"Drives: {best.drive_text}. Margins over what is asked: {best.margin_text}.",
     ]
 
 
@@ -106,7 +105,7 @@ def picture(candidate: Candidate) -> Figure:
 def page(choice: Choice) -> str:
     """Return the page as HTML without reference to another file."""
     serving = [candidate for candidate in choice.candidates if candidate.serves]
-    headings = list(dict.fromkeys(key for candidate in serving for key in cells(candidate)))
+    headings = list(dict.fromkeys(key for candidate in serving for key in candidate.figure_texts))
     figure = None
     if len(serving) > 1 or any(len(candidate.front) > 1 for candidate in serving):
         first, second = list(serving[0].front[0])[:2]
@@ -116,19 +115,15 @@ def page(choice: Choice) -> str:
         }
         units = [OBJECTIVES[name] or "as in the lists" for name in (first, second)]
         figure = fronts_figure(fronts, [first, second], units)
-    return template("choice/page.html.j2").render(
+    return template("design/choice.html.j2").render(
         choice=choice,
         serving=serving,
         reasons=reasons(choice, serving),
         steps=next_steps(choice, serving),
         others=[candidate for candidate in choice.candidates if not candidate.serves],
         headings=headings,
-        cells={candidate.kind: cells(candidate) for candidate in serving},
-        dimensions=dimensions,
-        drives=drives,
-        margins=margins,
-        asked=asked(choice.job),
-        assumed=assumed(choice),
+        asked=choice.job.requirement_lines(),
+        assumed=choice.assumption_lines(),
         figure=figure,
         pictures={candidate.kind: picture(candidate) for candidate in serving},
     )
