@@ -68,7 +68,7 @@ def choose(
                 requirements,
                 folder=out,
                 workers=workers,
-                progress=lambda share, _: bar(share),
+                progress=bar,
                 begun=log.begin,
                 finished=log.finish,
             )

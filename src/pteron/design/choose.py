@@ -27,6 +27,7 @@ from pteron.kernels.program_cache import EQUATIONS, name_of
 from pteron.manipulator import load
 from pteron.manipulator.saving import text_of
 from pteron.processes import WorkerPool
+from pteron.progress import Progress, Share
 from pteron.renamed import former_attribute
 from pteron.result import Result
 
@@ -134,7 +135,7 @@ def choose_machine(
     *,
     folder: str | Path | None = None,
     workers: int = 1,
-    progress: Callable[[float, str], None] | None = None,
+    progress: Progress | None = None,
     begun: Callable[[Sequence[str], Sequence[str]], None] | None = None,
     finished: Callable[[Candidate], None] | None = None,
 ) -> Choice:
@@ -154,7 +155,7 @@ def choose_machine(
     workers : int
         Processes that do the work.
     progress : callable, optional
-        Takes the share that is done, and the kind.
+        Takes the share that is done, a `Share` whose step is the kind.
     begun : callable, optional
         Takes the kinds that are searched, and those that an earlier run had finished.
     finished : callable, optional
@@ -179,7 +180,7 @@ def choose_machine(
     def tell(name: str, share: float) -> None:
         shares[name] = share if name in candidates else _SEARCH * share
         if progress is not None:
-            progress(sum(shares.values()) / len(shares), name)
+            progress(Share(sum(shares.values()) / len(shares), name))
 
     remaining = {
         name: evaluator for name, evaluator in evaluators.items() if name not in candidates
@@ -187,7 +188,7 @@ def choose_machine(
     if begun is not None:
         begun(tuple(remaining), resumed)
     if progress is not None and remaining:  # what was done before is not this run's
-        progress(sum(shares.values()) / len(shares), next(iter(remaining)))
+        progress(Share(sum(shares.values()) / len(shares), next(iter(remaining))))
     for name, candidate in _search_kinds(remaining, workers, tell):
         candidates[name] = candidate
         store.keep(candidate)
@@ -243,7 +244,7 @@ def _has_drives(name: str, options: Mapping[str, Options], job: Job) -> bool:
     return not lacking
 
 
-def _candidate(evaluator: KindEvaluator, progress: Callable[[float], None]) -> Candidate:
+def _candidate(evaluator: KindEvaluator, progress: Progress) -> Candidate:
     search = evaluator.job.search
     with one_thread():
         return prove_best_design(

@@ -11,6 +11,7 @@ import scipy  # type: ignore[import-untyped]
 from pteron.design.evolution import latin_hypercube, pareto_front
 from pteron.design.rating import KindEvaluator, Rating
 from pteron.kernels import Array, alike
+from pteron.progress import Progress
 
 _POPULATION = 3
 """Size of the population, for each number that a design has."""
@@ -29,7 +30,7 @@ def search_kind(
     evaluator: KindEvaluator,
     evaluations: int,
     seed: int,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress | None = None,
 ) -> list[Rating]:
     """Return all designs that the search rated; each objective gets an equal share of them.
 

@@ -30,6 +30,7 @@ from pteron.kernels import Array
 from pteron.kernels.one_thread import one_thread
 from pteron.maps import TableStore, sweep
 from pteron.processes import WorkerPool, result_of
+from pteron.progress import Progress
 from pteron.shapes import Workers
 
 if TYPE_CHECKING:
@@ -46,7 +47,7 @@ def search(
     seed: int | None = None,
     workers: Workers | None = None,
     scheduler: str | None = None,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress | None = None,
 ) -> Front:
     """Search for the best designs of a machine.
 
@@ -131,7 +132,7 @@ class DesignRows:
         jobs: Sequence[Any],
         name: str,
         plan: dict[str, Any],
-        progress: Callable[[float], None] | None = None,
+        progress: Progress | None = None,
     ) -> pl.DataFrame:
         """Return the rows that a function gives for jobs; those that the folder has stay."""
         store = TableStore(self.folder / name, {**self.task.plan, **plan})
@@ -166,7 +167,7 @@ def _await_rows(pending: Sequence[Future[pl.DataFrame]]) -> pl.DataFrame:
     return rows
 
 
-def _generations(evaluation: DesignRows, progress: Callable[[float], None] | None) -> Front:
+def _generations(evaluation: DesignRows, progress: Progress | None) -> Front:
     """Return the front of all designs that were evaluated, each design of it proved."""
     task = evaluation.task
     settings, (low, high) = task.spec.search, task.ranges
@@ -198,9 +199,7 @@ def _generations(evaluation: DesignRows, progress: Callable[[float], None] | Non
     return proofs.front(lambda: tables)
 
 
-def _report(
-    progress: Callable[[float], None], number: int, settings: SearchTable, share: float
-) -> None:
+def _report(progress: Progress, number: int, settings: SearchTable, share: float) -> None:
     """Report the share of all generations that is done."""
     progress((number - 1 + share) / settings.generations)
 

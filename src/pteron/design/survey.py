@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,6 +18,7 @@ from pteron.design.task import Task
 from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.maps import TableStore, sweep
+from pteron.progress import Progress
 from pteron.shapes import Workers
 
 if TYPE_CHECKING:
@@ -34,7 +35,7 @@ def survey(
     *,
     workers: Workers | None = None,
     scheduler: str | None = None,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress | None = None,
 ) -> Front:
     """Evaluate many designs, and return the front of them.
 

@@ -23,6 +23,7 @@ from pteron.kinematics.architecture import architecture, expect_regular
 from pteron.kinematics.evaluate import finite_pose
 from pteron.kinematics.sampling import search_ball
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.progress import Progress
 from pteron.result import Result
 from pteron.shapes import PoseLike
 from pteron.workspace.enclosing import enclosing_box
@@ -80,7 +81,7 @@ def nearest_singularities(
     pose: PoseLike,
     *,
     most: int = _MOST,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress | None = None,
 ) -> tuple[NearestSingularity, ...]:
     """Return the nearest singular poses of each kind, by translation and by rotation alone.
 

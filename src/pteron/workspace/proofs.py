@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -14,6 +13,7 @@ from pteron.kernels import Array, numeric
 from pteron.kinematics.architecture import expect_regular
 from pteron.kinematics.limits import limited_joints
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.progress import Progress
 from pteron.result import Result
 from pteron.workspace.boxes import halve_boxes
 from pteron.workspace.conditions import (
@@ -117,7 +117,7 @@ def prove(
     type_ii: float = 0.0,
     given: tuple[Condition, ...] | None = None,
     most: int = 1_000_000,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress | None = None,
 ) -> Proof:
     """Prove that every pose of a region keeps reach, limits and floors, or show one that does not.
 

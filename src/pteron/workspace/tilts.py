@@ -16,6 +16,7 @@ from pteron.errors import ModelError
 from pteron.kernels import Array
 from pteron.kinematics.evaluate import finite_pose
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.progress import Progress
 from pteron.result import Result
 from pteron.shapes import PoseLike
 from pteron.workspace.conditions import Condition, conditions, keeps
@@ -143,7 +144,7 @@ def largest_tilt(
     radius: float = 0.0,
     tolerance: float = 5e-3,
     given: tuple[Condition, ...] | None = None,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress | None = None,
 ) -> LargestTilt:
     """Return the largest tilt to every side at a place that is proved to lie in the workspace.
 
@@ -190,7 +191,7 @@ def largest_ball(
     tilt: float = 0.0,
     tolerance: float = 5e-3,
     given: tuple[Condition, ...] | None = None,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress | None = None,
 ) -> LargestTilt:
     """Return the largest ball of places at each of which every tilt up to a given one is reached.
 
