@@ -9,8 +9,7 @@ import numpy as np
 import scipy  # type: ignore[import-untyped]
 from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm, Normalize, to_hex, to_rgb
-from matplotlib.figure import Figure
-from matplotlib.gridspec import GridSpec
+from matplotlib.figure import Figure, SubFigure
 from matplotlib.patches import Patch
 from matplotlib.ticker import LogLocator, NullFormatter
 
@@ -29,6 +28,7 @@ from pteron.plots.canvas import (
     axis_label,
     blank,
     plain_axes,
+    real_figure,
     shown_unit,
     spot,
 )
@@ -64,7 +64,11 @@ _BELOW = 4.5
 """Sizes of a letter from the axes to the legend: the scale's numbers and its name stand there."""
 
 
-def map_figure(index_map: Map, *names: str) -> Figure:
+def map_figure(
+    index_map: Map,
+    *names: str,
+    ax: Axes | SubFigure | None = None,
+) -> Figure:
     """Return the picture of a map: a panel for each index, one below the other.
 
     Over one coordinate it is a curve, over two a plane. Over three it is the three planes through
@@ -78,6 +82,8 @@ def map_figure(index_map: Map, *names: str) -> Figure:
         Over one to three coordinates.
     *names : str
         Its indices; by default all.
+    ax : Axes or SubFigure, optional
+        Axes of another figure, on which it is drawn; several panels take their place.
 
     Returns
     -------
@@ -102,7 +108,7 @@ def map_figure(index_map: Map, *names: str) -> Figure:
     planes = _planes(index_map)
     scales = {name: color_scale(index_map, name) for name in chosen}
     panels = [(plane, name) for plane in planes for name in chosen]
-    return map_panels(panels, scales, {}, len(chosen) if len(planes) > 1 else 1)
+    return map_panels(panels, scales, {}, len(chosen) if len(planes) > 1 else 1, ax)
 
 
 def _planes(volume: Map) -> list[Map]:
@@ -146,11 +152,12 @@ def map_panels(
     scales: Mapping[str, Normalize],
     causes: Mapping[str, Any],
     columns: int = 1,
+    ax: Axes | SubFigure | None = None,
 ) -> Figure:
     """Return a figure of panels, whose legends have these causes too, there or not."""
     heights = [_height(plane) for plane, _ in panels[::columns]]
-    figure = blank(columns * _WIDTH, sum(heights))
-    grid = GridSpec(len(heights), columns, figure=figure, height_ratios=heights)
+    figure = blank(columns * _WIDTH, sum(heights), ax)
+    grid = figure.add_gridspec(len(heights), columns, height_ratios=heights)
     for k, (plane, name) in enumerate(panels):
         labels = [axis_label(axis.name) for axis in plane.grid.axes]
         upright = labels[1] if len(labels) > 1 else _index_label(name)
@@ -160,7 +167,7 @@ def map_panels(
             _curve(axes, plane, name)
         else:
             _plane(figure, axes, plane, name, scales[name], causes)
-    return figure
+    return real_figure(figure)
 
 
 def _height(plane: Map) -> float:

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 
 from pteron.kernels import Array
-from pteron.plots.canvas import nice_step, plain_axes
+from pteron.plots.canvas import Picture, nice_step, plain_axes
 from pteron.plots.machine_axes import MachineAxes
 
 _RIM = 0.06
@@ -49,7 +49,8 @@ class PlaneAxes(MachineAxes):
         super().__init__(axes, small=small)
         axes.set_aspect("equal")
         if box is not None:
-            figure.set_layout_engine("none")
+            if isinstance(figure, Picture):
+                figure.set_layout_engine("none")
             left, bottom, width, height = box
             if not small:
                 wide, tall = figure.get_size_inches()
