@@ -138,7 +138,9 @@ class SharedCode:
         """
         if self.ready or os.environ.get(VARIABLE) == "vm" or compiler() is None:
             return
-        if at_any_cost or self.code.is_cached():
+        if self.code.is_cached():
+            self._load()  # at once, whatever is being compiled
+        elif at_any_cost:
             taken = _AT_WORK
             with taken:
                 self._load()

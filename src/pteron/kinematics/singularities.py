@@ -8,7 +8,6 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-import scipy  # type: ignore[import-untyped]
 from numpy.typing import ArrayLike
 
 from pteron.equations.machine import closure_of
@@ -18,6 +17,7 @@ from pteron.kernels.bisection import bisect_condition
 from pteron.kernels.program_cache import cached_result
 from pteron.kinematics.architecture import expect_regular, is_singular_everywhere
 from pteron.kinematics.sampling import draw_poses, type_ii_sizes
+from pteron.kinematics.simplex_ascent import climb
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 
 _VANISHING = 1e-10
@@ -35,6 +35,9 @@ _TRIES = 200
 
 _IMPROVED = 1e-7
 """Improvement of the measure below which a local search ends."""
+
+_SHARE, _STEP = 0.05, 0.00025
+"""First steps of a local search, as a share of each coordinate; in m or rad where it is zero."""
 
 _ANGLES = 720
 """Samples of the platform's angle phi over a turn."""
@@ -65,17 +68,17 @@ def _best_type_ii(robot: Manipulator) -> float:
     if is_singular_everywhere(robot):
         return 1.0  # no share of rounding
     drawn = draw_poses(robot, _DRAWN, np.random.default_rng(0), limits=False)
-    sizes = measure(drawn)
-    improved = [
-        -scipy.optimize.minimize(
-            lambda pose: -float(measure(pose)),
-            start,
-            method="Nelder-Mead",
-            options={"maxfev": _TRIES, "fatol": _IMPROVED, "xatol": np.inf},
-        ).fun
-        for start in drawn[np.argsort(-sizes, kind="stable")[:_FOREMOST]]
-    ]
-    return float(max(improved))
+    starts = drawn[np.argsort(-measure(drawn), kind="stable")[:_FOREMOST], None]
+    stepped = np.where(starts == 0.0, _STEP, (1.0 + _SHARE) * starts)
+    simplices = np.where(np.eye(robot.freedom, dtype=bool), stepped, starts)
+    _, sizes = climb(
+        measure,
+        np.concatenate([starts, simplices], axis=1),
+        size=np.inf,
+        gain=_IMPROVED,
+        evaluations=_TRIES,
+    )
+    return float(sizes.max())
 
 
 def singular_orientations(robot: RobotLike, position: ArrayLike | None = None) -> Array:

@@ -17,7 +17,6 @@ from operator import add
 from typing import Any, TypeVar
 
 import numpy as np
-from sympy import Integer, factorint, isprime
 
 from pteron.bodies.parameters import Parameter
 from pteron.errors import ModelError, SingularPose
@@ -37,8 +36,8 @@ from pteron.reduction.exact_regressor import (
 )
 from pteron.reduction.grouping import Grouping, Shares
 from pteron.reduction.numerical import fitted_shares, numerical_rank
-from pteron.reduction.symbols import algebraic_values, symbolic_shares
-from pteron.reduction.transfers import Transfer
+from pteron.reduction.primes import is_prime, prime_factors
+from pteron.reduction.transfers import MassTransfer
 
 _BITS = 61
 """Bits of a prime."""
@@ -73,7 +72,7 @@ class _ExactRegressor:
     columns: Sequence[Parameter]
     order: Sequence[int]
     sharing: Array
-    transfers: Sequence[Transfer]
+    transfers: Sequence[MassTransfer]
     rng: random.Random
 
     @property
@@ -97,6 +96,9 @@ class _ExactRegressor:
 
     def symbolic_shares(self, base_columns: Sequence[int]) -> dict[int, dict[int, Any]]:
         """Return the dependent columns' shares by the mass transfers, as exact SymPy numbers."""
+        # SymPy is slow to import.
+        from pteron.reduction.symbols import algebraic_values, symbolic_shares
+
         numbers = algebraic_values(self.geometry)
         return symbolic_shares(self.columns, sorted(base_columns), self.transfers, [], numbers)
 
@@ -138,7 +140,7 @@ def exact_grouping(
     columns: Sequence[Parameter],
     order: Sequence[int],
     sharing: Array,
-    mass_transfers: Sequence[Transfer],
+    mass_transfers: Sequence[MassTransfer],
     seed: int,
 ) -> Grouping:
     """Return the grouping of a machine's columns, kept in the order of preference.
@@ -282,12 +284,12 @@ def _no_dynamics_error(robot: Manipulator) -> SingularPose:
 
 
 def _modular(
-    transfer: Transfer, geometry: ExactGeometry, columns: Sequence[Parameter], prime: int
+    transfer: MassTransfer, geometry: ExactGeometry, columns: Sequence[Parameter], prime: int
 ) -> dict[int, int]:
     """Return a transfer's null vector modulo a prime, by column."""
     field = PrimeField(prime)
-    symbols = {name: Integer(value.within(field)) for name, value in geometry.symbols().items()}
-    entries = {columns.index(c): int(v) % prime for c, v in transfer.evaluate(symbols).items()}
+    symbols = {name: value.within(field) for name, value in geometry.symbols().items()}
+    entries = {columns.index(c): v % prime for c, v in transfer.evaluate(symbols).items()}
     return {column: value for column, value in entries.items() if value}
 
 
@@ -310,10 +312,10 @@ def _unexplained_columns(
 
 def primes_of(geometry: ExactGeometry, rng: random.Random) -> Iterator[int]:
     """Yield primes p = 3 (mod 4) in which the geometry's roots exist."""
-    factors = {prime for s in geometry.radicands for prime in factorint(s)}
+    factors = {prime for s in geometry.radicands for prime in prime_factors(s)}
     while True:
         candidate = rng.getrandbits(_BITS) | (1 << (_BITS - 1)) | 3
-        if isprime(candidate) and all(is_square(f % candidate, candidate) for f in factors):
+        if is_prime(candidate) and all(is_square(f % candidate, candidate) for f in factors):
             yield candidate
 
 

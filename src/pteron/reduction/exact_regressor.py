@@ -41,8 +41,22 @@ def modular_rows(
     ZeroDivisionError
         If no pose can be used, as for a machine that is singular everywhere.
     """
-    field = PrimeField(prime)
-    vector = geometry.within(field)
+    vector = tuple(geometry.within(PrimeField(prime)))
+    rows, state = _cached_rows(topology, vector, prime, states, rng.getstate())
+    rng.setstate(state)
+    return rows
+
+
+@lru_cache(maxsize=16)
+def _cached_rows(
+    topology: Manipulator, vector: tuple[int, ...], prime: int, states: int, state: Any
+) -> tuple[list[list[int]], Any]:
+    """Return the rows, and the random generator's state after them.
+
+    Groupings of one machine in several orders of its columns take the same rows.
+    """
+    field, rng = PrimeField(prime), random.Random()
+    rng.setstate(state)
     deltas = Evaluation(general_program(topology, "discriminants").function, field, [vector])
     program = Evaluation(general_program(topology, "regressor").function, field, [vector])
     rows: list[list[int]] = []
@@ -57,7 +71,7 @@ def modular_rows(
             continue
         rows += _split_rows(values, topology)
         if len(rows) >= states * topology.freedom:
-            return rows
+            return rows, rng.getstate()
     raise ZeroDivisionError
 
 

@@ -18,10 +18,12 @@ from pteron.kernels import OTHER_LAYOUT, bare, same_layout
 from pteron.kernels.program_cache import cached_result
 from pteron.kinematics.evaluate import evaluate_kernel
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.reduction.exact import exact_grouping
 from pteron.reduction.grouping import Grouping
 from pteron.reduction.numerical import qr_grouping, svd_grouping
 from pteron.reduction.result import BaseParameters
 from pteron.reduction.sharing import Sharing, default_order, leg_groups, share
+from pteron.reduction.transfers import transfers
 from pteron.shapes import OnFailure, PoseLike, Regressors, Seed, seed_number
 
 Method = Literal["exact", "svd", "qr"]
@@ -115,10 +117,6 @@ def _grouping(
     def found() -> Grouping:
         columns, sharing = share(layout, groups)
         if method == "exact":
-            # Only where nothing is kept: SymPy is slow to import.
-            from pteron.reduction.exact import exact_grouping
-            from pteron.reduction.transfers import transfers
-
             by_mass = transfers(layout, columns)
             return exact_grouping(layout, columns, order, sharing, by_mass, seed)
         return _NUMERICAL[method](layout, order, sharing, seed)

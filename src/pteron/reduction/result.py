@@ -6,7 +6,7 @@ import json
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 from markupsafe import Markup
@@ -23,12 +23,11 @@ from pteron.reduction.exact_geometry import exact_geometry
 from pteron.reduction.expressions import as_html, as_latex, as_sympy, as_text, terms_of
 from pteron.reduction.grouping import Grouping, Shares
 from pteron.reduction.latex_table import latex_table
+from pteron.reduction.transfers import MassTransfer, transfers
 from pteron.result import Result
 
 if TYPE_CHECKING:
     import polars as pl
-
-    from pteron.reduction.transfers import Transfer
 
 Form = Literal["text", "sympy", "latex", "html"]
 """Forms in which expressions are written."""
@@ -140,10 +139,8 @@ class BaseParameters(Result):
         return np.asarray(self.grouping @ values_of(robot or self.robot))
 
     @cached_property
-    def transfers(self) -> tuple[Transfer, ...]:
+    def transfers(self) -> tuple[MassTransfer, ...]:
         """The mass transfers, which give the groupings in symbols."""
-        from pteron.reduction.transfers import transfers  # SymPy
-
         return tuple(transfers(self.robot, self.parameters))
 
     @cached_property

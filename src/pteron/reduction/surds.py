@@ -7,11 +7,13 @@ relations between such numbers, hence on the number that was meant.
 from __future__ import annotations
 
 import math
+from collections import Counter
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import TypeVar
 
 from pteron.kernels import Field
+from pteron.reduction.primes import prime_factors
 
 Element = TypeVar("Element")
 
@@ -26,10 +28,9 @@ class Surd:
     @classmethod
     def root(cls, square: Fraction, sign: float) -> Surd:
         """Return the square root of a rational number, with the sign of `sign`."""
-        from sympy import factorint  # slow to import
-
+        factors = Counter((*prime_factors(square.numerator), *prime_factors(square.denominator)))
         outside, inside = 1, 1
-        for prime, power in factorint(square.numerator * square.denominator).items():
+        for prime, power in factors.items():
             outside *= prime ** (power // 2)
             inside *= prime ** (power % 2)
         return cls(Fraction(int(math.copysign(outside, sign)), square.denominator), inside)
@@ -55,10 +56,8 @@ class Surd:
         The root of s is the product of the roots of its primes, so that sqrt(2) sqrt(3) = sqrt(6)
         holds in every field.
         """
-        from sympy import factorint  # slow to import
-
         value = field.number(self.q)
-        for prime in factorint(self.s):
+        for prime in prime_factors(self.s):
             value = field.multiply(value, field.square_root(field.number(prime)))
         return value
 

@@ -12,7 +12,7 @@ from sympy.polys.matrices import DomainMatrix
 from pteron.bodies.parameters import Parameter
 from pteron.reduction.exact_geometry import ExactGeometry
 from pteron.reduction.surds import Surd
-from pteron.reduction.transfers import Transfer
+from pteron.reduction.transfers import MassTransfer
 
 
 def named_values(geometry: ExactGeometry, *, shared: bool = True) -> dict[str, Any]:
@@ -41,7 +41,7 @@ def algebraic_values(geometry: ExactGeometry) -> dict[str, Any]:
 def symbolic_shares(
     columns: Sequence[Parameter],
     base_columns: Sequence[int],
-    mass_transfers: Sequence[Transfer],
+    mass_transfers: Sequence[MassTransfer],
     extra: Sequence[Mapping[int, Any]],
     symbols: Mapping[str, Any],
 ) -> dict[int, dict[int, Any]]:
@@ -51,9 +51,9 @@ def symbolic_shares(
     ----------
     columns : sequence of Parameter
         The columns.
-    kept : sequence of int
+    base_columns : sequence of int
         The columns kept.
-    found : sequence of Transfer
+    mass_transfers : sequence of MassTransfer
         The transfers.
     extra : sequence of mapping
         Null vectors that no transfer explains, by column, as numbers.

@@ -7,44 +7,57 @@ base parameters in symbols.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
-from sympy import Integer, Mul, Symbol
-
 from pteron.bodies.parameters import PLATFORM, Parameter
+from pteron.legs.kind import Transfer
 from pteron.manipulator import Manipulator
+
+Values = Mapping[str, Any]
+"""Numbers or expressions by the symbols `lu1`, `ll1`, `s1x`, `s1y`, ... of each leg's geometry."""
 
 
 @dataclass(frozen=True)
-class Transfer:
+class MassTransfer:
     """A null vector of the regressor.
 
     Attributes
     ----------
     reason : str
         Why it is one, for a reader.
-    entries : dict
-        By column, SymPy polynomials in symbols `lu1`, `ll1`, `s1x`, `s1y`, ... of each leg's
-        geometry.
+    evaluate : callable
+        Returns the entries, by column, with numbers or expressions put for the symbols.
     """
 
     reason: str
-    entries: Mapping[Parameter, Any]
+    evaluate: Callable[[Values], dict[Parameter, Any]]
 
-    def evaluate(self, values: Mapping[str, Any]) -> dict[Parameter, Any]:
-        """Return the entries with numbers, or SymPy expressions, put for the symbols."""
-        put = {Symbol(name): value for name, value in values.items()}
-        return {column: entry.xreplace(put) for column, entry in self.entries.items()}
+    @property
+    def entries(self) -> dict[Parameter, Any]:
+        """By column, SymPy polynomials in the symbols of each leg's geometry."""
+        return self.evaluate(_Symbols())
 
 
-def transfers(robot: Manipulator, columns: Sequence[Parameter]) -> list[Transfer]:
+class _Symbols(dict[str, Any]):
+    """SymPy's symbols by their names."""
+
+    def __missing__(self, name: str) -> Any:
+        from sympy import Symbol  # slow to import
+
+        return Symbol(name)
+
+
+def transfers(robot: Manipulator, columns: Sequence[Parameter]) -> list[MassTransfer]:
     """Return the transfers of a machine, for columns that legs may share in groups."""
-    grouped: list[Transfer] = []
+    grouped: list[MassTransfer] = []
+    platform = {p.kind: p for p in columns if p.body == PLATFORM}
     for group in dict.fromkeys(p.legs for p in columns if p.legs):
-        place = {(p.kind, p.body): p for p in columns if p.legs == group}
-        suffix = next(iter(place.values())).suffix
+        places = {(p.kind, p.body): p for p in columns if p.legs == group}
+        suffix = next(iter(places.values())).suffix
         legs = [robot.legs[leg - 1] for leg in group]
         leg_transfers = [leg.transfers(robot.gravity) for leg in legs]
         for transfer in leg_transfers[0]:
@@ -52,28 +65,50 @@ def transfers(robot: Manipulator, columns: Sequence[Parameter]) -> list[Transfer
             symbols = {s for _, names in transfer.entries.values() for s in names}
             sizes = {tuple(q.value for q in leg.quantities if q.symbol in symbols) for leg in legs}
             if len(sizes) == 1 and all(transfer in others for others in leg_transfers):
-                entries = {
-                    place[key]: Mul(factor, *(Symbol(f"{s}{group[0]}") for s in names))
-                    for key, (factor, names) in transfer.entries.items()
-                }
-                grouped.append(Transfer(transfer.reason.format(suffix), entries))
-        platform = {p.kind: p for p in columns if p.body == PLATFORM}
+                entries = partial(_leg_entries, transfer, places, group[0])
+                grouped.append(MassTransfer(transfer.reason.format(suffix), entries))
         for letter in legs[0].equations_class.rides:
-            mass = place["m", letter]
-            shares: dict[Parameter, Any] = {mass: Integer(1)}
-            for leg in group:
-                coordinates = zip("xyz", robot.legs[leg - 1].platform_point, strict=True)
-                point = [Symbol(f"s{leg}{axis}") * int(value != 0.0) for axis, value in coordinates]
-                for kind, share in robot.platform.inertia.shares_of_point(*point).items():
-                    shares[platform[kind]] = shares.get(platform[kind], Integer(0)) - share
+            mass = places["m", letter]
             name = f"{legs[0].names[letter]}{mass.suffix}"
-            grouped.append(Transfer(f"{name} and platform carry the platform point", shares))
+            entries = partial(_rider_entries, robot, mass, platform, group)
+            grouped.append(MassTransfer(f"{name} and platform carry the platform point", entries))
     if robot.platform.center is not None:
-        grouped.append(
-            Transfer("the platform turns about a fixed point", {platform["m"]: Integer(1)})
-        )
+        unfelt = partial(_unit_entry, platform["m"])
+        grouped.append(MassTransfer("the platform turns about a fixed point", unfelt))
     if not robot.platform.angles:
         reason = "the platform does not turn"
-        turning = (p for p in columns if p.body == PLATFORM and p.kind != "m")
-        grouped += [Transfer(reason, {p: Integer(1)}) for p in turning]
+        turning = (p for p in platform.values() if p.kind != "m")
+        grouped += [MassTransfer(reason, partial(_unit_entry, p)) for p in turning]
     return grouped
+
+
+def _leg_entries(
+    transfer: Transfer, places: Mapping[tuple[str, str], Parameter], leg: int, values: Values
+) -> dict[Parameter, Any]:
+    """Return the entries of a leg's transfer; legs count from 1."""
+    return {
+        places[key]: math.prod((values[f"{name}{leg}"] for name in names), start=factor)
+        for key, (factor, names) in transfer.entries.items()
+    }
+
+
+def _rider_entries(
+    robot: Manipulator,
+    mass: Parameter,
+    platform: Mapping[str, Parameter],
+    group: Sequence[int],
+    values: Values,
+) -> dict[Parameter, Any]:
+    """Return the entries by which legs' masses on platform points join the platform's inertia."""
+    shares: dict[Parameter, Any] = {mass: 1}
+    axes = "xyz" if robot.platform.tilts else "xy"
+    for leg in group:
+        coordinates = zip("xyz", robot.legs[leg - 1].platform_point, strict=True)
+        point = [values[f"s{leg}{a}"] if a in axes and c else 0 for a, c in coordinates]
+        for kind, share in robot.platform.inertia.shares_of_point(*point).items():
+            shares[platform[kind]] = shares.get(platform[kind], 0) - share
+    return shares
+
+
+def _unit_entry(parameter: Parameter, _: Values) -> dict[Parameter, Any]:
+    return {parameter: 1}

@@ -20,6 +20,7 @@ from pteron.kernels import Array, bare
 from pteron.kernels.program_cache import cached_result
 from pteron.kinematics import inverse_kinematics, singular_orientations
 from pteron.kinematics.sampling import search_ball
+from pteron.kinematics.simplex_ascent import climb
 from pteron.kinematics.singularities import best_type_ii
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.result import Result
@@ -33,7 +34,6 @@ from pteron.workspace.home_starts import (
 )
 from pteron.workspace.margins import pose_margins
 from pteron.workspace.reach_errors import limits_error, why_unreachable
-from pteron.workspace.simplex_ascent import climb
 
 _STARTS = 8
 """Best poses of each kind, on each side of the base, that are improved by a local search."""
@@ -43,6 +43,10 @@ _NEAR = 200
 
 _LEVELLED = 4
 """The best of these, made level, that are improved by another."""
+
+_CONVERGED, _GAIN = 1e-5, 1e-6
+"""Size of a simplex, in units of the longest leg and rad, and difference of its margins, below
+which it has converged."""
 
 _STEPS = (0.05, 0.2)
 """Size of a local search's first simplex: share of the longest leg, and rad."""
@@ -417,6 +421,9 @@ def _refine_poses(
         return all_coordinates
 
     steps = _steps(robot, *_STEPS)[movable] / units
-    return poses(
-        climb(lambda scaled: _worth(robot, poses(scaled)), starts[:, movable] / units, steps)
+    edges = np.vstack([np.zeros(len(steps)), np.diag(steps)])
+    simplices = (starts[:, movable] / units)[:, None, :] + edges
+    best, _ = climb(
+        lambda scaled: _worth(robot, poses(scaled)), simplices, size=_CONVERGED, gain=_GAIN
     )
+    return poses(best)
