@@ -133,7 +133,7 @@ def test_least_norm_and_what_is_no_load():
 
     assert (norm(found[0], lengths[0]) < norm(found[1], lengths[0])).all()
     assert (norm(found[1], lengths[1]) < norm(found[0], lengths[1])).all()
-    assert not found[0].unique
+    assert not found[0].is_unique
     # A moment that would tilt the platform goes into the joints, not into the actuators.
     tilted = reactions("3-prr", pose, moment=np.cross([0.0, 0.0, 1.0], [2.0, -3.0, 0.0]))
     np.testing.assert_allclose(tilted.actuators, found[0].actuators, rtol=0, atol=1e-9)

@@ -29,7 +29,7 @@ from pteron.report.quantities import readable
 from pteron.report.typeset import format_fixed
 from pteron.viewer import view
 from pteron.viewer.boundary import is_allowed
-from pteron.viewer.guard import is_here
+from pteron.viewer.guard import is_local_address
 from pteron.viewer.motion_files import motion_of_file
 from pteron.viewer.panel import action, activity_text, values
 from pteron.viewer.picture import ViewerPicture
@@ -39,7 +39,7 @@ from pteron.viewer.readout import readout
 from pteron.viewer.server import free_port
 from pteron.viewer.session import Session
 from pteron.viewer.slices import choices, slice_map, slice_parts
-from pteron.viewer.sliding import nearest
+from pteron.viewer.sliding import nearest_reachable_pose
 from pteron.viewer.state import (
     assembly_poses,
     current_assembly,
@@ -80,7 +80,9 @@ def test_a_pose_out_of_reach_slides_along_the_boundary_and_names_what_stops_it(h
         beside = beside[is_allowed(robot, beside)]
         assert (np.linalg.norm((target - beside)[:, lengths], axis=-1) > rest - 1e-3).all()
         # From there it goes on along the boundary, and inwards.
-        sideways = nearest(robot, found.pose, found.pose + 0.05 * rng.normal(size=robot.freedom))[0]
+        sideways = nearest_reachable_pose(
+            robot, found.pose, found.pose + 0.05 * rng.normal(size=robot.freedom)
+        )[0]
         assert not np.array_equal(sideways, found.pose)
         inwards = move_platform(found, home.pose)
         assert np.array_equal(inwards.pose, home.pose)
@@ -572,7 +574,7 @@ def test_who_serves_to_the_network_has_names_unknown_here_but_no_foreign_pages()
     ],
 )
 def test_hosts_that_only_this_machine_reaches(host, here):
-    assert is_here(host) == here
+    assert is_local_address(host) == here
 
 
 # In a real browser.

@@ -23,6 +23,7 @@ from pteron.indices.internal_forces import (
 from pteron.kernels import Array, as_array
 from pteron.kinematics.evaluate import evaluate_kernel, finite_rows
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.renamed import former_attribute
 from pteron.result import Result
 from pteron.shapes import OnFailure, PoseLike
 
@@ -65,9 +66,11 @@ class Reactions(Result):
     unheld: Array
 
     @property
-    def unique(self) -> bool:
+    def is_unique(self) -> bool:
         """Whether statics alone determine the reactions."""
         return self.redundancy == 0
+
+    unique = former_attribute("unique", "is_unique")
 
 
 def reactions(

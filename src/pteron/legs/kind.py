@@ -134,7 +134,12 @@ class LegKind(ABC):
 
     def __init_subclass__(cls) -> None:
         adopt_former_methods(
-            cls, closing="draw_closure", under="with_platform_frame", turned="map_vectors"
+            cls,
+            closing="draw_closure",
+            under="with_platform_frame",
+            turned="map_vectors",
+            passive="passive_joints",
+            doubts="unlikely_values",
         )
         # The keys are the single source of the fields' descriptions.
         if cls.__doc__ and "keys" in vars(cls) and "Parameters\n" not in cls.__doc__:
@@ -344,7 +349,9 @@ class LegKind(ABC):
         """The length that its reach is relative to, m."""
         return sum(float(q.value[0]) for q in self.quantities if q.role == "length")
 
-    def passive(self, motion: LegMotion, zero_axes: Expression, axes: Expression) -> list[Passive]:
+    def passive_joints(
+        self, motion: LegMotion, zero_axes: Expression, axes: Expression
+    ) -> list[Passive]:
         """Return its passive joints that have limits.
 
         The columns (3, 3) of `axes` are the platform's axes, of `zero_axes` at phi = 0.
@@ -358,7 +365,7 @@ class LegKind(ABC):
         """
         return None
 
-    def doubts(self, axis: Vector | None) -> Iterator[str]:
+    def unlikely_values(self, axis: Vector | None) -> Iterator[str]:
         """Yield warnings about values that are valid but unlikely in this kind of leg.
 
         The platform turns about `axis`, if it does.
@@ -404,6 +411,7 @@ class LegKind(ABC):
     turned = former_attribute("turned", "map_vectors")
     under = former_attribute("under", "with_platform_frame")
     at_zero = former_attribute("at_zero", "crank_at_zero")
+    doubts = former_attribute("doubts", "unlikely_values")
 
 
 def __getattr__(name: str) -> Any:

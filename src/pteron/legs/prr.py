@@ -54,7 +54,9 @@ class PRR(SlideLeg):
 
     conditions = (FieldCondition(("elbow_limits",), _check_elbow),)
 
-    def passive(self, motion: LegMotion, zero_axes: Expression, axes: Expression) -> list[Passive]:
+    def passive_joints(
+        self, motion: LegMotion, zero_axes: Expression, axes: Expression
+    ) -> list[Passive]:
         # The branch keeps the link ahead of the slider along sigma e.
         ahead, link = self.elbow * ca.SX(ca.vertcat(*self.slider_direction)), motion.links[1]
         sideways = ca.cross(ca.SX(ca.vertcat(*self.plane_normal)), ahead)

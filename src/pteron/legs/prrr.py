@@ -122,7 +122,9 @@ class PRRR(LegKind):
     def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
         return (self.direction,) if axis is None else (self.direction, axis)
 
-    def passive(self, motion: LegMotion, zero_axes: Expression, axes: Expression) -> list[Passive]:
+    def passive_joints(
+        self, motion: LegMotion, zero_axes: Expression, axes: Expression
+    ) -> list[Passive]:
         angle = angle_between(*motion.links)
         return joint_limit("elbow", "rad", angle, self.elbow_limits, self.lower_length)
 

@@ -33,7 +33,9 @@ class RPS(RPR):
     def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
         return every_axis()
 
-    def passive(self, motion: LegMotion, zero_axes: Expression, axes: Expression) -> list[Passive]:
+    def passive_joints(
+        self, motion: LegMotion, zero_axes: Expression, axes: Expression
+    ) -> list[Passive]:
         return ball_cone(self.platform_cone, motion, axes, self.limits[1])
 
 

@@ -45,7 +45,9 @@ class RRR(CrankLeg):
     def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
         return (self.direction,)
 
-    def passive(self, motion: LegMotion, zero_axes: Expression, axes: Expression) -> list[Passive]:
+    def passive_joints(
+        self, motion: LegMotion, zero_axes: Expression, axes: Expression
+    ) -> list[Passive]:
         angle = angle_between(*motion.links)
         return joint_limit("elbow", "rad", angle, self.elbow_limits, self.lower_length)
 

@@ -33,8 +33,10 @@ class RRS(RRR):
     def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
         return every_axis()
 
-    def passive(self, motion: LegMotion, zero_axes: Expression, axes: Expression) -> list[Passive]:
-        inherited = super().passive(motion, zero_axes, axes)
+    def passive_joints(
+        self, motion: LegMotion, zero_axes: Expression, axes: Expression
+    ) -> list[Passive]:
+        inherited = super().passive_joints(motion, zero_axes, axes)
         return [*inherited, *ball_cone(self.platform_cone, motion, axes, self.lower_length)]
 
 

@@ -114,10 +114,12 @@ class RUPU(LegKind):
     def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
         return (1, 0, 0), (0, 1, 0), (0, 0, 1)
 
-    def passive(self, motion: LegMotion, zero_axes: Expression, axes: Expression) -> list[Passive]:
+    def passive_joints(
+        self, motion: LegMotion, zero_axes: Expression, axes: Expression
+    ) -> list[Passive]:
         return joint_limit("shaft", "m", ca.norm_2(motion.links[1]), self.travel, 1.0)
 
-    def doubts(self, axis: Vector | None) -> Iterator[str]:
+    def unlikely_values(self, axis: Vector | None) -> Iterator[str]:
         if not 1.0 / _FAST <= abs(self.ratio) <= _FAST:
             yield (
                 f"ratio: {self.ratio:g} rad of the joint per rad of phi: is that the motor's gear? "

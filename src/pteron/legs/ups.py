@@ -85,7 +85,9 @@ class UPS(RamLeg):
     def base_axis(self) -> Vector | None:
         return self.direction
 
-    def passive(self, motion: LegMotion, zero_axes: Expression, axes: Expression) -> list[Passive]:
+    def passive_joints(
+        self, motion: LegMotion, zero_axes: Expression, axes: Expression
+    ) -> list[Passive]:
         (_, way), length = motion.links, self.limits[1]
         assert way is not None
         return [

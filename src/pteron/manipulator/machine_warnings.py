@@ -78,7 +78,7 @@ def machine_warnings(robot: Manipulator, *, bodies: bool = True) -> tuple[str, .
     legs_by_text: dict[str, list[int]] = {}
     for i, leg in enumerate(robot.legs, start=1):
         leg_warnings = () if i in long_lengths else _leg_warnings(leg, platform, bodies)
-        for text in (*leg_warnings, *leg.doubts(axis), *drive_warnings(leg)):
+        for text in (*leg_warnings, *leg.unlikely_values(axis), *drive_warnings(leg)):
             legs_by_text.setdefault(text, []).append(i)
     warnings += [f"{legs_text(legs)}: {text}" for text, legs in legs_by_text.items()]
     if axis is not None:

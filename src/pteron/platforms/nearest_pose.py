@@ -59,9 +59,8 @@ def pose_nearest_frame(platform: Platform, pose: Array, axes: Array) -> Array:
             platform.placement(nearest + side * offsets)[1].reshape(-1, 9) for side in (1.0, -1.0)
         )
         slopes = (ahead - behind).T / (2.0 * _TURN_APART)
-        step = np.linalg.lstsq(slopes, (axes - platform.placement(nearest)[1]).ravel(), rcond=None)[
-            0
-        ]
+        misfit = (axes - platform.placement(nearest)[1]).ravel()
+        step = np.linalg.lstsq(slopes, misfit, rcond=None)[0]
         nearest[turns] += np.clip(step, -_TURN_MOST, _TURN_MOST)
         if np.abs(step).max(initial=0.0) < _TURN_ROUNDING:
             break

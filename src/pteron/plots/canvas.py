@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.platforms.coordinates import SHOWN, coordinate
-from pteron.plots.fonts import no_word_of_glyphs, take_fonts, warn_of_absent
+from pteron.plots.fonts import silence_glyph_warnings, take_fonts, warn_of_absent
 from pteron.short_numbers import power_of_ten
 
 Kind = TypeVar("Kind", bound=Hashable)
@@ -94,7 +94,7 @@ class Picture(Figure):
         saving, engine = self.canvas.is_saving(), self.get_layout_engine()
         if not saving:  # else `savefig` has done it
             take_fonts(self)
-        with no_word_of_glyphs():
+        with silence_glyph_warnings():
             if saving and isinstance(engine, ConstrainedLayoutEngine) and self._is_flat:
                 # Matplotlib draws all in vain to place the axes, then again with an idle engine.
                 engine.execute(self)
@@ -108,7 +108,7 @@ class Picture(Figure):
     def savefig(self, fname: Any, **options: Any) -> None:
         """Write the figure, with one warning of all letters that no font here has."""
         absent = take_fonts(self)
-        with no_word_of_glyphs():
+        with silence_glyph_warnings():
             super().savefig(fname, **options)
         # An .svg keeps text as text, for its reader's fonts.
         if str(options.get("format") or Path(str(fname)).suffix[1:]).lower() != "svg":
@@ -267,7 +267,7 @@ class _Numbers(ScalarFormatter):
         if label.get_text() != self._written:
             self._plain = label.get_text()
         power = super().get_offset().replace("\u2212", "-").partition("e")[2]
-        self._written = _with_power(self._plain, int(power or 0))
+        self._written = _label_with_power(self._plain, int(power or 0))
         label.set_text(self._written)
 
     def get_offset(self) -> str:
@@ -275,7 +275,7 @@ class _Numbers(ScalarFormatter):
         return ""
 
 
-def _with_power(label: str, power: int) -> str:
+def _label_with_power(label: str, power: int) -> str:
     """Return a label whose unit has a power of ten, if there is one."""
     if not power:
         return label
@@ -398,10 +398,10 @@ def leg_curves(
             if label and i == alike[-1]:
                 label += f" (on {', '.join(names[j] for j in alike[:-1])})"
         axes.plot(time, values[:, i], label=label, **style)
-    all_of_time(axes, time)
+    fit_time_scale(axes, time)
 
 
-def all_of_time(axes: Axes, time: Array) -> None:
+def fit_time_scale(axes: Axes, time: Array) -> None:
     """Make the scale along x that of all of the time (T,); one instant has a second about it."""
     first, last = float(time[0]), float(time[-1])
     room = 0.0 if last > first else 0.5

@@ -20,8 +20,8 @@ from pteron.plots.canvas import (
     LEG_COLORS,
     MUTED,
     PAPER,
-    all_of_time,
     blank,
+    fit_time_scale,
     log_scale,
     plain_axes,
     real_figure,
@@ -78,7 +78,7 @@ def comparison_figure(
     for start, stop in np.minimum(edges, len(time) - 1).tolist():
         for axes in (forces, residuals):
             axes.axvspan(time[start], time[stop], color=GRID, alpha=0.75, linewidth=0.0, zorder=0.5)
-    all_of_time(residuals, time)
+    fit_time_scale(residuals, time)
     figure.align_ylabels([forces, residuals])
     return real_figure(figure)
 
@@ -146,7 +146,7 @@ def residual_time_figure(
             axes.fill_between(middle, low, high, facecolor=color, edgecolor=color, linewidth=0.6)
         size = float(np.nanmax(np.abs(counted), initial=0.0)) or 1.0
         axes.set_ylim(-1.15 * size, 1.15 * size)
-    all_of_time(panels[-1], time)
+    fit_time_scale(panels[-1], time)
     figure.align_ylabels(panels)
     return real_figure(figure)
 

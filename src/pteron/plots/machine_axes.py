@@ -68,11 +68,11 @@ class MachineAxes(ABC):
         self._drawn.clear()
 
     @property
-    def drawn(self) -> Array:
+    def drawn_points(self) -> Array:
         """The points (K, 2) or (K, 3) of all things, as the axes have them."""
         return np.vstack(self._drawn)
 
-    def hold(self, drawn: Array) -> None:
+    def reserve_space(self, drawn: Array) -> None:
         """Let `fill` leave space for points, (K, 2) or (K, 3), of other axes."""
         self._drawn.append(drawn)
 

@@ -14,7 +14,7 @@ from pteron.motion import Guide, JointPoints, Part
 from pteron.plots.canvas import INK, LEG_COLORS, MUTED, PAPER, REACH, nice_step
 from pteron.plots.machine_axes import MachineAxes
 from pteron.plots.plane_axes import PlaneAxes
-from pteron.plots.space_axes import SpaceAxes, upright
+from pteron.plots.space_axes import SpaceAxes, upright_rotation
 
 _PLATFORM_AXES = ("x\u2032", "y\u2032", "z\u2032")
 """x, y and z with a prime."""
@@ -91,7 +91,7 @@ def scene_of(points: JointPoints, guides: Sequence[Guide], gravity: Array | None
     if points.plane is None:
         upwards = points.axes.reshape(-1, 3, 3)[0, 2]
         vertical = upwards if gravity is None else -gravity
-        flat = everything @ upright(vertical).T
+        flat = everything @ upright_rotation(vertical).T
     else:
         flat = everything @ points.plane.T
         if gravity is not None:
@@ -220,7 +220,7 @@ def _draw_leg(sheet: MachineAxes, points: JointPoints, guide: Guide, i: int, siz
 
 def _block(center: Array, direction: Array, size: float) -> list[Array]:
     """Return the six faces of a slider's block."""
-    frame = upright(direction)
+    frame = upright_rotation(direction)
     half = size * np.array([0.02, 0.02, 0.036])
     loop = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
     return [

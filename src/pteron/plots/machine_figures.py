@@ -258,9 +258,9 @@ def poses_figure(
             style: dict[str, Any] = {"ha": "center", "va": "bottom", "fontsize": FONT_SIZE}
             figure.text(x_start + 0.5 / columns, below + share, titles[k], color=INK, **style)
         sheets.append(sheet)
-    together = np.vstack([sheet.drawn for sheet in sheets])
+    together = np.vstack([sheet.drawn_points for sheet in sheets])
     for sheet in sheets:
-        sheet.hold(together)
+        sheet.reserve_space(together)
         sheet.fill()
     return figure
 

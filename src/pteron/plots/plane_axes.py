@@ -84,7 +84,7 @@ class PlaneAxes(MachineAxes):
 
     def fill(self, angles: Sequence[float] = (0.0,)) -> None:
         """Let the scales end a rim beyond what was drawn."""
-        drawn = self.drawn
+        drawn = self.drawn_points
         low, high = drawn.min(axis=0), drawn.max(axis=0)
         rim = _RIM * float((high - low).max())
         low, high = low - rim, high + rim

@@ -29,7 +29,7 @@ _MARGIN = 0.04
 """Margin on each side, as a share of the box that is filled."""
 
 
-def upright(vertical: Array) -> Array:
+def upright_rotation(vertical: Array) -> Array:
     """Return a rotation (3, 3) that takes a direction to z and keeps x, or y, near its place."""
     z = vertical / np.linalg.norm(vertical)
     near = np.eye(3)[0] if abs(z[0]) < 0.9 else np.eye(3)[1]
@@ -59,7 +59,7 @@ class SpaceAxes(MachineAxes):
         super().__init__(axes, small=small)
         axes.set_axis_off()
         axes.set_proj_type("persp", focal_length=1.6)
-        self.rotation = upright(vertical)
+        self.rotation = upright_rotation(vertical)
         self._box = box
         self.turn(0.0)
 
@@ -108,7 +108,7 @@ class SpaceAxes(MachineAxes):
 
         Later things leave them where they are.
         """
-        drawn = self.drawn
+        drawn = self.drawn_points
         low, high = drawn.min(axis=0), drawn.max(axis=0)
         self.axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
         self.axes.set_box_aspect(high - low)

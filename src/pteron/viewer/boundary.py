@@ -43,7 +43,9 @@ def is_allowed(robot: Manipulator, poses: Array) -> NDArray[np.bool_]:
     return np.asarray(bent & (distance_to_limits(robot, poses).min(axis=-1) >= -_ROUNDING))
 
 
-def farthest(robot: Manipulator, start: Array, target: Array) -> tuple[Array, Array | None]:
+def farthest_reachable_pose(
+    robot: Manipulator, start: Array, target: Array
+) -> tuple[Array, Array | None]:
     """Return the last pose that the platform reaches on the straight path to another.
 
     A target that is allowed is always reached. With the pose comes one next to it that is not
@@ -98,7 +100,7 @@ def _last_good_pose(
     return last, beyond
 
 
-def what_stops(robot: Manipulator, beyond: Array) -> str:
+def stop_reason(robot: Manipulator, beyond: Array) -> str:
     """Return the leg or limit that forbids a pose (m,), as a sentence without its full stop.
 
     A pose that nothing forbids is one at which an assembly mode ends.

@@ -11,8 +11,8 @@ from pteron.kinematics import inverse_kinematics, joint_rates
 from pteron.manipulator import Manipulator
 from pteron.motion.simulation.plant import advance, drive_states
 from pteron.motion.simulation.stable_steps import allowed_step
-from pteron.viewer.boundary import is_allowed, what_stops
-from pteron.viewer.sliding import nearest
+from pteron.viewer.boundary import is_allowed, stop_reason
+from pteron.viewer.sliding import nearest_reachable_pose
 
 _NO_PULL = 1e-6
 """Gravity along the platform's lengths, m/s^2, up to which the machine does not fall."""
@@ -119,8 +119,8 @@ class Push:
             if not np.isfinite(energy):
                 energy = self._energy(last_pose, rates)
             target = self.pose if np.isfinite(self.pose).all() else last_pose
-            last, beyond = nearest(robot, last_pose, target)
-            self.stops = what_stops(robot, target if beyond is None else beyond)
+            last, beyond = nearest_reachable_pose(robot, last_pose, target)
+            self.stops = stop_reason(robot, target if beyond is None else beyond)
             slide = (last - last_pose) / (periods * _PERIOD)
             resting = self._energy(last, 0.0 * slide)
             most, kinetic = max(energy - resting, 0.0), self._energy(last, slide) - resting
