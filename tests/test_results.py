@@ -397,6 +397,17 @@ def test_a_result_without_a_machine_numbers_its_columns():
     assert _cycle().table_for(pteron.load("five-bar")).columns[:3] == ["t", "x", "y"]
 
 
+def test_rows_of_several_results_have_the_columns_of_all():
+    fault = identification.IsolatedFault(
+        "delay", ("1",), np.ones(1), np.ones(1), 0.0, 0.1, np.zeros(1)
+    )
+    none = np.zeros(1)
+    faults = (fault, replace(fault, speeds=np.array([0.1, 0.2])))
+    table = identification.FaultIsolation((), faults, none, none).table()
+    assert table["speeds_2"].to_list() == [None, 0.2]
+    assert identification.FaultIsolation((), (), none, none).table().height == 0
+
+
 def test_nan_equals_nan_and_other_shapes_do_not():
     margins = workspace.pose_margins("five-bar", [HOME, [0.01, 0.12]])
     unknown = replace(margins, least=np.full(2, np.nan))

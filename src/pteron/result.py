@@ -89,7 +89,8 @@ class Result:
                 return part.table_for(robot)
             if isinstance(part, tuple) and part and isinstance(part[0], Result):
                 rows = [dict(_row(each, names)) for each in part]
-                columns |= {heading: [row[heading] for row in rows] for heading in rows[0]}
+                headings = dict.fromkeys(heading for row in rows for heading in row)
+                columns |= {heading: [row.get(heading) for row in rows] for heading in headings}
             else:
                 columns |= _columns(name, np.asarray(part), int(axes or 0), names)
         return pl.DataFrame(columns).with_columns(pl.selectors.float().fill_nan(None))
@@ -121,7 +122,7 @@ class Result:
 
     def __eq__(self, other: object) -> bool:
         """Return whether another result is of this class, and has equal fields."""
-        return type(self) is type(other) and _equal_fields(self, other)
+        return _equal_fields(self, other) if type(self) is type(other) else NotImplemented
 
     def __hash__(self) -> int:
         """Return a hash that equal results share."""

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import asdict, dataclass, field
-from typing import Any
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -76,6 +75,11 @@ class Candidate(Result):
     robot: str = ""
     middle: tuple[float, ...] = ()
 
+    def __repr__(self) -> str:
+        """Return the candidate in a line."""
+        counts = f"{self.kept} of {self.evaluated} designs keep all that is asked"
+        return f"<Candidate of {self.kind!r}: {counts}>"
+
     @property
     def least_margin(self) -> float:
         """The least of the drives' margins."""
@@ -121,10 +125,6 @@ class Candidate(Result):
         return f"{ratios}; least at {self.worst}" if self.worst else ratios
 
     data = former_attribute("data", "as_dict")
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return it as plain data."""
-        return asdict(self)
 
 
 def _ratio(margin: float) -> str:
