@@ -25,6 +25,7 @@ from pteron.kinematics import random_poses
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.result import Result
 from pteron.shapes import Seed
+from pteron.tolerances import EXACT
 from pteron.workspace import Box, Cylinder, home_pose, prove
 
 Array = NDArray[np.float64]
@@ -62,9 +63,6 @@ _RISES = 1e-6
 
 _ABOVE = 0.005
 """Height above a plane to which a probe is lifted between two places, m."""
-
-_ROUNDING = 1e-12
-"""Relative distance of candidates from a disc's rim: far more than their rounding."""
 
 _NOISE = dict.fromkeys(KINDS, 2e-5)
 """Noise that is expected where nobody says it, m and rad."""
@@ -215,7 +213,7 @@ def _candidates(robot: Manipulator, region: Box | Cylinder, rng: np.random.Gener
     sides = rng.uniform(-1.0, 1.0, (_CANDIDATES, robot.freedom))
     if isinstance(region, Cylinder):
         angles = np.pi * sides[:, 0]
-        radii = (1.0 - _ROUNDING) * region.radius * np.abs(sides[:, 1]) ** _TO_THE_RIM
+        radii = (1.0 - EXACT) * region.radius * np.abs(sides[:, 1]) ** _TO_THE_RIM
         poses = np.tile(0.5 * (low + high), (_CANDIDATES, 1))
         poses[:, :2] = np.array(region.center[:2])
         poses[:, :2] += radii[:, None] * np.stack([np.cos(angles), np.sin(angles)], axis=1)

@@ -16,6 +16,7 @@ from pteron.cli.result import CommandResult
 from pteron.cli.terminal import note, show
 from pteron.errors import DataError
 from pteron.json_values import fields_as_json
+from pteron.tolerances import SAME
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -40,9 +41,6 @@ _KINDS_OF: dict[str, tuple[Kind, ...]] = {
     "jerk": ("joints",),
 }
 """Kinds of motion that an option belongs to."""
-
-_ROUNDING = 1e-6
-"""Share of a limit by which a motion may exceed it without a note."""
 
 _DENSE = 10
 """Moments per sample at which a motion's peaks are sought."""
@@ -189,7 +187,7 @@ def _result(
     fine = np.linspace(float(motion.time[0]), float(motion.time[-1]), count)
     largest = peaks(machine, *motion.at(fine), limits)
     for peak in largest:
-        if peak.share > 1.0 + _ROUNDING:  # of a motion that came in a table
+        if peak.share > 1.0 + SAME:  # of a motion that came in a table
             note(f"Note: {peak.phrase()}")
     if out is not None:
         from pteron.tables import write_table

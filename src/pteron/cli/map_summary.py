@@ -9,15 +9,13 @@ from pteron.cli.pose_ranges import pose_text, span_text
 from pteron.cli.terminal import percent, plain, show, table
 from pteron.errors import DataError
 from pteron.json_values import fields_as_json
+from pteron.tolerances import ROUNDING
 
 if TYPE_CHECKING:
     import rich.table
 
     from pteron.maps import Map
     from pteron.workspace import ReachVolume
-
-_ALIKE = 1e-9
-"""Relative difference below which the best and the worst value are one."""
 
 _AXIS = "name unit least greatest count"
 """Keys of an axis in the data."""
@@ -115,7 +113,7 @@ def show_map(index_map: Map, volume: ReachVolume | None, data: Mapping[str, Any]
         if index["best"] is None:
             index_table.add_row(named, "", "-", "determined at no pose in reach")
             continue
-        if abs(index["best"] - index["worst"]) <= _ALIKE * abs(index["best"]):
+        if abs(index["best"] - index["worst"]) <= ROUNDING * abs(index["best"]):
             index_table.add_row(named, "", f"{index['best']:.4g}", "everywhere in reach")
         else:
             for side in ("best", "worst"):

@@ -19,6 +19,7 @@ from pteron.cli.progress import spinner
 from pteron.cli.result import CommandResult
 from pteron.cli.terminal import plain, show, table, warn
 from pteron.errors import UnlikelyValue
+from pteron.tolerances import ROUNDING
 
 if TYPE_CHECKING:
     import rich.table
@@ -32,9 +33,6 @@ _OVERLOADED = 1
 
 _NAMED = {"peak_force": "peak {}", "rms_force": "RMS {}", "peak_speed": "speed"}
 """Quantities whose worst places are told."""
-
-_ROUNDING = 1e-9
-"""Share of a margin by which it may be missed."""
 
 
 def size(
@@ -156,7 +154,7 @@ def _weak(sizing: Sizing, margin: float) -> list[str]:
         f"{drive.margin:.3g} times the {drive.needed:.4g} {drive.unit} that the cycle takes"
         f"{sizing.place_text(drive)}, and a margin of {margin:g} is asked for"
         for drive in sizing.margins
-        if 1.0 <= drive.margin < margin * (1.0 - _ROUNDING)
+        if 1.0 <= drive.margin < margin * (1.0 - ROUNDING)
     ]
     return [*sizing.overloads, *beyond]
 
@@ -273,7 +271,7 @@ def _verdict(sizing: Sizing, fits: tuple[MotorFit, ...], margin: float) -> list[
     lines = []
     if sizing.margins:
         least = min(sizing.margins, key=lambda limit: limit.margin)
-        enough = "Enough" if least.margin >= margin * (1.0 - _ROUNDING) else "Not enough"
+        enough = "Enough" if least.margin >= margin * (1.0 - ROUNDING) else "Not enough"
         lines.append(
             f"{enough}: the drives in the file have a margin of {least.margin:.3g}, {margin:g} "
             f"asked; least is leg {least.leg}'s: {least.limit} allow {least.most:.4g} "

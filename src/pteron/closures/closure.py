@@ -21,9 +21,7 @@ from pteron.closures.determinants import determinant, solve, solve_transposed
 from pteron.errors import ModelError
 from pteron.legs.leg import AngleLocus, LegEquations, LegMotion, PlaneLocus
 from pteron.platforms.motion import PlatformEquations, PlatformMotion
-
-_COINCIDENT = 1e-9
-"""Tolerance, relative to the platform points' distances from P, of coincident points."""
+from pteron.tolerances import ROUNDING
 
 
 class Closure(ABC):
@@ -141,7 +139,7 @@ class Closure(ABC):
         size = sum(ca.norm_2(offset.a) for offset in self.platform.offsets)
         if not size.is_constant():
             return False
-        return bool(float(self._moment_bound) <= _COINCIDENT * float(size))
+        return bool(float(self._moment_bound) <= ROUNDING * float(size))
 
     keeps_modes: bool = False
     """Whether each column of `poses` belongs to one assembly mode for all joint coordinates."""

@@ -12,9 +12,7 @@ from pteron.manipulator import Manipulator
 from pteron.manipulator.manipulator import legs_text
 from pteron.renamed import former_attribute
 from pteron.result import Result
-
-_NONE = 1e-9
-"""Smaller changes, in m or without unit, count as none."""
+from pteron.tolerances import ROUNDING
 
 _SMALL = 1e-2
 """Length from which on a tenth of a millimetre is fine enough, m."""
@@ -56,10 +54,10 @@ class Change(Result):
         """Relative change in %; the difference where the value was zero or changes its sign."""
         if math.isnan(self.before) or math.isnan(self.after):
             return ""
-        if abs(self.before) > _NONE and self.before * self.after > 0.0:
+        if abs(self.before) > ROUNDING and self.before * self.after > 0.0:
             text = f"{100.0 * (self.after / self.before - 1.0):+.1f} %"
             return "none" if float(text[:-2]) == 0.0 else text
-        if abs(self.after - self.before) <= _NONE:
+        if abs(self.after - self.before) <= ROUNDING:
             return "none"
         sign = "+" if self.after > self.before else "-"
         return f"{sign}{self.format_value(abs(self.after - self.before))}"
@@ -84,7 +82,7 @@ def geometry_changes(task: Task, robot: Manipulator) -> list[Change]:
     for variable in task.variables:
         for place in variable.places:
             drawn, designed = place.read(task.robot), place.read(robot)
-            if abs(designed - drawn) > _NONE:
+            if abs(designed - drawn) > ROUNDING:
                 part = "" if place.part is None else f" {'xyz'[place.part]}"
                 what = f"{place.key.replace('_', ' ')}{part}"
                 unit = "m" if place.role in ("length", "point") else ""
@@ -102,7 +100,7 @@ def mass_changes(task: Task, robot: Manipulator) -> list[Change]:
     for i, (leg, other) in enumerate(zip(task.robot.legs, robot.legs, strict=True), start=1):
         for (letter, body), new in zip(leg.bodies.items(), other.bodies.values(), strict=True):
             drawn, designed = body.values[0], new.values[0]
-            if abs(designed - drawn) > _NONE:
+            if abs(designed - drawn) > ROUNDING:
                 legs_by_change.setdefault(
                     (leg.names[letter], drawn, round(designed, 9)), []
                 ).append(i)

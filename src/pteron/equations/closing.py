@@ -17,6 +17,7 @@ from pteron.equations.kinematics import reach
 from pteron.equations.machine import Machine
 from pteron.legs.leg import AngleLocus, CircleLocus, LegEquations, PlaneLocus, SphereLocus
 from pteron.platforms.motion import PlatformMotion
+from pteron.tolerances import ROUNDING
 
 _STEPS = 4
 """Newton's steps of a controller: from some hundredths of a machine's size they reach rounding."""
@@ -31,9 +32,6 @@ Near a solution they agree. Where no pose exists, next to a singularity, the res
 its tolerance, but each step halves the determinant or more.
 """
 
-
-_NOTHING = 1e-9
-"""Length that counts as zero beside any machine, m."""
 
 _NO_CHANGE = 1e-300
 """Factor of a term that is added to propagate NaN: it changes no finite number."""
@@ -151,7 +149,7 @@ def closure_residuals(machine: Machine, joints: Expression, pose: Expression) ->
     """Return the residuals of the closures of joints (n, 1) at a pose (m, 1)."""
     zero_rates = ca.SX.zeros(machine.freedom)
     platform = machine.platform.motion(pose, zero_rates, zero_rates)
-    lengths, rows, angles, sizes = [], [], [ca.SX(0)], [ca.SX(_NOTHING)]
+    lengths, rows, angles, sizes = [], [], [ca.SX(0)], [ca.SX(ROUNDING)]
     arms: list[Expression | None] = []
     for leg, q, point in zip(machine.legs, ca.vertsplit(joints), platform.points, strict=True):
         locus, c = leg.locus(q), point.position

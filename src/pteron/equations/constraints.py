@@ -14,9 +14,7 @@ from pteron.bodies.motion import Expression
 from pteron.bodies.vectors import Vector
 from pteron.closures.determinants import determinant
 from pteron.equations.machine import Machine, State
-
-_PARALLEL = 1e-9
-"""Sine, or cosine, of an angle between directions that counts as zero."""
+from pteron.tolerances import ROUNDING
 
 
 def constraint_rows(machine: Machine, state: State) -> Expression | None:
@@ -61,7 +59,7 @@ def constraint_rows(machine: Machine, state: State) -> Expression | None:
 def _may_act_along(couple: Expression, axis: Expression) -> bool:
     """Return whether a couple has, or may have, a component along the axis."""
     share = ca.dot(couple, axis)
-    return not share.is_constant() or abs(float(share)) > _PARALLEL
+    return not share.is_constant() or abs(float(share)) > ROUNDING
 
 
 def constraint_measure(machine: Machine, state: State) -> Expression:

@@ -19,9 +19,7 @@ from pteron.legs.kind import LegKind
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.result import Result
 from pteron.shapes import OnFailure, PoseLike
-
-_UPRIGHT = 1e-9
-"""Cosine of the angle below which two directions count as perpendicular."""
+from pteron.tolerances import ROUNDING
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -214,7 +212,7 @@ def _leg_dimensions(leg: LegKind) -> Iterator[tuple[str, str, dict[str, tuple[fl
     if not directions:  # a ram's pose depends on points alone
         return
     first, *others = directions
-    tilted_along = [name for name, v in vectors.items() if abs(dot(v, vectors[first])) < _UPRIGHT]
+    tilted_along = [name for name, v in vectors.items() if abs(dot(v, vectors[first])) < ROUNDING]
     if leg.plane_normal is None:
         yield from _tilts(first, [first, *tilted_along], vectors)
     for name in others:

@@ -19,6 +19,7 @@ from pteron.kinematics.architecture import expect_regular, is_singular_everywher
 from pteron.kinematics.sampling import draw_poses, type_ii_sizes
 from pteron.kinematics.simplex_ascent import climb
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.tolerances import ROUNDING
 
 _VANISHING = 1e-10
 """Size of the type-II measure that counts as zero where no angle in reach has a larger one."""
@@ -44,9 +45,6 @@ _ANGLES = 720
 
 _HALVINGS = 50
 """Bisections between two samples, half a degree apart: down to rounding."""
-
-_ZERO = 1e-9
-"""Largest size of the measure at a zero so found; at a gap in the reach it is larger."""
 
 
 @lru_cache(maxsize=64)
@@ -160,7 +158,7 @@ def _sign_changes(robot: Manipulator, position: Array) -> Array:
     first = np.flatnonzero((negative[1:] != negative[:-1]) & known[1:] & known[:-1])
     low, high, side = angles[first], angles[first + 1], negative[first]
     low, _ = bisect_condition(lambda angle: (measure(angle) < 0.0) == side, low, high, _HALVINGS)
-    is_zero = np.abs(measure(low)) <= _ZERO  # else a gap in the reach lies between two samples
+    is_zero = np.abs(measure(low)) <= ROUNDING  # else a gap in the reach lies between two samples
     return np.sort(_wrap_angles(low[is_zero]))
 
 

@@ -21,6 +21,7 @@ from pteron.legs.keys import COMMON, FieldCondition, Key, KeyRole, parameters_se
 from pteron.legs.leg import LegEquations, LegMotion, Passive
 from pteron.legs.reading import Reading
 from pteron.renamed import adopt_former_methods, former_attribute, former_name
+from pteron.tolerances import ROUNDING
 from pteron.toml import raise_faults
 
 
@@ -87,9 +88,6 @@ class ReachBound(NamedTuple):
     """The direction of a slider: the platform point is within `radius` of point + q line."""
     radius: float
 
-
-_ROUNDING = 1e-9
-"""Tolerance of the centre of mass beyond a body's ends, relative to its length: rounding."""
 
 _EquationsClass = type[LegEquations]
 
@@ -326,7 +324,7 @@ class LegKind(ABC):
         if letter not in self.extents:
             return None
         _, low, high, ends = self.extents[letter]
-        room = _ROUNDING * (high - low)
+        room = ROUNDING * (high - low)
         if low - room <= x <= high + room:
             return None
         turned = f"; is it {-x:g}?" if low <= -x <= high else ""

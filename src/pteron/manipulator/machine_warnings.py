@@ -15,6 +15,7 @@ from pteron.legs.drive_warnings import drive_warnings
 from pteron.manipulator.manipulator import Manipulator, legs_text, unheld_axes
 from pteron.platforms import Platform
 from pteron.thresholds import STOUT_LINK
+from pteron.tolerances import SAME
 
 _LARGE = 10.0
 """Length, m, beyond which millimetres are likelier."""
@@ -34,9 +35,6 @@ _HEAVY = 100.0
 
 _LEGS = 3
 """Least number of legs of which one can be an outlier."""
-
-_SAME = 1e-6
-"""Tolerance of equal directions."""
 
 _PULL = 30.0
 """Gravity, m/s^2, beyond which another unit is likelier."""
@@ -104,7 +102,7 @@ def _beside_the_pin(robot: Manipulator) -> Iterator[str]:
         # A planar body's centre of mass has two coordinates.
         point = to_base @ np.array([*place, 0.0][:3])
         beside = hypot(*np.cross(axes[0], point - pin))
-        if beside > _SAME:
+        if beside > SAME:
             yield (
                 f"platform: {key}: {1e3 * beside:.4g} mm beside the pin where the links meet, but "
                 "no leg keeps the platform from turning about that pin; on an extended link it "
@@ -118,7 +116,7 @@ def _odd_directions(robot: Manipulator) -> Iterator[str]:
     axis = np.array(robot.platform.axis)
     out = (points - points.mean(axis=0)) @ (np.eye(3) - np.outer(axis, axis))
     radii = np.linalg.norm(out, axis=1, keepdims=True)
-    if len(out) < _LEGS or radii.min() < _SAME:
+    if len(out) < _LEGS or radii.min() < SAME:
         return
     out /= radii
     frames = np.stack([out, np.cross(axis, out), np.broadcast_to(axis, out.shape)], axis=1)
@@ -130,7 +128,7 @@ def _odd_directions(robot: Manipulator) -> Iterator[str]:
         local_directions = np.einsum(
             "ijk,ik->ij", frames, [directions[name] for directions in directions_by_leg]
         )
-        opposite = (np.abs(local_directions[:, None] + local_directions).max(axis=-1) < _SAME).sum(
+        opposite = (np.abs(local_directions[:, None] + local_directions).max(axis=-1) < SAME).sum(
             axis=1
         )
         for i in np.flatnonzero(opposite == len(out) - 1) + 1:

@@ -25,13 +25,8 @@ from pteron.manipulator.tool import Tool, tool_faults
 from pteron.platforms import Platform
 from pteron.platforms.coordinates import Unit
 from pteron.platforms.parts import HeldPoint
+from pteron.tolerances import ROUNDING
 from pteron.toml import raise_faults
-
-_COINCIDENT = 1e-9
-"""Distance, m, below which points count as coincident."""
-
-_NO_EFFECT = 1e-9
-"""Component in the platform's plane of a leg's unit force that counts as zero."""
 
 STANDARD_GRAVITY: Vector = (0.0, 0.0, -9.81)
 """Default acceleration of gravity, m/s^2."""
@@ -278,7 +273,7 @@ def _leg_faults(platform: Platform, leg: object) -> Iterator[str]:
         )
     elif platform.plane_normal is not None and leg.equations_class.row_is_constant:
         row = np.array(ca.evalf(leg.equations().constant_row)).ravel()
-        if np.linalg.norm(platform.directions @ row) <= _NO_EFFECT * np.linalg.norm(row):
+        if np.linalg.norm(platform.directions @ row) <= ROUNDING * np.linalg.norm(row):
             yield (
                 f"its joint does not move the platform: a {leg.type} leg with these directions "
                 f"pushes along the platform's axis {list(platform.axis)} alone, across the plane; "
@@ -368,7 +363,7 @@ def _unheld_freedoms(platform: Platform, legs: list[LegKind]) -> list[str]:
     if platform.plane_normal is not None and not platform.angles:
         first, second = (_planar_point(platform, leg) for leg in legs)
         distance = math.hypot(*(first - second))
-        if distance <= _COINCIDENT:
+        if distance <= ROUNDING:
             return []
         return [
             f"legs: their platform points are {distance:.4g} m apart, so that the platform is free "

@@ -18,6 +18,7 @@ from pteron.maps.grid import Axis, Grid
 from pteron.maps.map import ALL, Map, column_heading
 from pteron.platforms.coordinates import COORDINATES
 from pteron.tables import Table, join_names, read_table, write_table
+from pteron.tolerances import SAME
 from pteron.workspace import BEYOND_LIMITS
 
 _STATUS = "status"
@@ -29,9 +30,6 @@ harmless."""
 
 _WRITER = "ARROW:schema"
 """Key that every file of a data frame has; where it is missing, the metadata are damaged."""
-
-_EQUAL = 1e-6
-"""Greatest difference of a coordinate's steps, over a step, for tables with few digits."""
 
 
 def write_map_table(index_map: Map, target: Path) -> Path:
@@ -137,7 +135,7 @@ def _axis(table: Table, name: str, coordinates: Array) -> Axis:
     """Return the axis of a coordinate's values, after a check that their steps are equal."""
     axis = Axis(name, float(coordinates[0]), float(coordinates[-1]), len(coordinates))
     differences = np.abs(coordinates - axis.values)
-    if differences.max() > _EQUAL * (axis.greatest - axis.least) / (axis.count - 1):
+    if differences.max() > SAME * (axis.greatest - axis.least) / (axis.count - 1):
         raise DataError(
             f"{table.source}: {name} = {coordinates[int(differences.argmax())]:g} is not in equal "
             "steps with the others, so that these are not the poses of a grid"

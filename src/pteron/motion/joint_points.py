@@ -16,12 +16,7 @@ from pteron.legs import LegKind
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.renamed import former_attribute
 from pteron.shapes import PerJoint, PoseLike
-
-_SAME = 1e-9
-"""Distance within which two joints of a leg count as one point, over the leg's extent."""
-
-_COINCIDENT = 1e-9
-"""Distance within which two points of the platform count as one, m."""
+from pteron.tolerances import ROUNDING
 
 _FLAT = 1e-6
 """Thickness over width of a part below which it is flat."""
@@ -196,7 +191,7 @@ def _links(leg: LegKind, chain: Array, coordinate: Array, end: Array) -> Array:
     start = chain[..., 0, :]
     if "p" in leg.bodies and leg.joint_axis is not None:
         start = start + np.multiply.outer(coordinate, leg.joint_axis)
-    same = _SAME * float(np.abs(end - start).max(initial=0.0))
+    same = ROUNDING * float(np.abs(end - start).max(initial=0.0))
     line = [start]
     if leg.cylinder is not None:
         way = end - start
@@ -221,7 +216,7 @@ def _parts(robot: Manipulator, poses: Array, p: Array) -> tuple[Part, ...]:
         arms, offsets = arms + offsets, np.zeros_like(offsets)
     parts = [Part(p, p[..., None, :] + platform.arms(_corners(arms), poses))]
     for hinge in _distinct(arms):
-        corners = _corners(offsets[np.abs(arms - hinge).max(axis=-1) <= _COINCIDENT])
+        corners = _corners(offsets[np.abs(arms - hinge).max(axis=-1) <= ROUNDING])
         if len(corners):
             hub = p + platform.arms(hinge[None], poses)[..., 0, :]
             parts.append(Part(hub, hub[..., None, :] + corners @ frame))
@@ -230,14 +225,14 @@ def _parts(robot: Manipulator, poses: Array, p: Array) -> tuple[Part, ...]:
 
 def _corners(arms: Array) -> Array:
     """Return the distinct arms (k, 3) that lead away from a hub, in order round its z axis."""
-    arms_out = _distinct(arms[np.abs(arms).max(axis=-1) > _COINCIDENT])
+    arms_out = _distinct(arms[np.abs(arms).max(axis=-1) > ROUNDING])
     offsets = arms_out - arms_out.mean(axis=0) if len(arms_out) else arms_out
     return arms_out[np.argsort(np.arctan2(offsets[:, 1], offsets[:, 0]), kind="stable")]
 
 
 def _distinct(points: Array) -> Array:
     """Return the distinct points (k, 3), each at its first place."""
-    differs = np.abs(points[:, None] - points).max(axis=-1) > _COINCIDENT
+    differs = np.abs(points[:, None] - points).max(axis=-1) > ROUNDING
     return points[[bool(differs[i, :i].all()) for i in range(len(points))]]
 
 

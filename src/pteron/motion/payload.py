@@ -15,7 +15,8 @@ from pteron.errors import DataError, ModelError, warn_unlikely
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 
 _HEAVY = 20.0
-"""Payload over the machine's moving mass above which it is likely in grams."""
+"""Payload over the machine's moving mass above which it is likely in grams: light parallel robots
+carry up to their own moving mass, presses and simulators up to ten times it."""
 
 
 def payload_warning(robot: Manipulator, mass: float) -> str:

@@ -27,15 +27,13 @@ from pteron.platforms.kinds import XYZ, AngleOrder, Motion, equations_class
 from pteron.platforms.motion import PlatformEquations, PlatformMotion
 from pteron.platforms.parts import Bar, GearedPart, HeldPoint
 from pteron.renamed import former_attribute
+from pteron.tolerances import ROUNDING
 from pteron.toml import raise_faults
 
 Limits = tuple[float, float]
 
 _TILT = 0.5
 """Largest angle of random poses of a platform with several, rad, where the file has no limits."""
-
-_IN_LINE = 1e-9
-"""Rounding of points on a line, relative to their distance from P."""
 
 
 @dataclass(frozen=True)
@@ -275,7 +273,7 @@ class Platform:
 
     def has_points_in_line(self, points: NDArray[np.float64]) -> bool:
         """Return whether it turns about an axis through platform points (k, 3), up to rounding."""
-        size = _IN_LINE * max(float(np.abs(points).max()), _IN_LINE)
+        size = ROUNDING * max(float(np.abs(points).max()), ROUNDING)
         if not self.tilts:
             return bool(np.ptp(points[:, :2], axis=0).max() <= size)
         if len(self.angles) < 3:

@@ -32,6 +32,7 @@ from pteron.plots.canvas import (
     shown_unit,
     spot,
 )
+from pteron.tolerances import EXACT, SAME
 from pteron.workspace import BEYOND_LIMITS, REACHABLE
 
 _WIDTH = 5.0
@@ -50,12 +51,6 @@ _HATCHES = {
 
 _WIDE = 20.0
 """Ratio of the greatest value to the median above which colours are logarithmic."""
-
-_ALIKE = 1e-6
-"""Relative difference below which two values look alike."""
-
-_TINY = 1e-12
-"""Added to the range of colours, so that it is not empty."""
 
 _LAST = 99.0
 """Percentile of the last colour where a few values are far off."""
@@ -139,8 +134,8 @@ def color_scale(shown_map: Map, name: str) -> Normalize:
     if not len(known):
         return Normalize(0.0, 1.0)
     low, high = float(known.min()), float(known.max())
-    if high - low <= _ALIKE * max(abs(low), abs(high)):
-        return Normalize(0.9 * low, 1.1 * low + _TINY)
+    if high - low <= SAME * max(abs(low), abs(high)):
+        return Normalize(0.9 * low, 1.1 * low + EXACT)
     middle, last = np.percentile(known, [50.0, _LAST]).tolist()
     if low > 0.0 and high > _WIDE * middle:
         return LogNorm(low, last if last > low else high)
@@ -237,7 +232,7 @@ def _plane(
 def _colorbar_extension(drawn: Any, scale: Normalize) -> str:
     """Return the ends of a scale that a picture's values exceed, as matplotlib names them."""
     low, high = float(scale.vmin or 0.0), float(scale.vmax or 0.0)
-    slack = _ALIKE * (high - low)
+    slack = SAME * (high - low)
     under = drawn.count() > 0 and float(drawn.min()) < low - slack
     over = drawn.count() > 0 and float(drawn.max()) > high + slack
     return ("both" if over else "min") if under else ("max" if over else "neither")
@@ -292,7 +287,7 @@ def _mark_best(axes: Axes, plane: Map, name: str, handles: list[Any]) -> None:
 
 
 def _is_constant(summary: Summary) -> bool:
-    return abs(summary.best - summary.worst) <= _ALIKE * abs(summary.best)
+    return abs(summary.best - summary.worst) <= SAME * abs(summary.best)
 
 
 def _curve(axes: Axes, curve: Map, name: str) -> None:

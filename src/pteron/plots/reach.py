@@ -26,6 +26,7 @@ from pteron.plots.canvas import (
     real_figure,
     spot,
 )
+from pteron.tolerances import ROUNDING
 from pteron.workspace import BEYOND_LIMITS, REACHABLE, ReachSlice
 
 _BANDS = 4
@@ -33,9 +34,6 @@ _BANDS = 4
 
 _TENTHS = [tenth / 10.0 for tenth in range(10)]
 """Levels of a measure's lines."""
-
-_TIE = 1e-9
-"""Difference of two legs' margins, m, up to which they are equal."""
 
 _SPECK = 2.0
 """Size, in cells of the grid, below which an outline is not drawn."""
@@ -160,7 +158,7 @@ def _territories(legs: Array) -> Iterator[tuple[Array, str]]:
     alike in the whole slice, as mirrored ones do, the first counts.
     """
     far = np.abs(legs[:, None] - legs).max(axis=(-2, -1))
-    first = [i for i in range(len(legs)) if not (far[i, :i] <= _TIE).any()]
+    first = [i for i in range(len(legs)) if not (far[i, :i] <= ROUNDING).any()]
     ranked, missed = legs[first], -legs.min(axis=0)
     for count in range(len(first), 0, -1):
         others = ranked[count:].min(axis=0, initial=np.inf)

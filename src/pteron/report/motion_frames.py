@@ -15,6 +15,7 @@ from pteron.motion import Guide, JointPoints, Motion, joint_guides, joint_points
 from pteron.platforms.coordinates import SHOWN
 from pteron.plots.machine_drawing import APART, base_outline, grid_step
 from pteron.report.quantities import coordinate
+from pteron.tolerances import SAME
 
 _A_SECOND = 60.0
 """Frames for a second of real time: as many as screens show."""
@@ -29,11 +30,8 @@ _DRAWN = 1000
 _DECIMALS = 6
 """Decimals of the data, m or rad."""
 
-_SAME = 1e-6
-"""Greatest gap between the ends of a closed motion, as a share of its size, or of its speed."""
-
 _LITTLE = 1e-3
-"""Least size (m, rad), or speed, that `_SAME` is a share of."""
+"""Least size (m, rad), or speed, that `SAME` is a share of."""
 
 
 @dataclass(frozen=True)
@@ -118,7 +116,7 @@ def is_closed(motion: Motion) -> bool:
     parts = motion.pose, motion.velocity
     sizes = [max(float(np.ptp(part, axis=0).max()), _LITTLE) for part in parts]
     return all(
-        bool(np.abs(part[-1] - part[0]).max() <= _SAME * size)
+        bool(np.abs(part[-1] - part[0]).max() <= SAME * size)
         for part, size in zip(parts, sizes, strict=True)
     )
 

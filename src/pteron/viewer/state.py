@@ -16,12 +16,10 @@ from pteron.manipulator.variants import with_elbows
 from pteron.motion import Motion
 from pteron.motion.payload import add_payload as loaded_robot, payload_warning
 from pteron.platforms.coordinates import SHOWN
+from pteron.tolerances import SAME
 from pteron.viewer.boundary import distance_text, follow_joints, is_allowed, stop_reason
 from pteron.viewer.sliding import nearest_reachable_pose
 from pteron.workspace import home_pose
-
-_SAME_POSE = 1e-6
-"""Difference of two poses, m or rad, up to which they are one assembly mode."""
 
 _METRES = 3.0
 """Largest length, mm, up to which it is asked whether what was typed is in m."""
@@ -116,7 +114,7 @@ def current_assembly(state: ViewerState, poses: Array) -> int | None:
     differences = np.abs(poses - state.pose)
     around = np.abs((differences + np.pi) % (2.0 * np.pi) - np.pi)
     differences = np.where(state.robot.wraps, around, differences)
-    near = np.flatnonzero((differences <= _SAME_POSE).all(axis=-1))
+    near = np.flatnonzero((differences <= SAME).all(axis=-1))
     return int(near[0]) if len(near) else None
 
 

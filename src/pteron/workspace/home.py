@@ -24,6 +24,7 @@ from pteron.kinematics.simplex_ascent import climb
 from pteron.kinematics.singularities import best_type_ii
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.result import Result
+from pteron.tolerances import ROUNDING
 from pteron.workspace.holding import expect_regular
 from pteron.workspace.home_starts import (
     axis_poses,
@@ -87,9 +88,6 @@ preferred."""
 
 _LEVEL = 0.75
 """Share of the best margin from which on a level pose of a platform that tilts is preferred."""
-
-_SAME = 1e-9
-"""Differences of margins that are rounding."""
 
 _MIDDLE = 0.9
 """The share that the middle between equals must have: from there the machine moves every way."""
@@ -377,7 +375,7 @@ def _move_onto_axis(robot: Manipulator, poses: Array) -> Array:
         turn = scipy.spatial.transform.Rotation.from_rotvec(2.0 * np.pi / fold * axis).as_matrix()
         images = poses.copy()
         images[:, :lengths] = center + offsets @ (directions @ turn @ directions.T).T
-        if np.allclose(_worth(robot, images), _worth(robot, poses), rtol=0.0, atol=_SAME):
+        if np.allclose(_worth(robot, images), _worth(robot, poses), rtol=0.0, atol=ROUNDING):
             images[:, :lengths] = center + np.outer(offsets @ direction, direction)
             return images
     return poses[:0]

@@ -17,9 +17,7 @@ from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.renamed import former_attribute
 from pteron.result import Result
 from pteron.shapes import Numbers, PerJoint, PoseLike
-
-_ROUNDING = 1e-9
-"""Difference of shares that is rounding."""
+from pteron.tolerances import ROUNDING
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -105,7 +103,7 @@ def least_margin_text(robot: Manipulator, pose: Array) -> str:
 
 def _first_least(margins: Array) -> int:
     """Return the first leg, from 1, with the least of values (n,): those of equal legs round."""
-    return int((margins <= margins.min() + _ROUNDING).argmax()) + 1
+    return int((margins <= margins.min() + ROUNDING).argmax()) + 1
 
 
 @lru_cache(maxsize=64)

@@ -14,6 +14,7 @@ from pteron.kinematics.evaluate import finite_pose
 from pteron.kinematics.sampling import type_ii_sizes
 from pteron.manipulator import Manipulator
 from pteron.shapes import PoseLike
+from pteron.tolerances import ROUNDING
 from pteron.workspace import home_pose
 from pteron.workspace.home import has_exact_home
 
@@ -22,9 +23,6 @@ _GOOD = 0.1
 
 _SEARCHES = ((200, 0.3), (200, 0.02), (200, 0.0))
 """Numbers of random poses, and least measures of them, that are tried in turn otherwise."""
-
-_ALIKE = 1e-9
-"""Difference below which two measures count as equal."""
 
 
 def chosen_home(robot: Manipulator, home: PoseLike | None) -> Array:
@@ -78,7 +76,7 @@ def _middle(robot: Manipulator) -> tuple[float, ...]:
 
 def _best(worth: Array) -> int:
     """Return the first of the best, so that rounding does not choose between mirrored poses."""
-    return int((worth >= worth.max() - _ALIKE).argmax())
+    return int((worth >= worth.max() - ROUNDING).argmax())
 
 
 def _worth(robot: Manipulator, poses: Array) -> Array:

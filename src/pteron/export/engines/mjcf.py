@@ -27,15 +27,13 @@ from pteron.kernels import Array
 from pteron.kernels.code import render_template
 from pteron.manipulator import RobotLike, as_manipulator
 from pteron.shapes import PoseLike
+from pteron.tolerances import SAME
 
 STEP = 2e-4
 """The file's step of integration, s."""
 
 STIFFNESS = 0.2
 """The rate at which the loops' constraints pull gaps back, times the step."""
-
-_SAME = 1e-6
-"""Distance below which a shape's ends count as equal, m."""
 
 
 def export_mjcf(
@@ -106,7 +104,7 @@ def mjcf(opened: Tree, *, step: float = STEP) -> str:
         | {motor.joint: motor for motor in opened.motors},
         hold=_hold(opened),
         local=lambda body, points: points if body is None else body_frame_points(body, points),
-        same=lambda shape: np.ptp(shape.ends, axis=0).max() < _SAME,
+        same=lambda shape: np.ptp(shape.ends, axis=0).max() < SAME,
         half=lambda shape: float(np.linalg.norm(shape.ends[1] - shape.ends[0])) / 2.0,
         moments=_moments,
         frame_texts=lambda body: _frame_texts(opened, body),

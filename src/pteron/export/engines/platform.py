@@ -25,9 +25,7 @@ from pteron.kernels import Array
 from pteron.manipulator import Manipulator
 from pteron.platforms import Platform
 from pteron.platforms.joints import platform_joints
-
-_COINCIDENT = 1e-9
-"""Distance within which two hinges count as one, m; m/rad where the platform slides."""
+from pteron.tolerances import ROUNDING
 
 _SIDE = 0.05
 """Side of the cube that stands for a part that does not turn, m."""
@@ -60,7 +58,7 @@ def _turning_platform(robot: Manipulator, pose: Array) -> Pieces:
     p, axes = platform.placement(pose)
     # What of a leg's fixed offset is along the axis turns with the platform as well as not.
     offsets = [cross(leg.fixed_offset, platform.axis) for leg in robot.legs]
-    hung = [bool(np.abs(offset).max() > _COINCIDENT) for offset in offsets]
+    hung = [bool(np.abs(offset).max() > ROUNDING) for offset in offsets]
     points = [np.array(leg.platform_point) for leg in robot.legs]
     hinges = _distinct([point for point, hangs in zip(points, hung, strict=True) if hangs])
     masses, shares, remainder = _part_masses(platform, hinges, len(platform.geared))
@@ -93,7 +91,7 @@ def _sliding_platform(robot: Manipulator, pose: Array) -> Pieces:
     p, _ = platform.placement(pose)
     frame = np.array(platform.frame)
     points = [np.array(leg.platform_point) for leg in robot.legs]
-    halves = _distinct([point for point in points if np.abs(point).max() > _COINCIDENT])
+    halves = _distinct([point for point in points if np.abs(point).max() > ROUNDING])
     masses, shares, remainder = _part_masses(platform, halves, 2 + len(platform.geared))
     mass, center, about = remainder
     *moves, turn = _joints(platform, pose)
@@ -114,7 +112,7 @@ def _sliding_platform(robot: Manipulator, pose: Array) -> Pieces:
         follows = (turned, by)
         joint = TreeJoint(f"{name}_slide", True, direction, at, by * angle, None, follows)
         bodies.append(_still_body(platform, name, 0, [joint], at, part_mass))
-    slide = [np.abs(point).max() > _COINCIDENT for point in points]
+    slide = [np.abs(point).max() > ROUNDING for point in points]
     carried = [
         first + _axis_index(halves, point) if away else 0
         for point, away in zip(points, slide, strict=True)
@@ -224,7 +222,7 @@ def _gears(platform: Platform, pose: Array, masses: Array, against: float) -> li
 
 def _share_axis(first: Array, second: Array) -> bool:
     """Return whether two places of the platform are on one axis of it."""
-    return bool(np.abs(first - second)[:2].max() <= _COINCIDENT)
+    return bool(np.abs(first - second)[:2].max() <= ROUNDING)
 
 
 def _distinct(places: Sequence[Array]) -> list[Array]:

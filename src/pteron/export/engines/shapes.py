@@ -9,6 +9,7 @@ import numpy as np
 
 from pteron.export.engines.parts import BASE, BodyShape, Tree, TreeBody
 from pteron.kernels import Array
+from pteron.tolerances import SAME
 
 _THICK = 0.011
 """Radius of a link, as a share of the machine's size; other shapes are in proportion."""
@@ -21,9 +22,6 @@ _SPARE = 0.25
 
 _OVERLAP = 0.55
 """Length of each of the two parts of a telescopic body, as a share of the whole."""
-
-_SAME = 1e-6
-"""Distance below which points count as one, m."""
 
 
 def add_shapes(opened: Tree) -> Tree:
@@ -56,7 +54,7 @@ def _leg(
             axis = 2.6 * thick * body.joints[-1].axis
             shapes.append([BodyShape("box", np.array([start - axis, start + axis]), 1.9 * thick)])
             continue
-        if np.linalg.norm(stop - start) < _SAME:  # the next one slides in this one
+        if np.linalg.norm(stop - start) < SAME:  # the next one slides in this one
             stop, radius = start + _OVERLAP * (end - start), 1.4 * thick
         elif is_prismatic:
             start = stop - _OVERLAP * (stop - start)
@@ -94,7 +92,7 @@ def _platform(opened: Tree, looks: list[list[BodyShape]], thick: float) -> None:
     hub = np.array([p - 0.8 * thick * axis, p + 0.8 * thick * axis])
     looks[0].append(BodyShape("cylinder", hub, 2.2 * thick))
     tool = p + np.array(platform.tool) @ axes
-    if np.linalg.norm(tool - p) > _SAME:
+    if np.linalg.norm(tool - p) > SAME:
         looks[0].append(_arm(p, tool, 0.8 * thick))
     for k, body in enumerate(bodies):
         if body.color == 0 and body.parent != BASE and not body.joints[0].is_prismatic:

@@ -27,9 +27,7 @@ from pteron.legs.kind import LegKind
 from pteron.manipulator import RobotLike, as_manipulator
 from pteron.manipulator.readings import refuse_readings
 from pteron.shapes import PoseLike
-
-_NONE = 1e-9
-"""Sine between two directions below which they count as parallel."""
+from pteron.tolerances import ROUNDING
 
 
 def tree(robot: RobotLike, home: PoseLike | None = None) -> Tree:
@@ -173,7 +171,7 @@ def _frame_along(x: Array, z: Array | None = None) -> Array:
     """Return axes as columns (3, 3): x along a vector, and z near another one."""
     x = x / np.linalg.norm(x)
     normal = None if z is None else z - (z @ x) * x
-    if normal is None or np.linalg.norm(normal) < _NONE:
+    if normal is None or np.linalg.norm(normal) < ROUNDING:
         normal = np.cross(x, np.eye(3)[np.argmin(np.abs(x))])
     normal = normal / np.linalg.norm(normal)
     return np.column_stack([x, np.cross(normal, x), normal])

@@ -31,13 +31,11 @@ from pteron.json_values import fields_as_json
 from pteron.kernels import Array
 from pteron.renamed import former_attribute
 from pteron.result import Result
+from pteron.tolerances import ROOT_OF_ROUNDING
 
 _ROWS, _MORE = 20_000, 100_000
 """Number of rows of all logs that are searched, those in which the joints move most; and the number
 where these have too little motion."""
-
-_EXACT = 1e-7
-"""Residuals, over the forces, below which they are rounding and show no faults."""
 
 _ROUNDS = 6
 """Greatest number of times that a delay is corrected and sought again."""
@@ -251,7 +249,7 @@ def _found_faults(
     """Return the fit without faults, and the faults that residuals show beside each other."""
     columns = parts[0].model
     largest = max(float(np.abs(part.log.forces).max()) for part in parts)
-    exact = np.abs(estimate.residuals).max() < _EXACT * largest
+    exact = np.abs(estimate.residuals).max() < ROOT_OF_ROUNDING * largest
     plain, found_faults = search_faults(columns, observations, () if exact else None, noise)
     if any(fault.family is DELAY for fault in found_faults):
         # Columns hold for small delays: other faults are sought after a long one is corrected.

@@ -13,9 +13,7 @@ from pteron.errors import DataError
 from pteron.kernels.loop_code import LinkedLaw
 from pteron.manipulator import RobotLike
 from pteron.manipulator.readings import reading_scales, reading_zeros
-
-_SAME = 1e-9
-"""Relative difference of two periods that is rounding."""
+from pteron.tolerances import ROUNDING
 
 
 @dataclass(frozen=True)
@@ -119,7 +117,7 @@ class Exported:
         period_match = re.search(
             rf"\b{table}\[\d+\] = {{[^}}]*?([-+.\w]+),?\s*/\* period \*/", source
         )
-        if period_match and abs(float(period_match[1]) - self.period) > _SAME * self.period:
+        if period_match and abs(float(period_match[1]) - self.period) > ROUNDING * self.period:
             raise DataError(
                 f"{self.folder}: {table} is for a period of {float(period_match[1]):g} s, the "
                 f"controller's is {self.period:g} s; export it again, or give the controller that "

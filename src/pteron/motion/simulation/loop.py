@@ -35,9 +35,7 @@ from pteron.motion.simulation.stops import (
 )
 from pteron.motion.trajectories.limits import limits_of
 from pteron.progress import Progress
-
-_WHOLE = 1e-9
-"""Part of a sample, from rounding, by which a delay of whole samples may miss them."""
+from pteron.tolerances import ROUNDING
 
 _BLOCK = 1000
 """Samples after which a run returns from compiled code: some 10 ms, at most a second."""
@@ -108,10 +106,10 @@ class Timing:
             for delay in (self.delay, self.sensing)
         )
         reading_time = period - reading_age
-        reading_time = late if abs(reading_time - late) < _WHOLE * period else reading_time
+        reading_time = late if abs(reading_time - late) < ROUNDING * period else reading_time
         bounds = [0.0, min(late, reading_time), max(late, reading_time), period]
         spans, step = np.diff(bounds), min(self.step, period)
-        counts = [int(np.ceil(span / step - _WHOLE)) for span in spans]
+        counts = [int(np.ceil(span / step - ROUNDING)) for span in spans]
         lengths = [float(span) / max(n, 1) for span, n in zip(spans, counts, strict=True)]
         force_span = 0 if late == 0.0 else 2 if late > reading_time else 1
         return [*lengths, period], [
@@ -125,9 +123,9 @@ class Timing:
 
 def split_delay(delay: float, period: float) -> tuple[float, int]:
     """Return a delay's part of a sample, and its whole samples."""
-    samples = int(delay / period + _WHOLE)
+    samples = int(delay / period + ROUNDING)
     part = max(delay - samples * period, 0.0)
-    return (part if part > _WHOLE * period else 0.0), samples
+    return (part if part > ROUNDING * period else 0.0), samples
 
 
 def run_simulation(

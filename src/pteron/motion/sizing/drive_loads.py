@@ -24,22 +24,14 @@ from pteron.motion.sizing.places import CyclePlace
 from pteron.renamed import former_attribute
 from pteron.result import Result
 from pteron.shapes import PerJoint
+from pteron.tolerances import ROUNDING
 
 if TYPE_CHECKING:
     import polars as pl
 
-_STILL = 1e-9
-"""Share of the fastest joint's acceleration below which a joint counts as still: rounding."""
-
 HOLDING = 100.0
 """Ratio to the best one of the places where a joint moves, up to which a ratio is sought if it
 rests at others."""
-
-_SAME = 1e-9
-"""Relative difference below which ratios are the same."""
-
-_NONE = 1e-9
-"""Share of the drives' energy below which its net sum counts as zero: rounding."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -227,7 +219,7 @@ class Sizing(Result):
             self._quantities_at_places[f"{key}_energy"].sum(axis=1) for key in ("given", "braked")
         )
         net = float((driving - braking).max())
-        return net if abs(net) > _NONE * float(driving.max()) else 0.0
+        return net if abs(net) > ROUNDING * float(driving.max()) else 0.0
 
     @property
     def mean_power(self) -> PerJoint:
@@ -367,7 +359,7 @@ def best_ratio(sizing: Sizing, leg: int, rotor_inertia: float) -> float:
     295.1
     """
     force, _, acceleration = sizing.squares(leg)
-    moving = acceleration > _STILL**2 * max(
+    moving = acceleration > ROUNDING**2 * max(
         float(sizing.squares(i)[2].max()) for i in range(1, sizing.robot.joint_count + 1)
     )
     if rotor_inertia == 0.0 or not moving.any():
@@ -376,14 +368,14 @@ def best_ratio(sizing: Sizing, leg: int, rotor_inertia: float) -> float:
     least, most = float(optimal_ratios.min()), float(optimal_ratios.max())
     if not moving.all():  # where it only holds, more is better
         most *= HOLDING
-    if most - least <= _SAME * most:
+    if most - least <= ROUNDING * most:
         return most
     # The greatest of convex functions of i^2.
     solution = scipy.optimize.minimize_scalar(
         lambda log: float(mean_squares(sizing, leg, math.exp(log), rotor_inertia).max()),
         bounds=(math.log(least), math.log(most)),
         method="bounded",
-        options={"xatol": _SAME},
+        options={"xatol": ROUNDING},
     )
     return math.exp(solution.x)
 

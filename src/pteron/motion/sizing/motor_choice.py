@@ -14,9 +14,7 @@ from pteron.motion.sizing.drive_loads import HOLDING, Sizing, best_ratio, mean_s
 from pteron.motion.sizing.gearing import Span, peak_span, rated_span, speed_span, torques
 from pteron.motion.sizing.motors import Motor
 from pteron.result import Result
-
-_SAME = 1e-9
-"""Relative difference below which ratios are the same."""
+from pteron.tolerances import ROUNDING
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -200,7 +198,7 @@ def _best_ratio(sizing: Sizing, legs: tuple[int, ...], rotor_inertia: float) -> 
     least, most = min(moving), max(moving)
     if len(moving) < len(optimal_ratios):  # where a leg only holds, more is better
         most *= HOLDING
-    if most - least <= _SAME * most:
+    if most - least <= ROUNDING * most:
         return most
 
     def largest(log: float) -> float:
@@ -210,7 +208,7 @@ def _best_ratio(sizing: Sizing, legs: tuple[int, ...], rotor_inertia: float) -> 
     # The largest of convex functions of i^2, which all fall before these bounds and rise behind.
     bounds = math.log(least), math.log(most)
     solution = scipy.optimize.minimize_scalar(
-        largest, bounds=bounds, method="bounded", options={"xatol": _SAME}
+        largest, bounds=bounds, method="bounded", options={"xatol": ROUNDING}
     )
     return math.exp(solution.x)
 

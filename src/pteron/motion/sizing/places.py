@@ -25,6 +25,7 @@ from pteron.motion.trajectories.cycle import moves
 from pteron.motion.trajectories.scaling import keeps_margin, least_margin
 from pteron.motion.trajectories.tool import Curve, pose_motion, tool_motion
 from pteron.result import Result
+from pteron.tolerances import ROUNDING
 from pteron.workspace import Box, Region, bounding_box, home_pose
 
 TURNS = 12
@@ -38,9 +39,6 @@ _SPREAD = 300
 
 _TILT = np.pi / 2.0
 """Largest angle, rad, tried of a platform that moves along fewer than two directions."""
-
-_ROUNDING = 1e-9
-"""Distance from a region's border that is rounding, m and rad."""
 
 
 @checked_arguments
@@ -169,10 +167,10 @@ def places_in(course: Course, box: Array, fits: Fits) -> tuple[CyclePlace, ...]:
     candidates = []
     for turn in map(float, turns):
         low, high = box - course.extent(turn)
-        if (low > high + _ROUNDING).any():
+        if (low > high + ROUNDING).any():
             continue
-        varies = high - low > 2.0 * _ROUNDING
-        low, high = low + _ROUNDING * varies, high - _ROUNDING * varies
+        varies = high - low > 2.0 * ROUNDING
+        low, high = low + ROUNDING * varies, high - ROUNDING * varies
         counts = np.where(varies, _COUNTS.get(int(varies.sum()), 2), 1)
         grid = [CyclePlace(pose, turn) for pose in product(*map(np.linspace, low, high, counts))]
         if turn and course.yaw.any() and not (varies & (course.yaw != 0.0)).any():
@@ -197,9 +195,9 @@ def _quasirandom_places(course: Course, box: Array) -> Iterator[CyclePlace]:
     for k, (*units, part) in enumerate((0.5 + np.arange(_SPREAD)[:, None] * steps) % 1.0):
         turn = 2.0 * np.pi * part if course.axis is not None else 0.0
         low, high = box - course.extent(turn)
-        if (low <= high + _ROUNDING).all():
+        if (low <= high + ROUNDING).all():
             place = CyclePlace(tuple(map(float, low + units * np.maximum(high - low, 0.0))), turn)
-            turns = k % 2 and not (high - low > 2.0 * _ROUNDING)[course.yaw != 0.0].any()
+            turns = k % 2 and not (high - low > 2.0 * ROUNDING)[course.yaw != 0.0].any()
             yield with_platform(place, course.yaw, turn) if turns else place
 
 
@@ -248,7 +246,7 @@ def _axis(robot: Manipulator) -> Array | None:
         return None
     if platform.plane_normal is None:
         return moves(robot, None, 1)[0][1]
-    level = not (np.abs(platform.directions @ np.array(robot.gravity)) > _ROUNDING).any()
+    level = not (np.abs(platform.directions @ np.array(robot.gravity)) > ROUNDING).any()
     return np.array(platform.axis) if level else None
 
 
@@ -260,7 +258,7 @@ def _yaw(robot: Manipulator, axis: Array | None) -> Array:
     if axis is None or about is None:
         return rates
     cosine = float(np.dot(about, axis))
-    rates[last] = np.sign(cosine) if abs(cosine) > 1.0 - _ROUNDING else 0.0
+    rates[last] = np.sign(cosine) if abs(cosine) > 1.0 - ROUNDING else 0.0
     return rates
 
 
@@ -269,7 +267,7 @@ def _is_in_box(region: Region, poses: Array) -> NDArray[np.bool_]:
     if not isinstance(region, Box):
         return np.zeros(poses.shape[:-1], dtype=bool)
     low, high = region.box
-    return np.asarray(((poses >= low - _ROUNDING) & (poses <= high + _ROUNDING)).all(axis=-1))
+    return np.asarray(((poses >= low - ROUNDING) & (poses <= high + ROUNDING)).all(axis=-1))
 
 
 def expect_places_of(robot: Manipulator, places: Sequence[CyclePlace]) -> tuple[CyclePlace, ...]:
