@@ -88,6 +88,6 @@ if TYPE_CHECKING:
         base_regressor as base_regressor,
     )
 
-__version__ = "0.2.0"
+__version__ = "0.3.0.dev0"
 
 _publish(__name__, extras={"environments": "gymnasium"})

@@ -116,7 +116,7 @@ RENAMED = {
 }
 """Names of version 0.1 by package, and where each of them is now."""
 
-UNTIL = "0.3"
+UNTIL = "0.4"
 """The first version without them."""
 
 
