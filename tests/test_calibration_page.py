@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from measured import built, positions
 from mechanisms import CATALOG, CLIENTS
-from test_report import HOSTILE, Reader, strict
+from page_reader import HOSTILE, Reader, strict
 
 import pteron
 from pteron.calibration import Measurements, calibrate

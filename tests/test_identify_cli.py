@@ -15,7 +15,7 @@ import pytest
 from command_line import done, refused, run
 from logs_of_motions import log_of, motion
 from mechanisms import CATALOG, CLIENTS
-from test_report import Reader, strict
+from page_reader import Reader, strict
 
 import pteron
 from pteron.cli import identify as command

@@ -13,6 +13,7 @@ import polars as pl
 import pytest
 import xarray
 import zarr
+from compared_maps import alike
 from dying import dies_once, rows, slow_rows
 from mechanisms import CATALOG, CLIENTS
 
@@ -50,16 +51,6 @@ def delta():
 def whole(delta):
     """Return a map in space, coarse."""
     return map_index(delta, INDICES, pose_grid(delta, {}, points=31, rim=0.04))
-
-
-def alike(one, other):
-    """Say whether two maps are the same to the last bit."""
-    return (
-        one.grid == other.grid
-        and (one.status == other.status).all()
-        and one.values.keys() == other.values.keys()
-        and all(np.array_equal(v, other.values[k], equal_nan=True) for k, v in one.values.items())
-    )
 
 
 # Grids.

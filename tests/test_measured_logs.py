@@ -5,6 +5,7 @@ import warnings
 import numpy as np
 import polars as pl
 import pytest
+from firmware_logs import CFG
 
 import pteron
 from pteron.calibration import Place, ReferencePlane, read_measurements
@@ -130,44 +131,6 @@ def test_what_is_unlikely_is_doubted(tmp_path, text, words):
         read_measurements(DELTA, written(tmp_path, text))
     assert any(words in str(one.message) for one in told)
     assert {one.category for one in told} == {UnlikelyValue}
-
-
-CFG = """[printer]
-kinematics: delta
-delta_radius: 141.553523
-[stepper_a]
-microsteps: 16
-rotation_distance: 32
-arm_length: 280.0
-position_endstop: 372.971746
-[stepper_b]
-microsteps: 16
-rotation_distance: 64
-gear_ratio: 80:40
-position_endstop: 373.433577
-[stepper_c]
-step_distance: 0.01
-position_endstop: 373.62993
-#*# <---------------------- SAVE_CONFIG ---------------------->
-#*# DO NOT EDIT THIS BLOCK OR BELOW. The contents are auto-generated.
-#*#
-#*# [delta_calibrate]
-#*# height0 = 17.197
-#*# height0_pos = 35612.667,35612.667,35612.667
-#*# height1 = 17.197
-#*# height1_pos = 41651.333,41651.333,32050.333
-#*# manual_height0 = 0.3
-#*# manual_height0_pos = 37302.0,37302.0,37302.0
-#*# distance0 = 60.5
-#*# distance0_pos1 = 35612.667,35612.667,35612.667
-#*# distance0_pos2 = 41651.333,41651.333,32050.333
-#*#
-#*# [stepper_a]
-#*# angle = 210.181908
-#*#
-#*# [stepper_b]
-#*# angle = 329.784204
-"""
 
 
 def test_klippers_stable_positions_are_readings(tmp_path):

@@ -7,11 +7,11 @@ import fmpy.validation
 import numpy as np
 import pytest
 import tilting
+from compiled_exports import KINDS, EmcPose, driven, kinematics, simulated, started
+from exported_code import compiled
 from mechanisms import CLIENTS, gated
 from scipy.integrate import solve_ivp
-from test_export import compiled
-from test_other_tools import KINDS, EmcPose, driven, kinematics, simulated, started
-from test_structured_text import Runner
+from structured_text import Runner
 
 import pteron
 from pteron.equations.drives import drive_numbers

@@ -9,8 +9,8 @@ import pytest
 from mechanisms import CLIENTS
 from PIL import Image
 from scipy.spatial import ConvexHull
-from test_viewer import opened, slide, wait_for
 from tilting import machine
+from viewer_pages import opened, slide, wait_for
 
 import pteron
 from pteron.motion import Motion, joint_points, pick_and_place, with_payload

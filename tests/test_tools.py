@@ -9,9 +9,9 @@ import numpy as np
 import polars as pl
 import pytest
 from command_line import done, refused
-from mechanisms import CLIENTS
+from exported_code import compiled
+from mechanisms import CLIENTS, states
 from scipy.spatial.transform import Rotation
-from test_export import compiled, states
 
 import pteron
 from pteron.export import export_fmu

@@ -17,6 +17,7 @@ import pytest
 from matplotlib.path import Path
 from measured import built
 from mechanisms import CATALOG, CLIENTS, MECHANISMS, gated
+from viewer_pages import opened, slide, unfold, wait_for
 from websockets.http11 import Request
 
 import pteron
@@ -580,22 +581,6 @@ def test_hosts_that_only_this_machine_reaches(host, here):
 # In a real browser.
 
 
-@contextmanager
-def opened(browser, url, width=1100, height=800, **context):
-    """A tab with the page, whose first numbers have come."""
-    there = browser.new_context(viewport={"width": width, "height": height}, **context)
-    tab = there.new_page()
-    tab.failures = []
-    tab.on("pageerror", lambda error: tab.failures.append(str(error)))
-    tab.goto(url)
-    tab.wait_for_selector("table.legs", state="attached")
-    try:
-        yield tab
-        assert tab.failures == []
-    finally:
-        there.close()
-
-
 SHOWN = """values => {
     const sliders = [...document.querySelectorAll('input[type=range]')];
     return values.every((value, i) => Math.abs(Number(sliders[i].value) - value) < 0.051);
@@ -603,41 +588,10 @@ SHOWN = """values => {
 """Whether the first sliders of a page stand at values."""
 
 
-def wait_for(tab, condition, argument=None):
-    tab.wait_for_function(condition, arg=argument, timeout=60_000)
-
-
 def said(tab, text):
     """Wait until the page's status says something."""
     wait_for(tab, "text => document.querySelector('[role=status]').innerText.includes(text)", text)
     return tab.inner_text("[role=status]")
-
-
-def slide(tab, label, keys):
-    """Focus a slider by its label and press keys."""
-    tab.get_by_label(label, exact=True).focus()
-    for key in keys:
-        tab.keyboard.press(key)
-
-
-def unfold(tab, *names):
-    for name in names:
-        tab.evaluate("id => { document.getElementById(id).open = true; }", name)
-
-
-@pytest.fixture(scope="module")
-def viewer():
-    with view(pteron.load("quadrupteron"), port=0) as found:
-        yield found
-        assert found.faults == ()
-
-
-@pytest.fixture(scope="module")
-def tab(browser, viewer):
-    """A tab with the page, for all tests."""
-    with opened(browser, viewer.url) as found:
-        unfold(found, "player", "pushed", "plots", "looks")
-        yield found
 
 
 @pytest.fixture
