@@ -3,6 +3,7 @@
 import json
 import re
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,6 +12,8 @@ from command_line import refused, run
 import pteron
 from pteron.export import export_named, export_names
 from pteron.indices import INDICES, Index, evaluate
+from pteron.maps import load_map, map_index, pose_grid, save_map
+from pteron.plots import map_figure
 
 PACKAGE = """
 import json
@@ -120,3 +123,45 @@ def test_an_export_of_an_installed_package_writes_its_files(installed, tmp_path)
 )
 def test_an_export_that_is_none_is_refused(installed, target, words):
     assert words in refused(f"export tripteron --target {target}")
+
+
+# Maps of own indices.
+
+HEIGHT = Index("height", "height of P", unit="m", better="less", function=lambda _, p: p[:, 2])
+
+
+def test_a_map_has_own_indices_beside_those_of_pteron():
+    grid = pose_grid("tripteron", {"y": 0.0}, points=11, rim=0.3)
+    index_map = map_index("tripteron", ["condition", HEIGHT], grid)
+    poses = grid.poses()
+    expected = np.where(np.isnan(index_map.values["condition"]), np.nan, poses[..., 2])
+    np.testing.assert_array_equal(index_map.values["height"], expected)
+    assert 0 < np.isnan(expected).sum() < expected.size
+    assert index_map.units == {"condition": "", "height": "m"}
+    assert index_map.statistics("height").best == np.nanmin(expected)
+    assert "height [m]" in index_map.table().columns
+    (labels,) = [axes.get_ylabel() for axes in map_figure(index_map, "height").axes[1:]]
+    assert "height of P (mm)" in labels
+    assert index_map.slice_at("x", 0.0).index("height").better == "less"
+
+
+@pytest.mark.parametrize("ending", ["npz", "zarr"])
+def test_a_file_keeps_what_an_own_index_is(ending, tmp_path):
+    grid = pose_grid("tripteron", {"y": 0.0}, points=7)
+    out = tmp_path / f"map.{ending}"
+    index_map = map_index("tripteron", [HEIGHT, "kappa"], grid, out=out)
+    loaded = load_map(out)
+    assert loaded.index("height").title == "height of P"
+    assert (loaded.index("height").unit, loaded.index("height").better) == ("m", "less")
+    np.testing.assert_array_equal(loaded.values["height"], index_map.values["height"])
+    assert (
+        load_map(save_map(loaded, tmp_path / f"again.{ending}")).own_indices == loaded.own_indices
+    )
+
+
+def test_own_indices_that_a_map_cannot_have_are_refused():
+    grid = pose_grid("tripteron", {"y": 0.0}, points=5)
+    with pytest.raises(pteron.DataError, match="index: 'height' is named twice"):
+        map_index("tripteron", [HEIGHT, replace(HEIGHT, title="another")], grid)
+    with pytest.raises(pteron.DataError, match="index: 'height' is a function, and engine \"jax\""):
+        map_index("tripteron", HEIGHT, grid, engine="jax")

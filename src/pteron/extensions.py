@@ -14,9 +14,9 @@ if TYPE_CHECKING:
 
 EXTENSION_GROUPS = {
     "pteron.legs": "a kind of leg",
-    "pteron.platforms": "a motion of platforms",
     "pteron.indices": "an index of performance",
     "pteron.exports": "an export",
+    "pteron.design": "a quantity of designs",
 }
 """Groups of entry points, and what each of their names stands for."""
 

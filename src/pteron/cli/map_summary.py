@@ -44,9 +44,7 @@ def map_data(
 
 
 def _index_data(index_map: Map, name: str) -> dict[str, Any]:
-    from pteron.maps.map import ALL
-
-    index = ALL[name]
+    index = index_map.index(name)
     about = fields_as_json(index, "index=name title unit better")
     try:
         summary = index_map.statistics(name)

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import lru_cache, partial
-from importlib.metadata import entry_points
 from inspect import getdoc
 from typing import Any, Literal
 
@@ -15,6 +14,7 @@ import numpy as np
 from pteron.design.cycle_loads import best_motors, shortest_time
 from pteron.design.worst_cases import worst_position_errors
 from pteron.errors import shorten
+from pteron.extensions import extension_names, load_extension
 from pteron.indices import INDICES, Index, stiffness
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
@@ -274,8 +274,8 @@ def quantities() -> dict[str, DesignQuantity]:
     or a `DesignQuantity`.
     """
     known = _BUILT_IN | {name: _worst(index) for name, index in INDICES.items()}
-    for point in entry_points(group=GROUP):
-        known.setdefault(point.name, quantity_of(point.load(), point.name))
+    for name in extension_names(GROUP):
+        known.setdefault(name, quantity_of(load_extension(GROUP, name), name))
     return known
 
 

@@ -14,7 +14,7 @@ from pteron.atomic import write_bytes
 from pteron.errors import DataError
 from pteron.maps.checksums import checksum
 from pteron.maps.grid import Grid
-from pteron.maps.map import Map
+from pteron.maps.map import Map, own_attributes, own_indices_of
 
 _ABOUT, _STATUS = "about", "status"
 """Names of two more arrays: grid, machine and units as JSON; whether each pose is in reach."""
@@ -37,6 +37,8 @@ def write_archive(index_map: Map, target: Path) -> Path:
         "units": index_map.units,
         "grid": index_map.grid.plain(),
     }
+    if index_map.own_indices:
+        about["own"] = {index.name: own_attributes(index) for index in index_map.own_indices}
     about["sha256"] = checksum(about, arrays)
     arrays[_ABOUT] = np.array(json.dumps(about))
     np.savez_compressed(buffer, **arrays)
@@ -53,7 +55,9 @@ def read_archive(source: Path) -> Map:
             raise ValueError("its checksum is another one")
         indices = {name: arrays[name] for name in about["units"]}
         grid = Grid.from_plain(about["grid"])
-        return Map(about["robot"], grid, indices, arrays[_STATUS], about["machine"])
+        own_indices = own_indices_of(about.get("own", {}))
+        status, machine = arrays[_STATUS], about["machine"]
+        return Map(about["robot"], grid, indices, status, machine, own_indices)
     except Exception as error:  # unpacking damaged bytes raises anything
         reason = str(error) if type(error) is ValueError else type(error).__name__
         raise DataError(

@@ -86,6 +86,8 @@ class Map(Result):
     machine : str
         The text of the machine's file, as `save` writes it; empty where it is not known, as of a
         map that was read from a table.
+    own_indices : tuple of Index
+        Those of its values that are no indices of Pteron.
     """
 
     robot: str
@@ -93,6 +95,7 @@ class Map(Result):
     values: Mapping[str, Array]
     status: NDArray[np.int8]
     machine: str = ""
+    own_indices: tuple[Index, ...] = ()
 
     def __repr__(self) -> str:
         sides = " x ".join(f"{axis.name} {axis.count}" for axis in self.grid.axes)
@@ -101,7 +104,11 @@ class Map(Result):
     @property
     def indices(self) -> tuple[Index, ...]:
         """The indices of its values, in their order."""
-        return tuple(ALL[name] for name in self.values)
+        return tuple(map(self.index, self.values))
+
+    def index(self, name: str) -> Index:
+        """Return the index of a name, one's own or one of Pteron."""
+        return {**ALL, **{index.name: index for index in self.own_indices}}[name]
 
     @property
     def units(self) -> dict[str, str]:
@@ -151,7 +158,7 @@ class Map(Result):
         """
         if name not in self.values:
             raise DataError(f"{name}: is not in this map; it has {', '.join(self.values)}")
-        index, amounts, serves = ALL[name], self.values[name], self.reachable
+        index, amounts, serves = self.index(name), self.values[name], self.reachable
         known = serves & np.isfinite(amounts)
         if not known.any():
             raise DataError(f"{name}: determined at no pose of this map that serves")
@@ -207,13 +214,27 @@ class Map(Result):
         pose[self.grid.coordinates.index(name)] = float(steps[i])
         indices = {index: np.take(array, i, axis=k) for index, array in self.values.items()}
         grid = Grid(self.grid.coordinates, tuple(pose), tuple(axes))
-        return Map(self.robot, grid, indices, np.take(self.status, i, axis=k), self.machine)
+        status = np.take(self.status, i, axis=k)
+        return Map(self.robot, grid, indices, status, self.machine, self.own_indices)
 
     at = former_attribute("at", "slice_at")
 
     def _overview(self) -> Overview:
         about = f"{self.share:.1%} of {self.status.size} poses in reach"
         return frame_overview(self.robot, about, self.table())
+
+
+def own_attributes(index: Index) -> dict[str, str]:
+    """Return what a file says of an index that is not Pteron's, for `own_indices_of`."""
+    return {"units": index.unit, "long_name": index.title, "better": index.better}
+
+
+def own_indices_of(attributes: Mapping[str, Mapping[str, Any]]) -> tuple[Index, ...]:
+    """Return the indices, without functions, of what a file says of each by its name."""
+    return tuple(
+        Index(name, str(said["long_name"]), unit=str(said["units"]), better=said["better"])
+        for name, said in attributes.items()
+    )
 
 
 def column_heading(index: Index) -> str:

@@ -9,7 +9,7 @@ import shutil
 import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -20,9 +20,10 @@ from numpy.typing import NDArray
 from pteron.arguments import expect_to_fit
 from pteron.errors import DataError, OutputError
 from pteron.extras import import_extra
+from pteron.indices import Index
 from pteron.maps.checksums import checksum
 from pteron.maps.grid import Grid
-from pteron.maps.map import ALL, Map
+from pteron.maps.map import ALL, Map, own_attributes, own_indices_of
 from pteron.maps.plan import expect_same
 from pteron.platforms.coordinates import COORDINATES
 
@@ -84,17 +85,24 @@ class MapStore:
 
     @classmethod
     def create(
-        cls, path: Path, robot: str, grid: Grid, names: tuple[str, ...], plan: Mapping[str, Any]
+        cls,
+        path: Path,
+        robot: str,
+        grid: Grid,
+        names: tuple[str, ...],
+        plan: Mapping[str, Any],
+        own_indices: tuple[Index, ...] = (),
     ) -> MapStore:
         """Return the store of a map at a path; it is made if there is none.
 
         A store of the same map is continued. `robot` is the machine's name, `names` are those of
-        the indices, and `plan` is all else that the numbers depend on.
+        the indices, and `plan` is all else that the numbers depend on; but for the functions of
+        `own_indices`, which only their author knows.
         """
         full_plan = {**plan, "index": list(names), "grid": grid.plain()}
         if not path.exists():
             with _temporary_beside(path) as work:
-                _make(work, grid, names, {"name": robot, "plan": full_plan})
+                _make(work, grid, names, {"name": robot, "plan": full_plan}, own_indices)
                 _move_into_place(work, path)
         attributes = _attributes(path)
         if "plan" not in attributes:
@@ -164,19 +172,23 @@ def read_store(path: Path) -> Map:
         raise DataError(f"{path}: is no map's store")
     seal = _checked_seal(path, attributes)
     plan, name = attributes["plan"], attributes["name"]
-    store = MapStore(path.resolve(), Grid.from_plain(plan["grid"]), tuple(plan["index"]), seal)
-    return store.map(name, "" if plan["robot"] == name else plan["robot"])
+    names = tuple(plan["index"])
+    store = MapStore(path.resolve(), Grid.from_plain(plan["grid"]), names, seal)
+    group = _group(path)
+    own_indices = own_indices_of({k: dict(group[k].attrs) for k in names if k not in ALL})
+    index_map = store.map(name, "" if plan["robot"] == name else plan["robot"])
+    return replace(index_map, own_indices=own_indices)
 
 
 def save_store(index_map: Map, path: Path) -> Path:
     """Write a map to a Zarr store, whole or not at all."""
     plan = {"robot": index_map.machine or index_map.robot, "saved": True}
-    names = tuple(index_map.values)
+    names, own = tuple(index_map.values), index_map.own_indices
     if path.exists():
-        MapStore.create(path, index_map.robot, index_map.grid, names, plan)
+        MapStore.create(path, index_map.robot, index_map.grid, names, plan, own)
     with _temporary_beside(path) as work:
         new_store = work / path.name
-        store = MapStore.create(new_store, index_map.robot, index_map.grid, names, plan)
+        store = MapStore.create(new_store, index_map.robot, index_map.grid, names, plan, own)
         for number, region in enumerate(index_map.grid.regions()):
             arrays = {name: array[region] for name, array in index_map.values.items()}
             store.write(number, arrays | {_STATUS: index_map.status[region]})
@@ -185,15 +197,22 @@ def save_store(index_map: Map, path: Path) -> Path:
         return new_store.rename(path)
 
 
-def _make(work: Path, grid: Grid, names: tuple[str, ...], attributes: dict[str, Any]) -> None:
+def _make(
+    work: Path,
+    grid: Grid,
+    names: tuple[str, ...],
+    attributes: dict[str, Any],
+    own_indices: tuple[Index, ...],
+) -> None:
     """Make a store without chunks in a folder."""
     group = _zarr().create_group(work, attributes=attributes)
     axes = tuple(axis.name for axis in grid.axes)
+    known = {**ALL, **{index.name: index for index in own_indices}}
     for axis in grid.axes:
         array = group.create_array(axis.name, data=axis.values, dimension_names=(axis.name,))
         array.attrs["units"] = axis.unit
     for name in (*names, _STATUS):
-        index = ALL.get(name)
+        index = known.get(name)
         array = group.create_array(
             name,
             shape=grid.shape,
@@ -205,6 +224,8 @@ def _make(work: Path, grid: Grid, names: tuple[str, ...], attributes: dict[str, 
         )
         if index:
             array.attrs.update({"units": index.unit, "long_name": index.title})
+        if index in own_indices:
+            array.attrs.update(own_attributes(index))
     group.create_array(
         _CHECKSUM,
         shape=(len(grid.regions()),),

@@ -16,7 +16,7 @@ from matplotlib.ticker import LogLocator, NullFormatter
 from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.maps import Axis, Map, Summary
-from pteron.maps.map import ALL, MARGIN, cause
+from pteron.maps.map import MARGIN, cause
 from pteron.platforms.coordinates import coordinate
 from pteron.plots.canvas import (
     FONT_SIZE,
@@ -127,7 +127,7 @@ def _planes(volume: Map) -> list[Map]:
 
 def color_scale(shown_map: Map, name: str) -> Normalize:
     """Return the scale of colours for the values of an index."""
-    factor = shown_unit(ALL[name].unit)[0]
+    factor = shown_unit(shown_map.index(name).unit)[0]
     known = (
         factor * shown_map.values[name][shown_map.reachable & np.isfinite(shown_map.values[name])]
     )
@@ -139,7 +139,9 @@ def color_scale(shown_map: Map, name: str) -> Normalize:
     middle, last = np.percentile(known, [50.0, _LAST]).tolist()
     if low > 0.0 and high > _WIDE * middle:
         return LogNorm(low, last if last > low else high)
-    return Normalize(low, last if ALL[name].better == "less" and high > 3.0 * last else high)
+    return Normalize(
+        low, last if shown_map.index(name).better == "less" and high > 3.0 * last else high
+    )
 
 
 def map_panels(
@@ -155,7 +157,7 @@ def map_panels(
     grid = figure.add_gridspec(len(heights), columns, height_ratios=heights)
     for k, (plane, name) in enumerate(panels):
         labels = [axis_label(axis.name) for axis in plane.grid.axes]
-        upright = labels[1] if len(labels) > 1 else _index_label(name)
+        upright = labels[1] if len(labels) > 1 else _index_label(plane, name)
         axes = plain_axes(figure, labels[0], upright, grid[divmod(k, columns)])
         axes.set_title(_title(plane), fontsize=FONT_SIZE, color=INK, loc="left")
         if len(labels) == 1:
@@ -182,10 +184,10 @@ def _plane(
     """Draw an index over two coordinates."""
     axes.grid(visible=False)
     first, second = (_axis_values(axis) for axis in plane.grid.axes)
-    factor = shown_unit(ALL[name].unit)[0]
+    factor = shown_unit(plane.index(name).unit)[0]
     values = factor * np.ma.masked_invalid(plane.values[name].T)
     drawn = np.ma.masked_where(plane.status.T != REACHABLE, values)
-    better = ALL[name].better == "more"
+    better = plane.index(name).better == "more"
     mesh = axes.pcolormesh(
         first,
         second,
@@ -209,7 +211,7 @@ def _plane(
         bar.ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         bar.ax.yaxis.set_major_formatter("{x:g}")
         bar.ax.yaxis.set_minor_formatter(NullFormatter())
-    bar.set_label(f"{_index_label(name)}\n{direction}", fontsize=FONT_SIZE, color=INK)
+    bar.set_label(f"{_index_label(plane, name)}\n{direction}", fontsize=FONT_SIZE, color=INK)
     bar.ax.tick_params(labelsize=FONT_SIZE - 1.0, colors=INK, color=MUTED)
     outline: Any = bar.outline
     outline.set_visible(False)
@@ -281,7 +283,7 @@ def _mark_best(axes: Axes, plane: Map, name: str, handles: list[Any]) -> None:
         shown_unit(axis.unit)[0] * summary.best_pose[plane.grid.coordinates.index(axis.name)]
         for axis in plane.grid.axes
     ]
-    label = f"best here: {factor * summary.best:.4g} {_unit(name)}".rstrip()
+    label = f"best here: {factor * summary.best:.4g} {_unit(plane, name)}".rstrip()
     spot(axes, at[0], at[1], PAPER, INK, 6.0, zorder=5, label=label, clip_on=False)
     handles.append(axes.lines[-1])
 
@@ -293,7 +295,7 @@ def _is_constant(summary: Summary) -> bool:
 def _curve(axes: Axes, curve: Map, name: str) -> None:
     """Draw an index over one coordinate."""
     place = _axis_values(curve.grid.axes[0])
-    factor = shown_unit(ALL[name].unit)[0]
+    factor = shown_unit(curve.index(name).unit)[0]
     serves = curve.reachable
     axes.plot(place, np.where(serves, factor * curve.values[name], np.nan), color=INK)
     axes.set(xlim=(place[0], place[-1]))
@@ -322,14 +324,14 @@ def _axis_values(axis: Axis) -> Array:
     return coordinate(axis.name).shown_factor * axis.values
 
 
-def _index_label(name: str) -> str:
-    unit = _unit(name)
-    return f"{ALL[name].title} ({unit})" if unit else ALL[name].title
+def _index_label(index_map: Map, name: str) -> str:
+    unit = _unit(index_map, name)
+    return f"{index_map.index(name).title} ({unit})" if unit else index_map.index(name).title
 
 
-def _unit(name: str) -> str:
+def _unit(index_map: Map, name: str) -> str:
     """Return the unit in which an index is shown."""
-    return shown_unit(ALL[name].unit)[1]
+    return shown_unit(index_map.index(name).unit)[1]
 
 
 def _title(shown_map: Map) -> str:
