@@ -185,19 +185,13 @@ def _calibrate(
     judged = None
     steps.report("Judging")
     if partial_fit is not None:
-        other = (
-            held_out
-            if held_out is not None
-            else _select_fitting_rows(measurements, fit, ~fitted_rows)
-        )
-        judged = _held_out_errors(start, partial_fit, blocks, other)
+        if held_out is None:
+            held_out = _select_fitting_rows(measurements, fit, ~fitted_rows)
+        judged = _held_out_errors(start, partial_fit, blocks, held_out)
     shown = observability_of(start, measurements, blocks, _scaled_slopes(fitter, fit), seed)
     steps.report("Looking for faults")
-    findings = (
-        *mistakes,
-        *zero_faults(fitter, fit),
-        *residual_faults(fitter, fit, aside.reasons),
-    )
+    faults = (*zero_faults(fitter, fit), *residual_faults(fitter, fit, aside.reasons))
+    findings = (*mistakes, *faults)
     possible = open_errors(measurements, fit, blocks)
     hidden = None if mistakes else hidden_order(measurements, blocks, start, fit)
     tilt = hidden_tilt(fitter, fit)

@@ -108,12 +108,7 @@ def export(
     options: dict[str, object] = {"function": function, "float": float_, "gains": gains}
     options |= {"specialised": specialised, "wrench": wrench, "base": base}
     options |= {"output": output != "force"}
-    _check(targets, [name for name, is_set in options.items() if is_set])
-    if tool is not None and base is not None:
-        raise DataError(
-            f"--tool {tool}: not with --base, whose values are of the machine without it; leave it "
-            "out, and let the controller call set_payload_base"
-        )
+    _check(targets, [name for name, is_set in options.items() if is_set], tool)
     machine = Carried(tool=tool).mount_tool(machine)
     files = []
     with spinner(f"Writing code for {machine.name}"):
@@ -133,11 +128,8 @@ def export(
             )
         if st is not None:
             files += export_st(machine, asked_for, st, wrench=wrench, output=output, base=base)
-        for name, folder in targets.items():
-            if name == "target":
-                files += _export_with_extension(machine, folder)
-            elif name not in ("c", "st"):
-                files += getattr(import_module("pteron.export"), f"export_{name}")(machine, folder)
+        for name in targets.keys() - {"c", "st"}:
+            files += _export_target(machine, name, targets[name])
     if grade != _TRUSTED:
         note(f"Warning: {base}: the verdict on these values is: {grade}")
     return CommandResult(
@@ -145,17 +137,22 @@ def export(
     )
 
 
-def _export_with_extension(machine: Manipulator, target: str) -> list[Path]:
-    """Return the files that an installed package's export writes; `target` is NAME=DIR."""
+def _export_target(machine: Manipulator, target: str, folder: str) -> list[Path]:
+    """Return the files of a target; `folder` of an installed package's export is NAME=DIR."""
+    if target != "target":
+        files: list[Path] = getattr(import_module("pteron.export"), f"export_{target}")(
+            machine, folder
+        )
+        return files
     from pteron.export.installed import export_named
 
-    name, separator, folder = target.partition("=")
-    if not (name and separator and folder):
-        raise DataError(f"--target: {target!r} given, NAME=DIR expected, as in acme=controller")
-    return export_named(name)(machine, folder)
+    name, separator, place = folder.partition("=")
+    if not (name and separator and place):
+        raise DataError(f"--target: {folder!r} given, NAME=DIR expected, as in acme=controller")
+    return export_named(name)(machine, place)
 
 
-def _check(targets: dict[str, str], options: list[str]) -> None:
+def _check(targets: dict[str, str], options: list[str], tool: str | None) -> None:
     """Refuse no target, or several (but C with Structured Text), and options of another target."""
     if not targets:
         names = ", ".join(f"--{name}" for name in (*_TARGETS, "target"))
@@ -169,3 +166,8 @@ def _check(targets: dict[str, str], options: list[str]) -> None:
         raise DataError(f"{names}: goes with --c and --st, not with --{others[0]}; leave it out")
     if "float" in options and "c" not in targets:
         raise DataError("--float: goes with --c; Structured Text has LREAL alone")
+    if tool is not None and "base" in options:
+        raise DataError(
+            f"--tool {tool}: not with --base, whose values are of the machine without it; leave it "
+            "out, and let the controller call set_payload_base"
+        )

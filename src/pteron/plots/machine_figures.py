@@ -47,6 +47,8 @@ _INSET = 0.02
 _TITLE = 0.24
 """Height of the title over a picture, inches."""
 
+_TITLE_STYLE: dict[str, Any] = {"ha": "center", "va": "bottom", "fontsize": FONT_SIZE, "color": INK}
+
 
 def draw(
     robot: RobotLike,
@@ -255,8 +257,7 @@ def poses_figure(
             draw_path(sheet, path)
         draw_directions(sheet, scene)
         if titles:
-            style: dict[str, Any] = {"ha": "center", "va": "bottom", "fontsize": FONT_SIZE}
-            figure.text(x_start + 0.5 / columns, below + share, titles[k], color=INK, **style)
+            figure.text(x_start + 0.5 / columns, below + share, titles[k], **_TITLE_STYLE)
         sheets.append(sheet)
     together = np.vstack([sheet.drawn_points for sheet in sheets])
     for sheet in sheets:

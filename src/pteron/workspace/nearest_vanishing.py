@@ -117,7 +117,8 @@ class Search:
             boxes = np.concatenate([halve_boxes(batch), others])
             distances = self._distances(boxes)
             boxes, distances = boxes[distances < nearest], distances[distances < nearest]
-            proved = distances.min(initial=nearest) / ((1.0 - _CLOSE) * nearest)
+            known = np.isfinite(nearest)  # before a place is found there is nothing to reach
+            proved = distances.min(initial=nearest) / ((1.0 - _CLOSE) * nearest) if known else 0.0
             self._report(min(max(examined / most, proved), 1.0))
         if len(boxes) and distances.min() < (1.0 - _CLOSE) * nearest:
             order = np.argsort(distances, kind="stable")

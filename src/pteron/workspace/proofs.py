@@ -196,11 +196,7 @@ def prove(
             return Proof(True, robot, region, required, boxes=examined)
         counterexample = _find_counterexample(robot, test, region, boxes)
         if counterexample is not None:
-            margins = condition_margins(robot, required, counterexample)
-            # Out of reach limits are undefined: the cause is the reach.
-            fails = margins < 0.0
-            fails = fails if fails.any() else np.isnan(margins)
-            failed = tuple(required[c] for c in np.flatnonzero(fails))
+            failed = _failed_conditions(robot, required, counterexample)
             return Proof(
                 False, robot, region, required, counterexample, causes=failed, boxes=examined
             )
@@ -211,6 +207,16 @@ def prove(
                 None, robot, region, required, None, boxes[smallest], causes=causes, boxes=examined
             )
         boxes, open_bits = halve_boxes(boxes, sizes), np.repeat(open_bits, 2)
+
+
+def _failed_conditions(
+    robot: Manipulator, required: tuple[Condition, ...], pose: Array
+) -> tuple[Condition, ...]:
+    """Return the conditions that a pose violates; out of reach limits have no margin."""
+    margins = condition_margins(robot, required, pose)
+    fails = margins < 0.0
+    fails = fails if fails.any() else np.isnan(margins)
+    return tuple(required[c] for c in np.flatnonzero(fails))
 
 
 def expect_space(robot: Manipulator, name: str) -> None:
