@@ -38,7 +38,7 @@ ENTRY_POINTS = """
 [pteron.indices]
 height = acme_pteron:height
 wrong = acme_pteron:unnamed
-[pteron.exports]
+[pteron.export]
 acme = acme_pteron:write
 silent = acme_pteron:silent
 number = acme_pteron:__name__

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 EXTENSION_GROUPS = {
     "pteron.legs": "a kind of leg",
     "pteron.indices": "an index of performance",
-    "pteron.exports": "an export",
+    "pteron.export": "an export",
     "pteron.design": "a quantity of designs",
 }
 """Groups of entry points, and what each of their names stands for."""

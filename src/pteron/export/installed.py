@@ -10,7 +10,7 @@ from pteron.errors import ModelError
 from pteron.extensions import extension_names, extension_value, load_extension
 from pteron.manipulator import RobotLike, as_manipulator
 
-GROUP = "pteron.exports"
+GROUP = "pteron.export"
 """The group of entry points by which installed packages add exports."""
 
 
@@ -33,7 +33,7 @@ def export_names() -> tuple[str, ...]:
 def export_named(name: str) -> Callable[[RobotLike, str | Path], list[Path]]:
     """Return an installed package's export: a function that writes a machine to a folder.
 
-    A package names it as an entry point of the group `pteron.exports`: a function of a
+    A package names it as an entry point of the group `pteron.export`: a function of a
     `Manipulator` and a folder, `pathlib.Path`, which returns the paths of the files it wrote.
     `pteron export FILE --target NAME=DIR` calls it.
 
