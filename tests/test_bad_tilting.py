@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import tilting
-from command_line import run
+from commands import run
 from mechanisms import CLIENTS, TILTED
 from scipy.optimize import root
 from scipy.spatial.transform import Rotation

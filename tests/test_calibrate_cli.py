@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 import pytest
-from command_line import done, refused
+from commands import done, refused
 from measured import built, positions
 from mechanisms import CATALOG, CLIENTS
 

@@ -13,7 +13,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import pytest
 import tomlkit
-from command_line import refused, run
+from commands import refused, run
 from mechanisms import CLIENTS
 from scipy.spatial.transform import Rotation
 

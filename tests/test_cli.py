@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 import pytest
-from command_line import PROGRAM, done, read, refused, run, without_styles
+from commands import PROGRAM, done, read, refused, run, without_styles
 from mechanisms import CLIENTS, gated
 
 import pteron

@@ -15,7 +15,7 @@ import numpy as np
 import polars as pl
 import pytest
 import tomlkit
-from command_line import done, refused, run
+from commands import done, refused, run
 from mechanisms import CATALOG, CLIENTS
 from objectives import crank_area, ends_its_process, widest_pose
 from threadpoolctl import threadpool_limits

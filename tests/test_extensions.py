@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from command_line import refused, run
+from commands import refused, run
 
 import pteron
 from pteron.export import export_named, export_names

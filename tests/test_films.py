@@ -10,7 +10,7 @@ from pathlib import Path
 import imageio_ffmpeg
 import numpy as np
 import pytest
-from command_line import done, refused, run
+from commands import done, refused, run
 from mechanisms import CLIENTS, gated
 from PIL import Image, ImageSequence
 

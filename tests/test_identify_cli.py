@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 import pytest
-from command_line import done, refused, run
+from commands import done, refused, run
 from logs_of_motions import log_of, motion
 from mechanisms import CATALOG, CLIENTS
 from page_reader import Reader, strict

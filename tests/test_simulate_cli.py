@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import polars as pl
 import pytest
-from command_line import read
+from commands import read
 from mechanisms import CLIENTS
 from typer.testing import CliRunner
 

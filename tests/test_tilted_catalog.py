@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 import tilting
-from command_line import run
+from commands import run
 from mechanisms import CLIENTS, TILTED, gated
 
 import pteron

@@ -8,7 +8,7 @@ from zipfile import ZipFile
 import numpy as np
 import polars as pl
 import pytest
-from command_line import done, refused
+from commands import done, refused
 from exported_code import compiled
 from mechanisms import CLIENTS, states
 from scipy.spatial.transform import Rotation

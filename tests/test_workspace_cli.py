@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 import pytest
-from command_line import done, read, refused, run
+from commands import done, read, refused, run
 from mechanisms import gated
 
 import pteron
