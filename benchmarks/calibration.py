@@ -19,7 +19,7 @@ import numpy as np
 from scipy.stats import chi2  # type: ignore[import-untyped]
 
 import pteron
-from pteron.calibration import Measurements, Plane, Setup, calibrate, plan
+from pteron.calibration import Measurements, ReferencePlane, Setup, calibrate, plan
 from pteron.calibration.fit import Fitter
 from pteron.calibration.guess import Guess
 from pteron.calibration.residuals import MachineSlopes
@@ -43,7 +43,7 @@ class Twin:
     def __init__(self, name: str, seed: int, count: int) -> None:
         self.robot = robot = pteron.load(name)
         self.rng = np.random.default_rng(seed)
-        empty = Measurements.of(robot, np.zeros((1, len(robot.legs))))
+        empty = Measurements.from_readings(robot, np.zeros((1, len(robot.legs))))
         self.blocks = blocks_of(robot, empty, FREE)
         tolerances = np.array([u.tolerance for block in self.blocks for u in block.unknowns])
         self.steps = tolerances * self.rng.standard_normal(len(tolerances))
@@ -60,14 +60,14 @@ class Twin:
     def measured(self, part: slice) -> Measurements:
         """Return the measurements of some rows: whole poses with noise."""
         robot, poses = self.robot, self.poses[part]
-        place, axes = self.truth.robot.platform.at(poses)
+        place, axes = self.truth.robot.platform.placement(poses)
         tool = place + np.einsum("nij,i->nj", axes, self.truth.marks[""])
         seen = [name in robot.coordinates for name in "xyz"]
         lengths = int((~robot.platform.angular).sum())
         if lengths not in (0, 3):
             tool = tool @ np.array(robot.platform.frame).T
         tool = np.where(seen, tool, np.nan) + NOISE * self.rng.standard_normal(tool.shape)
-        given = Measurements.of(robot, self.readings[part], poses=poses, positions=tool)
+        given = Measurements.from_readings(robot, self.readings[part], poses=poses, positions=tool)
         noisy = given.angles + NOISE * self.rng.standard_normal(given.angles.shape)
         noise = {"position": NOISE, "angle": NOISE}
         return replace(given, angles=noisy, setup=Setup(noise=noise))
@@ -112,8 +112,8 @@ def heights(name: str, repetitions: int) -> tuple[Any, ...]:
         readings = slopes.joints(twin.truth, poses) - twin.truth.zeros
         tool = twin.truth.marks[""][2]
         seen = NOISE * twin.rng.standard_normal(len(poses))
-        setup = Setup(noise={"height": NOISE}, planes={"": Plane(offset=level + tool)})
-        given = Measurements.of(robot, readings[:30], heights=seen[:30], setup=setup)
+        setup = Setup(noise={"height": NOISE}, planes={"": ReferencePlane(offset=level + tool)})
+        given = Measurements.from_readings(robot, readings[:30], heights=seen[:30], setup=setup)
         fitter = Fitter(given, twin.blocks, Guess.drawn(robot, given), poses[:30])
         fit = fitter.run()
         found = slopes.poses(fit.guess, fit.guess.joints(readings[30:]), poses[30:])
@@ -123,7 +123,7 @@ def heights(name: str, repetitions: int) -> tuple[Any, ...]:
         off = np.abs(fit.total - twin.steps) / np.sqrt(np.diag(fit.covariance))
         far, farther = far + (off[lengths] > 3).sum(), farther + (off[lengths] > 5).sum()
         values += sum(lengths)
-        others = Measurements.of(robot, readings[30:])
+        others = Measurements.from_readings(robot, readings[30:])
         moved = slopes.pose_slopes(fit.guess, others, found)[0][:, :2]
         spread = np.sqrt(np.einsum("nip,pq,niq->ni", moved, fit.covariance, moved, optimize=True))
         sideways.append(np.abs(found - poses[30:])[:, :2] < 1.959964 * spread)
@@ -142,7 +142,7 @@ def trap(seed: int) -> list[tuple[float, float]]:
     poses = np.column_stack([places, 1e-4 * rng.standard_normal(len(places))])
     joints = pteron.inverse_kinematics(printer(0.1442, 0.2881), poses)
     robot = printer(0.1447, 0.2878)
-    given = Measurements.of(
+    given = Measurements.from_readings(
         robot, joints + np.array([3e-4, -2e-4, 1e-4]), heights=np.zeros(len(poses))
     )
     nine = ["zeros", "lengths", "radius", "legs[1].angle", "legs[2].angle"]

@@ -26,9 +26,9 @@ from measuring.as_they_are import as_they_are
 import pteron
 from pteron.controllers import CONTROLLERS, ComputedTorque
 from pteron.design import Candidate, Choice, Job, choose_machine, read_job
-from pteron.design.choosing.choose import cases_of
-from pteron.design.choosing.rating import Rating
-from pteron.design.choosing.search import search_kind
+from pteron.design.choose import evaluators_of
+from pteron.design.kind_search import search_kind
+from pteron.design.rating import Rating
 from pteron.dynamics import drive_forces
 from pteron.indices import Tolerances, pose_error
 from pteron.kernels import Array, sharing_programs
@@ -116,7 +116,7 @@ def checked(job: Job, one: Candidate) -> str:
     errors = Tolerances((np.pi / job.accuracy.counts_per_turn / ratios).tolist())
     error = float(pose_error(robot, poses, errors).position.max())
     assert max(error, one.figures["error"]) <= job.accuracy.most
-    carrying = job.payload.on(robot)
+    carrying = job.payload.add_to(robot)
     found = [drive_margins(carrying, *state) for state in random_cycles(job, robot, one, rng)]
     worst = np.min(found, axis=0)
     assert worst.min() >= 1.0
@@ -144,8 +144,8 @@ def random_poses(job: Job, robot: Manipulator, one: Candidate, rng: np.random.Ge
 
 def carried(robot: Manipulator, one: Candidate, places: Array) -> Array:
     """Return poses from places of the tool about the middle, and angles."""
-    _, axes = robot.platform.at(places)
-    _, upright = robot.platform.at(np.zeros((1, robot.freedom)))
+    _, axes = robot.platform.placement(places)
+    _, upright = robot.platform.placement(np.zeros((1, robot.freedom)))
     tool = np.array(robot.platform.tool)
     found = np.array(one.middle) + places
     found[:, :3] -= tool @ axes - tool @ upright
@@ -218,7 +218,7 @@ def driven(job: Job, robot: Manipulator, one: Candidate) -> str:
     points = path_points(job, robot, np.zeros(robot.freedom), 0.0)
     path = line_path(robot, carried(robot, one, points), cycle.corner)
     motion = polynomial_motion(robot, path, duration=cycle.duration)
-    carrying, limits = job.payload.on(robot), limits_of(robot).force
+    carrying, limits = job.payload.add_to(robot), limits_of(robot).force
     soft, sensors = as_they_are(carrying), Sensors(1e-6)
     tuned = tune(soft, motion, ComputedTorque(), model=carrying, sensors=sensors).controller
     told = [f"simulated: {motion.duration:g} s"]
@@ -244,12 +244,12 @@ def against_chance() -> None:
     for seed in range(_SEED, _SEED + _JOBS):
         job = random_job(seed)
         objective = job.objectives[0]
-        for name, case in cases_of(job).items():
-            own = least(search_kind(case, _EVALUATIONS, seed), objective)
-            rng, (low, high) = np.random.default_rng(1000 + seed), case.kind.ranges
+        for name, evaluator in evaluators_of(job).items():
+            own = least(search_kind(evaluator, _EVALUATIONS, seed), objective)
+            rng, (low, high) = np.random.default_rng(1000 + seed), evaluator.kind.ranges
             drawn = low + rng.random((10 * _EVALUATIONS, len(low))) * (high - low)
-            with sharing_programs(case.kind.like):
-                other = least([case.rate(values) for values in drawn], objective)
+            with sharing_programs(evaluator.kind.like):
+                other = least([evaluator.rate(values) for values in drawn], objective)
             ratios.append(own / other if np.isfinite(other) else 0.0)
             print(f"job {seed}, {name}: {objective} {own:.4g}, by chance {other:.4g}", flush=True)
     print(f"at worst {max(ratios):.3f} of what chance finds")

@@ -17,8 +17,8 @@ from tempfile import TemporaryDirectory
 from measuring import quick
 
 import pteron
-from pteron.design import Design, Spec, Summary, Task, proved_cube, read_spec, search
-from pteron.design.rows import evaluated
+from pteron.design import Design, FrontReport, Spec, Task, proved_cube, read_spec, search
+from pteron.design.rows import evaluate_design
 
 _FILE = Path(__file__).parent.parent / "examples" / "design_quadrupteron.toml"
 _NEEDED = 1.3
@@ -33,12 +33,12 @@ def main() -> None:
     )
     for name, spec in (("links as long as needed", free), ("links no longer in all", kept)):
         compared(name, sized(spec))
-    task = Task.of(free)
+    task = Task.from_spec(free)
     values = task.ranges.mean(axis=0).tolist()
-    evaluated(task, values)
+    evaluate_design(task, values)
     begin = time.perf_counter()
     for _ in range(10):
-        evaluated(task, values)
+        evaluate_design(task, values)
     print(f"one design, its largest cube included: {100 * (time.perf_counter() - begin):.0f} ms")
     resumed(sized(free, population=8, generations=3))
 
@@ -55,8 +55,8 @@ def compared(name: str, spec: Spec) -> None:
     begin = time.perf_counter()
     front = search(spec)
     took = time.perf_counter() - begin
-    summary = Summary(front)
-    before, best = summary.start.cube, summary.chosen[0]
+    summary = FrontReport(front)
+    before, best = summary.start.cube, summary.selection[0]
     assert before is not None
     assert best.cube is not None
     with TemporaryDirectory() as folder:
@@ -84,7 +84,7 @@ def resumed(spec: Spec) -> None:
         chunks = sorted(half.glob("*/0*.parquet"))
         for chunk in chunks[len(chunks) // 2 :]:
             chunk.unlink()
-        same = search(spec, folder=half).table.equals(first.table)
+        same = search(spec, folder=half).designs.equals(first.designs)
     print(f"a run that lost half of its {len(chunks)} chunks: {'the same' if same else 'ANOTHER'}")
     assert same
 

@@ -100,7 +100,7 @@ def searched(robot: pteron.Manipulator, joints: Array) -> int:
             at += move * np.minimum(1.0, 0.5 / np.linalg.norm(move, axis=-1, keepdims=True))
         at = at[np.isfinite(at).all(axis=-1)]
         at = at[step(joints, at)[1] < 1e-13]
-    place, axes = platform.at(at)
+    place, axes = platform.placement(at)
     known = np.concatenate([place, axes.reshape(-1, 9)], axis=-1)
     count = 0
     while len(known):

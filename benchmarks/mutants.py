@@ -138,7 +138,7 @@ refined = 1
 seed = 5
 """
     (work / "search.toml").write_bytes(text)
-    Task.of(read_spec(work / "search.toml"))
+    Task.from_spec(read_spec(work / "search.toml"))
 
     def damage(place: Path, chance: Chance) -> Path:
         file = place / "search.toml"
@@ -146,7 +146,7 @@ seed = 5
         return file
 
     def read(file: Path) -> str:
-        task = Task.of(read_spec(file))
+        task = Task.from_spec(read_spec(file))
         expect(np.isfinite(task.ranges).all(), "a range is not finite")
         return _AS_IT_STANDS
 

@@ -99,14 +99,14 @@ def _pushed(robot: pteron.Manipulator) -> tuple[list[float], float]:
     """Return times, ms, of spans under a spring that pulls sideways, and how far it pulled, m."""
     home = home_pose(robot)
     push, times = Push(robot, home, next(iter(DRIVES))), []
-    at = robot.platform.at(home)[0]
+    at = robot.platform.placement(home)[0]
     push.pull(at, at + 0.1 * robot.platform.directions[0])
     for _ in range(6 if quick() else 90):
         begin = perf_counter()
         push.go(_SPAN)
         times.append(1e3 * (perf_counter() - begin))
         assert np.isfinite(push.pose).all()
-    return times[3:], float(np.linalg.norm(robot.platform.at(push.pose)[0] - at))
+    return times[3:], float(np.linalg.norm(robot.platform.placement(push.pose)[0] - at))
 
 
 def _told(times: list[float]) -> str:

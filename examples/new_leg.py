@@ -19,8 +19,8 @@ from pteron.bodies.motion import BodyMotion, Expression, PointMotion, RotationMo
 from pteron.bodies.vectors import Vector
 from pteron.legs import KINDS, Drive, Reading
 from pteron.legs.keys import Key
-from pteron.legs.kind import SLIDER, LegKind, Quantity, ReachBound
-from pteron.legs.leg import Joint, LegEquations, LegMotion, Reach, Sphere
+from pteron.legs.kind import SLIDER, LegKind, LegQuantity, ReachBound
+from pteron.legs.leg import Joint, LegEquations, LegMotion, Reach, SphereLocus
 from pteron.legs.rods import rod_body, universal_joints
 
 
@@ -53,13 +53,13 @@ class SliderRod(LegKind):
     }
 
     @property
-    def quantities(self) -> tuple[Quantity, ...]:
+    def quantities(self) -> tuple[LegQuantity, ...]:
         return (
-            Quantity("guide_point", "point", self.guide_point),
-            Quantity("slider_direction", "direction", self.slider_direction, "e"),
-            Quantity("bar_direction", "direction", self.bar_direction, "d"),
-            Quantity("lower_length", "length", (self.lower_length,), "ll"),
-            Quantity("elbow", "sign", (self.elbow,)),
+            LegQuantity("guide_point", "point", self.guide_point),
+            LegQuantity("slider_direction", "direction", self.slider_direction, "e"),
+            LegQuantity("bar_direction", "direction", self.bar_direction, "d"),
+            LegQuantity("lower_length", "length", (self.lower_length,), "ll"),
+            LegQuantity("elbow", "sign", (self.elbow,)),
         )
 
     def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
@@ -124,8 +124,8 @@ class SliderRodEquations(LegEquations):
         margin = self.ll - ca.sqrt(ca.dot(w, w) - h * h)
         return Reach(margin, discriminant, self.ll**2, self.ll)
 
-    def locus(self, q: Expression) -> Sphere:
-        return Sphere(self.r + q * self.e, self.ll)
+    def locus(self, q: Expression) -> SphereLocus:
+        return SphereLocus(self.r + q * self.e, self.ll)
 
 
 SliderRod.equations_class = SliderRodEquations

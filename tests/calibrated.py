@@ -38,7 +38,7 @@ def printer(radius, arm, angles=(210.0, 330.0, 90.0)):
 
 def tool_places(robot, poses, tool):
     """Return the tool (N, 3) as logs count it; NaN where the pose has no such coordinate."""
-    place, axes = robot.platform.at(poses)
+    place, axes = robot.platform.placement(poses)
     point = place + np.einsum("nij,i->nj", axes, tool)
     if int((~robot.platform.angular).sum()) not in (0, 3):
         point = point @ np.array(robot.platform.frame).T
@@ -50,7 +50,7 @@ def tool_places(robot, poses, tool):
 def off_drawing(robot, seed=0, count=60):
     """Return a machine off its drawing by tolerances: truth, steps, poses and readings."""
     rng = np.random.default_rng(seed)
-    empty = Measurements.of(robot, np.zeros((1, len(robot.legs))))
+    empty = Measurements.from_readings(robot, np.zeros((1, len(robot.legs))))
     blocks = blocks_of(robot, empty, GEOMETRY)
     tolerances = np.array([u.tolerance for block in blocks for u in block.unknowns])
     steps = tolerances * rng.standard_normal(len(tolerances))
@@ -72,6 +72,6 @@ def measured(robot, seed=0, count=60, told=True):
     angles = poses + NOISE * rng.standard_normal(poses.shape)
     noise = {"position": NOISE, "angle": NOISE} if told else {}
     places = places + NOISE * rng.standard_normal(places.shape)
-    return Measurements.of(
+    return Measurements.from_readings(
         robot, readings, poses=angles, positions=places, setup=Setup(noise=noise)
     )

@@ -284,7 +284,7 @@ class Trial:
             if leg.reading is not None:
                 joints[:, i] = (joints[:, i] - leg.reading.zero) / leg.reading.scale
         good = np.isfinite(joints).all(axis=1)
-        place, axes = calibrated.platform.at(self.desired[good])
+        place, axes = calibrated.platform.placement(self.desired[good])
         tool = np.array(calibrated.platform.tool or (0.0, 0.0, 0.0))
         asked = place + np.einsum("i,nij->nj", tool, axes)
         gone = self.plant.tools(joints[good] + self.zeros, starts(self.robot, self.desired[good]))
@@ -293,7 +293,7 @@ class Trial:
 
 def starts(robot, poses):
     """Return six coordinates (N, 6) of the body near poses."""
-    place, axes = robot.platform.at(poses)
+    place, axes = robot.platform.placement(poses)
     matrices = np.swapaxes(axes, -1, -2)
     # Rotation vectors, by the antisymmetric part: turns are well below a right angle.
     parts = 0.5 * (matrices - np.swapaxes(matrices, -1, -2))
@@ -355,8 +355,8 @@ def trial(case, fault, seed=0, count=60):
         measured["poses"] = angles_of(robot, poses, matrices, rng)
     readings, measured, zeros = spoil(fault, robot, readings, measured, zeros, count)
     distances = measured.pop("distances", None)
-    plane = {"": pteron.calibration.Plane(offset=level)} if heights else {}
-    given = Measurements.of(robot, readings, setup=Setup(planes=plane), **measured)
+    plane = {"": pteron.calibration.ReferencePlane(offset=level)} if heights else {}
+    given = Measurements.from_readings(robot, readings, setup=Setup(planes=plane), **measured)
     if distances is not None:
         given = replace(given, distances=distances, origins=origins_of(count))
     return Trial(given, robot, plant, zeros, desired)
@@ -371,7 +371,7 @@ def angles_of(robot, poses, matrices, rng):
     """Return poses (N, 6) with the angles of matrices, by Newton's steps on the platform's own."""
     found = poses.copy()
     for _ in range(20):
-        axes = np.swapaxes(robot.platform.at(found)[1], -1, -2)
+        axes = np.swapaxes(robot.platform.placement(found)[1], -1, -2)
         off = matrices @ np.swapaxes(axes, -1, -2)
         vector = 0.5 * np.stack(
             [off[:, 2, 1] - off[:, 1, 2], off[:, 0, 2] - off[:, 2, 0], off[:, 1, 0] - off[:, 0, 1]],
@@ -381,7 +381,7 @@ def angles_of(robot, poses, matrices, rng):
         for k in range(3):
             step = np.zeros(6)
             step[3 + k] = 1e-6
-            ahead = np.swapaxes(robot.platform.at(found + step)[1], -1, -2)
+            ahead = np.swapaxes(robot.platform.placement(found + step)[1], -1, -2)
             rate = (ahead - axes) / 1e-6 @ np.swapaxes(axes, -1, -2)
             slopes[:, :, k] = np.stack([rate[:, 2, 1], rate[:, 0, 2], rate[:, 1, 0]], axis=-1)
         found[:, 3:] += np.linalg.solve(slopes, vector[..., None])[..., 0]

@@ -245,7 +245,9 @@ def _drawn_machine(rng, name, kinds):
             pteron.platforms.Bar(rng.uniform(0.1, 0.3), (*rng.uniform(-0.06, 0.06, 2), 0.0))
             for _ in range(2)
         ]
-        parts["geared"] = [pteron.platforms.Geared(rng.uniform(1e-5, 1e-4), rng.uniform(-6.0, 6.0))]
+        parts["geared"] = [
+            pteron.platforms.GearedPart(rng.uniform(1e-5, 1e-4), rng.uniform(-6.0, 6.0))
+        ]
     platform = pteron.platforms.Platform(motion, inertia(rng, 0.08), axis, x_axis, slides, **parts)
     return pteron.Manipulator(name, platform, tuple(legs), 9.81 * unit(rng))
 
@@ -395,3 +397,35 @@ def relative_error(found, expected):
     """Return the largest error of any row, relative to the row's largest entry."""
     scale = np.abs(expected).max(axis=-1, keepdims=True)
     return float((np.abs(np.asarray(found) - expected) / scale).max())
+
+
+def with_limits(robot, low, high):
+    return replace(robot, legs=tuple(replace(leg, limits=(low, high)) for leg in robot.legs))
+
+
+def fourfold():
+    """Return a layout with fourfold symmetry about k, which is singular everywhere."""
+    robot = MECHANISMS["quadrupteron"]
+    legs = []
+    for i, leg in enumerate(robot.legs):
+        turn = Rotation.from_euler("z", 90 * i, degrees=True).as_matrix()
+        legs.append(
+            replace(
+                leg,
+                guide_point=turn @ [0.25, 0.0, 0.0],
+                platform_point=turn @ [0.04, 0.0, 0.0],
+                direction=turn @ np.array([0.0, 0.6, 0.8]),
+                upper_length=0.16,
+                lower_length=0.16,
+            )
+        )
+    return replace(robot, legs=tuple(legs))
+
+
+MIXTURES = [
+    *("PPP", "RRR", "SSS", "PRS"),  # 3T
+    *("PPPP", "RRRR", "SSSS", "PPSS", "RRRU", "PRSU", "PRSSI"),  # 3T1R
+    *("CC", "LL", "CL", "CS", "TT", "TL"),  # 2T
+    *("CCC", "LLL", "CCL", "CCU", "CPR", "TTT", "TCL", "TTU"),  # 2T1R
+]
+"""The letters are those of `random_machine`."""

@@ -7,9 +7,14 @@ of the language that is in use; what reads long blocks is held against blark on 
 import math
 import re
 from itertools import product
+from types import SimpleNamespace
 
 import blark.transform as tree
+import numpy as np
 from blark.parse import new_parser, parse_source_code
+
+from pteron.export.structured_text import function_block
+from pteron.kernels.graph import graph_of
 
 _WORDS = """
     abs abstract acos action add and andn any array asin at atan atan2 begin bool by byte cal
@@ -402,3 +407,45 @@ class _Reader:
             values.append(self.expression())
         self.take(last)
         return values
+
+
+def text_of(given, name="FB_Test", **more):
+    graph = graph_of(given.function, given.inputs)
+    return function_block(name, graph, given.inputs, given.outputs, **more)
+
+
+def as_elements(port, values):
+    """Return the elements of an array as the controller holds them, by subscripts."""
+    values = np.asarray(values, dtype=float).ravel()
+    if not port.shape:
+        return float(values[0])
+    places = product(*map(range, port.shape))
+    return dict(zip(places, map(float, values), strict=True))
+
+
+def as_array(port, elements):
+    if not port.shape:
+        return np.array([elements])
+    return np.array([elements[place] for place in product(*map(range, port.shape))])
+
+
+class Runner:
+    """A program twice: as a block that runs, and in CasADi."""
+
+    def __init__(self, given, **more):
+        self.program = given
+        self.text = text_of(given, **more)
+        self.block = Block(read(self.text))
+
+    def __call__(self, values):
+        """Return Valid, Status and the outputs, one vector a port."""
+        ports = self.program.inputs
+        found = self.block(
+            **{p.name: as_elements(p, v) for p, v in zip(ports, values, strict=True)}
+        )
+        outputs = [as_array(port, found[port.name]) for port in self.program.outputs]
+        return SimpleNamespace(valid=found["valid"], status=found["status"], outputs=outputs)
+
+    def casadi(self, values):
+        results = self.program.function.call([np.asarray(value, float) for value in values])
+        return [np.array(result).ravel("F") for result in results]

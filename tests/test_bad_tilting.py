@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import tilting
+from commands import run
 from mechanisms import CLIENTS, TILTED
 from scipy.optimize import root
 from scipy.spatial.transform import Rotation
-from test_cli import run
 
 import pteron
 from pteron.errors import ModelError, SingularPose, UnlikelyValue, UnreachablePose
@@ -118,7 +118,7 @@ def test_a_screws_length_is_that_of_a_ram_between_universal_joints(tmp_path):
 
     poses = home_pose(robot) + rng.uniform(-0.4, 0.4, (5, 6))
     for pose, added in zip(poses, screw_lengths(robot, poses), strict=True):
-        place, rows = robot.platform.at(pose)
+        place, rows = robot.platform.placement(pose)
         target = Rotation.from_matrix(rows.T), place + leg.platform_point @ rows
         length = pteron.inverse_kinematics(robot, pose)[1]
         found = root(missed, [0, 0, 0, 0, 0, length], args=(target,), tol=1e-14)

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 import pytest
+from commands import done, refused
 from measured import built, positions
 from mechanisms import CATALOG, CLIENTS
-from test_cli import done, refused
 
 import pteron
 

@@ -11,7 +11,7 @@ from mechanisms import CLIENTS, NIGHTLY, gated
 from scipy.spatial.transform import Rotation
 
 import pteron
-from pteron.calibration import Measurements, Place, Plane, Setup, calibrate, plan
+from pteron.calibration import Measurements, Place, ReferencePlane, Setup, calibrate, plan
 from pteron.calibration.exact_rank import exact_rank
 from pteron.calibration.fit import Fitter
 from pteron.calibration.guess import Guess, tolerances_of
@@ -48,7 +48,9 @@ def poses_seen(robot, poses):
     """Return measurements of whole poses without noise."""
     tool = np.array(robot.platform.tool or (0.0, 0.0, 0.0))
     joints = pteron.inverse_kinematics(robot, poses)
-    return Measurements.of(robot, joints, poses=poses, positions=tool_places(robot, poses, tool))
+    return Measurements.from_readings(
+        robot, joints, poses=poses, positions=tool_places(robot, poses, tool)
+    )
 
 
 def of_legs(robot, given):
@@ -107,9 +109,9 @@ def test_what_a_platform_turns_about_shows_too(name):
 def test_a_printers_radius_and_angles_have_an_exact_rank():
     robot = pteron.turned(pteron.load("linear-delta"), TURN)
     poses = pteron.random_poses(robot, 120)
-    setup = Setup(planes={"": Plane(tuple(TURN[:, 2]), known=False)})
+    setup = Setup(planes={"": ReferencePlane(tuple(TURN[:, 2]), known=False)})
     joints = pteron.inverse_kinematics(robot, poses)
-    given = Measurements.of(robot, joints, heights=poses @ TURN[:, 2], setup=setup)
+    given = Measurements.from_readings(robot, joints, heights=poses @ TURN[:, 2], setup=setup)
     assert ranks(robot, given, poses, ["radius", "angles", "zeros", "lengths"]) == (11, 11)
 
 
@@ -126,9 +128,9 @@ def test_heights_over_an_unknown_plane_show_less(name, equal, count):
         joints = pteron.inverse_kinematics(robot, poses, on_failure="nan")
         poses = poses[np.isfinite(joints).all(axis=1)][:150]
     level = poses[0, 2]
-    setup = Setup(planes={"": Plane(offset=level, known=False)})
+    setup = Setup(planes={"": ReferencePlane(offset=level, known=False)})
     joints = pteron.inverse_kinematics(robot, poses)
-    given = Measurements.of(robot, joints, heights=poses[:, 2] - level, setup=setup)
+    given = Measurements.from_readings(robot, joints, heights=poses[:, 2] - level, setup=setup)
     assert ranks(robot, given, poses) == (count, count)
 
 
@@ -148,12 +150,12 @@ def test_slopes_are_those_of_differences(robot, frame_known):
     count, rng = 6, np.random.default_rng(4)
     _, _, poses, readings = off_drawing(robot, 0, count)
     angular = robot.platform.angular
-    start = Guess.drawn(robot, Measurements.of(robot, readings))
+    start = Guess.drawn(robot, Measurements.from_readings(robot, readings))
     slopes = MachineSlopes(robot, ())
     poses = slopes.poses(start, readings, poses)
     setup = Setup(
         marks={"a": Place((0.05, 0.02, 0.03), known=False)},
-        planes={"p": Plane((0.6, 0.0, 0.8), 0.1, known=False)},
+        planes={"p": ReferencePlane((0.6, 0.0, 0.8), 0.1, known=False)},
         anchors={"w": Place((0.5, 0.4, 0.3), known=False)},
         frame_known=frame_known,
     )
@@ -220,7 +222,7 @@ def steps_of(name, radius, arm, end_stop):
     robot = printer(radius, arm)
     readings = end_stop + np.sqrt(arm**2 - radius**2) - steps
     heights = np.full(len(steps), data["height_mm"] / 1000.0)
-    return robot, Measurements.of(robot, readings, heights=heights)
+    return robot, Measurements.from_readings(robot, readings, heights=heights)
 
 
 @pytest.mark.parametrize("name", ["flsun", "large-delta"])
@@ -262,7 +264,7 @@ def test_forty_heights_leave_some_for_a_check_where_their_noise_is_given():
     heights += NOISE * np.random.default_rng(1).standard_normal(40)
     for noise, checked in (({"height": NOISE}, True), ({}, False)):
         setup = Setup(noise=noise)
-        given = Measurements.of(robot, readings, heights=heights, setup=setup)
+        given = Measurements.from_readings(robot, readings, heights=heights, setup=setup)
         result = calibrate(robot, given, free=GEOMETRY)
         assert (result.held_out is not None) == checked
         assert (result.verdict.grade == "trustworthy") == checked
@@ -276,7 +278,9 @@ def test_free_factors_without_tolerance_bend_rods_and_tolerances_hold_them():
     uneven = np.column_stack([places, 1e-4 * rng.standard_normal(16)])
     joints = pteron.inverse_kinematics(printer(0.1442, 0.2881), uneven)
     robot = printer(0.1447, 0.2878)
-    given = Measurements.of(robot, joints + np.array([3e-4, -2e-4, 1e-4]), heights=np.zeros(16))
+    given = Measurements.from_readings(
+        robot, joints + np.array([3e-4, -2e-4, 1e-4]), heights=np.zeros(16)
+    )
     nine = ["zeros", "lengths", "radius", "legs[1].angle", "legs[2].angle"]
     loose = dict.fromkeys(("zeros", "lengths", "radius", "angles"), 10.0)
     trapped, held = (
@@ -350,7 +354,7 @@ def test_rows_that_a_fault_explains_are_not_listed_one_by_one():
 def test_an_instrument_and_a_mark_that_moved_are_told_apart_where_the_platform_turns():
     robot = pteron.load("quadrupteron")
     given, step = measured(robot), np.array([0.0, 4e-4, 3e-4])
-    turns = robot.platform.at(off_drawing(robot)[2])[1][33:]
+    turns = robot.platform.placement(off_drawing(robot)[2])[1][33:]
     for moved, words in ((step, "The instrument moved"), (step @ turns, "The mark tool moved")):
         positions = given.positions.copy()
         positions[33:] += moved
@@ -394,7 +398,7 @@ def test_swapped_marks_are_told():
     )
     setup = Setup(marks={name: Place(at) for name, at in marks.items()})
     places += NOISE * np.random.default_rng(0).standard_normal(places.shape)
-    seen = Measurements.of(robot, readings, poses=poses, positions=places, setup=setup)
+    seen = Measurements.from_readings(robot, readings, poses=poses, positions=places, setup=setup)
     given = replace(seen, marks=names)
     assert calibrate(robot, given, free=GEOMETRY).verdict.grade == "trustworthy"
     other = replace(given, marks=tuple("ba"["ab".index(name)] for name in names))
@@ -413,7 +417,7 @@ def test_swapped_marks_are_told_in_an_unknown_frame_too():
     seen = Rotation.from_rotvec([0.4, 1.2, -2.0]).apply(places) + np.array([3.0, -1.0, 0.5])
     seen += NOISE * np.random.default_rng(0).standard_normal(seen.shape)
     setup = Setup(marks={name: Place(at) for name, at in marks.items()}, frame_known=False)
-    given = Measurements.of(robot, readings, positions=seen, setup=setup)
+    given = Measurements.from_readings(robot, readings, positions=seen, setup=setup)
     right, swapped = (replace(given, marks=tuple(m)) for m in ("ab" * 30, "ba" * 30))
     assert not calibrate(robot, right, free=GEOMETRY).findings
     words = calibrate(robot, swapped, free=GEOMETRY).verdict.reasons[0]
@@ -430,7 +434,7 @@ def test_what_is_measured_at_planned_places_is_trusted():
     poses = machine.poses(truth, truth.joints(planned.readings), planned.poses)
     places = tool_places(truth.robot, poses, truth.marks[""])
     places += NOISE * np.random.default_rng(1).standard_normal(places.shape)
-    given = Measurements.of(robot, planned.readings, positions=places)
+    given = Measurements.from_readings(robot, planned.readings, positions=places)
     assert calibrate(robot, given).verdict.grade == "trustworthy"
 
 
@@ -438,7 +442,7 @@ def test_a_mark_far_from_the_tool_leads_to_the_pose():
     robot, at = pteron.load("five-bar"), (0.08, 0.0, 0.0)
     poses = pteron.random_poses(robot, 40)
     given = replace(
-        Measurements.of(
+        Measurements.from_readings(
             robot,
             pteron.inverse_kinematics(robot, poses),
             positions=tool_places(robot, poses, np.array(at)),
@@ -455,7 +459,7 @@ def test_an_unknown_frame_and_distances_find_the_same_machine():
     truth, _, poses, readings = off_drawing(robot, 2, 80)
     turn = Rotation.from_rotvec([0.4, 1.2, -2.0])
     places = tool_places(truth.robot, poses, truth.marks[""])
-    given = Measurements.of(
+    given = Measurements.from_readings(
         robot,
         readings,
         positions=turn.apply(places) + np.array([3.0, -1.0, 0.5]),
@@ -463,7 +467,7 @@ def test_an_unknown_frame_and_distances_find_the_same_machine():
     )
     anchor = np.array([0.2, 0.1, -0.4])
     bar = Setup(noise={"distance": 1e-6}, anchors={"": Place((0.19, 0.11, -0.39), known=False)})
-    lengths = Measurements.of(robot, readings, setup=bar)
+    lengths = Measurements.from_readings(robot, readings, setup=bar)
     lengths = replace(lengths, distances=np.linalg.norm(places - anchor, axis=1))
     for seen in (given, lengths):
         result = calibrate(robot, seen, free=GEOMETRY)
@@ -480,7 +484,7 @@ def test_readings_noise_is_carried_to_what_is_measured():
     rng = np.random.default_rng(0)
     noisy = readings + 1e-4 * rng.standard_normal(readings.shape)
     setup = Setup(noise={"position": 1e-6, "readings": 1e-4})
-    given = Measurements.of(robot, noisy, poses=poses, setup=setup)
+    given = Measurements.from_readings(robot, noisy, poses=poses, setup=setup)
     result = calibrate(robot, given, free=GEOMETRY)
     assert result.fit.kept.all()
     assert np.median(result.fit.distances) < 3.0
@@ -515,7 +519,7 @@ def test_intervals_hold_where_many_distances_share_a_rows_readings():
         lengths = np.linalg.norm(places - places[0], axis=1) + 1e-5 * rng.standard_normal(rows)
         setup = Setup(noise={"distance": 1e-5, "readings": 1e-4})
         noisy = readings + 1e-4 * rng.standard_normal(readings.shape)
-        given = Measurements.of(robot, noisy, setup=setup)
+        given = Measurements.from_readings(robot, noisy, setup=setup)
         lengths[0] = np.nan
         given = replace(given, distances=lengths, origins=origins)
         blocks = blocks_of(robot, given, GEOMETRY)
@@ -589,10 +593,12 @@ def test_measurements_from_arrays_and_tables_fit_together():
     read = pteron.inverse_kinematics(robot, poses)
     names = [*robot.joint_names[::-1], "z", "x", "y"]
     table = dict(zip(names, np.hstack([read[:, ::-1], poses[:, [2, 0, 1]]]).T, strict=True))
-    named = Measurements.of(robot, table, poses=table)
+    named = Measurements.from_readings(robot, table, poses=table)
     np.testing.assert_array_equal(named.readings, read)
     np.testing.assert_array_equal(named.positions, poses)
-    np.testing.assert_array_equal(Measurements.of(robot, table, positions=table).positions, poses)
+    np.testing.assert_array_equal(
+        Measurements.from_readings(robot, table, positions=table).positions, poses
+    )
     for wrong in (
         {"poses": poses[:1]},
         {"poses": poses[:, :2]},
@@ -601,6 +607,6 @@ def test_measurements_from_arrays_and_tables_fit_together():
         {"heights": poses[:3, 0]},
     ):
         with pytest.raises(DataError, match=r"shape .* given, .* expected"):
-            Measurements.of(robot, read, **wrong)
+            Measurements.from_readings(robot, read, **wrong)
     with pytest.raises(DataError, match=r"readings: shape \(6, 2\) given, \(\.\.\., 3\) expected"):
-        Measurements.of(robot, read[:, :2])
+        Measurements.from_readings(robot, read[:, :2])

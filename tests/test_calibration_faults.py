@@ -82,7 +82,7 @@ def shuffled():
     robot = pteron.load("delta")
     _, _, poses, readings = off_drawing(robot, 0, 60)
     order = np.random.default_rng(0).permutation(60)
-    return calibrate(robot, Measurements.of(robot, readings, poses=poses[order]))
+    return calibrate(robot, Measurements.from_readings(robot, readings, poses=poses[order]))
 
 
 def test_errors_that_nothing_explains_are_not_trustworthy_in_the_first_sentence():
@@ -110,9 +110,9 @@ def test_rows_in_another_assembly_mode_start_where_their_heights_say():
     robot = pteron.load("orthoglide")
     poses = pteron.random_poses(robot, 60)
     joints = pteron.inverse_kinematics(robot, poses)
-    result = calibrate(robot, Measurements.of(robot, joints, heights=poses[:, 2]))
+    result = calibrate(robot, Measurements.from_readings(robot, joints, heights=poses[:, 2]))
     assert result.fit.kept.all()
-    assert result.held_out.advance["height"] < 1e-9
+    assert result.held_out.after["height"] < 1e-9
 
 
 def test_a_row_that_the_drawn_machine_does_not_reach_refuses_no_log():
@@ -131,8 +131,8 @@ def test_a_row_that_the_drawn_machine_does_not_reach_refuses_no_log():
     assert (~reached).sum() >= 2
     poses = poses[chosen]
     readings = pteron.inverse_kinematics(built, poses) - 2e-3
-    result = calibrate(robot, Measurements.of(robot, readings, poses=poses))
-    assert result.held_out.advance["position"] < 1e-5 < 1e-4 < result.held_out.before["position"]
+    result = calibrate(robot, Measurements.from_readings(robot, readings, poses=poses))
+    assert result.held_out.after["position"] < 1e-5 < 1e-4 < result.held_out.before["position"]
     assert (~result.fit.kept).sum() <= 2
 
 
@@ -146,7 +146,7 @@ def test_rows_under_the_bed_are_named_with_the_factor_of_their_steps():
     places = np.column_stack([[(0.0, 0.0), *rim, *rim[:2]], np.zeros(9)])
     readings = pteron.inverse_kinematics(robot, places)
     readings[7:] = 0.41 - 2.0 * (0.41 - readings[7:])
-    given = Measurements.of(robot, readings, heights=[*[0.0] * 7, np.nan, np.nan])
+    given = Measurements.from_readings(robot, readings, heights=[*[0.0] * 7, np.nan, np.nan])
     distances, origins = np.full(9, np.nan), np.full(9, -1)
     distances[8], origins[8] = np.linalg.norm(places[8] - places[7]), 7
     result = calibrate(robot, replace(given, distances=distances, origins=origins))
@@ -263,7 +263,7 @@ def test_the_written_file_leads_readings_to_where_they_were_measured(name, tmp_p
     robot = pteron.load(name)
     truth, _, poses, readings = off_drawing(robot, 5, 70)
     places = tool_places(truth.robot, poses, truth.marks[""])
-    given = Measurements.of(robot, readings, poses=poses, positions=places)
+    given = Measurements.from_readings(robot, readings, poses=poses, positions=places)
     fitted = np.arange(len(poses)) < 50
     result = calibrate(robot, given.rows(fitted), free=GEOMETRY)
     assert result.verdict.grade == "trustworthy"

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from measured import built, positions
 from mechanisms import CATALOG, CLIENTS
-from test_report import HOSTILE, Reader, strict
+from page_reader import HOSTILE, Reader, strict
 
 import pteron
 from pteron.calibration import Measurements, calibrate
@@ -27,7 +27,7 @@ TRUE = built(DRAWN)
 @lru_cache
 def calibration():
     readings, poses = positions(DRAWN, TRUE, 30)
-    return calibrate(DRAWN, Measurements.of(DRAWN, readings, poses=poses))
+    return calibrate(DRAWN, Measurements.from_readings(DRAWN, readings, poses=poses))
 
 
 @CLIENTS
@@ -58,7 +58,7 @@ def test_of_a_machine_that_turns_only_the_angles_are_mapped(tmp_path: Path):
     robot = pteron.load("ankle")
     poses, off = pteron.random_poses(robot, 30), np.array([0.01, -0.01])
     readings = pteron.inverse_kinematics(robot, poses)
-    given = Measurements.of(robot, readings + off, poses=poses)
+    given = Measurements.from_readings(robot, readings + off, poses=poses)
     result = calibrate(robot, given, free=["zeros"])
     asked = np.array([0.1, -0.2])
     ends = pteron.inverse_kinematics(robot, asked) - np.outer(np.linspace(0.0, 1.0, 5), off)
@@ -139,7 +139,9 @@ def test_a_printer_gets_its_firmwares_values_first(tmp_path: Path):
     x, y = rng.uniform(-0.055, 0.055, (2, 40))
     readings = pteron.inverse_kinematics(robot, np.stack([x, y, 0.0 * x], axis=-1))
     off = np.array([3e-4, -2e-4, 1e-4])  # of end stops
-    given = Measurements.of(robot, readings + off, heights=2e-5 * rng.standard_normal(40))
+    given = Measurements.from_readings(
+        robot, readings + off, heights=2e-5 * rng.standard_normal(40)
+    )
     result = calibrate(robot, given)
     firmware = firmware_fit(result)
     assert firmware is not None
@@ -165,4 +167,7 @@ def test_a_machine_that_is_no_printer_has_no_firmware():
     robot = pteron.load("five-bar")
     poses = pteron.random_poses(robot, 30)
     joints = pteron.inverse_kinematics(robot, poses)
-    assert firmware_fit(calibrate(robot, Measurements.of(robot, joints, poses=poses))) is None
+    assert (
+        firmware_fit(calibrate(robot, Measurements.from_readings(robot, joints, poses=poses)))
+        is None
+    )

@@ -13,30 +13,31 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import pytest
 import tomlkit
+from commands import refused, run
 from mechanisms import CLIENTS
 from scipy.spatial.transform import Rotation
-from test_cli import refused, run
 
 import pteron
 from pteron.design import Job, choose_machine
-from pteron.design.choosing.choose import cases_of
-from pteron.design.choosing.margins import margins_of
-from pteron.design.choosing.proofs import regions, told
-from pteron.design.choosing.rating import Rating
-from pteron.design.choosing.room import tool_places
-from pteron.design.choosing.samples import (
-    about_the_worst,
+from pteron.design.choose import evaluators_of
+from pteron.design.kind_search import search_kind
+from pteron.design.load_margins import margins_of
+from pteron.design.machine_space import tool_places
+from pteron.design.proofs import proof_sentence
+from pteron.design.rating import Rating
+from pteron.design.regions import kind_regions
+from pteron.design.workspace_samples import (
+    poses_about_tool,
+    refine_worst_values,
     sample_poses,
-    with_tool_in_the_middle,
 )
-from pteron.design.choosing.search import search_kind
 from pteron.design.worst_cases import worst_forces
 from pteron.dynamics import drive_forces
 from pteron.errors import DataError
 from pteron.kernels import numeric
 from pteron.kinematics import inverse_kinematics, pose_of
 from pteron.motion import line_path, polynomial_motion, with_payload
-from pteron.report.choice.write import page, write_choice
+from pteron.report.design.choice import page, write_choice
 from pteron.workspace import Box, clearance, pose_margins, prove
 
 JOB = {
@@ -66,6 +67,17 @@ def loaded(one):
         file = Path(folder) / "machine.toml"
         file.write_text(one.robot)
         return pteron.load(file)
+
+
+def test_a_choice_has_a_summary_a_table_and_shows_in_a_notebook(chosen):
+    choice, _ = chosen
+    frame = choice.table()
+    assert frame["kind"].to_list() == [candidate.kind for candidate in choice.candidates]
+    assert frame["price"][0] == choice.best.figures["price"]
+    assert choice.summary().splitlines()[0].startswith(f"{choice.best.kind}: ")
+    assert f"<b>Kinds of machines</b> {choice.best.kind} is best" in choice._repr_html_()
+    nowhere = replace(choice.best, serves=False, why=("no reach",))
+    assert nowhere.summary().endswith("falls out: the nearest design has no reach")
 
 
 def test_a_chosen_machine_keeps_what_was_asked(chosen):
@@ -136,7 +148,7 @@ def test_a_finished_kind_is_not_searched_again(chosen, tmp_path):
     first, folder = chosen
     again = choose_machine(of(), folder=folder)
     assert again.resumed == ("linear-delta",)
-    assert again.data() == first.data()
+    assert again.as_dict() == first.as_dict()
     other = choose_machine(of(search={"evaluations": 6, "seed": 3}), folder=folder)
     assert other.resumed == ()
 
@@ -152,18 +164,18 @@ TURNING = {
 
 def test_the_tool_stays_in_the_workspace_while_the_platform_turns():
     job = of(**TURNING)
-    case = cases_of(job)["delta-4"]
-    robot, middle = case.kind.machine(case.kind.ranges.mean(axis=0))
+    evaluator = evaluators_of(job)["delta-4"]
+    robot, middle = evaluator.kind.machine(evaluator.kind.ranges.mean(axis=0))
     center = tool_places(robot, middle[None])
-    away = tool_places(robot, middle + case.poses) - center
+    away = tool_places(robot, middle + evaluator.poses) - center
     assert np.abs(away).max(axis=0) == pytest.approx([0.1, 0.1, 0.025])
-    (cycle,) = case.every_cycle
+    (cycle,) = evaluator.every_cycle
     pose = cycle.states[0]
     away = tool_places(robot, middle + pose.reshape(-1, 4)) - center
     assert np.abs(away).max(axis=0) == pytest.approx([0.1, 0.1, 0.025])
     assert (pose[..., 3].min(), pose[..., 3].max()) == pytest.approx((-1.0, 1.0))
-    (region,) = regions(case, robot, middle)
-    assert region.holds(middle + 0.99 * case.poses)[case.poses[:, 3] == 0.0].all()
+    (region,) = kind_regions(evaluator, robot, middle)
+    assert region.holds(middle + 0.99 * evaluator.poses)[evaluator.poses[:, 3] == 0.0].all()
     # No box that holds a pose of the region is said to miss it.
     poses = np.random.default_rng(0).uniform(*region.box, (2000, 4))
     size = np.array([0.01, 0.01, 0.01, 0.2])
@@ -190,7 +202,7 @@ def test_the_worst_place_is_found_between_the_samples():
         return 1.0 / worst_forces(robot, middle + poses, 1.0, 10.0)
 
     sampled = margins(sample_poses(job, robot, 7)).min(axis=0)
-    least, where = about_the_worst(job, robot, margins, 7, keep=2)
+    least, where = refine_worst_values(job, robot, margins, 7, keep=2)
     assert least[0] < 0.5 * sampled[0], "the valley is narrower than the samples' distance"
     np.testing.assert_allclose(np.diag(margins(where)), least, rtol=1e-12)
     size = np.array(job.workspace.size)
@@ -217,7 +229,7 @@ def test_worse_places_stay_in_the_workspace(space):
         turned = np.cos(3.0 * poses[:, 3] - 1.0)
         return np.column_stack([turned, -poses @ [1.0, 1.0, 0.2, 0.0], -np.abs(poses[:, 2])])
 
-    least, where = about_the_worst(job, robot, values, keep=2)
+    least, where = refine_worst_values(job, robot, values, keep=2)
     poses = np.vstack(seen)
     places = tool_places(robot, poses) - tool_places(robot, np.zeros((1, 4)))
     if "radius" in space:
@@ -238,23 +250,23 @@ def test_a_cycle_between_the_poses_of_a_list_keeps_the_limits():
     space = {"poses": [[0.0, 0.0, 0.0], [0.3, 0.2, 0.1]]}
     ends = np.array([[-0.15, 0.1, -0.05], [0.15, -0.1, 0.05]])
     cycle = {"points": ends.tolist(), "duration": 0.5, "anywhere": False}
-    (case,) = cases_of(of(workspace=space, cycles=[cycle], accuracy=None)).values()
-    kept = next(one for one in search_kind(case, 20, 0) if not one.misses)
+    (evaluator,) = evaluators_of(of(workspace=space, cycles=[cycle], accuracy=None)).values()
+    kept = next(one for one in search_kind(evaluator, 20, 0) if not one.misses)
     low, high = np.array([leg.limits for leg in kept.robot.legs]).T
     line = ends[0] + np.linspace(0.0, 1.0, 41)[:, None] * (ends[1] - ends[0])
     joints = inverse_kinematics(kept.robot, kept.middle + line)
     assert (joints >= low).all()
     assert (joints <= high).all()
-    assert "so do the cycles between them" in told(case, [])
+    assert "so do the cycles between them" in proof_sentence(evaluator, [])
 
 
 def test_margins_are_those_between_the_directions_of_a_cycle_too(chosen):
     # In a cylinder a line is farthest out beside its middle, where no corner of a box is.
     one = chosen[0].best
-    (case,) = cases_of(of(workspace={"radius": 0.1, "height": 0.05})).values()
+    (evaluator,) = evaluators_of(of(workspace={"radius": 0.1, "height": 0.05})).values()
     carrying = with_payload(loaded(one), 0.3)
     most = np.array([leg.drive.max_force for leg in carrying.legs])
-    found = margins_of(case, carrying, np.array(one.middle), None)
+    found = margins_of(evaluator, carrying, np.array(one.middle), None)
     turns, tau = np.radians(np.arange(0.0, 360.0, 3.0)), np.linspace(0.0, 1.0, 61)
     ways = np.c_[np.cos(turns), np.sin(turns), 0.0 * turns]
     across = np.c_[-np.sin(turns), np.cos(turns), 0.0 * turns]
@@ -274,26 +286,29 @@ def test_rounded_corners_of_a_cycle_are_seen_in_time():
     up, across = 0.01, 0.08
     points = [[-across, 0, -up], [-across, 0, up], [across, 0, up], [across, 0, -up]]
     cycle = {"points": points, "corner": 0.015, "duration": 0.4}
-    (case,) = cases_of(of(cycles=[cycle])).values()
-    (places,) = case.every_cycle
-    fine = replace(places.at(np.array([0])), samples=5001).states[2]
+    (evaluator,) = evaluators_of(of(cycles=[cycle])).values()
+    (places,) = evaluator.every_cycle
+    fine = replace(places.select_places(np.array([0])), samples=5001).states[2]
     seen = places.both_ways().states[2]
     assert np.linalg.norm(seen, axis=-1).max() > 0.98 * np.linalg.norm(fine, axis=-1).max()
 
 
 def test_guides_tools_and_thin_posts_count_as_room():
     tool = {"mass": 0.3, "tool": [0.0, 0.0, -0.2]}
-    case = cases_of(of(payload=tool, cell={"margin": 0.0}))["linear-delta"]
-    robot, middle = case.kind.machine(case.kind.ranges.mean(axis=0))
+    evaluator = evaluators_of(of(payload=tool, cell={"margin": 0.0}))["linear-delta"]
+    robot, middle = evaluator.kind.machine(evaluator.kind.ranges.mean(axis=0))
     legs = tuple(replace(leg, limits=(-3.0, 3.0)) for leg in robot.legs)
     robot = replace(robot, legs=legs)
-    sizes, _ = case.room.within(case.room.taken(robot, middle[None], middle)[0])
+    sizes, _ = evaluator.machine_space.judge_extents(
+        evaluator.machine_space.extents(robot, middle[None], middle)[0]
+    )
     assert sizes["height"] == pytest.approx(6.0), "guides reach from end to end"
 
     def lacks(low, high):
         box = {"low": list(low), "high": list(high)}
-        room = cases_of(of(payload=tool, keep_out=[box], cell={"margin": 0.0}))["linear-delta"].room
-        return "keep-out" in room.within(room.taken(robot, middle[None], middle)[0])[1]
+        job = of(payload=tool, keep_out=[box], cell={"margin": 0.0})
+        space = evaluators_of(job)["linear-delta"].machine_space
+        return "keep-out" in space.judge_extents(space.extents(robot, middle[None], middle)[0])[1]
 
     # A box of 2 mm about a point of a rod, of a guide, and of what leads to the tool.
     center = tool_places(robot, middle[None])[0]
@@ -307,23 +322,23 @@ def test_guides_tools_and_thin_posts_count_as_room():
 
 def test_tilts_fill_a_cone():
     job = of(workspace={**JOB["workspace"], "tilt": 0.2}, kinds=["stewart"])
-    case = cases_of(job)["stewart"]
-    axes = pteron.rotation_of("stewart", case.poses)[..., 2]
+    evaluator = evaluators_of(job)["stewart"]
+    axes = pteron.rotation_of("stewart", evaluator.poses)[..., 2]
     tilts = np.arccos(np.clip(axes[:, 2], -1.0, 1.0))
     assert set(np.round(tilts, 9)) == {0.0, 0.2}
     assert len(np.unique(np.round(axes, 9), axis=0)) == 7
 
 
-def tilted(case, count):
+def tilted(evaluator, count):
     """Return random poses of a machine that leans to every side, from the middle."""
-    job, rng = case.job, np.random.default_rng(0)
+    job, rng = evaluator.job, np.random.default_rng(0)
     lean = job.workspace.tilt * np.sqrt(rng.random(count)).clip(0.5)
     way = rng.uniform(0.0, 2.0 * np.pi, count)
     vectors = lean[:, None] * np.c_[-np.sin(way), np.cos(way), 0.0 * way]
     matrices = Rotation.from_rotvec(vectors).as_matrix()
-    poses = np.asarray(pose_of(case.kind.robot, np.zeros(3), matrices))
+    poses = np.asarray(pose_of(evaluator.kind.robot, np.zeros(3), matrices))
     half = 0.5 * np.array(job.workspace.size)
-    at = with_tool_in_the_middle(case.kind.robot, poses[:, 3:])
+    at = poses_about_tool(evaluator.kind.robot, poses[:, 3:])
     at[:, :3] += rng.uniform(-1.0, 1.0, (count, 3)).round(1) * half
     return at
 
@@ -332,16 +347,18 @@ def tilted(case, count):
 def test_worse_tilts_are_looked_for_in_the_whole_cone():
     tool = {"payload": {"mass": 1.0, "tool": [0.0, 0.0, 0.1]}}
     job = of(workspace={"size": [0.2, 0.2, 0.1], "tilt": 0.3}, kinds=["stewart"], **tool)
-    case = cases_of(job)["stewart"]
-    robot, middle = case.kind.machine(case.kind.ranges.mean(axis=0))
+    evaluator = evaluators_of(job)["stewart"]
+    robot, middle = evaluator.kind.machine(evaluator.kind.ranges.mean(axis=0))
 
     def lengths(poses):
         rams = inverse_kinematics(robot, middle + poses)
         return np.hstack([rams, -rams])
 
-    drawn = lengths(tilted(case, 5000)).min(axis=0)
-    assert (drawn < lengths(case.poses).min(axis=0) - 6e-4).any(), "samples miss the worst tilts"
-    least, where = case.worst(robot, lengths)
+    drawn = lengths(tilted(evaluator, 5000)).min(axis=0)
+    assert (drawn < lengths(evaluator.poses).min(axis=0) - 6e-4).any(), (
+        "samples miss the worst tilts"
+    )
+    least, where = evaluator.worst(robot, lengths)
     assert (least <= drawn + 3e-4).all()
     leans = np.arccos(pteron.rotation_of("stewart", where)[:, 2, 2])
     assert leans.max() <= 0.3 + 1e-9
@@ -350,12 +367,14 @@ def test_worse_tilts_are_looked_for_in_the_whole_cone():
 @CLIENTS
 def test_rams_go_as_far_as_the_job_asks():
     space = {"size": [0.2, 0.2, 0.1], "tilt": 0.2}
-    (case,) = cases_of(of(workspace=space, kinds=["stewart"])).values()
-    kept = [one for one in search_kind(case, 30, 0) if not one.misses]
+    (evaluator,) = evaluators_of(of(workspace=space, kinds=["stewart"])).values()
+    kept = [one for one in search_kind(evaluator, 30, 0) if not one.misses]
     assert kept
     robot, middle = kept[-1].robot, kept[-1].middle
     low, high = np.array([leg.limits for leg in robot.legs]).T
-    joints = inverse_kinematics(robot, middle + np.vstack([case.poses, tilted(case, 2000)]))
+    joints = inverse_kinematics(
+        robot, middle + np.vstack([evaluator.poses, tilted(evaluator, 2000)])
+    )
     assert (joints > low).all()
     assert (joints < high).all()
     assert (high <= 1.7 * low).all()
@@ -370,13 +389,13 @@ def test_shares_make_a_duty_cycle():
     for share in (None, 1.0):
         slow = fast | {"duration": 0.6, "dwell": 1.0}
         cycles = [fast, slow] if share is None else [fast | {"share": 1}, slow | {"share": 3}]
-        case = cases_of(of(cycles=cycles))["linear-delta"]
-        values = case.kind.ranges.mean(axis=0)
+        evaluator = evaluators_of(of(cycles=cycles))["linear-delta"]
+        values = evaluator.kind.ranges.mean(axis=0)
         values[0] += 0.7  # twice the size
-        robot, middle = case.kind.machine(values)
+        robot, middle = evaluator.kind.machine(values)
         rating = Rating(values, middle=middle, worst=np.zeros((0, 3)))
-        found, _ = case.loads(case.loaded(robot), rating, None)
-        loads.append(found.margins(case.options["m"], [0, 1, 2]))
+        found, _ = evaluator.loads(evaluator.add_payload(robot), rating, None)
+        loads.append(found.margins(evaluator.options["m"], [0, 1, 2]))
     times = np.array([0.3, 3 * 1.6])
     parts = [1.0 / margins[0] ** 2 for margins in loads]
     assert (loads[1][0] > loads[0][0]).all()
@@ -468,11 +487,11 @@ def test_motors_in_a_toml_file_have_prices(tmp_path):
     file = tmp_path / "motors.toml"
     text = 'name = "a"\nrotor_inertia = 1e-5\nrated_torque = 1\npeak_torque = 3\nmax_speed = 300\n'
     file.write_text(f"[[motors]]\n{text}price = 70\n")
-    options = cases_of(of(motors={"list": str(file)}))["linear-delta"].options["m"]
+    options = evaluators_of(of(motors={"list": str(file)}))["linear-delta"].options["m"]
     assert {one.price - one.gearbox.price for one in options.all} == {70.0}
     file.write_text(f"[[motors]]\n{text}price = -1\n")
     with pytest.raises(DataError, match="motor a: price: -1 given"):
-        cases_of(of(motors={"list": str(file)}))
+        evaluators_of(of(motors={"list": str(file)}))
 
 
 def test_a_machine_that_no_longer_serves_leaves_the_folder(chosen, tmp_path):

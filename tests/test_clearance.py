@@ -88,7 +88,7 @@ def test_bodies_are_where_they_are_drawn(name, distance):
             links = [names[letter] for letter in "ul" if letter in names]
             for link, ends in zip(links, pairwise(line), strict=True):
                 bodies[f"leg {i} {link}"] = [ends]
-            if guide.slides:
+            if guide.is_prismatic:
                 bodies[f"leg {i} guide"] = [guide.path]
         for part in points.parts:
             bodies["platform"] += [(part.hub, corner) for corner in part.corners]
@@ -99,7 +99,7 @@ def test_bodies_are_where_they_are_drawn(name, distance):
 
 def lines_of(robot, pose):
     """Return the lines of a tilting machine's bodies, by formulas of textbooks."""
-    p, axes = robot.platform.at(pose)
+    p, axes = robot.platform.placement(pose)
     points = [p + leg.platform_point @ axes for leg in robot.legs]
     found = {"platform": [(p, point) for point in points]}
     joints = pteron.inverse_kinematics(robot, pose)

@@ -16,19 +16,16 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 import pytest
+from commands import PROGRAM, done, read, refused, run, without_styles
 from mechanisms import CLIENTS, gated
-from typer.testing import CliRunner, Result
 
 import pteron
 from pteron.cli.arguments import group_numbers
-from pteron.cli.main import app
 from pteron.manipulator.machine_warnings import machine_warnings
 from pteron.manipulator.variants import with_elbows
 from pteron.playback import playback
 from pteron.report.given_forces import force_doubts
 
-PROGRAM = [sys.executable, "-c", "from pteron_command import main; main()"]
-PLAIN = {"COLUMNS": "60", "NO_COLOR": "1", "FORCE_COLOR": None, "TTY_COMPATIBLE": None}
 POSES = "x,y,z,phi\n0.01,0.02,-0.03,0.1\n0.02,-0.01,0.03,-0.2\n"
 COMMANDS = (
     *("catalog", "check", "report", "inverse", "direct", "forces", "base", "excite", "identify"),
@@ -39,34 +36,6 @@ COMMANDS = (
 @pytest.fixture(autouse=True)
 def _in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-
-
-def run(line: str, stdin: str | None = None, **env: str) -> Result:
-    """Run a command line without a shell."""
-    return CliRunner(env={**PLAIN, **env}).invoke(app, line.split(), input=stdin)
-
-
-def done(line: str, stdin: str | None = None) -> str:
-    """Return the standard output of a command line that must succeed, quietly."""
-    result = run(line, stdin)
-    assert result.exception is None, result.stderr
-    assert (result.exit_code, result.stderr) == (0, "")
-    return result.stdout
-
-
-def refused(line: str, *words: str, stdin: str | None = None) -> str:
-    """Return the one line of a command line that must fail, and must leave nothing behind."""
-    before = sorted(Path().iterdir())
-    result = run(line, stdin)
-    assert result.exit_code == 2, result.output
-    assert result.stdout == ""
-    assert result.stderr.startswith("Error: ")
-    # Lines to paste into a file may follow, from a table's name on.
-    assert "\n" not in result.stderr.partition("\n[")[0].removesuffix("\n")
-    for word in words:
-        assert word in result.stderr
-    assert sorted(Path().iterdir()) == before
-    return result.stderr
 
 
 def frame(text: str) -> pl.DataFrame:
@@ -254,17 +223,16 @@ def test_json_is_one_object_for_a_pose_and_a_list_for_a_table():
 
 
 def test_a_person_sees_a_table_of_60_columns(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr("pteron.cli.table_rows.is_terminal", lambda: True)
-    text = done("inverse quadrupteron 0.01 0.02 -0.03 0.1")
+    text = read("inverse quadrupteron 0.01 0.02 -0.03 0.1")
     assert "rho1 (m)" in text
     assert "-0.030000" in text
     motion(100).write_parquet("motion.parquet")
-    result = run("inverse quadrupteron --table motion.parquet")
+    result = run("inverse quadrupteron --table motion.parquet", TTY_COMPATIBLE="1")
     assert result.stderr == "40 of 100 rows shown; --out FILE writes them all\n"
     assert "row" in result.stdout
-    assert max(map(len, result.stdout.splitlines())) <= 60
+    assert max(map(len, without_styles(result.stdout).splitlines())) <= 60
     monkeypatch.setattr("pteron.cli.table_rows.SHOWN_ROWS", 2)
-    text = run("direct quadrupteron 0.03 0.02 0.01 0.02").stdout
+    text = read("direct quadrupteron 0.03 0.02 0.01 0.02")
     assert "mode" in text
     assert "3.141593" in text
 
@@ -275,7 +243,7 @@ def mixed() -> str:
     return str(Path(__file__).with_name("data") / "mixed.toml")
 
 
-def test_columns_and_units_are_those_of_the_joints(mixed: str, monkeypatch: pytest.MonkeyPatch):
+def test_columns_and_units_are_those_of_the_joints(mixed: str):
     for robot, joints, forces in (
         ("delta", "theta1 theta2 theta3", "torque1 torque2 torque3"),
         (mixed, "rho1 theta2 theta3", "force1 torque2 torque3"),
@@ -291,9 +259,8 @@ def test_columns_and_units_are_those_of_the_joints(mixed: str, monkeypatch: pyte
         row = json.loads(done(f"forces {robot} --pose 0.02 -0.01 -0.9 --json"))
         expected = pteron.inverse_dynamics(machine, pose, [0.0] * 3, [0.0] * 3)
         assert [row[name] for name in forces.split()] == expected.tolist()
-    monkeypatch.setattr("pteron.cli.table_rows.is_terminal", lambda: True)
-    assert "rho1 (m)  theta2 (rad)" in done(f"inverse {mixed} 0 0 -0.9")
-    assert "force1 (N)  torque2 (N m)" in done(f"forces {mixed} --pose 0 0 -0.9")
+    assert "rho1 (m)  theta2 (rad)" in read(f"inverse {mixed} 0 0 -0.9")
+    assert "force1 (N)  torque2 (N m)" in read(f"forces {mixed} --pose 0 0 -0.9")
     assert "is it in millimetres?" in refused("inverse delta 0 0 -900")
     degrees = run(f"direct {mixed} --table -", "rho1,theta2,theta3\n0.1,30,0\n").stderr
     assert "theta2, theta3 up to 30: are these degrees?" in degrees
@@ -354,7 +321,7 @@ def test_a_long_table_shows_a_bar_and_has_the_same_result(monkeypatch: pytest.Mo
     monkeypatch.setattr("pteron.cli.table_rows.LONG", 99)
     monkeypatch.setattr("pteron.cli.table_rows.CHUNK", 7)
     assert done(line) == expected
-    monkeypatch.setattr("pteron.cli.progress.is_watched", lambda: True)
+    monkeypatch.setenv("TTY_INTERACTIVE", "1")
     shown = run(line, FORCE_COLOR="1")
     assert shown.stdout == expected
     assert "motion.csv" in shown.stderr
@@ -587,16 +554,15 @@ def test_the_catalog_is_listed():
     "robot",
     gated(["quadrupteron", "delta", "mixed", "h4", "delta-4", "five-bar"], ["mixed", "five-bar"]),
 )
-def test_a_good_file_is_described(robot: str, mixed: str, monkeypatch: pytest.MonkeyPatch):
+def test_a_good_file_is_described(robot: str, mixed: str):
     machine = pteron.load(mixed if robot == "mixed" else robot)
     pteron.save(machine, "robot.toml")
-    monkeypatch.setattr("pteron.cli.terminal.is_terminal", lambda: True)
-    text = done("check robot.toml")
+    text = read("check robot.toml")
     assert "This machine can work." in text
     assert max(map(len, text.splitlines())) <= 60
     for noun in {leg.joint.noun for leg in machine.legs}:
         assert len(re.findall(rf"(?m)^A {noun} (?:is at|counts) ", text)) == 1
-    found = json.loads(done("check robot.toml --json"))
+    found = json.loads(read("check robot.toml --json"))
     assert found["motion"] == machine.platform.motion
     assert [leg["type"] for leg in found["legs"]] == [leg.type for leg in machine.legs]
     assert found["legs"][1]["lengths"]["upper_length"] == machine.legs[1].upper_length
@@ -622,15 +588,14 @@ def driven(robot, **more):
 
 
 @CLIENTS
-def test_drives_are_a_table_and_data(mixed: str, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr("pteron.cli.terminal.is_terminal", lambda: True)
+def test_drives_are_a_table_and_data(mixed: str):
     robot = driven(pteron.load("quadrupteron"), stribeck=pteron.legs.Stribeck(1.0, 0.01))
     pteron.save(robot, "robot.toml")
-    text = done("check robot.toml")
+    text = read("check robot.toml")
     assert max(map(len, text.splitlines())) <= 60
     assert re.search(r"dry friction \(N\) +3 +3 +3 +3 ", text)
     assert re.search(r"rotor, at the joint \(kg\) +4.626 ", text)
-    assert json.loads(done("check robot.toml --json"))["legs"][0]["drive"] == {
+    assert json.loads(read("check robot.toml --json"))["legs"][0]["drive"] == {
         "coulomb": 3.0,
         "viscous": 12.0,
         "offset": 0.0,
@@ -646,10 +611,10 @@ def test_drives_are_a_table_and_data(mixed: str, monkeypatch: pytest.MonkeyPatch
         **{name: [] for name in ("curve", "ripple", "cogging")},
     }
     pteron.save(driven(pteron.load(mixed)), "mixed.toml")
-    text = done("check mixed.toml")
+    text = read("check mixed.toml")
     assert "3 N m" in text
     assert max(map(len, text.splitlines())) <= 60
-    assert json.loads(done("check delta --json"))["legs"][0]["drive"] is None
+    assert json.loads(read("check delta --json"))["legs"][0]["drive"] is None
 
 
 def test_forces_of_drives_and_what_they_exceed():
@@ -851,8 +816,7 @@ def test_a_machine_without_a_common_reach_is_refused():
 
 @CLIENTS
 def test_a_report_is_a_page_with_its_numbers(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr("pteron.cli.terminal.is_terminal", lambda: True)
-    text = done("report tripteron --out one/two --elbows +-+")
+    text = read("report tripteron --out one/two --elbows +-+")
     page = Path("one/two/report.html")
     assert page.read_text().lstrip().startswith("<!")
     assert sorted(file.name for file in page.parent.iterdir()) == ["report.html", "report.json"]
@@ -867,10 +831,11 @@ def test_a_report_is_a_page_with_its_numbers(monkeypatch: pytest.MonkeyPatch):
     shown = replace(pteron.load("tripteron"), gravity=(0.0, 0.0, -98.1))
     doubts = machine_warnings(shown)
     page.with_suffix(".json").write_text(json.dumps({**written, "doubts": doubts}))
-    told = run(f"report {pteron.save(shown, 'odd.toml')} --out other").stderr.splitlines()
+    line = f"report {pteron.save(shown, 'odd.toml')} --out other"
+    told = run(line).stderr.splitlines()
     assert told == [f"Warning: {doubts[0]}"]  # once: where it is loaded it is kept back
     page.with_suffix(".json").write_text(json.dumps(written))
-    found = json.loads(done("report tripteron --out other --json"))
+    found = json.loads(read("report tripteron --out other --json"))
     assert found["page"] == str(page)
     assert found["home"] == written["home"]
     assert found["base_parameters"]["rank"] == 16
@@ -993,10 +958,8 @@ def test_base_parameters_as_asked_for():
     assert "Exact rank 13 of 25" in done("base delta --symbols")
 
 
-def test_a_person_sees_base_parameters_with_values(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr("pteron.cli.base_parameters.is_terminal", lambda: True)
-    monkeypatch.setattr("pteron.cli.terminal.is_terminal", lambda: True)
-    text = done("base quadrupteron")
+def test_a_person_sees_base_parameters_with_values():
+    text = read("base quadrupteron")
     assert "26 base parameters of 40" in text
     assert "kg m^2" in text
     assert max(map(len, text.splitlines())) <= 60

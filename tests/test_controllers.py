@@ -398,7 +398,7 @@ def test_exported_laws_are_the_librarys(tmp_path):
     for controller in controllers:
         law = controller.law(robot)
         table = ctypes.c_double * len(law.gains)
-        gains = np.array(table.in_dll(loaded, f"machine_{controller.what}_gains"))
+        gains = np.array(table.in_dll(loaded, f"machine_{controller.law_name}_gains"))
         np.testing.assert_array_equal(gains, law.gains)
         shared = [gains]
         if law.base is None:
@@ -411,7 +411,7 @@ def test_exported_laws_are_the_librarys(tmp_path):
             inputs = [np.ascontiguousarray(v[k]) for v in given] + shared
             outputs = np.empty(len(forces)), np.empty(len(kept))
             pointers = [ctypes.c_void_p(v.ctypes.data) for v in (*inputs, *outputs)]
-            assert getattr(loaded, f"machine_{controller.what}")(*pointers) == 0
+            assert getattr(loaded, f"machine_{controller.law_name}")(*pointers) == 0
             np.testing.assert_allclose(outputs[0], forces, rtol=0, atol=1e-9)
             np.testing.assert_allclose(outputs[1], kept, rtol=0, atol=1e-9)
 

@@ -15,19 +15,21 @@ import numpy as np
 import polars as pl
 import pytest
 import tomlkit
+from commands import done, refused, run
 from mechanisms import CATALOG, CLIENTS
-from test_cli import done, refused, run
+from objectives import crank_area, ends_its_process, widest_pose
 from threadpoolctl import threadpool_limits
 
 import pteron
 from pteron.design import (
     Change,
     Design,
+    DesignQuantity,
+    FrontReport,
     Spec,
-    Summary,
     Task,
     cube_proofs,
-    proved,
+    prove_design,
     proved_cube,
     read_spec,
     search,
@@ -35,8 +37,8 @@ from pteron.design import (
     survey,
 )
 from pteron.design.cycle_loads import best_motors, shortest_time
-from pteron.design.paths import places
-from pteron.design.rows import evaluated
+from pteron.design.paths import named_numbers
+from pteron.design.rows import evaluate_design
 from pteron.design.variables import geometry_slopes
 from pteron.equations.machine import numbers
 from pteron.errors import DataError, ModelError, OutputError
@@ -71,7 +73,7 @@ def spec_of(**given):
 
 @pytest.fixture(scope="module")
 def task():
-    return Task.of(spec_of())
+    return Task.from_spec(spec_of())
 
 
 @pytest.fixture(scope="module")
@@ -83,10 +85,113 @@ def found(tmp_path_factory):
 
 def test_a_path_names_numbers_of_the_file():
     robot = pteron.load("quadrupteron")
-    assert [p.path for p in places(robot, "legs.upper_length")][3] == "legs[4].upper_length"
-    (one,) = places(robot, "-legs[2].guide_point.x")
+    assert [p.path for p in named_numbers(robot, "legs.upper_length")][3] == "legs[4].upper_length"
+    (one,) = named_numbers(robot, "-legs[2].guide_point.x")
     assert (one.sign, one.part, one.read(robot)) == (-1, 0, -0.26)
-    assert len(places(robot, "legs[1,3].platform_point")) == 6
+    assert len(named_numbers(robot, "legs[1,3].platform_point")) == 6
+
+
+def functions_spec():
+    reach = DesignQuantity("m", "largest coordinate", widest_pose, name="widest_pose")
+    spec = spec_of(objectives=[{"minimise": "links"}], requirements=[])
+    spec = spec.with_objectives(minimise=[crank_area], maximise=["cube", reach])
+    return spec.with_requirement(crank_area, most=0.6)
+
+
+def test_functions_of_a_user_are_objectives_and_requirements(tmp_path):
+    front = search(functions_spec(), folder=tmp_path)
+    assert [o.quantity for o in front.task.spec.objectives] == ["crank_area", "cube", "widest_pose"]
+    for k in range(len(front)):
+        assert front.objectives[k, 0] == crank_area(front.robot(k)) <= 0.6
+    assert (front.objectives[:, 2] > 0.0).all()
+    page = FrontReport(front).page()
+    assert "crank_area as small as can be" in page
+    assert "crank_area at most 0.6" in page
+    # The folder is of these functions: it is gone on with them, and refused with others.
+    assert search(functions_spec(), folder=tmp_path).designs.equals(front.designs)
+    other = eval("lambda robot: 2.0 * len(robot.legs)")
+    other.__name__ = "crank_area"
+    spec = spec_of(objectives=[{"minimise": "links"}]).with_objectives(minimise=[other])
+    with pytest.raises(OutputError, match="holds results of another plan"):
+        search(spec, folder=tmp_path)
+    words = (
+        r"^other processes cannot take part: .*define functions and classes at the top of a module"
+    )
+    with pytest.raises(pteron.PteronError, match=words):
+        search(spec, workers=2)
+
+
+@CLIENTS
+def test_a_process_that_is_ended_is_named():
+    spec = spec_of(objectives=[{"minimise": "links"}]).with_objectives(minimise=[ends_its_process])
+    with pytest.raises(
+        pteron.PteronError, match=r"^a process that did a part of the work was ended"
+    ):
+        search(spec, workers=2)
+
+
+def test_a_front_has_a_summary_a_table_and_shows_in_a_notebook(found):
+    front, _ = found
+    assert front.summary().startswith("quadrupteron: ")
+    assert front.table().columns == list(front.headings.values())
+    assert front.as_dict()["front"] == front.designs.select(list(front.headings)).to_dicts()
+    html = front._repr_html_()
+    assert "<b>quadrupteron</b>" in html
+    assert "designs evaluated" in html
+    with pytest.warns(DeprecationWarning, match=r"^Front\.table is a method .* write \.designs"):
+        assert front.table["links"].equals(front.designs["links"])
+    with pytest.warns(DeprecationWarning, match=r"^Front\.table is a method"):
+        assert front.table.height == len(front)
+
+
+@CLIENTS
+def test_functions_of_a_user_cross_to_other_processes():
+    front, shared = search(functions_spec()), search(functions_spec(), workers=2)
+    assert shared.designs.equals(front.designs)
+
+
+def test_a_function_that_gives_no_number_says_why():
+    def none_at_all(robot):
+        raise ModelError("nothing to measure")
+
+    spec = spec_of(objectives=[{"minimise": "links"}]).with_objectives(minimise=[none_at_all])
+    design = Design(Task.from_spec(spec), pteron.load("quadrupteron"))
+    assert np.isnan(design.quantity("none_at_all"))
+    assert design.missing_reason("none_at_all") == "nothing to measure"
+    with pytest.raises(DataError, match=r"^links: is a quantity already"):
+        spec.with_objectives(minimise=[DesignQuantity("m", "", len, name="links")])
+    with pytest.raises(DataError, match=r"^name: '' given to a quantity, an identifier expected"):
+        spec.with_requirement(DesignQuantity("m", "", len), most=1.0)
+    with pytest.raises(DataError, match=r'^"?.kube.? is no quantity'):
+        spec.with_objectives(maximise=["kube"])
+    with pytest.raises(DataError, match=r"^none_at_all: neither least nor most given"):
+        spec.with_requirement(none_at_all)
+
+
+def test_a_package_brings_quantities_to_files_and_processes(tmp_path):
+    (tmp_path / "own_quantities.py").write_text(
+        'def leg_count(robot):\n    """Number of legs."""\n    return len(robot.legs)\n'
+    )
+    info = tmp_path / "own_quantities-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: own-quantities\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text("[pteron.design]\nleg_count=own_quantities:leg_count\n")
+    code = (
+        "import pteron.design as d; s = d.Spec.model_validate({'robot': 'delta', 'variables': "
+        "[{'moves': 'legs.upper_length', 'range': (0.1, 0.2)}], 'objectives': [{'minimise': "
+        "'leg_count'}]}); t = d.Task.from_spec(s); "
+        "print(d.Design(t, t.robot).quantity('leg_count')); "
+        "print(d.quantities()['leg_count'].about)"
+    )
+    path = os.pathsep.join([str(tmp_path), *filter(None, [os.environ.get("PYTHONPATH")])])
+    run = subprocess.run(
+        [sys.executable, "-c", code],
+        env=os.environ | {"PYTHONPATH": path},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert run.stdout.split("\n")[:2] == ["3.0", "Number of legs."]
 
 
 @pytest.mark.parametrize("name", [*CATALOG, "ball-table", "stewart"])
@@ -96,7 +201,7 @@ def test_every_machine_has_variables_and_keeps_its_start(name):
         {"moves": "legs.platform_point", "by": "factor", "range": (0.9, 1.1)},
         {"moves": "legs.guide_point.x", "by": "offset", "range": (-0.1, 0.1)},
     ]
-    one = Task.of(spec_of(robot=name, variables=tables, requirements=[]))
+    one = Task.from_spec(spec_of(robot=name, variables=tables, requirements=[]))
     assert one.machine([1.0, 0.0]) == robot
     other = one.machine([1.05, 0.02])
     np.testing.assert_allclose(other.legs[0].guide_point[0], robot.legs[0].guide_point[0] + 0.02)
@@ -157,7 +262,7 @@ def test_the_cube_is_that_of_the_proved_search(name):
     lengths = [{"moves": "legs.upper_length", "by": "factor", "range": (0.9, 1.1)}]
     floors = {"type_i": 0.0, "type_ii": 0.0}
     asked = spec_of(robot=name, variables=lengths, floors=floors, requirements=[])
-    cube = start_design(Task.of(asked)).cube
+    cube = start_design(Task.from_spec(asked)).cube
     known = largest_cube(robot, np.zeros(robot.freedom), proved=False)
     assert cube.edge == pytest.approx(known.edge, rel=0.005)
 
@@ -166,7 +271,7 @@ def test_the_cube_is_that_of_the_proved_search(name):
 def test_a_tube_between_the_points_is_no_part_of_the_cube():
     """The Tripteron's links are equally long: they fold, unreachable, onto a line through it."""
     asked = spec_of(robot="tripteron", variables=LENGTHS[:1], requirements=[])
-    design = start_design(Task.of(asked))
+    design = start_design(Task.from_spec(asked))
     cube = proved_cube(design)
     assert cube is not None
     assert cube.edge > 0.99 * design.cube.edge
@@ -190,7 +295,7 @@ def test_a_tube_is_seen_beside_many_points_on_a_limit(task):
 def test_what_the_points_miss_goes_back_to_the_search():
     """A tube, as wide as the links differ, through which no point and no step of a search goes."""
     asked = {"floors": {"type_i": 0.0, "type_ii": 0.0}, "requirements": []}
-    task = Task.of(spec_of(robot="tripteron", variables=LENGTHS[:2], **asked))
+    task = Task.from_spec(spec_of(robot="tripteron", variables=LENGTHS[:2], **asked))
     design = Design(task, task.machine([0.25] * 3 + [0.2501] * 3))
     (first,) = cube_proofs(design, design.cube.center, 0.9999 * design.cube.edge)
     assert first.counterexample is not None
@@ -201,9 +306,9 @@ def test_what_the_points_miss_goes_back_to_the_search():
 def test_every_design_of_a_front_is_proved(found, threads):
     """Also in a process whose linear algebra adds up in another order than the search's."""
     front, _ = found
-    for k, edge in enumerate(front.table["cube"]):
+    for k, edge in enumerate(front.designs["cube"]):
         with threadpool_limits(threads):
-            told = proved(Design(front.task, front.robot(k)))
+            told = prove_design(Design(front.task, front.robot(k)))
         assert told.cube.edge == edge == told.design.cube.edge
         ends = (told.cube.center + side * edge for side in (-0.5, 0.5))
         box = Box(*((*end.tolist(), 0.0) for end in ends))
@@ -213,8 +318,10 @@ def test_every_design_of_a_front_is_proved(found, threads):
 def test_a_workspace_that_fails_between_its_points_is_missed():
     """The line onto which equal links of a Tripteron's first leg cannot fold, within a box."""
     box = {"low": (-0.03, 0.2, -0.03), "high": (0.04, 0.26, 0.04), "samples": 2}
-    task = Task.of(workspace_spec(robot="tripteron", workspace=box, angles=None))
-    missed = [evaluated(task, [0.25, 0.25], proofs=p)["misses workspace"] for p in (False, True)]
+    task = Task.from_spec(workspace_spec(robot="tripteron", workspace=box, angles=None))
+    missed = [
+        evaluate_design(task, [0.25, 0.25], proofs=p)["misses workspace"] for p in (False, True)
+    ]
     assert missed[0] == 0.0 < missed[1]
     with pytest.raises(ModelError, match=r"leg 1: type-I measure, at pose \[0.005, 0.23, 0.005\]"):
         search(task.spec)
@@ -246,7 +353,7 @@ def test_a_search_that_was_ended_goes_on_to_the_same_front(found, tmp_path):
     shutil.copytree(folder, again)
     for chunk in sorted(again.glob("*/0*.parquet"))[2:]:
         chunk.unlink()
-    assert search(spec_of(), folder=again).table.equals(front.table)
+    assert search(spec_of(), folder=again).designs.equals(front.designs)
     with pytest.raises(OutputError, match=r"another plan \(spec.search.seed 0, not 1; "):
         search(spec_of(), folder=again, seed=1)
     heavy = pteron.save(replace(pteron.load("quadrupteron"), gravity=(0, 0, -1.6)), tmp_path / "r")
@@ -261,7 +368,7 @@ def test_processes_find_the_same_front_and_go_on_where_one_ended(found, tmp_path
     shutil.copytree(folder, again)
     for chunk in sorted(again.glob("*/0*.parquet"))[1:]:
         chunk.unlink()
-    assert search(spec_of(), folder=again, workers=2).table.equals(front.table)
+    assert search(spec_of(), folder=again, workers=2).designs.equals(front.designs)
     written = {file.relative_to(folder): file.read_bytes() for file in folder.rglob("*.parquet")}
     assert written == {f.relative_to(again): f.read_bytes() for f in again.rglob("*.parquet")}
 
@@ -277,16 +384,16 @@ def test_a_checkpoint_that_is_damaged_is_computed_again(found, tmp_path):
     first.write_bytes(data)
     second.write_bytes(second.read_bytes()[:-100])
     third.write_bytes(second.read_bytes())
-    assert search(spec_of(), folder=again).table.equals(front.table)
+    assert search(spec_of(), folder=again).designs.equals(front.designs)
 
 
 def test_what_changed_is_told_in_words(found):
-    summary = Summary(found[0])
+    summary = FrontReport(found[0])
     page = summary.page()
     assert "| cube | 167.2 mm |" in page
     assert "cube proved: every position of the cube with edge" in page
     assert "slider of leg 1:" in page
-    best = summary.chosen[0]
+    best = summary.selection[0]
     lengths = [c for c in best.changes if c.what.startswith("upper length")]
     assert lengths
     assert all(" mm -> " in change.words for change in lengths)
@@ -316,11 +423,11 @@ def test_a_survey_streams_and_goes_on(tmp_path):
     assert front.evaluated == 512
     table = pl.read_parquet(tmp_path / "survey" / "*.parquet")
     good = table.filter(pl.col("misses workspace") == 0.0)
-    assert front.table["links"][0] == good["links"].min()
+    assert front.designs["links"][0] == good["links"].min()
     next((tmp_path / "survey").glob("00000001-*.parquet")).unlink()
     again = survey(asked, 500, tmp_path / "survey")
-    assert again.table.equals(front.table)
-    design = Summary(front).chosen[0]
+    assert again.designs.equals(front.designs)
+    design = FrontReport(front).selection[0]
     assert [proof.holds for proof in design.workspace] == [True, True]
 
 
@@ -373,7 +480,7 @@ def test_faults_of_a_spec_are_told(tmp_path, body, pattern):
     path = tmp_path / "spec.toml"
     path.write_text(f'robot = "quadrupteron"\n[[variables]]\nmoves = "legs.upper_length"\n{body}\n')
     with pytest.raises(DataError, match=pattern) as told:
-        Task.of(read_spec(path))
+        Task.from_spec(read_spec(path))
     assert str(told.value).startswith(f"{path}: ")
 
 
@@ -381,7 +488,7 @@ def test_all_faults_of_variables_are_told_at_once():
     moves = ["legs.uper_length", "legs[7].upper_length", "legs.guide_point.w", "upper_length"]
     variables = [{"moves": one, "range": (0.1, 0.2)} for one in moves]
     with pytest.raises(DataError, match=r"4 faults") as told:
-        Task.of(spec_of(variables=variables))
+        Task.from_spec(spec_of(variables=variables))
     for text in ('did you mean "upper_length"?', "no leg 7", ".w is none of", "is not a path"):
         assert text in str(told.value)
 
@@ -445,14 +552,14 @@ LOADED = {
 
 @pytest.fixture(scope="module")
 def loaded():
-    return Summary(search(Spec.model_validate(LOADED)))
+    return FrontReport(search(Spec.model_validate(LOADED)))
 
 
 @CLIENTS
 def test_no_state_of_a_machine_designed_for_loads_breaks_a_bound(loaded):
     """A workspace that floats has its place in the results; everywhere in it what is told holds."""
-    data = loaded.data()
-    for one in loaded.chosen:
+    data = loaded.as_dict()
+    for one in loaded.selection:
         machine, told = one.design.robot, data["chosen"][one.name]
         rng, half = np.random.default_rng(0), np.array([0.025, 0.015])
         poses = told["workspace_center"] + half * rng.uniform(-1.0, 1.0, (20_000, 2))
@@ -485,19 +592,19 @@ def test_a_report_tells_how_far_each_quantity_is_known_and_what_was_asked(loaded
     ):
         assert text in page
     assert "nan" not in page
-    center = loaded.chosen[0].design.cube.center
+    center = loaded.selection[0].design.cube.center
     row = loaded.table().row(0, named=True)
     assert [row["center x (m)"], row["center y (m)"]] == center.tolist()
-    wide = Task.of(Spec.model_validate(LOADED | {"workspace": {"sides": (0.4, 0.4)}}))
+    wide = Task.from_spec(Spec.model_validate(LOADED | {"workspace": {"sides": (0.4, 0.4)}}))
     design = Design(wide, wide.robot)
     assert np.isnan(design.quantity("force"))
-    assert "of 25 sampled poses are out of reach" in design.lack("force")
+    assert "of 25 sampled poses are out of reach" in design.missing_reason("force")
 
 
 def test_changes_are_told_by_one_rule():
     told = Change("radius", 0.2, 0.185, "m").words, Change("x", -0.2, -0.185, "m").words
     assert told == ("radius 200.0 mm -> 185.0 mm (-7.5 %)", "x -200.0 mm -> -185.0 mm (-7.5 %)")
-    assert Change("x", -0.1, 0.05, "m").by == "+150.0 mm"
+    assert Change("x", -0.1, 0.05, "m").relative_change == "+150.0 mm"
     assert Change("force", np.nan, 2.0, "N").words == "force none -> 2 N ()"
 
 
@@ -507,8 +614,8 @@ def test_the_plan_of_an_older_search_stays(task):
     assert set(plan) == {"robot", "spec", "pteron"}
     assert not {"payload", "cycles", "errors", "elasticity", "motors"} & set(plan["spec"])
     boxed = workspace_spec(objectives=[{"minimise": "force"}])
-    assert "sides" not in Task.of(boxed).plan["spec"]["workspace"]
-    assert "over all directions" in Task.of(boxed).plan["definition of its quantities"]
+    assert "sides" not in Task.from_spec(boxed).plan["spec"]["workspace"]
+    assert "over all directions" in Task.from_spec(boxed).plan["definition of its quantities"]
 
 
 def test_the_shortest_time_brings_a_drive_to_its_limit():

@@ -12,33 +12,18 @@ import re
 import runpy
 import shutil
 import sys
-from pathlib import Path
 
 import console_blocks
 import pytest
+from claimed_machines import FREE, IN_THE_LOOP, LIMITED
 from console_blocks import steps
+from documentation import DOCS, PAGES, ROOT, TEXTS
 from mechanisms import CATALOG, CLIENTS, TILTED, gated
-from test_simulation import FREE
-from test_software_in_the_loop import IN_THE_LOOP
-from test_sticking import LIMITED
 from typer.main import get_command
 
 import pteron
 from pteron.cli.main import app
 
-ROOT = Path(__file__).parent.parent
-DOCS = ROOT / "docs"
-MADE = ("_build", "gallery", "measured", "functions", "inside", "modules")
-"""Folders of docs that `make docs` fills."""
-
-PAGES = sorted(
-    (
-        *ROOT.glob("[!C]*.md"),
-        ROOT / "CONTRIBUTING.md",
-        *(p for p in DOCS.rglob("*.md") if not {*p.parts} & {*MADE}),
-    ),
-)
-TEXTS = {str(page.relative_to(ROOT)): page.read_text(encoding="utf-8") for page in PAGES}
 NAMES = pytest.mark.parametrize("name", TEXTS)
 
 sys.path.insert(0, str(DOCS / "extensions"))

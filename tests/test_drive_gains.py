@@ -4,19 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from loaded_logs import EACH, LOAD, NOISE, PERIOD, SOLID, base_of, halves, laden, make_log
 from logs_of_motions import machine
 from mechanisms import CLIENTS
-from test_payload import (
-    EACH,
-    LOAD,
-    NOISE,
-    PERIOD,
-    SOLID,
-    base_of,
-    halves,
-    laden,
-    make_log,
-)
 
 import pteron
 from pteron.errors import DataError

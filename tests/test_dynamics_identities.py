@@ -92,7 +92,7 @@ def test_what_a_leg_needs_is_what_its_bodies_need(name):
         machine.legs, state.legs, state.platform.points, inertia, strict=True
     ):
         given = point, state.platform.rotation, machine.gravity, bodies
-        for mass_by in (type(leg).riding, LegEquations.riding):
+        for mass_by in (type(leg).point_mass_needs, LegEquations.point_mass_needs):
             forms = []
             for form in (type(leg).needs, LegEquations.needs):
                 needs = form(leg, *given)

@@ -441,5 +441,5 @@ def test_the_looks_join_up(case):
         assert touches(opened.bodies[closing.one], closing.point)
         assert touches(opened.bodies[closing.other], closing.point)
     for body in opened.bodies:
-        telescopes = body.parent != -1 and body.joints[-1].slides
+        telescopes = body.parent != -1 and body.joints[-1].is_prismatic
         assert telescopes or touches(body, body.origin), body.name

@@ -8,6 +8,7 @@ from functools import lru_cache
 import gymnasium
 import numpy as np
 import pytest
+from driven_machines import driven
 from gymnasium.utils.env_checker import check_env
 from mechanisms import (
     CATALOG,
@@ -20,7 +21,6 @@ from mechanisms import (
     with_elbows,
 )
 from scipy.integrate import solve_ivp
-from test_sizing import driven
 
 import pteron
 from pteron.environments import REACH, PteronEnv, PteronVectorEnv

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import multiprocessing
 import signal
+import sys
 import threading
 import time
 import tomllib
@@ -482,11 +484,14 @@ def test_processes_find_the_same_as_this_one_and_so_does_the_seed_again():
 
 
 @CLIENTS
-def test_starts_whose_processes_fail_are_improved_here(monkeypatch):
-    monkeypatch.setattr("sys.executable", "/bin/false")
-    found = optimal_excitation(
-        CATALOG["tripteron"], harmonics=2, period=4.0, starts=2, draws=6, workers=2, seconds=3.0
-    )
+def test_starts_whose_processes_fail_are_improved_here():
+    multiprocessing.set_executable("/bin/false")
+    try:
+        found = optimal_excitation(
+            CATALOG["tripteron"], harmonics=2, period=4.0, starts=2, draws=6, workers=2, seconds=3.0
+        )
+    finally:
+        multiprocessing.set_executable(sys.executable)
     assert found.gain > 1.5
 
 

@@ -13,20 +13,13 @@ import numpy as np
 import pytest
 import trees
 from lagrange import Lagrange
-from mechanisms import CATALOG, gated, in_turn, random_machine, relative_error
+from mechanisms import CATALOG, MIXTURES, gated, in_turn, random_machine, relative_error
 
 import pteron
 
 COUNT = 200
 MANY = int(os.environ.get("PTERON_MANY", "1"))
 ENGINES = {"pinocchio": trees.Pinocchio, "mujoco": trees.MuJoCo}
-KINDS = [
-    *("PPP", "RRR", "SSS", "PRS"),  # 3T
-    *("PPPP", "RRRR", "SSSS", "PPSS", "RRRU", "PRSU", "PRSSI"),  # 3T1R
-    *("CC", "LL", "CL", "CS", "TT", "TL"),  # 2T
-    *("CCC", "LLL", "CCL", "CCU", "CPR", "TTT", "TCL", "TTU"),  # 2T1R
-]
-"""The letters are those of `random_machine`."""
 
 GATE = (
     *("quadrupteron", "tripteron-oblique", "linear-delta", "h4", "five-bar"),
@@ -48,7 +41,7 @@ class Case(NamedTuple):
 
 
 EVERY = in_turn(
-    [*CATALOG, *((kinds, seed) for kinds in KINDS for seed in range(MANY))],
+    [*CATALOG, *((kinds, seed) for kinds in MIXTURES for seed in range(MANY))],
     GATE,
     share=3,
     argument="case",
@@ -149,7 +142,7 @@ def test_energies(case):
 
 
 @pytest.mark.parametrize("seed", range(MANY))
-@pytest.mark.parametrize("kinds", gated(KINDS if MANY > 1 else MIXED, ("PRS", "CL")))
+@pytest.mark.parametrize("kinds", gated(MIXTURES if MANY > 1 else MIXED, ("PRS", "CL")))
 def test_forces_of_every_working_mode(kinds, seed):
     for mode in pteron.working_modes(random_machine(seed, kinds)):
         motion = descriptions.states(descriptions.describe(mode), 5, seed, least=0.02)

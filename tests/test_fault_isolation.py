@@ -5,10 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from faulty_logs import RATE, brisk, clean, found, late_by, noisy
 from logs_of_motions import log_of
 from mechanisms import CLIENTS, gated
 from scipy.interpolate import make_interp_spline
-from test_faults import RATE, brisk, clean, found, late_by, noisy
 
 import pteron
 from pteron.controllers import ComputedTorque, FeedForwardPD

@@ -1,11 +1,11 @@
 """Faults of a log or a machine that identification tells by name: none is seen where none is."""
 
 from dataclasses import replace
-from functools import lru_cache
 
 import numpy as np
 import pytest
-from logs_of_motions import Friction, log_of, machine
+from faulty_logs import RATE, brisk, clean, found, late_by, noisy
+from logs_of_motions import log_of, machine
 from mechanisms import CLIENTS, NIGHTLY, gated, random_machine
 from scipy.interpolate import make_interp_spline
 
@@ -18,37 +18,6 @@ from pteron.identification.recordings import read_recording
 from pteron.identification.signals import States
 from pteron.legs import Drive, Stribeck
 from pteron.workspace import home_pose
-
-RATE = 300.0
-
-
-def brisk(robot):
-    """Return a motion of a size and pace that suits a machine."""
-    metres = 0.12 * float(np.mean([leg.size for leg in robot.legs if leg.size]))
-    return {"size": metres, "turn": 0.5, "period": 2.0, "duration": 8.0, "rate": RATE}
-
-
-@lru_cache
-def clean(name, seed=0, dry=0.05):
-    """Return a machine, its log without noise, and its friction, a share of the forces' spread."""
-    robot = machine(name) if isinstance(name, str) else name
-    bare = Friction(*np.zeros((3, len(robot.legs))))
-    size = log_of(robot, friction=bare, seed=seed, **brisk(robot)).forces.std(axis=0)
-    friction = Friction(dry * size, 0.02 * size, 0.01 * size)
-    return robot, log_of(robot, friction=friction, seed=seed, **brisk(robot)), friction
-
-
-def noisy(log, seed=0, noise=0.01):
-    rng = np.random.default_rng(seed)
-    size = np.sqrt((log.forces**2).mean(axis=0))
-    joints = log.joints + 2e-7 * rng.normal(size=log.joints.shape)
-    return replace(
-        log, joints=joints, forces=log.forces + noise * size * rng.normal(size=log.forces.shape)
-    )
-
-
-def found(robot, log, **how):
-    return identify(robot, log, cad=None, **how)
 
 
 def named(robot, log, **how):
@@ -87,11 +56,6 @@ def test_a_delay_is_measured_and_taken_out(name, delay):
     assert "late for the positions; that is taken out" in mended.causes[0]
     assert not any(one.fault == "delay" for one in mended.fault_isolation.faults)
     assert mended.preprocessing[0].delay == pytest.approx(delay, abs=3e-4)
-
-
-def late_by(log, delay):
-    at = log.time - delay
-    return np.stack([np.interp(at, log.time, force) for force in log.forces.T], axis=-1)
 
 
 @pytest.mark.parametrize("derivatives", ["central", "spline", "periodic"])

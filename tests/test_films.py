@@ -10,9 +10,9 @@ from pathlib import Path
 import imageio_ffmpeg
 import numpy as np
 import pytest
+from commands import done, refused, run
 from mechanisms import CLIENTS, gated
 from PIL import Image, ImageSequence
-from test_cli import done, refused, run
 
 import pteron
 from pteron.errors import DataError, OutputError, PteronError

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_measured_logs import CFG
+from firmware_logs import CFG
 
 import pteron
 from pteron.calibration import read_measurements

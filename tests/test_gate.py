@@ -6,8 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import tilting
-from mechanisms import CATALOG, GATE, MACHINES, NIGHTLY, TURNS, random_machine
-from test_family import KINDS as MIXTURES
+from mechanisms import CATALOG, GATE, MACHINES, MIXTURES, NIGHTLY, TURNS, random_machine
 
 from pteron.closures import KINDS as CLOSURES
 from pteron.equations.machine import Machine

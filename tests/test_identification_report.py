@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from logs_of_motions import log_of
 from mechanisms import CATALOG, CLIENTS, gated
-from test_report import HOSTILE, Reader, strict
+from page_reader import HOSTILE, Reader, strict
 
 import pteron
 from pteron.identification import Terms, identification_model, identify

@@ -27,6 +27,7 @@ from pteron.identification import (
     write_log,
 )
 from pteron.identification.exchanged_columns import ColumnFault
+from pteron.identification.fit_task import STEPS
 from pteron.identification.logs import Description
 from pteron.identification.plausibility import has_negative_inertia
 from pteron.identification.prediction import Prediction
@@ -689,12 +690,14 @@ def test_a_file_in_pieces_gives_what_the_log_in_memory_gives(tmp_path):
         QUADRUPTERON,
         file,
         processing=pinned,
-        progress=lambda task, done, total: told.append(task),
+        progress=told.append,
     )
     off = np.abs(streamed.estimate.values - whole.estimate.values) / whole.estimate.deviations
     assert off.max() < 1e-3
     assert streamed.verdict.grade == whole.verdict.grade
-    assert {"Filtering", "Checking"} <= set(told)
+    assert set(STEPS) <= {getattr(share, "step", "") for share in told}
+    assert (told[-1], told == sorted(told)) == (1.0, True)
+    assert len(set(told)) > len(STEPS)
 
 
 def test_results_are_plain_data():

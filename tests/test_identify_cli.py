@@ -12,18 +12,19 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 import pytest
+from commands import done, refused, run
 from logs_of_motions import log_of, motion
 from mechanisms import CATALOG, CLIENTS
-from test_cli import done, refused, run
-from test_report import Reader, strict
+from page_reader import Reader, strict
 
 import pteron
 from pteron.cli import identify as command
-from pteron.cli.progress import TimeLeft, stages
+from pteron.cli.progress import TimeLeft, progress_bar
 from pteron.extras import install_command
 from pteron.identification import METHODS, write_log
 from pteron.identification.model import Passive
 from pteron.identification.signals import Derivatives
+from pteron.progress import Share
 
 FILES = ["identification.html", "identification.json"]
 
@@ -269,11 +270,12 @@ def test_each_stage_shows_a_bar(monkeypatch: pytest.MonkeyPatch):
     write_log(log("tripteron"), "fit.csv")
     line = "identify fit.csv --robot tripteron --out out"
     assert run(line, FORCE_COLOR="1").stderr == ""
-    monkeypatch.setattr("pteron.cli.progress.is_watched", lambda: True)
+    monkeypatch.setenv("TTY_INTERACTIVE", "1")
     shown = run(line, FORCE_COLOR="1")
     assert shown.exit_code == 0
     assert "Reading" in shown.stderr
-    with stages("Working", 100) as tell:
-        for done_rows, total in ((40, 40), (80, 80), (30, 30), (100, 100), (100, 200)):
-            tell("Reading", done_rows, total)
-            tell("Filtering", done_rows, total)
+    assert "Looking for faults" in shown.stderr
+    with progress_bar("Working") as tell:
+        for share in (0.1, 0.5, 0.5, 1.0):
+            tell(Share(share, "Reading"))
+            tell(share)

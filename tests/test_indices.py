@@ -299,7 +299,7 @@ def test_an_overconstrained_machine_as_a_frame_of_beams():
         exact = frame_compliance(robot, pose, 1e6, section)
         scale = np.abs(exact).max()
         np.testing.assert_allclose(found.compliance, exact, rtol=0, atol=1e-6 * scale)
-        assert found.least <= found.along([1.0, 2.0, 3.0]) <= found.most
+        assert found.least <= found.directional_stiffness([1.0, 2.0, 3.0]) <= found.greatest
 
 
 def test_a_published_tripteron():
@@ -337,7 +337,7 @@ def test_a_published_tripteron():
 def test_parallel_rods_as_six_springs():
     robot, distance, rod = CATALOG["linear-delta"], 0.08, Section.tube(0.01, 0.005, STEEL)
     pose = pteron.workspace.home_pose(robot) + np.array([0.02, -0.01, 0.01])
-    p, whole = robot.platform.at(pose)[0], np.zeros((6, 6))
+    p, whole = robot.platform.placement(pose)[0], np.zeros((6, 6))
     tips = numeric(robot, "joint_points")(pose)[0][:, 1]
     ends = numeric(robot, "platform_points")(pose)[0]
     for leg, tip, end in zip(robot.legs, tips, ends, strict=True):

@@ -3,6 +3,7 @@
 import importlib
 import sys
 from dataclasses import dataclass, replace
+from typing import ClassVar
 from unittest.mock import patch
 
 import numpy as np
@@ -12,8 +13,13 @@ from typer.testing import CliRunner
 
 import pteron
 from pteron.cli.main import app
-from pteron.legs import KINDS, PRR
+from pteron.closures import conformance as of_closures
+from pteron.legs import KINDS, PRR, UPS
+from pteron.legs.conformance import faults
+from pteron.legs.leg import LegEquations
 from pteron.legs.prr import PRREquations
+from pteron.legs.ram import RamLeg
+from pteron.legs.ups import UPSEquations
 
 
 class UndrivenEquations(PRREquations):
@@ -50,6 +56,68 @@ class IdleEquations(PRREquations):
     def motion(self, point, rotation):
         found = super().motion(point, rotation)
         return found._replace(row=0 * found.row)
+
+
+class StrutEquations(UPSEquations):
+    """A ram whose cylinder and piston count for nothing."""
+
+    kinds: ClassVar = {}
+    rides = ()
+    needs, change_frame = LegEquations.needs, LegEquations.change_frame
+
+    def motion(self, point, rotation):
+        motion = super().motion(point, rotation)
+        chain = tuple(joint._replace(body="") for joint in motion.chain)
+        return motion._replace(bodies={}, chain=chain)
+
+
+@dataclass(frozen=True)
+class Strut(RamLeg):
+    upper: None = None
+    lower: None = None
+    limits: tuple[float, float] = (0.1, 1.0)
+
+    type = "Strut"
+    names: ClassVar = {}
+    extents: ClassVar = {}
+    keys: ClassVar = {k: UPS.keys[k] for k in ("guide_point", "limits", "elbow", "direction")}
+    equations_class = StrutEquations
+    quantities, free_axes, base_axis = UPS.quantities, UPS.free_axes, UPS.base_axis
+
+
+@pytest.fixture
+def struts():
+    """The catalog's hexapod with rams that have no bodies."""
+    names = "guide_point", "platform_point", "limits", "elbow", "direction"
+    robot = pteron.load("stewart")
+    legs = tuple(Strut(**{name: getattr(leg, name) for name in names}) for leg in robot.legs)
+    return replace(robot, name="struts", legs=legs)
+
+
+def test_a_leg_without_bodies_is_valid(struts):
+    assert faults(struts.legs[0], tilts=True) == ()
+    pose = pteron.random_poses(struts, 5)
+    rates, growths = np.random.default_rng(0).normal(size=(2, *pose.shape))
+    forces = pteron.inverse_dynamics(struts, pose, rates, growths)
+    of_platform = slice(-len(pteron.parameters(struts)), None)
+    regressor = pteron.regressor("stewart", pose, rates, growths)[..., of_platform]
+    expected = regressor @ pteron.parameters("stewart")[of_platform]
+    np.testing.assert_allclose(forces, expected, rtol=1e-12)
+    back = pteron.forward_dynamics(struts, pose, rates, forces)
+    np.testing.assert_allclose(back, growths, rtol=1e-9, atol=1e-9)
+    assert pteron.base_parameters(struts).rank == 10
+
+
+def test_engines_refuse_a_leg_without_bodies(struts, tmp_path):
+    with pytest.raises(pteron.ModelError, match="leg 1: a Strut leg has no bodies"):
+        pteron.export.export_mjcf(struts, tmp_path)
+
+
+@pytest.mark.parametrize("count", [2, 4])
+def test_other_numbers_of_legs_than_coordinates_are_refused_by_closures(count):
+    robot = CATALOG["delta"]
+    with pytest.raises(pteron.ModelError, match=f"legs: {count} given, 3 expected, one for each"):
+        of_closures.faults((robot.legs * 2)[:count], robot.platform, [0.1, 0.0, -0.9])
 
 
 @dataclass(frozen=True)

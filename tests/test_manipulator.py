@@ -1,6 +1,9 @@
 """Manipulators as values: their checks, their files, their parameters, and turning them."""
 
+import datetime
+import json
 import os
+import pickle
 import re
 import time
 from dataclasses import FrozenInstanceError, fields, replace
@@ -16,6 +19,7 @@ import pteron
 from pteron import Manipulator, ModelError, OutputError
 from pteron.bodies import PlanarInertia
 from pteron.legs import Leg
+from pteron.manipulator import with_dimensions
 from pteron.platforms import Platform
 
 EVERY = pytest.mark.parametrize("name", MECHANISMS)
@@ -677,7 +681,7 @@ def test_parameters_stand_in_the_papers_order(name):
             moments = dict(zip(("mgx", "mgy"), body.first_moment, strict=False))
             values = {"m": body.mass, **moments, "I": body.inertia}
             expected |= {f"{kind}_{letter}{i}": value for kind, value in values.items()}
-    body = robot.platform.joined
+    body = robot.platform.total_inertia
     platform = body.mass, *body.first_moment, body.inertia
     expected |= zip(("m_e", "mgx_e", "mgy_e", "I_e"), platform, strict=True)
     assert pteron.parameter_names(robot) == tuple(expected)
@@ -697,7 +701,7 @@ def test_parameters_stand_in_the_papers_order(name):
 def test_with_parameters_gives_the_same_machine_back(name):
     robot = MECHANISMS[name]
     # Parameters tell the platform as a whole, not its bars and geared parts.
-    whole = replace(robot, platform=robot.platform.with_joined(robot.platform.joined))
+    whole = replace(robot, platform=robot.platform.with_total_inertia(robot.platform.total_inertia))
     values = pteron.parameters(robot)
     assert pteron.with_parameters(robot, values) == whole
     doubled = pteron.with_parameters(robot, 2 * values)
@@ -776,3 +780,65 @@ def test_what_is_no_rotation_is_refused():
     refused(lambda: pteron.turned(robot, "over"), words, error=pteron.DataError)
     words = "rotation: the matrix is a reflection (determinant -1); negate one column"
     refused(lambda: pteron.turned(robot, np.diag([1, 1, -1])), words)
+
+
+# Machines as text and as dictionaries.
+
+
+@pytest.mark.parametrize("name", sorted(CATALOG))
+def test_a_machine_goes_through_text_and_dictionary_without_loss(name):
+    robot = pteron.load(name)
+    assert pteron.loads(pteron.dumps(robot)) == robot
+    assert pteron.from_dict(json.loads(json.dumps(pteron.to_dict(robot)))) == robot
+
+
+OWNER = {
+    "serial": "Q-07",
+    "calibrated": datetime.date(2026, 3, 1),
+    "sensors": [{"place": [0.1, 0.2], "works": True}],
+    "firmware": {"version": 3},
+}
+
+
+def test_data_of_the_owner_stay_with_the_machine_and_do_not_count(tmp_path):
+    robot = pteron.load("delta")
+    owned = replace(robot, owner=OWNER)
+    assert owned == robot
+    assert hash(owned) == hash(robot)
+    for copy in (
+        pteron.loads(pteron.dumps(owned)),
+        pteron.load(pteron.save(owned, tmp_path / "owned.toml")),
+        pickle.loads(pickle.dumps(owned)),
+        with_dimensions(owned, rod=1.0),
+        pteron.with_parameters(owned, pteron.parameters(owned)),
+    ):
+        assert dict(copy.owner) == OWNER
+    owned.owner["sensors"].clear()
+    assert dict(owned.owner) == OWNER
+    assert dict(robot.owner) == {}
+
+
+def test_data_of_the_owner_that_no_file_can_hold_are_named():
+    with pytest.raises(ModelError) as raised:
+        replace(pteron.load("delta"), owner={"a": None, "b": [{"c": object()}], 1: 2})
+    assert str(raised.value) == (
+        "3 faults\n"
+        "  owner.a: NoneType given; a string, number, boolean, date, list or table expected\n"
+        "  owner.b, item 1.c: object given; a string, number, boolean, date, list or table "
+        "expected\n"
+        "  owner: the key 1 given, a string expected"
+    )
+
+
+@pytest.mark.parametrize(
+    ("read", "words"),
+    [
+        (lambda: pteron.loads("a = "), "the text: "),
+        (lambda: pteron.loads("name = 'x'"), "platform: missing"),
+        (lambda: pteron.from_dict({"name": "x"}), "the tables: 2 faults"),
+        (lambda: pteron.from_dict({"owner": 3}), "owner: 3 given, a table expected: [owner]\n"),
+    ],
+)
+def test_a_text_or_dictionary_that_is_no_machine_has_its_faults_named(read, words):
+    with pytest.raises(ModelError, match=re.escape(words)):
+        read()

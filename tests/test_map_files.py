@@ -8,8 +8,8 @@ import numpy as np
 import polars as pl
 import pytest
 import zarr
+from compared_maps import alike
 from mechanisms import gated
-from test_maps import alike
 
 import pteron
 from pteron.errors import DataError, OutputError

@@ -13,6 +13,7 @@ import polars as pl
 import pytest
 import xarray
 import zarr
+from compared_maps import alike
 from dying import dies_once, rows, slow_rows
 from mechanisms import CATALOG, CLIENTS
 
@@ -50,16 +51,6 @@ def delta():
 def whole(delta):
     """Return a map in space, coarse."""
     return map_index(delta, INDICES, pose_grid(delta, {}, points=31, rim=0.04))
-
-
-def alike(one, other):
-    """Say whether two maps are the same to the last bit."""
-    return (
-        one.grid == other.grid
-        and (one.status == other.status).all()
-        and one.values.keys() == other.values.keys()
-        and all(np.array_equal(v, other.values[k], equal_nan=True) for k, v in one.values.items())
-    )
 
 
 # Grids.
@@ -184,7 +175,7 @@ def test_the_status_says_which_leg_or_limit_ends_the_reach(name):
 
 def test_the_summary_is_over_poses_that_serve(whole):
     for name, best, worst in (("condition", np.nanmin, np.nanmax), ("margin", np.max, np.min)):
-        found, own = whole.summary(name), whole.values[name][whole.reachable]
+        found, own = whole.statistics(name), whole.values[name][whole.reachable]
         assert (found.best, found.worst) == (best(own), worst(own))
         at = (whole.grid.poses() == found.best_pose).all(axis=-1) & (
             whole.values[name] == found.best
@@ -192,7 +183,7 @@ def test_the_summary_is_over_poses_that_serve(whole):
         assert at.sum() == 1
         assert (found.mean, found.count) == (pytest.approx(own.mean()), len(own))
     with pytest.raises(DataError, match=r"^speed: is not in this map; it has condition, kappa"):
-        whole.summary("speed")
+        whole.statistics("speed")
 
 
 def test_threads_and_chunks_change_no_bit(delta):
@@ -253,7 +244,7 @@ def test_xarray_opens_a_store(whole, tmp_path):
         np.testing.assert_array_equal(found["x"].to_numpy(), whole.grid.axes[0].values)
         assert found["margin"].attrs["units"] == "m"
         near = found["margin"].sel(z=-0.9, method="nearest")
-        np.testing.assert_array_equal(near.to_numpy(), whole.at("z", -0.9).values["margin"])
+        np.testing.assert_array_equal(near.to_numpy(), whole.slice_at("z", -0.9).values["margin"])
 
 
 def test_the_surface_of_the_reach_encloses_its_volume(delta, whole, tmp_path):
@@ -352,7 +343,7 @@ def test_a_worker_and_a_client_may_die_and_nothing_is_lost(delta, tmp_path):
     assert sweep(rows, range(12), here) == 12
     with pytest.raises(ZeroDivisionError):  # who asks is gone after a part
         sweep(rows, range(12), there, progress=lambda share: 1 // (5 - round(12 * share)))
-    assert len(there.finished()) == 5
+    assert len(there.finished_chunks()) == 5
     work = partial(dies_once, str(tmp_path / "flag"), rows, 8)
     assert sweep(work, range(12), there, workers=2) == 7
     assert (tmp_path / "flag").exists()
@@ -397,7 +388,7 @@ def test_a_scheduler_may_die_and_nothing_is_lost(tmp_path):
         f"scheduler {address}: has ended, or its connection has; what is finished is kept: run it "
         "again"
     )
-    kept = len(store.finished())
+    kept = len(store.finished_chunks())
     assert told[-1] <= kept < 40
     assert sweep(rows, range(40), store) == 40 - kept
     assert store.scan().collect()["number"].to_list() == [k for k in range(40) for _ in range(3)]
@@ -436,8 +427,8 @@ def test_workers_that_cannot_be_are_refused(tmp_path):
 
 
 def test_pictures_hatch_and_name_what_does_not_serve(whole):
-    plane = whole.at("z", -0.9)
-    assert plane.grid.held["z"] == pytest.approx(-0.9, abs=0.03)
+    plane = whole.slice_at("z", -0.9)
+    assert plane.grid.fixed_coordinates["z"] == pytest.approx(-0.9, abs=0.03)
     figure = map_figure(plane, "margin", "condition")
     panels = [axes for axes in figure.axes if axes.get_legend() is not None]
     named = [[text.get_text() for text in axes.get_legend().get_texts()] for axes in panels]
@@ -475,3 +466,6 @@ def test_a_film_goes_through_the_last_coordinate(whole, tmp_path):
 
 def test_a_map_says_what_it_is(whole):
     assert repr(whole) == "<Map of 'delta': condition, kappa, margin over x 31 x y 31 x z 31>"
+    html = whole._repr_html_()
+    assert f"{whole.share:.1%} of 29791 poses in reach" in html
+    assert "<p>29779 more rows: see table()</p>" in html

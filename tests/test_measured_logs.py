@@ -5,9 +5,10 @@ import warnings
 import numpy as np
 import polars as pl
 import pytest
+from firmware_logs import CFG
 
 import pteron
-from pteron.calibration import Place, Plane, read_measurements
+from pteron.calibration import Place, ReferencePlane, read_measurements
 from pteron.errors import DataError, UnlikelyValue
 from pteron.export import from_klipper
 from pteron.kinematics import random_poses
@@ -58,7 +59,7 @@ def test_every_column_of_a_table_and_of_its_description_is_read(tmp_path):
     setup = found.setup
     assert setup.noise == {"height": 2e-5, "readings": 1e-6}
     assert setup.marks == {"corner": Place((0.02, 0.0, 0.0))}
-    assert setup.planes == {"bed": Plane(offset=-0.001, known=False)}
+    assert setup.planes == {"bed": ReferencePlane(offset=-0.001, known=False)}
     assert setup.anchors == {"post": Place(known=False)}
     assert not setup.frame_known
 
@@ -132,44 +133,6 @@ def test_what_is_unlikely_is_doubted(tmp_path, text, words):
     assert {one.category for one in told} == {UnlikelyValue}
 
 
-CFG = """[printer]
-kinematics: delta
-delta_radius: 141.553523
-[stepper_a]
-microsteps: 16
-rotation_distance: 32
-arm_length: 280.0
-position_endstop: 372.971746
-[stepper_b]
-microsteps: 16
-rotation_distance: 64
-gear_ratio: 80:40
-position_endstop: 373.433577
-[stepper_c]
-step_distance: 0.01
-position_endstop: 373.62993
-#*# <---------------------- SAVE_CONFIG ---------------------->
-#*# DO NOT EDIT THIS BLOCK OR BELOW. The contents are auto-generated.
-#*#
-#*# [delta_calibrate]
-#*# height0 = 17.197
-#*# height0_pos = 35612.667,35612.667,35612.667
-#*# height1 = 17.197
-#*# height1_pos = 41651.333,41651.333,32050.333
-#*# manual_height0 = 0.3
-#*# manual_height0_pos = 37302.0,37302.0,37302.0
-#*# distance0 = 60.5
-#*# distance0_pos1 = 35612.667,35612.667,35612.667
-#*# distance0_pos2 = 41651.333,41651.333,32050.333
-#*#
-#*# [stepper_a]
-#*# angle = 210.181908
-#*#
-#*# [stepper_b]
-#*# angle = 329.784204
-"""
-
-
 def test_klippers_stable_positions_are_readings(tmp_path):
     robot = from_klipper(CFG)
     found = read_measurements(robot, written(tmp_path, CFG, name="printer.cfg"))
@@ -238,7 +201,7 @@ def test_controllers_logs_are_found_by_their_contents(tmp_path, name):
 def test_a_linuxcnc_of_a_hexapod_has_angles_and_its_tool(tmp_path):
     robot = pteron.load("stewart")
     pose = random_poses(robot, 1, seed=1)[0]
-    place, turn = robot.platform.at(pose)
+    place, turn = robot.platform.placement(pose)
     tool = 1e3 * (place + np.array(robot.platform.tool) @ turn)
     line = " ".join(f"{v:.9f}" for v in (*tool, *np.degrees(pose[3:]), 0.0, 0.0, 0.0))
     found = read_measurements(robot, written(tmp_path, line + "\n", name="probe.log"))

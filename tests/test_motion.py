@@ -109,7 +109,7 @@ def test_a_cycles_derivatives_are_exact(name):
 
 def tool(robot, pose):
     """Return where the tool's centre point is."""
-    p, axes = robot.platform.at(np.asarray(pose))
+    p, axes = robot.platform.placement(np.asarray(pose))
     return p + robot.platform.tool @ axes
 
 
@@ -261,22 +261,22 @@ def test_guides_lead_where_the_joints_go(name):
     poses, _, _ = states(robot, 50)
     points = joint_points(robot, poses)
     for i, (leg, guide) in enumerate(zip(robot.legs, joint_guides(robot, poses), strict=True)):
-        assert guide.slides == (leg.joint.noun == "slider")
+        assert guide.is_prismatic == (leg.joint.noun == "slider")
         np.testing.assert_array_equal(guide.axis, leg.joint_axis)
         if leg.joint.noun == "shaft":  # it turns where it is
             np.testing.assert_array_equal(guide.path, [leg.guide_point])
             continue
-        ends = points.links[i][:, 0 if guide.slides else 1]
+        ends = points.links[i][:, 0 if guide.is_prismatic else 1]
         if leg.limits is None:
             steps = np.linalg.norm(np.diff(guide.path, axis=0), axis=-1)
             away = np.linalg.norm(ends[:, None] - guide.path, axis=-1).min(axis=-1)
             assert away.max() <= steps.max()
-        center = guide.path[0] if guide.slides else np.array(leg.guide_point)
-        across = np.cross if guide.slides else np.dot
+        center = guide.path[0] if guide.is_prismatic else np.array(leg.guide_point)
+        across = np.cross if guide.is_prismatic else np.dot
         np.testing.assert_allclose(across(guide.path - center, guide.axis), 0.0, atol=1e-12)
         if leg.limits is not None:
             reached = guide.path[[0, -1]] - leg.guide_point
-            size = leg.lever if not guide.slides else np.abs(leg.limits)
+            size = leg.lever if not guide.is_prismatic else np.abs(leg.limits)
             np.testing.assert_allclose(np.linalg.norm(reached, axis=-1), size, rtol=1e-12)
 
 

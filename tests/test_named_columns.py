@@ -174,3 +174,50 @@ def test_a_motion_needs_a_time():
     ):
         with pytest.raises(DataError, match=f"^{message}$"):
             pteron.motion.replay("tripteron", table)
+
+
+# A log of a program's own tables.
+
+LOG_COLUMNS = ("t", "x", "y", "z", "rho1", "rho2", "rho3", "force1", "force2", "force3", "payload")
+
+
+@pytest.fixture(scope="module")
+def recorded():
+    """Return a simulated motion of the Tripteron."""
+    robot = pteron.load("tripteron")
+    start = np.array([0.0, 0.0, 0.0]), np.array([0.1, -0.2, 0.3])
+    return robot, pteron.motion.simulate(robot, start=start, duration=0.05)
+
+
+@pytest.mark.parametrize("form", [dict, pd.DataFrame, pl.DataFrame])
+def test_a_log_is_made_of_one_table_or_of_arrays(recorded, form):
+    robot, run = recorded
+    payload = np.zeros(len(run.time), dtype=int)
+    columns = [run.time, *run.pose.T, *run.joints.T, *run.forces.T, payload]
+    table = dict(zip(LOG_COLUMNS, columns, strict=True))
+    shuffled = form({name: table[name] for name in reversed(LOG_COLUMNS)})
+    of = pteron.identification.Log.of
+    from_arrays = of(robot, run.time, run.joints, run.forces, pose=run.pose, payload=payload)
+    for log in (of(robot, shuffled), of(robot, run.time, shuffled, shuffled, pose=shuffled)):
+        for name in ("time", "joints", "forces", "pose"):
+            assert np.array_equal(getattr(log, name), getattr(from_arrays, name))
+        assert log.joint_names == ("rho1", "rho2", "rho3")
+        assert log.force_names == ("force1", "force2", "force3")
+    assert np.array_equal(of(robot, shuffled).payload, payload)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (lambda t: (t,), "mine: time alone given; give joints and forces too, or one table"),
+        (lambda t: (t, np.zeros((9, 3))), "mine: forces: missing"),
+        (lambda t: (t, np.zeros((9, 2)), np.zeros((9, 3))), r"mine: joints: shape \(9, 2\) given"),
+        (lambda t: (t, np.zeros((8, 3)), np.zeros((8, 3))), r"mine: joints of shape \(8, 3\)"),
+        (lambda t: ({"t": t, "rho1": t},), "mine: joints: no column rho2, rho3 in a table of t"),
+        (lambda t: ({"rho1": t, "rho2": t, "rho3": t},), "mine: no column t in a table"),
+        (lambda t: ({"t": t[::-1]} | dict.fromkeys(LOG_COLUMNS[4:], t),), "does not rise"),
+    ],
+)
+def test_what_a_log_lacks_is_named(arguments, words):
+    with pytest.raises(DataError, match=words):
+        pteron.identification.Log.of("tripteron", *arguments(np.arange(9.0)), source="mine")

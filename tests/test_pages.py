@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 from logs_of_motions import log_of
 from mechanisms import CATALOG, CLIENTS, MECHANISMS, gated, several
+from page_reader import driven
 from PIL import Image
-from test_report import driven
 
 import pteron
 from pteron.identification import identify

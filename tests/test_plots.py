@@ -48,7 +48,7 @@ from pteron.plots import (
     trajectory_figure,
 )
 from pteron.plots.canvas import PAPER, blank
-from pteron.plots.space_axes import upright
+from pteron.plots.space_axes import upright_rotation
 from pteron.workspace import home_pose, reach_slice
 
 IN_SPACE = ["tripteron", "quadrupteron turned", "delta", "random PRR 0", "par4", "delta-4"]
@@ -285,13 +285,13 @@ def test_gravity_points_down_in_the_picture():
     for seed in range(5):
         robot = random_machine(seed, "PPPP")
         gravity = np.array(robot.gravity)
-        rotation = upright(-gravity)
+        rotation = upright_rotation(-gravity)
         np.testing.assert_allclose(rotation @ rotation.T, np.eye(3), atol=1e-15)
         assert np.linalg.det(rotation) == pytest.approx(1.0)
         np.testing.assert_allclose(
             rotation @ gravity, [0.0, 0.0, -np.linalg.norm(gravity)], atol=1e-14
         )
-    np.testing.assert_allclose(upright(np.array([0.0, 0.0, 2.0])), np.eye(3), atol=1e-15)
+    np.testing.assert_allclose(upright_rotation(np.array([0.0, 0.0, 2.0])), np.eye(3), atol=1e-15)
 
 
 def test_forces_are_drawn_as_given():

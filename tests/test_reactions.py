@@ -74,7 +74,7 @@ def test_what_the_base_gives_changes_the_momentum():
         second = np.array([-1 / 560, 8 / 315, -1 / 5, 8 / 5])
         moments.append((second @ (found[:4] + found[:3:-1]) - 205 / 72 * here) / step**2)
     mass = sum(body.mass for leg in robot.legs for body in leg.bodies.values())
-    mass += robot.platform.joined.mass
+    mass += robot.platform.total_inertia.mass
     needed = np.array(moments) - mass * np.array(robot.gravity)
     wrench = np.array([3.0, -4.0, 5.0, 0.2])
     found = reactions(robot, pose, velocity, acceleration, wrench)
@@ -100,7 +100,7 @@ def test_a_platform_that_tilts_gets_from_its_legs_what_newton_and_euler_ask(moti
     way = pose + t * velocity + 0.5 * t * t * acceleration
     body = robot.platform.inertia
     spread = 0.5 * np.trace(body.tensor) * np.eye(3) - body.tensor
-    place, axes = robot.platform.at(np.vstack([way, pose]))
+    place, axes = robot.platform.placement(np.vstack([way, pose]))
     arm = body.first_moment @ axes
     first, now, here = body.mass * place + arm, axes[-1].T, place[-1]
     integral = np.einsum("i,bj->bij", first[-1], place) + np.einsum("i,bj->bij", here, arm)
@@ -133,7 +133,7 @@ def test_least_norm_and_what_is_no_load():
 
     assert (norm(found[0], lengths[0]) < norm(found[1], lengths[0])).all()
     assert (norm(found[1], lengths[1]) < norm(found[0], lengths[1])).all()
-    assert not found[0].unique
+    assert not found[0].is_unique
     # A moment that would tilt the platform goes into the joints, not into the actuators.
     tilted = reactions("3-prr", pose, moment=np.cross([0.0, 0.0, 1.0], [2.0, -3.0, 0.0]))
     np.testing.assert_allclose(tilted.actuators, found[0].actuators, rtol=0, atol=1e-9)

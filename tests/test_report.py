@@ -6,13 +6,21 @@ import re
 import socket
 from dataclasses import asdict, replace
 from functools import lru_cache
-from html.parser import HTMLParser
 from pathlib import Path
 
 import numpy as np
 import pytest
-from mechanisms import CATALOG, CLIENTS, MECHANISMS, in_turn, random_machine, with_elbows
-from test_workspace import fourfold, with_limits
+from mechanisms import (
+    CATALOG,
+    CLIENTS,
+    MECHANISMS,
+    fourfold,
+    in_turn,
+    random_machine,
+    with_elbows,
+    with_limits,
+)
+from page_reader import HOSTILE, Reader, driven, strict
 
 import pteron
 from pteron.kinematics.jacobian_at import jacobian_at
@@ -25,9 +33,6 @@ from pteron.report.page import bodies, geometry, page, symbolic_sums, typeset_ac
 from pteron.report.typeset import format_fixed, significant, triple
 from pteron.report.write import checked_folder, numbers
 from pteron.workspace import REACHABLE, pose_margins
-
-HOSTILE = '</script><b onload="x">&\'{{ 7 * 6 }}'
-"""A machine's name comes from a file that anyone may have written."""
 
 
 def doubtful(robot):
@@ -46,14 +51,6 @@ def with_a_tool(robot):
     return replace(robot, name="with a shaft", platform=platform, legs=legs)
 
 
-def driven(robot):
-    """Return the machine with drives, of which the first has neither limits nor a ratio."""
-    motor = pteron.legs.Drive(3.0, 12.0, 0.1, 3e-5, 392.7, max_force=40.0, max_speed=9.0)
-    drives = (pteron.legs.Drive(2.0), *(motor for _ in robot.legs[1:]))
-    legs = zip(robot.legs, drives, strict=True)
-    return replace(robot, legs=tuple(replace(leg, drive=drive) for leg, drive in legs))
-
-
 MACHINES = {
     "quadrupteron": CATALOG["quadrupteron"],
     "driven": driven(CATALOG["tripteron"]),
@@ -68,8 +65,6 @@ MACHINES = {
 }
 EVERY = in_turn(MACHINES, ("quadrupteron", "hostile"), share=1)
 
-VOID = {"meta", "input", "br", "hr", "img", "link"}
-
 
 @lru_cache
 def report(name):
@@ -79,50 +74,6 @@ def report(name):
 @lru_cache
 def html(name):
     return page(report(name))
-
-
-class Reader(HTMLParser):
-    """Collects what a page holds, and what does not balance."""
-
-    def __init__(self, text):
-        super().__init__()
-        self.open, self.faults, self.ids, self.links, self.sources = [], [], [], [], []
-        self.counts, self.words, self.scripts = {}, [], {}
-        self.feed(text)
-        self.close()
-
-    def handle_starttag(self, tag, attributes):
-        found = dict(attributes)
-        self.counts[tag] = self.counts.get(tag, 0) + 1
-        if "id" in found:
-            self.ids.append(found["id"])
-        self.links += [v for k, v in attributes if k.endswith("href")]
-        self.sources += [v for k, v in attributes if k in ("src", "srcset", "data", "action")]
-        self.faults += [f"{k} on {tag}" for k, _ in attributes if k.startswith("on")]
-        if tag not in VOID:
-            self.open.append((tag, found.get("id")))
-
-    def handle_startendtag(self, tag, attributes):
-        self.handle_starttag(tag, attributes)
-        if tag not in VOID:
-            self.open.pop()
-
-    def handle_endtag(self, tag):
-        if not self.open or self.open[-1][0] != tag:
-            self.faults.append(f"</{tag}> at {self.getpos()}, open: {self.open[-3:]}")
-        else:
-            self.open.pop()
-
-    def handle_data(self, data):
-        if self.open and self.open[-1][0] == "script":
-            key = self.open[-1][1]
-            self.scripts[key] = self.scripts.get(key, "") + data
-        elif not (self.open and self.open[-1][0] == "style"):
-            self.words.append(data)
-
-    @property
-    def text(self):
-        return re.sub(r"\s+", " ", " ".join(self.words))
 
 
 @lru_cache
@@ -237,13 +188,6 @@ def test_the_moving_picture_is_the_machine(name):
     # The last frame is followed by the first: no jump, and no frame twice.
     steps = np.diff(np.append(data["time"], data["duration"]))
     np.testing.assert_allclose(steps, steps[0], atol=2e-6)
-
-
-def strict(text):
-    def refuse(constant):
-        raise AssertionError(f"{constant} is not JSON")
-
-    return json.loads(text, parse_constant=refuse)
 
 
 @EVERY
@@ -376,7 +320,7 @@ def test_the_platforms_inertia_is_told_with_all_its_parts():
     assert len(names) == 2 + len(own.bars) + len(own.geared)
     parts = [values.get("m", 0.0) for _, values in rows[:-1]]
     assert rows[-1][1]["m"] == pytest.approx(sum(parts))
-    assert rows[-1][1]["I"] == own.joined.inertia
+    assert rows[-1][1]["I"] == own.total_inertia.inertia
     assert [name for name, leg, _ in bodies(MACHINES["delta"]) if leg is None] == ["platform"]
 
 

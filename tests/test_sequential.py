@@ -29,8 +29,7 @@ def minimum(program: NonlinearProgram, start: list[float]) -> np.ndarray | None:
     return sequential_minimum(
         program,
         np.array(start),
-        radius=0.5,
-        settled=1e-14,
+        tolerance=1e-14,
         iterations=300,
         stop=lambda: False,
     )
@@ -56,7 +55,5 @@ def test_a_minimum_where_rows_meet_is_found_from_outside_too(start):
 def test_it_does_not_begin_where_there_is_no_value_and_ends_when_told():
     assert minimum(SPHERE, [-2.0, 0.0, 0.0]) is None
     start = np.array([0.1, 0.2, 0.3])
-    told = sequential_minimum(
-        SPHERE, start, radius=0.5, settled=1e-9, iterations=9, stop=lambda: True
-    )
-    assert (told == start).all()
+    iterate = sequential_minimum(SPHERE, start, tolerance=1e-9, iterations=9, stop=lambda: True)
+    assert (iterate == start).all()

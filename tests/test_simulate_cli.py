@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import polars as pl
 import pytest
+from commands import read
 from mechanisms import CLIENTS
 from typer.testing import CliRunner
 
@@ -133,11 +134,8 @@ def test_units_of_a_cycle_and_a_payload_are_doubted(tmp_path):
 
 
 @CLIENTS
-def test_a_table_on_a_narrow_screen_keeps_its_numbers(monkeypatch):
-    monkeypatch.setattr("pteron.cli.simulate.is_terminal", lambda: True)
-    monkeypatch.setattr("pteron.cli.terminal.is_terminal", lambda: True)
-    monkeypatch.setenv("COLUMNS", "60")
-    lines = run("delta", "--duration", 1).stdout.splitlines()
+def test_a_table_on_a_narrow_screen_keeps_its_numbers():
+    lines = read("simulate delta --duration 1").splitlines()
     assert max(map(len, lines)) <= 60
     cells = lines[-2].split()
     assert cells[0] == "3"

@@ -5,6 +5,7 @@ from dataclasses import replace
 import mechanisms
 import numpy as np
 import pytest
+from claimed_machines import FREE
 from mechanisms import CLIENTS
 
 import pteron
@@ -21,8 +22,6 @@ from pteron.motion import (
     simulate,
 )
 from pteron.workspace import home_pose
-
-FREE = ["quadrupteron", "delta", "par4", "five-bar", "quadrupteron-oblique"]
 
 DRIVE = pteron.legs.Drive(coulomb=3.0, viscous=10.0, offset=0.5, rotor_inertia=0.1, rest_speed=0.01)
 

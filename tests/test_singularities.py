@@ -130,7 +130,7 @@ def test_singular_orientations_are_the_roots_of_det_j_for_1000_layouts():
 
 def rods_determinant(robot, pose):
     """Return det of the wrenches of all single rods on the platform and its parts, joints held."""
-    p, axes = robot.platform.at(pose)
+    p, axes = robot.platform.placement(pose)
     links, points = (numeric(robot, w)(pose) for w in ("link_vectors", "platform_points"))
     k = np.array(robot.platform.axis)
     hinges = [tuple(leg.platform_point) for leg in robot.legs]

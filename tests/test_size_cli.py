@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 import pytest
+from commands import done, read, refused, run
 from mechanisms import CLIENTS
-from test_cli import done, refused, run
 
 import pteron
 from pteron.motion import Motor, choose, choose_common, pick_and_place, size, with_payload
@@ -58,7 +58,7 @@ def rows_of(line: str) -> pl.DataFrame:
 
 
 @CLIENTS
-def test_a_program_gets_all_numbers_and_a_pipe_what_a_person_sees(driven: str, monkeypatch):
+def test_a_program_gets_all_numbers_and_a_pipe_what_a_person_sees(driven: str):
     rows = rows_of(f"size {driven}")
     data = json.loads(done(f"size {driven} --json"))
     assert rows.to_dicts() == [pytest.approx(row) for row in data["drives"]]
@@ -71,8 +71,7 @@ def test_a_program_gets_all_numbers_and_a_pipe_what_a_person_sees(driven: str, m
     least = min(data["margins"], key=lambda one: one["margin"])
     text = done(f"size {driven}")
     assert f"Enough: the drives in the file have a margin of {least['margin']:.3g}, 1 asked" in text
-    monkeypatch.setattr("pteron.cli.terminal.is_terminal", lambda: True)
-    assert done(f"size {driven}").split() == text.split()
+    assert read(f"size {driven}").split() == text.split()
 
 
 @CLIENTS
@@ -163,10 +162,9 @@ def test_one_table_may_be_written(driven: str):
 
 
 @CLIENTS
-def test_a_person_sees_tables_within_80_columns(driven: str, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr("pteron.cli.terminal.is_terminal", lambda: True)
+def test_a_person_sees_tables_within_80_columns(driven: str):
     Path("motors.csv").write_text(MOTORS, encoding="utf-8")
-    text = run(f"size {driven} --motors motors.csv --payload 0.2", COLUMNS="80").stdout
+    text = read(f"size {driven} --motors motors.csv --payload 0.2", COLUMNS="80")
     assert max(map(len, text.splitlines())) <= 80
     for words in ("with 0.2 kg", "RMS torque", "takes back (J)", "J a cycle", "400 W"):
         assert words in text

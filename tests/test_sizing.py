@@ -6,21 +6,22 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from driven_machines import driven
 from mechanisms import CATALOG, CLIENTS, NIGHTLY, gated, in_turn, random_machine, with_elbows
 
 import pteron
 from pteron.motion import (
+    CyclePlace,
     Motion,
     Motor,
-    Place,
     Sizing,
     Span,
     best_ratio,
     best_ratios,
     choose,
+    motion_at_place,
     overloads,
     pick_and_place,
-    placed,
     read_motors,
     size,
     with_payload,
@@ -37,24 +38,6 @@ BARE = {
     "sliding": random_machine(0, "PRSSI"),
     "planar": random_machine(0, "CLP"),
 }
-
-
-def driven(robot, **more):
-    """Return the machine with different drives on its legs."""
-    legs = []
-    for i, leg in enumerate(robot.legs):
-        slides = leg.joint.unit == "m"
-        drive = pteron.legs.Drive(
-            coulomb=(2.0 + i) * (1.0 if slides else 0.1),
-            viscous=(10.0 - i) * (1.0 if slides else 0.01),
-            offset=0.3 * i,
-            rotor_inertia=3e-5,
-            ratio=(-1.0) ** i * (200.0 if slides else 20.0),
-            rest_speed=0.05,
-            **more,
-        )
-        legs.append(replace(leg, drive=drive))
-    return replace(robot, legs=tuple(legs))
 
 
 MACHINES = {name: driven(robot) for name, robot in BARE.items()}
@@ -219,22 +202,22 @@ def test_places_are_those_that_a_loop_over_all_finds(name, wider):
     keys = {f"{name}s": name for name in ("peak_force", "rms_force", "peak_speed")}
     some = {i for name in keys.values() for i in found.worst(name)}
     some |= set(range(0, len(found.places), max(1, len(found.places) // 60)))
-    alone = {i: size(robot, placed(robot, tool, found.places[i]), dwell=0.1) for i in some}
+    alone = {i: size(robot, motion_at_place(robot, tool, found.places[i]), dwell=0.1) for i in some}
     for key in (*keys, "given_energy"):
         for i, one in alone.items():
-            assert getattr(found.at(i), key) == pytest.approx(getattr(one, key), rel=1e-9)
+            assert getattr(found.select_place(i), key) == pytest.approx(getattr(one, key), rel=1e-9)
     for key in keys:
         every = [getattr(one, key) for one in alone.values()]
         assert getattr(found, key) == pytest.approx(np.max(every, axis=0), rel=1e-9)
     # No place or turn between those that were looked at is worse.
     rng, most = np.random.default_rng(0), found.rms_forces
     for _ in range(25):
-        other = Place(tuple(rng.uniform(*region.box)), rng.uniform(0.0, 2.0 * np.pi))
-        moved = placed(robot, tool, other)
+        other = CyclePlace(tuple(rng.uniform(*region.box)), rng.uniform(0.0, 2.0 * np.pi))
+        moved = motion_at_place(robot, tool, other)
         if region.holds(moved.pose).all():
             assert (size(robot, moved, dwell=0.1).rms_forces <= 1.01 * most).all()
     # The best ratio, and those that serve, are of all places.
-    every = [found.at(i) for i in range(len(found.places))]
+    every = [found.select_place(i) for i in range(len(found.places))]
     best = best_ratio(found, 1, 3e-5)
     ratios = best * np.array([0.999, 1.0, 1.001])
     least = [torques(found, 1, ratio, 3e-5)[0] for ratio in ratios]
@@ -265,14 +248,16 @@ def test_the_platform_turns_with_the_cycle(name):
     middle = Box.around(tool.pose).box.mean(axis=0)
     pose = (tool.pose - middle) @ matrix.T + found.places[i].pose
     moved = Motion(tool.time, pose, tool.velocity @ matrix.T, tool.acceleration @ matrix.T)
-    assert found.at(i).rms_forces == pytest.approx(size(robot, moved).rms_forces, rel=1e-9)
+    assert found.select_place(i).rms_forces == pytest.approx(
+        size(robot, moved).rms_forces, rel=1e-9
+    )
     # No place and turn of the path, or of the whole, between those that were looked at is worse.
     rng, box = np.random.default_rng(0), Box.around(np.array([p.pose for p in found.places])).box
     least = least_margin(robot, home_pose(robot))
     for k in range(40):
         turn = rng.uniform(-0.5, 0.5) if k % 2 else rng.uniform(0.0, 2.0 * np.pi)
-        place = Place((*rng.uniform(*box)[:3], turn if k % 2 else 0.0), turn)
-        moved = placed(robot, tool, place)
+        place = CyclePlace((*rng.uniform(*box)[:3], turn if k % 2 else 0.0), turn)
+        moved = motion_at_place(robot, tool, place)
         if keeps_margin(robot, moved.pose, least):
             assert (size(robot, moved).rms_forces <= 1.01 * found.rms_forces).all()
 
@@ -282,7 +267,7 @@ def test_a_region_that_is_not_all_in_reach_is_refused_with_the_place():
     with pytest.raises(pteron.DataError, match=r"places: about \[.*: pose.*misses it by"):
         size(robot, cycle("delta-4", 31), places=Box((-2.0, 0.0, -1.0, 0.0), (2.0, 0.1, -0.8, 0.5)))
     with pytest.raises(pteron.DataError, match=r"places\[0\]: pose \[0.0\] given, x y z phi"):
-        size(robot, cycle("delta-4", 31), places=[Place((0.0,))])
+        size(robot, cycle("delta-4", 31), places=[CyclePlace((0.0,))])
 
 
 def test_friction_is_assumed_where_the_file_has_none():
@@ -445,7 +430,7 @@ def test_a_motor_that_gives_too_little_at_a_speed_is_told_with_its_place():
     legs[1] = replace(legs[1], drive=pteron.legs.Drive(curve=((0.0, force), (0.5 * speed, 0.0))))
     none = overloads(replace(bare, legs=tuple(legs)), found.forces, found.speeds)
     assert none[0].endswith("its drive gives 0 N (curve)")
-    here = Place(tuple(cycle("quadrupteron-oblique").pose.mean(axis=0)))
+    here = CyclePlace(tuple(cycle("quadrupteron-oblique").pose.mean(axis=0)))
     places = size(robot, cycle("quadrupteron-oblique"), places=[here])
     assert str(here) in places.overloads[0]
 
@@ -567,5 +552,5 @@ def test_a_toml_list_with_a_mistake_is_refused(tmp_path, text, words):
 def test_other_units_are_doubted():
     assert "revolutions per minute" in Motor("A", 4e-6, 0.32, 0.95, 6000.0).warnings[0]
     assert "kg cm^2" in Motor("A", 0.04, 0.32, 0.95, 600.0).warnings[0]
-    assert Span(2.0, 1.0).within(Span(0.0, 3.0)) == Span(2.0, 1.0)
+    assert Span(2.0, 1.0).intersect(Span(0.0, 3.0)) == Span(2.0, 1.0)
     assert not Span(2.0, 1.0)

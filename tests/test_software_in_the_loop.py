@@ -10,6 +10,7 @@ import casadi as ca
 import mechanisms
 import numpy as np
 import pytest
+from claimed_machines import IN_THE_LOOP
 
 import pteron
 from pteron.controllers import (
@@ -37,10 +38,8 @@ def driven(name):
 GIVEN = {"sensors": Sensors(1e-6), "delay": 5e-4, "duration": 0.05}
 
 
-IN_THE_LOOP = ("five-bar", "quadrupteron", "delta", "par4", "stewart", "3-rrr")
-
 LAWS = {
-    one.what: one
+    one.law_name: one
     for one in (PDGravity(), FeedForwardPD(), ComputedTorque(), Adaptive(friction=True))
 }
 

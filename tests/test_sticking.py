@@ -5,6 +5,7 @@ from dataclasses import replace
 import mechanisms
 import numpy as np
 import pytest
+from claimed_machines import LIMITED
 from mechanisms import CLIENTS
 
 import pteron
@@ -144,11 +145,6 @@ def narrow(name, **drive):
     joints = zip(robot.legs, pteron.inverse_kinematics(robot, home).tolist(), strict=True)
     legs = tuple(replace(leg, limits=(at - 0.05, at + 0.05)) for leg, at in joints)
     return driven(replace(robot, legs=legs), Drive(**drive)), home
-
-
-LIMITED = mechanisms.gated(
-    ["quadrupteron", "3-rpr", "sprint-z3", "ankle", "stewart", "delta"], ["3-rpr", "ankle"]
-)
 
 
 @pytest.mark.parametrize("name", LIMITED)

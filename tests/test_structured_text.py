@@ -4,13 +4,12 @@ import math
 import re
 from functools import cache
 from itertools import product
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from exported_code import ROBOTS, identification_file, stiff
 from mechanisms import CATALOG, CLIENTS, LARGE, gated, several, states
-from structured_text import Block, Trap, parse, read
-from test_export import ROBOTS, identification_file, stiff
+from structured_text import Block, Runner, Trap, as_elements, parse, read, text_of
 
 import pteron
 from pteron.equations.drives import drive_numbers
@@ -57,48 +56,6 @@ SHORT = (
     ("delta", "inverse_kinematics"),
 )
 """One of every kind of statement; blark takes 10 ms a line."""
-
-
-def text_of(given, name="FB_Test", **more):
-    graph = graph_of(given.function, given.inputs)
-    return function_block(name, graph, given.inputs, given.outputs, **more)
-
-
-def as_elements(port, values):
-    """Return the elements of an array as the controller holds them, by subscripts."""
-    values = np.asarray(values, dtype=float).ravel()
-    if not port.shape:
-        return float(values[0])
-    places = product(*map(range, port.shape))
-    return dict(zip(places, map(float, values), strict=True))
-
-
-def as_array(port, elements):
-    if not port.shape:
-        return np.array([elements])
-    return np.array([elements[place] for place in product(*map(range, port.shape))])
-
-
-class Runner:
-    """A program twice: as a block that runs, and in CasADi."""
-
-    def __init__(self, given, **more):
-        self.program = given
-        self.text = text_of(given, **more)
-        self.block = Block(read(self.text))
-
-    def __call__(self, values):
-        """Return Valid, Status and the outputs, one vector a port."""
-        ports = self.program.inputs
-        found = self.block(
-            **{p.name: as_elements(p, v) for p, v in zip(ports, values, strict=True)}
-        )
-        outputs = [as_array(port, found[port.name]) for port in self.program.outputs]
-        return SimpleNamespace(valid=found["valid"], status=found["status"], outputs=outputs)
-
-    def casadi(self, values):
-        results = self.program.function.call([np.asarray(value, float) for value in values])
-        return [np.array(result).ravel("F") for result in results]
 
 
 def inputs_of(robot, given, count, seed=0):

@@ -345,7 +345,7 @@ def test_a_leg_closes_without_a_root(kind):
         e = x if kind == "PRR" else (Fraction(3, 5), Fraction(0), Fraction(4, 5))
         directions = {"direction": z, "slider_direction": e, "plane_axis": x, "zero_direction": y}
         lengths = {"upper_length": (Fraction(2, 7),), "lower_length": (Fraction(3, 5),)}
-        w, sigma = type(KINDS[kind]).closing(directions | lengths, rng)
+        w, sigma = type(KINDS[kind]).draw_closure(directions | lengths, rng)
         assert all(isinstance(value, Fraction) for value in w)
         fields = {key: [float(v) for v in value] for key, value in directions.items()}
         fields |= {"upper_length": 2 / 7, "lower_length": 0.6, "guide_point": (0.0, 0.0, 0.0)}

@@ -5,8 +5,8 @@ import json
 import numpy as np
 import pytest
 import tilting
+from commands import run
 from mechanisms import CLIENTS, TILTED, gated
-from test_cli import run
 
 import pteron
 from pteron.export.engines import tree
@@ -47,7 +47,7 @@ def test_it_is_clean_and_level_at_home(name):
 def test_a_machine_turned_as_a_whole_keeps_its_margins(name):
     robot, turn = TILTED[name], tilting.rotation(np.random.default_rng(1))
     other, pose = pteron.turned(robot, turn), home_pose(robot) + 0.01
-    moved, place = pose.copy(), robot.platform.at(pose)[0]
+    moved, place = pose.copy(), robot.platform.placement(pose)[0]
     moved[~robot.platform.angular] = other.platform.directions @ turn @ place
     found, expected = pose_margins(other, moved), pose_margins(robot, pose)
     np.testing.assert_allclose(found.joints, expected.joints, rtol=0, atol=1e-9)

@@ -69,7 +69,7 @@ def test_a_wrench_does_its_work(drawn):
     held -= pteron.inverse_dynamics(robot, x, rest, rest)
     power = np.einsum("bn,bnm,bm->b", held, pteron.jacobian(robot, x), dx)
     step = 1e-6
-    (p1, r1), (p0, r0) = (robot.platform.at(x + side * step * dx) for side in (1, -1))
+    (p1, r1), (p0, r0) = (robot.platform.placement(x + side * step * dx) for side in (1, -1))
     velocity = (p1 - p0) / (2 * step)
     turn = np.einsum("bij,bik->bjk", r1, r0) / (4 * step)  # R(t) R(-t)^T, axes being rows
     spin = np.stack([turn[:, i - 1, i - 2] - turn[:, i - 2, i - 1] for i in range(3)], -1)

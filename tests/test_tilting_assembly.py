@@ -114,7 +114,7 @@ def test_poses_are_counted_another_way(name):
     at = at[np.isfinite(at).all(axis=-1)]
     good = at[step(joints, at)[1] < 1e-12]
     for pose in good:
-        place, axes = robot.platform.at(pose)
+        place, axes = robot.platform.placement(pose)
         known = np.append(place, axes)
         if not any(np.abs(known - other).max() < 1e-6 for other in found):
             found.append(known)

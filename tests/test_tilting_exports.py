@@ -7,11 +7,11 @@ import fmpy.validation
 import numpy as np
 import pytest
 import tilting
+from compiled_exports import KINDS, EmcPose, driven, kinematics, simulated, started
+from exported_code import compiled
 from mechanisms import CLIENTS, gated
 from scipy.integrate import solve_ivp
-from test_export import compiled
-from test_other_tools import KINDS, EmcPose, driven, kinematics, simulated, started
-from test_structured_text import Runner
+from structured_text import Runner
 
 import pteron
 from pteron.equations.drives import drive_numbers
@@ -186,7 +186,7 @@ def test_linuxcnc_moves_a_tilting_machine_as_genhexkins_does(tmp_path, motion):
     units = [degrees if leg.joint.unit == "rad" else 1000.0 for leg in robot.legs]
     joints = (ctypes.c_double * 16)(*[77.0] * 16)
     for pose in poses:
-        p, axes = robot.platform.at(pose)
+        p, axes = robot.platform.placement(pose)
         tip = 1e3 * (p + tool @ axes) + length * (upright - axes[2])
         seen = np.concatenate([robot.platform.directions @ tip, degrees * pose])[: len(pose)]
         seen[robot.platform.angular] = degrees * pose[robot.platform.angular]

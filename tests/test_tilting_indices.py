@@ -28,7 +28,9 @@ def twists(robot, pose):
     """Return d(v, omega) / d x' (6, m), by differences of P and of the axes."""
     columns, step = [], 1e-5
     for way in np.eye(len(pose)):
-        (p1, r1), (p0, r0) = (robot.platform.at(pose + side * step * way) for side in (1, -1))
+        (p1, r1), (p0, r0) = (
+            robot.platform.placement(pose + side * step * way) for side in (1, -1)
+        )
         turn = r1.T @ r0 / (4 * step)  # R(t) R(-t)^T, axes being rows
         spin = [turn[i - 1, i - 2] - turn[i - 2, i - 1] for i in range(3)]
         columns.append([*(p1 - p0) / (2 * step), *spin])
@@ -43,7 +45,7 @@ def test_indices_are_those_of_the_homogeneous_jacobian(motion, kinds):
     assert ("speed_least" in found) == bool(robot.platform.lengths)
     levers = np.array([leg.lever for leg in robot.legs])
     for k, pose in enumerate(poses):
-        twist, axes = twists(robot, pose), robot.platform.at(pose)[1]
+        twist, axes = twists(robot, pose), robot.platform.placement(pose)[1]
         # Along which the index counts: the twist, omega, or the pose's own coordinates.
         basis = twist if motion in ("1T2R", "2R") else np.eye(6)[:, -len(pose) :]
         quasi = np.linalg.lstsq(basis, twist, rcond=None)[0]
@@ -124,14 +126,16 @@ def test_stiffness_is_that_of_the_actuators_springs(name):
     found = stiffness(robot, pose, Elasticity(tuple(springs)))
     rows = pteron.jacobian(robot, pose)
     moves = pteron.twist(robot, pose, np.eye(m))
-    moves[:, :3] += np.cross(moves[:, 3:], tool @ robot.platform.at(pose)[1])
+    moves[:, :3] += np.cross(moves[:, 3:], tool @ robot.platform.placement(pose)[1])
     per_joint = moves.T @ np.linalg.inv(rows)
     exact = per_joint @ np.diag(1.0 / springs) @ per_joint.T
     np.testing.assert_allclose(found.compliance, exact, atol=1e-12 * np.abs(exact).max())
     mass = pteron.mass_matrix(robot, pose)
     squares = eigh(rows.T @ np.diag(springs) @ rows, mass, eigvals_only=True)
     np.testing.assert_allclose(found.frequencies, np.sqrt(squares) / (2 * np.pi), rtol=1e-9)
-    assert found.along([0.0, 0.0, 1.0]) == pytest.approx(1.0 / exact[2, 2], rel=1e-9)
+    assert found.directional_stiffness([0.0, 0.0, 1.0]) == pytest.approx(
+        1.0 / exact[2, 2], rel=1e-9
+    )
     if m < 6:
         with pytest.raises(ModelError, match=f"a platform of {m} freedoms does not give way"):
             _ = found.matrix
@@ -143,8 +147,8 @@ def test_stiffness_is_that_of_the_actuators_springs(name):
     other = replace(leg, platform_point=(x, y, z + step))
     changed = replace(robot, legs=(robot.legs[0], other, *robot.legs[2:]))
     joints = pteron.inverse_kinematics(robot, pose)
-    p, axes = robot.platform.at(pteron.follow(changed, joints[None], pose)[0])
-    before, turned = robot.platform.at(pose)
+    p, axes = robot.platform.placement(pteron.follow(changed, joints[None], pose)[0])
+    before, turned = robot.platform.placement(pose)
     moved = robot.platform.directions @ (p + tool @ axes - before - tool @ turned)
     count = len(robot.platform.lengths)
     np.testing.assert_allclose(told.tool[:count, k], moved / step, atol=2e-5)

@@ -9,8 +9,8 @@ import pytest
 from mechanisms import CLIENTS
 from PIL import Image
 from scipy.spatial import ConvexHull
-from test_viewer import opened, slide, wait_for
 from tilting import machine
+from viewer_pages import opened, slide, wait_for
 
 import pteron
 from pteron.motion import Motion, joint_points, pick_and_place, with_payload
@@ -46,7 +46,7 @@ def test_drawn_points_are_those_of_a_platform_turned_by_its_pose(kinds):
     robot, home = tooled(*kinds)
     pose = home + 0.05
     points = joint_points(robot, pose)
-    place, axes = robot.platform.at(pose)
+    place, axes = robot.platform.placement(pose)
     arms = np.array([leg.platform_point for leg in robot.legs])
     np.testing.assert_allclose(points.platform_points, place + arms @ axes, atol=1e-14)
     np.testing.assert_allclose(points.tool, place + TOOL @ axes, atol=1e-15)
@@ -119,16 +119,16 @@ def test_a_frame_that_is_turned_becomes_the_nearest_pose(kinds):
     platform = robot.platform
     other = home + np.where(platform.angular, 0.3, 0.0)
     np.testing.assert_allclose(
-        pose_nearest_frame(platform, home, platform.at(other)[1]), other, atol=1e-9
+        pose_nearest_frame(platform, home, platform.placement(other)[1]), other, atol=1e-9
     )
     # A frame that a tripod, or a universal joint, has in no pose.
     c, s = np.cos(0.2), np.sin(0.2)
-    wanted = platform.at(other)[1] @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1.0]])
+    wanted = platform.placement(other)[1] @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1.0]])
     found = pose_nearest_frame(platform, home, wanted)
     steps = 1e-3 * np.eye(len(home))[platform.angular]
     beside = found + np.vstack([steps, -steps])
-    apart = ((platform.at(beside)[1] - wanted) ** 2).sum(axis=(-1, -2))
-    assert (apart > ((platform.at(found)[1] - wanted) ** 2).sum()).all()
+    apart = ((platform.placement(beside)[1] - wanted) ** 2).sum(axis=(-1, -2))
+    assert (apart > ((platform.placement(found)[1] - wanted) ** 2).sum()).all()
     np.testing.assert_array_equal(found[~platform.angular], home[~platform.angular])
 
 

@@ -44,7 +44,7 @@ def leaning(robot, home, tilt, count=20_000, radius=0.0):
     lengths = np.flatnonzero(~robot.platform.angular)
     way = rng.normal(size=(count, len(lengths)))
     poses[:, lengths] += radius * way / np.maximum(np.linalg.norm(way, axis=1)[:, None], 1e-9)
-    axis = robot.platform.at(poses)[1][:, 2] @ np.array(robot.platform.frame[2])
+    axis = robot.platform.placement(poses)[1][:, 2] @ np.array(robot.platform.frame[2])
     np.testing.assert_allclose(np.arccos(axis), tilt, atol=1e-7)
     return poses
 
@@ -94,7 +94,7 @@ def test_what_has_no_tilt_or_no_place_is_told():
 
 def rams_apart(robot, poses, count=60):
     """Return the least distance of the rams' centre lines (B,), from points along them."""
-    p, axes = robot.platform.at(poses)
+    p, axes = robot.platform.placement(poses)
     share = np.linspace(0.0, 1.0, count)[:, None]
     lines = []
     for leg in robot.legs:

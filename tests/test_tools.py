@@ -8,10 +8,10 @@ from zipfile import ZipFile
 import numpy as np
 import polars as pl
 import pytest
-from mechanisms import CLIENTS
+from commands import done, refused
+from exported_code import compiled
+from mechanisms import CLIENTS, states
 from scipy.spatial.transform import Rotation
-from test_cli import done, refused
-from test_export import compiled, states
 
 import pteron
 from pteron.export import export_fmu

@@ -76,7 +76,7 @@ def test_a_payload_is_the_weight_and_the_inertia_of_a_point_at_the_tool(name):
 
     def tool(times):
         poses = pose + times * velocity + 0.5 * times**2 * acceleration
-        p, axes = robot.platform.at(poses)
+        p, axes = robot.platform.placement(poses)
         return p + robot.platform.tool @ axes
 
     step = 1e-3
@@ -222,7 +222,7 @@ def test_a_path_goes_straight_between_its_corners_and_rounds_them():
     )
 
     def tool(pose):
-        p, axes = robot.platform.at(pose)
+        p, axes = robot.platform.placement(pose)
         return p + robot.platform.tool @ axes
 
     stops = line_path(robot, poses)

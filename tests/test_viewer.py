@@ -17,6 +17,7 @@ import pytest
 from matplotlib.path import Path
 from measured import built
 from mechanisms import CATALOG, CLIENTS, MECHANISMS, gated
+from viewer_pages import opened, slide, unfold, wait_for
 from websockets.http11 import Request
 
 import pteron
@@ -29,7 +30,7 @@ from pteron.report.quantities import readable
 from pteron.report.typeset import format_fixed
 from pteron.viewer import view
 from pteron.viewer.boundary import is_allowed
-from pteron.viewer.guard import is_here
+from pteron.viewer.guard import is_local_address
 from pteron.viewer.motion_files import motion_of_file
 from pteron.viewer.panel import action, activity_text, values
 from pteron.viewer.picture import ViewerPicture
@@ -39,7 +40,7 @@ from pteron.viewer.readout import readout
 from pteron.viewer.server import free_port
 from pteron.viewer.session import Session
 from pteron.viewer.slices import choices, slice_map, slice_parts
-from pteron.viewer.sliding import nearest
+from pteron.viewer.sliding import nearest_reachable_pose
 from pteron.viewer.state import (
     assembly_poses,
     current_assembly,
@@ -80,7 +81,9 @@ def test_a_pose_out_of_reach_slides_along_the_boundary_and_names_what_stops_it(h
         beside = beside[is_allowed(robot, beside)]
         assert (np.linalg.norm((target - beside)[:, lengths], axis=-1) > rest - 1e-3).all()
         # From there it goes on along the boundary, and inwards.
-        sideways = nearest(robot, found.pose, found.pose + 0.05 * rng.normal(size=robot.freedom))[0]
+        sideways = nearest_reachable_pose(
+            robot, found.pose, found.pose + 0.05 * rng.normal(size=robot.freedom)
+        )[0]
         assert not np.array_equal(sideways, found.pose)
         inwards = move_platform(found, home.pose)
         assert np.array_equal(inwards.pose, home.pose)
@@ -240,7 +243,7 @@ def test_every_machine_is_pushed_by_a_spring_and_stays_where_it_may_be(name):
     session = Session(robot)
     session.begin_push("off: no force")
     push = session.push
-    place, _ = robot.platform.at(session.home)
+    place, _ = robot.platform.placement(session.home)
     rng = np.random.default_rng(0)
     for _ in range(3):
         push.pull(push.spring[0] if push.spring else place, place + rng.normal(size=3))
@@ -258,7 +261,7 @@ def test_a_damped_spring_only_takes_energy_and_the_free_machine_falls_as_simulat
     free = simulate(robot, start=(home, np.zeros(2)), duration=0.048)
     push.go(0.048)
     np.testing.assert_allclose(push.pose, free.pose[-1], atol=1e-9)
-    place, _ = robot.platform.at(push.pose)
+    place, _ = robot.platform.placement(push.pose)
     push.pull(place, place + np.array([0.03, 0.02, 0.0]))
 
     def energy():
@@ -284,7 +287,7 @@ def test_a_spring_lifts_a_small_machine_that_has_fallen():
     assert activity_text(session) == "Drives off: it falls. Pull at its platform."
     fallen = session.state.pose[0]
     assert fallen < session.home[0] - 0.02
-    place, _ = session.state.robot.platform.at(session.state.pose)
+    place, _ = session.state.robot.platform.placement(session.state.pose)
     session.push.pull(place, place + np.array([0.0, 0.0, 0.1]))
     for _ in range(20):
         session.advance(1.0 / 30.0)
@@ -462,10 +465,10 @@ def test_a_drag_moves_or_turns_the_platform(homes):
     session.drag(0, np.array([0.01 + np.cos(0.3), 0.02 + np.sin(0.3), 0.03]))
     assert session.state.pose[3] == pytest.approx(0.3, abs=1e-12)
     tilting = Session(pteron.load("ankle"))
-    axes = tilting.state.robot.platform.at(tilting.home)[1]
-    place = tilting.state.robot.platform.at(tilting.home)[0]
+    axes = tilting.state.robot.platform.placement(tilting.home)[1]
+    place = tilting.state.robot.platform.placement(tilting.home)[0]
     tilting.drag(2, place + axes[2] + 0.1 * axes[0])
-    turned = tilting.state.robot.platform.at(tilting.state.pose)[1]
+    turned = tilting.state.robot.platform.placement(tilting.state.pose)[1]
     assert turned[2] @ axes[0] == pytest.approx(np.sin(np.arctan(0.1)), abs=1e-9)
 
 
@@ -572,26 +575,10 @@ def test_who_serves_to_the_network_has_names_unknown_here_but_no_foreign_pages()
     ],
 )
 def test_hosts_that_only_this_machine_reaches(host, here):
-    assert is_here(host) == here
+    assert is_local_address(host) == here
 
 
 # In a real browser.
-
-
-@contextmanager
-def opened(browser, url, width=1100, height=800, **context):
-    """A tab with the page, whose first numbers have come."""
-    there = browser.new_context(viewport={"width": width, "height": height}, **context)
-    tab = there.new_page()
-    tab.failures = []
-    tab.on("pageerror", lambda error: tab.failures.append(str(error)))
-    tab.goto(url)
-    tab.wait_for_selector("table.legs", state="attached")
-    try:
-        yield tab
-        assert tab.failures == []
-    finally:
-        there.close()
 
 
 SHOWN = """values => {
@@ -601,41 +588,10 @@ SHOWN = """values => {
 """Whether the first sliders of a page stand at values."""
 
 
-def wait_for(tab, condition, argument=None):
-    tab.wait_for_function(condition, arg=argument, timeout=60_000)
-
-
 def said(tab, text):
     """Wait until the page's status says something."""
     wait_for(tab, "text => document.querySelector('[role=status]').innerText.includes(text)", text)
     return tab.inner_text("[role=status]")
-
-
-def slide(tab, label, keys):
-    """Focus a slider by its label and press keys."""
-    tab.get_by_label(label, exact=True).focus()
-    for key in keys:
-        tab.keyboard.press(key)
-
-
-def unfold(tab, *names):
-    for name in names:
-        tab.evaluate("id => { document.getElementById(id).open = true; }", name)
-
-
-@pytest.fixture(scope="module")
-def viewer():
-    with view(pteron.load("quadrupteron"), port=0) as found:
-        yield found
-        assert found.faults == ()
-
-
-@pytest.fixture(scope="module")
-def tab(browser, viewer):
-    """A tab with the page, for all tests."""
-    with opened(browser, viewer.url) as found:
-        unfold(found, "player", "pushed", "plots", "looks")
-        yield found
 
 
 @pytest.fixture

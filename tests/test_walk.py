@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_console_blocks import run_page
+from console_blocks import run_page
 
 import pteron
 from pteron.kernels.c import compiler

@@ -5,8 +5,17 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from mechanisms import CATALOG, CLIENTS, MECHANISMS, NIGHTLY, gated, random_machine, states
-from scipy.spatial.transform import Rotation
+from mechanisms import (
+    CATALOG,
+    CLIENTS,
+    MECHANISMS,
+    NIGHTLY,
+    fourfold,
+    gated,
+    random_machine,
+    states,
+    with_limits,
+)
 
 import pteron
 from pteron.kinematics.singularities import best_type_ii
@@ -47,29 +56,6 @@ def machine(name):
     held = {"platform_cone": pteron.legs.Cone((0.0, 0.0, 1.0), angle)}
     legs = CATALOG[name].legs
     return replace(CATALOG[name], legs=tuple(replace(leg, **held) for leg in legs))
-
-
-def with_limits(robot, low, high):
-    return replace(robot, legs=tuple(replace(leg, limits=(low, high)) for leg in robot.legs))
-
-
-def fourfold():
-    """Return a layout with fourfold symmetry about k, which is singular everywhere."""
-    robot = MECHANISMS["quadrupteron"]
-    legs = []
-    for i, leg in enumerate(robot.legs):
-        turn = Rotation.from_euler("z", 90 * i, degrees=True).as_matrix()
-        legs.append(
-            replace(
-                leg,
-                guide_point=turn @ [0.25, 0.0, 0.0],
-                platform_point=turn @ [0.04, 0.0, 0.0],
-                direction=turn @ np.array([0.0, 0.6, 0.8]),
-                upper_length=0.16,
-                lower_length=0.16,
-            )
-        )
-    return replace(robot, legs=tuple(legs))
 
 
 def steinmetz(link):

@@ -8,11 +8,10 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 import pytest
+from commands import done, read, refused, run
 from mechanisms import gated
-from test_cli import done, refused, run
 
 import pteron
-from pteron.cli import terminal, workspace as command
 from pteron.indices import evaluate
 from pteron.maps import load_map
 from pteron.workspace import conditions
@@ -42,10 +41,8 @@ def test_a_pipe_gets_a_row_an_index_and_json_all_that_is_known():
     assert 0.0 < data["reach"]["volume"] < np.prod(np.diff(data["reach"]["box"], axis=0))
 
 
-def test_a_person_reads_the_reach_what_ends_it_and_each_index(monkeypatch):
-    for module in (command, terminal):
-        monkeypatch.setattr(module, "is_terminal", lambda: True)
-    text = done(f"workspace five-bar --index condition {SLICE}")
+def test_a_person_reads_the_reach_what_ends_it_and_each_index():
+    text = read(f"workspace five-bar --index condition {SLICE}")
     assert max(map(len, text.splitlines())) <= 60
     words = " ".join(text.split())
     for part in ("Reach: x ", "area ", "Map: x -0.1 to 0.1 m, y 0.05 to 0.17 m: 81 poses", "best"):

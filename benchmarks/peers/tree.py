@@ -63,11 +63,11 @@ def tree(robot: pteron.Manipulator, carried: bool = True) -> list[Body]:
         return [*bodies, Body(-1, np.eye(3), np.zeros(3), (), "free", *_spatial(platform.inertia))]
     if not carried:
         end = np.array([legs[0].lower_length, 0.0, 0.0])
-        bodies[1] = _with_mass(bodies[1], platform.joined.mass, end)
+        bodies[1] = _with_mass(bodies[1], platform.total_inertia.mass, end)
         return bodies
     frame = np.column_stack(platform.frame)
     slides = tuple(platform.directions @ frame)
-    inertia = _planar(platform.joined)
+    inertia = _planar(platform.total_inertia)
     return [*bodies, Body(-1, frame, np.zeros(3), slides, "z" if platform.turns else "", *inertia)]
 
 

@@ -404,7 +404,7 @@ def ups() -> Sheet:
 
 def rupu() -> Sheet:
     """Draw a telescopic shaft."""
-    leg = RUPU((0.16, 0, 0.34), (0.0, 0.0, 0.0), _ROD, _ROD).under(
+    leg = RUPU((0.16, 0, 0.34), (0.0, 0.0, 0.0), _ROD, _ROD).with_platform_frame(
         ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
     )
     p, k = np.array([0.36, 0.02, 0.02]), np.array([0.0, 0.0, 1.0])

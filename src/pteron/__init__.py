@@ -71,10 +71,14 @@ if TYPE_CHECKING:
     from pteron.manipulator import (
         Manipulator as Manipulator,
         catalog as catalog,
+        dumps as dumps,
+        from_dict as from_dict,
         load as load,
+        loads as loads,
         parameter_names as parameter_names,
         parameters as parameters,
         save as save,
+        to_dict as to_dict,
         turned as turned,
         with_parameters as with_parameters,
         working_modes as working_modes,
@@ -84,6 +88,6 @@ if TYPE_CHECKING:
         base_regressor as base_regressor,
     )
 
-__version__ = "0.2.0"
+__version__ = "0.3.0.dev0"
 
 _publish(__name__, extras={"environments": "gymnasium"})

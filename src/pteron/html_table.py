@@ -7,14 +7,20 @@ it loads nothing from the network.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from markupsafe import Markup
 
 from pteron.templates import template
 
+if TYPE_CHECKING:
+    import polars as pl
+
 _DIGITS = 5
 """Significant digits of a number."""
+
+_ROWS = 12
+"""Rows of a longer table that are shown."""
 
 
 class Column(NamedTuple):
@@ -25,6 +31,33 @@ class Column(NamedTuple):
 
 
 Cell = str | float | int | None
+
+
+class Overview(NamedTuple):
+    """What `html_table` shows of a result."""
+
+    title: str
+    about: str
+    columns: Sequence[Column]
+    rows: Sequence[Sequence[Cell]]
+    notes: Sequence[str] = ()
+
+    @property
+    def text(self) -> str:
+        """The same as lines of text: one for each row, and one for each note.
+
+        Examples
+        --------
+        >>> from pteron.html_table import Column, Overview
+        >>> print(Overview("A", "two", [Column("sum"), Column("of")], [["3", 2]]).text)
+        A: two
+        sum 3, of 2
+        """
+        lines = [f"{self.title}: {self.about}"]
+        for row in self.rows:
+            cells = zip(self.columns, map(_cell, row), strict=True)
+            lines.append(", ".join(f"{column.heading} {text}".strip() for column, text in cells))
+        return "\n".join([*lines, *self.notes])
 
 
 def html_table(
@@ -62,6 +95,16 @@ def html_table(
     page = template("", "html_table.html.j2", cell=_cell, kind=_kind)
     cells = [list(zip(columns, row, strict=True)) for row in rows]
     return page.render(title=title, about=about, columns=columns, rows=cells, notes=notes)
+
+
+def frame_overview(
+    title: str, about: str, frame: pl.DataFrame, notes: Iterable[str] = ()
+) -> Overview:
+    """Return the first rows of a table for `html_table`, with a note on those left out."""
+    columns = [Column(c.name, "number" if c.dtype.is_numeric() else "") for c in frame]
+    hidden = len(frame) - _ROWS
+    hint = [f"{hidden} more rows: see table()"] if hidden > 0 else []
+    return Overview(title, about, columns, [*frame.head(_ROWS).iter_rows()], (*notes, *hint))
 
 
 def _kind(kind: str) -> Markup:

@@ -7,6 +7,7 @@ class: ``old = former_attribute("old", "new")``.
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable
 from importlib import import_module
 from typing import Any
 
@@ -20,7 +21,7 @@ _MOVED = {
     ),
     "legs": "PRR PRRR PSS RPR RRR RSS RUPU Cone Drive Leg Stribeck",
     "manipulator": "Radii parameter_data parameter_units",
-    "platforms": "Bar Geared Platform",
+    "platforms": "Bar Platform",
     "reduction": "BaseParameters cheapest_parameters",
 }
 """Names that stood in `pteron` itself, by the package that has them."""
@@ -30,8 +31,25 @@ RENAMED = {
         name: f"pteron.{package}.{name}"
         for package, names in _MOVED.items()
         for name in names.split()
+    }
+    | {"Geared": "pteron.platforms.GearedPart"},
+    "pteron.platforms": {"Geared": "pteron.platforms.GearedPart"},
+    "pteron.legs.kind": {
+        "Quantity": "pteron.legs.kind.LegQuantity",
+        "Transfer": "pteron.legs.kind.LegTransfer",
     },
-    "pteron.design": {"Told": "pteron.design.ReportedDesign"},
+    "pteron.legs.leg": {
+        "Plane": "pteron.legs.leg.PlaneLocus",
+        "Sphere": "pteron.legs.leg.SphereLocus",
+        "Circle": "pteron.legs.leg.CircleLocus",
+        "Turned": "pteron.legs.leg.AngleLocus",
+    },
+    "pteron.design": {
+        "Quantity": "pteron.design.DesignQuantity",
+        "Summary": "pteron.design.FrontReport",
+        "Told": "pteron.design.ReportedDesign",
+        "proved": "pteron.design.prove_design",
+    },
     "pteron.export.engines": {"Motor": "pteron.export.engines.TreeMotor"},
     "pteron.identification": {
         "weighted": "pteron.identification.weighted_least_squares",
@@ -60,12 +78,15 @@ RENAMED = {
         "specialised": "pteron.kernels.specialise_program",
     },
     "pteron.motion": {
+        "Fit": "pteron.motion.MotorFit",
+        "Place": "pteron.motion.CyclePlace",
+        "least_reserve": "pteron.motion.least_margin",
+        "placed": "pteron.motion.motion_at_place",
         "there_and_back": "pteron.motion.return_path",
         "along": "pteron.motion.polynomial_motion",
         "linearised": "pteron.motion.linearise",
         "Margins": "pteron.motion.LoopMargins",
         "Trial": "pteron.motion.GainTrial",
-        "least_reserve": "pteron.motion.least_margin",
     },
     "pteron.motion.simulation": {"Law": "pteron.motion.simulation.ControlLaw"},
     "pteron.workspace": {
@@ -97,11 +118,12 @@ RENAMED = {
     },
     "pteron.calibration": {
         "Finding": "pteron.calibration.CalibrationFinding",
+        "Plane": "pteron.calibration.ReferencePlane",
     },
 }
 """Names of version 0.1 by package, and where each of them is now."""
 
-UNTIL = "0.3"
+UNTIL = "0.4"
 """The first version without them."""
 
 
@@ -143,6 +165,21 @@ def former_name(package: str, name: str) -> Any:
         return import_module(present)
 
 
+def warn_former(former: str, present: str, *, depth: int = 3) -> None:
+    """Warn that a former way goes, with what to write instead; `depth` calls below the user's."""
+    text = f"{former} goes with version {UNTIL}; write {present}"
+    warnings.warn(text, DeprecationWarning, stacklevel=depth)
+
+
+class FormerAttribute(property):
+    """A property of a class and its objects: an attribute under its former name."""
+
+    def __get__(self, own: Any, owner: Any = None) -> Any:
+        """Return the attribute of an object, or of the class."""
+        assert self.fget is not None
+        return self.fget(owner if own is None else own)
+
+
 def former_attribute(former: str, present: str) -> property:
     """Return a property for a class's body: an attribute under its former name.
 
@@ -158,11 +195,55 @@ def former_attribute(former: str, present: str) -> property:
     """
 
     def attribute(own: Any) -> Any:
-        warnings.warn(
-            f"{type(own).__name__}.{former} goes with version {UNTIL}; write .{present}",
-            DeprecationWarning,
-            stacklevel=2,
-        )
+        owner = own if isinstance(own, type) else type(own)
+        warn_former(f"{owner.__name__}.{former}", f".{present}", depth=4)
         return getattr(own, present)
 
-    return property(attribute)
+    return FormerAttribute(attribute)
+
+
+def adopt_former_methods(owner: type, **former: str) -> None:
+    """Take over methods that a subclass of a user defines under former names, with a warning.
+
+    Parameters
+    ----------
+    owner : type
+        The subclass, in its base's ``__init_subclass__``.
+    **former : str
+        Present names, by former ones.
+    """
+    for name in vars(owner).keys() & former.keys():
+        warnings.warn(
+            f"{owner.__name__}.{name} goes with version {UNTIL}; define {former[name]} instead",
+            DeprecationWarning,
+            stacklevel=3,
+        )
+        setattr(owner, former[name], vars(owner)[name])
+
+
+class FormerTable:
+    """A method `table` that was a property until version 0.1: what is read of it is the table."""
+
+    def __init__(self, owner: str, frame: Any, table: Callable[[], Any]) -> None:
+        self._owner, self._frame, self._table = owner, frame, table
+
+    def __call__(self) -> Any:
+        """Return the table."""
+        return self._table()
+
+    def _former(self) -> Any:
+        warnings.warn(
+            f"{self._owner}.table is a method from version {UNTIL} on; write .designs",
+            DeprecationWarning,
+            stacklevel=3,
+        )
+        return self._frame
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._former(), name)
+
+    def __getitem__(self, key: Any) -> Any:
+        return self._former()[key]
+
+    def __len__(self) -> int:
+        return len(self._former())

@@ -34,8 +34,15 @@ else:
 OnFailure = Literal["raise", "nan"]
 """The action of a batch function at a pose that fails: raise the error, or return NaN there."""
 
-Seed = Annotated[int, Between(0)]
-"""The seed of random numbers: the same seed, the same result."""
+Seed = Annotated[int, Between(0)] | None
+"""The seed of random numbers: the same seed, the same result; None for others at every call."""
+
+
+def seed_number(seed: Seed) -> int:
+    """Return a seed as a number, for None one that the system draws."""
+    return int(np.random.SeedSequence().generate_state(1)[0]) if seed is None else seed
+
+
 Workers = Annotated[int, Between(1, 1024)]
 """Processes or threads that share the work."""
 

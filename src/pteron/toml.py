@@ -348,7 +348,8 @@ def _fault(
     is_key = all(isinstance(part, str) for part in location)
     if expected == "a table" and is_key and not isinstance(fault["input"], dict):
         key = ".".join(str(part) for part in location)
-        return f"{shown_input} given, a table expected: [{key}] with {', '.join(_keys(node, ''))}"
+        keys = ", ".join(_keys(node, ""))
+        return f"{shown_input} given, a table expected: [{key}]{f' with {keys}' if keys else ''}"
     if kind in ("too_short", "too_long") and "prefixItems" not in node:
         least, most = context.get("min_length"), context.get("max_length")
         count = f"at least {least}" if kind == "too_short" else f"at most {most}"

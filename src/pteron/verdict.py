@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, Literal, get_args
+from typing import Literal, get_args
 
-from pteron.json_values import fields_as_json
+from pteron.result import Result
 
 Grade = Literal["trustworthy", "usable with care", "not trustworthy"]
 """The grades of a verdict, best first."""
 
 
-@dataclass(frozen=True)
-class Verdict:
+@dataclass(frozen=True, eq=False, repr=False)
+class Verdict(Result):
     """Whether a result can be trusted, and why.
 
     Attributes
@@ -32,13 +32,15 @@ class Verdict:
         Advice for a better result.
     """
 
+    ROWS = "reasons"
+
     grade: Grade
     reasons: tuple[str, ...]
     next_steps: tuple[str, ...] = ()
 
-    def as_dict(self) -> dict[str, Any]:
-        """Return the verdict as plain data."""
-        return fields_as_json(self, "grade reasons next_steps")
+    def summary(self) -> str:
+        """Return the grade, the reasons and the advice, for people, as lines of text."""
+        return "\n".join([self.grade, *self.reasons, *self.next_steps])
 
 
 @dataclass

@@ -12,9 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pteron.bodies.motion import Expression
-
-_SAME = 1e-9
-"""Relative tolerance of equal quantities."""
+from pteron.tolerances import ROUNDING
 
 _SMALL = 1e-3
 """Lower bound of the size that differences are relative to, SI units."""
@@ -34,7 +32,9 @@ def mismatched_names(pairs: Mapping[str, tuple[Expression, Expression]]) -> Iter
         size = max(
             np.abs(value_now).max(initial=0.0), np.abs(expected_now).max(initial=0.0), _SMALL
         )
-        if not np.abs(value_now - expected_now).max(initial=0.0) <= _SAME * size:  # NaN differs too
+        if (
+            not np.abs(value_now - expected_now).max(initial=0.0) <= ROUNDING * size
+        ):  # NaN differs too
             yield name
 
 

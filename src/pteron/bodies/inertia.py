@@ -11,9 +11,7 @@ from numpy.typing import NDArray
 
 from pteron.bodies.vectors import number, numbers, positive
 from pteron.errors import ModelError
-
-_ROUNDING = 1e-12
-"""Relative tolerance of the least inertia of a real body."""
+from pteron.tolerances import EXACT
 
 
 @runtime_checkable
@@ -82,7 +80,7 @@ class _TurningInertia:
         moment = numbers(self.first_moment, "first_moment", len(self.kinds) - 2)
         inertia = number(self.inertia, "inertia")
         least = sum(h * h for h in moment) / mass
-        if inertia < least * (1.0 - _ROUNDING) or inertia <= 0.0:
+        if inertia < least * (1.0 - EXACT) or inertia <= 0.0:
             mend = f"; about the centre of mass? Then write {inertia + least:g}"
             raise ModelError(
                 f"inertia: {inertia:g} kg m^2 belongs to no real body; with this mass and centre "
@@ -221,7 +219,7 @@ class SpatialInertia:
         h = np.array(self.first_moment)
         second = 0.5 * np.trace(tensor) * np.eye(3) - tensor - np.outer(h, h) / self.mass
         size = max(float(np.abs(tensor).max()), float(h @ h) / self.mass)
-        if np.linalg.eigvalsh(second).min() < -_ROUNDING * size or not np.trace(tensor) > 0.0:
+        if np.linalg.eigvalsh(second).min() < -EXACT * size or not np.trace(tensor) > 0.0:
             c = h / self.mass
             least = self.mass * (c @ c * np.eye(3) - np.outer(c, c))
             moments = [f"{v:.4g}" for v in np.linalg.eigvalsh(tensor - least)]

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pteron.errors import ModelError, shorten
+from pteron.tolerances import ROUNDING
 
 Vector = tuple[float, float, float]
 
@@ -18,9 +19,6 @@ UNIT_TOLERANCE = 1e-6
 
 PARALLEL_TOLERANCE = 1e-9
 """Sine of the angle under which two unit vectors count as parallel."""
-
-_VANISHING = 1e-9
-"""Singular value of stacked unit vectors that counts as zero."""
 
 _ROUNDING = 4 * math.ulp(1.0)
 """Tolerance of the length of a vector that stays bit for bit: rounding."""
@@ -183,7 +181,7 @@ def complement(axes: ArrayLike) -> NDArray[np.float64]:
     """Return orthonormal rows (k, 3) that span the complement of vectors (n, 3)."""
     matrix = np.asarray(axes, dtype=float).reshape(-1, 3)
     _, sizes, rows = np.linalg.svd(matrix) if len(matrix) else (None, np.zeros(0), np.eye(3))
-    spanning: NDArray[np.float64] = rows[int((sizes > _VANISHING).sum()) :]
+    spanning: NDArray[np.float64] = rows[int((sizes > ROUNDING).sum()) :]
     return spanning
 
 

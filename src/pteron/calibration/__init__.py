@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from pteron.calibration.measurements import (
         Measurements as Measurements,
         Place as Place,
-        Plane as Plane,
+        ReferencePlane as ReferencePlane,
         Setup as Setup,
     )
     from pteron.calibration.observability import Observability as Observability

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +30,8 @@ from pteron.calibration.unknowns import blocks_of
 from pteron.calibration.verdict import EVERY, Evidence, fitted_errors, rows_for_check, verdict_of
 from pteron.errors import DataError
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.progress import Progress, Steps
+from pteron.shapes import Seed, seed_number
 
 Array = NDArray[np.float64]
 
@@ -37,6 +40,9 @@ _TRIED_ROWS = 5000
 
 _RANK_ROWS = 400
 """Rows, evenly spread, at which the singular values are taken."""
+
+_STEPS = {"Starting": 1.0, "Fitting": 4.0, "Judging": 1.0, "Looking for faults": 2.0}
+"""The steps of a calibration, and about how their times compare."""
 
 _IN_TIME = ("slipped zero", "backlash", "drift")
 """Faults that differ from row to row, so that none of the whole log explains them."""
@@ -49,7 +55,8 @@ def calibrate(
     free: Sequence[str] | None = None,
     prior: Mapping[str, float] | None = None,
     held_out: Measurements | None = None,
-    seed: int = 0,
+    seed: Seed = 0,
+    progress: Progress | None = None,
 ) -> Calibration:
     """Find a machine's geometry from measurements at many poses.
 
@@ -76,6 +83,8 @@ def calibrate(
         on a fit without them, the values are from all.
     seed : int
         Of the random poses of the exact rank.
+    progress : callable, optional
+        Takes the share of the work that is done, a `Share` with the name of its step.
 
     Returns
     -------
@@ -102,7 +111,8 @@ def calibrate(
     >>> robot = pteron.load("linear-delta")
     >>> poses = pteron.random_poses(robot, 40)
     >>> readings = pteron.inverse_kinematics(robot, poses) + [0.001, 0.0, 0.0]
-    >>> found = calibrate(robot, Measurements.of(robot, readings, poses=poses), free=["zeros"])
+    >>> measurements = Measurements.from_readings(robot, readings, poses=poses)
+    >>> found = calibrate(robot, measurements, free=["zeros"])
     >>> found.fit.guess.zeros.round(6) + 0.0
     array([-0.001,  0.   ,  0.   ])
     """
@@ -110,20 +120,37 @@ def calibrate(
     _check_readings(robot.joint_count, measurements)
     blocks = blocks_of(robot, measurements, free, prior)
     start = Guess.drawn(robot, measurements)
+    seed = seed_number(seed)
+    steps = Steps(progress, _STEPS)
+    calibration = _undo_mistakes(
+        start, measurements, blocks, partial(_calibrate, robot, seed=seed, steps=steps), held_out
+    )
+    steps.end()
+    return calibration
+
+
+def _undo_mistakes(
+    start: Guess,
+    measurements: Measurements,
+    blocks: tuple[UnknownBlock, ...],
+    run_calibration: Callable[..., Calibration],
+    held_out: Measurements | None,
+) -> Calibration:
+    """Return the calibration of a log, of which a mistake that explains it is undone."""
     mistake = raw_mistake(measurements, blocks, start)
     if mistake is None:
-        result = _calibrate(robot, measurements, blocks, held_out, seed)
-        explained = any(finding.kind in _IN_TIME for finding in result.findings)
-        if explained or not _exceeds_ordinary_error(result.fit, measurements):
-            return result
+        calibration = run_calibration(measurements, blocks, held_out)
+        explained = any(finding.kind in _IN_TIME for finding in calibration.findings)
+        if explained or not _exceeds_ordinary_error(calibration.fit, measurements):
+            return calibration
         mistake = raw_mistake(measurements, blocks, start, fitted=True)
         if mistake is None:
-            return result
+            return calibration
     finding = describe_mistake(mistake, measurements, start)
     undone = mistake.undo(measurements)
     other = None if held_out is None else mistake.undo(held_out)
     try:
-        return _calibrate(robot, undone, blocks, other, seed, [finding])
+        return run_calibration(undone, blocks, other, mistakes=[finding])
     except DataError as error:
         raise DataError(finding.text) from error
 
@@ -133,10 +160,13 @@ def _calibrate(
     measurements: Measurements,
     blocks: tuple[UnknownBlock, ...],
     held_out: Measurements | None,
+    *,
     seed: int,
+    steps: Steps,
     mistakes: Sequence[CalibrationFinding] = (),
 ) -> Calibration:
     """Return the calibration of a log that has no mistakes, or with `mistakes` undone."""
+    steps.report("Starting")
     start = Guess.drawn(robot, measurements)
     poses = starting_poses(start, measurements)
     start = place_surroundings(start, measurements, poses)
@@ -144,26 +174,24 @@ def _calibrate(
     fitted_rows = np.ones(len(measurements), dtype=bool)
     if held_out is None and len(measurements) >= checked:
         fitted_rows[EVERY // 2 :: EVERY] = False
-    partial = None
+    steps.report("Fitting")
+    partial_fit = None
     if held_out is not None or not fitted_rows.all():
-        partial = _partial_fit(start, measurements, blocks, fitted_rows)
+        partial_fit = _partial_fit(start, measurements, blocks, fitted_rows)
     aside = rows_set_aside(start, measurements, blocks, poses)
     fitter = Fitter(measurements, blocks, start, poses, aside.aside, aside.barred)
-    fit = fitter.run(partial)
+    steps.report("Fitting", 0.5)
+    fit = fitter.run(partial_fit)
     judged = None
-    if partial is not None:
-        other = (
-            held_out
-            if held_out is not None
-            else _select_fitting_rows(measurements, fit, ~fitted_rows)
-        )
-        judged = _held_out_errors(start, partial, blocks, other)
+    steps.report("Judging")
+    if partial_fit is not None:
+        if held_out is None:
+            held_out = _select_fitting_rows(measurements, fit, ~fitted_rows)
+        judged = _held_out_errors(start, partial_fit, blocks, held_out)
     shown = observability_of(start, measurements, blocks, _scaled_slopes(fitter, fit), seed)
-    findings = (
-        *mistakes,
-        *zero_faults(fitter, fit),
-        *residual_faults(fitter, fit, aside.reasons),
-    )
+    steps.report("Looking for faults")
+    faults = (*zero_faults(fitter, fit), *residual_faults(fitter, fit, aside.reasons))
+    findings = (*mistakes, *faults)
     possible = open_errors(measurements, fit, blocks)
     hidden = None if mistakes else hidden_order(measurements, blocks, start, fit)
     tilt = hidden_tilt(fitter, fit)
@@ -174,7 +202,7 @@ def _calibrate(
         robot,
         calibrated_robot(fit.guess),
         values_of(start, fit, blocks),
-        {kind: value for kind, value in fit.noise.items() if kind in measurements.kinds},
+        {kind: deviation for kind, deviation in fit.noise.items() if kind in measurements.kinds},
         shown,
         judged,
         findings,

@@ -82,8 +82,8 @@ def read_controller_log(
     if file.suffix.lower() == ".parquet" or not file.is_file():
         return None  # reported where tables are opened
     with file.open("rb") as opened:
-        data = opened.read(_LARGEST if file.suffix.lower() != ".csv" else 1 << 20)
-    text = data.decode("utf-8-sig", "replace")
+        content = opened.read(_LARGEST if file.suffix.lower() != ".csv" else 1 << 20)
+    text = content.decode("utf-8-sig", "replace")
     if file.suffix.lower() == ".csv" and not text.startswith(_MAP):
         return None
     try:
@@ -144,13 +144,13 @@ def _read_stable_positions(robot: Manipulator, text: str, source: str) -> Measur
     rows: list[tuple[str, list[float], float, float, int]] = []
     for kind in ("height", "manual_height", "distance"):
         k = 0
-        while (value := setting(config, "delta_calibrate", f"{kind}{k}")) is not None:
+        while (setting_value := setting(config, "delta_calibrate", f"{kind}{k}")) is not None:
             key = f"{kind}{k}_pos"
             if kind == "distance":
                 rows.append((f"{key}1", position(f"{key}1"), np.nan, np.nan, -1))
-                rows.append((f"{key}2", position(f"{key}2"), np.nan, value, len(rows) - 1))
+                rows.append((f"{key}2", position(f"{key}2"), np.nan, setting_value, len(rows) - 1))
             else:
-                rows.append((key, position(key), value, np.nan, -1))
+                rows.append((key, position(key), setting_value, np.nan, -1))
             k += 1
     if not rows:
         faults.append("[delta_calibrate]: no height0 nor distance0; run DELTA_CALIBRATE, save it")
@@ -159,7 +159,7 @@ def _read_stable_positions(robot: Manipulator, text: str, source: str) -> Measur
     keys, counts, heights, distances, origins = zip(*rows, strict=True)
     readings = to_readings(robot, np.array(ends) + away * np.array(counts))
     return replace(
-        Measurements.of(robot, readings, heights=1e-3 * np.array(heights)),
+        Measurements.from_readings(robot, readings, heights=1e-3 * np.array(heights)),
         distances=1e-3 * np.array(distances),
         origins=np.array(origins),
         places=tuple(f"{source}, {key}" for key in keys),
@@ -172,8 +172,8 @@ def _read_height_map(text: str, source: str) -> Iterator[_Touch]:
         return
     lines = text.splitlines()
     names = [cell.strip() for cell in lines[1].split(",")]
-    values = [cell.strip() for cell in lines[2].split(",")]
-    header = dict(zip(names, values, strict=False))
+    texts = [cell.strip() for cell in lines[2].split(",")]
+    header = dict(zip(names, texts, strict=False))
     axes = (("xmin", "xspacing"), ("ymin", "yspacing"))
     if "spacing" in header:  # of version 1, before 2.0
         axes = (("xmin", "spacing"), ("ymin", "spacing"))
@@ -221,7 +221,7 @@ def _read_klipper_log(text: str, source: str) -> Iterator[_Touch]:
     offsets = [(m.start(), float(m[1])) for m in _OFFSET.finditer(text)]
     for match in _KLIPPER.finditer(text):
         x, y, word, z = match.groups()
-        earlier_offsets = [value for at, value in offsets if at < match.start()]
+        earlier_offsets = [offset for at, offset in offsets if at < match.start()]
         # It says where the probe touched, the tool above it, or where the tool would.
         height = earlier_offsets[-1] if earlier_offsets and word.startswith("is") else 0.0
         yield _Touch(_match_place(text, match, source), _xyz(float(x), float(y), float(z)), height)
@@ -303,7 +303,7 @@ def _touched_heights(robot: Manipulator, touched: Sequence[_Touch]) -> Measureme
     poses = np.array(
         [[touch.at.get(axis.letter, 0.0) / axis.scale for axis in axes] for touch in touched]
     )
-    tool = np.einsum("i,nij->nj", np.array(platform.tool), platform.at(poses)[1])
+    tool = np.einsum("i,nij->nj", np.array(platform.tool), platform.placement(poses)[1])
     poses[:, ~platform.angular] -= tool @ platform.directions.T
     joints = inverse_kinematics(robot, poses, on_failure="nan")
     lost = np.isnan(joints).any(axis=-1)
@@ -322,5 +322,5 @@ def _touched_heights(robot: Manipulator, touched: Sequence[_Touch]) -> Measureme
         touched = [touch for touch, bad in zip(touched, lost, strict=True) if not bad]
         joints = joints[~lost]
     heights = 1e-3 * np.array([touch.height for touch in touched])
-    measurements = Measurements.of(robot, to_readings(robot, joints), heights=heights)
+    measurements = Measurements.from_readings(robot, to_readings(robot, joints), heights=heights)
     return replace(measurements, places=tuple(touch.place for touch in touched))

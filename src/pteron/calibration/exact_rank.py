@@ -168,11 +168,11 @@ class _ModularSlopes(MachineSlopes):
     def _evaluate(self, pose: list[int]) -> list[Residues]:
         """Return the program's outputs at a pose."""
         robot = self.start.robot
-        values = self.program(pose)
+        outputs = self.program(pose)
         n, m = len(robot.legs), robot.freedom
         shapes = [(n,), (n, m), (n, -1), (6, m), (3,), (3, 3), (6, -1)]
-        both = zip(values, shapes, strict=False)
-        return [np.array(value, dtype=object).reshape(shape) for value, shape in both]
+        both = zip(outputs, shapes, strict=False)
+        return [np.array(numbers, dtype=object).reshape(shape) for numbers, shape in both]
 
     def _move_to_height(self, pose: list[int], i: int, level: float) -> list[int]:
         """Return a pose moved along one of its lengths to a height."""
@@ -210,7 +210,7 @@ class _ModularSlopes(MachineSlopes):
 
     def _outputs(self, guess: Guess, poses: Residues) -> list[Residues]:
         columns = zip(*(self.known[tuple(pose)] for pose in poses), strict=True)
-        return [np.stack(values) for values in columns]
+        return [np.stack(residues) for residues in columns]
 
     def _matrix(self, guess: Guess) -> Residues:
         return self.steps
@@ -241,6 +241,6 @@ def _solve(square: Residues, right: Residues, prime: int) -> Residues:
         raise ZeroDivisionError
     solution = np.zeros(right.shape, dtype=object)
     for column, parts in combinations.items():
-        for k, value in parts.items():
-            solution[k, column - n] = value
+        for k, share in parts.items():
+            solution[k, column - n] = share
     return solution

@@ -341,9 +341,9 @@ class Fitter:
         if not np.isfinite(cost):
             raise ValueError
         distances[lost] = BEYOND
-        values = guess, fit.total, fit.noise, fitted_rows, new_poses, self.prior
+        state = guess, fit.total, fit.noise, fitted_rows, new_poses, self.prior
         ends = matrix, right, cost, fit.steps, 0.0, fit.settled
-        return CalibrationFit(*values, residuals, measured, distances, *ends)
+        return CalibrationFit(*state, residuals, measured, distances, *ends)
 
     def whiten_rows(
         self, at: ResidualRows, guess: Guess, noise: dict[str, float]
@@ -403,8 +403,8 @@ class Fitter:
             took = np.einsum("ij,jk,ik->", part, fit.covariance, part, optimize=True)
             freedom = count - took * len(rows) / len(some) / fit.noise[kind] ** 2
             # Half the middle of their sizes serves where a few rows are far off.
-            values = np.abs(fit.residuals[entries])
-            rms = float(np.sqrt((values**2).sum() / max(freedom, 1.0)))
-            middle = float(np.median(values)) / 0.6745 * np.sqrt(count / max(freedom, 1.0))
+            sizes = np.abs(fit.residuals[entries])
+            rms = float(np.sqrt((sizes**2).sum() / max(freedom, 1.0)))
+            middle = float(np.median(sizes)) / 0.6745 * np.sqrt(count / max(freedom, 1.0))
             noise[kind] = max(middle if rms > 2.0 * middle and count > 20 else rms, FLOOR)
         return noise

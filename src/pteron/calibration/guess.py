@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pteron.bodies.vectors import rotation_matrices
-from pteron.calibration.measurements import TOOL, Measurements, Place, Plane
+from pteron.calibration.measurements import TOOL, Measurements, Place, ReferencePlane
 from pteron.equations.variations import Variation, vary_geometry
 from pteron.manipulator import Manipulator
 
@@ -74,7 +74,7 @@ class Guess:
         """Return the machine as drawn, and its surroundings as described."""
         setup = measured.setup
         marks = {TOOL: Place(robot.platform.tool or (0.0, 0.0, 0.0))} | dict(setup.marks)
-        planes = {TOOL: Plane()} | dict(setup.planes)
+        planes = {TOOL: ReferencePlane()} | dict(setup.planes)
         return cls(
             robot,
             np.array([leg.reading.zero if leg.reading else 0.0 for leg in robot.legs]),
@@ -99,7 +99,7 @@ class Guess:
 
     def points(self, marks: Sequence[str], poses: Array) -> Array:
         """Return where each row's mark is (N, 3) at its pose, in the base frame, m."""
-        place, axes = self.robot.platform.at(poses)
+        place, axes = self.robot.platform.placement(poses)
         return np.asarray(place + np.einsum("nij,ni->nj", axes, self.mark_points(marks)))
 
     def apply_step(self, blocks: Sequence[UnknownBlock], step: Array) -> Guess:
@@ -127,9 +127,9 @@ class UnknownBlock:
         if self.kind == "geometry":
             return replace(guess, robot=vary_geometry(guess.robot, self.changes, step))
         if self.kind in ("zeros", "scales"):
-            values = getattr(guess, self.kind).copy()
-            values[list(self.legs)] += step
-            return replace(guess, **{self.kind: values})
+            numbers = getattr(guess, self.kind).copy()
+            numbers[list(self.legs)] += step
+            return replace(guess, **{self.kind: numbers})
         if self.kind in ("mark", "anchor"):
             places = getattr(guess, f"{self.kind}s")
             moved: Any = {**places, self.name: places[self.name] + step}

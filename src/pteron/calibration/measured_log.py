@@ -187,7 +187,7 @@ def _read_rows(robot: Manipulator, opened: _Opened, source: str) -> Measurements
     times = column("t") if "t" in columns else None
     for i in () if times is None else np.flatnonzero(np.isnan(times)):
         fault(i, ", column t: no number; give each row its time, or none")
-    values = several(_POSITION), several(robot.platform.angles), column("height")
+    measured_columns = several(_POSITION), several(robot.platform.angles), column("height")
     distances, start_rows, anchors = column("distance"), column("from"), texts("anchor")
     origins = np.full(n, -1)
     for i in np.flatnonzero(~np.isnan(start_rows)):
@@ -207,7 +207,7 @@ def _read_rows(robot: Manipulator, opened: _Opened, source: str) -> Measurements
     if faults:
         raise DataError(joined_faults(list(dict.fromkeys(faults))), subject=table.source)
     names = texts("mark"), texts("plane"), anchors, _places(table, source)
-    return Measurements(readings, *values, distances, origins, *names, times)
+    return Measurements(readings, *measured_columns, distances, origins, *names, times)
 
 
 def _numbers(table: Table, column: str, faults: list[str]) -> Array:
@@ -261,8 +261,8 @@ def _unlikely_readings(
     size = 0.1 * unlikely_length(robot)
     measured = np.concatenate([measurements.positions, measurements.angles], axis=-1)
     names = (*robot.joint_names, *_POSITION, *robot.platform.angles)
-    values = np.concatenate([measurements.readings, measured], axis=-1)
-    for text in unlikely_values(robot, names, values):
+    columns = np.concatenate([measurements.readings, measured], axis=-1)
+    for text in unlikely_values(robot, names, columns):
         yield f"{source}: {text}"
     joints = from_readings(robot, measurements.readings)
     for j, leg in enumerate(robot.legs):

@@ -17,6 +17,7 @@ from pteron.bodies.vectors import Vector
 from pteron.errors import DataError
 from pteron.kernels import as_array
 from pteron.manipulator import Manipulator
+from pteron.renamed import former_attribute
 from pteron.shapes import JointsLike, PoseLike
 
 KINDS = ("position", "angle", "height", "distance")
@@ -48,7 +49,7 @@ class Place:
 
 
 @dataclass(frozen=True)
-class Plane:
+class ReferencePlane:
     """The plane normal . p = offset in the base frame, above which heights are counted.
 
     Parameters
@@ -84,7 +85,7 @@ class Setup:
 
     noise: Mapping[str, float] = field(default_factory=dict)
     marks: Mapping[str, Place] = field(default_factory=dict)
-    planes: Mapping[str, Plane] = field(default_factory=dict)
+    planes: Mapping[str, ReferencePlane] = field(default_factory=dict)
     anchors: Mapping[str, Place] = field(default_factory=dict)
     frame_known: bool = True
 
@@ -165,7 +166,7 @@ class Measurements:
     setup: Setup = Setup()
 
     @classmethod
-    def of(
+    def from_readings(
         cls,
         robot: Manipulator,
         readings: JointsLike,
@@ -220,24 +221,26 @@ class Measurements:
             setup=setup or Setup(),
         )
 
+    of = former_attribute("of", "from_readings")
+
     def __len__(self) -> int:
         return len(self.readings)
 
     @property
     def parts(self) -> dict[str, Array]:
         """All that was measured, (N, K) in all, by kind; NaN where not."""
-        values = self.positions, self.angles, self.heights[:, None], self.distances[:, None]
-        return dict(zip(KINDS, values, strict=True))
+        arrays = self.positions, self.angles, self.heights[:, None], self.distances[:, None]
+        return dict(zip(KINDS, arrays, strict=True))
 
     @property
     def kinds(self) -> list[str]:
         """The kinds of measurements that there are."""
-        return [kind for kind, values in self.parts.items() if not np.isnan(values).all()]
+        return [kind for kind, array in self.parts.items() if not np.isnan(array).all()]
 
     @property
     def kind_of(self) -> NDArray[np.str_]:
         """The kind of each of a row's numbers (K,)."""
-        return np.repeat(KINDS, [values.shape[1] for values in self.parts.values()])
+        return np.repeat(KINDS, [array.shape[1] for array in self.parts.values()])
 
     def rows(self, chosen: NDArray[np.bool_]) -> Measurements:
         """Return rows chosen by a mask, and those that a distance of theirs is measured from."""

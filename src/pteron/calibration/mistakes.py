@@ -178,10 +178,10 @@ def _large_lengths(measurements: Measurements, guess: Guess, lengths: Sequence[s
     legs = guess.robot.legs
     size = max(leg.size for leg in legs)
     linear = [leg.joint.unit == "m" for leg in legs]
-    values = {name: getattr(measurements, name) for name in lengths}
-    values["readings"] = measurements.readings[:, linear]
+    lengths_read = {name: getattr(measurements, name) for name in lengths}
+    lengths_read["readings"] = measurements.readings[:, linear]
     large = set()
-    for name, columns in values.items():
+    for name, columns in lengths_read.items():
         seen = columns[np.isfinite(columns)]
         least = _LARGE_HEIGHTS * size if name == "heights" else size
         if seen.size and np.median(np.abs(seen - np.median(seen))) > least:
@@ -307,10 +307,10 @@ def _shifted_rows(measurements: Measurements, guess: Guess) -> Iterator[Mistake]
         def undo(rows: Measurements, shift: int = shift) -> Measurements:
             changed: dict[str, Array] = {}
             for name in VALUES:
-                values = np.roll(getattr(rows, name), shift, axis=0)
-                values[: max(shift, 0)] = np.nan
-                values[len(values) + min(shift, 0) :] = np.nan
-                changed[name] = values
+                column = np.roll(getattr(rows, name), shift, axis=0)
+                column[: max(shift, 0)] = np.nan
+                column[len(column) + min(shift, 0) :] = np.nan
+                changed[name] = column
             moved: Any = changed
             return replace(rows, **moved)
 

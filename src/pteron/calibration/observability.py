@@ -18,18 +18,17 @@ from pteron.calibration.guess import Guess, UnknownBlock, tolerances_of
 from pteron.calibration.measurements import Measurements
 from pteron.calibration.unseen import combination_text, unseen_combinations
 from pteron.renamed import former_attribute
+from pteron.result import Result
+from pteron.tolerances import ROUNDING
 
 Array = NDArray[np.float64]
-
-_ROUNDING = 1e-9
-"""Singular value, relative to the greatest, up to which a direction counts as unseen."""
 
 _NAMED = 6
 """Most weak combinations that are named."""
 
 
-@dataclass(frozen=True)
-class Observability:
+@dataclass(frozen=True, eq=False, repr=False)
+class Observability(Result):
     """The combinations of values that measurements show, and those that they do not.
 
     Attributes
@@ -111,7 +110,7 @@ def observability_of(
     count = blocks[-1].where.stop
     sizes, axes = _spectrum(slopes, count)
     relative = sizes / max(float(sizes[0]), 1e-300)
-    here = int((relative > _ROUNDING).sum())
+    here = int((relative > ROUNDING).sum())
     rank, primes, rows = exact_rank(start, blocks, measurements, seed)
     tolerances = tolerances_of(blocks)
     tolerances[~np.isfinite(tolerances)] = 1.0

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from pteron.arguments import expect, expect_one_of
 from pteron.calibration.guess import Guess, tolerances_of, variances
-from pteron.calibration.measurements import KINDS, TOOL, Measurements, Place, Plane, Setup
+from pteron.calibration.measurements import KINDS, TOOL, Measurements, Place, ReferencePlane, Setup
 from pteron.calibration.residuals import MachineSlopes
 from pteron.calibration.unknowns import blocks_of
 from pteron.calibration.verdict import rows_for_check
@@ -23,6 +23,9 @@ from pteron.errors import DataError, ModelError
 from pteron.kernels import numeric
 from pteron.kinematics import random_poses
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.result import Result
+from pteron.shapes import Seed
+from pteron.tolerances import EXACT
 from pteron.workspace import Box, Cylinder, home_pose, prove
 
 Array = NDArray[np.float64]
@@ -61,15 +64,12 @@ _RISES = 1e-6
 _ABOVE = 0.005
 """Height above a plane to which a probe is lifted between two places, m."""
 
-_ROUNDING = 1e-12
-"""Relative distance of candidates from a disc's rim: far more than their rounding."""
-
 _NOISE = dict.fromkeys(KINDS, 2e-5)
 """Noise that is expected where nobody says it, m and rad."""
 
 
-@dataclass(frozen=True)
-class Plan:
+@dataclass(frozen=True, eq=False, repr=False)
+class Plan(Result):
     """Poses to measure, in the order to go.
 
     Attributes
@@ -84,7 +84,7 @@ class Plan:
         What the joints read there on the machine as drawn.
     region : Box or Cylinder
         The proved region of poses that holds them, and the straight ways between them.
-    plane : Plane or None
+    plane : ReferencePlane or None
         The plane over which heights are measured.
     before, after : float
         Expected greatest error of the tool's place in that region, as a standard deviation, by
@@ -93,12 +93,14 @@ class Plan:
         How many poses, or more, leave some to check the calibration by.
     """
 
+    ROWS = "poses:1 readings:1"
+
     robot: Manipulator
     measure: Measure
     poses: Array
     readings: Array
     region: Box | Cylinder
-    plane: Plane | None
+    plane: ReferencePlane | None
     before: float
     after: float
     checked: int
@@ -106,8 +108,8 @@ class Plan:
     def columns(self) -> dict[str, Array]:
         """Return the columns of the table that the machine runs: poses, then readings."""
         names = (*self.robot.coordinates, *self.robot.joint_names)
-        values = np.concatenate([self.poses, self.readings], axis=1)
-        return dict(zip(names, values.T, strict=True))
+        columns = np.concatenate([self.poses, self.readings], axis=1)
+        return dict(zip(names, columns.T, strict=True))
 
 
 def plan(
@@ -119,7 +121,7 @@ def plan(
     free: Sequence[str] | None = None,
     prior: Mapping[str, float] | None = None,
     criterion: Criterion = "D",
-    seed: int = 0,
+    seed: Seed = 0,
 ) -> Plan:
     """Choose the poses to measure for a calibration.
 
@@ -166,7 +168,7 @@ def plan(
         )
     home = home_pose(robot)
     setup = setup or Setup()
-    drawn = Guess.drawn(robot, Measurements.of(robot, np.zeros((1, robot.joint_count))))
+    drawn = Guess.drawn(robot, Measurements.from_readings(robot, np.zeros((1, robot.joint_count))))
     region: Box | Cylinder
     if measure == "heights":
         home, setup, region = _lower_onto_plane(drawn, home, setup)
@@ -177,7 +179,7 @@ def plan(
         poses[:, _upright(robot)] = home[_upright(robot)]
         poses[:, robot.platform.angular] = home[robot.platform.angular]
     if measure == "distances" and not setup.anchors:
-        place = robot.platform.at(home[None])[0][0] - [0.0, 0.0, robot.legs[0].size]
+        place = robot.platform.placement(home[None])[0][0] - [0.0, 0.0, robot.legs[0].size]
         setup = replace(setup, anchors={TOOL: Place(tuple(place.tolist()), known=False)})
     measurements = _ideal_measurements(drawn, poses, measure, setup)
     blocks = blocks_of(robot, measurements, free, prior)
@@ -211,7 +213,7 @@ def _candidates(robot: Manipulator, region: Box | Cylinder, rng: np.random.Gener
     sides = rng.uniform(-1.0, 1.0, (_CANDIDATES, robot.freedom))
     if isinstance(region, Cylinder):
         angles = np.pi * sides[:, 0]
-        radii = (1.0 - _ROUNDING) * region.radius * np.abs(sides[:, 1]) ** _TO_THE_RIM
+        radii = (1.0 - EXACT) * region.radius * np.abs(sides[:, 1]) ** _TO_THE_RIM
         poses = np.tile(0.5 * (low + high), (_CANDIDATES, 1))
         poses[:, :2] = np.array(region.center[:2])
         poses[:, :2] += radii[:, None] * np.stack([np.cos(angles), np.sin(angles)], axis=1)
@@ -338,7 +340,7 @@ def _lower_onto_plane(
         moved = _lower_home(home, at, point, next(iter(setup.planes.values())))
         return moved, setup, _proved_level(robot, moved)
     if point[2] > 0.0:
-        bed = Plane()
+        bed = ReferencePlane()
         moved = _lower_home(home, at, point, bed)
         try:
             return moved, replace(setup, planes={TOOL: bed}), _proved_level(robot, moved)
@@ -347,11 +349,11 @@ def _lower_onto_plane(
     moved = home.copy()
     below = proved_box(robot, home).box[0, at] - home[at]
     moved[at] += below
-    plane = Plane(offset=float(point[2] + below), known=False)
+    plane = ReferencePlane(offset=float(point[2] + below), known=False)
     return moved, replace(setup, planes={TOOL: plane}), _proved_level(robot, moved)
 
 
-def _lower_home(home: Array, at: int, point: Array, plane: Plane) -> Array:
+def _lower_home(home: Array, at: int, point: Array, plane: ReferencePlane) -> Array:
     """Return home moved along a coordinate so that the tool, at a point (3,), is on a plane."""
     normal = np.array(plane.normal)
     moved = home.copy()
@@ -363,7 +365,7 @@ def _ideal_measurements(drawn: Guess, poses: Array, measure: Measure, setup: Set
     """Return the measurements that a faultless machine would give at poses."""
     robot, n = drawn.robot, len(poses)
     readings = drawn.readings(MachineSlopes(robot, ()).joints(drawn, poses))
-    measurements = Measurements.of(robot, readings, setup=setup)
+    measurements = Measurements.from_readings(robot, readings, setup=setup)
     if measure == "positions":
         return replace(measurements, positions=np.zeros((n, 3)))
     if measure == "poses":

@@ -252,7 +252,9 @@ class MachineSlopes:
             return np.asarray((at[:, angular] - read + np.pi) % (2.0 * np.pi) - np.pi)
         measured_poses = at.copy()
         measured_poses[:, angular] = read
-        measured_turn, turn = (np.swapaxes(platform.at(x)[1], -1, -2) for x in (measured_poses, at))
+        measured_turn, turn = (
+            np.swapaxes(platform.placement(x)[1], -1, -2) for x in (measured_poses, at)
+        )
         rotations = scipy.spatial.transform.Rotation.from_matrix(
             turn @ np.swapaxes(guess.turn @ measured_turn, -1, -2)
         ).as_rotvec()

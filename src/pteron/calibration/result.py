@@ -26,6 +26,7 @@ from pteron.json_values import fields_as_json
 from pteron.legs import Reading
 from pteron.manipulator import Manipulator
 from pteron.manipulator.machine_record import machine_record
+from pteron.result import Result
 from pteron.verdict import Verdict
 
 Array = NDArray[np.float64]
@@ -34,19 +35,22 @@ Origin = Literal["data", "both", "tolerance"]
 """The source of a value: the measurements, the drawing with its tolerance, or both."""
 
 _BY_DATA = 0.3
-"""Deviation after the fit, as a share of the tolerance, up to which the data made a value."""
+"""Deviation after the fit, as a share of the tolerance, up to which the data made a value: they
+weigh ten times as much as the tolerance then, by the squares."""
 
 _BY_TOLERANCE = 0.9
-"""Deviation after the fit, as a share of the tolerance, from which the value is the drawing's."""
+"""Deviation after the fit, as a share of the tolerance, from which the value is the drawing's: the
+data weigh less than a quarter of what the tolerance does."""
 
 _OPEN_ROWS = 400
-"""Most rows, evenly spread, at which possible errors are taken."""
+"""Most rows, evenly spread, at which possible errors are taken: errors are smooth over the
+workspace, and each row takes an iteration of direct kinematics."""
 
 _QUANTILE = float(scipy.stats.norm.ppf(0.975))
 
 
-@dataclass(frozen=True)
-class Value:
+@dataclass(frozen=True, eq=False, repr=False)
+class Value(Result):
     """One value of a calibration.
 
     Attributes
@@ -77,8 +81,8 @@ class Value:
         return self.found - half, self.found + half
 
 
-@dataclass(frozen=True)
-class HeldOut:
+@dataclass(frozen=True, eq=False, repr=False)
+class HeldOut(Result):
     """Root mean square errors at held-out rows, by kind of measurement, in SI units.
 
     `before` is with the machine as drawn, `after` with the calibrated one.
@@ -91,8 +95,8 @@ class HeldOut:
     """The expected values of `after`, from the noise and the intervals."""
 
 
-@dataclass(frozen=True)
-class CalibrationFinding:
+@dataclass(frozen=True, eq=False, repr=False)
+class CalibrationFinding(Result):
     """A fault that the measurements show: its kind, and a sentence that says where it is."""
 
     kind: str
@@ -103,8 +107,8 @@ class CalibrationFinding:
     """Greatest shift that it makes of a measurement that was fitted, in ordinary errors."""
 
 
-@dataclass(frozen=True)
-class HiddenOrder:
+@dataclass(frozen=True, eq=False, repr=False)
+class HiddenOrder(Result):
     """Legs whose readings could stand in another order and nothing would show.
 
     Attributes
@@ -119,8 +123,8 @@ class HiddenOrder:
     error: float
 
 
-@dataclass(frozen=True)
-class Calibration:
+@dataclass(frozen=True, eq=False, repr=False)
+class Calibration(Result):
     """A machine's geometry from measurements.
 
     Attributes
@@ -152,6 +156,8 @@ class Calibration:
     hidden_order : HiddenOrder or None
         Legs of which the measurements do not show the order.
     """
+
+    ROWS = "values"
 
     drawn: Manipulator
     robot: Manipulator
@@ -190,7 +196,9 @@ class Calibration:
         """
         desired = np.atleast_2d(np.asarray(poses, dtype=float))
         slopes = MachineSlopes(self.drawn, self.blocks)
-        measurements = Measurements.of(self.drawn, np.zeros((len(desired), len(self.drawn.legs))))
+        measurements = Measurements.from_readings(
+            self.drawn, np.zeros((len(desired), len(self.drawn.legs)))
+        )
         readings = self.start.readings(slopes.joints(self.start, desired))
         measurements = replace(measurements, readings=readings)
         fitted = self.fit.guess
@@ -221,18 +229,25 @@ class Calibration:
             self.fit.guess, self.fit.total, self.fit
         )
 
+    def summary(self) -> str:
+        """Return the verdict with its reasons and advice, and the rank, for people, as lines."""
+        return f"{self.robot.name}: {self.verdict.summary()}\n{self.observability.summary()}"
+
     def as_dict(self) -> dict[str, Any]:
         """Return the calibration as plain data, as `calibration.json` has it."""
-        values = [{**asdict(value), "interval": list(value.interval)} for value in self.values]
+        value_records = [
+            {**asdict(known_value), "interval": list(known_value.interval)}
+            for known_value in self.values
+        ]
         outliers = [self.measurements.places[i] for i in np.flatnonzero(~self.fit.kept)]
         return {
             "name": self.drawn.name,
             "machine": machine_record(self.drawn),
             "calibrated_geometry": machine_record(self.robot)["geometry"],
-            "values": values,
+            "values": value_records,
             **fields_as_json(self.fit.guess, "zeros scales"),
             "noise": self.noise,
-            **fields_as_json(self.observability, "rank shown columns"),
+            **fields_as_json(self.observability, "rank shown=determined_count columns"),
             "certificate": self.observability.summary(),
             **fields_as_json(self.observability, "unseen weak"),
             **fields_as_json(self, "held_out findings verdict open_errors hidden_order"),
@@ -247,7 +262,7 @@ def open_errors(
     robot = fit.guess.robot
     slopes = MachineSlopes(robot, blocks)
     rows = spread_rows(len(measurements), _OPEN_ROWS)
-    tools = Measurements.of(robot, measurements.readings[rows])
+    tools = Measurements.from_readings(robot, measurements.readings[rows])
     covariance = _contradicted_covariance(fit, blocks)
     poses, moved = slopes.pose_slopes(fit.guess, tools, fit.poses[rows])
     length_slopes = position_axes(robot)[length_columns(robot)] @ moved

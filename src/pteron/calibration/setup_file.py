@@ -11,7 +11,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from pteron.bodies.tables import Number, Three, TomlTable
 from pteron.bodies.vectors import unit_vector
-from pteron.calibration.measurements import KINDS, Place, Plane, Setup
+from pteron.calibration.measurements import KINDS, Place, ReferencePlane, Setup
 from pteron.errors import DataError, shorten
 from pteron.tables import Dialect
 from pteron.toml import read_toml, to_model
@@ -108,7 +108,7 @@ class MeasuredLog(TomlTable):
         return Setup(
             self.measured.noise.model_dump(exclude_none=True),
             places(self.marks),
-            {name: Plane(p.normal, p.offset, p.known) for name, p in self.planes.items()},
+            {name: ReferencePlane(p.normal, p.offset, p.known) for name, p in self.planes.items()},
             places(self.anchors),
             self.instrument.frame == "known",
         )

@@ -97,7 +97,7 @@ def _measured_poses(
         seen, measurements.angles, begin[:, robot.platform.angular]
     )
     lengths = length_columns(robot)
-    arms = guess.points(measurements.marks, begin) - robot.platform.at(begin)[0]
+    arms = guess.points(measurements.marks, begin) - robot.platform.placement(begin)[0]
     places = (measurements.positions - arms @ position_axes(robot).T)[:, lengths]
     if not measurements.setup.frame_known:
         return begin, np.zeros(len(measurements), dtype=bool)

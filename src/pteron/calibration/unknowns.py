@@ -87,9 +87,9 @@ def blocks_of(
             f"free, prior: {', '.join(map(repr, wrong))}: no group or value of this machine; "
             f"groups are {', '.join((*GROUPS, *AXIAL))}, values like {varying[0].name}"
         )
-    for name, value in tolerances.items():
-        if not value > 0.0:
-            raise DataError(f"prior: {name} = {value:g}: a standard deviation above 0 expected")
+    for name, tolerance in tolerances.items():
+        if not tolerance > 0.0:
+            raise DataError(f"prior: {name} = {tolerance:g}: a standard deviation above 0 expected")
     blocks: list[UnknownBlock] = []
     if at := free_indices(geometry):
         free_geometry = tuple(geometry[i] for i in at)

@@ -101,9 +101,9 @@ def _named_combinations(
 
     def vector(**parts: float) -> Array:
         combination = np.zeros(len(names))
-        for name, value in parts.items():
-            if value:
-                combination[place[name]] = value
+        for name, share in parts.items():
+            if share:
+                combination[place[name]] = share
         return combination
 
     for name, k in place.items():

@@ -66,7 +66,7 @@ class _Reason(NamedTuple):
 
 def rows_for_check(measurements: Measurements, blocks: Sequence[UnknownBlock]) -> int:
     """Return the least number of such rows from which some are held out of the fit."""
-    counted = sum(int((~np.isnan(values)).sum()) for values in measurements.parts.values())
+    counted = sum(int((~np.isnan(array)).sum()) for array in measurements.parts.values())
     least = (
         _PER_VALUE[set(measurements.kinds) <= set(measurements.setup.noise)] * blocks[-1].where.stop
     )

@@ -9,7 +9,7 @@ from typer import echo
 
 from pteron.cli.arguments import MachineArgument
 from pteron.cli.progress import spinner
-from pteron.cli.result import Result
+from pteron.cli.result import CommandResult
 from pteron.cli.terminal import is_terminal, plain, show, show_json, table
 from pteron.json_values import fields_as_json
 
@@ -34,7 +34,7 @@ def base(
     format_: Format = "text",
     symbols: bool = False,
     leg_symbols: bool = False,
-) -> Result:
+) -> CommandResult:
     """Find the base inertial parameters: the sums of parameters that act on the forces.
 
     The format latex prints lines of mathematics, booktabs a table with values for a paper.
@@ -65,10 +65,10 @@ def base(
         data["geometry"] = _geometry(parameters, written)
         data["shared_symbols"] = {} if written == "leg" else parameters.shared_symbols
     if format_ == "json":
-        return Result(data, partial(show_json, data))
+        return CommandResult(data, partial(show_json, data))
     if format_ == "text":
-        return Result(data, partial(_show, parameters, written))
-    return Result(data, partial(_write, parameters, written, format_))
+        return CommandResult(data, partial(_show, parameters, written))
+    return CommandResult(data, partial(_write, parameters, written, format_))
 
 
 def _write(
@@ -125,7 +125,7 @@ def _closing_lines(parameters: BaseParameters, symbols: Symbols) -> list[str]:
     return [*lines, *parameters.certificate.summary().splitlines()]
 
 
-def table1() -> Result:
+def table1() -> CommandResult:
     """Print the paper's Table 1, as printed and as computed; exit with 1 if they disagree.
 
     Examples
@@ -153,4 +153,4 @@ def table1() -> Result:
             "restored from its other rows."
         )
     lines = [table("", "printed", "computed", "agrees", rows=rows), agree]
-    return Result(data, lines, code=1 if wrong else 0)
+    return CommandResult(data, lines, code=1 if wrong else 0)

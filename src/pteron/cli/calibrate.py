@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Literal
 
 from pteron.cli.arguments import MachineArgument
 from pteron.cli.progress import spinner
-from pteron.cli.result import Result
+from pteron.cli.result import CommandResult
 from pteron.cli.terminal import GRADE_COLORS, ascii_number, plain, show, table
 from pteron.errors import DataError
 
@@ -40,7 +40,7 @@ def calibrate(
     measure: Measure = "positions",
     plane: str | None = None,
     anyway: bool = False,
-) -> Result:
+) -> CommandResult:
     """Find a machine's true geometry from measurements, and say what they cannot show.
 
     The folder gets calibration.html to read, calibration.json with all numbers, and the machine as
@@ -101,7 +101,7 @@ def calibrate(
         firmware = firmware_fit(result)
         files = write_calibration(result, out, sources=sources, anyway=anyway, firmware=firmware)
     data = {"files": [str(path) for path in files.paths], **numbers(result, firmware)}
-    return Result(data, partial(_show, result, firmware, files.left_out), files.paths)
+    return CommandResult(data, partial(_show, result, firmware, files.left_out), files.paths)
 
 
 def _prior(path: str) -> dict[str, float]:
@@ -126,7 +126,7 @@ def _plan(
     free: list[str] | None,
     prior: dict[str, float] | None,
     plane: str | None,
-) -> Result:
+) -> CommandResult:
     """Choose the poses to measure, and write the table that the machine runs."""
     from pteron.tables import check_output, write_table
 
@@ -154,18 +154,18 @@ def _plan(
         f"deviation of the tolerances); {1e3 * poses.after:.3g} {unit} are expected to be left.",
         *([few] if count < poses.checked else []),
     ]
-    return Result({"file": str(path), "expected": expected, "region": box}, lines, [path])
+    return CommandResult({"file": str(path), "expected": expected, "region": box}, lines, [path])
 
 
 def _level(text: str) -> Setup:
     """Return a setup with the plane of --plane."""
-    from pteron.calibration import Plane, Setup
+    from pteron.calibration import ReferencePlane, Setup
     from pteron.cli.pose_ranges import pose_ranges
 
     constants, ranges = pose_ranges(text, "--plane")
     if set(constants) != {"z"} or ranges:
         raise DataError(f"--plane: {text!r} given; z=HEIGHT expected, in m, such as z=0")
-    return Setup(planes={"": Plane(offset=constants["z"])})
+    return Setup(planes={"": ReferencePlane(offset=constants["z"])})
 
 
 def _plane_text(planned: Plan) -> str:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from pteron.cli.pose_ranges import box_of, pose_ranges, pose_spans, pose_text, span_text
 from pteron.cli.progress import progress_bar, spinner
-from pteron.cli.result import Result
+from pteron.cli.result import CommandResult
 from pteron.cli.terminal import note, percent, plain, show, table, warn
 from pteron.errors import DataError, ModelError
 from pteron.json_values import fields_as_json
@@ -82,7 +82,7 @@ class RequestedProofs:
             if value is not None and not (value > 0.0 or (value == 0.0 and name != "tolerance")):
                 raise DataError(f"--{name}: {value:g} given, a number {least} expected")
 
-    def result(self, robot: Manipulator, slice_: str | None, warnings: list[str]) -> Result:
+    def result(self, robot: Manipulator, slice_: str | None, warnings: list[str]) -> CommandResult:
         """Run the proof and return its result; the exit code is 1 if a box is not proved."""
         if self.prove is None:
             pose = _orientation(robot, slice_)
@@ -98,13 +98,13 @@ class RequestedProofs:
         lines = [f"[bold]{plain(robot.name)}[/bold]: {_spans(robot, region)}", plain(str(proof))]
         lines += self._unsure if proof.holds else []
         data = _proof(proof, self.floors) | {"warnings": warnings}
-        return Result(data, lines, code=0 if proof.holds else _NOT_PROVED)
+        return CommandResult(data, lines, code=0 if proof.holds else _NOT_PROVED)
 
     @property
     def _unsure(self) -> list[str]:
         return [] if self.type_ii else [_MAY_BE_SINGULAR]
 
-    def _certify_tilt(self, robot: Manipulator, pose: Array, warnings: list[str]) -> Result:
+    def _certify_tilt(self, robot: Manipulator, pose: Array, warnings: list[str]) -> CommandResult:
         from pteron.workspace import conditions, largest_tilt
 
         warn(warnings)
@@ -116,9 +116,9 @@ class RequestedProofs:
             _heading(robot, dict(list(_angles(robot, pose).items())[2:]), self.floors),
             f"It leans by {math.degrees(leans.tilt):.4g} deg to every side: proved.",
         ]
-        return Result(data | {"proved": True, "warnings": warnings}, lines + self._unsure)
+        return CommandResult(data | {"proved": True, "warnings": warnings}, lines + self._unsure)
 
-    def _certify(self, robot: Manipulator, pose: Array, warnings: list[str]) -> Result:
+    def _certify(self, robot: Manipulator, pose: Array, warnings: list[str]) -> CommandResult:
         from pteron.workspace import conditions, largest_cube, paving
 
         warn(warnings)
@@ -134,7 +134,9 @@ class RequestedProofs:
         if not paved.complete:
             note(f"Warning: the gap is not {percent(tolerance)}: there were too many boxes")
         contents = paved, pose, self.floors, cube
-        return Result(_paving_data(*contents) | {"warnings": warnings}, partial(_show, *contents))
+        return CommandResult(
+            _paving_data(*contents) | {"warnings": warnings}, partial(_show, *contents)
+        )
 
 
 def _expect_none(options: Mapping[str, object], what: str) -> None:

@@ -7,13 +7,13 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from pteron.cli.progress import progress_bar
-from pteron.cli.result import Result
+from pteron.cli.result import CommandResult
 from pteron.cli.terminal import note, plain, show, table
 from pteron.errors import DataError
 
 if TYPE_CHECKING:
     from pteron.design import Choice
-    from pteron.design.choosing.candidate import Candidate
+    from pteron.design.candidate import Candidate
 
 _NONE = 1
 """Exit code where no machine does the job."""
@@ -24,7 +24,7 @@ def choose(
     *,
     out: str | None = None,
     workers: int = 1,
-) -> Result:
+) -> CommandResult:
     """Choose a machine for a job: which kind, which dimensions, which motors.
 
     The file says what the machine must do: workspace, payload, cycles, accuracy, stiffness, room,
@@ -68,7 +68,7 @@ def choose(
                 requirements,
                 folder=out,
                 workers=workers,
-                progress=lambda share, _: bar(share),
+                progress=bar,
                 begun=log.begin,
                 finished=log.finish,
             )
@@ -78,11 +78,11 @@ def choose(
         raise
     files = []
     if out is not None:
-        from pteron.report.choice.write import write_choice
+        from pteron.report.design.choice import write_choice
 
         files = write_choice(choice, out)
-    data = choice.data() | ({"files": [str(file) for file in files]} if files else {})
-    return Result(data, partial(_show, choice), files, _NONE if choice.best is None else 0)
+    data = choice.as_dict() | ({"files": [str(file) for file in files]} if files else {})
+    return CommandResult(data, partial(_show, choice), files, _NONE if choice.best is None else 0)
 
 
 class _Log:
@@ -114,11 +114,9 @@ class _Log:
 
 
 def _show(choice: Choice) -> None:
-    from pteron.design.choosing.told import asked, assumed, cells, dimensions, drives, margins
-
-    show("[bold]Asked[/bold]: " + plain("; ".join(asked(choice.job))))
+    show("[bold]Asked[/bold]: " + plain("; ".join(choice.job.requirement_lines())))
     serving = [candidate for candidate in choice.candidates if candidate.serves]
-    rows = {candidate.kind: cells(candidate) for candidate in serving}
+    rows = {candidate.kind: candidate.figure_texts for candidate in serving}
     shown = list(dict.fromkeys(key for row in rows.values() for key in row))
     if serving:
         table_rows = (
@@ -127,15 +125,15 @@ def _show(choice: Choice) -> None:
         show(table("kind", *shown, rows=table_rows, numbers=tuple(shown), names=("kind",)))
     for candidate in serving:
         show(
-            f"[bold]{candidate.kind}[/bold]: {plain(drives(candidate))}",
-            f"  mm: {dimensions(candidate)}",
+            f"[bold]{candidate.kind}[/bold]: {plain(candidate.drive_text)}",
+            f"  mm: {candidate.dimension_text}",
             f"  {plain(candidate.proved)}",
             f"  {plain(candidate.clear)}",
-            f"  margins: {plain(margins(candidate))}",
+            f"  margins: {plain(candidate.margin_text)}",
         )
     for candidate in choice.candidates:
         if not candidate.serves:
-            near = plain("; ".join(candidate.why))
-            show(f"[bold]{candidate.kind}[/bold] falls out: the nearest design has {near}")
+            verdict = candidate.summary().removeprefix(candidate.kind)
+            show(f"[bold]{candidate.kind}[/bold]{plain(verdict)}")
     if serving:
-        show(*(f"[dim]{plain(line)}[/dim]" for line in assumed(choice)))
+        show(*(f"[dim]{plain(line)}[/dim]" for line in choice.assumption_lines()))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from pteron.cli.arguments import MachineArgument
 from pteron.cli.motion_table import motion_frame, peaks_table
 from pteron.cli.progress import spinner
-from pteron.cli.result import Result
+from pteron.cli.result import CommandResult
 from pteron.cli.terminal import note
 from pteron.errors import DataError
 
@@ -32,7 +32,7 @@ def cue(
     tilt_rate: float | None = None,
     rotation: float | None = None,
     smoothing: float | None = None,
-) -> Result:
+) -> CommandResult:
     """Show a vehicle's accelerations and turns with a simulator's platform: a classical washout.
 
     The file holds t (s), accelerations ax ay az without gravity (m/s^2) and angular rates wx wy wz
@@ -106,7 +106,7 @@ def cue(
         f"amplitudes reduced by at most {cued.pressed:.0%}, so that the motion stays in the box",
         peaks_table(largest),
     ]
-    return Result(data, lines, files)
+    return CommandResult(data, lines, files)
 
 
 def _write(machine: Manipulator, cued: Cue, out: str | None, page: str | None) -> list[str]:

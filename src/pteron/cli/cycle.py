@@ -12,10 +12,11 @@ from pteron.cli.motion_argument import Carried, given_pose, read_motion
 from pteron.cli.motion_table import motion_frame, peaks_table
 from pteron.cli.planned_motions import joint_motion, line_motion, standard_motion
 from pteron.cli.progress import spinner
-from pteron.cli.result import Result
+from pteron.cli.result import CommandResult
 from pteron.cli.terminal import note, show
 from pteron.errors import DataError
 from pteron.json_values import fields_as_json
+from pteron.tolerances import SAME
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -40,9 +41,6 @@ _KINDS_OF: dict[str, tuple[Kind, ...]] = {
     "jerk": ("joints",),
 }
 """Kinds of motion that an option belongs to."""
-
-_ROUNDING = 1e-6
-"""Share of a limit by which a motion may exceed it without a note."""
 
 _DENSE = 10
 """Moments per sample at which a motion's peaks are sought."""
@@ -72,7 +70,7 @@ def cycle(
     tool_acceleration: float | None = None,
     carried: Carried,
     out: str | None = None,
-) -> Result:
+) -> CommandResult:
     """Make a motion, within the limits, and see what it asks of the drives.
 
     The standard pick-and-place cycle, 25 mm up, 305 mm across, 25 mm down and back; straight lines
@@ -177,7 +175,7 @@ def _result(
     limits: MotionLimits,
     carried: Carried,
     out: str | None,
-) -> Result:
+) -> CommandResult:
     import numpy as np
 
     from pteron.manipulator.template_masses import template_masses
@@ -189,7 +187,7 @@ def _result(
     fine = np.linspace(float(motion.time[0]), float(motion.time[-1]), count)
     largest = peaks(machine, *motion.at(fine), limits)
     for peak in largest:
-        if peak.share > 1.0 + _ROUNDING:  # of a motion that came in a table
+        if peak.share > 1.0 + SAME:  # of a motion that came in a table
             note(f"Note: {peak.phrase()}")
     if out is not None:
         from pteron.tables import write_table
@@ -215,7 +213,9 @@ def _result(
     text = f"{motion.duration:.4g} s, {len(motion.time)} samples"
     if bound is not None:
         text += f"; a polynomial in time along the same path takes {bound:.4g} s"
-    return Result(data, partial(_show, [text, peaks_table(largest)], out), [out] if out else [])
+    return CommandResult(
+        data, partial(_show, [text, peaks_table(largest)], out), [out] if out else []
+    )
 
 
 def _show(lines: list[str | Table], out: str | None) -> None:

@@ -10,15 +10,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pteron.cli.progress import progress_bar
-from pteron.cli.result import Result
+from pteron.cli.result import CommandResult
 from pteron.cli.terminal import note, plain, show, table
 from pteron.errors import DataError
 from pteron.extras import expect_extra
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from pteron.design import Front, Spec, Summary
+    from pteron.design import Front, FrontReport, Spec
 
 _GENERATIONS, _SURVEY = "generations", "survey"
 """Subfolders of the results for the designs evaluated by a search, and by `--sweep`."""
@@ -35,7 +33,7 @@ def design(
     sweep: int | None = None,
     workers: int | None = None,
     scheduler: str | None = None,
-) -> Result:
+) -> CommandResult:
     """Search for the dimensions of a machine that are best for what is asked of it.
 
     The file names the machine to begin with, the numbers that may change, what must be kept
@@ -66,7 +64,7 @@ def design(
     pteron design search.toml --out all --sweep 100000 --scheduler tcp://host:8786
     """
     expect_extra("design", "pymoo", "a search needs pymoo")
-    from pteron.design import Summary, read_spec
+    from pteron.design import FrontReport, read_spec
 
     requirements = read_spec(spec)
     if sweep is not None and out is None:
@@ -81,10 +79,14 @@ def design(
         checked_folder(out)
         _tell_resumed(Path(out))
     front = _search_front(requirements, out, sweep, workers, scheduler)
-    summary = Summary(front)
-    files = [] if out is None else _write(summary, Path(out))
-    data = summary.data() | ({"files": [str(file) for file in files]} if files else {})
-    return Result(data, partial(_show, summary), files)
+    summary = FrontReport(front)
+    files = []
+    if out is not None:
+        from pteron.report.design.front import write_front
+
+        files = write_front(summary, out)
+    data = summary.as_dict() | ({"files": [str(file) for file in files]} if files else {})
+    return CommandResult(data, partial(_show, summary), files)
 
 
 def _tell_resumed(folder: Path) -> None:
@@ -113,54 +115,16 @@ def _search_front(
         return search(spec, folder=None if out is None else Path(out) / _GENERATIONS, **work)
 
 
-def _write(summary: Summary, folder: Path) -> list[Path]:
-    from pteron.atomic import write_texts
-    from pteron.json_values import json_text
-    from pteron.plots import save_figure
-    from pteron.tables import write_table
-
-    rows = summary.table()
-    figures = json_text(summary.data())
-    texts = {"report.md": summary.page(), "design.json": figures, **summary.robots()}
-    return [
-        *write_texts(folder, texts),
-        write_table(rows, folder / "front.csv"),
-        write_table(rows, folder / "front.parquet"),
-        save_figure(_figure(summary), folder / "front.png"),
-    ]
-
-
-def _figure(summary: Summary) -> Figure:
-    from pteron.design import start_design
-    from pteron.plots import front_figure
-
+def _show(summary: FrontReport) -> None:
     front = summary.front
-    names = [o.quantity for o in front.task.spec.objectives]
-    return front_figure(
-        front.objectives,
-        names,
-        [front.task.unit(name) for name in names],
-        start=[start_design(front.task).quantity(name) for name in names],
-        chosen=front.chosen,
-    )
-
-
-def _show(summary: Summary) -> None:
-    from pteron.design.spec import asked_words
-
-    front = summary.front
-    show(
-        f"[bold]{plain(front.task.robot.name)}[/bold]: {front.evaluated} designs evaluated, "
-        f"{front.kept} keep all that is asked, {len(front)} on the front"
-    )
-    show(*(f"Asked for: {plain(line)}" for line in asked_words(front.task.spec)))
-    lines = (*summary.start.proofs, *summary.start.lacking)
+    name, _, counts = front.summary().partition(": ")
+    show(f"[bold]{plain(name)}[/bold]: {counts}")
+    show(*(f"Asked for: {plain(line)}" for line in front.task.spec.requirement_lines()))
+    lines = (*summary.start.proofs, *summary.start.missing_quantities)
     show(*(f"To begin with: {plain(line)}" for line in lines))
     numbers = ("to begin with", "now", "change")
-    for reported in summary.chosen:
-        rows = (
-            (plain(c.what), c.shown(c.before), c.shown(c.after), c.by) for c in reported.changes
-        )
+    for reported in summary.selection:
+        rows = (map(plain, change.cells) for change in reported.changes)
         show(
             "",
             f"[bold]{plain(reported.name.replace('-', ' '))}[/bold]",

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pteron.cli.result import Result
+from pteron.cli.result import CommandResult
 
 if TYPE_CHECKING:
     import polars as pl
@@ -54,7 +54,7 @@ class Destination:
         further_files: Callable[[], dict[str, str]],
         person: Callable[[], None],
         code: int = 0,
-    ) -> Result:
+    ) -> CommandResult:
         """Write files if they are asked for, and return the command's result.
 
         `data` are the figures, `more` makes the other files of a folder, by name, and `person`
@@ -72,4 +72,4 @@ class Destination:
             texts = {f"{self.name}.csv": table.write_csv(), f"{self.name}.json": json_text(data)}
             files = write_texts(self.out, texts | further_files())
         written = {"files": [str(file) for file in files]} if files else {}
-        return Result(data | written, person, files, code)
+        return CommandResult(data | written, person, files, code)

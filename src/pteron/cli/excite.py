@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 
 from pteron.cli.arguments import MachineArgument
 from pteron.cli.progress import progress_bar
-from pteron.cli.result import Result
+from pteron.cli.result import CommandResult
 from pteron.cli.terminal import note, table
 from pteron.errors import ModelError
 
@@ -123,7 +123,7 @@ def excite(
     file: _FileOptions,
     search: _SearchOptions,
     json: bool = False,
-) -> Result:
+) -> CommandResult:
     """Find a periodic trajectory from whose forces the base parameters are seen best.
 
     The file leads in from rest, repeats the trajectory, and leads out to rest in the pose where it
@@ -220,7 +220,7 @@ def _result(
     series: _SeriesOptions,
     file: _FileOptions,
     out: str | None,
-) -> Result:
+) -> CommandResult:
     """Check the motions between samples, write them, and return what is said of them."""
     import numpy as np
 
@@ -265,7 +265,7 @@ def _result(
     if slow is not None:
         slowly = f"the same way in {slow.duration:g} s, for friction that falls with speed."
         lines.append(f"Slowly: {slowly}")
-    return Result(data, lines, files)
+    return CommandResult(data, lines, files)
 
 
 def _held_out_cycles(excitation: Excitation, rate: float) -> RepeatedCycle | None:

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from importlib import import_module
-from typing import Any, Literal
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
 
 from pteron.cli.arguments import MachineArgument
 from pteron.cli.motion_argument import Carried
 from pteron.cli.progress import spinner
-from pteron.cli.result import Result
+from pteron.cli.result import CommandResult
 from pteron.cli.terminal import note
 from pteron.errors import DataError
+
+if TYPE_CHECKING:
+    from pteron.manipulator import Manipulator
 
 _TRUSTED = "trustworthy"
 """The verdict on an identified model with which its export needs no warning."""
@@ -40,6 +44,7 @@ def export(
     marlin: str | None = None,
     reprap: str | None = None,
     linuxcnc: str | None = None,
+    target: str | None = None,
     function: list[str] | None = None,
     float_: bool = False,
     specialised: bool = False,
@@ -48,7 +53,7 @@ def export(
     base: str | None = None,
     tool: str | None = None,
     gains: str | None = None,
-) -> Result:
+) -> CommandResult:
     """Write code for a controller, or the machine as another engine or tool wants it.
 
     With --c or --st: kinematics, Jacobian, dynamics and regressor, in functions that return a
@@ -74,6 +79,7 @@ def export(
     --marlin DIR: Write M665 and M666 of a linear Delta for Marlin.
     --reprap DIR: Write M665 and M666 of a linear Delta for RepRapFirmware.
     --linuxcnc DIR: Write kinematics for LinuxCNC.
+    --target NAME=DIR: Write with the export NAME of an installed package.
     --float: C: float instead of double.
     --specialised: C: fold the inertial parameters in.
     --wrench: Dynamics take a wrench on the platform too.
@@ -97,15 +103,12 @@ def export(
     """
     folders = (c, st, mjcf, sdf, urdf, pinocchio, casadi, fmu, klipper, marlin, reprap, linuxcnc)
     targets = {name: folder for name, folder in zip(_TARGETS, folders, strict=True) if folder}
+    if target is not None:
+        targets["target"] = target
     options: dict[str, object] = {"function": function, "float": float_, "gains": gains}
     options |= {"specialised": specialised, "wrench": wrench, "base": base}
     options |= {"output": output != "force"}
-    _check(targets, [name for name, is_set in options.items() if is_set])
-    if tool is not None and base is not None:
-        raise DataError(
-            f"--tool {tool}: not with --base, whose values are of the machine without it; leave it "
-            "out, and let the controller call set_payload_base"
-        )
+    _check(targets, [name for name, is_set in options.items() if is_set], tool)
     machine = Carried(tool=tool).mount_tool(machine)
     files = []
     with spinner(f"Writing code for {machine.name}"):
@@ -125,18 +128,34 @@ def export(
             )
         if st is not None:
             files += export_st(machine, asked_for, st, wrench=wrench, output=output, base=base)
-        for name, folder in targets.items():
-            if name not in ("c", "st"):
-                files += getattr(import_module("pteron.export"), f"export_{name}")(machine, folder)
+        for name in targets.keys() - {"c", "st"}:
+            files += _export_target(machine, name, targets[name])
     if grade != _TRUSTED:
         note(f"Warning: {base}: the verdict on these values is: {grade}")
-    return Result({"robot": machine.name, "files": [str(path) for path in files]}, files=files)
+    return CommandResult(
+        {"robot": machine.name, "files": [str(path) for path in files]}, files=files
+    )
 
 
-def _check(targets: dict[str, str], options: list[str]) -> None:
+def _export_target(machine: Manipulator, target: str, folder: str) -> list[Path]:
+    """Return the files of a target; `folder` of an installed package's export is NAME=DIR."""
+    if target != "target":
+        files: list[Path] = getattr(import_module("pteron.export"), f"export_{target}")(
+            machine, folder
+        )
+        return files
+    from pteron.export.installed import export_named
+
+    name, separator, place = folder.partition("=")
+    if not (name and separator and place):
+        raise DataError(f"--target: {folder!r} given, NAME=DIR expected, as in acme=controller")
+    return export_named(name)(machine, place)
+
+
+def _check(targets: dict[str, str], options: list[str], tool: str | None) -> None:
     """Refuse no target, or several (but C with Structured Text), and options of another target."""
     if not targets:
-        names = ", ".join(f"--{name}" for name in _TARGETS)
+        names = ", ".join(f"--{name}" for name in (*_TARGETS, "target"))
         raise DataError(f"{names}: none given; say what to write, such as --c controller")
     others = [name for name in targets if name not in ("c", "st")]
     if others and len(targets) > 1:
@@ -147,3 +166,8 @@ def _check(targets: dict[str, str], options: list[str]) -> None:
         raise DataError(f"{names}: goes with --c and --st, not with --{others[0]}; leave it out")
     if "float" in options and "c" not in targets:
         raise DataError("--float: goes with --c; Structured Text has LREAL alone")
+    if tool is not None and "base" in options:
+        raise DataError(
+            f"--tool {tool}: not with --base, whose values are of the machine without it; leave it "
+            "out, and let the controller call set_payload_base"
+        )

@@ -7,7 +7,7 @@ from typing import Any
 from pteron.cli.arguments import STANDARD, MachineArgument
 from pteron.cli.motion_argument import Carried, cycle_of
 from pteron.cli.progress import progress_bar, spinner
-from pteron.cli.result import Result
+from pteron.cli.result import CommandResult
 from pteron.cli.terminal import plain
 from pteron.errors import DataError
 from pteron.extras import expect_extra
@@ -26,7 +26,7 @@ def film(
     turns: float = 0.0,
     forces: bool = False,
     carried: Carried,
-) -> Result:
+) -> CommandResult:
     """Film a machine that goes through a cycle, in real time or slow motion, as MP4 or GIF.
 
     The view is the same from the first frame to the last, or goes round the machine with --turns;
@@ -74,7 +74,7 @@ def film(
         f"{motion.duration:.4g} s of {plain(machine.name)} {pace}: {written.duration:.3g} s, "
         f"{written.frames} frames of {written.size[0]}x{written.size[1]}"
     )
-    return Result(data, [summary], [written.path])
+    return CommandResult(data, [summary], [written.path])
 
 
 def _expect_ffmpeg(options: dict[str, Any]) -> None:

@@ -8,8 +8,8 @@ from shutil import get_terminal_size
 from typing import TYPE_CHECKING, Any, Literal
 
 from pteron.cli.arguments import MachineArgument, load_robot, split_numbers
-from pteron.cli.progress import Times, spinner, stages
-from pteron.cli.result import Result
+from pteron.cli.progress import Times, progress_bar, spinner
+from pteron.cli.result import CommandResult
 from pteron.cli.terminal import (
     GRADE_COLORS,
     ascii_number,
@@ -67,7 +67,7 @@ def identify(
     period: float | None = None,
     cad: str = "robot",
     box: list[str] | None = None,
-) -> Result:
+) -> CommandResult:
     """Identify a machine from recorded motions, and say whether the result can be trusted.
 
     With --payload, the inertia of a payload is found from the motion recorded with it and without:
@@ -126,20 +126,19 @@ def identify(
     read = [*log, *(held_out or ()), *(path for path in (robot, description) if path)]
     sources = [path for path in read if Path(path).is_file()]
     model_path(out, machine.name, sources)
-    rows = sum(log.rows_estimate or 0 for log in (*fit, *check))
     folder = checked_folder(out)
-    with stages(f"Identifying {machine.name}", rows) as tell:
+    with progress_bar(f"Identifying {machine.name}") as tell:
         times = Times(tell)
         model: dict[str, Any] = {"terms": terms, "shared": shared, "cad": drawn, "bounds": bounds}
         how: dict[str, Any] = {"estimator": estimator, "processing": processing}
         result = identified(machine, fit, held_out=check, **model, **how, progress=times)
     with spinner("Drawing the report"):
-        times("Drawing the report", 0, 0)
+        times.begin("Drawing the report")
         files = write_identification(result, folder, sources=sources)
     if is_terminal():
         note(times.summary())
     data = {"files": [str(path) for path in files.paths], **numbers(result)}
-    return Result(data, partial(_show, result), files.paths)
+    return CommandResult(data, partial(_show, result), files.paths)
 
 
 def _speeds(text: str | None) -> tuple[float, ...] | Literal["auto"] | None:

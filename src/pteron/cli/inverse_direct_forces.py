@@ -15,6 +15,7 @@ from pteron.cli.table_rows import (
 )
 from pteron.cli.terminal import note
 from pteron.errors import DataError
+from pteron.tolerances import ROUNDING
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -22,9 +23,6 @@ if TYPE_CHECKING:
     from pteron.cli.typed_row import TypedRow
     from pteron.manipulator import Manipulator
     from pteron.tables import Table
-
-_ROUNDING = 1e-9
-"""Metres or radians by which a joint may be beyond its limits."""
 
 
 def inverse(
@@ -132,9 +130,9 @@ def _note_limits(machine: Manipulator, joints: NDArray[Any]) -> None:
     for name, leg, coordinates in zip(machine.joint_names, machine.legs, joints.T, strict=True):
         low, high = leg.limits or (-np.inf, np.inf)
         beyond = np.nan_to_num(np.maximum(low - coordinates, coordinates - high), nan=-np.inf)
-        if beyond.max(initial=0.0) > _ROUNDING:
+        if beyond.max(initial=0.0) > ROUNDING:
             rows = (
-                f"in {(beyond > _ROUNDING).sum()} of {len(coordinates)} rows, "
+                f"in {(beyond > ROUNDING).sum()} of {len(coordinates)} rows, "
                 if len(coordinates) > 1
                 else ""
             )

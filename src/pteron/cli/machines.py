@@ -12,7 +12,7 @@ from typer import Exit
 
 from pteron.cli.arguments import load_robot, signs, split_numbers
 from pteron.cli.progress import spinner
-from pteron.cli.result import Result
+from pteron.cli.result import CommandResult
 from pteron.cli.terminal import complain, plain, show, table, warn, write
 from pteron.errors import ModelError, OutputError, PteronError
 from pteron.json_values import fields_as_json
@@ -30,7 +30,7 @@ _FAULTY = 2
 """Exit code for a faulty file."""
 
 
-def catalog() -> Result:
+def catalog() -> CommandResult:
     """List the machines that come with Pteron.
 
     Examples
@@ -48,7 +48,7 @@ def catalog() -> Result:
     cells = ((machine[key] for key in keys) for machine in machines)
     rows = (tuple(c if isinstance(c, str) else " ".join(c) for c in row) for row in cells)
     machine_table = table("name", "motion", "legs", "machine", rows=rows, names=("name",))
-    return Result(machines, [machine_table])
+    return CommandResult(machines, [machine_table])
 
 
 def new(
@@ -63,7 +63,7 @@ def new(
     platform_mass: float | None = None,
     out: str | None = None,
     overwrite: bool = False,
-) -> Result:
+) -> CommandResult:
     """Write a file for a machine of your own, which says what every key is.
 
     It is a machine like KIND, to put your numbers into; without KIND the kinds are listed. The
@@ -115,9 +115,11 @@ def new(
         write_text(out, text)
     data = {"kind": kind, "file": out, "text": text}
     if out is None:
-        return Result(data, partial(write, text))
+        return CommandResult(data, partial(write, text))
     written = f"Written: {plain(out)}. Put in your numbers, then: pteron check {plain(out)}"
-    return Result(data, [written, *map(plain, kept_numbers_sentence(load(kind), dimensions))])
+    return CommandResult(
+        data, [written, *map(plain, kept_numbers_sentence(load(kind), dimensions))]
+    )
 
 
 def _stocks(texts: list[str] | None) -> dict[str, str]:
@@ -139,7 +141,7 @@ def _machine(robot: Manipulator) -> dict[str, Any]:
     }
 
 
-def check(file: str, *, elbows: str | None = None) -> Result:
+def check(file: str, *, elbows: str | None = None) -> CommandResult:
     """Check a machine's file and say what the machine is.
 
     It fails if the file is not valid, telling all its faults, if the machine is singular at every
@@ -175,7 +177,7 @@ def check(file: str, *, elbows: str | None = None) -> Result:
         warn(findings["doubts"][len(unlikely) :], f"{file}: ")
     except PteronError as error:
         raise ModelError(error.message, subject=file) from None
-    return Result(findings, partial(_show, robot, findings))
+    return CommandResult(findings, partial(_show, robot, findings))
 
 
 def _findings(robot: Manipulator) -> dict[str, Any]:
@@ -246,7 +248,7 @@ def _show(robot: Manipulator, findings: dict[str, Any]) -> None:
     angles = ", ".join(f"{math.degrees(angle):.4g}" for angle in findings["singular_orientations"])
     where = "" if findings["singular_at_every_position"] or not angles else " at the home position"
     singular = [f"Singular orientations{where}: {f'{angles} deg' if angles else 'none'}"]
-    singular = singular if robot.platform.angles and not robot.platform.tilts else []
+    singular = singular if robot.platform.axis_angle else []
     tool = [f"Tool: {_vector(findings['tool'])} m from P, in the platform frame"]
     tool = tool if any(findings["tool"]) else []
     work = "[green]Fine: the file is valid. This machine can work.[/green]"

@@ -32,7 +32,7 @@ from pteron.cli.machines import catalog, check, new
 from pteron.cli.options import help_of, parsed_command
 from pteron.cli.play import play
 from pteron.cli.report import report
-from pteron.cli.result import Result
+from pteron.cli.result import CommandResult
 from pteron.cli.simulate import simulate
 from pteron.cli.size import size
 from pteron.cli.terminal import complain, note
@@ -140,7 +140,7 @@ _LOOKS: dict[str, Any] = {"rich_markup_mode": "rich", "pretty_exceptions_enable"
 app = Typer(name="pteron", cls=CommandGroup, **_LOOKS)
 
 
-_COMMANDS: dict[str, tuple[Callable[..., Result | None], ...]] = {
+_COMMANDS: dict[str, tuple[Callable[..., CommandResult | None], ...]] = {
     "Machines": (catalog, new, check, report),
     "See it": (view, play, film, workspace),
     "Compute": (inverse, direct, forces, base, table1),

@@ -9,15 +9,13 @@ from pteron.cli.pose_ranges import pose_text, span_text
 from pteron.cli.terminal import percent, plain, show, table
 from pteron.errors import DataError
 from pteron.json_values import fields_as_json
+from pteron.tolerances import ROUNDING
 
 if TYPE_CHECKING:
     import rich.table
 
     from pteron.maps import Map
     from pteron.workspace import ReachVolume
-
-_ALIKE = 1e-9
-"""Relative difference below which the best and the worst value are one."""
 
 _AXIS = "name unit least greatest count"
 """Keys of an axis in the data."""
@@ -33,7 +31,7 @@ def map_data(
     grid = index_map.grid
     return {
         "robot": index_map.robot,
-        "held": grid.held,
+        "held": grid.fixed_coordinates,
         "varies": [fields_as_json(axis, _AXIS) for axis in grid.axes],
         "poses": grid.size,
         "in_reach": index_map.share,
@@ -46,12 +44,10 @@ def map_data(
 
 
 def _index_data(index_map: Map, name: str) -> dict[str, Any]:
-    from pteron.maps.map import ALL
-
-    index = ALL[name]
+    index = index_map.index(name)
     about = fields_as_json(index, "index=name title unit better")
     try:
-        summary = index_map.summary(name)
+        summary = index_map.statistics(name)
     except DataError:
         undetermined = int(index_map.reachable.sum())
         return {
@@ -84,7 +80,8 @@ def show_map(index_map: Map, volume: ReachVolume | None, data: Mapping[str, Any]
     """Print for a person: the reach, what ends it, and each index."""
     from pteron.platforms.coordinates import are_angles, coordinate
 
-    constants = ", ".join(pose_text(name, value) for name, value in index_map.grid.held.items())
+    fixed = index_map.grid.fixed_coordinates
+    constants = ", ".join(pose_text(name, coordinate) for name, coordinate in fixed.items())
     lines: list[str | rich.table.Table] = [
         f"[bold]{plain(index_map.robot)}[/bold]{f' at {constants}' if constants else ''}"
     ]
@@ -93,7 +90,7 @@ def show_map(index_map: Map, volume: ReachVolume | None, data: Mapping[str, Any]
         box = zip(names, *volume.box.tolist(), strict=True)
         spans = ", ".join(span_text(name, low, high) for name, low, high in box)
         noun = "area" if volume.unit == "m^2" else "volume"
-        angles = {n: angle for n, angle in index_map.grid.held.items() if n not in names}
+        angles = {n: angle for n, angle in fixed.items() if n not in names}
         at = ", ".join(pose_text(name, angle) for name, angle in angles.items())
         size = f"{noun} {volume.volume:.4g} {volume.unit}"
         lines.append(
@@ -114,7 +111,7 @@ def show_map(index_map: Map, volume: ReachVolume | None, data: Mapping[str, Any]
         if index["best"] is None:
             index_table.add_row(named, "", "-", "determined at no pose in reach")
             continue
-        if abs(index["best"] - index["worst"]) <= _ALIKE * abs(index["best"]):
+        if abs(index["best"] - index["worst"]) <= ROUNDING * abs(index["best"]):
             index_table.add_row(named, "", f"{index['best']:.4g}", "everywhere in reach")
         else:
             for side in ("best", "worst"):

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     import rich.table
 
     from pteron.manipulator import Manipulator
-    from pteron.motion import CommonFit, Fit
+    from pteron.motion import CommonFit, MotorFit
 
 _BEST = 3
 """Motors shown for each joint, the best ones."""
@@ -32,7 +32,7 @@ _CAPTIONS = {
 """Captions of the tables, by the heading of their first column."""
 
 
-def fits_frame(robot: Manipulator, fits: Sequence[Fit]) -> pl.DataFrame:
+def fits_frame(robot: Manipulator, fits: Sequence[MotorFit]) -> pl.DataFrame:
     """Return the motors of each leg as data, SI units."""
     import polars as pl
 
@@ -48,7 +48,7 @@ def common_rows(robot: Manipulator, fits: Sequence[CommonFit]) -> list[dict[str,
     return [{"legs": list(fit.legs), **_data(robot, fit)} for fit in fits]
 
 
-def motors_table(robot: Manipulator, fits: Sequence[Fit]) -> list[rich.table.Table]:
+def motors_table(robot: Manipulator, fits: Sequence[MotorFit]) -> list[rich.table.Table]:
     """Return the best motors of each leg; none where there are none."""
     return _table(robot, "leg", map(_alone, fits))
 
@@ -58,7 +58,7 @@ def common_table(robot: Manipulator, fits: Sequence[CommonFit]) -> list[rich.tab
     return _table(robot, "legs", fits)
 
 
-def _alone(fit: Fit) -> CommonFit:
+def _alone(fit: MotorFit) -> CommonFit:
     from pteron.motion import CommonFit
 
     return CommonFit((fit.leg,), fit.motor, fit.span, fit.ratio, (fit,))

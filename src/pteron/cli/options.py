@@ -25,7 +25,7 @@ from pteron.cli import completion
 from pteron.cli.arguments import MachineArgument, load_robot
 from pteron.cli.exported_functions import FUNCTIONS
 from pteron.cli.motion_argument import Carried
-from pteron.cli.result import Result
+from pteron.cli.result import CommandResult
 
 _SECTION = re.compile(r"\n\n(\w+)\n-+\n")
 _LINE = re.compile(r"(\S+?)(?:, (-\w))?(?: (\S+))?: (.*?)(?: \[default: (.*)\])?$")
@@ -60,7 +60,7 @@ _COMPLETION = {
 
 
 def parsed_command(
-    command: Callable[..., Result | None], *, general: bool = False
+    command: Callable[..., CommandResult | None], *, general: bool = False
 ) -> Callable[..., None]:
     """Return a command as it is typed.
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from pteron.cli.arguments import STANDARD, MachineArgument
 from pteron.cli.motion_argument import Carried, read_playback
 from pteron.cli.progress import spinner
-from pteron.cli.result import Result
+from pteron.cli.result import CommandResult
 from pteron.cli.terminal import plain
 from pteron.errors import DataError
 
@@ -24,7 +24,7 @@ def play(
     out: str = "motion.html",
     cycle: str | None = None,
     carried: Carried,
-) -> Result:
+) -> CommandResult:
     """Show a motion in 3-D: one page that needs no other file or network.
 
     The page has the machine as it moves, in real time or slower, with its forces, joints and pose
@@ -68,7 +68,7 @@ def play(
         "samples": samples,
     }
     summary = f"{plain(machine.name)}: {playback.motion.duration:.4g} s, {samples} samples"
-    return Result(data, [summary, f"Written: {plain(str(page))}, {size / 1e6:.1f} MB"])
+    return CommandResult(data, [summary, f"Written: {plain(str(page))}, {size / 1e6:.1f} MB"])
 
 
 def _playback(machine: Manipulator, motion: str) -> Playback:

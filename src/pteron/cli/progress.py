@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-import sys
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from time import perf_counter
 from typing import TYPE_CHECKING
 
-from pteron.cli.terminal import plain
+from pteron.cli.terminal import is_interactive, plain
 
 if TYPE_CHECKING:
-    from rich.progress import Progress
+    from rich import progress as rich_progress
+
+    from pteron.progress import Progress
 
 _SHORT = 0.05
 """Time below which a stage is not listed, s."""
@@ -27,19 +28,10 @@ _RECENT = 60.0
 """Time that a rate is taken over at least, s."""
 
 
-def is_watched() -> bool:
-    """Say whether a person watches standard error.
-
-    Rich takes FORCE_COLOR for one, which Jupyter and build servers set: colours are meant, not
-    pictures that move.
-    """
-    return sys.stderr.isatty()
-
-
 @contextmanager
 def spinner(task: str) -> Iterator[None]:
     """Show a person that work of unknown length goes on."""
-    if not is_watched():
+    if not is_interactive():
         yield
         return
     from rich.console import Console
@@ -49,7 +41,7 @@ def spinner(task: str) -> Iterator[None]:
 
 
 @contextmanager
-def progress_bar(task: str) -> Iterator[Callable[[float], None]]:
+def progress_bar(task: str) -> Iterator[Progress]:
     """Show a person how much of long work is done, and what time it needs yet.
 
     The callable takes the share, from 0 to 1; what it takes first may have been done before.
@@ -60,7 +52,9 @@ def progress_bar(task: str) -> Iterator[Callable[[float], None]]:
 
         def tell(share: float) -> None:
             estimate.tell(share)
-            progress.update(number, completed=share)
+            text = plain(getattr(share, "step", "") or task)
+            is_new = text != progress.tasks[number].description
+            progress.update(number, completed=share, description=text, refresh=is_new)
 
         yield tell
 
@@ -121,74 +115,47 @@ class TimeLeft:
         return f"about {float(f'{seconds / 3600.0:.2g}'):g} h left"
 
 
-@contextmanager
-def stages(task: str, rows: int) -> Iterator[Callable[[str, int, int], None]]:
-    """Show a bar for each stage of long work, and between them that the work goes on.
-
-    The callable takes a stage's name, how many of its rows are done, and how many there are: no
-    more than are done where the stage does not know, which then has `rows`.
-    """
-    with _bar() as progress:
-        number = progress.add_task(plain(task), total=None)
-        stage, done_rows = "", 0
-
-        def tell(name: str, done: int, total: int) -> None:
-            nonlocal done_rows, stage
-            if name != stage:
-                progress.reset(number, total=max(total, rows), description=plain(name))
-                stage, done_rows = name, 0
-            # The rows of a stage's next file are counted anew.
-            progress.update(number, advance=done - done_rows if done >= done_rows else done)
-            done_rows = done
-            if done >= max(total, rows):
-                progress.reset(number, total=None, description=plain(task))
-                stage = ""
-
-        yield tell
-
-
-def _bar(estimate: TimeLeft | None = None) -> Progress:
+def _bar(estimate: TimeLeft) -> rich_progress.Progress:
     from rich import progress
     from rich.console import Console
     from rich.text import Text
 
     class Left(progress.ProgressColumn):
         def render(self, task: progress.Task) -> Text:
-            return Text("" if estimate is None else estimate.words())
+            return Text(estimate.words())
 
     return progress.Progress(
         progress.TextColumn("{task.description}"),
         progress.BarColumn(),
         progress.TaskProgressColumn(),
-        progress.TimeRemainingColumn() if estimate is None else Left(),
+        Left(),
         console=Console(stderr=True),
-        disable=not is_watched(),
+        disable=not is_interactive(),
         transient=True,
     )
 
 
 class Times:
-    """The times of the stages of long work; it is called as a bar of `stages` is."""
+    """The times of the steps of long work; it is called as a bar's callable is."""
 
-    def __init__(self, tell: Callable[[str, int, int], None]) -> None:
+    def __init__(self, tell: Progress) -> None:
         self._tell = tell
         self._spent: dict[str, float] = {}
-        self._stage, self._since = "", perf_counter()
+        self._step, self._since = "", perf_counter()
 
-    def __call__(self, name: str, done: int, total: int) -> None:
-        """Take a stage's name, and how much of it is done."""
-        self._end(name)
-        # Some stages tell of themselves as they go on, others when they begin.
-        self._stage = "" if done else name
-        self._tell(name, done, total)
+    def __call__(self, share: float) -> None:
+        """Take the share of the work that is done, with the name of its step."""
+        self.begin(getattr(share, "step", ""))
+        self._tell(share)
+
+    def begin(self, step: str) -> None:
+        """Count the time from here on for a step."""
+        now = perf_counter()
+        self._spent[self._step] = self._spent.get(self._step, 0.0) + now - self._since
+        self._step, self._since = step, now
 
     def summary(self) -> str:
-        """Return the stages with their times, in a line."""
-        self._end("")
+        """Return the steps with their times, in a line."""
+        self.begin("")
         spans = ((name, spent) for name, spent in self._spent.items() if name and spent > _SHORT)
         return f"Time: {', '.join(f'{name.lower()} {spent:.1f} s' for name, spent in spans)}"
-
-    def _end(self, name: str) -> None:
-        now, stage = perf_counter(), self._stage or name
-        self._spent[stage] = self._spent.get(stage, 0.0) + now - self._since
-        self._since = now

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from pteron.cli.arguments import MachineArgument
 from pteron.cli.motion_argument import Carried, read_playback
 from pteron.cli.progress import spinner
-from pteron.cli.result import Result
+from pteron.cli.result import CommandResult
 from pteron.cli.terminal import plain, table, warn
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ def report(
     out: str,
     motion: str | None = None,
     carried: Carried,
-) -> Result:
+) -> CommandResult:
     """Write a report on a machine: one page with pictures, and its numbers.
 
     The page is report.html, the numbers are in report.json beside it. Forces are computed for the
@@ -54,7 +54,7 @@ def report(
     cycle = {key: value for key, value in contents["cycle"].items() if key not in _SERIES}
     tables = _machine(contents), _legs(contents["cycle"], contents["joints"])
     lines = [*tables, f"Written to {plain(str(page))}"]
-    return Result({"page": str(page), **contents, **asdict(carried), "cycle": cycle}, lines)
+    return CommandResult({"page": str(page), **contents, **asdict(carried), "cycle": cycle}, lines)
 
 
 vars(report)["warns"] = True

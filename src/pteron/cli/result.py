@@ -12,7 +12,7 @@ from pteron.cli.terminal import file_lines, show, show_json
 
 
 @dataclass(frozen=True)
-class Result:
+class CommandResult:
     """The result of a command.
 
     Attributes

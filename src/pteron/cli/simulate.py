@@ -12,7 +12,7 @@ from pteron.cli.destination import Destination
 from pteron.cli.motion_argument import Carried, cycle_of
 from pteron.cli.motion_table import force_word
 from pteron.cli.progress import spinner
-from pteron.cli.result import Result
+from pteron.cli.result import CommandResult
 from pteron.cli.terminal import is_terminal, note, plain, show, table, warn, write
 from pteron.errors import DataError
 
@@ -47,7 +47,7 @@ def simulate(
     anyway: bool = False,
     out: str | None = None,
     elbows: str | None = None,
-) -> Result:
+) -> CommandResult:
     """Simulate a machine with its drives under a controller.
 
     The rigid bodies with the payload, the drives' friction and rotors move under what the

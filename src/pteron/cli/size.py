@@ -16,15 +16,16 @@ from pteron.cli.motion_table import force_word
 from pteron.cli.motor_tables import common_rows, common_table, fits_frame, motors_table
 from pteron.cli.pose_ranges import box_of, pose_spans
 from pteron.cli.progress import spinner
-from pteron.cli.result import Result
+from pteron.cli.result import CommandResult
 from pteron.cli.terminal import plain, show, table, warn
 from pteron.errors import UnlikelyValue
+from pteron.tolerances import ROUNDING
 
 if TYPE_CHECKING:
     import rich.table
 
     from pteron.manipulator import Manipulator
-    from pteron.motion import CommonFit, Fit, Motion, Sizing
+    from pteron.motion import CommonFit, Motion, MotorFit, Sizing
     from pteron.workspace import Box
 
 _OVERLOADED = 1
@@ -32,9 +33,6 @@ _OVERLOADED = 1
 
 _NAMED = {"peak_force": "peak {}", "rms_force": "RMS {}", "peak_speed": "speed"}
 """Quantities whose worst places are told."""
-
-_ROUNDING = 1e-9
-"""Share of a margin by which it may be missed."""
 
 
 def size(
@@ -49,7 +47,7 @@ def size(
     motors: str | None = None,
     margin: float = 1.0,
     out: str | None = None,
-) -> Result:
+) -> CommandResult:
     """Size the motors: peak and RMS force, speed, power and energy of each drive over a cycle.
 
     The standard cycle is done at all places of the workspace and at all turns about the vertical,
@@ -154,14 +152,14 @@ def _weak(sizing: Sizing, margin: float) -> list[str]:
     beyond = [
         f"leg {drive.leg}: not enough: {drive.limit} allow {drive.most:.4g} {drive.unit}, "
         f"{drive.margin:.3g} times the {drive.needed:.4g} {drive.unit} that the cycle takes"
-        f"{sizing.where(drive)}, and a margin of {margin:g} is asked for"
+        f"{sizing.place_text(drive)}, and a margin of {margin:g} is asked for"
         for drive in sizing.margins
-        if 1.0 <= drive.margin < margin * (1.0 - _ROUNDING)
+        if 1.0 <= drive.margin < margin * (1.0 - ROUNDING)
     ]
     return [*sizing.overloads, *beyond]
 
 
-def _unserved_legs(sizing: Sizing, fits: tuple[Fit, ...], margin: float) -> list[str]:
+def _unserved_legs(sizing: Sizing, fits: tuple[MotorFit, ...], margin: float) -> list[str]:
     """Return the joints for which no motor of the list is enough, and what the best one lacks."""
     lines = []
     for leg in range(1, sizing.robot.joint_count + 1):
@@ -176,7 +174,7 @@ def _unserved_legs(sizing: Sizing, fits: tuple[Fit, ...], margin: float) -> list
     return lines
 
 
-def _data(sizing: Sizing, fits: tuple[Fit, ...], request: _Asked) -> dict[str, Any]:
+def _data(sizing: Sizing, fits: tuple[MotorFit, ...], request: _Asked) -> dict[str, Any]:
     total = sizing.power.sum(axis=-1)
     return {
         "robot": sizing.robot.name,
@@ -196,7 +194,7 @@ def _data(sizing: Sizing, fits: tuple[Fit, ...], request: _Asked) -> dict[str, A
         "places": len(sizing.places) or 1,
         "worst": _worst(sizing),
         "assumed_friction": sizing.assumed_friction.tolist(),
-        "margins": [limit._asdict() | {"margin": limit.margin} for limit in sizing.margins],
+        "margins": [limit.as_dict() | {"margin": limit.margin} for limit in sizing.margins],
         "overloads": list(sizing.overloads),
         "motors": fits_frame(sizing.robot, fits).to_dicts() if fits else [],
     }
@@ -212,19 +210,19 @@ def _worst(sizing: Sizing) -> list[dict[str, Any]]:
     return rows
 
 
-def _further_files(sizing: Sizing, fits: tuple[Fit, ...]) -> dict[str, str]:
+def _further_files(sizing: Sizing, fits: tuple[MotorFit, ...]) -> dict[str, str]:
     """Return the further files of a folder."""
     from pteron.plots import svg_file
     from pteron.report.drive_figures import force_speed, power
 
     if sizing.places:
-        sizing = sizing.at(int(sizing.power.sum(axis=-1).max(axis=0).argmax()))
+        sizing = sizing.select_place(int(sizing.power.sum(axis=-1).max(axis=0).argmax()))
     texts = {"power.svg": svg_file(power(sizing)), "force-speed.svg": svg_file(force_speed(sizing))}
     return texts | ({"motors.csv": fits_frame(sizing.robot, fits).write_csv()} if fits else {})
 
 
 def _show(
-    sizing: Sizing, fits: tuple[Fit, ...], common: tuple[CommonFit, ...], request: _Asked
+    sizing: Sizing, fits: tuple[MotorFit, ...], common: tuple[CommonFit, ...], request: _Asked
 ) -> None:
     """Print for a person: loads, power, motors, and the choice."""
     dwell = f", {sizing.dwell:g} s of it at rest" if sizing.dwell else ""
@@ -268,16 +266,17 @@ def _energy(sizing: Sizing) -> list[str]:
     return lines
 
 
-def _verdict(sizing: Sizing, fits: tuple[Fit, ...], margin: float) -> list[str]:
+def _verdict(sizing: Sizing, fits: tuple[MotorFit, ...], margin: float) -> list[str]:
     """Return whether drives and motors are enough, and the margin that exists."""
     lines = []
     if sizing.margins:
         least = min(sizing.margins, key=lambda limit: limit.margin)
-        enough = "Enough" if least.margin >= margin * (1.0 - _ROUNDING) else "Not enough"
+        enough = "Enough" if least.margin >= margin * (1.0 - ROUNDING) else "Not enough"
         lines.append(
             f"{enough}: the drives in the file have a margin of {least.margin:.3g}, {margin:g} "
             f"asked; least is leg {least.leg}'s: {least.limit} allow {least.most:.4g} "
-            f"{least.unit}, the cycle takes {least.needed:.4g} {least.unit}{sizing.where(least)}"
+            f"{least.unit}, the cycle takes {least.needed:.4g} {least.unit}"
+            f"{sizing.place_text(least)}"
         )
     best = [next(f for f in fits if f.leg == leg) for leg in sorted({fit.leg for fit in fits})]
     if best:

@@ -8,10 +8,11 @@ theirs themselves.
 from __future__ import annotations
 
 import json
+import os
 import sys
 from collections.abc import Iterable
 from io import TextIOWrapper
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TextIO
 
 from typer import echo
 
@@ -33,8 +34,22 @@ GRADE_COLORS = {"trustworthy": "green", "usable with care": "yellow", "not trust
 
 
 def is_terminal() -> bool:
-    """Say whether a person reads standard output."""
-    return sys.stdout.isatty()
+    """Return whether a person reads standard output; TTY_COMPATIBLE, 1 or 0, decides (Rich)."""
+    return _is_watched(sys.stdout, "TTY_COMPATIBLE")
+
+
+def is_interactive() -> bool:
+    """Return whether a person watches standard error; TTY_INTERACTIVE, 1 or 0, decides.
+
+    Rich takes FORCE_COLOR for a person too, which Jupyter and build servers set: colours are meant,
+    not pictures that move.
+    """
+    return _is_watched(sys.stderr, "TTY_INTERACTIVE")
+
+
+def _is_watched(stream: TextIO, variable: str) -> bool:
+    decision = {"0": False, "1": True}.get(os.environ.get(variable, ""))
+    return stream.isatty() if decision is None else decision
 
 
 def plain(text: str) -> str:

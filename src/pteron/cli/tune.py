@@ -9,7 +9,7 @@ from pteron.cli.arguments import STANDARD, MachineArgument, check_rate, parsed_l
 from pteron.cli.destination import Destination
 from pteron.cli.motion_argument import Carried, cycle_of
 from pteron.cli.progress import spinner
-from pteron.cli.result import Result
+from pteron.cli.result import CommandResult
 from pteron.cli.simulate import Name, controller_of
 from pteron.cli.terminal import plain, show, table
 
@@ -48,7 +48,7 @@ def tune(
     delay: float = 0.0,
     encoders: str = _ENCODERS,
     out: str | None = None,
-) -> Result:
+) -> CommandResult:
     """Choose gains of a controller with stability margins that hold in a cycle and the workspace.
 
     The loop of machine, drives, encoders, controller and delay is linearised at moments of the

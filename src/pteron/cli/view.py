@@ -65,7 +65,7 @@ def view(
         machine, carried = carried.load_machine(machine), Carried()
     with spinner(f"Preparing {machine.name}"):
         from pteron.viewer import view as opened
-        from pteron.viewer.guard import is_here
+        from pteron.viewer.guard import is_local_address
 
         shown: Any = {
             "motion": motion,
@@ -79,7 +79,7 @@ def view(
     with viewer, suppress(KeyboardInterrupt):
         if port not in (0, viewer.port):
             note(f"Note: port {port} is in use; the page is at {viewer.port}")
-        if not is_here(host):
+        if not is_local_address(host):
             note(
                 f"Warning: --host {host}: anyone who can reach this machine over the network can "
                 "see the page, move the picture and load files into it, without a password"

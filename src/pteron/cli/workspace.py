@@ -14,7 +14,7 @@ from pteron.cli.certify import RequestedProofs
 from pteron.cli.map_summary import map_data, map_rows, show_map
 from pteron.cli.pose_ranges import pose_ranges, pose_text
 from pteron.cli.progress import progress_bar, spinner
-from pteron.cli.result import Result
+from pteron.cli.result import CommandResult
 from pteron.cli.terminal import file_lines, is_terminal, note, show, warn, write
 from pteron.errors import DataError, ModelError, OutputError
 
@@ -63,7 +63,7 @@ def workspace(
     tolerance: float | None = None,
     type_i: float | None = None,
     type_ii: float | None = None,
-) -> Result:
+) -> CommandResult:
     """Map the workspace: where the machine reaches, what ends it, and how good it is there.
 
     An index of performance is mapped over the poses of a grid; with none, the distance to the end
@@ -145,7 +145,7 @@ def workspace(
     if out is not None and ending in (*_PICTURES, *_FILMS):
         _draw(index_map, out, ending)
     data = map_data(index_map, volume, [*warnings, *outside], out)
-    return Result(data, partial(_show, index_map, volume, data, out))
+    return CommandResult(data, partial(_show, index_map, volume, data, out))
 
 
 def _show(
@@ -266,12 +266,13 @@ def _unreachable_slice_warnings(grid: Grid, volume: ReachVolume | None) -> list[
     if volume is None:
         return []
     lengths = [name for name in grid.coordinates if coordinate(name).unit == "m"]
+    fixed = grid.fixed_coordinates
     spans = zip(lengths, *volume.box.tolist(), strict=True)
     return [
-        f"nothing is in reach at {pose_text(name, grid.held[name])}: {name} goes from {low:.4g} to "
+        f"nothing is in reach at {pose_text(name, fixed[name])}: {name} goes from {low:.4g} to "
         f"{high:.4g} m at this orientation"
         for name, low, high in spans
-        if name in grid.held and not low <= grid.held[name] <= high
+        if name in fixed and not low <= fixed[name] <= high
     ]
 
 

@@ -18,17 +18,21 @@ import casadi as ca
 
 from pteron.bodies.motion import Expression
 from pteron.closures.determinants import determinant, solve, solve_transposed
-from pteron.legs.leg import LegEquations, LegMotion, Plane, Turned
+from pteron.errors import ModelError
+from pteron.legs.leg import AngleLocus, LegEquations, LegMotion, PlaneLocus
 from pteron.platforms.motion import PlatformEquations, PlatformMotion
-
-_COINCIDENT = 1e-9
-"""Tolerance, relative to the platform points' distances from P, of coincident points."""
+from pteron.tolerances import ROUNDING
 
 
 class Closure(ABC):
     """The closure of one machine, for one state, from its legs and platform."""
 
     def __init__(self, legs: Sequence[LegEquations], platform: PlatformEquations) -> None:
+        if len(legs) != len(platform.coordinates):
+            raise ModelError(
+                f"legs: {len(legs)} given, {len(platform.coordinates)} expected, one for each "
+                f"coordinate of the platform: {', '.join(platform.coordinates)}"
+            )
         self.legs, self.platform = legs, platform
 
     @classmethod
@@ -97,8 +101,8 @@ class Closure(ABC):
         lengths = self.platform.directions.shape[1]
         loci = [leg.locus(ca.SX(0)) for leg in self.legs]
         if sizes is None:
-            sizes = [ca.norm_2(x.normal) if isinstance(x, Plane) else ca.SX(1) for x in loci]
-        forces = sum(not isinstance(locus, Turned) for locus in loci)
+            sizes = [ca.norm_2(x.normal) if isinstance(x, PlaneLocus) else ca.SX(1) for x in loci]
+        forces = sum(not isinstance(locus, AngleLocus) for locus in loci)
         bound = (forces / lengths) ** (lengths / 2)
         if forces == len(self.legs) and self.platform.angles():
             if self._points_are_collinear:  # no force has a moment
@@ -135,7 +139,7 @@ class Closure(ABC):
         size = sum(ca.norm_2(offset.a) for offset in self.platform.offsets)
         if not size.is_constant():
             return False
-        return bool(float(self._moment_bound) <= _COINCIDENT * float(size))
+        return bool(float(self._moment_bound) <= ROUNDING * float(size))
 
     keeps_modes: bool = False
     """Whether each column of `poses` belongs to one assembly mode for all joint coordinates."""

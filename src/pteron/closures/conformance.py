@@ -32,6 +32,11 @@ def faults(
     seed : int
         Seed of the random forces and rates that are tried.
 
+    Raises
+    ------
+    ModelError
+        If there are not as many legs as coordinates.
+
     Examples
     --------
     >>> import pteron

@@ -17,7 +17,7 @@ import numpy as np
 from pteron.bodies.motion import Expression
 from pteron.closures.closure import Closure, nan_below_zero
 from pteron.closures.determinants import adjugate, determinant
-from pteron.legs.leg import LegEquations, LegMotion, Plane
+from pteron.legs.leg import LegEquations, LegMotion, PlaneLocus
 from pteron.platforms.motion import PlatformEquations, PlatformMotion
 from pteron.platforms.translating import Translating
 from pteron.platforms.turning import Turning
@@ -42,10 +42,10 @@ class ConstantRows(Closure):
 
     def __init__(self, legs: Sequence[LegEquations], platform: PlatformEquations) -> None:
         super().__init__(legs, platform)
-        self.turns = bool(platform.angles())
+        self._has_angle = bool(platform.angles())
         bars: list[Expression] = [leg.constant_row for leg in legs]
         self.rows = ca.horzcat(*bars).T  # D
-        if not self.turns:
+        if not self._has_angle:
             self.right_inverse = adjugate(self.rows).T / determinant(self.rows)  # P
             return
         normal = ca.mtimes(self.rows.T, self.rows)
@@ -80,7 +80,7 @@ class ConstantRows(Closure):
 
     @property
     def modes(self) -> int:
-        return 2 if self.turns else 1
+        return 2 if self._has_angle else 1
 
     def measure_of(
         self,
@@ -94,7 +94,7 @@ class ConstantRows(Closure):
         """
         if self.rows.is_constant() and self.vanishes():
             return ca.SX(0)
-        return (-1 if self.turns else 1) * super().measure_of(platform, rows, sizes)
+        return (-1 if self._has_angle else 1) * super().measure_of(platform, rows, sizes)
 
     def forces(
         self, wrench: Expression, platform: PlatformMotion, legs: Sequence[LegMotion]
@@ -135,8 +135,8 @@ class ConstantRows(Closure):
             self.legs, self.platform.offsets, ca.vertsplit(joints), strict=True
         ):
             locus = leg.locus(q)
-            assert isinstance(locus, Plane)
-            constant = offset.constant if self.turns else offset.constant + offset.a
+            assert isinstance(locus, PlaneLocus)
+            constant = offset.constant if self._has_angle else offset.constant + offset.a
             constants.append(locus.offset - ca.dot(locus.normal, constant))
             sizes.append(locus.size)
         right = ca.vertcat(*constants)

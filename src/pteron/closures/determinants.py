@@ -1,4 +1,8 @@
-"""Determinants, adjugates and solutions of CasADi systems, 2 to 4 or 6 in size, without pivots."""
+"""Determinants, adjugates and solutions of CasADi systems of n rows and m <= n columns, no pivots.
+
+Square systems are solved by minors of half their rows, by Laplace's expansion; others, and large
+ones with one right side, by Householder reflections, in the sense of least squares or least norm.
+"""
 
 from __future__ import annotations
 
@@ -12,51 +16,61 @@ import casadi as ca
 
 from pteron.bodies.motion import Expression
 
+_Minors = dict[tuple[int, ...], Expression]
+"""The minors of some rows, by their columns."""
+
 
 def determinant(m: Expression) -> Expression:
-    """Return the determinant of a matrix (2, 2) to (4, 4), or (6, 6)."""
-    if m.shape[0] == 6:
-        upper, lower = (_triples(ca.horzsplit(half)) for half in (m[:3, :], m[3:, :]))
-        return sum(
-            _sign((*three, *_complement(three))) * volume * lower[_complement(three)]
-            for three, volume in upper.items()
-        )
+    """Return the determinant of a square matrix; of one with more rows the root of det(m^T m)."""
+    n, columns = m.shape
+    if n > columns:  # Cauchy and Binet; accurate near 0, too
+        return ca.norm_2(ca.vertcat(*_minors(m.T).values()))
+    if n > 4:
+        half = n // 2
+        return _expanded(_minors(m[:half, :]), _minors(m[half:, :]), range(n))
     return ca.mtimes(m[0, :], adjugate(m)[:, 0])
 
 
 def solve(m: Expression, right: Expression) -> tuple[Expression, Expression]:
-    """Return x (n, K) and d = det m with m x = d right."""
+    """Return x (m, K) and d with A x = d right, d = det A, for A (n, m).
+
+    With n > m x is the solution of least squares, and d = 1.
+    """
+    if m.shape[0] > m.shape[1]:
+        return _LQFactors.factorise(m).solve(right), ca.SX(1)
     adj = adjugate(m)
     return ca.mtimes(adj, right), ca.mtimes(m[0, :], adj[:, 0])
 
 
 def adjugate(m: Expression) -> Expression:
-    """Return the adjugate, det(m) m^-1, of a matrix (2, 2) to (4, 4), or (6, 6)."""
-    if m.shape[0] == 6:
-        return _adjugate_of_six(m)
-    if m.shape[0] == 2:
+    """Return the adjugate, det(m) m^-1, of a square matrix."""
+    n = m.shape[0]
+    if n == 2:
         return ca.vertcat(ca.horzcat(m[1, 1], -m[0, 1]), ca.horzcat(-m[1, 0], m[0, 0]))
-    if m.shape[0] == 3:
+    if n == 3:
         a, b, c = m[0, :].T, m[1, :].T, m[2, :].T
         return ca.horzcat(ca.cross(b, c), ca.cross(c, a), ca.cross(a, b))
-    # Laplace: the minors of the upper and of the lower pair of rows serve all cofactors.
-    upper, lower = _minors(m[:2, :]), _minors(m[2:, :])
-    columns = [_cofactors(m, i, lower if i < 2 else upper) for i in range(4)]
-    return ca.horzcat(*columns)
+    # Laplace: the minors of the upper and of the lower half of the rows serve all cofactors.
+    halves = range(n // 2), range(n // 2, n)
+    minors = [_minors(m[half, :]) for half in halves]
+    return ca.horzcat(
+        *(_cofactors(m, row, half, minors[1 - k]) for k, half in enumerate(halves) for row in half)
+    )
 
 
 def solve_transposed(rows: Expression, right: Expression) -> tuple[Expression, Expression]:
-    """Return x (n, K) and d with A^T x = d w, from the rows of A (n, n), n = 2 to 4 or 6.
+    """Return x (n, K) and d with A^T x = d w, from the rows of A (n, m); of least norm for n > m.
 
-    d is det A, or 1 where the solution needs no determinant; x is not finite where det A is 0.
+    d is det A, or 1 where the solution needs no determinant; x is not finite where A has rank < m.
     """
-    if rows.shape[0] == 6 and right.shape[1] == 1:
-        return _solve_six_transposed(rows, right), ca.SX(1)
-    if right.shape[1] > 1 or rows.shape[0] == 2:
+    n, columns = rows.shape
+    if n > columns or (n > 4 and right.shape[1] == 1):
+        return _LQFactors.factorise(rows).solve_transposed(right), ca.SX(1)
+    if right.shape[1] > 1 or n == 2:
         adj = adjugate(rows)
         return ca.mtimes(adj.T, right), ca.mtimes(rows[0, :], adj[:, 0])
     # Cramer's rule, with each minor computed once.
-    if rows.shape[0] == 3:
+    if n == 3:
         a, b, c = (row.T for row in ca.vertsplit(rows))
         minor, turned = ca.cross(b, c), ca.cross(a, right)
         parts = ca.dot(minor, right), ca.dot(c, turned), -ca.dot(b, turned)
@@ -74,89 +88,71 @@ def solve_transposed(rows: Expression, right: Expression) -> tuple[Expression, E
     return ca.vertcat(*swapped), volume(0, 1, 2, 3)
 
 
-def _minors(rows: Expression) -> dict[tuple[int, int], Expression]:
-    """Return the minors of two rows, by their columns."""
-    return {
-        (i, j): rows[0, i] * rows[1, j] - rows[0, j] * rows[1, i]
-        for i, j in combinations(range(rows.shape[1]), 2)
-    }
+def determinant_square(rows: Expression) -> Expression:
+    """Return det(A^T A) of the rows of A, at no cost beside `solve_transposed` by reflections."""
+    return reduce(mul, _LQFactors.factorise(rows).squares)
 
 
-def _cofactors(m: Expression, row: int, minors: dict[tuple[int, int], Expression]) -> Expression:
-    """Return the cofactors of a row (4, 1), from the minors of the pair of rows it is not in."""
-    other = m[row ^ 1, :]
+def _minors(rows: Expression) -> _Minors:
+    """Return the minors of all rows: row by row, each from those of the rows above it."""
+    minors: _Minors = {(i,): entry for i, entry in enumerate(ca.horzsplit(rows[0, :]))}
+    for row in ca.vertsplit(rows)[1:]:
+        last: _Minors = {(i,): entry for i, entry in enumerate(ca.horzsplit(row))}
+        size = len(next(iter(minors))) + 1
+        subsets = combinations(range(rows.shape[1]), size)
+        minors = {columns: _expanded(minors, last, columns) for columns in subsets}
+    return minors
+
+
+def _expanded(upper: _Minors, lower: _Minors, columns: Sequence[int]) -> Expression:
+    """Return a determinant of columns by Laplace's expansion in the minors of its rows' halves."""
+    total = ca.SX(0)
+    for subset in combinations(columns, len(next(iter(upper)))):
+        complement = tuple(column for column in columns if column not in subset)
+        inversions = sum(a > b for a in subset for b in complement)
+        total += (-1) ** inversions * (upper[subset] * lower[complement])
+    return total
+
+
+def _cofactors(m: Expression, row: int, half: Sequence[int], minors: _Minors) -> Expression:
+    """Return the cofactors of a row (n, 1), from the minors of the half of rows it is not in."""
+    n, others = m.shape[0], [k for k in half if k != row]
+    own = _minors(m[others, :])
+    # The other rows of its half go first.
+    swaps = half[0] * len(others)
     cofactors = []
-    for column in range(4):
-        i, j, k = (c for c in range(4) if c != column)
-        minor = other[i] * minors[j, k] - other[j] * minors[i, k] + other[k] * minors[i, j]
-        cofactors.append((-1) ** (row + column) * minor)
+    for column in range(n):
+        columns = [k for k in range(n) if k != column]
+        cofactors.append((-1) ** (row + column + swaps) * _expanded(own, minors, columns))
     return ca.vertcat(*cofactors)
 
 
-# Six rows: Laplace's expansion by three rows and three, whose minors are triple products.
-
-_Three = tuple[int, ...]
-
-
-def _triples(columns: Sequence[Expression]) -> dict[_Three, Expression]:
-    crosses = _crosses(columns)
-    return {
-        (i, j, k): ca.dot(crosses[i, j], columns[k])
-        for i, j, k in combinations(range(len(columns)), 3)
-    }
-
-
-def _crosses(columns: Sequence[Expression]) -> dict[tuple[int, int], Expression]:
-    pairs = combinations(range(len(columns)), 2)
-    return {(i, j): ca.cross(columns[i], columns[j]) for i, j in pairs}
-
-
-def _complement(three: _Three) -> _Three:
-    return tuple(i for i in range(6) if i not in three)
-
-
-def _sign(order: Sequence[int]) -> int:
-    return -1 if sum(a > b for a, b in combinations(order, 2)) % 2 else 1
-
-
-def _adjugate_of_six(m: Expression) -> Expression:
-    """Return the adjugate: row c is the gradient of det m by column c."""
-    halves = [ca.horzsplit(half) for half in (m[:3, :], m[3:, :])]
-    crosses, triples = [_crosses(half) for half in halves], [_triples(half) for half in halves]
-    rows = []
-    for c in range(6):
-        slopes = [ca.SX(3, 1), ca.SX(3, 1)]
-        for i, j in combinations([k for k in range(6) if k != c], 2):
-            complement = _complement((i, j, c))
-            for half, order in enumerate([(i, j, c, *complement), (*complement, i, j, c)]):
-                slopes[half] += _sign(order) * crosses[half][i, j] * triples[1 - half][complement]
-        rows.append(ca.vertcat(*slopes).T)
-    return ca.vertcat(*rows)
-
-
 class _LQFactors(NamedTuple):
-    """The LQ factors of A^T for six rows, Q being a product of Householder reflections.
+    """The LQ factors of A^T (m, n), Q being a product of Householder reflections.
 
     L is lower triangular. A reflection takes x to x - v (v.x) 2/(v.v); row by row it makes zeros
     right of L's diagonal, whose sign avoids cancellation in v.
     """
 
     lower: list[list[Expression]]
-    """L's rows."""
+    """L's rows (m, m)."""
     squares: list[Expression]
     """Squares of L's diagonal."""
     mirrors: list[tuple[Expression, Expression]]
-    """v and 2/(v.v), of each row but the last."""
+    """v (n, 1) and 2/(v.v), of each row, but of the last one of a square matrix."""
+    size: int
+    """n."""
 
     @classmethod
     def factorise(cls, rows: Expression) -> _LQFactors:
-        """Return the factors for the rows of A."""
-        lower, squares, mirrors = factors = cls([], [], [])
+        """Return the factors for the rows of A (n, m)."""
+        n = rows.shape[0]
+        lower, squares, mirrors, _ = factors = cls([], [], [], n)
         for k, row in enumerate(ca.horzsplit(rows)):
             for mirror in mirrors:
                 row = _reflect(row, mirror)
             first, square = row[k], ca.dot(row[k:], row[k:])
-            if k < 5:
+            if k < n - 1:
                 size = ca.sqrt(square) * (ca.if_else(first > 0, 2, 0) - 1)
                 v = ca.vertcat(ca.SX(k, 1), first + size, row[k + 1 :])
                 mirrors.append((v, 1 / (square + size * first)))
@@ -165,23 +161,26 @@ class _LQFactors(NamedTuple):
             squares.append(square)
         return factors
 
+    def solve_transposed(self, right: Expression) -> Expression:
+        """Return x (n, K) of least norm with A^T x = right: L Q x = right."""
+        components: list[Expression] = []
+        for row, residual in zip(self.lower, ca.vertsplit(right), strict=True):
+            for component, coefficient in zip(components, row, strict=False):
+                residual = residual - component * coefficient
+            components.append(residual / row[-1])
+        zeros = ca.SX(self.size - len(components), right.shape[1])
+        return reduce(_reflect, reversed(self.mirrors), ca.vertcat(*components, zeros))
+
+    def solve(self, right: Expression) -> Expression:
+        """Return x (m, K) of least squares with A x = right (n, K): L^T x = Q right."""
+        rotated = ca.vertsplit(reduce(_reflect, self.mirrors, right))
+        components: dict[int, Expression] = {}
+        for k in reversed(range(len(self.lower))):
+            sums = sum(self.lower[i][k] * component for i, component in components.items())
+            components[k] = (rotated[k] - sums) / self.lower[k][k]
+        return ca.vertcat(*(components[k] for k in range(len(self.lower))))
+
 
 def _reflect(x: Expression, mirror: tuple[Expression, Expression]) -> Expression:
     v, factor = mirror
-    return x - v * (ca.dot(v, x) * factor)
-
-
-def determinant_square(rows: Expression) -> Expression:
-    """Return the square of the determinant of six rows, at no cost beside `solve_transposed`."""
-    return reduce(mul, _LQFactors.factorise(rows).squares)
-
-
-def _solve_six_transposed(rows: Expression, right: Expression) -> Expression:
-    """Return x with A^T x = w: L Q x = w."""
-    lower, _, mirrors = _LQFactors.factorise(rows)
-    components: list[Expression] = []
-    for row, residual in zip(lower, ca.vertsplit(right), strict=True):
-        for component, coefficient in zip(components, row, strict=False):
-            residual = residual - component * coefficient
-        components.append(residual / row[-1])
-    return reduce(_reflect, reversed(mirrors), ca.vertcat(*components))
+    return x - ca.mtimes(v, ca.mtimes(v.T, x) * factor)

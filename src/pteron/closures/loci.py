@@ -10,7 +10,7 @@ from pteron.bodies.motion import Expression
 from pteron.closures.closure import nan_below_zero
 from pteron.closures.determinants import adjugate
 from pteron.legs.circles import quarter_turn
-from pteron.legs.leg import Locus, Plane, Sphere, Turned
+from pteron.legs.leg import AngleLocus, Locus, PlaneLocus, SphereLocus
 from pteron.platforms.motion import PlatformEquations
 
 _ROUNDING = 1e-14
@@ -19,8 +19,8 @@ _ROUNDING = 1e-14
 
 def shift_locus(locus: Locus, offset: Expression) -> Locus:
     """Return the locus of the platform's point P from that of P + offset."""
-    assert not isinstance(locus, Turned)
-    if isinstance(locus, Plane):
+    assert not isinstance(locus, AngleLocus)
+    if isinstance(locus, PlaneLocus):
         return locus._replace(offset=locus.offset - ca.dot(locus.normal, offset))
     return locus._replace(center=locus.center - offset)
 
@@ -39,8 +39,8 @@ def meeting_points(
 
 
 def _meeting_in_space(loci: Sequence[Locus]) -> tuple[Expression, Expression]:
-    spheres = [locus for locus in loci if isinstance(locus, Sphere)]
-    planes = [(locus.normal, locus.offset) for locus in loci if isinstance(locus, Plane)]
+    spheres = [locus for locus in loci if isinstance(locus, SphereLocus)]
+    planes = [(locus.normal, locus.offset) for locus in loci if isinstance(locus, PlaneLocus)]
     if not spheres:
         normals, offsets = (ca.horzcat(*parts) for parts in zip(*planes, strict=True))
         adj = adjugate(normals.T)
@@ -66,12 +66,12 @@ def _meeting_in_plane(
 ) -> tuple[Expression, Expression]:
     circles, lines = [], []
     for locus in loci:
-        assert not isinstance(locus, Turned)
-        if isinstance(locus, Plane):
+        assert not isinstance(locus, AngleLocus)
+        if isinstance(locus, PlaneLocus):
             lines.append((ca.mtimes(platform.directions.T, locus.normal), locus.offset))
             continue
         square = locus.radius * locus.radius
-        if isinstance(locus, Sphere):  # which the plane cuts in a circle
+        if isinstance(locus, SphereLocus):  # which the plane cuts in a circle
             square = square - ca.dot(platform.frame[2], locus.center) ** 2
         circles.append((ca.mtimes(platform.directions.T, locus.center), square))
     # A line n . (p - o) = h, o being the centre of the first circle.

@@ -27,7 +27,7 @@ class TiltingLoci(Closure):
 
     @classmethod
     def fits(cls, legs: Sequence[type[LegEquations]], platform: type[PlatformEquations]) -> bool:
-        return len(platform.angles()) > 1
+        return platform.tilts
 
     @property
     def modes(self) -> int:
@@ -55,7 +55,10 @@ class TiltingLoci(Closure):
         The moments' unit of length is the root of a third of the sum of squares of the points'
         distances from their mean, or from P. `stewart` reaches 0.84 of the bound.
         """
-        constraint_rows, size = self.platform.held_rows(platform), reduce(mul, sizes or [ca.SX(1)])
+        constraint_rows, size = (
+            self.platform.plane_wrenches(platform),
+            reduce(mul, sizes or [ca.SX(1)]),
+        )
         if constraint_rows is None:
             return determinant(rows_in_quasi_velocities(platform, rows)) / (self._bound(1) * size)
         pairs = zip(rows, platform.point_twists, strict=True)

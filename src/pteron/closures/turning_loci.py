@@ -18,7 +18,7 @@ from pteron.closures.closure import Closure
 from pteron.closures.determinants import adjugate
 from pteron.closures.loci import meeting_points, shift_locus
 from pteron.errors import ModelError
-from pteron.legs.leg import LegEquations, Plane, Turned
+from pteron.legs.leg import AngleLocus, LegEquations, PlaneLocus
 from pteron.platforms.motion import PlatformEquations
 
 
@@ -27,7 +27,7 @@ class TurningLoci(Closure):
 
     def __init__(self, legs: Sequence[LegEquations], platform: PlatformEquations) -> None:
         super().__init__(legs, platform)
-        fixes_angle = any(isinstance(leg.locus(ca.SX(0)), Turned) for leg in legs)
+        fixes_angle = any(isinstance(leg.locus(ca.SX(0)), AngleLocus) for leg in legs)
         curved = sum(not leg.row_is_constant for leg in legs) - fixes_angle
         self.closed_form = fixes_angle or not curved
         self._mode_count = 2 * len(legs)
@@ -40,7 +40,7 @@ class TurningLoci(Closure):
 
     @classmethod
     def fits(cls, legs: Sequence[type[LegEquations]], platform: type[PlatformEquations]) -> bool:
-        return len(platform.angles()) == 1
+        return platform.axis_angle is not None
 
     @property
     def modes(self) -> int:
@@ -51,7 +51,7 @@ class TurningLoci(Closure):
         loci = [leg.locus(q) for leg, q in zip(self.legs, ca.vertsplit(joints), strict=True)]
         offsets = self.platform.offsets
         for angle_locus in loci:
-            if isinstance(angle_locus, Turned):
+            if isinstance(angle_locus, AngleLocus):
                 c, s = ca.cos(angle_locus.angle), ca.sin(angle_locus.angle)
                 others = [
                     shift_locus(locus, constant + a * c + b * s)
@@ -64,7 +64,7 @@ class TurningLoci(Closure):
                 )
         rows, heights = [], []
         for locus, (a, _, constant) in zip(loci, offsets, strict=True):
-            if not isinstance(locus, Plane):
+            if not isinstance(locus, PlaneLocus):
                 raise ModelError(
                     "direct_kinematics: these legs have no closed form of it under a platform with "
                     'an angle; "direct_step" follows the pose from one that is near'

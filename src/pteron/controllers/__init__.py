@@ -16,7 +16,7 @@ from pteron.controllers.pd_gravity import PDGravity as PDGravity
 from pteron.public import publish as _publish
 
 CONTROLLERS: dict[str, Controller] = {
-    usual.what: usual
+    usual.law_name: usual
     for usual in (
         *(PDGravity(), FeedForwardPD(), ComputedTorque()),
         *(Adaptive(), Adaptive(friction=True)),

@@ -80,7 +80,7 @@ class Adaptive(Controller):
     positive: ClassVar[tuple[str, ...]] = ("bandwidth", "derivative", "adaptation", "uncertainty")
 
     @property
-    def what(self) -> str:
+    def law_name(self) -> str:
         """The name of its law."""
         return "adaptive_drives" if self.friction else "adaptive"
 

@@ -43,7 +43,7 @@ class ComputedTorque(Feedback):
     """
 
     @property
-    def what(self) -> str:
+    def law_name(self) -> str:
         """The name of the law."""
         return "computed_torque"
 

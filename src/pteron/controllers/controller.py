@@ -11,6 +11,7 @@ from pteron.controllers.law import Law
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.reduction import BaseParameters
+from pteron.renamed import adopt_former_methods, former_attribute
 
 
 @dataclass(frozen=True)
@@ -30,8 +31,13 @@ class Controller(ABC):
 
     @property
     @abstractmethod
-    def what(self) -> str:
+    def law_name(self) -> str:
         """The name of its law, among `pteron.kernels.FUNCTIONS`."""
+
+    what = former_attribute("what", "law_name")
+
+    def __init_subclass__(cls) -> None:
+        adopt_former_methods(cls, what="law_name")
 
     share: ClassVar[float] = 0.1
     """The default bandwidth, times the period: it allows for a delay of one sample, and for joints
@@ -92,4 +98,4 @@ class Controller(ABC):
             If there are not as many gains as joints.
         """
         model = as_manipulator(model)
-        return Law(self.what, model, self.gains(model), self.base(model))
+        return Law(self.law_name, model, self.gains(model), self.base(model))

@@ -100,7 +100,7 @@ class Custom:
         _ = self._program
 
     @property
-    def what(self) -> str:
+    def law_name(self) -> str:
         """The function's name."""
         return str(self.function.name())
 

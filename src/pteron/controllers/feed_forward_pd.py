@@ -40,6 +40,6 @@ class FeedForwardPD(Feedback):
     """
 
     @property
-    def what(self) -> str:
+    def law_name(self) -> str:
         """The name of its law."""
         return "feed_forward_pd"

@@ -67,7 +67,7 @@ class Feedback(Controller):
             poles = self.bandwidths(model), joint_array(model, "damping", self.damping)
             masses = 1.0 if self.of_accelerations else joint_masses(model)
             pair = [masses * gain for gain in pole_gains(*poles, self.period)]
-        period = [self.period] if "period" in GAINS[self.what] else []
+        period = [self.period] if "period" in GAINS[self.law_name] else []
         return np.concatenate([*pair, period])
 
 

@@ -8,10 +8,11 @@ from functools import lru_cache
 import numpy as np
 
 from pteron.dynamics import mass_matrix
+from pteron.dynamics.joint_space import joint_mobilities, mass_with_rotors
+from pteron.equations.drives import drives_of
 from pteron.errors import ModelError
 from pteron.kernels import Array
 from pteron.kinematics import jacobian, random_poses
-from pteron.legs import Drive
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 
 _POSES = 100
@@ -60,11 +61,8 @@ def joint_masses(robot: RobotLike) -> Array:
 def _joint_masses(robot: Manipulator) -> Array:
     poses = light_poses(robot)
     rows = jacobian(robot, poses)
-    rotors = np.diag([(leg.drive or Drive()).inertia for leg in robot.legs])
-    columns = np.swapaxes(rows, -1, -2)
-    masses = mass_matrix(robot, poses) + columns @ rotors @ rows
-    mobility = np.einsum("kij,kji->ki", rows, np.linalg.solve(masses, columns))
-    quantile: Array = np.quantile(1.0 / mobility, _SHARE, axis=0)
+    masses = mass_with_rotors(rows, mass_matrix(robot, poses), drives_of(robot).inertia)
+    quantile: Array = np.quantile(1.0 / joint_mobilities(rows, masses), _SHARE, axis=0)
     quantile.setflags(write=False)
     return quantile
 

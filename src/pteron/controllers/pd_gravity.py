@@ -43,6 +43,6 @@ class PDGravity(Feedback):
     share: ClassVar[float] = 0.2
 
     @property
-    def what(self) -> str:
+    def law_name(self) -> str:
         """The name of its law."""
         return "pd_gravity"

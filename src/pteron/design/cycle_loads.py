@@ -15,7 +15,7 @@ from pteron.kernels import Array
 from pteron.kinematics import joint_rates
 from pteron.legs import Drive
 from pteron.manipulator import Manipulator
-from pteron.motion import Fit, Motion, Motor, Sizing, limits_of
+from pteron.motion import Motion, Motor, MotorFit, Sizing, limits_of
 from pteron.motion.sizing.motor_choice import fit_at, serving_span
 
 _RATES = np.array([1.0, 2.0, 3.0])
@@ -77,27 +77,27 @@ def _first_root(square: Array, line: Array, constant: Array) -> Array:
     return np.where(np.isfinite(roots) & (roots > 0.0), roots, inf)
 
 
-def _best_fit(sizing: Sizing, leg: int, motor: Motor) -> Fit:
+def _best_fit(sizing: Sizing, leg: int, motor: Motor) -> MotorFit:
     """Return a motor at the ratio where its margin is greatest: from 1 on it serves.
 
     Each limit allows an interval of ratios, so that the least of their margins has one maximum.
     """
     span, fastest = serving_span(sizing, leg, motor, 1.0), float(sizing.peak_speeds[leg - 1])
 
-    def at(log_ratio: float) -> Fit:
+    def fit_at_log(log_ratio: float) -> MotorFit:
         return fit_at(sizing, leg, motor, span, float(np.exp(log_ratio)))
 
     middle = np.log(motor.max_speed / fastest if fastest else 1.0)
     optimum = scipy.optimize.minimize_scalar(
-        lambda log_ratio: -np.log(at(log_ratio).margin),
+        lambda log_ratio: -np.log(fit_at_log(log_ratio).margin),
         bounds=(middle - _DECADES * np.log(10.0), middle + np.log(10.0)),
         method="bounded",
         options={"xatol": 1e-6},
     )
-    return at(optimum.x)
+    return fit_at_log(optimum.x)
 
 
-def best_motors(sizing: Sizing, motors: Sequence[Motor], enough: float = inf) -> list[Fit]:
+def best_motors(sizing: Sizing, motors: Sequence[Motor], enough: float = inf) -> list[MotorFit]:
     """Return the smallest motor of a list with a sufficient margin, for each joint.
 
     Where no margin reaches `enough`, it is the motor with the greatest margin.

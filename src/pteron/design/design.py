@@ -1,4 +1,4 @@
-"""One design of a search: a machine with its quantities, such as workspace, margins and forces."""
+"""One design of a search: a machine with its workspace, margins, forces and other quantities."""
 
 from __future__ import annotations
 
@@ -9,10 +9,11 @@ from itertools import product
 
 import numpy as np
 
-from pteron.design.quantities import COVERS, quantities
-from pteron.design.region import placed_pose, workspace_poses, workspace_region
-from pteron.design.spec import ROUNDING, WorkspaceTable
+from pteron.design.quantities import COVERS
+from pteron.design.regions import placed_pose, workspace_poses, workspace_region
+from pteron.design.spec import ROUNDING
 from pteron.design.task import Task
+from pteron.design.workspace_tables import WorkspaceTable
 from pteron.design.worst_cases import worst_forces, worst_speeds
 from pteron.equations.machine import numbers
 from pteron.errors import PteronError
@@ -21,23 +22,24 @@ from pteron.kinematics.sampling import joint_limits, search_ball
 from pteron.manipulator import Manipulator, parameters
 from pteron.motion import Motion, Sizing, size
 from pteron.renamed import former_attribute
+from pteron.result import Result
 from pteron.workspace import Box, Region
 from pteron.workspace.fit import UNKNOWN, Fit, largest_fit
 from pteron.workspace.shape_samples import cube, shape_samples
 
 _STARTS = 8
-"""Worst sampled poses about which a worse one is sought."""
+"""Number of worst sample poses that local refinement starts from."""
 
 _ROUNDS = 4
-"""Halvings of the distance at which it is sought."""
+"""Halvings of the refinement's step."""
 
 _IN_CUBE = 5
 """Sample poses along each edge of the largest cube, where that stands for the workspace."""
 
 
-@dataclass(frozen=True)
-class Design:
-    """A machine of a search, and its quantities, each worked out when it is asked for.
+@dataclass(frozen=True, eq=False, repr=False)
+class Design(Result):
+    """A machine of a search, with quantities that are computed lazily.
 
     Attributes
     ----------
@@ -51,10 +53,21 @@ class Design:
         The least row of the conditions over the required workspace that a proof has shown.
     """
 
+    SHOWN = "robot quantities"
+
     task: Task
     robot: Manipulator
     known: Fit | None = None
     least: float = np.inf
+
+    def __repr__(self) -> str:
+        """Return the design in a line, without what it has yet to compute."""
+        return f"<Design of {self.task.robot.name!r}: {self.robot.name}>"
+
+    @property
+    def quantities(self) -> dict[str, float]:
+        """The quantities of its search, by name; NaN where it has none."""
+        return {name: self.quantity(name) for name in self.task.quantity_names}
 
     @cached_property
     def geometry(self) -> Array:
@@ -62,10 +75,10 @@ class Design:
         return np.array(numbers(self.robot))
 
     def values(self, what: str, poses: Array | None = None) -> Array:
-        """Return a function's first output at poses, those of `poses` if none are given."""
+        """Return a kernel's first output at poses; by default at `self.poses`."""
         function = self.task.function(what)
         numbers = {"geometry": self.geometry, "parameters": parameters(self.robot)}
-        fixed = {name: value for name, value in numbers.items() if name in function.fixed}
+        fixed = {name: part for name, part in numbers.items() if name in function.fixed}
         outputs = function(self.poses if poses is None else poses, **fixed)
         return np.asarray(outputs[0] if isinstance(outputs, tuple) else outputs)
 
@@ -77,7 +90,7 @@ class Design:
         return self.cube_without(np.empty((0, self.robot.freedom)))
 
     def cube_without(self, failing: Array) -> Fit:
-        """Return the same that holds none of the poses (F, m), which are known to fail."""
+        """Return the largest cube that excludes the poses (F, m), which are infeasible."""
         task, ball = self.task, search_ball(self.robot)
         shape, _ = task.shape
         return largest_fit(task.conditions, self.geometry, task.orientations, ball, failing, shape)
@@ -86,7 +99,7 @@ class Design:
     def workspace(self) -> WorkspaceTable | None:
         """The required workspace, where it is in this design."""
         table = self.task.spec.workspace
-        return table.placed(self.cube.center) if table is not None and table.floats else table
+        return table.with_center(self.cube.center) if table is not None and table.floats else table
 
     @cached_property
     def poses(self) -> Array:
@@ -95,7 +108,7 @@ class Design:
 
     @cached_property
     def fine_poses(self) -> Array:
-        """Poses of the same half as far apart, for what has many local extremes."""
+        """Poses at half the spacing, for quantities with many local extremes."""
         return self.lattice(2 * self._samples - 1)
 
     @property
@@ -116,15 +129,15 @@ class Design:
         return self.values("joint_coordinates")
 
     @cached_property
-    def carrying(self) -> Manipulator:
+    def loaded_robot(self) -> Manipulator:
         """The machine with the payload."""
         payload = self.task.spec.payload
-        return self.robot if payload is None else payload.on(self.robot)
+        return self.robot if payload is None else payload.add_to(self.robot)
 
     def forces(self, poses: Array) -> Array:
         """Return the greatest force of each drive (N, n) over all directions, N or N m."""
         motion = self.task.spec.motion
-        return worst_forces(self.carrying, poses, motion.speed, motion.acceleration)
+        return worst_forces(self.loaded_robot, poses, motion.speed, motion.acceleration)
 
     def speeds(self, poses: Array) -> Array:
         """Return the greatest speed of each joint (N, n) over all directions."""
@@ -146,14 +159,14 @@ class Design:
         one of them has none.
         """
         poses = self.fine_poses if fine else self.poses
-        values = sign * of(self, poses)
-        if np.isnan(values).any():
+        signed = sign * of(self, poses)
+        if np.isnan(signed).any():
             return np.nan
         lengths = len(self.robot.platform.lengths)
         offsets = np.zeros((3**lengths, self.robot.freedom))
         offsets[:, :lengths] = list(product((-1.0, 0.0, 1.0), repeat=lengths))
-        starts = np.argsort(values, kind="stable")[-_STARTS:]
-        worst, most = poses[starts], values[starts]
+        starts = np.argsort(signed, kind="stable")[-_STARTS:]
+        worst, most = poses[starts], signed[starts]
         regions = [self.region(pose) for pose in worst]
         low, high = np.stack([region.box for region in regions], axis=1)
         step = (high - low) / self._samples
@@ -186,7 +199,7 @@ class Design:
         )
 
     @cached_property
-    def sizing(self) -> Sizing:
+    def cycle_loads(self) -> Sizing:
         """The loads on the drives over the cycles, one after the other, with the payload.
 
         Where one may be anywhere they are taken at all its places and turns in the workspace.
@@ -194,7 +207,7 @@ class Design:
         cycles, pose = self.task.spec.cycles, self.task.orientations[0]
         anywhere = self.workspace is not None and any(cycle.anywhere for cycle in cycles)
         return size(
-            self.carrying,
+            self.loaded_robot,
             self.cycles,
             dwell=[cycle.dwell for cycle in cycles],
             places=workspace_region(self.workspace, pose) if anywhere and self.workspace else None,
@@ -220,7 +233,7 @@ class Design:
 
     @property
     def scale(self) -> float:
-        """The largest factor at which the floating workspace is found to fit."""
+        """Largest factor by which the floating workspace can be scaled."""
         return self.cube.edge / self.task.shape[1]
 
     @property
@@ -236,47 +249,52 @@ class Design:
         return min(self._sides[self.side], self.least)
 
     reserve = former_attribute("reserve", "margin")
+    carrying = former_attribute("carrying", "loaded_robot")
+    lack = former_attribute("lack", "missing_reason")
+    reached = former_attribute("reached", "is_reachable")
+    sizing = former_attribute("sizing", "cycle_loads")
+
     start_strokes = former_attribute("start_strokes", "reference_strokes")
 
     def quantity(self, name: str) -> float:
-        """Return one of its quantities; NaN where it has none, see `lack`."""
+        """Return one of its quantities; NaN where it has none, see `missing_reason`."""
         return self._quantities(name)[0]
 
-    def lack(self, name: str) -> str:
-        """Return why it has no such quantity; empty where it has it."""
+    def missing_reason(self, name: str) -> str:
+        """Return the reason why a quantity is undefined; empty where it is defined."""
         return self._quantities(name)[1]
 
     def cover(self, name: str) -> str:
-        """Return over what one of its quantities is known, in words."""
-        kind = quantities()[name].cover
+        """Return the poses or proofs behind a quantity, in words."""
+        kind = self.task.quantities[name].cover
         times, places = 0, str(len(self.fine_poses if kind == "fine" else self.poses))
         if kind == "cycles":
             times = sum(2 * len(motion.time) - 1 for motion in self.cycles)
-            several = () if name == "cycle_time" else self.sizing.places
+            several = () if name == "cycle_time" else self.cycle_loads.places
             places = f", at {len(several)} places and turns" if several else ""
         words = COVERS[kind].format(times=times, places=places)
         floor = dict(self.task.floors).get(name)
         return f"{words}; the proof is of at least {floor:.12g}" if floor else words
 
     @property
-    def reached(self) -> bool:
+    def is_reachable(self) -> bool:
         """Whether all poses of the workspace, or the cube, are in reach."""
         return bool(np.isfinite(self.joints).all())
 
     @cached_property
-    def _best_cube(self) -> dict[str, tuple[float, str]]:
+    def _known_quantities(self) -> dict[str, tuple[float, str]]:
         return {}
 
     def _quantities(self, name: str) -> tuple[float, str]:
-        if name not in self._best_cube:
-            self._best_cube[name] = self._evaluate_quantity(name)
-        return self._best_cube[name]
+        if name not in self._known_quantities:
+            self._known_quantities[name] = self._evaluate_quantity(name)
+        return self._known_quantities[name]
 
     def _evaluate_quantity(self, name: str) -> tuple[float, str]:
         """Return a quantity and, where there is none, why."""
-        quantity = quantities()[name]
+        quantity = self.task.quantities[name]
         if quantity.of_machine is not None:
-            return float(quantity.of_machine(self.robot)), ""
+            return self._evaluate_machine(quantity.of_machine)
         if name in ("cube", "scale"):
             return float(quantity.of(self)), ""
         nowhere = self.cube.edge <= 0.0 if self.task.seeks_place else False
@@ -294,6 +312,13 @@ class Design:
         where = f"{out} of {len(self.poses)} sampled poses are out of reach"
         return np.nan, where if out else "it has none at some sampled pose: a singularity"
 
+    def _evaluate_machine(self, of_machine: Callable[[Manipulator], float]) -> tuple[float, str]:
+        try:
+            amount = float(of_machine(self.robot))
+        except PteronError as error:
+            return np.nan, str(error)
+        return amount, "" if np.isfinite(amount) else f"its function gives {amount}"
+
     @cached_property
     def strokes(self) -> Array:
         """The travel of each joint (n,) over these poses, m or rad."""
@@ -301,7 +326,7 @@ class Design:
 
     @property
     def reference_strokes(self) -> Array:
-        """Travels (n,) over which `stroke` is a share: the limits' width, or those at the start."""
+        """Reference travels (n,) of `stroke`: the limits' width, or the start design's travel."""
         widths = np.ptp(joint_limits(self.task.robot), axis=0)
         endless = np.isinf(widths)
         return np.where(endless, _start(self.task).strokes, widths) if endless.any() else widths

@@ -11,16 +11,15 @@ from pteron.design.task import Task
 from pteron.manipulator import Manipulator
 from pteron.manipulator.manipulator import legs_text
 from pteron.renamed import former_attribute
-
-_NONE = 1e-9
-"""Smaller changes, in m or without unit, count as none."""
+from pteron.result import Result
+from pteron.tolerances import ROUNDING
 
 _SMALL = 1e-2
 """Length from which on a tenth of a millimetre is fine enough, m."""
 
 
-@dataclass(frozen=True)
-class Change:
+@dataclass(frozen=True, eq=False, repr=False)
+class Change(Result):
     """One number before and after.
 
     Attributes
@@ -41,31 +40,40 @@ class Change:
     @property
     def words(self) -> str:
         """The change as a clause: "upper length of legs 2 and 4 154.0 mm -> 246.0 mm (+59.7 %)"."""
-        return f"{self.what} {self.shown(self.before)} -> {self.shown(self.after)} ({self.by})"
+        what, start, end, change = self.cells
+        return f"{what} {start} -> {end} ({change})"
 
     @property
-    def by(self) -> str:
-        """By how much the size grows, in %; what is new or turns its sign, as a difference."""
+    def cells(self) -> tuple[str, str, str, str]:
+        """What changes, both values with their unit, and by how much it grows."""
+        start, end = self.format_value(self.before), self.format_value(self.after)
+        return self.what, start, end, self.relative_change
+
+    @property
+    def relative_change(self) -> str:
+        """Relative change in %; the difference where the value was zero or changes its sign."""
         if math.isnan(self.before) or math.isnan(self.after):
             return ""
-        if abs(self.before) > _NONE and self.before * self.after > 0.0:
+        if abs(self.before) > ROUNDING and self.before * self.after > 0.0:
             text = f"{100.0 * (self.after / self.before - 1.0):+.1f} %"
             return "none" if float(text[:-2]) == 0.0 else text
-        if abs(self.after - self.before) <= _NONE:
+        if abs(self.after - self.before) <= ROUNDING:
             return "none"
-        return (
-            f"{'+' if self.after > self.before else '-'}{self.shown(abs(self.after - self.before))}"
-        )
+        sign = "+" if self.after > self.before else "-"
+        return f"{sign}{self.format_value(abs(self.after - self.before))}"
 
-    told = former_attribute("told", "shown")
+    by = former_attribute("by", "relative_change")
+    shown = former_attribute("shown", "format_value")
 
-    def shown(self, value: float) -> str:
+    told = former_attribute("told", "format_value")
+
+    def format_value(self, number: float) -> str:
         """Return a value with its unit; lengths in millimetres."""
-        if math.isnan(value):
+        if math.isnan(number):
             return "none"
         if self.unit == "m":
-            return f"{1000.0 * value:{'.1f' if abs(value) >= _SMALL else '.3g'}} mm"
-        return f"{value:.4g} {self.unit}".rstrip()
+            return f"{1000.0 * number:{'.1f' if abs(number) >= _SMALL else '.3g'}} mm"
+        return f"{number:.4g} {self.unit}".rstrip()
 
 
 def geometry_changes(task: Task, robot: Manipulator) -> list[Change]:
@@ -74,7 +82,7 @@ def geometry_changes(task: Task, robot: Manipulator) -> list[Change]:
     for variable in task.variables:
         for place in variable.places:
             drawn, designed = place.read(task.robot), place.read(robot)
-            if abs(designed - drawn) > _NONE:
+            if abs(designed - drawn) > ROUNDING:
                 part = "" if place.part is None else f" {'xyz'[place.part]}"
                 what = f"{place.key.replace('_', ' ')}{part}"
                 unit = "m" if place.role in ("length", "point") else ""
@@ -92,7 +100,7 @@ def mass_changes(task: Task, robot: Manipulator) -> list[Change]:
     for i, (leg, other) in enumerate(zip(task.robot.legs, robot.legs, strict=True), start=1):
         for (letter, body), new in zip(leg.bodies.items(), other.bodies.values(), strict=True):
             drawn, designed = body.values[0], new.values[0]
-            if abs(designed - drawn) > _NONE:
+            if abs(designed - drawn) > ROUNDING:
                 legs_by_change.setdefault(
                     (leg.names[letter], drawn, round(designed, 9)), []
                 ).append(i)
@@ -103,11 +111,11 @@ def mass_changes(task: Task, robot: Manipulator) -> list[Change]:
 
 
 def quantity_changes(design: Design) -> list[Change]:
-    """Return the quantities that were asked for, of the machine to begin with and of a design."""
+    """Return the changes of objectives and required quantities from the start to a design."""
     task = design.task
     return [
         Change(name, start_design(task).quantity(name), design.quantity(name), task.unit(name))
-        for name in task.asked
+        for name in task.quantity_names
     ]
 
 

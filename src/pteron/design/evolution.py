@@ -1,4 +1,4 @@
-"""NSGA-II by pymoo, an optional extra: it proposes the generations of a search for designs."""
+"""Parts of searches: Latin hypercubes, Pareto fronts, and NSGA-II by pymoo, an optional extra."""
 
 from __future__ import annotations
 
@@ -15,11 +15,17 @@ def _pymoo(module: str) -> Any:
     return import_extra("design", f"pymoo.{module}", "a search needs pymoo")
 
 
-def non_dominated(costs: Array) -> NDArray[np.int_]:
-    """Return the numbers of the rows (N, M) of costs that no other row dominates, ascending."""
-    sorting = _pymoo("util.nds.non_dominated_sorting").NonDominatedSorting()
-    front_rows = sorting.do(costs, only_non_dominated_front=True)
-    return np.sort(np.asarray(front_rows, dtype=int))
+def pareto_front(costs: Array) -> NDArray[np.int_]:
+    """Return the indices of the distinct rows (N, M) that no other dominates, sorted by costs."""
+    rows, first = np.unique(costs, axis=0, return_index=True)
+    dominated = [((rows <= row).all(axis=1) & (rows < row).any(axis=1)).any() for row in rows]
+    return np.asarray(first[~np.array(dominated, dtype=bool)])
+
+
+def latin_hypercube(rng: np.random.Generator, count: int, size: int) -> Array:
+    """Return points (count, size) of the unit cube, one in each of `count` strata a coordinate."""
+    strata = rng.permuted(np.tile(np.arange(count)[:, None], size), axis=0)
+    return np.asarray((strata + rng.random(strata.shape)) / count)
 
 
 class Evolution:
@@ -50,7 +56,7 @@ class Evolution:
         return np.array(self._asked.get("X"), dtype=float)
 
     def tell(self, designs: Array, costs: Array, misses: Array) -> None:
-        """Take designs with their costs (N, M) and misses (N, C); the asked ones come first."""
+        """Take designs with costs (N, M) and violations (N, C); those of `ask` come first."""
         from pymoo.core.evaluator import Evaluator
         from pymoo.core.population import Population
         from pymoo.problems.static import StaticProblem

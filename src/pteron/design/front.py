@@ -10,26 +10,30 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pteron.design.design import Design
+from pteron.design.evolution import pareto_front
 from pteron.design.proofs import counterexamples
-from pteron.design.rows import FAILED, MISSES, places
+from pteron.design.rows import FAILED, MISSES, places, violations
 from pteron.design.task import Task
 from pteron.errors import ModelError
+from pteron.html_table import Overview, frame_overview
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
+from pteron.renamed import FormerTable, former_attribute
+from pteron.result import Result
 
 if TYPE_CHECKING:
     import polars as pl
 
 
-@dataclass(frozen=True, repr=False)
-class Front:
+@dataclass(frozen=True, eq=False, repr=False)
+class Front(Result):
     """The best designs that a search has found.
 
     Attributes
     ----------
     task : Task
         The task of the search.
-    table : polars.DataFrame
+    designs : polars.DataFrame
         A row for each design of the front: its variables, the quantities asked for, and misses of
         requirements, which are 0; the best of the first objective comes first.
     evaluated : int
@@ -39,54 +43,81 @@ class Front:
     """
 
     task: Task
-    table: pl.DataFrame
+    designs: pl.DataFrame
     evaluated: int
     kept: int
+
+    @property
+    def table(self) -> FormerTable:
+        """Called, it returns the designs with units in the headings of the columns."""
+        return FormerTable("Front", self.designs, self._headed_designs)
+
+    def _headed_designs(self) -> pl.DataFrame:
+        return self.designs.select(list(self.headings)).rename(self.headings)
+
+    def summary(self) -> str:
+        """Return the counts of designs, for people, in a line."""
+        return (
+            f"{self.task.robot.name}: {self.evaluated} designs evaluated, {self.kept} keep all "
+            f"that is asked, {len(self)} on the front"
+        )
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the front as plain data, SI units."""
+        return {
+            "evaluated": self.evaluated,
+            "kept": self.kept,
+            "objectives": [o.quantity for o in self.task.spec.objectives],
+            "front": self.designs.select(list(self.headings)).to_dicts(),
+        }
+
+    def _overview(self) -> Overview:
+        title, _, about = self.summary().partition(": ")
+        return frame_overview(title, about, self.table())
 
     def __repr__(self) -> str:
         """Return the front in a line."""
         return (
-            f"<Front of {self.task.robot.name!r}: {len(self.table)} designs of {self.evaluated} "
+            f"<Front of {self.task.robot.name!r}: {len(self.designs)} designs of {self.evaluated} "
             "evaluated>"
         )
 
     def __len__(self) -> int:
         """Return the number of its designs."""
-        return len(self.table)
+        return len(self.designs)
 
     @cached_property
     def values(self) -> Array:
         """The variables (K, V)."""
-        return np.asarray(self.table.select([v.name for v in self.task.variables]).to_numpy())
+        return self.task.points(self.designs)
 
     @cached_property
     def objectives(self) -> Array:
         """The objectives (K, M), in their units."""
         names = [o.quantity for o in self.task.spec.objectives]
-        return np.asarray(self.table.select(names).to_numpy())
+        return np.asarray(self.designs.select(names).to_numpy())
 
     def robot(self, index: int) -> Manipulator:
         """Return the machine of one of its designs."""
         return self.task.machine(self.values[index].tolist())
 
     @cached_property
-    def chosen(self) -> dict[str, int]:
+    def selection(self) -> dict[str, int]:
         """The designs of a report: the best in each objective, and the compromise.
 
         The compromise is nearest to the best of all objectives at once, each measured by its range
         over the front; of one objective there is none.
         """
-        signs = np.array([o.sign for o in self.task.spec.objectives])
-        costs = self.objectives * signs
-        best_designs = {
-            f"best-{o.quantity}": int(costs[:, k].argmin())
-            for k, o in enumerate(self.task.spec.objectives)
-        }
+        costs, objectives = self.task.costs(self.designs), self.task.spec.objectives
+        best = zip(objectives, costs.argmin(axis=0).tolist(), strict=True)
+        best_designs = {f"best-{objective.quantity}": at for objective, at in best}
         spans = np.ptp(costs, axis=0)
         shares = (costs - costs.min(axis=0)) / np.where(spans > 0.0, spans, 1.0)
-        if len(signs) > 1:
+        if len(objectives) > 1:
             best_designs["compromise"] = int(np.linalg.norm(shares, axis=1).argmin())
         return best_designs
+
+    chosen = former_attribute("chosen", "selection")
 
     @property
     def headings(self) -> dict[str, str]:
@@ -94,13 +125,13 @@ class Front:
         headings = {}
         for v in self.task.variables:
             headings[v.name] = f"{v.name} ({v.unit})" if v.unit else v.name
-        for name in self.task.asked:
+        for name in self.task.quantity_names:
             unit = self.task.unit(name)
             headings[name] = f"{name} ({unit})" if unit else name
         return headings | {name: f"{name} (m)" for name in places(self.task)}
 
 
-class Proofs:
+class ProvedRows:
     """The rows of designs that were proved, in place of those that a look at points gave.
 
     `prove` takes values of designs (N, V), and returns their rows, each as far as it is proved.
@@ -110,7 +141,7 @@ class Proofs:
         self._task, self._prove = task, prove
         self._rows: dict[bytes, tuple[Any, ...]] = {}
 
-    def applied(self, designs: pl.DataFrame) -> pl.DataFrame:
+    def replace_rows(self, designs: pl.DataFrame) -> pl.DataFrame:
         """Return a table of designs, with the rows of those that were proved."""
         keys = self._keys(designs)
         if self._rows.keys().isdisjoint(keys):
@@ -124,22 +155,21 @@ class Proofs:
         Where a proof takes something from one, the front is another, and that is proved.
         """
         while True:
-            front = front_of_parts(self._task, map(self.applied, parts()))
-            values = front.values.tolist()
-            keys = self._keys(front.table)
-            unproved = [v for v, key in zip(values, keys, strict=True) if key not in self._rows]
+            front = front_of_parts(self._task, map(self.replace_rows, parts()))
+            points = front.values.tolist()
+            keys = self._keys(front.designs)
+            unproved = [v for v, key in zip(points, keys, strict=True) if key not in self._rows]
             if not unproved:
                 return front
             proved = self._prove(unproved)
             self._rows |= zip(self._keys(proved), proved.rows(), strict=True)
 
     def _keys(self, designs: pl.DataFrame) -> list[bytes]:
-        values = designs.select([v.name for v in self._task.variables]).to_numpy()
-        return [np.ascontiguousarray(row).tobytes() for row in values]
+        return [np.ascontiguousarray(row).tobytes() for row in self._task.points(designs)]
 
 
 def front_of_parts(task: Task, parts: Iterable[pl.DataFrame]) -> Front:
-    """Return the front of designs that come in parts, of which only the front so far is held."""
+    """Return the front of designs that come in parts; only the current front stays in memory."""
     import polars as pl
 
     best: pl.DataFrame | None = None
@@ -150,7 +180,8 @@ def front_of_parts(task: Task, parts: Iterable[pl.DataFrame]) -> Front:
         good = part.filter(missed == 0.0)
         evaluated, feasible = evaluated + len(part), feasible + len(good)
         if len(good):
-            best = _foremost(task, good if best is None else pl.concat([best, good]))
+            both = good if best is None else pl.concat([best, good])
+            best = both[pareto_front(task.costs(both))]
         elif best is None:
             near = part[[int(missed.argmin())]]
             both = near if nearest is None else pl.concat([nearest, near])
@@ -163,27 +194,12 @@ def front_of_parts(task: Task, parts: Iterable[pl.DataFrame]) -> Front:
 
 def _misses_of(task: Task, designs: pl.DataFrame) -> Array:
     """Return how much each design misses, all in all; one without an objective misses it."""
-    names = [name for name in designs.columns if name.startswith(MISSES)]
-    objectives = designs.select([o.quantity for o in task.spec.objectives]).to_numpy()
-    missed = designs.select(names).to_numpy().sum(axis=1)
-    return np.asarray(missed + FAILED * (~np.isfinite(objectives)).sum(axis=1))
-
-
-def _foremost(task: Task, good: pl.DataFrame) -> pl.DataFrame:
-    """Return the rows that no other betters, each once, in the order of the objectives."""
-    from pteron.design.evolution import non_dominated
-
-    signs = np.array([o.sign for o in task.spec.objectives])
-    costs = good.select([o.quantity for o in task.spec.objectives]).to_numpy() * signs
-    best = non_dominated(costs)
-    best = best[np.lexsort(costs[best].T[::-1])]
-    is_distinct = np.append(True, (np.diff(costs[best], axis=0) != 0.0).any(axis=1))
-    rows: pl.DataFrame = good[best[is_distinct]]
-    return rows
+    missed = violations(designs).sum(axis=1)
+    return np.asarray(missed + FAILED * (~np.isfinite(task.costs(designs))).sum(axis=1))
 
 
 def _impossible(task: Task, nearest: pl.DataFrame, evaluated: int) -> ModelError:
-    """Return what is said where no design keeps all that is asked."""
+    """Return the error of a search without a feasible design; it names the nearest one."""
     row = nearest.row(0, named=True)
     design = Design(task, task.machine([row[v.name] for v in task.variables]))
     reasons = []
@@ -214,11 +230,11 @@ def _value(design: Design, name: str, row: dict[str, Any]) -> str:
     """Return the value of a quantity in words, or why there is none."""
     if np.isfinite(row[name]):
         return f"with {row[name]:.4g} {design.task.unit(name)}".rstrip()
-    return f"for there is none: {design.lack(name)}"
+    return f"for there is none: {design.missing_reason(name)}"
 
 
 def _worst_condition(design: Design) -> str:
-    """Return which condition a machine misses most in the workspace, and where."""
+    """Return the condition that a machine violates most in the workspace, and its pose."""
     task = design.task
     if task.spec.workspace is None or task.floats:
         center = design.cube.center

@@ -22,7 +22,7 @@ _SHAPE = 'a path such as "legs.platform_point" or "legs[1,3].guide_point.x"'
 
 
 @dataclass(frozen=True)
-class Place:
+class GeometryNumber:
     """One number of one leg.
 
     Attributes
@@ -53,11 +53,11 @@ class Place:
 
     def read(self, robot: Manipulator) -> float:
         """Return the number as it is in a machine."""
-        value = getattr(robot.legs[self.leg - 1], self.key)
-        return float(value if self.part is None else value[self.part])
+        numbers = getattr(robot.legs[self.leg - 1], self.key)
+        return float(numbers if self.part is None else numbers[self.part])
 
 
-def places(robot: Manipulator, path: str) -> list[Place]:
+def named_numbers(robot: Manipulator, path: str) -> list[GeometryNumber]:
     """Return the numbers that a path names."""
     match = _WRITTEN.fullmatch(path.strip())
     if match is None:
@@ -97,7 +97,7 @@ def geometric_keys(leg: LegKind) -> list[str]:
 
 def _places_in_leg(
     robot: Manipulator, path: str, i: int, key: str, part: str | None, sign: int
-) -> Iterator[Place]:
+) -> Iterator[GeometryNumber]:
     leg = robot.legs[i - 1]
     known = geometric_keys(leg)
     if key not in known:
@@ -114,7 +114,7 @@ def _places_in_leg(
     if part is not None and part not in ("x", "y", "z"):
         raise ModelError(f"{shorten(path)}: .{part} is none of .x, .y and .z")
     if scalar:
-        yield Place(i, key, None, sign, role)
+        yield GeometryNumber(i, key, None, sign, role)
     else:
         for k in range(3) if part is None else ["xyz".index(part)]:
-            yield Place(i, key, k, sign, role)
+            yield GeometryNumber(i, key, k, sign, role)

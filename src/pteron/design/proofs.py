@@ -1,4 +1,4 @@
-"""Proofs that all poses of a design's largest cube, or of its required workspace, can be used.
+"""Proofs that all poses of a design's workspace, or of its largest cube, can be used.
 
 A search tests points; here interval arithmetic (`pteron.workspace.prove`) covers all poses between
 them, under the floors (least measures) of the search. A counterexample is excluded from the cube,
@@ -7,17 +7,21 @@ which is sought anew until it is proved.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
 
 from pteron.design.design import Design
-from pteron.design.region import placed_pose, workspace_region
+from pteron.design.rating import KindEvaluator, Rating
+from pteron.design.regions import kind_regions, placed_pose, workspace_region
 from pteron.design.spec import ROUNDING
 from pteron.design.task import Task
 from pteron.kernels import Array, sharing_programs
-from pteron.workspace import Box, Proof, Region, prove
+from pteron.manipulator import Manipulator, Radii
+from pteron.result import Result
+from pteron.workspace import Box, Proof, Region, interference, prove
 from pteron.workspace.fit import UNKNOWN, Fit, proved_fit
 from pteron.workspace.shape_samples import Samples, fixed_samples
 
@@ -29,11 +33,18 @@ _PLACED = (1.0, 0.9999)
 """Shares of a workspace that floats, at the place that is found for it."""
 
 _MOST = 200_000
-"""Boxes after which a proof is given up."""
+"""Greatest number of boxes of a proof."""
+
+_BOXES, _BOXES_CLEAR = 60_000, 1_000
+"""Boxes after which a proof of reach is given up, and a proof that no two bodies touch, whose
+boxes take longer."""
+
+_LONGER = 0.05
+"""Share of its travel by which a guide or ram grows where a proof fails at its end."""
 
 
-@dataclass(frozen=True)
-class ProvedCube:
+@dataclass(frozen=True, eq=False, repr=False)
+class ProvedCube(Result):
     """A cube of which every pose keeps reach, limits and floors, at each orientation.
 
     Attributes
@@ -74,8 +85,8 @@ def place_words(center: Array) -> str:
     return f"({numbers}) mm" if len(center) > 1 else f"{numbers} mm"
 
 
-@dataclass(frozen=True)
-class Proved:
+@dataclass(frozen=True, eq=False, repr=False)
+class Proved(Result):
     """A design as far as it is proved.
 
     Attributes
@@ -88,12 +99,14 @@ class Proved:
         Proofs of the required workspace, one for each orientation; none where none is required.
     """
 
+    ROWS = "design"
+
     design: Design
     cube: ProvedCube | None
     workspace: tuple[Proof, ...]
 
 
-def proved(design: Design) -> Proved:
+def prove_design(design: Design) -> Proved:
     """Return a design with its proofs, and with the cube that they leave it."""
     task, cube = design.task, None
     workspace: tuple[Proof, ...] = ()
@@ -117,7 +130,7 @@ def proved(design: Design) -> Proved:
 @lru_cache(maxsize=8)
 def start_design(task: Task) -> Design:
     """Return the machine that a search begins with, as it is, as far as it is proved."""
-    return proved(Design(task, task.robot)).design
+    return prove_design(Design(task, task.robot)).design
 
 
 def proved_cube(design: Design) -> ProvedCube | None:
@@ -128,7 +141,7 @@ def proved_cube(design: Design) -> ProvedCube | None:
     """
     task = design.task
     shape, least = task.shape
-    capped = task.floats and "scale" not in task.asked
+    capped = task.floats and "scale" not in task.quantity_names
 
     def search(failing: Array) -> Fit:
         fit = design.cube_without(failing) if len(failing) else design.cube
@@ -161,7 +174,7 @@ def cube_proofs(design: Design, center: Array, edge: float) -> tuple[Proof, ...]
             region: Region = Box(*ends)
         else:
             share = edge / design.task.shape[1]
-            region = workspace_region(floating.placed(center), pose, share)
+            region = workspace_region(floating.with_center(center), pose, share)
         proofs.append(_proof(design, region))
         if not proofs[-1].holds:
             break
@@ -169,7 +182,7 @@ def cube_proofs(design: Design, center: Array, edge: float) -> tuple[Proof, ...]
 
 
 def workspace_proofs(design: Design) -> tuple[Proof, ...]:
-    """Return what is proved of the required workspace, a proof for each orientation.
+    """Return the proofs of the required workspace, one for each orientation.
 
     Where it touches the boundary it is undecided; the proof is then of 0.9999 of it, about its
     middle, if that can be proved: its region tells, and `workspace_share`.
@@ -204,7 +217,7 @@ def counterexamples(design: Design, center: Array, edge: float) -> Samples:
 
 
 def workspace_share(design: Design, proof: Proof) -> float:
-    """Return which share of the required workspace a proof is of."""
+    """Return the share of the required workspace that a proof covers."""
     required = design.workspace
     assert required is not None  # who asks has one
     if design.task.floats:
@@ -226,3 +239,57 @@ def _least(design: Design, proof: Proof) -> float:
         return UNKNOWN
     rows = design.task.conditions.rows(design.geometry, proof.counterexample, design.side)
     return min(UNKNOWN, float(np.nan_to_num(rows, nan=UNKNOWN).min()))
+
+
+def kind_proofs(evaluator: KindEvaluator, rating: Rating) -> tuple[list[Proof], Manipulator]:
+    """Return proofs of the workspace, and the machine, its guides and rams lengthened if needed."""
+    robot, floors = rating.machine, evaluator.job.floors
+    proofs: list[Proof] = []
+    for _ in range(4):
+        proofs = [
+            prove(robot, region, type_i=floors.type_i, type_ii=floors.type_ii, most=_BOXES)
+            for region in kind_regions(evaluator, robot, rating.middle)
+        ]
+        causes = {c.leg for proof in proofs if not proof.holds for c in proof.causes}
+        ended = {i for i in causes if i and robot.legs[i - 1].joint.unit == "m"}
+        if not ended:
+            break
+        legs = list(robot.legs)
+        for i in ended:
+            low, high = legs[i - 1].limits or (0.0, 0.0)
+            spare = _LONGER * (high - low)
+            travel = low - spare, high + spare
+            legs[i - 1] = evaluator.kind.with_travel(legs[i - 1], travel, rating.values)
+        robot = replace(robot, legs=tuple(legs))
+    return proofs, robot
+
+
+def proof_sentence(evaluator: KindEvaluator, proofs: Sequence[Proof]) -> str:
+    """Return the proved statement about the workspace, a sentence."""
+    space, boxes = evaluator.job.workspace, sum(proof.boxes for proof in proofs)
+    if not all(proof.holds for proof in proofs):
+        return (
+            f"kept at {len(evaluator.poses)} sample poses; intervals over {boxes} boxes do not "
+            "decide of all"
+        )
+    if space.poses is not None:
+        statement = (
+            f"every one of {len(proofs)} poses and orientations keeps reach, limits and floors"
+        )
+        between = f"; so do the cycles between them at {len(evaluator.between)} samples"
+        return statement + (between if len(evaluator.between) else "")
+    noun = "pose" if len(proofs) == 1 else f"position, at {len(proofs)} orientations,"
+    statement = f"every {noun} keeps reach, limits and floors, by intervals over {boxes} boxes"
+    return (
+        f"proved at the sampled tilts alone: {statement}" if space.tilt else f"proved: {statement}"
+    )
+
+
+def is_clear(evaluator: KindEvaluator, robot: Manipulator, middle: Array) -> bool:
+    """Return whether the least clearance of all bodies is proved."""
+    radii, least = robot.radii or Radii(), evaluator.job.floors.clearance / 2.0
+    parts = (radii.guide, radii.upper, radii.lower, radii.platform)
+    required = interference(robot, Radii(*(part + least for part in parts)))
+    workspace = kind_regions(evaluator, robot, middle)
+    most = _BOXES_CLEAR // len(workspace)
+    return all(prove(robot, region, given=required, most=most).holds for region in workspace)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from difflib import get_close_matches
-from functools import lru_cache
+from functools import lru_cache, partial
+from inspect import getdoc
 from typing import Any, Literal
 
 import numpy as np
@@ -13,6 +14,7 @@ import numpy as np
 from pteron.design.cycle_loads import best_motors, shortest_time
 from pteron.design.worst_cases import worst_position_errors
 from pteron.errors import shorten
+from pteron.extensions import extension_names, load_extension
 from pteron.indices import INDICES, Index, stiffness
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
@@ -39,9 +41,12 @@ COVERS: dict[Cover, str] = {
 }
 """How far a quantity is known, in words."""
 
+GROUP = "pteron.design"
+"""Group of the entry points of other packages' quantities."""
+
 
 @dataclass(frozen=True)
-class Quantity:
+class DesignQuantity:
     """One quantity of a design.
 
     Attributes
@@ -56,6 +61,8 @@ class Quantity:
         The same from the machine alone, where its poses do not matter: then gradients are known.
     cover : str
         How far it is known, a key of `COVERS`.
+    name : str
+        Its name in tables; of those of `quantities` it is their key.
     """
 
     unit: str
@@ -63,6 +70,7 @@ class Quantity:
     of: Callable[[Any], float]
     of_machine: Callable[[Manipulator], float] | None = None
     cover: Cover = "lattice"
+    name: str = ""
 
 
 def _sample_cover(
@@ -72,15 +80,32 @@ def _sample_cover(
     *,
     least: bool = False,
     cover: Cover = "places",
-) -> Quantity:
+) -> DesignQuantity:
     """Return the greatest or least of a function of a design and poses (N, m) in the workspace."""
     sign = -1.0 if least else 1.0
     fine = cover == "fine"
-    return Quantity(unit, about, lambda d: d.worst(at, sign, fine=fine), cover=cover)
+    return DesignQuantity(unit, about, lambda d: d.worst(at, sign, fine=fine), cover=cover)
 
 
-def _simple(unit: str, about: str, of: Callable[[Manipulator], float]) -> Quantity:
-    return Quantity(unit, about, lambda design: of(design.robot), of, "machine")
+def machine_quantity(
+    unit: str, about: str, of_machine: Callable[[Manipulator], float], name: str = ""
+) -> DesignQuantity:
+    """Return the quantity of a design that is a function of its machine alone."""
+    of = partial(_evaluate_machine, of_machine)
+    return DesignQuantity(unit, about, of, of_machine, "machine", name)
+
+
+def _evaluate_machine(of_machine: Callable[[Manipulator], float], design: Any) -> float:
+    return of_machine(design.robot)
+
+
+def quantity_of(
+    quantity: DesignQuantity | Callable[[Manipulator], float], name: str
+) -> DesignQuantity:
+    """Return the quantity that a function of the machine gives; a quantity as it is."""
+    if isinstance(quantity, DesignQuantity):
+        return quantity
+    return machine_quantity("", (getdoc(quantity) or "").partition("\n")[0], quantity, name)
 
 
 def _links(robot: Manipulator) -> float:
@@ -119,7 +144,7 @@ def _stroke(design: Any) -> float:
 
 
 def _drive_load(design: Any, poses: Array) -> Array:
-    """Return the greatest share of what drives can do, force or speed."""
+    """Return the greatest ratio of a drive's force or speed to its limit (N,)."""
     limits = limits_of(design.robot)
     shares = design.forces(poses) / limits.force, design.speeds(poses) / limits.speed
     return np.asarray(np.maximum(*shares).max(axis=-1))
@@ -135,26 +160,26 @@ def _accuracy(design: Any, poses: Array) -> Array:
 
 
 def _cycle_time(design: Any) -> float:
-    rests = sum(cycle.dwell for cycle in design.task.spec.cycles)
-    return float(rests) + sum(shortest_time(design.carrying, motion) for motion in design.cycles)
+    robot, rests = design.loaded_robot, sum(cycle.dwell for cycle in design.task.spec.cycles)
+    return float(rests) + sum(shortest_time(robot, motion) for motion in design.cycles)
 
 
-_OWN = {
-    "cube": Quantity(
+_BUILT_IN = {
+    "cube": DesignQuantity(
         "m",
         "edge of the largest cube that keeps the floors and limits",
         lambda d: d.cube.edge,
         cover="proved",
     ),
-    "scale": Quantity(
+    "scale": DesignQuantity(
         "",
         "factor by which a workspace that floats can grow, 1 as it is asked for",
         lambda d: d.scale,
         cover="proved",
     ),
-    "links": _simple("m", "sum of the links' lengths", _links),
-    "moving_mass": _simple("kg", "mass of all that moves", moving_mass),
-    "size": Quantity(
+    "links": machine_quantity("m", "sum of the links' lengths", _links),
+    "moving_mass": machine_quantity("kg", "mass of all that moves", moving_mass),
+    "size": DesignQuantity(
         "m", "diagonal of the box that holds all joints at the poses of the workspace", _size
     ),
     "type_i": _sample_cover(
@@ -168,7 +193,7 @@ _OWN = {
         least=True,
         cover="fine",
     ),
-    "stroke": Quantity(
+    "stroke": DesignQuantity(
         "",
         "greatest travel of a joint in the workspace, over the width of its limits or, without "
         "them, over its travel in the machine to begin with",
@@ -208,46 +233,53 @@ _OWN = {
     "accuracy": _sample_cover(
         "m", "most that the tool may be off by all [errors] together", _accuracy, cover="bound"
     ),
-    "cycle_time": Quantity(
+    "cycle_time": DesignQuantity(
         "s",
         "shortest time of all cycles, each evenly faster or slower, by the drives of the file",
         _cycle_time,
         cover="cycles",
     ),
-    "cycle_force": Quantity(
+    "cycle_force": DesignQuantity(
         "N or N m",
         "greatest force of a drive over the cycles, one after the other with their rests",
-        lambda d: d.sizing.peak_forces.max(),
+        lambda d: d.cycle_loads.peak_forces.max(),
         cover="cycles",
     ),
-    "cycle_speed": Quantity(
+    "cycle_speed": DesignQuantity(
         "m/s or rad/s",
         "greatest speed of a joint over the cycles",
-        lambda d: d.sizing.peak_speeds.max(),
+        lambda d: d.cycle_loads.peak_speeds.max(),
         cover="cycles",
     ),
-    "cycle_energy": Quantity(
+    "cycle_energy": DesignQuantity(
         "J",
         "energy that the drives give while they drive, all cycles once",
-        lambda d: d.sizing.given_energy.sum(),
+        lambda d: d.cycle_loads.given_energy.sum(),
         cover="cycles",
     ),
-    "motor_margin": Quantity(
+    "motor_margin": DesignQuantity(
         "",
         "least over joints of what the best motor of the list can do over what the cycles ask",
-        lambda d: min(fit.margin for fit in best_motors(d.sizing, d.task.motors)),
+        lambda d: min(fit.margin for fit in best_motors(d.cycle_loads, d.task.motors)),
         cover="cycles",
     ),
 }
 
 
 @lru_cache(maxsize=1)
-def quantities() -> dict[str, Quantity]:
-    """Return the quantities by name: those of this page, and the worst of each index."""
-    return _OWN | {name: _worst(index) for name, index in INDICES.items()}
+def quantities() -> dict[str, DesignQuantity]:
+    """Return the quantities by name: those of this page, the worst of each index, and packages'.
+
+    A package names its own as entry points of the group `pteron.design`: a function of the machine
+    or a `DesignQuantity`.
+    """
+    known = _BUILT_IN | {name: _worst(index) for name, index in INDICES.items()}
+    for name in extension_names(GROUP):
+        known.setdefault(name, quantity_of(load_extension(GROUP, name), name))
+    return known
 
 
-def _worst(index: Index) -> Quantity:
+def _worst(index: Index) -> DesignQuantity:
     """Return the worst value of an index over the workspace."""
     word = "least" if index.better == "more" else "greatest"
     return _sample_cover(
@@ -258,7 +290,7 @@ def _worst(index: Index) -> Quantity:
     )
 
 
-def known(name: str) -> str:
+def expect_quantity(name: str) -> str:
     """Return the name of a quantity."""
     names = quantities()
     if name in names:

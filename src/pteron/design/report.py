@@ -16,20 +16,21 @@ from pteron.design.differences import (
     stroke_words,
 )
 from pteron.design.front import Front
-from pteron.design.proofs import Proved, place_words, proved, workspace_share
-from pteron.design.spec import asked_words
+from pteron.design.proofs import Proved, place_words, prove_design, workspace_share
 from pteron.design.task import Task
 from pteron.manipulator import Manipulator
 from pteron.manipulator.machine_record import machine_record
 from pteron.manipulator.names import LONGEST_NAME
 from pteron.manipulator.saving import text_of
-from pteron.motion import Fit
+from pteron.motion import MotorFit
+from pteron.renamed import former_attribute
+from pteron.result import Result
 
 if TYPE_CHECKING:
     import polars as pl
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class ReportedDesign(Proved):
     """One machine of a search, with the proofs about it.
 
@@ -39,34 +40,30 @@ class ReportedDesign(Proved):
         "start", "best-cube", "compromise", ...
     """
 
+    ROWS = "changes"
+
     name: str
 
     @property
     def changes(self) -> list[Change]:
         """Quantities, geometry and masses that differ from those at the start."""
         task, robot = self.design.task, self.design.robot
-        return [
-            *quantity_changes(self.design),
-            *geometry_changes(task, robot),
-            *mass_changes(task, robot),
-        ]
+        geometry, masses = geometry_changes(task, robot), mass_changes(task, robot)
+        return [*quantity_changes(self.design), *geometry, *masses]
 
     @property
     def proofs(self) -> list[str]:
         """The statements that are proved, a sentence each."""
-        lines = []
-        if self.design.task.seeks_cube:
+        lines, task = [], self.design.task
+        if task.seeks_cube:
             lines.append("cube: not proved" if self.cube is None else f"cube {self.cube.words}")
-        if self.design.task.floats:
+        if task.floats:
             lines.append(self._place)
-        shares = (workspace_share(self.design, proof) for proof in self.workspace)
-        return [
-            *lines,
-            *(
-                f"workspace{'' if share == 1.0 else f', {100.0 * share:g} % of it,'} {proof}"
-                for share, proof in zip(shares, self.workspace, strict=True)
-            ),
-        ]
+        for proof in self.workspace:
+            share = workspace_share(self.design, proof)
+            part = "" if share == 1.0 else f", {100.0 * share:g} % of it,"
+            lines.append(f"workspace{part} {proof}")
+        return lines
 
     @property
     def _place(self) -> str:
@@ -77,91 +74,136 @@ class ReportedDesign(Proved):
             return f"workspace: it fits nowhere{largest}"
         return f"workspace placed about {place_words(design.cube.center)}"
 
+    @cached_property
+    def _reasons(self) -> dict[str, str]:
+        """The reason why each quantity is undefined; empty where it is defined."""
+        names = self.design.task.quantity_names
+        return {name: self.design.missing_reason(name) for name in names}
+
     @property
-    def lacking(self) -> list[str]:
+    def missing_quantities(self) -> list[str]:
         """The quantities that the machine does not have, with the reason."""
-        reasons = ((name, self.design.lack(name)) for name in self.design.task.asked)
-        return [f"{name}: none, because {lack}" for name, lack in reasons if lack]
+        reasons = self._reasons.items()
+        return [f"{name}: none, because {reason}" for name, reason in reasons if reason]
+
+    lacking = former_attribute("lacking", "missing_quantities")
 
     @property
     def covers(self) -> list[str]:
         """The quantities of the search by the samples or proofs behind them, and the motors."""
         design, task = self.design, self.design.task
-        known: dict[str, list[str]] = {}
-        for name in task.asked:
-            value = design.quantity(name)
-            if not design.lack(name):
-                text = Change(name, value, value, task.unit(name)).shown(value)
-                known.setdefault(design.cover(name), []).append(f"{name} {text}")
-        lines = [*self.lacking, *(f"{', '.join(text)}: {how}" for how, text in known.items())]
-        if task.motors and "motor_margin" in task.asked and not design.lack("motor_margin"):
+        texts: dict[str, list[str]] = {}
+        for name in (name for name, reason in self._reasons.items() if not reason):
+            amount = design.quantity(name)
+            text = Change(name, amount, amount, task.unit(name)).format_value(amount)
+            texts.setdefault(design.cover(name), []).append(f"{name} {text}")
+        lines = [f"{', '.join(parts)}: {cover}" for cover, parts in texts.items()]
+        if task.motors and self._reasons.get("motor_margin") == "":
             minimums = (r.least for r in task.spec.requirements if r.quantity == "motor_margin")
             least = max((minimum for minimum in minimums if minimum is not None), default=1.0)
-            lines += map(_motor_words, best_motors(design.sizing, task.motors, least))
-        return lines
+            lines += map(_motor_words, best_motors(design.cycle_loads, task.motors, least))
+        return [*self.missing_quantities, *lines]
+
+    def lines(self) -> list[str]:
+        """Return the lines on proofs, on the poses behind each quantity, and on strokes."""
+        design, lines = self.design, [*self.proofs, *self.covers]
+        region = "the workspace" if design.task.spec.workspace is not None else "the cube"
+        if (design.task.seeks_place and design.cube.edge <= 0.0) or not design.is_reachable:
+            return lines
+        return [*lines, *(f"{line}, over {region}" for line in stroke_words(design))]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the machine, its quantities and its proofs as plain data, SI units."""
+        design, names = self.design, self.design.task.quantity_names
+        center = {"workspace_center": design.cube.center.tolist() if self.workspace else None}
+        changes = [] if self.name == "start" else [vars(change) for change in self.changes]
+        contents = {
+            "machine": machine_record(design.robot),
+            **{name: design.quantity(name) for name in names},
+            "known": {name: self._reasons[name] or design.cover(name) for name in names},
+            **(center if design.task.floats else {}),
+            "changes": changes,
+        }
+        if self.cube is not None:
+            boxes = sum(proof.boxes for proof in self.cube.proofs)
+            cube = {"center": self.cube.center.tolist(), "edge": self.cube.edge, "boxes": boxes}
+            contents["proved_cube"] = cube
+        contents["workspace_proved"] = [proof.holds for proof in self.workspace]
+        contents["workspace_share"] = [workspace_share(design, proof) for proof in self.workspace]
+        return contents
 
 
-def _motor_words(fit: Fit) -> str:
+def _motor_words(fit: MotorFit) -> str:
     return (
         f"drive of leg {fit.leg}: {fit.motor.name} at a ratio of {fit.ratio:.4g} can do "
         f"{fit.margin:.3g} times what it must, least in {fit.scarcest}"
     )
 
 
-@dataclass(frozen=True)
-class Summary:
+@dataclass(frozen=True, eq=False, repr=False)
+class FrontReport(Result):
     """A front with the designs that a report shows, and the machine that it began with."""
 
     front: Front
 
+    def __repr__(self) -> str:
+        """Return the report in a line."""
+        return f"<FrontReport of {self.front.task.robot.name!r}: {', '.join(self.front.selection)}>"
+
     @cached_property
     def start(self) -> ReportedDesign:
         """The machine to begin with."""
-        return _change_text("start", Design(self.front.task, self.front.task.robot))
+        return _report_design("start", Design(self.front.task, self.front.task.robot))
 
     @cached_property
-    def chosen(self) -> list[ReportedDesign]:
+    def selection(self) -> list[ReportedDesign]:
         """The best design of each objective and the compromise; a design of several names once."""
         task, names = self.front.task, dict[int, str]()
-        for name, at in self.front.chosen.items():
+        for name, at in self.front.selection.items():
             names[at] = f"{names[at]}, {name}" if at in names else name
         return [
-            _change_text(name, _design(task, self.front.robot(at), name))
+            _report_design(name, _design(task, self.front.robot(at), name))
             for at, name in names.items()
         ]
+
+    chosen = former_attribute("chosen", "selection")
 
     def robots(self) -> dict[str, str]:
         """Return the chosen machines as texts of files, by the files' names."""
         return {
             f"{name}.toml": text_of(reported.design.robot)
-            for reported in self.chosen
+            for reported in self.selection
             for name in reported.name.split(", ")
         }
 
     def table(self) -> pl.DataFrame:
         """Return the front as a table, with units in the headings."""
-        shown = self.front.table.select(list(self.front.headings))
-        return shown.rename(self.front.headings)
+        frame: pl.DataFrame = self.front.table()
+        return frame
 
-    def data(self) -> dict[str, Any]:
+    def summary(self) -> str:
+        """Return the report, for people, as lines of text: that of `page`."""
+        return self.page()
+
+    data = former_attribute("data", "as_dict")
+
+    def as_dict(self) -> dict[str, Any]:
         """Return everything as plain data, SI units."""
-        front = self.front
+        front, task = self.front.as_dict(), self.front.task
         return {
-            "robot": front.task.robot.name,
-            "machine": machine_record(front.task.robot),
-            "evaluated": front.evaluated,
-            "kept": front.kept,
-            "variables": [
-                vars(v) | {"places": [p.path for p in v.places]} for v in front.task.variables
-            ],
-            "objectives": [o.quantity for o in front.task.spec.objectives],
-            "start": _data(self.start),
-            "chosen": {reported.name: _data(reported) for reported in self.chosen},
-            "front": front.table.select(list(front.headings)).to_dicts(),
+            "robot": task.robot.name,
+            "machine": machine_record(task.robot),
+            "evaluated": front["evaluated"],
+            "kept": front["kept"],
+            "variables": [vars(v) | {"places": [p.path for p in v.places]} for v in task.variables],
+            "objectives": front["objectives"],
+            "start": self.start.as_dict(),
+            "chosen": {reported.name: reported.as_dict() for reported in self.selection},
+            "front": front["front"],
         }
 
     def page(self) -> str:
-        """Return the report in Markdown: what changed, in words with units, and what is proved."""
+        """Return the report in Markdown: changes with units, proofs, basis of each number."""
         front = self.front
         lines = [
             f"# Designs of {front.task.robot.name}",
@@ -176,20 +218,17 @@ class Summary:
             "",
             "## Asked for",
             "",
-            *(f"- {line}" for line in asked_words(front.task.spec)),
+            *(f"- {line}" for line in front.task.spec.requirement_lines()),
             "",
             "## To begin with",
             "",
-            *(f"- {line}" for line in _lines(self.start)),
+            *(f"- {line}" for line in self.start.lines()),
         ]
-        for reported in self.chosen:
+        for reported in self.selection:
             lines += ["", f"## {reported.name.replace('-', ' ').capitalize()}", ""]
             lines += ["| what | to begin with | now | change |", "| --- | ---: | ---: | ---: |"]
-            lines += [
-                f"| {c.what} | {c.shown(c.before)} | {c.shown(c.after)} | {c.by} |"
-                for c in reported.changes
-            ]
-            lines += ["", *(f"- {line}" for line in _lines(reported))]
+            lines += [f"| {' | '.join(change.cells)} |" for change in reported.changes]
+            lines += ["", *(f"- {line}" for line in reported.lines())]
         return "\n".join(lines) + "\n"
 
 
@@ -198,41 +237,5 @@ def _design(task: Task, robot: Manipulator, name: str) -> Design:
     return Design(task, replace(robot, name=robot.name[: LONGEST_NAME - len(ending)] + ending))
 
 
-def _change_text(name: str, design: Design) -> ReportedDesign:
-    return ReportedDesign(**vars(proved(design)), name=name)
-
-
-def _lines(reported: ReportedDesign) -> list[str]:
-    """Return the lines on proofs, on the poses that each quantity is over, and on strokes."""
-    task, lines = reported.design.task, [*reported.proofs, *reported.covers]
-    region = "the workspace" if task.spec.workspace is not None else "the cube"
-    if (task.seeks_place and reported.design.cube.edge <= 0.0) or not reported.design.reached:
-        return lines
-    return [*lines, *(f"{line}, over {region}" for line in stroke_words(reported.design))]
-
-
-def _data(reported: ReportedDesign) -> dict[str, Any]:
-    task = reported.design.task
-    contents: dict[str, Any] = {"machine": machine_record(reported.design.robot)}
-    contents |= {name: reported.design.quantity(name) for name in task.asked}
-    contents["known"] = {
-        name: reported.design.lack(name) or reported.design.cover(name) for name in task.asked
-    }
-    if task.floats:
-        contents["workspace_center"] = (
-            reported.design.cube.center.tolist() if reported.workspace else None
-        )
-    contents["changes"] = (
-        [vars(change) for change in reported.changes] if reported.name != "start" else []
-    )
-    if reported.cube is not None:
-        contents["proved_cube"] = {
-            "center": reported.cube.center.tolist(),
-            "edge": reported.cube.edge,
-            "boxes": sum(proof.boxes for proof in reported.cube.proofs),
-        }
-    contents["workspace_proved"] = [proof.holds for proof in reported.workspace]
-    contents["workspace_share"] = [
-        workspace_share(reported.design, proof) for proof in reported.workspace
-    ]
-    return contents
+def _report_design(name: str, design: Design) -> ReportedDesign:
+    return ReportedDesign(**vars(prove_design(design)), name=name)

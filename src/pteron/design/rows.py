@@ -9,41 +9,44 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pteron.design.design import Design
-from pteron.design.proofs import proved
+from pteron.design.proofs import prove_design
 from pteron.design.spec import ROUNDING
 from pteron.design.task import Task
 from pteron.errors import ModelError
+from pteron.kernels import Array
 from pteron.kernels.one_thread import one_thread
 
 if TYPE_CHECKING:
     import polars as pl
 
 MISSES = "misses "
-"""Prefix of the columns with the amounts by which requirements are missed."""
+"""Prefix of the columns with violations."""
 
 FAILED = 1e6
-"""Amount for a design that is no possible machine, or has no such quantity."""
+"""Violation of a design that is no possible machine, or lacks a quantity."""
 
 
-def evaluated(task: Task, values: Sequence[float], *, proofs: bool = False) -> dict[str, float]:
-    """Return the row of a design: quantities, and by how much it misses what is asked.
+def evaluate_design(
+    task: Task, point: Sequence[float], *, proofs: bool = False
+) -> dict[str, float]:
+    """Return the row of a design: quantities, and violations of the requirements.
 
     "misses workspace" is how far the least condition is below 0, and "misses 1 links" how far
     the first requirement, of `links`, is missed over its bound; 0 where it is kept. With proofs the
     cube is the proved one, and a workspace that is not proved is missed.
     """
     try:
-        design = Design(task, task.machine(values))
+        design = Design(task, task.machine(point))
         if proofs:
-            design = proved(design).design
-        row = {name: design.quantity(name) for name in task.asked}
+            design = prove_design(design).design
+        row = {name: design.quantity(name) for name in task.quantity_names}
         row |= zip(places(task), design.cube.center.tolist() if task.floats else (), strict=True)
         margin = design.margin
     except ModelError:
-        row, margin = dict.fromkeys((*task.asked, *places(task)), float("nan")), -FAILED
+        row, margin = dict.fromkeys((*task.quantity_names, *places(task)), float("nan")), -FAILED
     misses = {f"{MISSES}workspace": 0.0 if margin >= -ROUNDING else -margin}
     for k, requirement in enumerate(task.spec.requirements, start=1):
-        misses[f"{MISSES}{k} {requirement.quantity}"] = requirement.missed_by(
+        misses[f"{MISSES}{k} {requirement.quantity}"] = requirement.violation(
             row[requirement.quantity], FAILED
         )
     return row | misses
@@ -58,8 +61,14 @@ def design_table(task: Task, designs: ArrayLike, *, proofs: bool = False) -> pl.
     """Return a table of designs (N, V), a row each: variables, then quantities and misses."""
     import polars as pl
 
-    values = np.asarray(designs)
+    points = np.asarray(designs)
     with one_thread():
-        rows = [evaluated(task, row, proofs=proofs) for row in values.tolist()]
-    columns = {v.name: values[:, k].tolist() for k, v in enumerate(task.variables)}
+        rows = [evaluate_design(task, row, proofs=proofs) for row in points.tolist()]
+    columns = {v.name: points[:, k].tolist() for k, v in enumerate(task.variables)}
     return pl.DataFrame(columns | {name: [row[name] for row in rows] for name in rows[0]})
+
+
+def violations(designs: pl.DataFrame) -> Array:
+    """Return the violations (N, C) in a table of designs: workspace, then each requirement."""
+    names = [name for name in designs.columns if name.startswith(MISSES)]
+    return np.asarray(designs.select(names).to_numpy())

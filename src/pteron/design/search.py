@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Sequence
-from contextlib import ExitStack
+from concurrent.futures import Future
+from contextlib import ExitStack, suppress
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -17,17 +19,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pteron.design.evolution import Evolution
-from pteron.design.front import Front, Proofs
-from pteron.design.processes import Processes, processes
-from pteron.design.refine import refined
-from pteron.design.rows import FAILED, MISSES, design_table
-from pteron.design.spec import Spec
+from pteron.design.evolution import Evolution, latin_hypercube
+from pteron.design.front import Front, ProvedRows
+from pteron.design.improvement import improve_design
+from pteron.design.rows import FAILED, design_table, violations
+from pteron.design.spec import SearchTable, Spec
 from pteron.design.task import Task
 from pteron.errors import DataError, ModelError
 from pteron.kernels import Array
 from pteron.kernels.one_thread import one_thread
 from pteron.maps import TableStore, sweep
+from pteron.processes import WorkerPool, result_of
+from pteron.progress import Progress
 from pteron.shapes import Workers
 
 if TYPE_CHECKING:
@@ -44,7 +47,7 @@ def search(
     seed: int | None = None,
     workers: Workers | None = None,
     scheduler: str | None = None,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress | None = None,
 ) -> Front:
     """Search for the best designs of a machine.
 
@@ -84,28 +87,90 @@ def search(
     """
     if seed is not None:
         spec = spec.with_seed(seed)
-    task = Task.of(spec)
+    task = Task.from_spec(spec)
     if workers is not None and scheduler is not None:
         raise DataError("workers and scheduler given; a scheduler has its own workers: give one")
     with ExitStack() as opened:
         generations_folder = folder or opened.enter_context(
             TemporaryDirectory(prefix="pteron-design-")
         )
-        # The same for all generations: a process compiles what it needs once.
-        shared = opened.enter_context(processes(task, workers or 1))
-        return _generations(task, Path(generations_folder), scheduler, shared, progress)
+        pool = None
+        if workers is not None and workers > 1:
+            # The same for all generations: a process compiles what it needs once.
+            pool = opened.enter_context(WorkerPool(workers, task))
+        evaluation = DesignRows(task, Path(generations_folder), scheduler=scheduler, pool=pool)
+        return _generations(evaluation, progress)
 
 
-def _generations(
-    task: Task,
-    folder: Path,
-    scheduler: str | None,
-    shared: Processes | None,
-    progress: Callable[[float], None] | None,
-) -> Front:
+@dataclass(frozen=True)
+class DesignRows:
+    """Evaluates designs by a cluster, by processes or here; the rows stay in a folder.
+
+    Attributes
+    ----------
+    task : Task
+        The search.
+    folder : Path
+        Folder of the folders of rows.
+    scheduler : str, optional
+        Address of a Dask scheduler.
+    workers : int, optional
+        Number of Dask workers of this computer.
+    pool : WorkerPool, optional
+        Processes that share the task.
+    """
+
+    task: Task
+    folder: Path
+    scheduler: str | None = None
+    workers: int | None = None
+    pool: WorkerPool | None = None
+
+    def rows(
+        self,
+        function: Callable[[Task, Sequence[Any]], pl.DataFrame],
+        jobs: Sequence[Any],
+        name: str,
+        plan: dict[str, Any],
+        progress: Progress | None = None,
+    ) -> pl.DataFrame:
+        """Return the rows that a function gives for jobs; those that the folder has stay."""
+        store = TableStore(self.folder / name, {**self.task.plan, **plan})
+        chunks = [jobs[k : k + _CHUNK] for k in range(0, len(jobs), _CHUNK)]
+        if self.pool is None:
+            sweep(
+                partial(function, self.task),
+                chunks,
+                store,
+                scheduler=self.scheduler,
+                workers=self.workers,
+                progress=progress,
+            )
+            return store.scan().collect()
+        # Each job goes to the process that is free next, those of the last chunk first: it has the
+        # designs that take longest.
+        numbers = sorted({*range(len(chunks))} - store.finished_chunks(), reverse=True)
+        pending = {k: [self.pool.start(function, [job]) for job in chunks[k]] for k in numbers}
+        sweep(lambda k: _await_rows(pending[k]), range(len(chunks)), store, progress=progress)
+        return store.scan().collect()
+
+    def prove(self, designs: list[list[float]]) -> pl.DataFrame:
+        """Return the rows of designs after their proofs."""
+        digest = _digest(np.array(designs))
+        return self.rows(proved_table, designs, f"proofs-{digest}", {"designs": digest})
+
+
+def _await_rows(pending: Sequence[Future[pl.DataFrame]]) -> pl.DataFrame:
+    import polars as pl
+
+    rows: pl.DataFrame = pl.concat(map(result_of, pending), rechunk=True)
+    return rows
+
+
+def _generations(evaluation: DesignRows, progress: Progress | None) -> Front:
     """Return the front of all designs that were evaluated, each design of it proved."""
-    settings = task.spec.search
-    low, high = task.ranges
+    task = evaluation.task
+    settings, (low, high) = task.spec.search, task.ranges
     evolution = Evolution(
         (first_designs(task, settings.population, settings.seed) - low) / (high - low),
         len(task.spec.objectives),
@@ -113,100 +178,57 @@ def _generations(
         settings.seed,
     )
     tables: list[pl.DataFrame] = []
-    proofs = Proofs(task, partial(swept_proofs, task, folder, scheduler, shared=shared))
+    proofs = ProvedRows(task, evaluation.prove)
     front: Front | None = None
     used: set[tuple[bytes, int]] = set()
     for number in range(1, settings.generations + 1):
         designs = low + evolution.ask() * (high - low)
-        jobs = [(values, -1) for values in designs.tolist()]
+        jobs = [(point, -1) for point in designs.tolist()]
         if front is not None:
             jobs += _designs_to_improve(front, number, used)
-        plan = {**task.plan, "generation": number, "designs": _digest(designs)}
-        store = TableStore(folder / f"{number:04d}", plan)
-        chunks = [jobs[k : k + _CHUNK] for k in range(0, len(jobs), _CHUNK)]
-        tell = None if progress is None else partial(_tell, progress, number, settings.generations)
-        _swept(task, worked, chunks, store, shared, scheduler=scheduler, progress=tell)
-        tables.append(store.scan().collect())
-        front = _proved_front(proofs, tables)
-        proved_rows = proofs.applied(tables[-1])
-        values = np.asarray(proved_rows.select([v.name for v in task.variables]).to_numpy())
-        evolution.tell((values - low) / (high - low), *_costs(task, proved_rows))
+        plan = {"generation": number, "designs": _digest(designs)}
+        report = None if progress is None else partial(_report, progress, number, settings)
+        tables.append(evaluation.rows(evaluate_designs, jobs, f"{number:04d}", plan, report))
+        front = None
+        with suppress(ModelError):  # until a design keeps all that is asked
+            front = proofs.front(lambda: tables)
+        proved = proofs.replace_rows(tables[-1])
+        costs = task.costs(proved)
+        costs = np.where(np.isfinite(costs), costs, FAILED)
+        evolution.tell((task.points(proved) - low) / (high - low), costs, violations(proved))
     return proofs.front(lambda: tables)
 
 
-def _swept(
-    task: Task,
-    function: Callable[..., pl.DataFrame],
-    chunks: Sequence[Any],
-    store: TableStore,
-    shared: Processes | None,
-    **options: Any,
-) -> None:
-    """Compute the chunks of designs that a store has not yet; processes share them."""
-    if shared is None:
-        sweep(partial(function, task), chunks, store, **options)
-    else:
-        remaining = sorted({*range(len(chunks))} - store.finished())
-        table = shared.tables(function, {k: chunks[k] for k in remaining})
-        sweep(table, range(len(chunks)), store, **options)
-
-
-def _tell(progress: Callable[[float], None], number: int, count: int, share: float) -> None:
-    """Tell how much of all generations is done, from the share of one of them."""
-    progress((number - 1 + share) / count)
-
-
-def _proved_front(proofs: Proofs, tables: list[pl.DataFrame]) -> Front | None:
-    """Return the front so far, if any design keeps all that is asked."""
-    try:
-        return proofs.front(lambda: tables)
-    except ModelError:
-        return None
-
-
-def swept_proofs(
-    task: Task,
-    folder: Path,
-    scheduler: str | None,
-    designs: list[list[float]],
-    *,
-    workers: int | None = None,
-    shared: Processes | None = None,
-) -> pl.DataFrame:
-    """Return the rows of designs, as far as they are proved, kept in a folder as the others are."""
-    digest = _digest(np.array(designs))
-    store = TableStore(folder / f"proofs-{digest}", {**task.plan, "designs": digest})
-    chunks = [designs[k : k + _CHUNK] for k in range(0, len(designs), _CHUNK)]
-    _swept(task, proved_table, chunks, store, shared, scheduler=scheduler, workers=workers)
-    return store.scan().collect()
+def _report(progress: Progress, number: int, settings: SearchTable, share: float) -> None:
+    """Report the share of all generations that is done."""
+    progress((number - 1 + share) / settings.generations)
 
 
 def first_designs(task: Task, count: int, seed: int) -> Array:
     """Return a Latin hypercube of designs (count, V), the first the machine to begin with."""
     low, high = task.ranges
-    rng = np.random.default_rng(seed)
-    rows = rng.permuted(np.tile(np.arange(count)[:, None], len(low)), axis=0)
-    designs: Array = low + (rows + rng.random(rows.shape)) / count * (high - low)
+    units = latin_hypercube(np.random.default_rng(seed), count, len(low))
+    designs: Array = low + units * (high - low)
     designs[0] = task.start
     return designs
 
 
-def worked(task: Task, jobs: Sequence[tuple[list[float], int]]) -> pl.DataFrame:
-    """Return the rows of designs; one whose number is an objective is improved in it first."""
+def evaluate_designs(task: Task, jobs: Sequence[tuple[list[float], int]]) -> pl.DataFrame:
+    """Return the rows of designs, of which those with an objective are improved in it first."""
     with one_thread():
-        designs = [values if k < 0 else refined(task, values, k) for values, k in jobs]
+        designs = [point if k < 0 else improve_design(task, point, k) for point, k in jobs]
     return design_table(task, designs)
 
 
 def proved_table(task: Task, designs: Sequence[list[float]]) -> pl.DataFrame:
-    """Return the rows of designs, as far as they are proved."""
+    """Return the rows of designs after their proofs."""
     return design_table(task, designs, proofs=True)
 
 
 def _designs_to_improve(
     front: Front, number: int, used: set[tuple[bytes, int]]
 ) -> list[tuple[list[float], int]]:
-    """Return designs of the front so far to improve, spread over it, each in one objective."""
+    """Return designs to improve, spread over the current front, each in one objective."""
     spec = front.task.spec
     settings, objectives = spec.search, len(spec.objectives)
     count = settings.refined
@@ -220,14 +242,6 @@ def _designs_to_improve(
             used.add(key)
             jobs.append((candidate[0].tolist(), candidate[1]))
     return jobs
-
-
-def _costs(task: Task, table: pl.DataFrame) -> tuple[Array, Array]:
-    """Return what is minimised (N, M), and what must not be above zero (N, C)."""
-    signs = np.array([o.sign for o in task.spec.objectives])
-    costs = table.select([o.quantity for o in task.spec.objectives]).to_numpy() * signs
-    misses = table.select([c for c in table.columns if c.startswith(MISSES)]).to_numpy()
-    return np.where(np.isfinite(costs), costs, FAILED), misses
 
 
 def _digest(designs: Array) -> str:

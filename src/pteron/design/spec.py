@@ -3,35 +3,38 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Sequence
 from itertools import chain
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, Self, TypeAlias
 
 from pydantic import BeforeValidator, Field, PrivateAttr, field_validator, model_validator
 
 from pteron.bodies.tables import Count, Number, TomlTable, Two, key
-from pteron.design.loads import (
+from pteron.design.load_tables import (
     CycleTable,
     ElasticityTable,
     ErrorsTable,
+    Floor,
     MotorsTable,
     PayloadTable,
     Positive,
-    listed,
+    as_list,
+    default_table,
 )
-from pteron.design.quantities import known
+from pteron.design.quantities import DesignQuantity, expect_quantity
+from pteron.design.user_quantities import function_of, named_quantity
+from pteron.design.workspace_tables import WorkspaceTable
 from pteron.errors import DataError, shorten
+from pteron.manipulator import Manipulator
+from pteron.renamed import former_attribute
 from pteron.toml import read_toml, to_model
 
 _ABSENT = "no such file; it should describe a search for a design"
 """The end of the message for a missing file."""
 
 ROUNDING = 1e-9
-"""Share of a bound by which it may be missed."""
-
-Floor = Annotated[Number, Field(ge=0.0, lt=1.0)]
-"""Type of the least value of a measure that is 1 at best."""
+"""Relative tolerance of bounds."""
 
 
 def _expect_rising(pair: tuple[float, float]) -> tuple[float, float]:
@@ -44,7 +47,7 @@ def _expect_rising(pair: tuple[float, float]) -> tuple[float, float]:
 class VariableTable(TomlTable):
     """`[[variables]]`: numbers of the robot's file that move as one."""
 
-    moves: Annotated[tuple[str, ...], BeforeValidator(listed), Field(min_length=1)] = key(
+    moves: Annotated[tuple[str, ...], BeforeValidator(as_list), Field(min_length=1)] = key(
         'paths such as "legs[1,3].platform_point" or "-legs[2].guide_point.x"'
     )
     range: Two = key("least and greatest value")
@@ -57,91 +60,6 @@ class VariableTable(TomlTable):
     name: str | None = key("what tables call it; its first path if left out", None)
 
     _rises = field_validator("range")(_expect_rising)
-
-
-class WorkspaceTable(TomlTable):
-    """`[workspace]`: the region in which the machine must work.
-
-    A box given by its sides, a cube or a cylinder may have no center: then it floats, and each
-    design has it where the machine's margins are largest.
-    """
-
-    low: tuple[Number, ...] | None = key("a box's least x, y, z, m", None)
-    high: tuple[Number, ...] | None = key("a box's greatest x, y, z, m", None)
-    sides: tuple[Positive, ...] | None = key("of a box, in place of these, m", None)
-    center: tuple[Number, ...] | None = key(
-        "of a box of sides, a cube or a cylinder, m; left out, it floats", None
-    )
-    edge: Positive | None = key("of a cube, m", None)
-    radius: Positive | None = key("of a cylinder, m", None)
-    height: Positive | None = key("of a cylinder, m", None)
-    axis: Literal["x", "y", "z"] = key("of a cylinder", "z")
-    samples: Annotated[int, Field(ge=2, le=41, strict=True)] = key(
-        "poses along each of its sides", 5
-    )
-
-    @model_validator(mode="after")
-    def _one_shape(self) -> Self:
-        keys = ("low", "high", "sides", "center", "edge", "radius", "height")
-        keys_present = {key for key in keys if getattr(self, key) is not None}
-        valid_sets = ({"low", "high"}, {"sides"}, {"edge"}, {"radius", "height"})
-        if keys_present not in valid_sets and keys_present - {"center"} not in valid_sets[1:]:
-            raise ValueError(
-                f"{', '.join(sorted(keys_present)) or 'nothing'} given; a box has low and high, or "
-                "sides, a cube edge, a cylinder radius and height; these three have a center, or "
-                "float"
-            )
-        pairs = ((self.low, self.high), (self.sides, self.center))
-        if any(a is not None and b is not None and len(a) != len(b) for a, b in pairs):
-            raise ValueError("unlike numbers of coordinates given")
-        if self.low is not None and not all(
-            a < b for a, b in zip(self.low, self.high or (), strict=True)
-        ):
-            raise ValueError(f"low {list(self.low)} is not below high {list(self.high or ())}")
-        return self
-
-    @property
-    def shape(self) -> Literal["box", "cube", "cylinder"]:
-        """The kind of workspace."""
-        if self.radius is not None:
-            return "cylinder"
-        return "cube" if self.edge is not None else "box"
-
-    @property
-    def floats(self) -> bool:
-        """Whether it has no given place."""
-        return self.low is None and self.center is None
-
-    def placed(self, center: Iterable[float]) -> Self:
-        """Return the same workspace at a given center, m."""
-        return self.model_copy(update={"center": tuple(map(float, center))})
-
-    def dimensions(self, count: int) -> tuple[float, ...]:
-        """Return the sides (count,) of the box around it, m."""
-        if self.low is not None and self.high is not None:
-            return tuple(b - a for a, b in zip(self.low, self.high, strict=True))
-        if self.radius is not None and self.height is not None:
-            return tuple(
-                self.height if letter == self.axis else 2.0 * self.radius for letter in "xyz"
-            )
-        return self.sides or (self.edge or 0.0,) * count
-
-    @property
-    def ends(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """Least and greatest coordinates of the box around a placed workspace, m."""
-        if self.low is not None and self.high is not None:
-            return self.low, self.high
-        center = self.center or ()
-        halves = [side / 2.0 for side in self.dimensions(len(center))]
-        ends = tuple(
-            zip(*((x - h, x + h) for x, h in zip(center, halves, strict=True)), strict=True)
-        )
-        return ends[0], ends[1]
-
-    @property
-    def lengths(self) -> int | None:
-        """Number of its coordinates; None if it fits any number."""
-        return len(self.low or self.sides or self.center or ()) or (3 if self.radius else None)
 
 
 class FloorsTable(TomlTable):
@@ -167,7 +85,7 @@ class ObjectiveTable(TomlTable):
     @field_validator("maximise", "minimise")
     @classmethod
     def _expect_known(cls, name: str | None) -> str | None:
-        return name and known(name)
+        return name and expect_quantity(name)
 
     @model_validator(mode="after")
     def _one_way(self) -> Self:
@@ -196,7 +114,7 @@ class RequirementTable(TomlTable):
     @field_validator("quantity")
     @classmethod
     def _expect_known(cls, name: str) -> str:
-        return known(name)
+        return expect_quantity(name)
 
     @model_validator(mode="after")
     def _expect_bound(self) -> Self:
@@ -209,12 +127,12 @@ class RequirementTable(TomlTable):
             )
         return self
 
-    def missed_by(self, value: float, failed: float) -> float:
+    def violation(self, amount: float, failed: float) -> float:
         """Return the violation by a value over the bound, 0 if met; `failed` for a value of NaN."""
-        if math.isnan(value):
+        if math.isnan(amount):
             return failed
-        missing = 0.0 if self.least is None else (self.least - value) / (abs(self.least) or 1.0)
-        beyond = 0.0 if self.most is None else (value - self.most) / (abs(self.most) or 1.0)
+        missing = 0.0 if self.least is None else (self.least - amount) / (abs(self.least) or 1.0)
+        beyond = 0.0 if self.most is None else (amount - self.most) / (abs(self.most) or 1.0)
         gap = max(missing, beyond)
         return gap if gap > ROUNDING else 0.0
 
@@ -237,6 +155,23 @@ class SearchTable(TomlTable):
     seed: Annotated[int, Field(ge=0, strict=True)] = key("of all chance", 0)
 
 
+Quantitative: TypeAlias = str | DesignQuantity | Callable[[Manipulator], float]
+"""A quantity by its name, or a user's own."""
+
+
+def _note_quantity(quantity: Quantitative, functions: dict[str, DesignQuantity]) -> str:
+    """Return a quantity's name; add a user's own to those that a search has."""
+    if not isinstance(quantity, str):
+        named = named_quantity(quantity)
+        if function_of(functions.setdefault(named.name, named)) != function_of(named):
+            raise DataError(f"{named.name}: two quantities of this name; give one another name")
+        return named.name
+    try:
+        return quantity if quantity in functions else expect_quantity(quantity)
+    except ValueError as error:
+        raise DataError(str(error)) from None
+
+
 class Spec(TomlTable):
     """A search for a design, as in its TOML file."""
 
@@ -254,16 +189,17 @@ class Spec(TomlTable):
     objectives: Annotated[list[ObjectiveTable], Field(min_length=1)]
     requirements: list[RequirementTable] = Field(default_factory=list)
     workspace: WorkspaceTable | None = None
-    floors: FloorsTable = Field(default_factory=lambda: FloorsTable.model_validate({}))
-    motion: MotionTable = Field(default_factory=lambda: MotionTable.model_validate({}))
+    floors: FloorsTable = default_table(FloorsTable)
+    motion: MotionTable = default_table(MotionTable)
     payload: PayloadTable | None = None
     cycles: list[CycleTable] = Field(default_factory=list)
     errors: ErrorsTable | None = None
     elasticity: ElasticityTable | None = None
     motors: MotorsTable | None = None
-    search: SearchTable = Field(default_factory=lambda: SearchTable.model_validate({}))
+    search: SearchTable = default_table(SearchTable)
 
     _source: str = PrivateAttr("")
+    _user_quantities: dict[str, DesignQuantity] = PrivateAttr(default_factory=dict)
 
     @property
     def source(self) -> str:
@@ -271,14 +207,89 @@ class Spec(TomlTable):
         return self._source
 
     @property
-    def asked(self) -> tuple[str, ...]:
+    def quantity_names(self) -> tuple[str, ...]:
         """The quantities that objectives and requirements name, each once."""
         named = (o.quantity for o in self.objectives), (r.quantity for r in self.requirements)
         return tuple(dict.fromkeys(chain(*named)))
 
+    asked = former_attribute("asked", "quantity_names")
+
+    @property
+    def user_quantities(self) -> dict[str, DesignQuantity]:
+        """The quantities that `with_objectives` and `with_requirement` have brought, by name."""
+        return dict(self._user_quantities)
+
+    def with_objectives(
+        self, *, minimise: Sequence[Quantitative] = (), maximise: Sequence[Quantitative] = ()
+    ) -> Spec:
+        """Return the same search with other objectives.
+
+        Parameters
+        ----------
+        minimise, maximise : sequence of str, callable or DesignQuantity
+            What is to be small, and large: names of quantities; functions of the machine, which
+            take a `Manipulator` and return a number; or, of what needs more than the machine,
+            `DesignQuantity`, whose `of` takes the `Design`. Processes import functions by module
+            and name.
+
+        Raises
+        ------
+        DataError
+            If there is no such quantity, or a function has the name of another quantity.
+        """
+        functions = dict(self._user_quantities)
+        tables = [
+            ObjectiveTable.model_construct(minimise=_note_quantity(quantity, functions))
+            for quantity in minimise
+        ] + [
+            ObjectiveTable.model_construct(maximise=_note_quantity(quantity, functions))
+            for quantity in maximise
+        ]
+        if not tables:
+            raise DataError("objectives: none given; give minimise or maximise")
+        return self._with_functions(functions, objectives=tables)
+
+    def with_requirement(
+        self, quantity: Quantitative, *, least: float | None = None, most: float | None = None
+    ) -> Spec:
+        """Return the same search with one more requirement, of a quantity as `with_objectives`."""
+        functions = dict(self._user_quantities)
+        name = _note_quantity(quantity, functions)
+        table = RequirementTable.model_construct(quantity=name, least=least, most=most)
+        try:
+            table._expect_bound()  # type: ignore[operator]
+        except ValueError as error:
+            raise DataError(str(error)) from None
+        return self._with_functions(functions, requirements=[*self.requirements, table])
+
+    def _with_functions(self, functions: dict[str, DesignQuantity], **update: Any) -> Spec:
+        spec = self.model_copy(update=update)
+        spec._user_quantities = functions
+        return spec
+
     def with_seed(self, seed: int) -> Spec:
         """Return the same search with another seed of the random numbers."""
         return self.model_copy(update={"search": self.search.model_copy(update={"seed": seed})})
+
+    def requirement_lines(self) -> list[str]:
+        """Return the objectives and requirements, a line each."""
+        lines = [
+            f"{part.quantity} as {'small' if part.minimise else 'large'} as can be"
+            for part in self.objectives
+        ]
+        lines += [part.words for part in self.requirements]
+        lines += [
+            f"{name} at least {floor:.12g} everywhere"
+            for name, floor in self.floors
+            if not any(r.quantity == name and r.least is not None for r in self.requirements)
+        ]
+        if self.payload is not None:
+            lines.append(f"a payload of {self.payload.mass:.12g} kg")
+        lines += [f"cycle {k}: {part.words}" for k, part in enumerate(self.cycles, start=1)]
+        speed, acceleration = self.motion.speed, self.motion.acceleration
+        if {"force", "speed", "drive_load"} & set(self.quantity_names):
+            lines.append(f"motion at up to {speed:.12g} m/s and {acceleration:.12g} m/s^2")
+        return lines
 
 
 def read_spec(path: str | Path) -> Spec:
@@ -312,24 +323,3 @@ def read_spec(path: str | Path) -> Spec:
     read = spec.model_copy(update=update)
     read._source = source
     return read
-
-
-def asked_words(spec: Spec) -> list[str]:
-    """Return the objectives and requirements of a search in words, one line each."""
-    lines = [
-        f"{part.quantity} as {'small' if part.minimise else 'large'} as can be"
-        for part in spec.objectives
-    ]
-    lines += [part.words for part in spec.requirements]
-    lines += [
-        f"{name} at least {value:.12g} everywhere"
-        for name, value in spec.floors
-        if not any(r.quantity == name and r.least is not None for r in spec.requirements)
-    ]
-    if spec.payload is not None:
-        lines.append(f"a payload of {spec.payload.mass:.12g} kg")
-    lines += [f"cycle {k}: {part.words}" for k, part in enumerate(spec.cycles, start=1)]
-    speed, acceleration = spec.motion.speed, spec.motion.acceleration
-    if {"force", "speed", "drive_load"} & set(spec.asked):
-        lines.append(f"motion at up to {speed:.12g} m/s and {acceleration:.12g} m/s^2")
-    return lines

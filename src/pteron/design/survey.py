@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,14 +10,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 import scipy  # type: ignore[import-untyped]
 
-from pteron.design.front import Front, Proofs
+from pteron.design.front import Front, ProvedRows
 from pteron.design.rows import design_table
-from pteron.design.search import swept_proofs
+from pteron.design.search import DesignRows
 from pteron.design.spec import Spec
 from pteron.design.task import Task
 from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.maps import TableStore, sweep
+from pteron.progress import Progress
 from pteron.shapes import Workers
 
 if TYPE_CHECKING:
@@ -34,7 +35,7 @@ def survey(
     *,
     workers: Workers | None = None,
     scheduler: str | None = None,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress | None = None,
 ) -> Front:
     """Evaluate many designs, and return the front of them.
 
@@ -71,7 +72,7 @@ def survey(
     """
     if count < 1:
         raise DataError(f"count: {count} given, 1 or more expected")
-    task = Task.of(spec)
+    task = Task.from_spec(spec)
     store = TableStore(folder, {**task.plan, "survey": _CHUNK})
     chunks = range(0, count, _CHUNK)
     sweep(
@@ -82,7 +83,8 @@ def survey(
         workers=workers,
         progress=progress,
     )
-    proofs = Proofs(task, partial(swept_proofs, task, Path(folder), scheduler, workers=workers))
+    evaluation = DesignRows(task, Path(folder), scheduler, workers)
+    proofs = ProvedRows(task, evaluation.prove)
     return proofs.front(lambda: _parts(store, chunks))
 
 

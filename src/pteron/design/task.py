@@ -5,15 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pteron.design.misfits import misfits
-from pteron.design.quantities import quantities
-from pteron.design.region import workspace_shape
+from pteron.design.quantities import DesignQuantity, quantities
+from pteron.design.regions import workspace_shape
 from pteron.design.spec import FloorsTable, Spec
-from pteron.design.variables import Variable, moved, variables_of
+from pteron.design.spec_faults import spec_faults
+from pteron.design.user_quantities import code_digest
+from pteron.design.variables import Variable, move_variables, variables_of
 from pteron.errors import DataError, ModelError, warn_unlikely
 from pteron.kernels import Array, Kernel, compile
 from pteron.manipulator import Manipulator, load
@@ -21,10 +22,14 @@ from pteron.manipulator.saving import text_of
 from pteron.maps.plan import RESULTS
 from pteron.motion import Motor, read_motors
 from pteron.motion.payload import payload_warning
+from pteron.renamed import former_attribute
 from pteron.toml import joined_faults
 from pteron.workspace.conditions import conditions
 from pteron.workspace.shape_samples import Shape, cube
 from pteron.workspace.smooth_conditions import SmoothConditions, smooth_conditions
+
+if TYPE_CHECKING:
+    import polars as pl
 
 _WORST = "about the worst sampled poses too, forces and speeds over all directions"
 """Where quantities are taken, in the plan of a search that asks for sampled ones: earlier searches,
@@ -56,7 +61,7 @@ class Task:
     motors: tuple[Motor, ...] = ()
 
     @classmethod
-    def of(cls, spec: Spec) -> Task:
+    def from_spec(cls, spec: Spec) -> Task:
         """Return the task of a search.
 
         Raises
@@ -73,7 +78,7 @@ class Task:
                 "needs one that moves",
                 subject=robot.name,
             )
-        faults = list(misfits(spec, robot))
+        faults = list(spec_faults(spec, robot))
         variables: tuple[Variable, ...] = ()
         motors: tuple[Motor, ...] = ()
         try:
@@ -104,14 +109,21 @@ class Task:
         plan: dict[str, Any] = {"robot": text_of(self.robot), "spec": spec, "pteron": RESULTS}
         if self.motors:
             plan["motors"] = [vars(motor) for motor in self.motors]
-        known = quantities()
-        if {known[name].cover for name in self.asked} & {"places", "fine", "directions", "bound"}:
+        if quantities := self.spec.user_quantities:
+            plan["user's quantities"] = {name: code_digest(q) for name, q in quantities.items()}
+        covers = {self.quantities[name].cover for name in self.quantity_names}
+        if covers & {"places", "fine", "directions", "bound"}:
             plan["definition of its quantities"] = _WORST
         return plan
 
     @cached_property
+    def quantities(self) -> dict[str, DesignQuantity]:
+        """The quantities that a search may name, the user's own among them."""
+        return quantities() | self.spec.user_quantities
+
+    @cached_property
     def floors(self) -> FloorsTable:
-        """The least measures of every pose: the file's, or what is required where it is more."""
+        """The least measures of every pose: the greater of `[floors]` and requirements."""
         measures = dict(self.spec.floors)
         for requirement in self.spec.requirements:
             if (
@@ -157,14 +169,17 @@ class Task:
         return np.where(angular, np.array(spec.angles)[:, None], pose)
 
     @property
-    def asked(self) -> tuple[str, ...]:
+    def quantity_names(self) -> tuple[str, ...]:
         """The quantities that objectives and requirements name, each once."""
-        return self.spec.asked
+        return self.spec.quantity_names
+
+    asked = former_attribute("asked", "quantity_names")
+    of = former_attribute("of", "from_spec")
 
     @property
     def seeks_cube(self) -> bool:
         """Whether the largest cube of each design is looked for."""
-        return "cube" in self.asked or self.spec.workspace is None
+        return "cube" in self.quantity_names or self.spec.workspace is None
 
     @property
     def seeks_place(self) -> bool:
@@ -181,18 +196,28 @@ class Task:
         """The variables' values in the machine to begin with (V,), moved into their ranges."""
         return np.clip([v.start for v in self.variables], *self.ranges)
 
+    def costs(self, designs: pl.DataFrame) -> Array:
+        """Return the costs of designs (N, M): objectives, negative where they are maximised."""
+        signs = [o.sign for o in self.spec.objectives]
+        names = [o.quantity for o in self.spec.objectives]
+        return np.asarray(designs.select(names).to_numpy() * signs)
+
+    def points(self, designs: pl.DataFrame) -> Array:
+        """Return the variables of a table of designs (N, V)."""
+        return np.asarray(designs.select([v.name for v in self.variables]).to_numpy())
+
     def unit(self, name: str) -> str:
         """Return the unit of a quantity, for this machine's joints."""
         joint = self.robot.legs[0].joint
         force, speed = joint.force_unit, f"{joint.unit}/s"
         units = {"force": force, "cycle_force": force, "speed": speed, "cycle_speed": speed}
-        return units.get(name, quantities()[name].unit)
+        return units.get(name, self.quantities[name].unit)
 
     def function(self, what: str) -> Kernel:
         """Return a function of the machines' topology, whose geometry a call gives."""
         return compile(self.robot, what, grade="general")
 
-    def machine(self, values: Sequence[float]) -> Manipulator:
+    def machine(self, point: Sequence[float]) -> Manipulator:
         """Return the machine of a design.
 
         Raises
@@ -201,4 +226,4 @@ class Task:
             If there can be none.
         """
         stretch = self.spec.masses == "per length"
-        return moved(self.robot, self.variables, values, stretch=stretch)
+        return move_variables(self.robot, self.variables, point, stretch=stretch)

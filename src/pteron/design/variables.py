@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from pteron.design.paths import Place, places
+from pteron.design.paths import GeometryNumber, named_numbers
 from pteron.design.spec import VariableTable
 from pteron.equations.machine import numbers
 from pteron.errors import ModelError
@@ -30,7 +30,7 @@ class Variable:
     ----------
     name : str
         Its name in tables.
-    places : tuple of Place
+    places : tuple of GeometryNumber
         The numbers.
     by : {"value", "factor", "offset"}
         Whether they become the value, their start times it, or their start plus it.
@@ -41,7 +41,7 @@ class Variable:
     """
 
     name: str
-    places: tuple[Place, ...]
+    places: tuple[GeometryNumber, ...]
     by: Literal["value", "factor", "offset"]
     low: float
     high: float
@@ -53,11 +53,11 @@ class Variable:
         scale = {"length", "point"} & {place.role for place in self.places}
         return "m" if scale and self.by != "factor" else ""
 
-    def number(self, place: Place, start: float, value: float) -> float:
+    def number(self, place: GeometryNumber, start: float, setting: float) -> float:
         """Return the new value of one of the numbers, from its value at the start."""
         if self.by == "factor":
-            return start * value
-        return place.sign * value + (start if self.by == "offset" else 0.0)
+            return start * setting
+        return place.sign * setting + (start if self.by == "offset" else 0.0)
 
 
 def variables_of(robot: Manipulator, tables: Sequence[VariableTable]) -> tuple[Variable, ...]:
@@ -82,7 +82,7 @@ def variables_of(robot: Manipulator, tables: Sequence[VariableTable]) -> tuple[V
 
 
 def _variables(robot: Manipulator, table: VariableTable) -> list[Variable]:
-    named = [place for path in table.moves for place in places(robot, path)]
+    named = [place for path in table.moves for place in named_numbers(robot, path)]
     legs = sorted({place.leg for place in named})
     groups = [[p for p in named if p.leg == leg] for leg in legs] if table.each else [named]
     variables = []
@@ -102,8 +102,8 @@ def _variables(robot: Manipulator, table: VariableTable) -> list[Variable]:
     return variables
 
 
-def moved(
-    robot: Manipulator, variables: Sequence[Variable], values: Sequence[float], *, stretch: bool
+def move_variables(
+    robot: Manipulator, variables: Sequence[Variable], point: Sequence[float], *, stretch: bool
 ) -> Manipulator:
     """Return a machine with its variables at other values.
 
@@ -111,7 +111,7 @@ def moved(
     """
     legs = list(robot.legs)
     changed: dict[int, dict[str, list[float]]] = {}
-    for variable, value in zip(variables, values, strict=True):
+    for variable, setting in zip(variables, point, strict=True):
         for place in variable.places:
             parts_by_key = changed.setdefault(place.leg, {})
             if place.key not in parts_by_key:
@@ -119,7 +119,7 @@ def moved(
                     getattr(legs[place.leg - 1], place.key)
                 ).tolist()
             part = place.part or 0
-            number = variable.number(place, place.read(robot), float(value))
+            number = variable.number(place, place.read(robot), float(setting))
             parts_by_key[place.key][part] = number
     for i, fields in changed.items():
         leg = legs[i - 1]
@@ -132,26 +132,26 @@ def moved(
 
 
 def geometry_slopes(
-    robot: Manipulator, variables: Sequence[Variable], values: Sequence[float]
+    robot: Manipulator, variables: Sequence[Variable], point: Sequence[float]
 ) -> Array:
     """Return d geometry / d values (G, V): how `equations.machine.numbers` follow the variables.
 
     Lengths and points are linear in them, so that a difference is exact but for rounding.
     """
 
-    def geometry(values: Array) -> Array:
-        return np.array(numbers(moved(robot, variables, values.tolist(), stretch=False)))
+    def geometry(point: Array) -> Array:
+        return np.array(numbers(move_variables(robot, variables, point.tolist(), stretch=False)))
 
-    return slopes_of(geometry, variables, values).T
+    return slopes_of(geometry, variables, point).T
 
 
 def slopes_of(
-    function: Callable[[Array], Any], variables: Sequence[Variable], values: Sequence[float]
+    function: Callable[[Array], Any], variables: Sequence[Variable], point: Sequence[float]
 ) -> Array:
     """Return the derivatives (V, ...) of a function of the variables, by central differences."""
     derivatives = []
     for k, variable in enumerate(variables):
         step = _STEP * (variable.high - variable.low) * np.eye(len(variables))[k]
-        low, high = (function(np.asarray(values) + side * step) for side in (-1.0, 1.0))
+        low, high = (function(np.asarray(point) + side * step) for side in (-1.0, 1.0))
         derivatives.append((np.asarray(high) - low) / (2.0 * step[k]))
     return np.array(derivatives)

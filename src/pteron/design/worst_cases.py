@@ -58,12 +58,12 @@ def worst_forces(robot: Manipulator, poses: Array, speed: float, acceleration: f
         return greatest
     drives = drives_of(robot)
     lines = drives.viscous[:, None] * jacobian(robot, poses)[..., : squares.shape[-1]]
-    values, vectors = np.linalg.eigh(squares)
+    eigenvalues, vectors = np.linalg.eigh(squares)
     parts = np.einsum("...ij,...i->...j", vectors, lines) ** 2
     independent = acceleration * np.linalg.norm(rows, axis=-1) + drives.coulomb + drives.stribeck
     static = static + drives.offset
-    above = static + _greatest_over_directions(values, parts, speed) + independent
-    below = -static + _greatest_over_directions(-values, parts, speed) + independent
+    above = static + _greatest_over_directions(eigenvalues, parts, speed) + independent
+    below = -static + _greatest_over_directions(-eigenvalues, parts, speed) + independent
     return np.asarray(np.maximum(above, below))
 
 
@@ -92,21 +92,21 @@ def _force_expansion(robot: Manipulator, poses: Array) -> tuple[Array, Array, Ar
     return static, rows.swapaxes(1, 2), squares
 
 
-def _greatest_over_directions(values: Array, parts: Array, size: float) -> Array:
+def _greatest_over_directions(eigenvalues: Array, parts: Array, size: float) -> Array:
     """Return the maximum over |v| <= size of v^T C v + b^T v, by its dual.
 
-    `values` are the eigenvalues of C (..., k), `parts` the squares of b along its axes. The dual is
-    the least over mu >= max(0, values) of mu size^2 + sum(parts / (mu - values)) / 4.
+    The eigenvalues are those of C (..., k), `parts` the squares of b along its axes. The dual is
+    the least over mu >= max(0, lambda) of mu size^2 + sum(parts / (mu - lambda)) / 4.
     """
-    floor = np.maximum(values.max(axis=-1), 0.0)
+    floor = np.maximum(eigenvalues.max(axis=-1), 0.0)
     low, high = floor, floor + np.sqrt(parts.sum(axis=-1)) / (2.0 * size)
     with np.errstate(divide="ignore", invalid="ignore"):
         for _ in range(_BISECTIONS if parts.any() else 0):
             mu = 0.5 * (low + high)
-            terms = np.where(parts > 0.0, parts / (mu[..., None] - values) ** 2, 0.0)
+            terms = np.where(parts > 0.0, parts / (mu[..., None] - eigenvalues) ** 2, 0.0)
             falls = 0.25 * terms.sum(axis=-1) > size**2
             low, high = np.where(falls, mu, low), np.where(falls, high, mu)
-        terms = np.where(parts > 0.0, parts / (high[..., None] - values), 0.0)
+        terms = np.where(parts > 0.0, parts / (high[..., None] - eigenvalues), 0.0)
     return np.asarray(high * size**2 + 0.25 * terms.sum(axis=-1))
 
 
@@ -125,7 +125,7 @@ def worst_position_errors(robot: Manipulator, poses: Array, tolerances: Toleranc
 
 @lru_cache(maxsize=4)
 def _directions(count: int) -> tuple[Array, float]:
-    """Return unit vectors (D, count), and the cosine of the angle within which each other has one.
+    """Return unit vectors (D, count), and the cosine of their covering angle.
 
     They lead through the middles of cells on a cube's faces; opposite ones count as one.
     """

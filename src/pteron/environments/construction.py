@@ -8,7 +8,9 @@ from functools import lru_cache
 import numpy as np
 
 from pteron.dynamics import drive_forces, mass_matrix
+from pteron.dynamics.joint_space import mass_with_rotors
 from pteron.environments.world import ENDS, LEVER, World
+from pteron.equations.drives import drives_of
 from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.kinematics import jacobian
@@ -91,8 +93,7 @@ def _forces(robot: Manipulator, home: Array) -> Array:
     """Return what an action of 1 gives, (n,)."""
     zero_rates = np.zeros(robot.freedom)
     rows = jacobian(robot, home)
-    rotors = np.diag([leg.drive.inertia if leg.drive else 0.0 for leg in robot.legs])
-    mass = mass_matrix(robot, home) + rows.T @ rotors @ rows
+    mass = mass_with_rotors(rows, mass_matrix(robot, home), drives_of(robot).inertia)
     most = np.where(robot.platform.angular, _LIVELY / LEVER, _LIVELY)
     lively = np.linalg.solve(rows.T, mass * most)
     enough = 2.0 * np.abs(drive_forces(robot, home, zero_rates, zero_rates)) + np.abs(lively).sum(

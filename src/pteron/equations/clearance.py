@@ -27,6 +27,7 @@ from pteron.equations.machine import Machine, State
 from pteron.legs import LegKind
 from pteron.legs.leg import LegMotion
 from pteron.manipulator import Manipulator
+from pteron.tolerances import ROUNDING
 
 Segment = tuple[Expression, Expression]
 """Both ends, (3, 1)."""
@@ -34,9 +35,6 @@ Segment = tuple[Expression, Expression]
 Kind = Literal["guide", "upper", "lower", "leg", "platform"]
 """Kinds of bodies: a slider's guide, an upper link or crank, a last link or rods, a leg whose two
 parts slide on one line (a ram or a shaft), the platform."""
-
-_COINCIDENT = 1e-9
-"""Distance below which points, or guides, count as coincident, m."""
 
 _TINY = 1e-24
 """Least value of a square (m^2, or a squared sine) in a denominator."""
@@ -172,12 +170,12 @@ def _arms(machine: Machine, state: State) -> Iterator[Segment]:
         hinge = point.position - ca.SX(list(leg.fixed_offset))
         ends = [p, hinge, point.position]
         offsets = [leg.platform_point, leg.fixed_offset]
-        if not state.platform.rotation.turns and not robot.platform.slides:
+        if not robot.platform.angles:
             total = tuple(a + b for a, b in zip(*offsets, strict=True))
             ends, offsets = [p, point.position], [total]
         for k, offset in enumerate(offsets):
             key = tuple(offsets[: k + 1])
-            if max(map(abs, offset)) > _COINCIDENT and key not in seen:
+            if max(map(abs, offset)) > ROUNDING and key not in seen:
                 seen.add(key)
                 yield ends[k], ends[k + 1]
 
@@ -213,7 +211,7 @@ def _share_platform_point(robot: Manipulator, i: int, j: int) -> bool:
         np.array([*leg.platform_point, *leg.fixed_offset])
         for leg in (robot.legs[i - 1], robot.legs[j - 1])
     )
-    return bool(np.abs(first - second).max() <= _COINCIDENT)
+    return bool(np.abs(first - second).max() <= ROUNDING)
 
 
 def _share_line(robot: Manipulator, i: int, j: int) -> bool:
@@ -226,4 +224,4 @@ def _share_line(robot: Manipulator, i: int, j: int) -> bool:
     if "p" not in first.bodies or "p" not in second.bodies:
         return False
     cross_products = np.cross(axis, separation), np.cross(axis, second.joint_axis)
-    return bool(max(np.abs(v).max() for v in cross_products) <= _COINCIDENT)
+    return bool(max(np.abs(v).max() for v in cross_products) <= ROUNDING)

@@ -15,8 +15,9 @@ from pteron.closures.closure import nan_below_zero, plain_rows, rows_in_quasi_ve
 from pteron.closures.determinants import determinant, solve
 from pteron.equations.kinematics import reach
 from pteron.equations.machine import Machine
-from pteron.legs.leg import Circle, LegEquations, Plane, Sphere, Turned
+from pteron.legs.leg import AngleLocus, CircleLocus, LegEquations, PlaneLocus, SphereLocus
 from pteron.platforms.motion import PlatformMotion
+from pteron.tolerances import ROUNDING
 
 _STEPS = 4
 """Newton's steps of a controller: from some hundredths of a machine's size they reach rounding."""
@@ -31,9 +32,6 @@ Near a solution they agree. Where no pose exists, next to a singularity, the res
 its tolerance, but each step halves the determinant or more.
 """
 
-
-_NOTHING = 1e-9
-"""Length that counts as zero beside any machine, m."""
 
 _NO_CHANGE = 1e-300
 """Factor of a term that is added to propagate NaN: it changes no finite number."""
@@ -66,16 +64,16 @@ def closure_rows(machine: Machine, joints: Expression) -> Rows:
     loci = [leg.locus(q) for leg, q in zip(machine.legs, ca.vertsplit(joints), strict=True)]
     origin, size = ca.SX(directions.shape[1], 1), ca.SX(1)
     for locus, offset in reversed(list(zip(loci, offsets, strict=True))):
-        if isinstance(locus, Sphere | Circle):
+        if isinstance(locus, SphereLocus | CircleLocus):
             origin, size = ca.mtimes(directions.T, locus.center - offset.constant), locus.radius
     leg_rows = []
     for leg, locus, (a, b, constant) in zip(machine.legs, loci, offsets, strict=True):
         s = ca.mtimes(directions, origin) + constant  # c = s + size v + a f_1 + b f_2
         w, m, h = ca.SX(1, 3), ca.SX(directions.shape[1], 3), ca.SX(1, 3)
         scale = ca.SX(1)
-        if isinstance(locus, Turned):  # sin(phi - angle) = 0
+        if isinstance(locus, AngleLocus):  # sin(phi - angle) = 0
             h[1], h[2] = -ca.sin(locus.angle), ca.cos(locus.angle)
-        elif isinstance(locus, Plane):
+        elif isinstance(locus, PlaneLocus):
             m[:, 0] = size * ca.mtimes(directions.T, locus.normal)
             h = ca.mtimes(locus.normal.T, ca.horzcat(s, a, b))
             h[0] -= locus.offset
@@ -94,10 +92,10 @@ def closure_rows(machine: Machine, joints: Expression) -> Rows:
 
 
 def _component_in_plane(
-    machine: Machine, leg: LegEquations, locus: Sphere | Circle, v: Expression
+    machine: Machine, leg: LegEquations, locus: SphereLocus | CircleLocus, v: Expression
 ) -> Expression:
     """Return a vector from a locus' center; for a circle, its component in the circle's plane."""
-    if isinstance(locus, Sphere):
+    if isinstance(locus, SphereLocus):
         return v
     if leg.holds is not None:
         return v - ca.mtimes(leg.holds.normal, ca.dot(leg.holds.normal, v))
@@ -113,7 +111,9 @@ def held_spheres(machine: Machine, joints: Expression) -> tuple[Expression, Expr
     centers, squares = [], []
     for leg, q in zip(machine.legs, ca.vertsplit(joints), strict=True):
         locus = leg.locus(q)
-        assert isinstance(locus, Sphere | Circle)  # legs under platforms that tilt have no other
+        assert isinstance(
+            locus, SphereLocus | CircleLocus
+        )  # legs under platforms that tilt have no other
         center = locus.center
         if leg.holds is not None:
             away = ca.dot(leg.holds.normal, center - leg.holds.point)
@@ -149,16 +149,16 @@ def closure_residuals(machine: Machine, joints: Expression, pose: Expression) ->
     """Return the residuals of the closures of joints (n, 1) at a pose (m, 1)."""
     zero_rates = ca.SX.zeros(machine.freedom)
     platform = machine.platform.motion(pose, zero_rates, zero_rates)
-    lengths, rows, angles, sizes = [], [], [ca.SX(0)], [ca.SX(_NOTHING)]
+    lengths, rows, angles, sizes = [], [], [ca.SX(0)], [ca.SX(ROUNDING)]
     arms: list[Expression | None] = []
     for leg, q, point in zip(machine.legs, ca.vertsplit(joints), platform.points, strict=True):
         locus, c = leg.locus(q), point.position
         arms.append(None)
-        if isinstance(locus, Turned):
+        if isinstance(locus, AngleLocus):
             length = platform.rotation.angle - locus.angle
             row = platform.rotation.turns[0].row
             angles.append(ca.fabs(length) / (1 + ca.fabs(locus.angle)))
-        elif isinstance(locus, Plane):
+        elif isinstance(locus, PlaneLocus):
             length, row = ca.dot(locus.normal, c) - locus.offset, point_rows(locus.normal.T)
             sizes.append(locus.size + ca.dot(ca.fabs(locus.normal), ca.fabs(c)))
         else:
@@ -173,7 +173,7 @@ def closure_residuals(machine: Machine, joints: Expression, pose: Expression) ->
     length_residuals = [
         ca.fabs(length)
         for leg, q, length in zip(machine.legs, ca.vertsplit(joints), lengths, strict=True)
-        if not isinstance(leg.locus(q), Turned)
+        if not isinstance(leg.locus(q), AngleLocus)
     ]
     share = ca.mmax(ca.vertcat(*length_residuals)) / ca.sum1(ca.vertcat(*sizes))
     largest = ca.mmax(ca.vertcat(share, *angles))
@@ -224,7 +224,7 @@ def converged_step(
     for leg, q, at in zip(
         machine.legs, ca.vertsplit(joints), reach(machine, last_pose), strict=True
     ):
-        if isinstance(leg.locus(q), Plane):  # it goes on where the leg does not reach
+        if isinstance(leg.locus(q), PlaneLocus):  # it goes on where the leg does not reach
             validity += nan_below_zero(at.discriminant)
     return NewtonEnd(last_pose + validity, measure, divisor, residuals)
 
@@ -248,7 +248,7 @@ def direct_step(
     for i, (leg, q, motion, at) in enumerate(legs):
         arm, joint = end.residuals.arms[i], ca.SX.sym("joint")
         locus = leg.locus(joint)
-        if arm is None or not isinstance(locus, Sphere | Circle):
+        if arm is None or not isinstance(locus, SphereLocus | CircleLocus):
             continue
         rows[i] = closed_rows[i]
         validity += nan_below_zero(at.discriminant)

@@ -14,9 +14,7 @@ from pteron.bodies.motion import Expression
 from pteron.bodies.vectors import Vector
 from pteron.closures.determinants import determinant
 from pteron.equations.machine import Machine, State
-
-_PARALLEL = 1e-9
-"""Sine, or cosine, of an angle between directions that counts as zero."""
+from pteron.tolerances import ROUNDING
 
 
 def constraint_rows(machine: Machine, state: State) -> Expression | None:
@@ -27,10 +25,9 @@ def constraint_rows(machine: Machine, state: State) -> Expression | None:
     that do not turn with it, such as the side bars of an H4, on which legs' couples about k act.
     """
     robot = machine.robot
-    turns = robot.platform.turns and not robot.platform.slides
     x0, y0, k = machine.platform.frame
-    is_one_axis = turns or robot.platform.planar
-    axis = robot.platform.axis if turns else None
+    axis = robot.platform.turning_axis
+    is_one_axis = axis is not None or robot.platform.plane_normal is not None
     columns = ca.horzcat(x0, y0) if is_one_axis else ca.SX.eye(3)
     couples: list[Expression] = []
     parts: list[Vector | None] = []
@@ -40,7 +37,8 @@ def constraint_rows(machine: Machine, state: State) -> Expression | None:
             return None
         couples += leg_couples
         parts += [
-            leg.platform_point if turns and _may_act_along(m, k) else None for m in leg_couples
+            leg.platform_point if axis is not None and _may_act_along(m, k) else None
+            for m in leg_couples
         ]
     # A part on which one couple acts yields to it.
     unpaired = [i for i, part in enumerate(parts) if part is not None and parts.count(part) == 1]
@@ -61,7 +59,7 @@ def constraint_rows(machine: Machine, state: State) -> Expression | None:
 def _may_act_along(couple: Expression, axis: Expression) -> bool:
     """Return whether a couple has, or may have, a component along the axis."""
     share = ca.dot(couple, axis)
-    return not share.is_constant() or abs(float(share)) > _PARALLEL
+    return not share.is_constant() or abs(float(share)) > ROUNDING
 
 
 def constraint_measure(machine: Machine, state: State) -> Expression:
@@ -70,8 +68,9 @@ def constraint_measure(machine: Machine, state: State) -> Expression:
     It is the volume that the couples span, each of length 1 or less, over the largest: det R of as
     many couples as turns, with its sign, else the root of det R^T R.
     """
-    if machine.robot.platform.tilts:
-        return machine.platform.constraint(state.platform)
+    measure = machine.platform.constraint(state.platform)
+    if measure is not None:
+        return measure
     rows = constraint_rows(machine, state)
     if rows is None:
         return ca.SX.nan()
@@ -79,10 +78,6 @@ def constraint_measure(machine: Machine, state: State) -> Expression:
     if count < turns:
         return ca.SX(0)
     if count == turns:
-        return _determinant(rows)
-    volume = ca.fmax(_determinant(ca.mtimes(rows.T, rows)), 0)
+        return determinant(rows)
+    volume = ca.fmax(determinant(ca.mtimes(rows.T, rows)), 0)
     return ca.sqrt(volume) / (count / turns) ** (0.5 * turns)
-
-
-def _determinant(m: Expression) -> Expression:
-    return determinant(m) if m.shape[0] <= 4 else ca.det(m)

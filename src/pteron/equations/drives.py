@@ -121,6 +121,17 @@ def drive_accelerations(
     drive_loads = drive_forces(drives, *joint_motion(state), smooth=True)
     load = ca.mtimes(rows.T, forces - drive_loads) + generalized_wrench(machine, state, wrench)
     load -= generalized_forces(machine, state, parameters)
-    mass = mass_matrix(machine, pose, parameters)
-    mass += ca.mtimes(rows.T, ca.mtimes(ca.diag(drives.inertia), rows))
+    mass = mass_with_rotors(machine, pose, parameters, rows, drives.inertia)
     return solve_positive_definite(mass, load)
+
+
+def mass_with_rotors(
+    machine: Machine,
+    pose: Expression,
+    parameters: Expression,
+    rows: Expression,
+    rotors: Expression,
+) -> Expression:
+    """Return M + J^T D J (m, m), D being the rotors' inertias (n, 1) at the joints, J `rows`."""
+    mass = mass_matrix(machine, pose, parameters)
+    return mass + ca.mtimes(rows.T, ca.mtimes(ca.diag(rotors), rows))

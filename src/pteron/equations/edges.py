@@ -37,7 +37,7 @@ def edges(machine: Machine, pose: Expression) -> list[Edge]:
             Edge(i, cause, "", margin) for cause, margin in leg_equations.edges(c).items()
         ]
         if leg.limits is not None:
-            limit_edges = leg_equations.within_limits(c, motion.coordinate, *leg.limits)
+            limit_edges = leg_equations.limit_margins(c, motion.coordinate, *leg.limits)
             limits += [
                 Edge(i, cause, leg.joint.noun, margin) for cause, margin in limit_edges.items()
             ]

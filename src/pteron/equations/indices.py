@@ -62,7 +62,7 @@ def point_jacobian(machine: Machine, state: State) -> Expression:
     """
     if not machine.platform.angles():
         return homogeneous(machine, state).matrix
-    if machine.robot.platform.tilts:
+    if machine.platform.axis_angle is None:
         return _point_jacobian_in_space(machine, state)
     first, *_ = arms = lever_arms(machine, state)
     # Relative to the first point, so that coincident points differ by exactly zero.
@@ -242,7 +242,7 @@ def pressure_angle(machine: Machine, state: State) -> Expression:
     for leg in state.legs:
         if not leg.pushes:
             continue
-        place = leg.chain.index(leg.driven)
+        place = leg.chain.index(leg.actuated_joint)
         joint, next_joint = leg.chain[place : place + 2]
         direction = joint.axis
         if joint.kind == "R":

@@ -45,7 +45,10 @@ def passive_joints(machine: Machine, pose: Expression) -> list[list[Passive]]:
         for name, limits in platform.angle_limits.items()
     ]
     pairs = zip(machine.robot.legs, state.legs, strict=True)
-    return [angles, *(leg.passive(motion, base_axes, platform_axes) for leg, motion in pairs)]
+    return [
+        angles,
+        *(leg.passive_joints(motion, base_axes, platform_axes) for leg, motion in pairs),
+    ]
 
 
 def _platform_radius(machine: Machine) -> Expression:

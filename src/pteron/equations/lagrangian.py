@@ -26,7 +26,7 @@ def mass_matrix(machine: Machine, pose: Expression, parameters: Expression) -> E
     for rides, bodies in zip((leg.rides for leg in machine.legs), legs, strict=True):
         point_masses.append(sum((bodies[k].m for k in rides), none))
         bodies |= {k: bodies[k]._replace(m=none) for k in rides}
-    moments = machine.platform.carrying(inertia, point_masses)
+    moments = machine.platform.add_point_masses(inertia, point_masses)
     total = machine.platform.mass_matrix(platform, moments)
     for leg, bodies, matrix in zip(state.legs, legs, platform.matrices, strict=True):
         at_c = sum(motion.mass_matrix(body, bodies[k]) for k, body in leg.bodies.items())
@@ -80,7 +80,7 @@ def forward_dynamics(
 
 def generalized_wrench(machine: Machine, state: State, wrench: Expression) -> Expression:
     """Return the generalized forces (m, 1), along the pose, of a wrench on the platform."""
-    return state.platform.pose_forces(machine.platform.applied(state.platform, wrench))
+    return state.platform.pose_forces(machine.platform.generalized_forces(state.platform, wrench))
 
 
 def solve_positive_definite(matrix: Expression, right: Expression) -> Expression:

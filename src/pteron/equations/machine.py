@@ -110,14 +110,14 @@ class Machine:
         Joint forces are the same; the platform's points are constant, which saves operations. None
         where it saves none.
         """
-        platform_in_axes = self.platform.in_own_axes(pose)
+        platform_in_axes = self.platform.change_to_platform_axes(pose)
         if platform_in_axes is None:
             return None
         platform, axes = platform_in_axes
         legs = tuple(
             leg_in_axes
             for leg in self.legs
-            if (leg_in_axes := leg.along(axes, pose[:3])) is not None
+            if (leg_in_axes := leg.change_frame(axes, pose[:3])) is not None
         )
         if len(legs) < len(self.legs):
             return None

@@ -104,7 +104,7 @@ def equilibrium(machine: Machine, state: State, parameters: Expression) -> Equil
         ca.vertcat(ca.SX(0, 6 * count), *(row for row, _ in presumed)),
         ca.vertcat(ca.SX(0, 1), *(constant for _, constant in presumed)),
         tuple(legs),
-        machine.platform.applied(platform, ca.SX.eye(machine.wrench_size)),
+        machine.platform.generalized_forces(platform, ca.SX.eye(machine.wrench_size)),
         *driven_parts,
     )
 
@@ -190,8 +190,10 @@ def _freedom_component(motion: LegMotion, leg_forces: LegForces, k: int) -> _Row
 
 def _actuator_row(motion: LegMotion, leg_forces: LegForces) -> _Row:
     """Return the actuator force: that along the driven joint's freedom, over its gear ratio."""
-    row, constant = _freedom_component(motion, leg_forces, motion.chain.index(motion.driven))
-    return row / motion.driven.gear, constant / motion.driven.gear
+    row, constant = _freedom_component(
+        motion, leg_forces, motion.chain.index(motion.actuated_joint)
+    )
+    return row / motion.actuated_joint.gear, constant / motion.actuated_joint.gear
 
 
 def _passive_joint_rows(

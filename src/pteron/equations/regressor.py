@@ -61,7 +61,9 @@ def terms(machine: Machine, state: State) -> RegressorTerms:
     for i in with_slider:
         leg = state.legs[i]
         acceleration = leg.bodies[slider].acceleration
-        forces[i] = ca.dot(leg.driven.axis, machine.gravity - acceleration)  # Eq. (14), m_p = 1
+        forces[i] = ca.dot(
+            leg.actuated_joint.axis, machine.gravity - acceleration
+        )  # Eq. (14), m_p = 1
     places = [(i, link) for link in links for i in range(n) if link in state.legs[i].bodies]
     jacobians = [body_jacobian(state, i, link) for i, link in places]
     matrices = [wrench_matrix(state.legs[i].bodies[link], machine.gravity) for i, link in places]

@@ -17,12 +17,11 @@ from typing import NamedTuple
 import casadi as ca
 
 from pteron.bodies.motion import Expression
-from pteron.equations.drives import Drives, dry_friction, joint_motion
+from pteron.equations.drives import Drives, dry_friction, joint_motion, mass_with_rotors
 from pteron.equations.kinematics import jacobian
 from pteron.equations.lagrangian import (
     generalized_wrench,
     ldl_factors,
-    mass_matrix,
     solve_positive_definite,
     substitute_backward,
     substitute_forward,
@@ -133,12 +132,10 @@ def stick_slip_rates(
         breakaway = sliding * ca.SX([float(not has_bristles) for has_bristles in kind.lugre])
         friction = -sides.side * breakaway
     pull = ca.vertcat(*outputs.motor_forces) - drives.viscous * rates - drives.offset + friction
-    inertia = rigid * drives.inertia
     load = rigid * (pull - drives.inertia * drift) + ca.vertcat(*outputs.transmission_forces)
     load = ca.mtimes(rows.T, load) + generalized_wrench(machine, state, wrench)
     load -= generalized_forces(machine, state, parameters)
-    mass = mass_matrix(machine, pose, parameters)
-    mass += ca.mtimes(rows.T, ca.mtimes(ca.diag(inertia), rows))
+    mass = mass_with_rotors(machine, pose, parameters, rows, rigid * drives.inertia)
     lower, pivots = ldl_factors(mass)
     acceleration = substitute_backward(lower, substitute_forward(lower, load) / pivots)
     motor_growth = (

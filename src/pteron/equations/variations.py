@@ -20,6 +20,7 @@ from pteron.equations.machine import number_places, numbers
 from pteron.errors import ModelError
 from pteron.legs import LegKind
 from pteron.manipulator import Manipulator
+from pteron.tolerances import ROUNDING
 
 Array = NDArray[np.float64]
 
@@ -31,9 +32,6 @@ AXIAL = ("radius", "angles")
 
 _TRIAL_AMOUNT = 1e-3
 """Amount, m or rad, by which each variation is tried; one that is no valid machine is left out."""
-
-_PARALLEL = 1e-9
-"""Difference from 1 of the cosine up to which a direction lies along an axis."""
 
 _AXES = ("x", "y", "z")
 
@@ -120,7 +118,7 @@ def _turns(robot: Manipulator, leg: int, key: str, direction: Sequence[float]) -
     """Return the rotations of a direction, except one about itself, which changes nothing."""
     axis_cosines = np.abs(np.array(robot.platform.frame) @ direction)
     rotations = [Variation(leg, key, axis, "directions") for axis in range(3)]
-    turns = [v for v, a in zip(rotations, axis_cosines, strict=True) if a < 1.0 - _PARALLEL]
+    turns = [v for v, a in zip(rotations, axis_cosines, strict=True) if a < 1.0 - ROUNDING]
     turns = [v for v in turns if _possible(robot, v)]
     if len(turns) == 3:
         del turns[int(axis_cosines.argmax())]

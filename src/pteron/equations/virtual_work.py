@@ -13,6 +13,7 @@ import casadi as ca
 
 from pteron.bodies.motion import Expression
 from pteron.equations.machine import Machine, State
+from pteron.legs.leg import Needs
 
 
 def inverse_dynamics(
@@ -31,7 +32,7 @@ def inverse_dynamics(
     """
     joints, load = needed_forces(machine, state, parameters, carried)
     if wrench is not None:
-        load = load - machine.platform.applied(state.platform, wrench)
+        load = load - machine.platform.generalized_forces(state.platform, wrench)
     forces = machine.closure.forces(load, state.platform, state.legs)
     return joints + forces  # Eq. (13), Contribution 2, Section 4
 
@@ -57,13 +58,17 @@ def needed_forces(
     platform = state.platform
     needs = [
         leg.needs(point, platform.rotation, machine.gravity, bodies)
+        if bodies
+        else Needs.zeros(parameters.shape[1])
         for leg, point, bodies in zip(machine.legs, platform.points, legs, strict=True)
     ]
     if carried:
-        inertia = machine.platform.carrying(inertia, [leg.mass for leg in needs])
+        inertia = machine.platform.add_point_masses(inertia, [leg.mass for leg in needs])
     else:
         trios = zip(machine.legs, platform.points, needs, strict=True)
-        needs += [leg.riding(point, machine.gravity, need.mass) for leg, point, need in trios]
+        needs += [
+            leg.point_mass_needs(point, machine.gravity, need.mass) for leg, point, need in trios
+        ]
     load = machine.platform.needs(platform, machine.gravity, inertia)
     joints = ca.SX(len(machine.legs), parameters.shape[1])
     for k, need in enumerate(needs):

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     )
     from pteron.export.fmu import export_fmu as export_fmu
     from pteron.export.functions import FUNCTIONS as FUNCTIONS
+    from pteron.export.installed import export_named as export_named, export_names as export_names
     from pteron.export.linuxcnc import export_linuxcnc as export_linuxcnc
     from pteron.export.printers import (
         export_klipper as export_klipper,

@@ -199,7 +199,7 @@ def export_casadi(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
         "prefix": prefix,
         "coordinates": robot.platform.coordinates,
         "units": dict.fromkeys(robot.units),
-        "tilts": robot.platform.tilts,
+        "in_base_axes": robot.platform.wrench_in_base_axes,
         "functions": {name: str(function) for name, function in functions.items()},
         "casadi": ca.__version__,
         "driven": has_drives(robot),

@@ -45,15 +45,16 @@ def port_meaning(robot: Manipulator, port: Port, output: Output) -> str:
     pose = ", ".join(f"{', '.join(names)} in {unit}" for names, unit in kinds)
     rates, seconds = (", ".join(f"{unit}/{per}" for _, unit in kinds) for per in ("s", "s^2"))
     moment = ", N m about k" if platform.angles else ""
-    wrench = "force, N, and moment about it, N m, in base axes" if platform.tilts else f"N{moment}"
+    in_base_axes = "force, N, and moment about it, N m, in base axes"
+    wrench = in_base_axes if platform.wrench_in_base_axes else f"N{moment}"
     joints_words = (
         "what the drives read of the joints" if has_readings(robot) else "joint coordinates"
     )
     center = "its centre of mass in the platform's frame: x, y, z in m"
-    if platform.slides:
+    if platform.carries_on_axis:
         center = "not looked at: what a platform that slides carries is on its axis"
-    about = "about its own centre of mass, kg m^2"
-    inertia = f"Ixx, Ixy, Ixz, Iyy, Iyz, Izz {about}" if platform.tilts else f"I {about}, along k"
+    inertia = f"{', '.join(platform.inertia_names)} about its own centre of mass, kg m^2"
+    inertia += "" if len(platform.inertia_names) > 1 else ", along k"
     if not platform.angles:
         center, inertia = (f"{text}; forces do not depend on it" for text in (center, inertia))
     words = {

@@ -258,7 +258,7 @@ def _meanings(
             for key in makers.keys() & meanings
         }
     if request.controller:
-        meanings |= law_meanings(request.controller.what, meanings)
+        meanings |= law_meanings(request.controller.law_name, meanings)
     elif {"pose", "joints"} <= taken:
         meanings["pose"] = f"near that of the joints, such as the last: {meanings['pose']}"
     return meanings
@@ -278,12 +278,12 @@ def _table(
     if isinstance(controller, Custom):
         values = controller.law(robot).numbers[f"law_{name}"].ravel()
         names = tuple(f"{name}_{k}" for k in range(1, len(values) + 1))
-        return NumberTable(f"{controller.what}_{name}", TEXTS["tables"]["own"], names, values)
+        return NumberTable(f"{controller.law_name}_{name}", TEXTS["tables"]["own"], names, values)
     comment = TEXTS["tables"][name]
     if name == "gains":
         assert controller is not None
         law = controller.law(robot)
-        return NumberTable(f"{controller.what}_gains", comment, law.gain_names, law.gains)
+        return NumberTable(f"{controller.law_name}_gains", comment, law.gain_names, law.gains)
     if name == "drives":
         return NumberTable(name, comment, drive_names(robot), drive_numbers(robot))
     if base is not None:

@@ -170,10 +170,7 @@ def _words(robot: Manipulator, pose: Array, forces: Array) -> dict[str, list[_Wo
             for i, (leg, force) in legs
         ],
         "wrench": list(_wrench(platform)),
-        "center": [
-            {"name": x}
-            for x in ("xyz" if platform.tilts else "xy" if platform.rotation_axes else "")
-        ],
+        "center": [{"name": x} for x in platform.payload_axes],
         "inertia": list(_inertia(platform)),
         "drives": list(_drives(robot)),
     }
@@ -185,7 +182,7 @@ def _fmi_unit(unit: str) -> str:
 
 def _wrench(platform: Platform) -> Iterator[_Words]:
     """Yield each part of a wrench: its name, its unit and along what it does work."""
-    if not platform.tilts:
+    if not platform.wrench_in_base_axes:
         for name, unit in zip(platform.coordinates, platform.units, strict=True):
             yield {"name": name, "unit": "N.m" if unit == "rad" else "N", "along": name}
         return
@@ -197,8 +194,8 @@ def _wrench(platform: Platform) -> Iterator[_Words]:
 
 def _inertia(platform: Platform) -> Iterator[_Words]:
     """Yield the parts of a payload's inertia that matter where the platform turns."""
-    if platform.tilts:
-        for pair in ("xx", "xy", "xz", "yy", "yz", "zz"):
+    if len(platform.inertia_names) > 1:
+        for pair in (name.removeprefix("I") for name in platform.inertia_names):
             least = {"least": 0.0} if pair[0] == pair[1] else {}
             yield {"name": pair, "told": f"I{pair} about its own centre", **least}
     elif platform.angles:

@@ -83,8 +83,8 @@ def exported_functions(
     identified = None if base is None else read_identified(robot, base)
     robot = identified.robot if identified else robot
     requested = [] if functions is None else choice_list(functions)
-    named = {item.what: item for item in requested if not isinstance(item, str)}
-    names = [item if isinstance(item, str) else item.what for item in requested]
+    named = {item.law_name: item for item in requested if not isinstance(item, str)}
+    names = [item if isinstance(item, str) else item.law_name for item in requested]
     custom = {name for name, item in named.items() if isinstance(item, Custom)}
     if functions is None:
         names = _usual_names(robot, usual, identified, specialised)

@@ -48,7 +48,7 @@ _THEIRS = (
 
 _LETTERS = dict.fromkeys(("roll", "rx", "alpha"), "A") | dict.fromkeys(("pitch", "ry", "beta"), "B")
 _LETTERS |= dict.fromkeys(("yaw", "rz"), "C") | {"x": "X", "y": "Y", "z": "Z"}
-"""Axes of LinuxCNC for the coordinates of platforms that tilt."""
+"""Axes of LinuxCNC for coordinates; phi has that of its axis."""
 
 
 @dataclass(frozen=True)
@@ -127,7 +127,7 @@ class _TurnedArm:
         places = {name: k for k, name in enumerate(platform.coordinates)}
         # A tripod's yaw, which is none of the pose, does not move the tool along its z.
         chain = platform_joints(platform, pose)
-        turns = [(j.axis, places[j.name]) for j in chain if not j.slides and j.name in places]
+        turns = [(j.axis, places[j.name]) for j in chain if not j.is_prismatic and j.name in places]
         *_, upright = frame = np.array(platform.frame)
         zero = np.array(platform.tool) @ frame
         return cls(zero, tuple(reversed(turns)), upright, platform.directions)
@@ -180,7 +180,6 @@ def export_linuxcnc(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
     robot = remove_readings(machine)  # LinuxCNC converts them itself, by SCALE and HOME_OFFSET
     prefix = prefix_of(robot)
     closed = closure_of(robot).closed_form
-    closed = closed and not robot.platform.tilts  # whose poses are many, and the last one is near
     names = ("inverse_kinematics", "direct_kinematics" if closed else "direct_step")
     exported = exported_functions(
         robot, names, specialised=True, wrench=False, output="force", base=None
@@ -189,7 +188,7 @@ def export_linuxcnc(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
     home = start_pose(robot)
     axes, joints = linuxcnc_axes(robot), tuple(_joints(machine, home))
     platform, seen = robot.platform, home.copy()
-    seen[~platform.angular] += platform.directions @ (platform.tool @ platform.at(home)[1])
+    seen[~platform.angular] += platform.directions @ (platform.tool @ platform.placement(home)[1])
     tilted = _TurnedArm.from_platform(platform, home) if platform.tilts else None
     arm = None if tilted else _Arm.from_platform(platform)
     places = {a.letter: f"{a.scale * at:.6f}" for a, at in zip(axes, seen, strict=True)}
@@ -205,9 +204,9 @@ def export_linuxcnc(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
         "freedom": robot.freedom,
         "modes": exported[1].outputs[0].shape[0] if closed else 0,
         "lengths": len(platform.lengths),
-        "free": bool(robot.wraps.any()) and not platform.tilts,
+        "free": platform.turning_axis is not None and bool(robot.wraps.any()),
         "places": [places.get(letter, "0") for letter in "XYZABC"],
-        "planar": platform.planar,
+        "planar": platform.plane_normal is not None,
         "arm": arm if tilted is None else bool(platform.lengths),
         "tilted": tilted,
         "points": [
@@ -250,21 +249,16 @@ def _linear(robot: Manipulator) -> bool:
 
 def linuxcnc_axes(robot: Manipulator) -> tuple[LinuxCncAxis, ...]:
     """Return the axes of LinuxCNC that the pose's coordinates are."""
-    letters = iter("XYZ")
     axes = []
     for name, unit in zip(robot.coordinates, robot.units, strict=True):
-        if robot.platform.tilts:
+        if name in _LETTERS:
             letter, angle = _LETTERS[name], unit == "rad"
             field = letter.lower() if angle else f"tran.{letter.lower()}"
             axes.append(LinuxCncAxis(letter, field, name, _DEGREES if angle else _MILLIMETRES))
             continue
-        if unit == "m":
-            letter = next(letters)
-            axes.append(LinuxCncAxis(letter, f"tran.{letter.lower()}", name, _MILLIMETRES))
-            continue
         axis = np.array(robot.platform.axis)
         place = int(np.abs(axis).argmax())
-        aligned = np.abs(axis[place]) > 1.0 - 1e-12 and not robot.platform.planar
+        aligned = np.abs(axis[place]) > 1.0 - 1e-12 and robot.platform.plane_normal is None
         letter = "ABC"[place] if aligned else "C"
         sign = float(np.sign(axis[place])) if aligned else 1.0
         axes.append(LinuxCncAxis(letter, letter.lower(), name, sign * _DEGREES))

@@ -17,9 +17,7 @@ from pteron.equations.machine import Machine
 from pteron.kernels import Array, Graph, Program
 from pteron.kernels.graph import CONSTANT, INPUT, expression
 from pteron.platforms.coordinates import are_angles
-
-_SAME = 1e-12
-"""Relative difference below which two values are the same quantity."""
+from pteron.tolerances import EXACT
 
 NamedQuantity = tuple[str, int, Expression]
 """A name, the leg (from 1) whose quantity it is, or 0, and a scalar or a vector."""
@@ -89,7 +87,7 @@ def _motion(machine: Machine, pose: Expression, *rates: Expression) -> Iterator[
     for i, (equations, leg, point) in enumerate(
         zip(machine.legs, state.legs, platform.points, strict=True), start=1
     ):
-        quantities = equations.named(point, platform.rotation) | {
+        quantities = equations.exported_terms(point, platform.rotation) | {
             "l_u": leg.links[0],
             "l_l": leg.links[1],
             "joint": leg.coordinate,
@@ -110,7 +108,7 @@ def _matches(values: Array, quantities: Array) -> dict[int, int]:
     places: dict[int, int] = {}
     for place, row in enumerate(quantities):
         if np.isfinite(row).all() and np.ptp(row) > 0.0:  # constants may be equal by chance
-            same = (np.abs(values - row) <= _SAME * np.abs(row)).all(axis=1)
+            same = (np.abs(values - row) <= EXACT * np.abs(row)).all(axis=1)
             for k in np.flatnonzero(same):
                 places.setdefault(int(k), place)
                 break

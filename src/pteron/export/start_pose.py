@@ -11,6 +11,7 @@ from pteron.kinematics import inverse_kinematics, random_poses
 from pteron.kinematics.evaluate import evaluate_unchecked
 from pteron.manipulator import Manipulator
 from pteron.workspace import home_pose
+from pteron.workspace.home import has_exact_home
 from pteron.workspace.margins import joint_distances
 
 _TYPE_I, _TYPE_II = 0.01, 0.001
@@ -31,7 +32,7 @@ def start_pose(robot: Manipulator) -> Array:
     ModelError
         If the machine has no such pose.
     """
-    if robot.platform.tilts or robot.home is not None:
+    if has_exact_home(robot):
         return home_pose(robot)
     poses = good_poses(robot)
     if len(poses) == 0:

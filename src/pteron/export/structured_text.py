@@ -105,7 +105,7 @@ def export_st(
     direct = "closure_poses" if closure_of(robot).closed_form else "direct_step"
     names = None if functions is None else choice_list(functions)
     if names is not None:
-        controllers = [function.what for function in names if isinstance(function, Custom)]
+        controllers = [function.law_name for function in names if isinstance(function, Custom)]
         if controllers:
             raise ModelError(
                 f"functions: {controllers[0]}, a Custom controller, can be exported as C alone: "

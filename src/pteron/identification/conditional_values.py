@@ -7,12 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from pteron.kernels import Array
+from pteron.tolerances import EXACT
 
 _ROUNDS = 5
 """Times, at most, that values below zero are set to zero and the others follow."""
-
-_ROUNDING = 1e-12
-"""Singular values of a correlation matrix, relative, that are rounding."""
 
 
 def conditional_shift(covariance: Array, places: Sequence[int], shift: Array) -> Array:
@@ -26,7 +24,7 @@ def conditional_shift(covariance: Array, places: Sequence[int], shift: Array) ->
     size = np.sqrt(np.maximum(np.diag(covariance), np.finfo(float).tiny))
     correlation = covariance / np.outer(size, size)
     block = correlation[np.ix_(chosen, chosen)]
-    pull = np.linalg.lstsq(block, shift / size[chosen], rcond=_ROUNDING)[0]
+    pull = np.linalg.lstsq(block, shift / size[chosen], rcond=EXACT)[0]
     moved = size * (correlation[:, chosen] @ pull)
     moved[chosen] = shift
     return np.asarray(moved)

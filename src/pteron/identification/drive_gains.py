@@ -22,6 +22,8 @@ from pteron.json_values import fields_as_json
 from pteron.kernels import Array
 from pteron.manipulator import RobotLike, as_manipulator
 from pteron.reduction import BaseParameters
+from pteron.result import Result
+from pteron.tolerances import LAST_DIGITS
 
 _UNSEEN = 1e-10
 """Singular value, relative to the largest, below which gains cannot be told from inertia."""
@@ -33,12 +35,9 @@ _SETTLED = 1e-3
 """Change of the predicted currents, over the residuals, below which an iteration is the last
 one."""
 
-_ROUNDING = 1e-13
-"""Change of the predicted currents, over the currents, that counts as rounding."""
 
-
-@dataclass(frozen=True)
-class DriveGains:
+@dataclass(frozen=True, eq=False, repr=False)
+class DriveGains(Result):
     """Gains g of the drives: force_i = g_i current_i.
 
     Attributes
@@ -63,6 +62,8 @@ class DriveGains:
     gap : float
         Ratio of the smallest to the second smallest: 0 without noise, 1 where noise hides it all.
     """
+
+    ROWS = "gains deviations residual"
 
     gains: Array
     deviations: Array
@@ -264,7 +265,7 @@ def _fit_likelihood(
         values = values + step
         change = np.linalg.norm(tangent @ step)
         residual = np.linalg.norm(observations.forces - inverse * force)
-        if change <= max(_SETTLED * residual, _ROUNDING * np.linalg.norm(observations.forces)):
+        if change <= max(_SETTLED * residual, LAST_DIGITS * np.linalg.norm(observations.forces)):
             break
         if iteration == _ITERATIONS:
             raise observations.fault(

@@ -20,6 +20,7 @@ from pteron.identification.observation import (
 )
 from pteron.identification.plausibility import unphysical
 from pteron.identification.signals import Preprocessing
+from pteron.tolerances import ROOT_OF_ROUNDING
 
 DECISIVE = 3.0
 """Factor by which mending must reduce the error of the fit for a fault to count as found."""
@@ -29,10 +30,6 @@ _EXPLAINED = 0.3
 
 _ALIKE = 1.2
 """Error of a fit, over the least one, up to which it explains the forces as well."""
-
-_ROUNDING = 1e-7
-"""Error relative to the forces that counts as zero: the root of the rounding, some 1e-15, of a
-difference of squares."""
 
 _ROWS = 4000
 """Rows of the observations, at least, to which longer ones are thinned."""
@@ -139,12 +136,12 @@ def column_fault(model: Model, log: Log, preprocessing: Preprocessing) -> Column
     candidates += _other_faults(none, model, log, plain, error)
     faults = [replace(fault, before=error) for fault, _, _ in candidates]
     least = min(fault.after for fault in faults)
-    limit = _ALIKE * max(least, _ROUNDING)
-    if not max(least, _ROUNDING) * DECISIVE < error:
+    limit = _ALIKE * max(least, ROOT_OF_ROUNDING)
+    if not max(least, ROOT_OF_ROUNDING) * DECISIVE < error:
         # Forces that no order explains say nothing about signs.
         if error > _EXPLAINED:
             return None
-        limit = _ALIKE * max(error, _ROUNDING)
+        limit = _ALIKE * max(error, ROOT_OF_ROUNDING)
     alike = [k for k, fault in enumerate(faults) if fault.after <= limit]
     alike = sorted(alike, key=lambda k: (faults[k].changes, faults[k].after))[:_LOOKED_INTO]
     states = {k: _unphysical(faults[k], *candidates[k][1:]) for k in alike}

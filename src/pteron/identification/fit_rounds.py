@@ -161,7 +161,7 @@ def _run_round(task: FitTask, equations: FitEquations, *, fits_delay: bool) -> F
     of_log = find_log_faults()
     with append_findings(motions.recordings):
         _check_log(task, fit, trusted=trusted, distorted=_distort(of_log))
-    task.report("Looking for faults", 0, 0)
+    task.steps.report("Looking for faults")
     faults = _isolate(task, fit)
     if faults.matters and not _distort(of_log):
         of_log = find_log_faults(doubtful=True)

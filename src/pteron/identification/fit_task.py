@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -24,13 +25,21 @@ from pteron.identification.result import reflected_inertia
 from pteron.identification.signals import Preprocessing, Processing
 from pteron.legs import Drive
 from pteron.manipulator import Manipulator
+from pteron.progress import Steps
 from pteron.reduction import base_parameters
 from pteron.reduction.sharing import Sharing
 
 Logs = Log | LogFile | Sequence[Log | LogFile]
 
-Stage = Callable[[str, int, int], None]
-"""A callback of progress: it gets the step, the number of its rows done, and of all its rows."""
+STEPS = {
+    "Reading": 2.0,
+    "Filtering": 3.0,
+    "Checking": 1.0,
+    "Looking for faults": 2.0,
+    "Predicting": 1.0,
+    "Finding real bodies": 1.0,
+}
+"""The steps of an identification, and about how their times compare."""
 
 
 @dataclass(frozen=True)
@@ -79,8 +88,8 @@ class FitTask:
         The estimator's name, or a function from observations to an estimate.
     processing : Processing
         Choices about derivatives and filters.
-    report : callable
-        The callback of progress.
+    steps : Steps
+        What reports the progress.
     """
 
     robot: Manipulator
@@ -89,16 +98,17 @@ class FitTask:
     rotors: tuple[tuple[float, float], ...] | None
     estimator: str | Callable[[Observations], Estimate]
     processing: Processing
-    report: Stage
+    steps: Steps
 
     @property
     def known_rotors(self) -> dict[str, float]:
         """The inertia that known rotors add at the joints, by name; kg or kg m^2."""
         return reflected_inertia(self.rotors)
 
-    def with_progress(self, recordings: Sequence[Recording], stage: str) -> list[Recording]:
-        """Return recordings that report how many of their rows a stage has read."""
-        return [replace(log, tell=_row_counter(self.report, stage)) for log in recordings]
+    def with_progress(self, recordings: Sequence[Recording], step: str) -> list[Recording]:
+        """Return recordings that report which share of their rows a step has read."""
+        count_rows = _row_counter(self.steps, step, sum(log.rows for log in recordings))
+        return [replace(log, tell=count_rows) for log in recordings]
 
     def observe(
         self,
@@ -123,30 +133,28 @@ def read_task(
     shared: Sharing,
     estimator: str | Callable[[Observations], Estimate],
     processing: Processing,
-    report: Stage,
+    steps: Steps,
 ) -> FitTask:
     """Return what is to be fitted, with recordings that are read and checked; see `identify`."""
-    motions = _read_motions(robot, logs, held_out, processing, report)
+    motions = _read_motions(robot, logs, held_out, processing, steps)
     base = base_parameters(robot, shared=shared)
     rotors = _motor_data(robot, motions.fit)
     known_rotors = replace(terms or Terms(), rotors=True) if rotors else terms
     model = identification_model(robot, known_rotors, base=base)
     if model.terms.payload:
         check_payload(motions.fit)
-    return FitTask(robot, motions, model, rotors, estimator, processing, report)
+    return FitTask(robot, motions, model, rotors, estimator, processing, steps)
 
 
 def _read_motions(
-    robot: Manipulator, logs: Logs, held_out: Logs, processing: Processing, report: Stage
+    robot: Manipulator, logs: Logs, held_out: Logs, processing: Processing, steps: Steps
 ) -> Motions:
     """Return the recordings, checked; without held-out logs the end of each recording is."""
-    count_rows = _row_counter(report, "Reading")
+    groups = [logs_in_newtons(group, robot) for group in (logs, held_out)]
+    rows = sum(Recording(log, 0, sys.maxsize).rows for group in groups for log in group)
+    count_rows = _row_counter(steps, "Reading", rows)
     recordings, separate = (
-        [
-            read_recording(log, count_rows, processing.period)
-            for log in logs_in_newtons(group, robot)
-        ]
-        for group in (logs, held_out)
+        [read_recording(log, count_rows, processing.period) for log in group] for group in groups
     )
     check_recordings(robot, recordings, separate, processing)
     originals = _originals(logs)
@@ -173,14 +181,15 @@ def _originals(logs: Logs) -> list[Log]:
     return [log if isinstance(log, Log) else next(iter(log.pieces())) for log in several]
 
 
-def _row_counter(report: Stage, stage: str) -> Callable[[int], None]:
-    """Return a function that adds rows to those done, and reports their number for a stage."""
+def _row_counter(steps: Steps, step: str, total: int) -> Callable[[int], None]:
+    """Return a function that adds rows to those done, and reports the step's share of all."""
     done = 0
+    steps.report(step)
 
     def count_rows(rows: int) -> None:
         nonlocal done
         done += rows
-        report(stage, done, done)
+        steps.report(step, done / max(total, 1))
 
     return count_rows
 

@@ -15,9 +15,7 @@ from pteron.identification.consistency import Bounds, Consistency, MissingSolver
 from pteron.identification.fit_rounds import FittedValues
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
-
-_SINGULAR = 1e-12
-"""Least eigenvalue of a correlation matrix, over its greatest: below it rounding makes them."""
+from pteron.tolerances import EXACT
 
 
 @dataclass(frozen=True)
@@ -79,7 +77,7 @@ def _make_positive(covariance: Array) -> Array:
     """
     size = np.sqrt(np.maximum(np.diag(covariance), np.finfo(float).tiny))
     values, vectors = np.linalg.eigh(covariance / np.outer(size, size))
-    least = _SINGULAR * values[-1]
+    least = EXACT * values[-1]
     if values[0] >= least:
         return covariance
     lifted = (vectors * np.maximum(values, least)) @ vectors.T

@@ -28,7 +28,7 @@ from pteron.identification.faults.assumptions import find_contradiction, hidden_
 from pteron.identification.faults.fault import is_half
 from pteron.identification.faults.log_faults import delay_fault
 from pteron.identification.fit_rounds import FitRound, FittedValues, fit_in_rounds
-from pteron.identification.fit_task import FitTask, Logs, Stage, logs_in_newtons, read_task
+from pteron.identification.fit_task import STEPS, FitTask, Logs, logs_in_newtons, read_task
 from pteron.identification.fitted_bodies import FittedBodies, fit_real_bodies
 from pteron.identification.fitting import METHODS, append_findings
 from pteron.identification.model import Terms
@@ -46,6 +46,7 @@ from pteron.identification.signals import Processing, preprocessing_for_log
 from pteron.identification.verdict import verdict_of, with_bodies, with_hidden_first
 from pteron.legs import Drive
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.progress import Progress, Steps
 from pteron.reduction.sharing import Sharing
 from pteron.verdict import Verdict
 
@@ -64,7 +65,7 @@ def identify(
     processing: Processing | None = None,
     cad: RobotLike | Literal["robot"] | None = "robot",
     bounds: Bounds | None = None,
-    progress: Stage | None = None,
+    progress: Progress | None = None,
 ) -> Identification:
     """Identify a machine from recorded motions.
 
@@ -96,7 +97,7 @@ def identify(
     bounds : Bounds, optional
         Limits that the bodies are known to keep.
     progress : callable, optional
-        Called with the step, the number of its rows done, and of all its rows.
+        Takes the share of the work that is done, a `Share` with the name of its step.
 
     Raises
     ------
@@ -119,9 +120,11 @@ def identify(
             shared=shared,
             estimator=estimator,
             processing=processing or Processing(),
-            report=progress or (lambda task, done, total: None),
+            steps=Steps(progress, STEPS),
         )
-        return _judge_fit(task, fit_in_rounds(task), drawn, bounds)
+        identification = _judge_fit(task, fit_in_rounds(task), drawn, bounds)
+        task.steps.end()
+        return identification
     except (DataError, ModelError) as error:
         # No pose, or values that are no machine's: an assumption of its file may be wrong.
         because = _refusal_cause(robot, logs, processing or Processing(), error)
@@ -160,7 +163,7 @@ def _judge_fit(
         delay = delay_fault(unknowns.delay, unknowns.delay_deviation)
         last = replace(last, log_faults=(*last.log_faults, delay))
     fitted = _predict_fitted(task, fit)
-    task.report("Finding real bodies", 0, 0)
+    task.steps.report("Finding real bodies")
     essential = _fit_essential(task, fit)
     with append_findings(motions.recordings):
         bodies = fit_real_bodies(fit, drawn, bounds)

@@ -25,15 +25,13 @@ from pteron.kinematics.evaluate import evaluate_unchecked
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.reduction import BaseParameters, base_parameters, base_regressor
 from pteron.renamed import former_attribute
+from pteron.tolerances import ROUNDING
 
 Passive = Literal["none", "shared", "each"]
 """Viscous friction in the passive joints: none, one coefficient a kind of joint, or one each."""
 
 _PROBES = 200
 """Random states at which columns are tested for dependence."""
-
-_DEPENDENT = 1e-9
-"""Residual of a column on those before it, relative to it, below which it depends on them."""
 
 
 @checked_arguments
@@ -335,7 +333,7 @@ def _independent(model: Model) -> Model:
     factor: Array = np.linalg.qr(columns)[1]
     # The diagonal of R is what is left of each column once those before it are taken out of it.
     remainders = np.abs(np.diag(factor))
-    dependent = [k for k in range(model.base.rank, len(names)) if remainders[k] < _DEPENDENT]
+    dependent = [k for k in range(model.base.rank, len(names)) if remainders[k] < ROUNDING]
     independent = [k for k in range(len(names)) if k not in dependent]
     joins = {}
     for k in dependent:
@@ -344,7 +342,7 @@ def _independent(model: Model) -> Model:
         joins[names[k]] = {
             names[j]: float(share)
             for j, share, size in zip(independent, coefficients, shares, strict=True)
-            if abs(size) > _DEPENDENT
+            if abs(size) > ROUNDING
         }
     return replace(model, joins=joins)
 

@@ -23,6 +23,7 @@ from pteron.kernels import Array
 from pteron.manipulator import Manipulator
 from pteron.motion.trajectories.fourier import fourier_basis
 from pteron.renamed import former_attribute
+from pteron.result import Result
 
 
 class LinearModel(Protocol):
@@ -56,8 +57,8 @@ _ROWS = ("matrix", "forces", "time", "gain", "payload")
 """Fields of observations with an entry for each row."""
 
 
-@dataclass(frozen=True)
-class Observations(OfLog):
+@dataclass(frozen=True, eq=False, repr=False)
+class Observations(OfLog, Result):
     """Rows of F = W beta, after the parallel filter.
 
     Rows are divided by the filter's gain for white noise: the residuals of a fit have the standard
@@ -82,6 +83,8 @@ class Observations(OfLog):
     kinds : tuple of str
         Kinds of the values, as `Model.kinds`; empty where they are not known.
     """
+
+    ROWS = "time forces:1 matrix:2 payload"
 
     names: tuple[str, ...]
     units: tuple[str, ...]

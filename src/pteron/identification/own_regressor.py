@@ -28,6 +28,7 @@ from pteron.identification.recordings import FITTED
 from pteron.identification.signals.filters import white_noise
 from pteron.identification.verdict import verdict_of
 from pteron.kernels import Array
+from pteron.result import Result
 from pteron.verdict import Verdict
 
 _LEAST_ROWS = 9
@@ -37,8 +38,8 @@ _ESTIMATORS = (*ESTIMATORS, "instrumental")
 """Estimators by name."""
 
 
-@dataclass(frozen=True)
-class RegressorFit:
+@dataclass(frozen=True, eq=False, repr=False)
+class RegressorFit(Result):
     """The values of a model with a regressor of the user's own, and a verdict on them.
 
     Attributes
@@ -55,11 +56,17 @@ class RegressorFit:
         The independent columns, if `reduce` was given.
     """
 
+    ROWS = "estimate"
+
     estimate: Estimate
     essential: Essential
     held_out: Prediction
     verdict: Verdict
     reduced: Reduced | None = None
+
+    def __repr__(self) -> str:
+        """Return the fit in a line."""
+        return f"<RegressorFit: {len(self.estimate.values)} values, {self.verdict.grade}>"
 
 
 def estimate(

@@ -42,6 +42,7 @@ from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.payload import with_payload
 from pteron.reduction import BaseParameters
 from pteron.renamed import former_attribute
+from pteron.result import Result
 
 if TYPE_CHECKING:
     from pteron.identification.result import Identification
@@ -53,8 +54,8 @@ _BOTH = frozenset(f"{name}_L" for name in LENGTH_POWERS)
 """Names of a payload's values: m_L, mgx_L, mgy_L, I_L, and those under a platform that tilts."""
 
 
-@dataclass(frozen=True)
-class Payload:
+@dataclass(frozen=True, eq=False, repr=False)
+class Payload(Result):
     """The inertia of a payload, about the platform's point P, the origin of the platform's frame.
 
     Attributes
@@ -221,8 +222,8 @@ class Payload:
         return fields_as_json(
             self,
             "mass first_moment inertia center_of_mass central_inertia names",
-            "standard_deviations=deviations covariance felt real residual trial=fault_isolation",
-            "findings",
+            "standard_deviations=deviations covariance felt=is_significant real residual",
+            "trial=fault_isolation findings",
         )
 
     carried_by = former_attribute("carried_by", "add_to")

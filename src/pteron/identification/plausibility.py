@@ -21,16 +21,19 @@ from pteron.kinematics import random_poses
 from pteron.kinematics.evaluate import evaluate_unchecked
 from pteron.manipulator import Manipulator, parameters
 from pteron.reduction import BaseParameters, base_regressor
+from pteron.tolerances import SAME
 
 _PROBES = 50
-"""Random poses at which kinetic energy must be positive."""
+"""Random poses at which kinetic energy must be positive: an energy that is negative at a tenth of
+the poses is missed once in 200 times."""
 
 _NO_FORCES = 1e4
 """Standard deviation of a base parameter, over its usual size, beyond which the forces are not the
 machine's."""
 
 _FAR_ABOVE = 5.0
-"""Residuals, over the forces' noise, from which the model is not the machine's."""
+"""Residuals, over the forces' noise, from which the model is not the machine's: friction that the
+model does not know, and elasticity, leave up to three times the noise in logs of built machines."""
 
 _FAR = 0.5
 """Difference from the drawn machine, over a base parameter's usual size, from which a warning is
@@ -44,10 +47,11 @@ _APART = 1.5
 """Least common factor, or its inverse, that is a wrong scale rather than a bad drawing."""
 
 _LEAST_SHARE = 0.02
-"""Least usual size of a parameter, as a share of its body's mass and length."""
+"""Least usual size of a parameter, as a share of its body's mass and length: a centre of mass is
+seldom nearer to the middle of a link than a fiftieth of its length."""
 
 _CERTAIN = 3.0
-"""Standard deviations by which energy is certainly below zero."""
+"""Standard deviations by which energy is certainly below zero: by chance once in 700 times."""
 
 _NOTABLE = 0.1
 """Energy below zero, over that of the machine as drawn, from which it counts: without noise the
@@ -65,9 +69,6 @@ _FRICTION = ("coulomb", "viscous", "passive")
 _POSITIVE = ("coulomb", "viscous", "passive", "rotor")
 """Terms that no machine has below zero."""
 
-_ROUNDING = 1e-6
-"""Difference of two rotors' inertia, over the largest, that is rounding of numbers in a file."""
-
 CHANCE = 1e-3
 """Probability below which infeasible values, or a payload's, are not chance."""
 
@@ -78,7 +79,8 @@ WANTED = 0.05
 """Share of the forces, or of the weight, that a log must be able to tell."""
 
 _USUAL_ERROR = 0.02
-"""Error of a payload's mass, or of a rotor's inertia, that is usual."""
+"""Error of a payload's mass, or of a rotor's inertia, that is usual: kitchen scales and data sheets
+are as good."""
 
 
 def plausibility_warnings(
@@ -209,7 +211,7 @@ def known_values(
         if (payload := recording.head().description.payload) is not None:
             kinds = model.robot.platform.inertia.kinds
             values |= zip((f"{kind}_L" for kind in kinds), payload.values, strict=True)
-    least = _ROUNDING * max(map(abs, rotors.values()), default=0.0)
+    least = SAME * max(map(abs, rotors.values()), default=0.0)
     return {
         name: value for name, value in values.items() if name in model.names and abs(value) > least
     }

@@ -16,6 +16,7 @@ from pteron.identification.signals import Preprocessing, samples
 from pteron.json_values import fields_as_json
 from pteron.kernels import Array
 from pteron.renamed import former_attribute
+from pteron.result import Result
 
 _KEPT = 6000
 """Samples, about, that are kept for pictures."""
@@ -37,8 +38,8 @@ FRICTION = ("coulomb", "viscous", "stribeck", "offset")
 """Kinds of values that are not the rigid bodies'."""
 
 
-@dataclass(frozen=True)
-class Prediction:
+@dataclass(frozen=True, eq=False, repr=False)
+class Prediction(Result):
     """A model's prediction of the forces of a recording, at its own samples.
 
     Samples of a joint that hardly moves are left out, and those next to them in which its direction
@@ -73,6 +74,8 @@ class Prediction:
     used : array of bool, shape (S, n)
         Whether they count.
     """
+
+    ROWS = "time measured:1 predicted:1 without_friction:1 speed:1"
 
     source: str
     samples: int
@@ -125,7 +128,7 @@ class Prediction:
             "rms_error_of_all_samples=error_of_all nrms_percent=nrms",
             "robust_nrms_percent=robust_nrms outliers",
             "nrms_percent_without_friction=nrms_without_friction",
-            "noise_floor_percent=floor unexplained_percent=unexplained",
+            "noise_floor_percent=floor unexplained_percent=unexplained_error",
         )
 
     unexplained = former_attribute("unexplained", "unexplained_error")

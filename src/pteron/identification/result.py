@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from pteron.html_table import Column, html_table
+from pteron.html_table import Column, Overview
 from pteron.identification.conditional_values import conditional_values
 from pteron.identification.consistency import Consistency
 from pteron.identification.estimators import Essential, Estimate
@@ -25,11 +25,12 @@ from pteron.legs import Drive, Stribeck
 from pteron.manipulator import Manipulator
 from pteron.manipulator.machine_record import machine_record
 from pteron.renamed import former_attribute
+from pteron.result import Result
 from pteron.verdict import Verdict
 
 
-@dataclass(frozen=True, repr=False)
-class Identification:
+@dataclass(frozen=True, eq=False, repr=False)
+class Identification(Result):
     """A machine as identified from logs.
 
     Attributes
@@ -68,6 +69,8 @@ class Identification:
         also where it is that of forces held from sample to sample.
     """
 
+    ROWS = "estimate"
+
     robot: Manipulator
     model: Model
     estimate: Estimate
@@ -92,7 +95,7 @@ class Identification:
         grade, known = self.verdict.grade, len(self.estimate.values)
         return f"<Identification of {self.robot.name!r}: {known} values, {grade}>"
 
-    def _repr_html_(self) -> str:
+    def _overview(self) -> Overview:
         from pteron.identification.names_in_html import html_expressions
 
         drawn = [*self.model.base.values(self.robot).tolist()]
@@ -113,7 +116,11 @@ class Identification:
             Column("unit"),
         ]
         about = f"identified, {self.verdict.grade}"
-        return html_table(self.robot.name, about, columns, rows, self.verdict.reasons)
+        return Overview(self.robot.name, about, columns, [*rows], self.verdict.reasons)
+
+    def summary(self) -> str:
+        """Return the verdict with its reasons and advice, for people, as lines of text."""
+        return f"{self.robot.name}: {self.verdict.summary()}"
 
     @property
     def causes(self) -> tuple[str, ...]:
@@ -254,7 +261,7 @@ class Identification:
             "machine": machine_record(self.robot),
             **fields_as_json(self, "verdict"),
             "expressions": [*expressions],
-            **fields_as_json(self.model, "kinds left_out"),
+            **fields_as_json(self.model, "kinds left_out=merged_terms"),
             "base_parameters": {
                 "names": list(base.names),
                 "expressions": list(base.expressions(digits=12)),

@@ -16,6 +16,7 @@ from pteron.kernels import Array
 from pteron.legs import Drive, Elastic
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.renamed import former_attribute
+from pteron.result import Result
 from pteron.shapes import PerJoint
 
 _BLOCKS = 25
@@ -36,8 +37,8 @@ _ACROSS = 2e-3
 """Share of a change of side by which a filtered one may be off."""
 
 
-@dataclass(frozen=True)
-class Transmissions:
+@dataclass(frozen=True, eq=False, repr=False)
+class Transmissions(Result):
     """Transmissions between motors and joints: load = stiffness bent + damping bent'.
 
     Attributes
@@ -50,6 +51,8 @@ class Transmissions:
         is one of stiffness and damping beside these, and filters and coarse encoders add tenths of
         a percent, to damping some percents.
     """
+
+    ROWS = "stiffness damping backlash stiffness_deviations damping_deviations backlash_deviations"
 
     stiffness: PerJoint
     damping: PerJoint

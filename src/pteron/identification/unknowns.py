@@ -25,18 +25,22 @@ from pteron.identification.observation import LinearModel, Observations, scale_c
 from pteron.identification.signals import States
 from pteron.identification.signals.preprocessing import LATEST
 from pteron.kernels import Array
+from pteron.tolerances import ROUNDING
 
 _SLOWEST, _FASTEST = 3e-3, 3.0
-"""Least and greatest speed of the search, over each joint's root mean square speed."""
+"""Least and greatest speed of the search, over each joint's root mean square speed: friction that
+falls at slower speeds is dry friction to the data, at faster ones viscous."""
 
 _COLUMNS = 24
-"""Speeds of the grid whose columns are computed."""
+"""Speeds of the grid whose columns are computed: 1.35 times the one before, over which a column
+changes smoothly enough for interpolation."""
 
 _FINE = 200
 """Speeds that are tried, with columns interpolated between those."""
 
 _ROUNDS = 8
-"""Most rounds through the joints one by one, and most steps on exact columns."""
+"""Most rounds through the joints one by one, and most steps on exact columns: joints influence each
+other little, and `_SETTLED` ends the iteration before."""
 
 _CLEAR = 30.0
 """Least increase of twice the log-likelihood for Stribeck's friction of a joint to count as
@@ -47,9 +51,6 @@ _STEP = 0.5
 
 _SETTLED = 0.02
 """Step, in standard deviations, below which the iteration ends."""
-
-_ROUNDING = 1e-9
-"""Step that never matters: s, or of a speed's logarithm."""
 
 _TWO_SIDED = 1.959963984540054
 """Standard deviations of an interval of 95 %."""
@@ -148,7 +149,7 @@ def fit_nonlinear_terms(
             unknowns = replace(unknowns, speeds=speeds.copy(), speed_deviations=spread)
         if late:
             unknowns = replace(unknowns, delay_deviation=float(deviations[-1]))
-        if not (np.abs(step) > np.maximum(_SETTLED * deviations, _ROUNDING)).any():
+        if not (np.abs(step) > np.maximum(_SETTLED * deviations, ROUNDING)).any():
             break
         if speeds is not None:
             speeds[seen] *= np.exp(np.clip(step[: len(seen)], -_STEP, _STEP))

@@ -23,6 +23,8 @@ from pteron.kernels import Array, as_array
 from pteron.kinematics import twist
 from pteron.kinematics.evaluate import evaluate_kernel, finite_rows
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.renamed import former_attribute
+from pteron.result import Result
 from pteron.shapes import Matrices, Numbers, OnFailure, PerCoordinate, PoseLike
 
 _GAUSS = 0.5 - 0.5 / np.sqrt(3.0), 0.5 + 0.5 / np.sqrt(3.0)
@@ -32,8 +34,8 @@ _FREE = 1e-12
 """Compliance to a self-stress, as a share of the largest, below which it counts as none."""
 
 
-@dataclass(frozen=True)
-class Stiffness:
+@dataclass(frozen=True, eq=False, repr=False)
+class Stiffness(Result):
     """Compliance of a machine under a load at its tool, while the actuators hold their joints.
 
     Attributes
@@ -47,6 +49,8 @@ class Stiffness:
     lengths : int
         Number of the rows of C, the first ones, that are lengths.
     """
+
+    ROWS = "compliance:2 frequencies:1"
 
     compliance: Matrices
     frequencies: PerCoordinate
@@ -65,7 +69,8 @@ class Stiffness:
         if freedom < size:
             raise ModelError(
                 f"matrix: a platform of {freedom} freedoms does not give way in {size - freedom} "
-                "others, so that the compliance has no inverse; use compliance, least or along"
+                "others, so that the compliance has no inverse; use compliance, least or "
+                "directional_stiffness"
             )
         return np.linalg.inv(self.compliance)
 
@@ -76,7 +81,7 @@ class Stiffness:
             return np.asarray(1.0 / self._principal_compliances[..., -1])
 
     @property
-    def most(self) -> Numbers:
+    def greatest(self) -> Numbers:
         """The same in the best direction."""
         with np.errstate(divide="ignore"):
             return np.asarray(1.0 / np.maximum(self._principal_compliances[..., 0], 0.0))
@@ -89,7 +94,7 @@ class Stiffness:
         eigenvalues = np.linalg.eigvalsh(np.where(known[..., None, None], part, 0.0))
         return np.asarray(np.where(known[..., None], eigenvalues, np.nan))
 
-    def along(self, direction: ArrayLike) -> Numbers:
+    def directional_stiffness(self, direction: ArrayLike) -> Numbers:
         """Return force over the tool's displacement along a direction (..., k), N/m.
 
         Raises
@@ -107,6 +112,9 @@ class Stiffness:
             return np.asarray(
                 1.0 / np.einsum("...i,...ij,...j", u, self.compliance[..., :k, :k], u)
             )
+
+    most = former_attribute("most", "greatest")
+    along = former_attribute("along", "directional_stiffness")
 
 
 def stiffness(
@@ -168,7 +176,7 @@ def stiffness(
         np.concatenate(part).reshape((*poses.shape[:-1], *part[0].shape[1:]))
         for part in zip(*parts, strict=True)
     )
-    lengths = 3 if robot.platform.tilts else len(robot.platform.lengths)
+    lengths = sum(name.startswith("f") for name in robot.platform.wrench_columns)
     return Stiffness(compliance, frequencies, lengths)
 
 
@@ -183,16 +191,18 @@ def _block_compliance(
     )
     link_lines: tuple[Array, ...] = evaluate_kernel(robot, "beams", "nan", poses)
     mass: Array = mass_matrix(robot, poses, on_failure="nan")
-    size = 6 if robot.platform.tilts else m
+    size = len(robot.platform.wrench_columns)
     compliance, frequencies = np.full((batch, size, size), np.nan), np.full((batch, m), np.nan)
     solvable = np.asarray(np.isfinite(outputs[0]).all(axis=(-2, -1)))
     if solvable.any():
         balance = Equations(*(array[solvable] for array in outputs))
         beams = [array[solvable] for array in link_lines]
-        energy = _energy_matrix(elasticity.of_legs(robot), elasticity.rod_distance, balance, beams)
+        energy = _energy_matrix(
+            elasticity.leg_springs(robot), elasticity.rod_distance, balance, beams
+        )
         point_compliance = _compliance(robot, balance, energy, np.zeros((len(energy), 3)))
         compliance[solvable] = point_compliance
-        if robot.platform.tilts:
+        if robot.platform.wrench_in_base_axes:
             twists = twist(robot, poses[solvable][:, None], np.eye(m)).mT
             size_of_legs = float(np.mean([leg.size for leg in robot.legs]))
             point_compliance = np.stack(
@@ -236,7 +246,7 @@ def _compliance(robot: Manipulator, balance: Equations, energy: Array, arm: Arra
 def _unit_loads(robot: Manipulator, balance: Equations, arm: Array) -> tuple[Array, Array]:
     """Return unit loads at a point: about P (B, 6, K), and against the freedoms (B, m, K)."""
     batch, m = len(arm), robot.freedom
-    if robot.platform.tilts:
+    if robot.platform.wrench_in_base_axes:
         load = wrench_shift(arm)
         return load, balance.loads @ load
     wrench = np.broadcast_to(np.eye(m), (batch, m, m)).copy()  # a row for each unit load

@@ -14,6 +14,7 @@ from pteron.indices.evaluation import evaluate
 from pteron.kernels import as_array, numeric
 from pteron.kinematics.evaluate import finite_pose
 from pteron.manipulator import RobotLike, as_manipulator
+from pteron.result import Result
 from pteron.shapes import PoseLike, Seed
 from pteron.workspace import bounding_box
 from pteron.workspace.margins import distance_to_limits
@@ -22,8 +23,8 @@ _GROUPS = 16
 """Independent scrambled sequences of poses, whose spread gives the standard error."""
 
 
-@dataclass(frozen=True)
-class GlobalConditioning:
+@dataclass(frozen=True, eq=False, repr=False)
+class GlobalConditioning(Result):
     """The mean of 1 / c over poses in reach.
 
     Attributes

@@ -10,6 +10,7 @@ from pteron.arguments import checked_arguments
 from pteron.bodies.vectors import number
 from pteron.errors import ModelError
 from pteron.manipulator import Manipulator
+from pteron.renamed import former_attribute
 
 
 def _positive_number(name: str, size: Any) -> float:
@@ -145,12 +146,14 @@ class Elasticity:
                 self, "rod_distance", _positive_number("rod_distance", self.rod_distance)
             )
 
-    def of_legs(self, robot: Manipulator) -> Springs:
+    def leg_springs(self, robot: Manipulator) -> Springs:
         """Return the actuators' stiffness and the sections of both links, for each leg."""
         actuators, upper, lower = (
             self._repeat_for_legs(robot, name) for name in ("actuators", "upper", "lower")
         )
         return actuators, tuple(zip(upper, lower, strict=True))
+
+    of_legs = former_attribute("of_legs", "leg_springs")
 
     def _repeat_for_legs(self, robot: Manipulator, name: str) -> tuple[Any, ...]:
         setting = getattr(self, name)

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from pteron.indices.index import expect_index
+import numpy as np
+from numpy.typing import NDArray
+
+from pteron.indices.index import Index, expect_index, function_values
+from pteron.kernels import Array, as_array
 from pteron.kinematics.evaluate import evaluate_kernel
-from pteron.manipulator import RobotLike, as_manipulator
+from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import Numbers, OnFailure, PoseLike
 
 
 def evaluate(
-    robot: RobotLike, name: str, poses: PoseLike, *, on_failure: OnFailure = "nan"
+    robot: RobotLike, name: str | Index, poses: PoseLike, *, on_failure: OnFailure = "nan"
 ) -> Numbers:
     """Return an index of performance at poses; `INDICES` says what each one means.
 
@@ -19,8 +23,8 @@ def evaluate(
     ----------
     robot : Manipulator, name or path
         The machine.
-    name : str
-        Name of the index, one of `indices_of(robot)`.
+    name : str or Index
+        Name of the index, one of `indices_of(robot)`; or an `Index` of one's own, with a function.
     poses : array, shape (..., m)
         The poses, m and rad.
     on_failure : {"nan", "raise"}
@@ -50,5 +54,20 @@ def evaluate(
     array([2.414,   nan])
     """
     robot = as_manipulator(robot)
-    expect_index(robot, name)
-    return evaluate_kernel(robot, name, on_failure, poses)
+    index = expect_index(robot, name)
+    if index.function is None:
+        return evaluate_kernel(robot, index.name, on_failure, poses)
+    joints: Array = evaluate_kernel(robot, "inverse_kinematics", on_failure, poses)
+    array = as_array(poses, "pose", (robot.freedom,), columns=robot.coordinates)
+    in_reach = np.asarray(~np.isnan(joints).any(axis=-1))
+    return values_in_reach(robot, index, array, in_reach)[()]
+
+
+def values_in_reach(
+    robot: Manipulator, index: Index, poses: Array, in_reach: NDArray[np.bool_]
+) -> Array:
+    """Return what an index's own function gives at poses (..., m); NaN at those out of reach."""
+    values = np.full(poses.shape[:-1], np.nan)
+    if in_reach.any():
+        values[in_reach] = function_values(robot, index, poses[in_reach])
+    return values

@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.resources import files
 from tomllib import loads
-from typing import Literal
+from typing import Any, Literal
 
-from pteron.errors import DataError, ModelError
+import numpy as np
+
+from pteron.errors import DataError, ModelError, shorten
+from pteron.extensions import extension_names, extension_value, load_extension
+from pteron.kernels import Array
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+
+GROUP = "pteron.indices"
+"""The group of entry points by which installed packages add indices."""
 
 
 @dataclass(frozen=True)
@@ -33,16 +41,27 @@ class Index:
         Whether it measures rotation: only platforms with an angle have it.
     moving : bool
         Whether it measures translation: only platforms with a length have it.
+    function : callable, optional
+        Of an index that is not Pteron's own: returns its values (N,) from a machine and poses
+        (N, m), all of them in reach.
+
+    Examples
+    --------
+    >>> from pteron.indices import Index, evaluate
+    >>> height = Index("height", "height", unit="m", function=lambda robot, poses: poses[:, 2])
+    >>> evaluate("tripteron", height, [[0.0, 0.1, 0.05]])
+    array([0.05])
     """
 
     name: str
     title: str
-    formula: str
-    source: str
-    unit: str
-    better: Literal["more", "less"]
+    formula: str = ""
+    source: str = ""
+    unit: str = ""
+    better: Literal["more", "less"] = "more"
     turning: bool = False
     moving: bool = True
+    function: Callable[[Manipulator, Array], Any] | None = None
 
     @property
     def label(self) -> str:
@@ -56,6 +75,25 @@ INDICES = {
     name: Index(name, **keys) for name, keys in loads(_TABLE.read_text(encoding="utf-8")).items()
 }
 """The indices by name."""
+
+
+def index_named(name: str) -> Index | None:
+    """Return the index of a name, of an installed package too; None if there is none.
+
+    Raises
+    ------
+    ModelError
+        If the package that has it cannot be imported, or has no `Index` of that name there.
+    """
+    if name in INDICES:
+        return INDICES[name]
+    index = load_extension(GROUP, name)
+    if index is not None and not (
+        isinstance(index, Index) and index.name == name and callable(index.function)
+    ):
+        value = extension_value(GROUP, name)
+        raise ModelError(f"{value} is no pteron.indices.Index {name!r} with a function")
+    return index
 
 
 def indices_of(robot: RobotLike) -> tuple[str, ...]:
@@ -77,7 +115,9 @@ def indices_of(robot: RobotLike) -> tuple[str, ...]:
     (False, True)
     """
     robot = as_manipulator(robot)
-    return tuple(index.name for index in INDICES.values() if not _missing_motion(robot, index))
+    installed = (index_named(name) for name in extension_names(GROUP) if name not in INDICES)
+    indices = [*INDICES.values(), *(index for index in installed if index is not None)]
+    return tuple(index.name for index in indices if not _missing_motion(robot, index))
 
 
 def _missing_motion(robot: Manipulator, index: Index) -> str:
@@ -89,12 +129,19 @@ def _missing_motion(robot: Manipulator, index: Index) -> str:
     return ""
 
 
-def expect_index(robot: RobotLike, name: str) -> Index:
+def expect_index(robot: RobotLike, name: str | Index) -> Index:
     """Return the index of that name, or refuse one that does not exist or suit the machine."""
     robot = as_manipulator(robot)
-    if name not in INDICES:
-        raise DataError(f"index: {name!r} is not known; choose from {', '.join(INDICES)}")
-    index = INDICES[name]
+    index = name if isinstance(name, Index) else index_named(name)
+    if index is None:
+        known = ", ".join(dict.fromkeys((*INDICES, *extension_names(GROUP))))
+        raise DataError(f"index: {name!r} is not known; choose from {known}")
+    if isinstance(name, Index):
+        name = index.name
+        if index.function is None and INDICES.get(name) != index:
+            raise DataError(f"index: {name!r} has no function; give one of the machine and poses")
+        if index.function is not None and name in INDICES:
+            raise DataError(f"index: {name!r} is the name of an index of Pteron; choose another")
     if missing := _missing_motion(robot, index):
         raise ModelError(
             f"index: {name!r} is about {missing.format(robot.platform.motion)}; choose from "
@@ -102,3 +149,22 @@ def expect_index(robot: RobotLike, name: str) -> Index:
             subject=robot.name,
         )
     return index
+
+
+def function_values(robot: Manipulator, index: Index, poses: Array) -> Array:
+    """Return what an index's own function gives at poses (N, m) in reach.
+
+    Raises
+    ------
+    DataError
+        If it returns something else than a real number for each pose.
+    """
+    assert index.function is not None
+    returned = index.function(robot, poses)
+    values = np.asarray(returned)
+    if values.shape != (len(poses),) or values.dtype.kind not in "biuf":
+        raise DataError(
+            f"index {index.name!r}: its function returns {shorten(returned)}; an array of "
+            f"{len(poses)} real numbers expected, one for each pose"
+        )
+    return values.astype(float)

@@ -111,15 +111,8 @@ def _range(projectors: Array) -> Array:
 
 def platform_wrench(robot: Manipulator, wrench: Array, moment: Array) -> Array:
     """Return the force and the moment at P (..., 6) of a wrench and of a moment beside it."""
-    count, platform = len(robot.platform.lengths), robot.platform
-    if platform.tilts:
-        return np.concatenate(np.broadcast_arrays(wrench[..., :3], wrench[..., 3:] + moment), -1)
-    force = wrench[..., :count] @ platform.directions
-    turning_moment = np.zeros(3)
-    if platform.rotation_axes:
-        turning_moment = wrench[..., platform.angular] @ np.array(platform.rotation_axes)
-    force, total_moment = np.broadcast_arrays(force, turning_moment + moment)
-    return np.concatenate([force, total_moment], axis=-1)
+    force, moment_of_wrench = robot.platform.force_and_moment(wrench)
+    return np.concatenate(np.broadcast_arrays(force, moment_of_wrench + moment), axis=-1)
 
 
 def wrench_shift(arms: Array) -> Array:

@@ -23,11 +23,13 @@ from pteron.indices.internal_forces import (
 from pteron.kernels import Array, as_array
 from pteron.kinematics.evaluate import evaluate_kernel, finite_rows
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.renamed import former_attribute
+from pteron.result import Result
 from pteron.shapes import OnFailure, PoseLike
 
 
-@dataclass(frozen=True)
-class Reactions:
+@dataclass(frozen=True, eq=False, repr=False)
+class Reactions(Result):
     """Forces and moments in the legs' joints: those of the base's side on the platform's side.
 
     Attributes
@@ -52,6 +54,8 @@ class Reactions:
         tilt the platform count over the legs' mean size. It is 0 where they hold all of it.
     """
 
+    ROWS = "unheld actuators:1 forces:3 moments:3"
+
     names: tuple[tuple[str, ...], ...]
     points: Array
     forces: Array
@@ -62,9 +66,11 @@ class Reactions:
     unheld: Array
 
     @property
-    def unique(self) -> bool:
+    def is_unique(self) -> bool:
         """Whether statics alone determine the reactions."""
         return self.redundancy == 0
+
+    unique = former_attribute("unique", "is_unique")
 
 
 def reactions(

@@ -13,6 +13,7 @@ from pteron.indices.sensitivities import geometric_sensitivities, tool_pose_chan
 from pteron.kernels import Array
 from pteron.kinematics.evaluate import evaluate_kernel, finite_rows
 from pteron.manipulator import RobotLike, as_manipulator
+from pteron.result import Result
 from pteron.shapes import Numbers, OnFailure, PerCoordinate, PoseLike
 
 
@@ -41,8 +42,8 @@ class Tolerances:
     named: Mapping[str, float] = field(default_factory=dict)
 
 
-@dataclass(frozen=True)
-class PoseError:
+@dataclass(frozen=True, eq=False, repr=False)
+class PoseError(Result):
     """Errors of the tool's pose.
 
     Attributes
@@ -59,6 +60,8 @@ class PoseError:
     parts : array, shape (..., m, p)
         The error of each to first order; the sign is that of a positive error.
     """
+
+    ROWS = "position worst:1 deviation:1"
 
     worst: PerCoordinate
     deviation: PerCoordinate

@@ -17,14 +17,13 @@ from pteron.kinematics import twist
 from pteron.kinematics.evaluate import evaluate_kernel, finite_rows
 from pteron.legs.kind import LegKind
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.result import Result
 from pteron.shapes import OnFailure, PoseLike
-
-_UPRIGHT = 1e-9
-"""Cosine of the angle below which two directions count as perpendicular."""
+from pteron.tolerances import ROUNDING
 
 
-@dataclass(frozen=True)
-class Sensitivities:
+@dataclass(frozen=True, eq=False, repr=False)
+class Sensitivities(Result):
     """Derivatives of the pose by a machine's dimensions.
 
     Attributes
@@ -42,11 +41,19 @@ class Sensitivities:
         The same, with the position of the tool's centre point.
     """
 
+    ROWS = "names roles units slopes:1"
+
     names: tuple[str, ...]
     roles: tuple[str, ...]
     units: tuple[str, ...]
     matrix: Array
     tool: Array
+
+    @property
+    def slopes(self) -> Array:
+        """The derivatives of `matrix`, shape (p, ... m): a row for each dimension."""
+        columns: Array = np.moveaxis(self.matrix, -1, 0)
+        return columns.reshape(len(self.names), -1)
 
 
 def geometric_sensitivities(
@@ -123,7 +130,7 @@ def _slopes(robot: Manipulator) -> ca.Function:
 
 def tool_arm(robot: Manipulator, poses: Array) -> Array:
     """Return the vector (..., 3) from P to the tool's centre point, base frame."""
-    _, axes = robot.platform.at(poses)
+    _, axes = robot.platform.placement(poses)
     return np.asarray(np.array(robot.platform.tool) @ axes)
 
 
@@ -133,7 +140,7 @@ def tool_pose_changes(robot: Manipulator, poses: Array, errors: Array) -> Array:
         return errors
     platform, turning = robot.platform, robot.platform.angular
     arm = tool_arm(robot, poses)
-    if platform.tilts:
+    if platform.axis_angle is None:
         turns = twist(robot, poses[..., None, :], np.eye(robot.freedom))[..., 3:]
         levers = np.cross(turns, arm[..., None, :]) @ platform.directions.T
     else:
@@ -150,7 +157,7 @@ _Dimension = tuple[str, str, str, Array]
 def _dimensions(robot: Manipulator) -> Iterator[_Dimension]:
     """Yield name, role, unit and d geometry of every dimension; `numbers` has the order."""
     size, start = len(numbers(robot)), 0
-    per_radian = "m/rad" if robot.platform.slides else "m"
+    point_unit = robot.platform.kind.point_unit
     for i, leg in enumerate(robot.legs, start=1):
         starts: dict[str, int] = {}
         for quantity in leg.quantities:
@@ -165,7 +172,7 @@ def _dimensions(robot: Manipulator) -> Iterator[_Dimension]:
                 direction[starts[key] : starts[key] + len(change)] = change
             unit = "rad" if role == "angle" else "m"
             if name.startswith("platform_point"):
-                unit = per_radian
+                unit = point_unit
             yield f"leg {i}: {name}", role, unit, direction
     yield from _platform_dimensions(robot)
 
@@ -205,7 +212,7 @@ def _leg_dimensions(leg: LegKind) -> Iterator[tuple[str, str, dict[str, tuple[fl
     if not directions:  # a ram's pose depends on points alone
         return
     first, *others = directions
-    tilted_along = [name for name, v in vectors.items() if abs(dot(v, vectors[first])) < _UPRIGHT]
+    tilted_along = [name for name, v in vectors.items() if abs(dot(v, vectors[first])) < ROUNDING]
     if leg.plane_normal is None:
         yield from _tilts(first, [first, *tilted_along], vectors)
     for name in others:

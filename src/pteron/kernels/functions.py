@@ -64,9 +64,8 @@ def _as_matrix(matrix: Expression) -> tuple[Expression, tuple[int, ...]]:
 
 def _set_payload(m: Machine, v: Symbols) -> Outputs:
     platform, inertial = m.robot.platform, v["parameters"]
-    # What a platform that slides carries is on its axis.
-    center = ca.SX(3, 1) if platform.slides else v["center"]
-    inertia = ca.vertsplit(v["inertia"])
+    on_axis, inertia = platform.carries_on_axis, ca.vertsplit(v["inertia"])
+    center = ca.SX(3, 1) if on_axis else v["center"]
     load = carried_values(type(platform.inertia), v["mass"], ca.vertsplit(center), inertia)
     start = inertial.shape[0] - len(load)  # the platform's are the last
     return {"loaded_parameters": ca.vertcat(inertial[:start], inertial[start:] + ca.vertcat(*load))}

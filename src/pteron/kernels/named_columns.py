@@ -40,19 +40,19 @@ def pick_columns(table: Any, columns: Sequence[str], name: str) -> Any:
     """
     if _has_labels(table):
         table = _columns_from_labels(table)
-    column_names = _names(table)
-    if not column_names:
+    names = column_names(table)
+    if not names:
         return table
     if not columns:
         raise DataError(
             f"{name}: a table with names given, an array expected, its columns in order: "
             "table[names].to_numpy()"
         )
-    if any(isinstance(column_name, tuple) for column_name in column_names):
+    if any(isinstance(column_name, tuple) for column_name in names):
         raise DataError(f"{name}: the table's columns have names of two levels; keep one")
-    if missing := [column for column in columns if column not in column_names]:
-        remaining = f" and {len(column_names) - _MANY} more" if len(column_names) > _MANY else ""
-        listed = ", ".join(shorten(column_name, bare=True) for column_name in column_names[:_MANY])
+    if missing := [column for column in columns if column not in names]:
+        remaining = f" and {len(names) - _MANY} more" if len(names) > _MANY else ""
+        listed = ", ".join(shorten(column_name, bare=True) for column_name in names[:_MANY])
         raise DataError(
             f"{name}: no column {', '.join(missing)} in a table of {listed}{remaining}; name its "
             "columns so, in SI units and radians, or give an array"
@@ -60,7 +60,7 @@ def pick_columns(table: Any, columns: Sequence[str], name: str) -> Any:
     if callable(numbers := getattr(table, "numbers", None)):
         return numbers(columns)
     for column in columns:
-        if column_names.count(column) > 1:
+        if names.count(column) > 1:
             raise DataError(f"{name}, column {column}: stands twice in the table; keep one")
     parts = [_column(table[column], f"{name}, column {column}") for column in columns]
     try:
@@ -70,7 +70,7 @@ def pick_columns(table: Any, columns: Sequence[str], name: str) -> Any:
         raise DataError(f"{name}: columns of different lengths: {shapes}") from None
 
 
-def _names(table: Any) -> list[str]:
+def column_names(table: Any) -> list[str]:
     """Return the names of a table's columns; [] for an argument without named columns."""
     if isinstance(table, np.ndarray):
         return list(table.dtype.names or ())

@@ -172,7 +172,8 @@ def _canonical_key(part_: Any) -> str | None:
     kind = type(part_)
     if not is_dataclass(part_) or not kind.__module__.startswith("pteron."):
         return None
-    parts = [_canonical_key(getattr(part_, field.name)) for field in fields(part_)]
+    compared = (field.name for field in fields(part_) if field.compare)
+    parts = [_canonical_key(getattr(part_, name)) for name in compared]
     return None if None in parts else f"{kind.__module__}.{kind.__qualname__}{parts}"
 
 

@@ -210,7 +210,7 @@ def _cached_geometry_only(robot: Manipulator) -> Manipulator:
         )
         for leg in robot.legs
     )
-    platform = robot.platform.with_joined(plain(robot.platform.joined))
+    platform = robot.platform.with_total_inertia(plain(robot.platform.total_inertia))
     return replace(robot, name="any", legs=legs, platform=platform, radii=None, tools=(), home=None)
 
 

@@ -22,8 +22,9 @@ from pteron.kinematics.jacobian_keys import alternatives, jacobian_keys
 from pteron.kinematics.modular_geometry import modular_geometry
 from pteron.kinematics.ram_figures import balance_of_rams
 from pteron.kinematics.ram_motions import self_motions_of_rams
-from pteron.kinematics.sampling import draw_poses, type_ii_sizes
+from pteron.kinematics.sampling import draw_poses, joints_limit_reach, type_ii_sizes
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.result import Result
 
 _VANISHING = 1e-10
 """Type-II measures, or singular values over the largest, below this are rounding."""
@@ -49,8 +50,8 @@ Proof = Literal["closed form", "exact arithmetic", "numerical", "one pose"]
 """Grounds on which a layout is known to be singular everywhere or, by one pose, not to be."""
 
 
-@dataclass(frozen=True)
-class Architecture:
+@dataclass(frozen=True, eq=False, repr=False)
+class Architecture(Result):
     """Properties of a machine's layout, whatever its pose.
 
     Attributes
@@ -189,7 +190,7 @@ def _poses(robot: Manipulator) -> Array:
     """Return some poses in reach, singular (type II) or not; an empty array if none is found."""
     try:
         # Limits, most of all those of short rams, leave few poses of a platform that tilts.
-        limits, rng = not robot.platform.tilts, np.random.default_rng(0)
+        limits, rng = not joints_limit_reach(robot), np.random.default_rng(0)
         return draw_poses(robot, _SAMPLES, rng, type_i=1e-3, limits=limits)
     except ModelError:
         return np.empty((0, robot.freedom))
@@ -237,7 +238,7 @@ def _reason(robot: Manipulator) -> str:
         )
     if _points_are_in_line(robot):
         where = " through P" if robot.platform.center else ""
-        where = where if robot.platform.tilts else " along the platform's axis"
+        where = " along the platform's axis" if robot.platform.turning_axis else where
         return f"all platform points lie on one line{where}, about which no force then has a moment"
     if balance := balance_of_rams(robot):
         return balance
@@ -263,15 +264,8 @@ def _reason(robot: Manipulator) -> str:
 
 def _points_are_in_line(robot: Manipulator) -> bool:
     """Return whether the platform turns about an axis through all its points, up to rounding."""
-    platform = robot.platform
-    if not robot.wraps.any() or (platform.tilts and len(platform.angles) < 3):
-        return False
     points = np.array([leg.platform_point for leg in robot.legs])
-    size = max(float(np.abs(points).max()), 1e-9)
-    if platform.tilts:
-        centred = points if platform.center else points - points.mean(axis=0)
-        return bool(np.linalg.svd(centred, compute_uv=False)[1] <= 1e-9 * size)
-    return bool(np.ptp(points[:, :2], axis=0).max() <= 1e-9 * size)
+    return bool(robot.wraps.any()) and robot.platform.has_points_in_line(points)
 
 
 def _always_free(rows: Array) -> Array | None:

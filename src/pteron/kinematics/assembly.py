@@ -33,6 +33,7 @@ from pteron.kinematics.evaluate import place
 from pteron.kinematics.tilting_assembly import tilting_poses
 from pteron.manipulator import Manipulator
 from pteron.platforms.coordinates import wrap_angle
+from pteron.tolerances import LAST_DIGITS, ROUNDING, SAME
 
 _BATCH = 4096
 """Rows of joint coordinates solved at a time."""
@@ -56,25 +57,16 @@ digits."""
 _LARGEST_RESIDUAL = 0.1
 """Largest relative residual of a closure from which Newton's method starts."""
 
-_ROUNDING = 1e-13
-"""Tolerance of a pose's residual: that of two coinciding modes within 1e-7 of their positions."""
-
 _STEPS = 20
 """Maximum number of Newton steps: they end where the residual no longer decreases."""
 
 _SPAN = np.pi
 """Scale of a sliding platform's angle, rad: phi = `_SPAN` tan(alpha)."""
 
-_DUPLICATE = 1e-6
-"""Distance of two poses, in rad and sizes of the machine, that may be duplicates."""
-
 _SEPARATION, _LEAST = 6.0, 2e-16
 """Factor and floor of the residual that separates two modes. Midway between two modes the residual
 is about a quarter of their squared distance: it must be this many times the residuals of both
 poses, and above rounding. It separates modes to some 1e-7 of the size."""
-
-_EQUAL = 1e-9
-"""Tolerance of equal coordinates, m or rad, in the order of poses."""
 
 
 def every_pose(robot: Manipulator, joints: Array, most: int) -> Array:
@@ -115,7 +107,7 @@ def _poses(robot: Manipulator, joints: Array, most: int) -> Array:
     which, points, phi = _points(_rows_at(rows[which], phi, slides), which, phi)
     starts = np.column_stack([origin[which] + size[which, None] * points, phi])
     which, poses, residuals = _refine_poses(robot, joints, which, starts)
-    around = robot.platform.angular & (not slides)
+    around = robot.platform.angular & bool(robot.platform.rotation_axes)
     poses[:, around] = wrap_angle(poses[:, around])
     same = _are_duplicates(robot, joints, which, poses, residuals, size)
     which, poses = which[~same], poses[~same]
@@ -239,7 +231,7 @@ def _refine_poses(
         if not len(active):
             break
         converged[active], residuals[active], poses[active] = tried, step_residuals[better], after
-    closed = residuals <= _ROUNDING
+    closed = residuals <= LAST_DIGITS
     return which[closed], converged[closed], residuals[closed]
 
 
@@ -257,11 +249,11 @@ def _are_duplicates(
     for back in range(1, int(count.max(initial=0)) + 1):
         later = np.flatnonzero(count >= back)
         difference = poses[later] - poses[later - back]
-        if not robot.platform.slides:
+        if robot.platform.rotation_axes:
             difference[:, -1] = wrap_angle(difference[:, -1])
         units = np.ones_like(difference)
         units[:, :-1] = size[which[later], None]
-        is_close = (np.abs(difference) < _DUPLICATE * units).all(axis=-1)
+        is_close = (np.abs(difference) < SAME * units).all(axis=-1)
         later, difference = later[is_close], difference[is_close]
         _, between, _ = numeric(robot, "newton_step")(
             joints[which[later]], poses[later] - 0.5 * difference
@@ -289,7 +281,7 @@ def sort_poses(poses: Array) -> Array:
 def _dense_ranks(coordinates: Array) -> NDArray[np.int64]:
     """Return dense ranks of coordinates (..., k); values equal up to rounding share one."""
     order = np.argsort(coordinates, axis=-1)
-    steps = ~(np.diff(np.take_along_axis(coordinates, order, axis=-1), axis=-1) <= _EQUAL)
+    steps = ~(np.diff(np.take_along_axis(coordinates, order, axis=-1), axis=-1) <= ROUNDING)
     ranks = np.zeros(coordinates.shape, dtype=np.int64)
     ranks[..., 1:] = np.cumsum(steps, axis=-1)
     np.put_along_axis(ranks, order, ranks.copy(), axis=-1)

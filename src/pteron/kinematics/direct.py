@@ -18,10 +18,7 @@ from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.manipulator.variants import with_elbows
 from pteron.platforms.coordinates import wrap_angle
 from pteron.shapes import JointsLike, OnFailure, PerJoint, PoseLike, Poses
-
-_SAME_JOINT = 1e-6
-"""Difference of joints, m or rad, up to which a pose reproduces them: far above rounding. A leg's
-other branch differs by more, but at a singularity, where both are one."""
+from pteron.tolerances import SAME
 
 
 def direct_kinematics(
@@ -246,4 +243,4 @@ def _same_joints(robot: Manipulator, joints: Array, other: Array) -> NDArray[np.
     cranks = np.array([leg.joint.unit == "rad" for leg in robot.legs])
     turn = 2.0 * np.pi
     differences = np.where(cranks, np.abs((differences + np.pi) % turn - np.pi), differences)
-    return np.asarray(differences <= _SAME_JOINT)
+    return np.asarray(differences <= SAME)

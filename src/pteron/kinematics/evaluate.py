@@ -18,11 +18,9 @@ from pteron.kinematics.architecture import is_singular_everywhere, singular_ever
 from pteron.kinematics.unlikely_values import warn_of_unlikely
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import OnFailure, PoseLike
+from pteron.tolerances import SAME
 
 _Outputs = TypeVar("_Outputs")
-
-_COINCIDENT = 1e-6
-"""Share of a leg's length within which its two ends count as coincident, in messages."""
 
 _TYPED: tuple[type, ...] = (list, tuple)
 """Types of poses that a person types; only these are checked for unlikely units."""
@@ -199,7 +197,7 @@ def _bad_pose(
             millimetres=far,
         )
     for i, leg in enumerate(robot.legs):
-        undetermined = bool(spread[i] <= _COINCIDENT * leg.size)
+        undetermined = bool(spread[i] <= SAME * leg.size)
         if type_i[i] <= TYPE_I and (needs != ("reach",) or undetermined):
             cause = (
                 "its two ends coincide, so that its elbow may be anywhere"

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pteron.kernels import Array
 from pteron.kinematics.evaluate import evaluate_kernel
 from pteron.manipulator import RobotLike
+from pteron.result import Result
 from pteron.shapes import OnFailure, PerJoint, PoseLike
 
 
@@ -39,8 +40,8 @@ def joint_screws(robot: RobotLike, pose: PoseLike, *, on_failure: OnFailure = "r
     return evaluate_kernel(robot, "joint_screws", on_failure, pose)
 
 
-@dataclass(frozen=True)
-class JointMotion:
+@dataclass(frozen=True, eq=False, repr=False)
+class JointMotion(Result):
     """Rates, or accelerations, of every joint.
 
     Attributes
@@ -55,6 +56,8 @@ class JointMotion:
         the leg; NaN for a joint that a leg does not have. Where d of a P-R-R-R leg is parallel to
         k, R3 and R4 are one joint: its motion is under R3, and R4 is 0.
     """
+
+    ROWS = "actuated:1 upper_links:1 lower_links:1 passive:2"
 
     actuated: PerJoint
     upper_links: PerJoint

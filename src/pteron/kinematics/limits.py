@@ -14,11 +14,12 @@ from pteron.kinematics.evaluate import finite_pose
 from pteron.legs.leg import Passive
 from pteron.manipulator import RobotLike, as_manipulator
 from pteron.renamed import former_attribute
+from pteron.result import Result
 from pteron.shapes import PoseLike
 
 
-@dataclass(frozen=True)
-class LimitedJoint:
+@dataclass(frozen=True, eq=False, repr=False)
+class LimitedJoint(Result):
     """A joint that has limits, and its coordinate in a pose.
 
     Attributes

@@ -15,6 +15,7 @@ import numpy as np
 from pteron.kernels import Array, numeric
 from pteron.kinematics.sampling import sample_poses, type_ii_sizes
 from pteron.manipulator import Manipulator
+from pteron.tolerances import ROUNDING
 
 _SAMPLE = 100
 """Poses in reach whose measures are taken: a tenth of them is 10, whose own deviation is 3."""
@@ -25,10 +26,6 @@ _USUAL = 0.1
 _SHARE = 0.1
 """Least share of poses in reach with the usual measure, so that it serves: drawing ten poses for
 one that is wanted is cheap. Of the catalog it is 0.25 and more."""
-
-_ROUNDING = 1e-9
-"""Share by which a measure may be below the median: one that is the same at every pose is so but
-for rounding."""
 
 
 class Floors(NamedTuple):
@@ -80,4 +77,4 @@ def _usual(measures: Array) -> float:
 def _median(measures: Array) -> float:
     """Return the median of measures above 0; 0 where there is none."""
     measures = measures[measures > 0.0]
-    return float(np.median(measures)) * (1.0 - _ROUNDING) if len(measures) else 0.0
+    return float(np.median(measures)) * (1.0 - ROUNDING) if len(measures) else 0.0

@@ -25,15 +25,12 @@ from pteron.kinematics.evaluate import (
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.platforms.nearest_pose import nearest_pose
 from pteron.shapes import Matrices, OnFailure, PerCoordinate, PoseLike, Vectors
+from pteron.tolerances import ROOT_OF_ROUNDING
 
 RotationForm = Literal["matrix", "quaternion", "tilt-torsion"]
 """The forms in which a rotation is written."""
 
 _SHAPES: dict[str, tuple[int, ...]] = {"matrix": (3, 3), "quaternion": (4,), "tilt-torsion": (3,)}
-
-_ROUNDING = 1e-7
-"""Difference, m, rad or their rates, up to which a position, rotation or twist that the platform
-cannot have counts as rounded: also in numbers of 32 bits."""
 
 
 def position_of(robot: RobotLike, pose: PoseLike) -> Vectors:
@@ -58,7 +55,7 @@ def position_of(robot: RobotLike, pose: PoseLike) -> Vectors:
     array([0.  , 0.  , 0.12])
     """
     robot = as_manipulator(robot)
-    return robot.platform.at(finite_rows(robot, pose, "pose"))[0]
+    return robot.platform.placement(finite_rows(robot, pose, "pose"))[0]
 
 
 def rotation_of(robot: RobotLike, pose: PoseLike, *, form: RotationForm = "matrix") -> Array:
@@ -89,7 +86,7 @@ def rotation_of(robot: RobotLike, pose: PoseLike, *, form: RotationForm = "matri
     """
     robot = as_manipulator(robot)
     _expect_form(form)
-    matrix = np.swapaxes(robot.platform.at(finite_rows(robot, pose, "pose"))[1], -1, -2)
+    matrix = np.swapaxes(robot.platform.placement(finite_rows(robot, pose, "pose"))[1], -1, -2)
     if form == "matrix":
         return np.ascontiguousarray(matrix)
     if form == "tilt-torsion":
@@ -152,10 +149,12 @@ def pose_of(
     skewed = np.abs(np.swapaxes(matrix, -1, -2) @ matrix - np.eye(3)).max(axis=(-1, -2))
     skewed = np.where(np.linalg.det(matrix) > 0.0, skewed, np.inf)
     pose = nearest_pose(robot.platform, positions, matrix)
-    nearest_position, axes = robot.platform.at(pose)
+    nearest_position, axes = robot.platform.placement(pose)
     distance = np.linalg.norm(nearest_position - positions, axis=-1)
     turned = np.linalg.norm(axes @ matrix - np.eye(3), axis=(-1, -2)) / np.sqrt(2.0)
-    good = (skewed <= _ROUNDING) & (distance <= _ROUNDING) & (turned <= _ROUNDING)
+    good = (
+        (skewed <= ROOT_OF_ROUNDING) & (distance <= ROOT_OF_ROUNDING) & (turned <= ROOT_OF_ROUNDING)
+    )
     if good.all():
         return pose
     if on_failure == "nan":
@@ -166,7 +165,7 @@ def pose_of(
         raise DataError(f"{place('position', index)}, rotation: finite numbers expected")
     if np.isnan(distance[index]):
         raise no_place(index)
-    if not skewed[index] <= _ROUNDING:
+    if not skewed[index] <= ROOT_OF_ROUNDING:
         raise DataError(
             f"{place('rotation', index)}: no rotation: its columns are no unit vectors at right "
             "angles that turn by the right hand"
@@ -266,7 +265,7 @@ def velocity_of(
     infeasible_sizes = [
         np.linalg.norm(part, axis=-1) for part in (infeasible[..., :3], infeasible[..., 3:])
     ]
-    size = _ROUNDING * np.maximum(1.0, np.abs(twists).max(axis=-1))
+    size = ROOT_OF_ROUNDING * np.maximum(1.0, np.abs(twists).max(axis=-1))
     known = robot.platform.angle_measures(poses) > ANGLES
     good = known & (infeasible_sizes[0] <= size) & (infeasible_sizes[1] <= size)
     if good.all():
@@ -342,7 +341,7 @@ def _frame_at_zero(robot: Manipulator) -> Array:
 def _difference_text(length: float, angle: float, per: str = "") -> str:
     """Return a phrase for a difference in length and angle, without parts that are rounding."""
     parts = [(length, f"{length:.3g} m{per}"), (angle, f"{angle:.3g} rad{per}")]
-    return " and ".join(text for size, text in parts if size > _ROUNDING)
+    return " and ".join(text for size, text in parts if size > ROOT_OF_ROUNDING)
 
 
 def _matrix(robot: Manipulator, rotations: Array, form: RotationForm) -> Array:

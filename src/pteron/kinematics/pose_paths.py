@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pteron.equations.pose_paths import Closed
+from pteron.errors import ModelError
 from pteron.kernels import Array
 from pteron.kernels.path_programs import path_kernel, rows_kernel
 from pteron.kinematics.pose_curves import ROUNDING, lie_on_curves, normalise_rows, second_slopes
@@ -77,8 +78,14 @@ class Generic(NamedTuple):
 @lru_cache
 def generic(closed: Closed) -> Generic:
     """Return the start machine of a kind of closures, from the file."""
+    key = key_of(closed)
     with np.load(FILE) as file:
-        return Generic(closed, *(file[f"{part} {key_of(closed)}"] for part in ("machine", "poses")))
+        if f"machine {key}" not in file:
+            raise ModelError(
+                f"direct_kinematics: there is no start machine of the kind {key} to follow poses "
+                'from; use "direct_step" from a pose that is near'
+            )
+        return Generic(closed, file[f"machine {key}"], file[f"poses {key}"])
 
 
 def key_of(closed: Closed) -> str:

@@ -50,7 +50,7 @@ def ram_figures(robot: Manipulator) -> tuple[Array, Array] | None:
 
     None for any other machine, and where all points of a figure coincide.
     """
-    if len(robot.platform.angles) < 3 or not robot.platform.lengths:
+    if not robot.platform.moves_freely:
         return None
     joints = np.array([[1.0], [2.0]]) * np.ones(robot.joint_count)
     base, other = spheres_kernel(robot)(joints)[0]

@@ -21,10 +21,11 @@ from pteron.manipulator import Manipulator
 from pteron.shapes import PoseLike
 
 _BATCH = 4096
-"""Poses drawn at a time."""
+"""Poses drawn at a time: kernels are at their full speed, and 1 MB of memory holds them."""
 
 _ATTEMPTS = 250
-"""Batches drawn before it is concluded that poses in reach are too rare."""
+"""Batches drawn before it is concluded that poses in reach are too rare: a million poses, a second
+of work; what is rarer than one in 10^5 is left to the walk."""
 
 _MANY = 50
 """Number of wanted poses from which a search that finds few ends after a quarter of its batches."""
@@ -41,7 +42,8 @@ _SCOUTS = 100
 """Poses found first in the whole box; their own bounding box, widened, serves for the others."""
 
 _LEADING = 20
-"""Steps of Newton's method that lead a pose to joint coordinates."""
+"""Steps of Newton's method that lead a pose to joint coordinates: what has not converged by then
+seldom does."""
 
 _RARE = 1e-3
 """Share of poses in reach of all legs below which a random walk looks for them."""
@@ -61,11 +63,8 @@ _PARENTS = 200
 _INSIDE = 0.05, 0.3
 """Share of a batch in reach below which the walk's steps shorten, and above which they lengthen."""
 
-_TILT = 0.5
-"""Greatest size of the angles drawn, rad, of a tilting platform whose file does not limit them."""
-
 _SEEN = 1000
-"""Poses that show how often limits are kept."""
+"""Poses that show how often limits are kept: a share of 10 % to within 1 %."""
 
 _PARALLEL = 1e-3
 """Squared angle, about, between guides that count as parallel."""
@@ -176,7 +175,7 @@ class _Conditions(NamedTuple):
         """Return those of the poses that keep the limits."""
         if self.limits:
             poses = poses[(numeric(robot, "passive_room")(poses)[0] >= 0.0).all(axis=-1)]
-        if self.limits and robot.platform.tilts:
+        if self.limits and joints_limit_reach(robot):
             low, high = joint_limits(robot)
             joints = numeric(robot, "joint_coordinates")(poses)[0]
             poses = poses[((low <= joints) & (joints <= high)).all(axis=-1)]
@@ -207,12 +206,7 @@ def widest_box(robot: Manipulator) -> tuple[Array, Array]:
     """Return the ends of a box (m,) of poses from which to draw."""
     center, radius = search_ball(robot)
     platform = robot.platform
-    # Beyond half a turn phi counts where the platform's shaft makes several.
-    turn = max((np.pi, *(abs(end) for pair in platform.angle_limits.values() for end in pair)))
-    ends = dict.fromkeys(platform.angles, (-turn, turn))
-    if platform.tilts:
-        ends = dict.fromkeys(platform.angles, (-_TILT, _TILT)) | platform.angle_limits
-    angles = np.array(list(ends.values())).reshape(-1, 2)
+    angles = np.array(list(platform.angle_box.values())).reshape(-1, 2)
     low = np.concatenate([center - radius, angles[:, 0]])
     return low, np.concatenate([center + radius, angles[:, 1]])
 
@@ -242,12 +236,17 @@ def _solved_poses(
     return conditions.keep_within_limits(robot, conditions.select_reachable(robot, poses))
 
 
+def joints_limit_reach(robot: Manipulator) -> bool:
+    """Return whether actuated joints' limits count: strokes of rams are the reach of a hexapod."""
+    return robot.platform.tilts
+
+
 def _joint_ranges(robot: Manipulator, *, limits: bool) -> Array | None:
     """Return the ranges (2, n) of joints, m or rad, of a platform that tilts, if all have one.
 
     A crank has a turn where it has no limits, or where these do not count.
     """
-    if not robot.platform.tilts:
+    if not joints_limit_reach(robot):
         return None
     low, high = joint_limits(robot).copy()
     cranks = np.array([leg.joint.unit == "rad" for leg in robot.legs])
@@ -347,7 +346,7 @@ def _too_few(
     if sample.regular >= count:
         text = (
             f"only {total} of {sample.regular} random poses in reach of all legs keep the limits "
-            f"of {'joints' if robot.platform.tilts else 'passive joints'}: "
+            f"of {'joints' if joints_limit_reach(robot) else 'passive joints'}: "
             f"{_rarely_kept_limits_phrase(robot, sample.seen)}; widen these limits"
         )
     elif not (sample.reachable or total):
@@ -388,7 +387,7 @@ def _rarely_kept_limits_phrase(robot: Manipulator, poses: Array) -> str:
     """Return a list, as text, of the passive joints that rarely keep their limits at poses."""
     pose, machine = ca.SX.sym("pose", robot.freedom), Machine.numeric(robot)
     angles, *legs = passive_joints(machine, pose)
-    if robot.platform.tilts:
+    if joints_limit_reach(robot):
         for leg, motion, leg_joints in zip(robot.legs, machine.state(pose).legs, legs, strict=True):
             if leg.limits is not None:
                 leg_joints.append(

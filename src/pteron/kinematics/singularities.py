@@ -19,6 +19,7 @@ from pteron.kinematics.architecture import expect_regular, is_singular_everywher
 from pteron.kinematics.sampling import draw_poses, type_ii_sizes
 from pteron.kinematics.simplex_ascent import climb
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.tolerances import ROUNDING
 
 _VANISHING = 1e-10
 """Size of the type-II measure that counts as zero where no angle in reach has a larger one."""
@@ -44,9 +45,6 @@ _ANGLES = 720
 
 _HALVINGS = 50
 """Bisections between two samples, half a degree apart: down to rounding."""
-
-_ZERO = 1e-9
-"""Largest size of the measure at a zero so found; at a gap in the reach it is larger."""
 
 
 @lru_cache(maxsize=64)
@@ -130,7 +128,7 @@ def singular_orientations(robot: RobotLike, position: ArrayLike | None = None) -
         a, b = (float(coefficient) for coefficient in orientation)
         angle = np.arctan2(b, a) + np.pi / 2
         return np.sort(_wrap_angles(np.array([angle, angle - np.pi])))
-    if position_array is None or not robot.platform.angles or robot.platform.tilts:
+    if position_array is None or robot.platform.axis_angle is None:
         return np.empty(0)
     return _sign_changes(robot, position_array)
 
@@ -145,7 +143,7 @@ def _sign_changes(robot: Manipulator, position: Array) -> Array:
 
     # Round angles, where many machines are singular, lie between the samples. The last is the first
     # again, but for a platform that slides.
-    count = _ANGLES if robot.platform.slides else _ANGLES + 1
+    count = _ANGLES + bool(robot.platform.rotation_axes)
     angles = np.pi * ((2.0 * np.arange(count) + 1.0) / _ANGLES - 1.0)
     measures = measure(angles)
     negative, known = measures < 0.0, ~np.isnan(measures)
@@ -160,7 +158,7 @@ def _sign_changes(robot: Manipulator, position: Array) -> Array:
     first = np.flatnonzero((negative[1:] != negative[:-1]) & known[1:] & known[:-1])
     low, high, side = angles[first], angles[first + 1], negative[first]
     low, _ = bisect_condition(lambda angle: (measure(angle) < 0.0) == side, low, high, _HALVINGS)
-    is_zero = np.abs(measure(low)) <= _ZERO  # else a gap in the reach lies between two samples
+    is_zero = np.abs(measure(low)) <= ROUNDING  # else a gap in the reach lies between two samples
     return np.sort(_wrap_angles(low[is_zero]))
 
 

@@ -15,12 +15,10 @@ from pteron.kernels.path_programs import spheres_kernel
 from pteron.kinematics.pose_paths import generic, positions_and_rotations, real_poses
 from pteron.manipulator import Manipulator
 from pteron.platforms.nearest_pose import nearest_pose
+from pteron.tolerances import SAME
 
 _HUGE = 1e30
 """Size of the spheres' centres and radii beyond which joints have no pose."""
-
-_ANOTHER = 1e-6
-"""Greatest difference of a position, over the size, and a rotation from those of coordinates."""
 
 
 def tilting_poses(
@@ -72,10 +70,10 @@ def tilting_poses(
     place = size[which, None] * place + base[which] - turned @ top
     rotation = turned @ frame.T
     poses = nearest_pose(platform, place, rotation)
-    positions, axes = platform.at(poses)
+    positions, axes = platform.placement(poses)
     distance = np.abs(positions - place).max(axis=-1) / size[which]
     distance += np.abs(np.swapaxes(axes, -1, -2) - rotation).max(axis=(-2, -1))
-    own_side = distance < _ANOTHER
+    own_side = distance < SAME
     moving = np.zeros(len(joints), dtype=bool)
     moving[good] = move
     return good[which[own_side]], poses[own_side], moving

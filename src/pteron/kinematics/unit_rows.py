@@ -49,7 +49,7 @@ def motion_frame(robot: Manipulator, poses: Array) -> tuple[Array, Array, float]
     middle = np.zeros(3) if robot.platform.center else points.mean(axis=0)
     length = float(np.linalg.norm(points - middle, axis=1).max())
     length = length if length > 0.0 else max(leg.size for leg in robot.legs)
-    arm = middle @ np.nan_to_num(robot.platform.at(poses)[1])
+    arm = middle @ np.nan_to_num(robot.platform.placement(poses)[1])
     steps = np.eye(robot.freedom)
     twists = [
         numeric(robot, "twist")(poses, np.broadcast_to(step, poses.shape))[0] for step in steps

@@ -33,7 +33,7 @@ def unlikely_values(
     """
     length, limits = unlikely_length(robot), robot.platform.angle_limits
     # Angles of a platform that tilts repeat beyond half a turn.
-    least = np.pi if robot.platform.tilts else 2.0 * np.pi
+    least = 2.0 * robot.platform.angle_range
     turns = {name: _turn(limits.get(name), least) for name in robot.platform.angles}
     thresholds, angles = dict.fromkeys(COORDINATES, length) | turns, set(turns)
     for name, leg in zip(robot.joint_names, robot.legs, strict=True):

@@ -25,7 +25,7 @@ from pteron.bodies.motion import (
 from pteron.bodies.vectors import Vector
 from pteron.legs.ball_end import every_axis
 from pteron.legs.kind import LegKind
-from pteron.legs.leg import Circle, LegEquations, LegMotion, Plane, Sphere
+from pteron.legs.leg import CircleLocus, LegEquations, LegMotion, PlaneLocus, SphereLocus
 from pteron.legs.protocol import breaches, point_in_reach
 
 
@@ -150,8 +150,12 @@ def _body_faults(at: _LegInMotion) -> Iterator[str]:
 def _force_faults(at: _LegInMotion) -> Iterator[str]:
     state = at.point, at.rotation, at.gravity, at.inertia
     needs, body_needs = at.equations.needs(*state), at.equations.needs_of_bodies(*state)
-    point_needs = needs.point + at.equations.riding(at.point, at.gravity, needs.mass).point
-    joint_needs = needs.joint + at.equations.riding(at.point, at.gravity, needs.mass).joint
+    point_needs = (
+        needs.point + at.equations.point_mass_needs(at.point, at.gravity, needs.mass).point
+    )
+    joint_needs = (
+        needs.joint + at.equations.point_mass_needs(at.point, at.gravity, needs.mass).joint
+    )
     row = at.motion.row / at.motion.divisor
     energy = ca.SX(0)
     for letter, body in at.motion.bodies.items():
@@ -175,11 +179,11 @@ def _force_faults(at: _LegInMotion) -> Iterator[str]:
 
 def _locus_faults(at: _LegInMotion) -> Iterator[str]:
     locus, c = at.equations.locus(at.motion.coordinate), at.point.position
-    if isinstance(locus, Plane):
+    if isinstance(locus, PlaneLocus):
         pair = ca.dot(locus.normal, c), locus.offset
-    elif isinstance(locus, Sphere):
+    elif isinstance(locus, SphereLocus):
         pair = ca.norm_2(c - locus.center), locus.radius
-    elif isinstance(locus, Circle):
+    elif isinstance(locus, CircleLocus):
         normal = ca.SX(list(at.leg.plane_normal or ()))
         pair = ca.norm_2(ca.cross(normal, c - locus.center)), locus.radius
     else:

@@ -27,7 +27,7 @@ from pteron.bodies.motion import (
 from pteron.bodies.vectors import Vector, cross, scale_vector, shift_point, vertical
 from pteron.legs.circles import perpendicular_to, plane_of, quarter_turn
 from pteron.legs.drive import Drive
-from pteron.legs.kind import CRANK, LegKind, Quantity, ReachBound, Transfer
+from pteron.legs.kind import CRANK, LegKind, LegQuantity, LegTransfer, ReachBound
 from pteron.legs.leg import Joint, LegEquations, LegMotion, Needs, Reach, force_wrench
 from pteron.legs.reading import Reading
 
@@ -64,24 +64,24 @@ class CrankLeg(LegKind):
     joint = CRANK
 
     @property
-    def quantities(self) -> tuple[Quantity, ...]:
+    def quantities(self) -> tuple[LegQuantity, ...]:
         # The crank's angle is the one nearest to the middle of its limits, else in (-pi, pi].
         low, high = self.limits or (0.0, 0.0)
         inside = -math.pi < low and high <= math.pi
         middle = 0.0 if inside else 0.5 * (low + high)
         return (
-            Quantity("guide_point", "point", self.guide_point),
-            Quantity("direction", "direction", self.direction, "d"),
-            Quantity(
+            LegQuantity("guide_point", "point", self.guide_point),
+            LegQuantity("direction", "direction", self.direction, "d"),
+            LegQuantity(
                 "zero_direction",
                 "normal",
                 self.zero_direction if inside else self._direction_at(middle),
             ),
-            Quantity("plane_axis", "normal", perpendicular_to(self.direction)),
-            Quantity("upper_length", "length", (self.upper_length,), "lu"),
-            Quantity("lower_length", "length", (self.lower_length,), "ll"),
-            Quantity("middle", "number", (middle,)),
-            Quantity("elbow", "sign", (self.elbow,)),
+            LegQuantity("plane_axis", "normal", perpendicular_to(self.direction)),
+            LegQuantity("upper_length", "length", (self.upper_length,), "lu"),
+            LegQuantity("lower_length", "length", (self.lower_length,), "ll"),
+            LegQuantity("middle", "number", (middle,)),
+            LegQuantity("elbow", "sign", (self.elbow,)),
         )
 
     @property
@@ -89,7 +89,7 @@ class CrankLeg(LegKind):
         return self.direction
 
     @property
-    def at_zero(self) -> Vector:
+    def crank_at_zero(self) -> Vector:
         return self.zero_direction
 
     def zero_at(self, zero: float) -> dict[str, Any]:
@@ -118,15 +118,17 @@ class CrankLeg(LegKind):
             "l": ("lower", -self.lower_length, 0.0, "crank and platform, where its x is zero"),
         }
 
-    def transfers(self, gravity: Vector) -> tuple[Transfer, ...]:
+    def transfers(self, gravity: Vector) -> tuple[LegTransfer, ...]:
         last = self.names["l"]
         transfer_list = [
-            Transfer("the crank{} turns about a fixed axis", {("m", "u"): (1, ())}),
-            Transfer(f"crank and {last}{{}} carry the joint between them", ELBOW),
+            LegTransfer("the crank{} turns about a fixed axis", {("m", "u"): (1, ())}),
+            LegTransfer(f"crank and {last}{{}} carry the joint between them", ELBOW),
         ]
         if vertical(self.direction, gravity):
             reason = "no gravity acts across the axis of the crank{}"
-            transfer_list += [Transfer(reason, {(kind, "u"): (1, ())}) for kind in ("mgx", "mgy")]
+            transfer_list += [
+                LegTransfer(reason, {(kind, "u"): (1, ())}) for kind in ("mgx", "mgy")
+            ]
         return tuple(transfer_list)
 
 
@@ -247,7 +249,7 @@ class CrankEquations(LegEquations):
             self.ll,
         )
 
-    def named(self, point: PointMotion, rotation: RotationMotion) -> dict[str, Expression]:
+    def exported_terms(self, point: PointMotion, rotation: RotationMotion) -> dict[str, Expression]:
         w, at = point.position - self.r, self.state(point)
         u, h, quarter = self._triangle(w)
         n2, root = ca.dot(u, u), ca.sqrt(quarter)
@@ -273,7 +275,7 @@ class CrankEquations(LegEquations):
         longest = self.ll * self.ll
         return {"stretched": longest - near, "folded": far - longest}
 
-    def within_limits(
+    def limit_margins(
         self, c: Expression, q: Expression, low: float, high: float
     ) -> dict[str, Expression]:
         """Return the sines of the crank's angles to its limits, times lu n^2: not negative within.

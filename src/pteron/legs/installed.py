@@ -6,9 +6,8 @@ file asks for the kind, not before.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from pteron.errors import ModelError
+from pteron.extensions import extension_names, extension_value, load_extension
 from pteron.legs.kind import LegKind
 from pteron.legs.prr import PRR
 from pteron.legs.prrr import PRRR
@@ -21,9 +20,6 @@ from pteron.legs.rrs import RRS
 from pteron.legs.rss import RSS
 from pteron.legs.rupu import RUPU
 from pteron.legs.ups import UPS
-
-if TYPE_CHECKING:
-    from importlib.metadata import EntryPoint
 
 GROUP = "pteron.legs"
 
@@ -39,12 +35,7 @@ Leg = PRRR
 
 def kind_names() -> tuple[str, ...]:
     """Return the names of all kinds that files may name."""
-    return (
-        *KINDS,
-        *sorted(
-            entry_point.name for entry_point in _entry_points() if entry_point.name not in KINDS
-        ),
-    )
+    return (*KINDS, *(name for name in extension_names(GROUP) if name not in KINDS))
 
 
 def kind_named(name: str) -> type[LegKind] | None:
@@ -55,25 +46,9 @@ def kind_named(name: str) -> type[LegKind] | None:
     ModelError
         If the package that has it cannot be imported, or holds no kind of that name.
     """
-    entry_point = (
-        next((e for e in _entry_points() if e.name == name), None) if name not in KINDS else None
-    )
-    if entry_point is not None:
-        KINDS[name] = _load_kind(entry_point)
+    if name not in KINDS and (kind := load_extension(GROUP, name)) is not None:
+        if not (isinstance(kind, type) and issubclass(kind, LegKind) and kind.type == name):
+            value = extension_value(GROUP, name)
+            raise ModelError(f"{value} is no kind of leg with type {name!r}")
+        KINDS[name] = kind
     return KINDS.get(name)
-
-
-def _entry_points() -> tuple[EntryPoint, ...]:
-    from importlib.metadata import entry_points
-
-    return tuple(entry_points(group=GROUP))
-
-
-def _load_kind(entry_point: EntryPoint) -> type[LegKind]:
-    try:
-        kind = entry_point.load()
-    except Exception as error:
-        raise ModelError(f"{entry_point.value}: {type(error).__name__}: {error}") from error
-    if not (isinstance(kind, type) and issubclass(kind, LegKind) and kind.type == entry_point.name):
-        raise ModelError(f"{entry_point.value} is no kind of leg with type {entry_point.name!r}")
-    return kind

@@ -104,7 +104,7 @@ def parameters_section(keys: Mapping[str, Key]) -> str:
     return "\n".join([*lines, "    "])
 
 
-class Condition(NamedTuple):
+class FieldCondition(NamedTuple):
     """A condition between fields that are valid by themselves."""
 
     names: tuple[str, ...]
@@ -115,7 +115,7 @@ class Condition(NamedTuple):
 def sound_fields(
     fields: Mapping[str, Any],
     keys: Mapping[str, Key],
-    conditions: Sequence[Condition],
+    conditions: Sequence[FieldCondition],
     branches: Sequence[int],
 ) -> tuple[dict[str, Any], list[str]]:
     """Return the valid fields, converted, and the faults of the others.

@@ -17,9 +17,11 @@ from pteron.bodies.motion import Expression
 from pteron.bodies.parameters import LEG_BODIES
 from pteron.bodies.vectors import Vector, complement
 from pteron.legs.drive import Drive
-from pteron.legs.keys import COMMON, Condition, Key, KeyRole, parameters_section, sound_fields
+from pteron.legs.keys import COMMON, FieldCondition, Key, KeyRole, parameters_section, sound_fields
 from pteron.legs.leg import LegEquations, LegMotion, Passive
 from pteron.legs.reading import Reading
+from pteron.renamed import adopt_former_methods, former_attribute, former_name
+from pteron.tolerances import ROUNDING
 from pteron.toml import raise_faults
 
 
@@ -51,7 +53,7 @@ Role = Literal["point", "direction", "normal", "length", "number", "sign"]
 depends on, as an axis perpendicular to the kind's first direction; a length; a number; +1 or -1."""
 
 
-class Quantity(NamedTuple):
+class LegQuantity(NamedTuple):
     """A part of a leg's geometry that its equations need, or that rotates with the machine.
 
     `LegEquations` takes all of them by name, also those that it ignores.
@@ -69,7 +71,7 @@ Monomial = tuple[int, tuple[str, ...]]
 """An integer times a product of the leg's length symbols."""
 
 
-class Transfer(NamedTuple):
+class LegTransfer(NamedTuple):
     """A combination of a leg's parameters without effect on any force, in its length symbols."""
 
     reason: str
@@ -86,9 +88,6 @@ class ReachBound(NamedTuple):
     """The direction of a slider: the platform point is within `radius` of point + q line."""
     radius: float
 
-
-_ROUNDING = 1e-9
-"""Tolerance of the centre of mass beyond a body's ends, relative to its length: rounding."""
 
 _EquationsClass = type[LegEquations]
 
@@ -126,33 +125,41 @@ class LegKind(ABC):
     """Its own fields, which are its TOML keys, and their descriptions; see `every_key`."""
     base_cones: ClassVar[tuple[str, ...]] = ()
     """The keys of cones whose axis is in the base frame."""
-    conditions: ClassVar[tuple[Condition, ...]] = ()
+    conditions: ClassVar[tuple[FieldCondition, ...]] = ()
     """Conditions between its fields."""
     equations_class: ClassVar[_EquationsClass]
     __dataclass_fields__: ClassVar[dict[str, Any]]
 
     def __init_subclass__(cls) -> None:
+        adopt_former_methods(
+            cls,
+            closing="draw_closure",
+            under="with_platform_frame",
+            turned="map_vectors",
+            passive="passive_joints",
+            doubts="unlikely_values",
+        )
         # The keys are the single source of the fields' descriptions.
         if cls.__doc__ and "keys" in vars(cls) and "Parameters\n" not in cls.__doc__:
             cls.__doc__ = cls.__doc__.rstrip() + parameters_section(cls.every_key())
 
     def __post_init__(self) -> None:
-        sound, faults = self.checked({name: getattr(self, name) for name in self.every_key()})
+        sound, faults = self.check_fields({name: getattr(self, name) for name in self.every_key()})
         raise_faults(faults)
         for name, field_value in sound.items():
             object.__setattr__(self, name, field_value)
 
     @classmethod
-    def checked(cls, given: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:
+    def check_fields(cls, fields: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:
         """Return the valid fields, converted, and the faults of the others; see `sound_fields`."""
-        return sound_fields(given, cls.every_key(), cls.conditions, cls.branches)
+        return sound_fields(fields, cls.every_key(), cls.conditions, cls.branches)
 
     @classmethod
     @cache
     def every_key(cls) -> dict[str, Key]:
         """Return all its keys, in the order of files and pages."""
         roles, keys = get_args(KeyRole), {**COMMON, **cls.keys}
-        return dict(sorted(keys.items(), key=lambda entry: roles.index(entry[1].role)))
+        return dict(sorted(keys.items(), key=lambda named_key: roles.index(named_key[1].role)))
 
     @property
     def bodies(self) -> dict[str, Inertia]:
@@ -198,7 +205,7 @@ class LegKind(ABC):
         return None
 
     @property
-    def at_zero(self) -> Vector | None:
+    def crank_at_zero(self) -> Vector | None:
         """The unit vector along which the crank points at coordinate 0; None without a crank."""
         return None
 
@@ -209,7 +216,7 @@ class LegKind(ABC):
 
     @property
     @abstractmethod
-    def quantities(self) -> tuple[Quantity, ...]:
+    def quantities(self) -> tuple[LegQuantity, ...]:
         """The geometry that its equations need, except the platform point."""
 
     @abstractmethod
@@ -232,7 +239,7 @@ class LegKind(ABC):
         """The normal of the plane in which a planar leg keeps its platform point; else None."""
         return None
 
-    def under(self, frame: Sequence[Vector]) -> Self:
+    def with_platform_frame(self, frame: Sequence[Vector]) -> Self:
         """Return the leg with a missing `direction` filled in from the platform's frame.
 
         `frame` is the platform's x, y and z at angles zero, in the base frame.
@@ -312,12 +319,12 @@ class LegKind(ABC):
         """The usual range of x of each body's mass: TOML key, least, greatest, what ends there."""
         return {}
 
-    def beyond_ends(self, letter: str, x: float) -> str | None:
+    def center_of_mass_warning(self, letter: str, x: float) -> str | None:
         """Return a warning about a centre of mass at x, m, beyond its body's ends; None within."""
         if letter not in self.extents:
             return None
         _, low, high, ends = self.extents[letter]
-        room = _ROUNDING * (high - low)
+        room = ROUNDING * (high - low)
         if low - room <= x <= high + room:
             return None
         turned = f"; is it {-x:g}?" if low <= -x <= high else ""
@@ -340,10 +347,12 @@ class LegKind(ABC):
         """The length that its reach is relative to, m."""
         return sum(float(q.value[0]) for q in self.quantities if q.role == "length")
 
-    def passive(self, motion: LegMotion, still: Expression, turned: Expression) -> list[Passive]:
+    def passive_joints(
+        self, motion: LegMotion, zero_axes: Expression, axes: Expression
+    ) -> list[Passive]:
         """Return its passive joints that have limits.
 
-        The platform's axes are the columns (3, 3) of `turned`, and of `still` at phi = 0.
+        The columns (3, 3) of `axes` are the platform's axes, of `zero_axes` at phi = 0.
         """
         return []
 
@@ -354,7 +363,7 @@ class LegKind(ABC):
         """
         return None
 
-    def doubts(self, axis: Vector | None) -> Iterator[str]:
+    def unlikely_values(self, axis: Vector | None) -> Iterator[str]:
         """Yield warnings about values that are valid but unlikely in this kind of leg.
 
         The platform turns about `axis`, if it does.
@@ -367,12 +376,12 @@ class LegKind(ABC):
             values = {q.name: ca.SX(ca.DM(list(q.value))) for q in self.quantities}
         return self.equations_class(**values)
 
-    def transfers(self, gravity: Vector) -> tuple[Transfer, ...]:
+    def transfers(self, gravity: Vector) -> tuple[LegTransfer, ...]:
         """Return the mass transfers within the leg, for gravity in the base frame."""
         return ()
 
     @classmethod
-    def closing(
+    def draw_closure(
         cls, values: Mapping[str, Sequence[Fraction]], rng: Random
     ) -> tuple[list[Fraction], int] | None:
         """Return a random rational c - r whose closure has a rational root, and the elbow.
@@ -381,7 +390,7 @@ class LegKind(ABC):
         """
         return None
 
-    def turned(self, turn: Any, *, platform: bool = False) -> Self:
+    def map_vectors(self, turn: Any, *, platform: bool = False) -> Self:
         """Return the leg with every base-frame vector v replaced by `turn(v)`.
 
         If `platform`, vectors of the platform's frame are replaced too.
@@ -396,3 +405,12 @@ class LegKind(ABC):
             if vector is not None
         }
         return replace(self, **rotated_fields)
+
+    turned = former_attribute("turned", "map_vectors")
+    under = former_attribute("under", "with_platform_frame")
+    at_zero = former_attribute("at_zero", "crank_at_zero")
+    doubts = former_attribute("doubts", "unlikely_values")
+
+
+def __getattr__(name: str) -> Any:
+    return former_name(__name__, name)

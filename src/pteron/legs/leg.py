@@ -18,10 +18,10 @@ A machine whose legs break this protocol is refused when it is made (`legs.proto
 That is all: Jacobian, dynamics, regressor, energies, limits, drawings, logs, exported code and
 files for other engines follow.
 `examples/new_leg.py` is a complete kind of leg. More may be overridden: `needs`, a cheaper form of
-the same forces; `named`, names in exported code; and of the data `conditions`, what must hold
-between its fields, `passive`, the passive joints that have limits, `zero_at`, the geometry
-that moves the zero of its coordinate, `doubts`, what is unlikely in
-its numbers, and `transfers`, the mass transfers that explain base parameters in symbols.
+the same forces; `exported_terms`, names in exported code; and of the data `conditions`, what must
+hold between its fields, `passive_joints`, those that have limits, `zero_at`, the geometry that
+moves the zero of its coordinate, `unlikely_values`, warnings about its numbers, and `transfers`,
+the mass transfers that explain base parameters in symbols.
 
 All vectors are in the base frame, columns (3, 1). An expression has no branch on a value: the side
 of an elbow is a quantity, +1 or -1.
@@ -31,7 +31,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import ClassVar, Literal, NamedTuple
+from typing import Any, ClassVar, Literal, NamedTuple
 
 import casadi as ca
 
@@ -44,6 +44,7 @@ from pteron.bodies.motion import (
     RotationMotion,
     needed_wrench,
 )
+from pteron.renamed import adopt_former_methods, former_name
 
 
 class Joint(NamedTuple):
@@ -96,7 +97,7 @@ class LegMotion(NamedTuple):
     length of the link that `row` lies along."""
 
     @property
-    def driven(self) -> Joint:
+    def actuated_joint(self) -> Joint:
         """The actuated joint."""
         return next(joint for joint in self.chain if joint.driven)
 
@@ -138,6 +139,11 @@ class Needs(NamedTuple):
     mass: Expression
     """(1, K): a point mass at the platform point, which the platform's inertia includes."""
 
+    @classmethod
+    def zeros(cls, columns: int) -> Needs:
+        """Return the forces of a leg without bodies, such as a cable: none."""
+        return cls(ca.SX(1, columns), ca.SX(6, columns), ca.SX(1, columns))
+
 
 def force_wrench(force: Expression) -> Expression:
     """Return the wrench (6, K) of a force (3, K) on the platform point alone."""
@@ -165,7 +171,7 @@ class Reach(NamedTuple):
         return ca.sqrt(self.discriminant / self.scale)
 
 
-class Plane(NamedTuple):
+class PlaneLocus(NamedTuple):
     """The locus of c for a given joint, a plane: normal . c = offset."""
 
     normal: Expression
@@ -174,14 +180,14 @@ class Plane(NamedTuple):
     """The size of the offset's terms, to which its rounding is relative."""
 
 
-class Sphere(NamedTuple):
+class SphereLocus(NamedTuple):
     """The locus of c for a given joint, a sphere: |c - center| = radius."""
 
     center: Expression
     radius: Expression
 
 
-class Circle(NamedTuple):
+class CircleLocus(NamedTuple):
     """The locus of c for a given joint of a planar leg: a circle, of its part in the plane."""
 
     center: Expression
@@ -189,13 +195,13 @@ class Circle(NamedTuple):
     radius: Expression
 
 
-class Turned(NamedTuple):
+class AngleLocus(NamedTuple):
     """The platform's angle for a given joint of a leg that follows it; c may be anywhere."""
 
     angle: Expression
 
 
-Locus = Plane | Sphere | Circle | Turned
+Locus = PlaneLocus | SphereLocus | CircleLocus | AngleLocus
 
 
 class LegEquations(ABC):
@@ -212,6 +218,15 @@ class LegEquations(ABC):
     holds: HeldPlane | None = None
     """The plane that it keeps its platform point in, of a leg that does so by itself."""
 
+    def __init_subclass__(cls) -> None:
+        adopt_former_methods(
+            cls,
+            along="change_frame",
+            named="exported_terms",
+            riding="point_mass_needs",
+            within_limits="limit_margins",
+        )
+
     @abstractmethod
     def motion(self, point: PointMotion, rotation: RotationMotion) -> LegMotion:
         """Return the motion of the leg's joints and bodies."""
@@ -220,7 +235,7 @@ class LegEquations(ABC):
     def reach(self, c: Expression) -> Reach:
         """Return whether the leg reaches c."""
 
-    def along(self, axes: Expression, origin: Expression) -> LegEquations | None:
+    def change_frame(self, axes: Expression, origin: Expression) -> LegEquations | None:
         """Return the leg with vectors in other axes, the columns of (3, 3), about an origin.
 
         None where the leg has directions, which are cheaper in the base frame.
@@ -241,7 +256,7 @@ class LegEquations(ABC):
         """
         return {"reach": self.reach(c).discriminant}
 
-    def within_limits(
+    def limit_margins(
         self, c: Expression, q: Expression, low: float, high: float
     ) -> dict[str, Expression]:
         """Return smooth expressions, by name, that are not negative within its joint's limits.
@@ -254,7 +269,7 @@ class LegEquations(ABC):
     def locus(self, q: Expression) -> Locus:
         """Return the locus of c while the actuated joint is at q."""
 
-    def named(self, point: PointMotion, rotation: RotationMotion) -> dict[str, Expression]:
+    def exported_terms(self, point: PointMotion, rotation: RotationMotion) -> dict[str, Expression]:
         """Return the named terms of exported code: scalars, or vectors (2, 1) or (3, 1)."""
         return {}
 
@@ -285,6 +300,8 @@ class LegEquations(ABC):
         F_b is the wrench on a body of its weight and inertia; the required wrench is -F_b. Eq. (13)
         sums J_b^T F_b, J_b being the body's rows in (c', omega).
         """
+        if not inertia:
+            return Needs.zeros(1)
         motion = self.motion(point, rotation)
         columns = next(iter(inertia.values())).m.shape[1]
         total = ca.SX(6, columns)
@@ -295,8 +312,12 @@ class LegEquations(ABC):
                 total = total + ca.mtimes(body.turning_row.T, moment)
         return Needs(ca.SX(1, columns), total, ca.SX(1, columns))
 
-    def riding(self, point: PointMotion, gravity: Expression, mass: Expression) -> Needs:
+    def point_mass_needs(self, point: PointMotion, gravity: Expression, mass: Expression) -> Needs:
         """Return the force for a mass at the platform point, outside the platform's inertia."""
         none = ca.SX(1, mass.shape[1])
         force = ca.mtimes(point.acceleration - gravity, mass)
         return Needs(none, force_wrench(force), none)
+
+
+def __getattr__(name: str) -> Any:
+    return former_name(__name__, name)

@@ -13,12 +13,10 @@ from pteron.bodies.motion import BodyMotion, Expression, PointMotion, RotationMo
 from pteron.legs.ball_end import ball_joint
 from pteron.legs.circles import quarter_turn
 from pteron.legs.leg import Joint
+from pteron.tolerances import EXACT
 
 _PARALLEL = 1.0 - 1e-12
 """Cosine between d and the platform's axis k above which their revolute joints coincide."""
-
-_COINCIDENT = 1e-12
-"""Distance of the two axes, m, below which the joints coincide."""
 
 
 class LinkRotation(NamedTuple):
@@ -71,9 +69,7 @@ def last_joints(
     hinges = []
     for turn in rotation.turns:
         cosine, offset = ca.dot(d, turn.axis), ca.cross(d, point.position - at)
-        is_shared = ca.logic_and(
-            ca.fabs(cosine) > _PARALLEL, ca.dot(offset, offset) < _COINCIDENT**2
-        )
+        is_shared = ca.logic_and(ca.fabs(cosine) > _PARALLEL, ca.dot(offset, offset) < EXACT**2)
         sense = ca.if_else(is_shared, cosine, 0)  # Section 2: where d is along k, U is R
         motion = turn.row, turn.rate, turn.acceleration
         ankle = LinkRotation(*(a + sense * b for a, b in zip(ankle, motion, strict=True)))

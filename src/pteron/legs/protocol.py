@@ -14,12 +14,10 @@ from pteron.bodies.motion import Expression, PointMotion, RotationMotion, Turn
 from pteron.bodies.vectors import Vector
 from pteron.legs.kind import LegKind
 from pteron.legs.leg import LegMotion
+from pteron.tolerances import ROUNDING
 
 _TRIAL_POINTS = 200
 """Number of random platform points tried; the first in reach is used."""
-
-_EQUAL = 1e-9
-"""Relative tolerance of equal velocity rows."""
 
 
 def breaches(leg: LegKind, axes: Sequence[Vector]) -> tuple[str, ...]:
@@ -101,7 +99,7 @@ def _driven_joint_breaches(leg: LegKind, motion: LegMotion) -> Iterator[str]:
             "whose motion is the leg's coordinate (`Joint.driven`)"
         )
         return
-    if not np.abs(_numbers(driven[0].row) - row).max() <= _EQUAL * size:
+    if not np.abs(_numbers(driven[0].row) - row).max() <= ROUNDING * size:
         yield (
             f"the driven joint of a {leg.type} leg does not move as its coordinate does: "
             "`Joint.row` is not `LegMotion.row` over its divisor"

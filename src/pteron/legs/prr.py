@@ -23,9 +23,9 @@ from pteron.bodies.motion import (
 from pteron.bodies.vectors import Vector, cross, perpendicular
 from pteron.legs.circles import perpendicular_to, plane_of, quarter_turn, random_vector
 from pteron.legs.cones import joint_limit
-from pteron.legs.keys import ACCOUNTS, Condition, check_elbow, keys_of
-from pteron.legs.kind import Quantity
-from pteron.legs.leg import Circle, Joint, LegMotion, Needs, Passive
+from pteron.legs.keys import ACCOUNTS, FieldCondition, check_elbow, keys_of
+from pteron.legs.kind import LegQuantity
+from pteron.legs.leg import CircleLocus, Joint, LegMotion, Needs, Passive
 from pteron.legs.planar_links import LinkRotation, last_joints, lower_link_body
 from pteron.legs.slide import SlideEquations, SlideLeg, SlideState
 
@@ -52,16 +52,18 @@ class PRR(SlideLeg):
 
     keys: ClassVar = keys_of("slider", "PRR")
 
-    conditions = (Condition(("elbow_limits",), _check_elbow),)
+    conditions = (FieldCondition(("elbow_limits",), _check_elbow),)
 
-    def passive(self, motion: LegMotion, still: Expression, turned: Expression) -> list[Passive]:
+    def passive_joints(
+        self, motion: LegMotion, zero_axes: Expression, axes: Expression
+    ) -> list[Passive]:
         # The branch keeps the link ahead of the slider along sigma e.
         ahead, link = self.elbow * ca.SX(ca.vertcat(*self.slider_direction)), motion.links[1]
         sideways = ca.cross(ca.SX(ca.vertcat(*self.plane_normal)), ahead)
         angle = ca.atan2(ca.dot(link, sideways), ca.dot(link, ahead))
         return joint_limit("link", "rad", angle, self.elbow_limits, self.lower_length)
 
-    def under(self, frame: Sequence[Vector]) -> Self:
+    def with_platform_frame(self, frame: Sequence[Vector]) -> Self:
         if self.direction is not None:
             return self
         axis = frame[2]
@@ -69,15 +71,15 @@ class PRR(SlideLeg):
         return replace(self, direction=axis)
 
     @property
-    def quantities(self) -> tuple[Quantity, ...]:
+    def quantities(self) -> tuple[LegQuantity, ...]:
         d = self.plane_normal
         return (
-            Quantity("guide_point", "point", self.guide_point),
-            Quantity("direction", "direction", d, "d"),
-            Quantity("slider_direction", "direction", self.slider_direction, "e"),
-            Quantity("plane_axis", "normal", perpendicular_to(d)),
-            Quantity("lower_length", "length", (self.lower_length,), "ll"),
-            Quantity("elbow", "sign", (self.elbow,)),
+            LegQuantity("guide_point", "point", self.guide_point),
+            LegQuantity("direction", "direction", d, "d"),
+            LegQuantity("slider_direction", "direction", self.slider_direction, "e"),
+            LegQuantity("plane_axis", "normal", perpendicular_to(d)),
+            LegQuantity("lower_length", "length", (self.lower_length,), "ll"),
+            LegQuantity("elbow", "sign", (self.elbow,)),
         )
 
     @property
@@ -127,8 +129,8 @@ class PRREquations(SlideEquations):
         ]
         return body, joints, (turning.rate, turning.acceleration)
 
-    def locus(self, q: Expression) -> Circle:
-        return Circle(self.r + q * self.e, self.ll)
+    def locus(self, q: Expression) -> CircleLocus:
+        return CircleLocus(self.r + q * self.e, self.ll)
 
     def needs(
         self,

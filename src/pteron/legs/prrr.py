@@ -37,15 +37,15 @@ from pteron.legs.circles import (
 from pteron.legs.cones import angle_between, joint_limit
 from pteron.legs.crank import ELBOW
 from pteron.legs.drive import Drive
-from pteron.legs.keys import ACCOUNTS, Condition, check_elbow, keys_of
-from pteron.legs.kind import SLIDER, LegKind, Quantity, ReachBound, Transfer
+from pteron.legs.keys import ACCOUNTS, FieldCondition, check_elbow, keys_of
+from pteron.legs.kind import SLIDER, LegKind, LegQuantity, LegTransfer, ReachBound
 from pteron.legs.leg import (
     Joint,
     LegEquations,
     LegMotion,
     Needs,
     Passive,
-    Plane,
+    PlaneLocus,
     Reach,
     force_wrench,
 )
@@ -98,8 +98,8 @@ class PRRR(LegKind):
     keys: ClassVar = keys_of("slider", "elbow_limits", "PRRR")
 
     conditions = (
-        Condition(("elbow_limits",), check_elbow),
-        Condition(("slider_direction", "direction"), _check_slide),
+        FieldCondition(("elbow_limits",), check_elbow),
+        FieldCondition(("slider_direction", "direction"), _check_slide),
     )
 
     @property
@@ -108,21 +108,23 @@ class PRRR(LegKind):
         return self.slider_direction or self.direction
 
     @property
-    def quantities(self) -> tuple[Quantity, ...]:
+    def quantities(self) -> tuple[LegQuantity, ...]:
         return (
-            Quantity("guide_point", "point", self.guide_point),
-            Quantity("direction", "direction", self.direction, "d"),
-            Quantity("slider_direction", "direction", self.e, "e"),
-            Quantity("plane_axis", "normal", perpendicular_to(self.direction)),
-            Quantity("upper_length", "length", (self.upper_length,), "lu"),
-            Quantity("lower_length", "length", (self.lower_length,), "ll"),
-            Quantity("elbow", "sign", (self.elbow,)),
+            LegQuantity("guide_point", "point", self.guide_point),
+            LegQuantity("direction", "direction", self.direction, "d"),
+            LegQuantity("slider_direction", "direction", self.e, "e"),
+            LegQuantity("plane_axis", "normal", perpendicular_to(self.direction)),
+            LegQuantity("upper_length", "length", (self.upper_length,), "lu"),
+            LegQuantity("lower_length", "length", (self.lower_length,), "ll"),
+            LegQuantity("elbow", "sign", (self.elbow,)),
         )
 
     def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
         return (self.direction,) if axis is None else (self.direction, axis)
 
-    def passive(self, motion: LegMotion, still: Expression, turned: Expression) -> list[Passive]:
+    def passive_joints(
+        self, motion: LegMotion, zero_axes: Expression, axes: Expression
+    ) -> list[Passive]:
         angle = angle_between(*motion.links)
         return joint_limit("elbow", "rad", angle, self.elbow_limits, self.lower_length)
 
@@ -150,21 +152,23 @@ class PRRR(LegKind):
             "l": ("lower", -self.lower_length, 0.0, "R2 and R3, where its x is zero"),
         }
 
-    def transfers(self, gravity: Vector) -> tuple[Transfer, ...]:
+    def transfers(self, gravity: Vector) -> tuple[LegTransfer, ...]:
         transfer_list = [
-            Transfer(
+            LegTransfer(
                 "slider and upper link{} move as one along the guide",
                 {("m", "u"): (1, ()), ("m", "p"): (-1, ())},
             ),
-            Transfer("both links{} carry the elbow R2", ELBOW),
+            LegTransfer("both links{} carry the elbow R2", ELBOW),
         ]
         if vertical(self.direction, gravity) and parallel(self.direction, self.e):
             reason = "no gravity and no slider acceleration acts across the upper link{}"
-            transfer_list += [Transfer(reason, {(kind, "u"): (1, ())}) for kind in ("mgx", "mgy")]
+            transfer_list += [
+                LegTransfer(reason, {(kind, "u"): (1, ())}) for kind in ("mgx", "mgy")
+            ]
         return tuple(transfer_list)
 
     @classmethod
-    def closing(
+    def draw_closure(
         cls, values: Mapping[str, Sequence[Fraction]], rng: Random
     ) -> tuple[list[Fraction], int]:
         """Draw the directions of the links in the leg's plane; the triangle then closes."""
@@ -260,7 +264,7 @@ class PRRREquations(LegEquations):
         angles = tuple((link.rate, link.acceleration) for link in (at.upper, at.lower))
         return LegMotion(rho, rate, sliding, row, ca.SX(1), bodies, chain, links, angles)
 
-    def named(self, point: PointMotion, rotation: RotationMotion) -> dict[str, Expression]:
+    def exported_terms(self, point: PointMotion, rotation: RotationMotion) -> dict[str, Expression]:
         at = self._state(point)
         u = at.l_u + at.l_l
         delta = squared_reach(self.lu, self.ll, ca.dot(u, u))
@@ -289,9 +293,9 @@ class PRRREquations(LegEquations):
         stretched, folded = edges_of_reach(self.lu, self.ll, ca.dot(u, u))
         return {"stretched": stretched, "folded": folded}
 
-    def locus(self, q: Expression) -> Plane:
+    def locus(self, q: Expression) -> PlaneLocus:
         size = ca.fabs(q) + ca.dot(ca.fabs(self.d_bar), ca.fabs(self.r))
-        return Plane(self.d_bar, q + ca.dot(self.d_bar, self.r), size)
+        return PlaneLocus(self.d_bar, q + ca.dot(self.d_bar, self.r), size)
 
     def needs(
         self,
@@ -320,7 +324,7 @@ class PRRREquations(LegEquations):
             masses + slider_force, force_wrench(ca.mtimes(self.plane, plane_force)), lower.m
         )
 
-    def riding(self, point: PointMotion, gravity: Expression, mass: Expression) -> Needs:
+    def point_mass_needs(self, point: PointMotion, gravity: Expression, mass: Expression) -> Needs:
         """Return the force for a mass at the platform point; along d the slider exerts it."""
         a_g = point.acceleration - gravity
         slope = 1 if self.aligned else ca.dot(self.d, self.e)

@@ -34,9 +34,11 @@ class PRS(PRR):
     def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
         return every_axis()
 
-    def passive(self, motion: LegMotion, still: Expression, turned: Expression) -> list[Passive]:
-        inherited = super().passive(motion, still, turned)
-        return [*inherited, *ball_cone(self.platform_cone, motion, turned, self.lower_length)]
+    def passive_joints(
+        self, motion: LegMotion, zero_axes: Expression, axes: Expression
+    ) -> list[Passive]:
+        inherited = super().passive_joints(motion, zero_axes, axes)
+        return [*inherited, *ball_cone(self.platform_cone, motion, axes, self.lower_length)]
 
 
 class PRSEquations(PRREquations):

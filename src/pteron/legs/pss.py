@@ -19,8 +19,8 @@ from pteron.bodies.motion import BodyMotion, Expression, PointMotion, RotationMo
 from pteron.bodies.vectors import Vector
 from pteron.legs.circles import perpendicular_to, random_vector
 from pteron.legs.keys import ACCOUNTS, keys_of
-from pteron.legs.kind import Quantity
-from pteron.legs.leg import Joint, LegMotion, Sphere
+from pteron.legs.kind import LegQuantity
+from pteron.legs.leg import Joint, LegMotion, SphereLocus
 from pteron.legs.rods import (
     RodLeg,
     rod_body,
@@ -42,13 +42,13 @@ class PSS(RodLeg, SlideLeg):
     keys: ClassVar = keys_of("slider", "rod", "PSS")
 
     @property
-    def quantities(self) -> tuple[Quantity, ...]:
+    def quantities(self) -> tuple[LegQuantity, ...]:
         return (
-            Quantity("guide_point", "point", self.guide_point),
-            Quantity("slider_direction", "direction", self.slider_direction, "e"),
-            Quantity("bar_direction", "normal", self._counting_axis),
-            Quantity("lower_length", "length", (self.lower_length,), "ll"),
-            Quantity("elbow", "sign", (self.elbow,)),
+            LegQuantity("guide_point", "point", self.guide_point),
+            LegQuantity("slider_direction", "direction", self.slider_direction, "e"),
+            LegQuantity("bar_direction", "normal", self._counting_axis),
+            LegQuantity("lower_length", "length", (self.lower_length,), "ll"),
+            LegQuantity("elbow", "sign", (self.elbow,)),
         )
 
     @property
@@ -101,8 +101,8 @@ class PSSEquations(SlideEquations):
         joints = universal_joints(self.bar, tip, point, swing, (n, dn, ddn), rotation)
         return rod_body(point, n, ddn, swing), joints, None
 
-    def locus(self, q: Expression) -> Sphere:
-        return Sphere(self.r + q * self.e, self.ll)
+    def locus(self, q: Expression) -> SphereLocus:
+        return SphereLocus(self.r + q * self.e, self.ll)
 
 
 PSS.equations_class = PSSEquations

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 from pteron.bodies.vectors import Vector
 from pteron.errors import ModelError
 from pteron.legs.drive import Drive
-from pteron.legs.keys import Condition
+from pteron.legs.keys import FieldCondition
 from pteron.legs.kind import ActuatedJoint, LegKind, ReachBound
 from pteron.legs.reading import Reading
 
@@ -40,7 +40,7 @@ class RamLeg(LegKind):
     branches = (1,)
     names: ClassVar = {"u": "cylinder", "l": "piston"}
     measure_text = "1 everywhere, as a ram pushes the platform point in every pose"
-    conditions = (Condition(("limits",), _check_limits),)
+    conditions = (FieldCondition(("limits",), _check_limits),)
 
     @property
     def cylinder(self) -> float:

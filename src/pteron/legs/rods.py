@@ -54,15 +54,17 @@ class RodLeg(LegKind):
             return []
         return None if self.bar is None else [self.rod_couple(motion) / self.lower_length]
 
-    def passive(self, motion: LegMotion, still: Expression, turned: Expression) -> list[Passive]:
+    def passive_joints(
+        self, motion: LegMotion, zero_axes: Expression, axes: Expression
+    ) -> list[Passive]:
         """Return the ball joints at the ends of the rod that have cones.
 
-        The columns of `still` and `turned` are the platform's axes. The bars of parallel rods do
-        not turn, nor do parts with a fixed offset.
+        The columns of `axes` are the platform's axes, of `zero_axes` at phi = 0. The bars of
+        parallel rods do not turn, nor do parts with a fixed offset.
         """
         rod, length = motion.links[1], self.lower_length
         assert rod is not None
-        socket = turned if self.rods == 1 and not any(self.fixed_offset) else still
+        socket = axes if self.rods == 1 and not any(self.fixed_offset) else zero_axes
         tip = self.tip_axes(motion)
         return [
             *cone_limit("rod at its tip", self.tip_cone, tip, rod, length),
@@ -79,7 +81,7 @@ class RodLeg(LegKind):
         bar = motion.chain[1].axis if self.bar is None else ca.SX(list(self.bar))
         return ca.cross(bar, motion.links[1])
 
-    def doubts(self, axis: Vector | None) -> Iterator[str]:
+    def unlikely_values(self, axis: Vector | None) -> Iterator[str]:
         """Yield a warning if parallel rods would keep their end of the platform from turning.
 
         The file does not say whether their bar is on a hinge at the platform point; on an

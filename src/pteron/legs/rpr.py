@@ -25,8 +25,8 @@ from pteron.legs.circles import (
     random_vector,
 )
 from pteron.legs.keys import ACCOUNTS, keys_of
-from pteron.legs.kind import Quantity, Transfer
-from pteron.legs.leg import Circle, Joint, LegEquations, LegMotion, Needs, Reach, force_wrench
+from pteron.legs.kind import LegQuantity, LegTransfer
+from pteron.legs.leg import CircleLocus, Joint, LegEquations, LegMotion, Needs, Reach, force_wrench
 from pteron.legs.planar_links import LinkRotation, last_joints, link_body, lower_link_body
 from pteron.legs.ram import RamLeg
 
@@ -47,17 +47,17 @@ class RPR(RamLeg):
 
     keys: ClassVar = keys_of("ram", "RPR")
 
-    def under(self, frame: Sequence[Vector]) -> Self:
+    def with_platform_frame(self, frame: Sequence[Vector]) -> Self:
         return self if self.direction is not None else replace(self, direction=frame[2])
 
     @property
-    def quantities(self) -> tuple[Quantity, ...]:
+    def quantities(self) -> tuple[LegQuantity, ...]:
         d = self.plane_normal
         return (
-            Quantity("guide_point", "point", self.guide_point),
-            Quantity("direction", "direction", d, "d"),
-            Quantity("plane_axis", "normal", perpendicular_to(d)),
-            Quantity("elbow", "sign", (self.elbow,)),
+            LegQuantity("guide_point", "point", self.guide_point),
+            LegQuantity("direction", "direction", d, "d"),
+            LegQuantity("plane_axis", "normal", perpendicular_to(d)),
+            LegQuantity("elbow", "sign", (self.elbow,)),
         )
 
     @property
@@ -68,20 +68,22 @@ class RPR(RamLeg):
     def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
         return (self.plane_normal,)
 
-    def transfers(self, gravity: Vector) -> tuple[Transfer, ...]:
+    def transfers(self, gravity: Vector) -> tuple[LegTransfer, ...]:
         transfer_list = [
-            Transfer("the cylinder{} turns about a fixed axis", {("m", "u"): (1, ())}),
-            Transfer(
+            LegTransfer("the cylinder{} turns about a fixed axis", {("m", "u"): (1, ())}),
+            LegTransfer(
                 "cylinder and piston{} turn alike", {("I", "u"): (1, ()), ("I", "l"): (-1, ())}
             ),
         ]
         if vertical(self.plane_normal, gravity):
             reason = "no gravity acts across the axis of the cylinder{}"
-            transfer_list += [Transfer(reason, {(kind, "u"): (1, ())}) for kind in ("mgx", "mgy")]
+            transfer_list += [
+                LegTransfer(reason, {(kind, "u"): (1, ())}) for kind in ("mgx", "mgy")
+            ]
         return tuple(transfer_list)
 
     @classmethod
-    def closing(
+    def draw_closure(
         cls, values: Mapping[str, Sequence[Fraction]], rng: Random
     ) -> tuple[list[Fraction], int]:
         """Draw the ram in the leg's plane."""
@@ -157,7 +159,7 @@ class RPREquations(LegEquations):
             at.length, at.rate, at.growth, row, unit, bodies, chain, links, turns, row_size=unit
         )
 
-    def named(self, point: PointMotion, rotation: RotationMotion) -> dict[str, Expression]:
+    def exported_terms(self, point: PointMotion, rotation: RotationMotion) -> dict[str, Expression]:
         at = self._ram(point)
         return {"w": at.w, "length": at.length, "n": at.n, "theta_rate": at.turning.rate}
 
@@ -167,8 +169,8 @@ class RPREquations(LegEquations):
         length = ca.sqrt(square)
         return Reach(length, square, square, length)
 
-    def locus(self, q: Expression) -> Circle:
-        return Circle(self.r, q)
+    def locus(self, q: Expression) -> CircleLocus:
+        return CircleLocus(self.r, q)
 
     def needs(
         self,

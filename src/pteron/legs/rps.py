@@ -33,8 +33,10 @@ class RPS(RPR):
     def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
         return every_axis()
 
-    def passive(self, motion: LegMotion, still: Expression, turned: Expression) -> list[Passive]:
-        return ball_cone(self.platform_cone, motion, turned, self.limits[1])
+    def passive_joints(
+        self, motion: LegMotion, zero_axes: Expression, axes: Expression
+    ) -> list[Passive]:
+        return ball_cone(self.platform_cone, motion, axes, self.limits[1])
 
 
 class RPSEquations(RPREquations):

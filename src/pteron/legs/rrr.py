@@ -16,8 +16,8 @@ from pteron.bodies.vectors import Vector
 from pteron.legs.circles import random_triangle
 from pteron.legs.cones import angle_between, joint_limit
 from pteron.legs.crank import CrankEquations, CrankLeg, CrankState
-from pteron.legs.keys import ACCOUNTS, Condition, check_elbow, keys_of
-from pteron.legs.leg import Circle, Joint, LegMotion, Passive
+from pteron.legs.keys import ACCOUNTS, FieldCondition, check_elbow, keys_of
+from pteron.legs.leg import CircleLocus, Joint, LegMotion, Passive
 from pteron.legs.planar_links import LinkRotation, last_joints, lower_link_body
 
 
@@ -40,12 +40,14 @@ class RRR(CrankLeg):
 
     keys: ClassVar = keys_of("crank", "elbow_limits", "RRR")
 
-    conditions = (Condition(("elbow_limits",), check_elbow),)
+    conditions = (FieldCondition(("elbow_limits",), check_elbow),)
 
     def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
         return (self.direction,)
 
-    def passive(self, motion: LegMotion, still: Expression, turned: Expression) -> list[Passive]:
+    def passive_joints(
+        self, motion: LegMotion, zero_axes: Expression, axes: Expression
+    ) -> list[Passive]:
         angle = angle_between(*motion.links)
         return joint_limit("elbow", "rad", angle, self.elbow_limits, self.lower_length)
 
@@ -59,7 +61,7 @@ class RRR(CrankLeg):
         return f"its links span {shortest:.4g} to {self.size:.4g} m"
 
     @classmethod
-    def closing(
+    def draw_closure(
         cls, values: Mapping[str, Sequence[Fraction]], rng: Random
     ) -> tuple[list[Fraction], int]:
         """Draw the directions of the links; the triangle then closes."""
@@ -100,8 +102,8 @@ class RRREquations(CrankEquations):
         joints = [knee, *last_joints(self.d, point, lower, rotation)]
         return body, joints, (lower.rate, lower.acceleration)
 
-    def locus(self, q: Expression) -> Circle:
-        return Circle(self.tip(q), self.ll)
+    def locus(self, q: Expression) -> CircleLocus:
+        return CircleLocus(self.tip(q), self.ll)
 
 
 RRR.equations_class = RRREquations

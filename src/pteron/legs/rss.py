@@ -20,8 +20,8 @@ from pteron.bodies.vectors import Vector, cross, parallel
 from pteron.errors import ModelError
 from pteron.legs.circles import random_vector
 from pteron.legs.crank import CrankEquations, CrankLeg, CrankState
-from pteron.legs.keys import ACCOUNTS, Condition, keys_of
-from pteron.legs.leg import Joint, LegMotion, Sphere
+from pteron.legs.keys import ACCOUNTS, FieldCondition, keys_of
+from pteron.legs.leg import Joint, LegMotion, SphereLocus
 from pteron.legs.rods import (
     RodLeg,
     rod_body,
@@ -52,7 +52,7 @@ class RSS(RodLeg, CrankLeg):
 
     keys: ClassVar = keys_of("crank", "rod", "RSS")
 
-    conditions = (Condition(("bar_direction", "direction"), _check_bar),)
+    conditions = (FieldCondition(("bar_direction", "direction"), _check_bar),)
 
     @property
     def bar(self) -> Vector | None:
@@ -70,7 +70,7 @@ class RSS(RodLeg, CrankLeg):
         )
 
     @classmethod
-    def closing(
+    def draw_closure(
         cls, values: Mapping[str, Sequence[Fraction]], rng: Random
     ) -> tuple[list[Fraction], int]:
         """Draw the directions of crank and rod: their sum is a platform point."""
@@ -110,8 +110,8 @@ class RSSEquations(CrankEquations):
         joints = universal_joints(self.d, tip, point, swing, (n, dn, ddn), rotation, crank)
         return rod_body(point, n, ddn, swing), joints, None
 
-    def locus(self, q: Expression) -> Sphere:
-        return Sphere(self.tip(q), self.ll)
+    def locus(self, q: Expression) -> SphereLocus:
+        return SphereLocus(self.tip(q), self.ll)
 
 
 RSS.equations_class = RSSEquations

@@ -22,16 +22,16 @@ from pteron.errors import ModelError
 from pteron.legs.circles import perpendicular_to, random_fraction, random_vector
 from pteron.legs.cones import joint_limit
 from pteron.legs.drive import Drive
-from pteron.legs.keys import ACCOUNTS, Condition, keys_of
-from pteron.legs.kind import SHAFT, LegKind, Quantity, Transfer
+from pteron.legs.keys import ACCOUNTS, FieldCondition, keys_of
+from pteron.legs.kind import SHAFT, LegKind, LegQuantity, LegTransfer
 from pteron.legs.leg import (
+    AngleLocus,
     Joint,
     LegEquations,
     LegMotion,
     Needs,
     Passive,
     Reach,
-    Turned,
     force_wrench,
 )
 from pteron.legs.reading import Reading
@@ -79,11 +79,11 @@ class RUPU(LegKind):
     keys: ClassVar = keys_of("RUPU")
 
     conditions = (
-        Condition(("ratio",), _check_ratio),
-        Condition(("travel",), _check_travel),
+        FieldCondition(("ratio",), _check_ratio),
+        FieldCondition(("travel",), _check_travel),
     )
 
-    def under(self, frame: Sequence[Vector]) -> Self:
+    def with_platform_frame(self, frame: Sequence[Vector]) -> Self:
         axis = frame[2]
         if self.direction is None:
             return replace(self, direction=axis)
@@ -101,23 +101,25 @@ class RUPU(LegKind):
         return self
 
     @property
-    def quantities(self) -> tuple[Quantity, ...]:
+    def quantities(self) -> tuple[LegQuantity, ...]:
         d = self.joint_axis
         return (
-            Quantity("guide_point", "point", self.guide_point),
-            Quantity("direction", "direction", d, "d"),
-            Quantity("plane_axis", "normal", perpendicular_to(d)),
-            Quantity("ratio", "number", (self.ratio,)),
-            Quantity("elbow", "sign", (self.elbow,)),
+            LegQuantity("guide_point", "point", self.guide_point),
+            LegQuantity("direction", "direction", d, "d"),
+            LegQuantity("plane_axis", "normal", perpendicular_to(d)),
+            LegQuantity("ratio", "number", (self.ratio,)),
+            LegQuantity("elbow", "sign", (self.elbow,)),
         )
 
     def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
         return (1, 0, 0), (0, 1, 0), (0, 0, 1)
 
-    def passive(self, motion: LegMotion, still: Expression, turned: Expression) -> list[Passive]:
+    def passive_joints(
+        self, motion: LegMotion, zero_axes: Expression, axes: Expression
+    ) -> list[Passive]:
         return joint_limit("shaft", "m", ca.norm_2(motion.links[1]), self.travel, 1.0)
 
-    def doubts(self, axis: Vector | None) -> Iterator[str]:
+    def unlikely_values(self, axis: Vector | None) -> Iterator[str]:
         if not 1.0 / _FAST <= abs(self.ratio) <= _FAST:
             yield (
                 f"ratio: {self.ratio:g} rad of the joint per rad of phi: is that the motor's gear? "
@@ -141,20 +143,20 @@ class RUPU(LegKind):
     def reach_text(self) -> str:
         return "its shaft has no length"
 
-    def transfers(self, gravity: Vector) -> tuple[Transfer, ...]:
+    def transfers(self, gravity: Vector) -> tuple[LegTransfer, ...]:
         swing = {("I", "u"): (1, ()), ("I", "l"): (-1, ())}
         transfer_list = [
-            Transfer("the shaft{} swings about a fixed point", {("m", "u"): (1, ())}),
-            Transfer("both parts of the shaft{} swing alike", swing),
+            LegTransfer("the shaft{} swings about a fixed point", {("m", "u"): (1, ())}),
+            LegTransfer("both parts of the shaft{} swing alike", swing),
         ]
         if not any(gravity):
             transfer_list.append(
-                Transfer("no gravity acts on the shaft{}", {("mgx", "u"): (1, ())})
+                LegTransfer("no gravity acts on the shaft{}", {("mgx", "u"): (1, ())})
             )
         return tuple(transfer_list)
 
     @classmethod
-    def closing(
+    def draw_closure(
         cls, values: Mapping[str, Sequence[Fraction]], rng: Random
     ) -> tuple[list[Fraction], int]:
         """Draw the shaft."""
@@ -257,8 +259,8 @@ class RUPUEquations(LegEquations):
     def lever(self, length: Expression) -> Expression:
         return length / ca.fabs(self.ratio)
 
-    def locus(self, q: Expression) -> Turned:
-        return Turned(q / self.ratio)
+    def locus(self, q: Expression) -> AngleLocus:
+        return AngleLocus(q / self.ratio)
 
 
 RUPU.equations_class = RUPUEquations

@@ -26,7 +26,7 @@ from pteron.bodies.motion import (
 from pteron.bodies.vectors import Vector, shift_point
 from pteron.legs.circles import random_fraction
 from pteron.legs.drive import Drive
-from pteron.legs.kind import SLIDER, LegKind, ReachBound, Transfer
+from pteron.legs.kind import SLIDER, LegKind, LegTransfer, ReachBound
 from pteron.legs.leg import Joint, LegEquations, LegMotion, Needs, Reach, force_wrench
 from pteron.legs.reading import Reading
 
@@ -70,7 +70,7 @@ class SlideLeg(LegKind):
         ends = "slider and platform, where its x is zero"
         return {"l": ("lower", -self.lower_length, 0.0, ends)}
 
-    def transfers(self, gravity: Vector) -> tuple[Transfer, ...]:
+    def transfers(self, gravity: Vector) -> tuple[LegTransfer, ...]:
         entries = {
             ("m", "p"): (1, ()),
             ("m", "l"): (-1, ()),
@@ -78,7 +78,7 @@ class SlideLeg(LegKind):
             ("I", "l"): (-1, ("ll", "ll")),
         }
         return (
-            Transfer(f"slider and {self.names['l']}{{}} carry the joint between them", entries),
+            LegTransfer(f"slider and {self.names['l']}{{}} carry the joint between them", entries),
         )
 
     @classmethod
@@ -89,7 +89,7 @@ class SlideLeg(LegKind):
         """Return the link in a random direction, in fractions."""
 
     @classmethod
-    def closing(
+    def draw_closure(
         cls, values: Mapping[str, Sequence[Fraction]], rng: Random
     ) -> tuple[list[Fraction], int]:
         """Draw the link and the slider's place: their sum is a platform point."""
@@ -188,7 +188,7 @@ class SlideEquations(LegEquations):
             self.ll,
         )
 
-    def named(self, point: PointMotion, rotation: RotationMotion) -> dict[str, Expression]:
+    def exported_terms(self, point: PointMotion, rotation: RotationMotion) -> dict[str, Expression]:
         w, h, square = self._closure_terms(point.position)
         return {"w": w, "h": h, "square": square, "root": ca.sqrt(square), "b": self.state(point).b}
 

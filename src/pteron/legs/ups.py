@@ -27,7 +27,7 @@ from pteron.bodies.vectors import Vector, dot
 from pteron.legs.circles import random_fraction, random_vector
 from pteron.legs.cones import Cone, cone_limit
 from pteron.legs.keys import ACCOUNTS, keys_of
-from pteron.legs.kind import Quantity, Transfer
+from pteron.legs.kind import LegQuantity, LegTransfer
 from pteron.legs.leg import (
     Joint,
     LegEquations,
@@ -35,7 +35,7 @@ from pteron.legs.leg import (
     Needs,
     Passive,
     Reach,
-    Sphere,
+    SphereLocus,
     force_wrench,
 )
 from pteron.legs.ram import RamLeg
@@ -61,7 +61,7 @@ class UPS(RamLeg):
 
     keys: ClassVar = keys_of("ram", "UPS")
 
-    def under(self, frame: Sequence[Vector]) -> Self:
+    def with_platform_frame(self, frame: Sequence[Vector]) -> Self:
         if self.direction is not None:
             return self
         way = [a - b for a, b in zip(self.platform_point, self.guide_point, strict=True)]
@@ -70,12 +70,12 @@ class UPS(RamLeg):
         return replace(self, direction=y if leans else x)
 
     @property
-    def quantities(self) -> tuple[Quantity, ...]:
+    def quantities(self) -> tuple[LegQuantity, ...]:
         assert self.direction is not None  # the manipulator has given it
         return (
-            Quantity("guide_point", "point", self.guide_point),
-            Quantity("direction", "normal", self.direction),
-            Quantity("elbow", "sign", (self.elbow,)),
+            LegQuantity("guide_point", "point", self.guide_point),
+            LegQuantity("direction", "normal", self.direction),
+            LegQuantity("elbow", "sign", (self.elbow,)),
         )
 
     def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
@@ -85,27 +85,29 @@ class UPS(RamLeg):
     def base_axis(self) -> Vector | None:
         return self.direction
 
-    def passive(self, motion: LegMotion, still: Expression, turned: Expression) -> list[Passive]:
+    def passive_joints(
+        self, motion: LegMotion, zero_axes: Expression, axes: Expression
+    ) -> list[Passive]:
         (_, way), length = motion.links, self.limits[1]
         assert way is not None
         return [
             *cone_limit("ram at the base", self.base_cone, ca.SX.eye(3), way, length),
-            *cone_limit("ram at the platform", self.platform_cone, turned, -way, length),
+            *cone_limit("ram at the platform", self.platform_cone, axes, -way, length),
         ]
 
     def rod_couple(self, motion: LegMotion) -> Expression:
         return ca.SX(3, 1)
 
-    def transfers(self, gravity: Vector) -> tuple[Transfer, ...]:
+    def transfers(self, gravity: Vector) -> tuple[LegTransfer, ...]:
         return (
-            Transfer("the cylinder{} turns about a fixed point", {("m", "u"): (1, ())}),
-            Transfer(
+            LegTransfer("the cylinder{} turns about a fixed point", {("m", "u"): (1, ())}),
+            LegTransfer(
                 "cylinder and piston{} turn alike", {("I", "u"): (1, ()), ("I", "l"): (-1, ())}
             ),
         )
 
     @classmethod
-    def closing(
+    def draw_closure(
         cls, values: Mapping[str, Sequence[Fraction]], rng: Random
     ) -> tuple[list[Fraction], int]:
         """Draw the ram."""
@@ -134,7 +136,7 @@ class UPSEquations(LegEquations):
     def __init__(self, guide_point: Expression, direction: Expression, elbow: Expression) -> None:
         self.r, self.d = guide_point, direction
 
-    def along(self, axes: Expression, origin: Expression) -> UPSEquations:
+    def change_frame(self, axes: Expression, origin: Expression) -> UPSEquations:
         guide = ca.mtimes(axes.T, self.r) - ca.mtimes(axes.T, origin)
         return UPSEquations(guide, ca.mtimes(axes.T, self.d), ca.SX(1))
 
@@ -172,7 +174,7 @@ class UPSEquations(LegEquations):
             at.length, at.rate, at.growth, row, unit, bodies, chain, links, row_size=unit
         )
 
-    def named(self, point: PointMotion, rotation: RotationMotion) -> dict[str, Expression]:
+    def exported_terms(self, point: PointMotion, rotation: RotationMotion) -> dict[str, Expression]:
         at = self._ram(point)
         return {"w": point.position - self.r, "length": at.length, "n": at.n, "dn": at.dn}
 
@@ -182,8 +184,8 @@ class UPSEquations(LegEquations):
         length = ca.sqrt(square)
         return Reach(length, square, square, length)
 
-    def locus(self, q: Expression) -> Sphere:
-        return Sphere(self.r, q)
+    def locus(self, q: Expression) -> SphereLocus:
+        return SphereLocus(self.r, q)
 
     def needs(
         self,

@@ -6,11 +6,17 @@ from pteron.public import publish as _publish
 
 if TYPE_CHECKING:
     from pteron.manipulator.dimensions import with_dimensions as with_dimensions
-    from pteron.manipulator.files import catalog as catalog, load as load
+    from pteron.manipulator.files import (
+        catalog as catalog,
+        from_dict as from_dict,
+        load as load,
+        loads as loads,
+    )
     from pteron.manipulator.manipulator import (
         STANDARD_GRAVITY as STANDARD_GRAVITY,
         Manipulator as Manipulator,
     )
+    from pteron.manipulator.owner_data import OwnerData as OwnerData
     from pteron.manipulator.parameters import (
         parameter_data as parameter_data,
         parameter_names as parameter_names,
@@ -23,7 +29,7 @@ if TYPE_CHECKING:
         RobotLike as RobotLike,
         as_manipulator as as_manipulator,
     )
-    from pteron.manipulator.saving import save as save
+    from pteron.manipulator.saving import dumps as dumps, save as save, to_dict as to_dict
     from pteron.manipulator.tool import Tool as Tool
     from pteron.manipulator.variants import turned as turned, working_modes as working_modes
 

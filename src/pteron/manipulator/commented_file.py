@@ -118,7 +118,7 @@ def crank_direction_text(robot: Manipulator) -> str:
     It is "" without gravity, too.
     """
     down = np.array(robot.gravity)
-    zeros = [leg.at_zero for leg in robot.legs if leg.at_zero is not None]
+    zeros = [leg.crank_at_zero for leg in robot.legs if leg.crank_at_zero is not None]
     if not zeros or not down.any():
         return ""
     sines = np.array(zeros) @ down / np.linalg.norm(down)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from difflib import get_close_matches
@@ -21,7 +21,7 @@ from pteron.manipulator.machine_warnings import machine_warnings
 from pteron.manipulator.manipulator import Manipulator, faults_of
 from pteron.manipulator.radii import Radii
 from pteron.manipulator.tool import Tool
-from pteron.platforms import Bar, Geared, Platform
+from pteron.platforms import Bar, GearedPart, Platform
 from pteron.platforms.kinds import TILTING
 from pteron.toml import fault_lines, joined_faults, parsed_toml, toml_bytes
 
@@ -83,10 +83,8 @@ def load(name_or_path: str | Path) -> Manipulator:
     >>> pteron.load("tripteron").coordinates
     ('x', 'y', 'z')
     """
-    robot, unlikely = read_machine(*contents(name_or_path), str(name_or_path))
-    for text in unlikely:
-        warn_unlikely(f"{name_or_path}: {text}")
-    return robot
+    source = str(name_or_path)
+    return _warned(*read_machine(*contents(name_or_path), source), source)
 
 
 @lru_cache(maxsize=64)
@@ -94,8 +92,89 @@ def read_machine(
     content: bytes, source: str, source_name: str
 ) -> tuple[Manipulator, tuple[str, ...]]:
     """Return the machine of a file's contents, and warnings (cached)."""
-    document = parsed_toml(content, source, ModelError)
-    robot = _machine(document, source_name)
+    return _machine_and_warnings(parsed_toml(content, source, ModelError), source_name)
+
+
+def loads(text: str) -> Manipulator:
+    """Read a manipulator from the text of a TOML file.
+
+    Parameters
+    ----------
+    text : str
+        What a robot file holds.
+
+    Returns
+    -------
+    Manipulator
+        The machine, checked.
+
+    Raises
+    ------
+    ModelError
+        As `load`.
+
+    Warns
+    -----
+    UnlikelyValue
+        As `load`.
+
+    Examples
+    --------
+    >>> import pteron
+    >>> robot = pteron.load("delta")
+    >>> pteron.loads(pteron.dumps(robot)) == robot
+    True
+    """
+    return _warned(*read_machine(text.encode(), "the text", "the text"), "the text")
+
+
+def from_dict(tables: Mapping[str, Any]) -> Manipulator:
+    """Return the manipulator that the tables of a robot file describe.
+
+    Parameters
+    ----------
+    tables : mapping
+        The keys of a robot file, as `to_dict` returns and `tomllib` or `json` reads them.
+
+    Returns
+    -------
+    Manipulator
+        The machine, checked.
+
+    Raises
+    ------
+    ModelError
+        As `load`.
+
+    Warns
+    -----
+    UnlikelyValue
+        As `load`.
+
+    Examples
+    --------
+    >>> import pteron
+    >>> tables = pteron.to_dict(pteron.load("delta"))
+    >>> tables["legs"][0]["upper_length"] = 0.25
+    >>> pteron.from_dict(tables).legs[0].upper_length
+    0.25
+    """
+    document = dict(tables)
+    return _warned(*_machine_and_warnings(document, "the tables"), "the tables")
+
+
+def _warned(robot: Manipulator, unlikely: Sequence[str], source: str) -> Manipulator:
+    """Return a machine, and warn of its unlikely values."""
+    for text in unlikely:
+        warn_unlikely(f"{source}: {text}")
+    return robot
+
+
+def _machine_and_warnings(
+    document: dict[str, Any], source: str
+) -> tuple[Manipulator, tuple[str, ...]]:
+    """Return the machine of a file's tables, and warnings."""
+    robot = _machine(document, source)
     # Pteron writes first moments, people centres of mass: an identified value of a single body is
     # one of many equivalent ones, and need not be likely.
     return robot, machine_warnings(robot, bodies=not _has_first_moments(document))
@@ -174,7 +253,14 @@ def _machine(document: dict[str, Any], source: str) -> Manipulator:
         reading.faults += faults_of(name, platform, legs_built, tools, home)
         if not reading.faults:
             return Manipulator(
-                name, platform, tuple(built), machine.gravity, radii, tuple(tools), home
+                name,
+                platform,
+                tuple(built),
+                machine.gravity,
+                radii,
+                tuple(tools),
+                home,
+                machine.owner or {},
             )
     subject = shorten(source, bare=True, longest=1000)
     raise ModelError(joined_faults(reading.faults), subject=subject, faults=reading.faults)
@@ -248,7 +334,9 @@ class _FileReader:
             required |= {"center": table.center, "second_axis": table.second_axis}
         else:
             optional["bars"] = tuple(self.parts("platform.bars", table.bars or [], Bar))
-            optional["geared"] = tuple(self.parts("platform.geared", table.geared or [], Geared))
+            optional["geared"] = tuple(
+                self.parts("platform.geared", table.geared or [], GearedPart)
+            )
             required["slides"] = bool(table.slides)
             if table.motion is None or table.axis is None:
                 return None

@@ -119,7 +119,7 @@ def leg_of(
             converted[name] = _field_value(raw, name, keys[name])
         except ModelError as error:
             refused[name] = error.faults
-    sound, others = kind.checked(converted)
+    sound, others = kind.check_fields(converted)
     filled = {
         name: _ORDINARY.get(key.role) if key.default is ... or key.role == "point" else key.default
         for name, key in keys.items()
@@ -176,7 +176,7 @@ def _end_fault(leg: LegKind, letter: str, body: Any) -> str | None:
     """Return the fault of a body whose centre of mass is beyond its ends, or None."""
     if not letter or body.center_of_mass is None or min(body.mass, body.inertia) <= 0.0:
         return None
-    text = leg.beyond_ends(letter, body.center_of_mass[0])
+    text = leg.center_of_mass_warning(letter, body.center_of_mass[0])
     return text and f"{text}; with it no real body has inertia {body.inertia:g} kg m^2"
 
 

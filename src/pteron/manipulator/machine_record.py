@@ -138,7 +138,7 @@ def _layout(robot: Manipulator) -> str:
     for leg in robot.legs:
         signs = [float(v) for q in leg.quantities if q.role == "sign" for v in q.value]
         legs.append(leg.type + "".join("+" if sign > 0.0 else "-" for sign in signs))
-    angles = f" {platform.angle_order}" if len(platform.angles) == 3 else ""
+    angles = f" {platform.angle_order}" if platform.has_angle_order else ""
     slides = ", slides" if platform.slides else ""
     return f"{platform.motion}{angles}{slides}: {' '.join(legs)}"
 

@@ -15,6 +15,7 @@ from pteron.legs.drive_warnings import drive_warnings
 from pteron.manipulator.manipulator import Manipulator, legs_text, unheld_axes
 from pteron.platforms import Platform
 from pteron.thresholds import STOUT_LINK
+from pteron.tolerances import SAME
 
 _LARGE = 10.0
 """Length, m, beyond which millimetres are likelier."""
@@ -34,9 +35,6 @@ _HEAVY = 100.0
 
 _LEGS = 3
 """Least number of legs of which one can be an outlier."""
-
-_SAME = 1e-6
-"""Tolerance of equal directions."""
 
 _PULL = 30.0
 """Gravity, m/s^2, beyond which another unit is likelier."""
@@ -59,7 +57,8 @@ def machine_warnings(robot: Manipulator, *, bodies: bool = True) -> tuple[str, .
     warnings = _millimetre_warnings(long_lengths)
     if hypot(*robot.gravity) > _PULL:
         warnings.append(f"gravity: {hypot(*robot.gravity):g} m/s^2: is that mm/s^2?")
-    turn, most = ("half a turn", pi) if platform.tilts else ("a turn", 2.0 * pi)
+    most = 2.0 * platform.angle_range
+    turn = "a turn" if most > pi else "half a turn"
     warnings += [
         f"platform: limits: {list(limits)} rad, more than {turn} from {angle} = 0: are these "
         "degrees?"
@@ -77,7 +76,7 @@ def machine_warnings(robot: Manipulator, *, bodies: bool = True) -> tuple[str, .
     legs_by_text: dict[str, list[int]] = {}
     for i, leg in enumerate(robot.legs, start=1):
         leg_warnings = () if i in long_lengths else _leg_warnings(leg, platform, bodies)
-        for text in (*leg_warnings, *leg.doubts(axis), *drive_warnings(leg)):
+        for text in (*leg_warnings, *leg.unlikely_values(axis), *drive_warnings(leg)):
             legs_by_text.setdefault(text, []).append(i)
     warnings += [f"{legs_text(legs)}: {text}" for text, legs in legs_by_text.items()]
     if axis is not None:
@@ -90,7 +89,7 @@ def machine_warnings(robot: Manipulator, *, bodies: bool = True) -> tuple[str, .
 def _beside_the_pin(robot: Manipulator) -> Iterator[str]:
     """Yield what stands beside the pin where both legs of a five-bar meet."""
     platform = robot.platform
-    if platform.tilts:
+    if platform.plane_normal is None:
         return
     axes = unheld_axes(platform, robot.legs)
     if len(axes) != 1:
@@ -103,7 +102,7 @@ def _beside_the_pin(robot: Manipulator) -> Iterator[str]:
         # A planar body's centre of mass has two coordinates.
         point = to_base @ np.array([*place, 0.0][:3])
         beside = hypot(*np.cross(axes[0], point - pin))
-        if beside > _SAME:
+        if beside > SAME:
             yield (
                 f"platform: {key}: {1e3 * beside:.4g} mm beside the pin where the links meet, but "
                 "no leg keeps the platform from turning about that pin; on an extended link it "
@@ -117,7 +116,7 @@ def _odd_directions(robot: Manipulator) -> Iterator[str]:
     axis = np.array(robot.platform.axis)
     out = (points - points.mean(axis=0)) @ (np.eye(3) - np.outer(axis, axis))
     radii = np.linalg.norm(out, axis=1, keepdims=True)
-    if len(out) < _LEGS or radii.min() < _SAME:
+    if len(out) < _LEGS or radii.min() < SAME:
         return
     out /= radii
     frames = np.stack([out, np.cross(axis, out), np.broadcast_to(axis, out.shape)], axis=1)
@@ -129,7 +128,7 @@ def _odd_directions(robot: Manipulator) -> Iterator[str]:
         local_directions = np.einsum(
             "ijk,ik->ij", frames, [directions[name] for directions in directions_by_leg]
         )
-        opposite = (np.abs(local_directions[:, None] + local_directions).max(axis=-1) < _SAME).sum(
+        opposite = (np.abs(local_directions[:, None] + local_directions).max(axis=-1) < SAME).sum(
             axis=1
         )
         for i in np.flatnonzero(opposite == len(out) - 1) + 1:
@@ -203,17 +202,17 @@ def _leg_warnings(leg: LegKind, platform: Platform, bodies: bool) -> Iterator[st
         yield f"limits: {list(leg.limits)} rad: are these degrees?"
     for letter, (key, low, high, _) in leg.extents.items() if bodies else ():
         body: Any = leg.bodies[letter]
-        if text := leg.beyond_ends(letter, body.center_of_mass[0]):
+        if text := leg.center_of_mass_warning(letter, body.center_of_mass[0]):
             yield f"{key}: center_of_mass: {text}"
         length = high - low
         thick = sqrt(4.0 * body.mass / (pi * _STEEL * length))
         if body.mass > _DENSE * length:
             yield f"{key}: mass: {body.mass:g} kg on {length:g} m: is it in grams?"
-        elif thick > STOUT_LINK * length and body.mass > platform.joined.mass:
+        elif thick > STOUT_LINK * length and body.mass > platform.total_inertia.mass:
             yield (
                 f"{key}: mass: {body.mass:g} kg on {length:g} m, more than the platform's "
-                f"{platform.joined.mass:g} kg: solid steel {1e3 * thick:.0f} mm thick: is it this "
-                "machine's?"
+                f"{platform.total_inertia.mass:g} kg: solid steel {1e3 * thick:.0f} mm thick: is "
+                "it this machine's?"
             )
         yield from (f"{key}: {text}" for text in _inertia_warnings(body, high - low))
 
@@ -272,7 +271,7 @@ def _size_warnings(platform: Platform, radius: float) -> Iterator[str]:
             )
     for i, part in enumerate(platform.geared, start=1):
         joined = part.ratio**2 * part.inertia
-        away = sqrt(joined / platform.joined.mass)
+        away = sqrt(joined / platform.total_inertia.mass)
         if away > 3.0 * size:
             yield (
                 f"geared item {i}: {part.ratio:g}^2 times {part.inertia:g} kg m^2 is the "

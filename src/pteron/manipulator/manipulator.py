@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, fields, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any
 
@@ -19,18 +19,14 @@ from pteron.errors import ModelError
 from pteron.legs import LegKind
 from pteron.legs.protocol import breaches
 from pteron.manipulator.names import name_faults
+from pteron.manipulator.owner_data import OwnerData
 from pteron.manipulator.radii import Radii
 from pteron.manipulator.tool import Tool, tool_faults
 from pteron.platforms import Platform
 from pteron.platforms.coordinates import Unit
 from pteron.platforms.parts import HeldPoint
+from pteron.tolerances import ROUNDING
 from pteron.toml import raise_faults
-
-_COINCIDENT = 1e-9
-"""Distance, m, below which points count as coincident."""
-
-_NO_EFFECT = 1e-9
-"""Component in the platform's plane of a leg's unit force that counts as zero."""
 
 STANDARD_GRAVITY: Vector = (0.0, 0.0, -9.81)
 """Default acceleration of gravity, m/s^2."""
@@ -59,6 +55,9 @@ class Manipulator:
         Tools that the platform can carry; `pteron.motion.with_tool` mounts one.
     home : tuple of float, optional
         The pose, m and rad, where the machine stands; `pteron.workspace.home_pose` finds one.
+    owner : mapping
+        Data of the machine's owner, such as a serial number: kept in its file, without effect, and
+        not compared.
 
     Raises
     ------
@@ -74,6 +73,7 @@ class Manipulator:
     radii: Radii | None = None
     tools: tuple[Tool, ...] = ()
     home: tuple[float, ...] | None = None
+    owner: Mapping[str, Any] = field(default_factory=OwnerData, compare=False, repr=False)
 
     def __hash__(self) -> int:
         """Hash once: the public functions look machines up at every call."""
@@ -81,7 +81,8 @@ class Manipulator:
 
     @cached_property
     def _hash(self) -> int:
-        return hash(tuple(getattr(self, field.name) for field in fields(self)))
+        compared = (part.name for part in fields(self) if part.compare)
+        return hash(tuple(getattr(self, name) for name in compared))
 
     def __getstate__(self) -> dict[str, Any]:
         # Texts hash differently in every process.
@@ -90,9 +91,10 @@ class Manipulator:
     def __post_init__(self) -> None:
         legs = tuple(self.legs)
         raise_faults(faults_of(self.name, self.platform, legs, self.tools, self.home))
-        legs = tuple(leg.under(self.platform.frame) for leg in legs)
+        legs = tuple(leg.with_platform_frame(self.platform.frame) for leg in legs)
         object.__setattr__(self, "legs", legs)
         object.__setattr__(self, "tools", tuple(self.tools))
+        object.__setattr__(self, "owner", OwnerData(self.owner))
         if self.home is not None:
             object.__setattr__(self, "home", tuple(float(coordinate) for coordinate in self.home))
         object.__setattr__(self, "platform", _with_held_points(self.platform, legs))
@@ -210,7 +212,7 @@ def faults_of(
     ]
     if faults or len(known_legs) < freedom:
         return faults
-    placed_legs = [leg.under(platform.frame) for leg in known_legs.values()]
+    placed_legs = [leg.with_platform_frame(platform.frame) for leg in known_legs.values()]
     return (_unheld_tilting if platform.tilts else _unheld_freedoms)(platform, placed_legs)
 
 
@@ -233,7 +235,7 @@ def _leg_faults(platform: Platform, leg: object) -> Iterator[str]:
     if not isinstance(leg, LegKind):
         yield f"{type(leg).__name__} given, a leg expected"
         return
-    if leg.follows_angle and (platform.slides or not platform.turns):  # nor where it tilts
+    if leg.follows_angle and platform.turning_axis is None:
         yield (
             f"a {leg.type} leg turns the platform, but this {platform.motion} platform does not "
             "turn; give it another leg or another motion"
@@ -245,7 +247,7 @@ def _leg_faults(platform: Platform, leg: object) -> Iterator[str]:
             "across it, so give 0"
         )
     try:
-        leg = leg.under(platform.frame)
+        leg = leg.with_platform_frame(platform.frame)
     except ModelError as error:
         yield str(error)
         return
@@ -259,7 +261,7 @@ def _leg_faults(platform: Platform, leg: object) -> Iterator[str]:
             f"a {leg.type} leg ends in a ball joint, under which a {platform.motion} platform "
             'tilts; make the platform\'s motion "1T2R", or give it another leg'
         )
-    elif normal is not None and not platform.planar:
+    elif normal is not None and platform.plane_normal is None:
         yield (
             f"a {leg.type} leg moves in a plane, which a {platform.motion} platform leaves; make "
             'the platform\'s motion "2T" or "2T1R", or give it another leg'
@@ -269,9 +271,9 @@ def _leg_faults(platform: Platform, leg: object) -> Iterator[str]:
             f"direction {list(normal)} is not along the platform's axis {list(platform.axis)}, the "
             "normal of its plane"
         )
-    elif platform.planar and leg.equations_class.row_is_constant:
+    elif platform.plane_normal is not None and leg.equations_class.row_is_constant:
         row = np.array(ca.evalf(leg.equations().constant_row)).ravel()
-        if np.linalg.norm(platform.directions @ row) <= _NO_EFFECT * np.linalg.norm(row):
+        if np.linalg.norm(platform.directions @ row) <= ROUNDING * np.linalg.norm(row):
             yield (
                 f"its joint does not move the platform: a {leg.type} leg with these directions "
                 f"pushes along the platform's axis {list(platform.axis)} alone, across the plane; "
@@ -281,8 +283,11 @@ def _leg_faults(platform: Platform, leg: object) -> Iterator[str]:
 
 def _tilting_leg_faults(platform: Platform, leg: LegKind) -> Iterator[str]:
     """Yield the faults of a leg under a platform that tilts."""
-    takes = "legs that end in ball joints and hold nothing else"
-    if platform.on_planes:
+    takes, on_planes = (
+        "legs that end in ball joints and hold nothing else",
+        platform.keeps_points_in_planes,
+    )
+    if on_planes:
         takes = "legs that keep their points in planes and end in ball joints"
     normal, free = leg.plane_normal, len(complement(leg.free_axes(None))) == 0
     if any(leg.fixed_offset):
@@ -297,7 +302,7 @@ def _tilting_leg_faults(platform: Platform, leg: LegKind) -> Iterator[str]:
             f"a {leg.type} leg keeps a platform from tilting, but a {platform.motion} platform "
             f"tilts; it takes {takes}"
         )
-    elif (normal is None) == platform.on_planes:
+    elif (normal is None) == on_planes:
         how = "does not keep its point" if normal is None else "keeps its point"
         yield f"a {leg.type} leg {how} in a plane; a {platform.motion} platform takes {takes}"
     elif normal is not None and abs(dot(normal, platform.axis)) > PARALLEL_TOLERANCE:
@@ -322,7 +327,7 @@ def _unheld_tilting(platform: Platform, legs: Sequence[LegKind]) -> list[str]:
 
 def _with_held_points(platform: Platform, legs: Sequence[LegKind]) -> Platform:
     """Return a platform with the planes in which its legs keep its points, if it is a tripod's."""
-    if not platform.on_planes:
+    if not platform.keeps_points_in_planes:
         return platform
     planes = [
         HeldPoint(leg.plane_normal, leg.guide_point, leg.platform_point)
@@ -337,7 +342,7 @@ def unheld_axes(platform: Platform, legs: Sequence[LegKind]) -> NDArray[np.float
 
     Only the points where both legs meet may carry anything there, as of a five-bar.
     """
-    axis = platform.axis if platform.turns and not platform.slides else None
+    axis = platform.turning_axis
     # What one leg withholds is perpendicular to the axes about which it lets the platform turn.
     withheld = [complement(leg.free_axes(axis)) for leg in legs]
     return complement(np.vstack([*withheld, *([axis] if axis else [])]))
@@ -348,17 +353,17 @@ def _unheld_freedoms(platform: Platform, legs: list[LegKind]) -> list[str]:
     turning = [i for i, leg in enumerate(legs, start=1) if leg.follows_angle]
     if len(turning) > 1:
         return [f"{legs_text(turning)}: all turn the platform, which takes one such leg"]
-    if platform.planar and all(leg.plane_normal is None for leg in legs):
+    if platform.plane_normal is not None and all(leg.plane_normal is None for leg in legs):
         return [f"legs: none keeps a {platform.motion} platform in its plane; give it a planar leg"]
-    axis = platform.axis if platform.turns and not platform.slides else None
+    axis = platform.turning_axis
     withheld = [complement(leg.free_axes(axis)) for leg in legs]
     free = unheld_axes(platform, legs)
     if not len(free):
         return []
-    if platform.motion == "2T":
+    if platform.plane_normal is not None and not platform.angles:
         first, second = (_planar_point(platform, leg) for leg in legs)
         distance = math.hypot(*(first - second))
-        if distance <= _COINCIDENT:
+        if distance <= ROUNDING:
             return []
         return [
             f"legs: their platform points are {distance:.4g} m apart, so that the platform is free "

@@ -43,7 +43,7 @@ def parameter_data(
     """
     robot = as_manipulator(robot)
     kinds = tuple(tuple((b, i.kinds) for b, i in leg.bodies.items()) for leg in robot.legs)
-    carried = robot.platform.joined.kinds
+    carried = robot.platform.total_inertia.kinds
     return _cached_parameter_list(kinds, carried, None if groups is None else tuple(groups))
 
 
@@ -104,7 +104,9 @@ def parameters(robot: RobotLike) -> NDArray[np.float64]:
     robot = as_manipulator(robot)
     legs = [leg.bodies for leg in robot.legs]
     listed = parameter_data(robot)
-    bodies = (legs[p.legs[0] - 1][p.body] if p.legs else robot.platform.joined for p in listed)
+    bodies = (
+        legs[p.legs[0] - 1][p.body] if p.legs else robot.platform.total_inertia for p in listed
+    )
     return np.array([b.values[b.kinds.index(p.kind)] for p, b in zip(listed, bodies, strict=True)])
 
 
@@ -141,7 +143,9 @@ def with_parameters(robot: RobotLike, values: ArrayLike) -> Manipulator:
         blocks.setdefault((p.body, p.legs), []).append(parameter)
     bodies: dict[tuple[str, tuple[int, ...]], Any] = {}
     for (body, owner), block in blocks.items():
-        old: Inertia = robot.legs[owner[0] - 1].bodies[body] if owner else robot.platform.joined
+        old: Inertia = (
+            robot.legs[owner[0] - 1].bodies[body] if owner else robot.platform.total_inertia
+        )
         try:
             bodies[body, owner] = old.of_values(block)
         except ModelError as error:
@@ -151,5 +155,5 @@ def with_parameters(robot: RobotLike, values: ArrayLike) -> Manipulator:
         leg.with_bodies({body: bodies[body, (i,)] for body in leg.bodies})
         for i, leg in enumerate(robot.legs, start=1)
     )
-    platform = robot.platform.with_joined(bodies[PLATFORM, ()])
+    platform = robot.platform.with_total_inertia(bodies[PLATFORM, ()])
     return replace(robot, legs=legs, platform=platform)

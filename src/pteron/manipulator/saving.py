@@ -34,6 +34,50 @@ def save(robot: RobotLike, path: str | Path) -> Path:
     return write_text(path, text_of(as_manipulator(robot)))
 
 
+def dumps(robot: RobotLike) -> str:
+    """Return the text of a manipulator's file, as `save` writes it.
+
+    Parameters
+    ----------
+    robot : Manipulator, name or path
+        The machine.
+
+    Returns
+    -------
+    str
+        TOML, which `loads` reads back without loss.
+
+    Examples
+    --------
+    >>> import pteron
+    >>> pteron.dumps("delta").splitlines()[2]
+    'name = "delta"'
+    """
+    return text_of(as_manipulator(robot))
+
+
+def to_dict(robot: RobotLike) -> dict[str, Any]:
+    """Return the tables of a manipulator's file: what `from_dict` and `json` take.
+
+    Parameters
+    ----------
+    robot : Manipulator, name or path
+        The machine.
+
+    Returns
+    -------
+    dict
+        Strings, numbers, lists and dictionaries, by the keys of a robot file.
+
+    Examples
+    --------
+    >>> import pteron
+    >>> pteron.to_dict("delta")["platform"]["motion"]
+    '3T'
+    """
+    return document_of(as_manipulator(robot))
+
+
 def text_of(robot: Manipulator) -> str:
     """Return the text of a manipulator's file, unique to the machine."""
     from pteron.manipulator.writing import robot_text
@@ -64,6 +108,8 @@ def document_of(robot: Manipulator) -> dict[str, Any]:
         ]
     if robot.home is not None:
         machine["home"] = {"pose": robot.home}
+    if robot.owner:
+        machine["owner"] = dict(robot.owner)
     machine |= {"platform": platform, "legs": legs}
     tables: dict[str, Any] = _plain(machine)
     return tables

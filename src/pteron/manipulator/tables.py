@@ -184,6 +184,9 @@ class MachineTable(TomlTable):
     home: HomeTable | None = key(
         "where the machine stands; left out, it is found: see home_pose", None
     )
+    owner: dict[str, Any] = key(
+        "data of its owner: kept as it is, without effect", {}, {"serial": "Q-07"}
+    )
     platform: PlatformTable = key("what the legs carry")
     legs: list[Any] = key("one table for each freedom of the platform")
 

@@ -8,9 +8,7 @@ from typing import Any
 
 from pteron.manipulator.files import catalog, contents, load
 from pteron.manipulator.manipulator import Manipulator
-
-_SAME = 1e-6
-"""Relative tolerance of unchanged masses: files have more digits."""
+from pteron.tolerances import SAME
 
 
 def template_masses(robot: Manipulator) -> str:
@@ -33,7 +31,7 @@ def template_masses(robot: Manipulator) -> str:
         if len(links) < len(robot.legs[0].extents):
             continue  # one link alone may have the same round number by chance
         mass = robot.platform.inertia.mass
-        if isclose(mass, template.platform.inertia.mass, rel_tol=_SAME):
+        if isclose(mass, template.platform.inertia.mass, rel_tol=SAME):
             links.append(f"the platform's {mass:.4g} kg")
         return f"masses are still those of {name}: {', '.join(links)}: are they this machine's?"
     return ""
@@ -48,7 +46,7 @@ def _links(robot: Manipulator, template: Manipulator) -> Iterator[str]:
             continue
         _, least, most, _ = template_leg.extents[letter]
         mass, former = leg.bodies[letter].mass, template_leg.bodies[letter].mass
-        if isclose(mass, former, rel_tol=_SAME):
+        if isclose(mass, former, rel_tol=SAME):
             yield f"{key} {mass:.4g} kg"
-        elif isclose(mass / (high - low), former / (most - least), rel_tol=_SAME):
+        elif isclose(mass / (high - low), former / (most - least), rel_tol=SAME):
             yield f"{key} {mass:.4g} kg (its section)"

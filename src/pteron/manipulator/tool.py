@@ -95,7 +95,8 @@ def tool_faults(platform: Platform, tools: Sequence[Tool]) -> Iterator[str]:
             yield f"tools, item {i}: name: {tool.name!r} is listed twice; give each its own name"
         several = isinstance(tool.central_inertia, tuple)
         if tool.central_inertia != 0.0 and several != (inertia_count(platform.inertia.kinds) > 1):
-            expected = "Ixx, Ixy, Ixz, Iyy, Iyz, Izz" if platform.tilts else "one number"
+            components = platform.inertia_names
+            expected = ", ".join(components) if len(components) > 1 else "one number"
             yield (
                 f"tools, item {i}: central_inertia: {tool.central_inertia} given, {expected} "
                 f"expected for a {platform.motion} platform"

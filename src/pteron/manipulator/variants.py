@@ -13,9 +13,7 @@ from pteron.bodies.vectors import Vector, vector
 from pteron.errors import ModelError
 from pteron.manipulator.manipulator import Manipulator
 from pteron.manipulator.robot_like import RobotLike, as_manipulator
-
-_ORTHOGONAL = 1e-9
-"""Greatest element by which R R^T of a rotation may differ from 1."""
+from pteron.tolerances import ROUNDING
 
 
 def working_modes(robot: RobotLike) -> tuple[Manipulator, ...]:
@@ -77,7 +75,7 @@ def turned(robot: RobotLike, rotation: ArrayLike, *, gravity: bool = True) -> Ma
     """
     robot = as_manipulator(robot)
     matrix = np.asarray(rotation, dtype=float)
-    if matrix.shape != (3, 3) or not np.allclose(matrix @ matrix.T, np.eye(3), atol=_ORTHOGONAL):
+    if matrix.shape != (3, 3) or not np.allclose(matrix @ matrix.T, np.eye(3), atol=ROUNDING):
         raise ModelError(f"rotation: not an orthogonal 3x3 matrix: {matrix.tolist()}")
     if np.linalg.det(matrix) < 0:
         raise ModelError("rotation: the matrix is a reflection (determinant -1); negate one column")
@@ -87,8 +85,8 @@ def turned(robot: RobotLike, rotation: ArrayLike, *, gravity: bool = True) -> Ma
 
     # A 2R platform's frame is the base frame at angles zero.
     on_platform = robot.platform.second_axis is not None
-    legs = tuple(leg.turned(turn, platform=on_platform) for leg in robot.legs)
-    platform, home = robot.platform.turned(turn), robot.home
+    legs = tuple(leg.map_vectors(turn, platform=on_platform) for leg in robot.legs)
+    platform, home = robot.platform.map_vectors(turn), robot.home
     if home is not None:
         count = len(platform.lengths)
         place = matrix @ (np.array(home[:count]) @ robot.platform.directions)

@@ -41,11 +41,15 @@ def robot_text(
     head = [*about, *([*_CONVENTIONS, _bodies()] if explained else [f"For Pteron. {_UNITS}"])]
     lines = [f"# {line}" for text in head for line in wrap(text, _WIDTH - 2)]
     machine_keys = {
-        k: content for k, content in document.items() if k not in ("home", "platform", "legs")
+        k: content
+        for k, content in document.items()
+        if k not in ("home", "owner", "platform", "legs")
     }
     lines += ["", *_block("", MachineTable, machine_keys, explained)]
     if "home" in document:
         lines += ["", *_block("home", HomeTable, document["home"], explained)]
+    if "owner" in document:
+        lines += ["", tomlkit.dumps({"owner": document["owner"]}).rstrip()]
     carried = document["platform"]
     model = platform_table(carried["motion"])
     lines += ["", *_block("platform", model, carried, explained)]

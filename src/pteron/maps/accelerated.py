@@ -21,21 +21,21 @@ from pteron.maps.grid import Grid, Region
 from pteron.maps.map import MARGIN
 
 
-def accelerated(
+def indices_by_jax(
     robot: Manipulator, names: tuple[str, ...], grid: Grid, region: Region
 ) -> dict[str, Array]:
     """Return the indices of a part of a grid, and `status`, computed by JAX where it runs."""
     places = tuple(grid.coordinates.index(axis.name) for axis in grid.axes)
     function = _function(robot, names, places, grid.chunk)
     # A chunk at the grid's rim is filled up: another shape would be compiled anew.
-    values = [
+    axis_values = [
         np.pad(array, (0, side - len(array)), mode="edge")
         for array, side in (
             (axis.values[part], side)
             for axis, part, side in zip(grid.axes, region, grid.chunk, strict=True)
         )
     ]
-    outputs = function(np.array(grid.pose), *values)
+    outputs = function(np.array(grid.pose), *axis_values)
     region_of_chunk = tuple(slice(0, part.stop - part.start) for part in region)
     return {name: np.asarray(array)[region_of_chunk] for name, array in outputs.items()}
 
@@ -54,9 +54,9 @@ def _function(
         if name != MARGIN.name
     }
 
-    def evaluate(pose: Any, *values: Any) -> dict[str, Any]:
+    def evaluate(pose: Any, *axis_values: Any) -> dict[str, Any]:
         columns = [jnp.broadcast_to(coordinate, shape) for coordinate in pose]
-        for k, (place, coordinate) in enumerate(zip(places, values, strict=True)):
+        for k, (place, coordinate) in enumerate(zip(places, axis_values, strict=True)):
             columns[place] = jnp.broadcast_to(
                 coordinate.reshape((-1,) + (1,) * (len(shape) - 1 - k)), shape
             )
@@ -65,8 +65,8 @@ def _function(
         outputs = {"status": status, MARGIN.name: margin}
         for name in names:
             if name != MARGIN.name:
-                value, serves = kernels[name](poses)
-                outputs[name] = jnp.where(serves > 0.0, value, jnp.nan)
+                amounts, serves = kernels[name](poses)
+                outputs[name] = jnp.where(serves > 0.0, amounts, jnp.nan)
         return {name: outputs[name] for name in (*names, "status")}
 
     compiled: Callable[..., dict[str, Any]] = jax.jit(evaluate)

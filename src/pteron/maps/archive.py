@@ -14,7 +14,7 @@ from pteron.atomic import write_bytes
 from pteron.errors import DataError
 from pteron.maps.checksums import checksum
 from pteron.maps.grid import Grid
-from pteron.maps.map import Map
+from pteron.maps.map import Map, own_attributes, own_indices_of
 
 _ABOUT, _STATUS = "about", "status"
 """Names of two more arrays: grid, machine and units as JSON; whether each pose is in reach."""
@@ -37,6 +37,8 @@ def write_archive(index_map: Map, target: Path) -> Path:
         "units": index_map.units,
         "grid": index_map.grid.plain(),
     }
+    if index_map.own_indices:
+        about["own"] = {index.name: own_attributes(index) for index in index_map.own_indices}
     about["sha256"] = checksum(about, arrays)
     arrays[_ABOUT] = np.array(json.dumps(about))
     np.savez_compressed(buffer, **arrays)
@@ -51,9 +53,11 @@ def read_archive(source: Path) -> Map:
         given_sum = about.pop("sha256")
         if given_sum != checksum(about, arrays):
             raise ValueError("its checksum is another one")
-        values = {name: arrays[name] for name in about["units"]}
-        grid = Grid.of_plain(about["grid"])
-        return Map(about["robot"], grid, values, arrays[_STATUS], about["machine"])
+        indices = {name: arrays[name] for name in about["units"]}
+        grid = Grid.from_plain(about["grid"])
+        own_indices = own_indices_of(about.get("own", {}))
+        status, machine = arrays[_STATUS], about["machine"]
+        return Map(about["robot"], grid, indices, status, machine, own_indices)
     except Exception as error:  # unpacking damaged bytes raises anything
         reason = str(error) if type(error) is ValueError else type(error).__name__
         raise DataError(
@@ -68,7 +72,7 @@ def _expect_sizes_of_a_map(archive: ZipFile) -> None:
         raise ValueError("its description is too long")
     text = np.lib.format.read_array(io.BytesIO(archive.read(about)), allow_pickle=False)
     described = json.loads(str(text))
-    grid = Grid.of_plain(described["grid"])
+    grid = Grid.from_plain(described["grid"])
     names = {*described["units"], _STATUS, *(axis.name for axis in grid.axes)}
     expected = {about.filename} | {f"{name}.npy" for name in names}
     if set(archive.namelist()) != expected or len(archive.namelist()) != len(expected):
@@ -84,6 +88,6 @@ def _arrays(source: Path) -> dict[str, Any]:
         _expect_sizes_of_a_map(archive)
         members = {name: archive.read(name) for name in archive.namelist()}
     return {
-        name.removesuffix(".npy"): np.lib.format.read_array(io.BytesIO(data), allow_pickle=False)
-        for name, data in members.items()
+        name.removesuffix(".npy"): np.lib.format.read_array(io.BytesIO(content), allow_pickle=False)
+        for name, content in members.items()
     }

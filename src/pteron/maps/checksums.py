@@ -20,8 +20,8 @@ def checksum(about: Any, arrays: Mapping[str, NDArray[Any]]) -> str:
     The order of the arrays does not count, and all NaNs count as equal, whatever their bits.
     """
     total = hashlib.sha256(json.dumps(about, sort_keys=True).encode())
-    for name, values in sorted(arrays.items()):
-        array = np.ascontiguousarray(values)
+    for name, array_like in sorted(arrays.items()):
+        array = np.ascontiguousarray(array_like)
         if array.dtype.kind == "f":
             array = np.where(np.isnan(array), np.nan, array)
         total.update(f"\0{name} {array.dtype.str} {array.shape}\0".encode())

@@ -16,7 +16,7 @@ _TABLES = (".csv", ".parquet")
 """File name endings of tables."""
 
 
-def save_map(given: Map, path: str | Path) -> Path:
+def save_map(index_map: Map, path: str | Path) -> Path:
     """Write a map to a file whose ending says its format.
 
     ===================  ==========================================================================
@@ -28,7 +28,7 @@ def save_map(given: Map, path: str | Path) -> Path:
 
     Parameters
     ----------
-    given : Map
+    index_map : Map
         The map.
     path : str or Path
         The file; it is replaced whole, or not at all.
@@ -47,7 +47,7 @@ def save_map(given: Map, path: str | Path) -> Path:
         If a library is missing: the message names the extra.
     """
     target = checked_map_file(path)
-    return _WRITERS[target.suffix.lower()](given, target)
+    return _WRITERS[target.suffix.lower()](index_map, target)
 
 
 def load_map(path: str | Path) -> Map:

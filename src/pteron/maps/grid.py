@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from itertools import product
-from math import isfinite, pi, prod
+from math import isfinite, prod
 from numbers import Integral
 from sys import float_info
 from typing import Any, Self
@@ -20,6 +20,7 @@ from pteron.kinematics.evaluate import finite_pose
 from pteron.kinematics.unlikely_values import unlikely_values
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.platforms.coordinates import COORDINATES, coordinate
+from pteron.renamed import former_attribute
 from pteron.shapes import PoseLike
 from pteron.workspace import bounding_box, home_pose
 
@@ -81,8 +82,8 @@ class Axis:
             )
         if self.count < 2:
             raise DataError(f"{self.name}: {self.count} points given, at least 2 expected")
-        for key, value in (("least", least), ("greatest", greatest), ("count", int(self.count))):
-            object.__setattr__(self, key, value)
+        for key, bound in (("least", least), ("greatest", greatest), ("count", int(self.count))):
+            object.__setattr__(self, key, bound)
 
     @property
     def values(self) -> Array:
@@ -139,7 +140,7 @@ class Grid:
         object.__setattr__(self, "pose", pose)
 
     @classmethod
-    def of_plain(cls, plain: Mapping[str, Any]) -> Self:
+    def from_plain(cls, plain: Mapping[str, Any]) -> Self:
         """Return the grid from its `plain` form."""
         axes = tuple(Axis(**axis) for axis in plain["axes"])
         return cls(tuple(plain["coordinates"]), tuple(plain["pose"]), axes)
@@ -163,11 +164,13 @@ class Grid:
         return prod(self.shape)
 
     @property
-    def held(self) -> dict[str, float]:
+    def fixed_coordinates(self) -> dict[str, float]:
         """The coordinates that do not vary, with their values, m or rad."""
         varying = {axis.name for axis in self.axes}
         pairs = zip(self.coordinates, self.pose, strict=True)
-        return {name: value for name, value in pairs if name not in varying}
+        return {name: coordinate_value for name, coordinate_value in pairs if name not in varying}
+
+    held = former_attribute("held", "fixed_coordinates")
 
     @cached_property
     def chunk(self) -> tuple[int, ...]:
@@ -189,12 +192,12 @@ class Grid:
     def poses(self, region: Region = ()) -> Array:
         """Return the poses (..., m) of the grid, or of a part of it, m and rad."""
         parts = region or (slice(None),) * len(self.axes)
-        values = [axis.values[part] for axis, part in zip(self.axes, parts, strict=True)]
-        poses = np.empty((*map(len, values), len(self.pose)))
+        axis_values = [axis.values[part] for axis, part in zip(self.axes, parts, strict=True)]
+        poses = np.empty((*map(len, axis_values), len(self.pose)))
         poses[...] = self.pose
-        for k, (axis, axis_values) in enumerate(zip(self.axes, values, strict=True)):
-            lead = (-1,) + (1,) * (len(values) - 1 - k)
-            poses[..., self.coordinates.index(axis.name)] = axis_values.reshape(lead)
+        for k, (axis, steps) in enumerate(zip(self.axes, axis_values, strict=True)):
+            lead = (-1,) + (1,) * (len(axis_values) - 1 - k)
+            poses[..., self.coordinates.index(axis.name)] = steps.reshape(lead)
         return poses
 
 
@@ -246,7 +249,7 @@ def pose_grid(
     >>> import pteron
     >>> from pteron.maps import pose_grid
     >>> grid = pose_grid(pteron.load("quadrupteron"), {"z": 0.0, "phi": 0.0}, points=50)
-    >>> grid.shape, [axis.name for axis in grid.axes], grid.held
+    >>> grid.shape, [axis.name for axis in grid.axes], grid.fixed_coordinates
     ((50, 50), ['x', 'y'], {'z': 0.0, 'phi': 0.0})
     """
     robot = as_manipulator(robot)
@@ -263,8 +266,8 @@ def pose_grid(
         pair = platform.lengths if len(platform.lengths) > 1 else platform.angles
         varying = set(spans or pair[:2])
         fixed = {n: float(v) for n, v in zip(names, pose, strict=True) if n not in varying}
-    for name, value in fixed.items():
-        pose[names.index(name)] = value
+    for name, coordinate_value in fixed.items():
+        pose[names.index(name)] = coordinate_value
     varying_names = [name for name in names if name not in fixed]
     if not varying_names:
         raise DataError(f"nothing varies: leave one of {', '.join(names)} out of what is held")
@@ -272,7 +275,7 @@ def pose_grid(
     free = [name for name in varying_names if name not in spans]
     angles = [name for name in free if name in robot.platform.angles]
     moved = [name for name in free if name not in angles]
-    most = pi / 2.0 if robot.platform.tilts else pi
+    most = robot.platform.angle_range
     spans |= {name: robot.platform.angle_limits.get(name, (-most, most)) for name in angles}
     if moved:
         box = _box(robot, pose, spans)
@@ -307,35 +310,35 @@ def _box(robot: Manipulator, pose: Array, spans: Mapping[str, tuple[float, ...]]
     return np.array([np.min(boxes, axis=(0, 1)), np.max(boxes, axis=(0, 1))])
 
 
-def _number(key: str, value: object) -> float:
+def _number(key: str, number: object) -> float:
     """Return a finite float, or raise an error that names its key."""
     if (
-        isinstance(value, int | float | np.integer | np.floating)
-        and not isinstance(value, bool)
-        and -_HUGE <= value <= _HUGE
+        isinstance(number, int | float | np.integer | np.floating)
+        and not isinstance(number, bool)
+        and -_HUGE <= number <= _HUGE
     ):
-        return float(value)
-    raise DataError(f"{key}: {shorten(value)} given, a finite number expected")
+        return float(number)
+    raise DataError(f"{key}: {shorten(number)} given, a finite number expected")
 
 
 def expect_coordinates(
-    robot: Manipulator, held: Mapping[str, float], ranges: Mapping[str, tuple[float, ...]]
+    robot: Manipulator, fixed: Mapping[str, float], ranges: Mapping[str, tuple[float, ...]]
 ) -> None:
     """Refuse coordinates that the machine does not have, and values not finite or of wrong unit."""
     names = robot.coordinates
-    for name in (*held, *ranges):
+    for name in (*fixed, *ranges):
         if name not in names:
             raise DataError(
                 f"{name}: is no coordinate of {robot.name}, whose poses have {', '.join(names)}"
             )
-        if name in held and name in ranges:
+        if name in fixed and name in ranges:
             raise DataError(f"{name}: both held and given a range; choose one")
-    for name, values in {**{n: (v,) for n, v in held.items()}, **ranges}.items():
-        if not np.isfinite(values).all():
+    for name, span in {**{n: (v,) for n, v in fixed.items()}, **ranges}.items():
+        if not np.isfinite(span).all():
             raise DataError(f"{name}: a finite number expected")
-        if len(values) > 1 and not values[0] < values[1]:
+        if len(span) > 1 and not span[0] < span[1]:
             raise DataError(
-                f"{name}: from {values[0]:g} to {values[1]:g} given, an ascending range expected"
+                f"{name}: from {span[0]:g} to {span[1]:g} given, an ascending range expected"
             )
-        for warning in unlikely_values(robot, [name], np.array([values[:2]])):
+        for warning in unlikely_values(robot, [name], np.array([span[:2]])):
             raise DataError(warning)

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pteron.errors import DataError
+from pteron.html_table import Overview, frame_overview
 from pteron.indices import INDICES, Index
 from pteron.kernels import Array
 from pteron.maps.grid import Grid
 from pteron.platforms.coordinates import coordinate
+from pteron.renamed import former_attribute, warn_former
+from pteron.result import Result
 from pteron.workspace import BEYOND_LIMITS, REACHABLE
 
 if TYPE_CHECKING:
@@ -33,8 +36,8 @@ ALL = {MARGIN.name: MARGIN, **INDICES}
 """All indices that a map may hold, by name."""
 
 
-@dataclass(frozen=True)
-class Summary:
+@dataclass(frozen=True, eq=False, repr=False)
+class Summary(Result):
     """Statistics of an index over the poses of a map that are in reach and within limits.
 
     Attributes
@@ -65,8 +68,8 @@ class Summary:
     infinite: int
 
 
-@dataclass(frozen=True)
-class Map:
+@dataclass(frozen=True, eq=False, repr=False)
+class Map(Result):
     """Indices over a grid of poses.
 
     Attributes
@@ -83,6 +86,8 @@ class Map:
     machine : str
         The text of the machine's file, as `save` writes it; empty where it is not known, as of a
         map that was read from a table.
+    own_indices : tuple of Index
+        Those of its values that are no indices of Pteron.
     """
 
     robot: str
@@ -90,6 +95,7 @@ class Map:
     values: Mapping[str, Array]
     status: NDArray[np.int8]
     machine: str = ""
+    own_indices: tuple[Index, ...] = ()
 
     def __repr__(self) -> str:
         sides = " x ".join(f"{axis.name} {axis.count}" for axis in self.grid.axes)
@@ -98,7 +104,11 @@ class Map:
     @property
     def indices(self) -> tuple[Index, ...]:
         """The indices of its values, in their order."""
-        return tuple(ALL[name] for name in self.values)
+        return tuple(map(self.index, self.values))
+
+    def index(self, name: str) -> Index:
+        """Return the index of a name, one's own or one of Pteron."""
+        return {**ALL, **{index.name: index for index in self.own_indices}}[name]
 
     @property
     def units(self) -> dict[str, str]:
@@ -122,7 +132,23 @@ class Map:
         shares = zip(codes.tolist(), (counts / self.status.size).tolist(), strict=True)
         return {cause(code): share for code, share in shares if code != REACHABLE}
 
-    def summary(self, name: str) -> Summary:
+    def summary(self, name: str = "") -> Any:
+        """Return the statistics of each index, for people, as lines of text."""
+        if name:
+            warn_former("Map.summary(name)", ".statistics(name)")
+            return self.statistics(name)
+        lines = [f"{self.robot}: {self.share:.1%} of {self.status.size} poses in reach"]
+        lines += [f"{cause}: {share:.1%}" for cause, share in self.causes.items()]
+        for index in self.indices:
+            if np.isfinite(self.values[index.name][self.reachable]).any():
+                figures = self.statistics(index.name)
+                numbers = f"best {figures.best:.4g}, worst {figures.worst:.4g}"
+                lines.append(
+                    f"{index.name}: {numbers}, mean {figures.mean:.4g} {index.unit}".rstrip()
+                )
+        return "\n".join(lines)
+
+    def statistics(self, name: str) -> Summary:
         """Return the best, the worst and the mean of an index over the poses that serve.
 
         Raises
@@ -132,21 +158,21 @@ class Map:
         """
         if name not in self.values:
             raise DataError(f"{name}: is not in this map; it has {', '.join(self.values)}")
-        index, values, serves = ALL[name], self.values[name], self.reachable
-        known = serves & np.isfinite(values)
+        index, amounts, serves = self.index(name), self.values[name], self.reachable
+        known = serves & np.isfinite(amounts)
         if not known.any():
             raise DataError(f"{name}: determined at no pose of this map that serves")
         sign = 1.0 if index.better == "more" else -1.0
         low, high = (
-            int(np.argmin(np.where(known, side * sign * values, np.inf))) for side in (1.0, -1.0)
+            int(np.argmin(np.where(known, side * sign * amounts, np.inf))) for side in (1.0, -1.0)
         )
-        chosen = values[known]
+        chosen = amounts[known]
         return Summary(
             name,
             index.unit,
-            float(values.flat[high]),
+            float(amounts.flat[high]),
             self._pose(high),
-            float(values.flat[low]),
+            float(amounts.flat[low]),
             self._pose(low),
             float(chosen.mean()),
             float(np.median(chosen)),
@@ -172,24 +198,46 @@ class Map:
             f"{name} [{coordinate(name).unit}]": poses[:, k]
             for k, name in enumerate(self.grid.coordinates)
         }
-        columns |= {headed(index): self.values[index.name].ravel() for index in self.indices}
+        columns |= {
+            column_heading(index): self.values[index.name].ravel() for index in self.indices
+        }
         frame = pl.DataFrame(columns | {"status": self.status.ravel()})
         return frame.with_columns(pl.col(pl.Float64).fill_nan(None))
 
-    def at(self, name: str, value: float) -> Map:
+    def slice_at(self, name: str, coordinate: float) -> Map:
         """Return the map at the value of a coordinate that is nearest to one, m or rad."""
         k = [axis.name for axis in self.grid.axes].index(name)
         axes = list(self.grid.axes)
         steps = axes.pop(k).values
-        i = int(np.abs(steps - value).argmin())
+        i = int(np.abs(steps - coordinate).argmin())
         pose = list(self.grid.pose)
         pose[self.grid.coordinates.index(name)] = float(steps[i])
-        values = {index: np.take(array, i, axis=k) for index, array in self.values.items()}
+        indices = {index: np.take(array, i, axis=k) for index, array in self.values.items()}
         grid = Grid(self.grid.coordinates, tuple(pose), tuple(axes))
-        return Map(self.robot, grid, values, np.take(self.status, i, axis=k), self.machine)
+        status = np.take(self.status, i, axis=k)
+        return Map(self.robot, grid, indices, status, self.machine, self.own_indices)
+
+    at = former_attribute("at", "slice_at")
+
+    def _overview(self) -> Overview:
+        about = f"{self.share:.1%} of {self.status.size} poses in reach"
+        return frame_overview(self.robot, about, self.table())
 
 
-def headed(index: Index) -> str:
+def own_attributes(index: Index) -> dict[str, str]:
+    """Return what a file says of an index that is not Pteron's, for `own_indices_of`."""
+    return {"units": index.unit, "long_name": index.title, "better": index.better}
+
+
+def own_indices_of(attributes: Mapping[str, Mapping[str, Any]]) -> tuple[Index, ...]:
+    """Return the indices, without functions, of what a file says of each by its name."""
+    return tuple(
+        Index(name, str(said["long_name"]), unit=str(said["units"]), better=said["better"])
+        for name, said in attributes.items()
+    )
+
+
+def column_heading(index: Index) -> str:
     """Return the heading of an index's column."""
     return f"{index.name} [{index.unit}]" if index.unit else index.name
 

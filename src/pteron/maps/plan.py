@@ -67,14 +67,14 @@ def _machine(text: Any) -> Mapping[str, Any]:
         return {"name": text}
 
 
-def _is_table_list(value: Any) -> bool:
-    return isinstance(value, list) and any(
-        isinstance(entry_of_list, Mapping) for entry_of_list in value
+def _is_table_list(part: Any) -> bool:
+    return isinstance(part, list) and any(
+        isinstance(entry_of_list, Mapping) for entry_of_list in part
     )
 
 
 def _difference_text(name: str, stored: Any, plan: Any) -> str:
-    texts = ["none" if value is None else shorten(value) for value in (stored, plan)]
+    texts = ["none" if plan_value is None else shorten(plan_value) for plan_value in (stored, plan)]
     name = shorten(name, bare=True, longest=2 * _LONG)
     if any(len(text) > _LONG for text in texts):
         return f"another {name}"

@@ -9,7 +9,7 @@ import shutil
 import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -20,9 +20,10 @@ from numpy.typing import NDArray
 from pteron.arguments import expect_to_fit
 from pteron.errors import DataError, OutputError
 from pteron.extras import import_extra
+from pteron.indices import Index
 from pteron.maps.checksums import checksum
 from pteron.maps.grid import Grid
-from pteron.maps.map import ALL, Map
+from pteron.maps.map import ALL, Map, own_attributes, own_indices_of
 from pteron.maps.plan import expect_same
 from pteron.platforms.coordinates import COORDINATES
 
@@ -47,16 +48,16 @@ class MemoryStore:
         self._values = {name: np.empty(grid.shape) for name in names}
         self._status = np.empty(grid.shape, dtype=np.int8)
 
-    def finished(self) -> tuple[int, ...]:
+    def finished_chunks(self) -> tuple[int, ...]:
         """Return the numbers of no chunks: nothing is there before the sweep begins."""
         return ()
 
-    def write(self, number: int, result: Mapping[str, NDArray[Any]]) -> None:
+    def write(self, number: int, chunk: Mapping[str, NDArray[Any]]) -> None:
         """Keep a chunk's values."""
         region = self._regions[number]
-        for name, values in self._values.items():
-            values[region] = result[name]
-        self._status[region] = result[_STATUS]
+        for name, index_values in self._values.items():
+            index_values[region] = chunk[name]
+        self._status[region] = chunk[_STATUS]
 
     def map(self, robot: str, machine: str) -> Map:
         """Return the map of a machine of that name and that file's text."""
@@ -83,18 +84,25 @@ class MapStore:
     seal: str
 
     @classmethod
-    def of(
-        cls, path: Path, robot: str, grid: Grid, names: tuple[str, ...], plan: Mapping[str, Any]
+    def create(
+        cls,
+        path: Path,
+        robot: str,
+        grid: Grid,
+        names: tuple[str, ...],
+        plan: Mapping[str, Any],
+        own_indices: tuple[Index, ...] = (),
     ) -> MapStore:
         """Return the store of a map at a path; it is made if there is none.
 
         A store of the same map is continued. `robot` is the machine's name, `names` are those of
-        the indices, and `plan` is all else that the numbers depend on.
+        the indices, and `plan` is all else that the numbers depend on; but for the functions of
+        `own_indices`, which only their author knows.
         """
         full_plan = {**plan, "index": list(names), "grid": grid.plain()}
         if not path.exists():
             with _temporary_beside(path) as work:
-                _make(work, grid, names, {"name": robot, "plan": full_plan})
+                _make(work, grid, names, {"name": robot, "plan": full_plan}, own_indices)
                 _move_into_place(work, path)
         attributes = _attributes(path)
         if "plan" not in attributes:
@@ -105,36 +113,36 @@ class MapStore:
         except DataError as error:
             raise OutputError(f"{error}; remove it, or name another place") from None
 
-    def finished(self) -> frozenset[int]:
+    def finished_chunks(self) -> frozenset[int]:
         """Return the numbers of the chunks that are there as they were written."""
         count = len(self.grid.regions())
         return frozenset(k for k in range(count) if self._read(k) is not None)
 
-    def write(self, number: int, result: Mapping[str, NDArray[Any]]) -> None:
+    def write(self, number: int, chunk: Mapping[str, NDArray[Any]]) -> None:
         """Write a chunk's values, each array's part through a temporary file and a rename."""
         region, group = self.grid.regions()[number], _group(self.path)
-        arrays = {name: np.asarray(result[name], dtype=_dtype(name)) for name in self._arrays}
-        for name, values in arrays.items():
-            group[name][region] = values
+        arrays = {name: np.asarray(chunk[name], dtype=_dtype(name)) for name in self._arrays}
+        for name, index_values in arrays.items():
+            group[name][region] = index_values
         group[_CHECKSUM][number] = self._checksum(number, arrays)
 
     def map(self, robot: str, machine: str) -> Map:
         """Return the map, read into memory."""
         regions = self.grid.regions()
-        values = {name: np.empty(self.grid.shape, _dtype(name)) for name in self._arrays}
+        arrays_by_name = {name: np.empty(self.grid.shape, _dtype(name)) for name in self._arrays}
         missing = 0
         for number, region in enumerate(regions):
             chunk = self._read(number)
             missing += chunk is None
             for name, array in (chunk or {}).items():
-                values[name][region] = array
+                arrays_by_name[name][region] = array
         if missing:
             raise DataError(
                 f"{self.path}: {missing} of {len(regions)} chunks are not finished, lost or "
                 "damaged; run again what made it, which computes them"
             )
-        status = values.pop(_STATUS)
-        return Map(robot, self.grid, values, status, machine)
+        status = arrays_by_name.pop(_STATUS)
+        return Map(robot, self.grid, arrays_by_name, status, machine)
 
     @property
     def _arrays(self) -> tuple[str, ...]:
@@ -152,9 +160,9 @@ class MapStore:
             return None
         return arrays if recorded == self._checksum(number, arrays) else None
 
-    def _checksum(self, number: int, values: Mapping[str, NDArray[Any]]) -> int:
+    def _checksum(self, number: int, arrays: Mapping[str, NDArray[Any]]) -> int:
         """Return the checksum, above 0, of a chunk's values, its number and the store's seal."""
-        return int(checksum([self.seal, number], values)[:15], 16) or 1
+        return int(checksum([self.seal, number], arrays)[:15], 16) or 1
 
 
 def read_store(path: Path) -> Map:
@@ -164,36 +172,47 @@ def read_store(path: Path) -> Map:
         raise DataError(f"{path}: is no map's store")
     seal = _checked_seal(path, attributes)
     plan, name = attributes["plan"], attributes["name"]
-    store = MapStore(path.resolve(), Grid.of_plain(plan["grid"]), tuple(plan["index"]), seal)
-    return store.map(name, "" if plan["robot"] == name else plan["robot"])
+    names = tuple(plan["index"])
+    store = MapStore(path.resolve(), Grid.from_plain(plan["grid"]), names, seal)
+    group = _group(path)
+    own_indices = own_indices_of({k: dict(group[k].attrs) for k in names if k not in ALL})
+    index_map = store.map(name, "" if plan["robot"] == name else plan["robot"])
+    return replace(index_map, own_indices=own_indices)
 
 
 def save_store(index_map: Map, path: Path) -> Path:
     """Write a map to a Zarr store, whole or not at all."""
     plan = {"robot": index_map.machine or index_map.robot, "saved": True}
-    names = tuple(index_map.values)
+    names, own = tuple(index_map.values), index_map.own_indices
     if path.exists():
-        MapStore.of(path, index_map.robot, index_map.grid, names, plan)
+        MapStore.create(path, index_map.robot, index_map.grid, names, plan, own)
     with _temporary_beside(path) as work:
         new_store = work / path.name
-        store = MapStore.of(new_store, index_map.robot, index_map.grid, names, plan)
+        store = MapStore.create(new_store, index_map.robot, index_map.grid, names, plan, own)
         for number, region in enumerate(index_map.grid.regions()):
-            arrays = {name: values[region] for name, values in index_map.values.items()}
+            arrays = {name: array[region] for name, array in index_map.values.items()}
             store.write(number, arrays | {_STATUS: index_map.status[region]})
         if path.exists():
             path.rename(work / "former")
         return new_store.rename(path)
 
 
-def _make(work: Path, grid: Grid, names: tuple[str, ...], attributes: dict[str, Any]) -> None:
+def _make(
+    work: Path,
+    grid: Grid,
+    names: tuple[str, ...],
+    attributes: dict[str, Any],
+    own_indices: tuple[Index, ...],
+) -> None:
     """Make a store without chunks in a folder."""
     group = _zarr().create_group(work, attributes=attributes)
     axes = tuple(axis.name for axis in grid.axes)
+    known = {**ALL, **{index.name: index for index in own_indices}}
     for axis in grid.axes:
         array = group.create_array(axis.name, data=axis.values, dimension_names=(axis.name,))
         array.attrs["units"] = axis.unit
     for name in (*names, _STATUS):
-        index = ALL.get(name)
+        index = known.get(name)
         array = group.create_array(
             name,
             shape=grid.shape,
@@ -205,6 +224,8 @@ def _make(work: Path, grid: Grid, names: tuple[str, ...], attributes: dict[str, 
         )
         if index:
             array.attrs.update({"units": index.unit, "long_name": index.title})
+        if index in own_indices:
+            array.attrs.update(own_attributes(index))
     group.create_array(
         _CHECKSUM,
         shape=(len(grid.regions()),),

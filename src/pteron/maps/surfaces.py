@@ -22,7 +22,8 @@ from pteron.atomic import write_bytes
 from pteron.errors import DataError, ModelError
 from pteron.extras import install_command
 from pteron.kernels import Array
-from pteron.maps.map import MARGIN, Map, headed
+from pteron.maps.map import MARGIN, Map, column_heading
+from pteron.result import Result
 
 ENDINGS = (".vtk", ".vtu", ".ply", ".stl")
 """Endings of files that hold surfaces; STL does not hold the value that a surface belongs to."""
@@ -34,8 +35,8 @@ _BEYOND = 1e-9
 """Places outside of the grid get minus this as margin, m, so that the reach's surface is closed."""
 
 
-@dataclass(frozen=True)
-class Surface:
+@dataclass(frozen=True, eq=False, repr=False)
+class Surface(Result):
     """A surface in three coordinates.
 
     Attributes
@@ -50,18 +51,22 @@ class Surface:
         The index at the points.
     """
 
+    ROWS = "points:1 values"
+
     level: float | None
     points: Array
     triangles: NDArray[np.int64]
     values: Array
 
 
-def surfaces(given: Map, name: str, levels: Sequence[float] | None = None) -> tuple[Surface, ...]:
+def surfaces(
+    index_map: Map, name: str, levels: Sequence[float] | None = None
+) -> tuple[Surface, ...]:
     """Return the surface of the reach, if the map has its margin, and those of equal value.
 
     Parameters
     ----------
-    given : Map
+    index_map : Map
         Over three axes.
     name : str
         The index.
@@ -83,47 +88,47 @@ def surfaces(given: Map, name: str, levels: Sequence[float] | None = None) -> tu
         If scikit-image is not installed.
     """
     measure = checked_surfaces()[0].marching_cubes
-    if len(given.grid.axes) != 3:
-        varying = ", ".join(axis.name for axis in given.grid.axes)
+    if len(index_map.grid.axes) != 3:
+        varying = ", ".join(axis.name for axis in index_map.grid.axes)
         raise DataError(
             f"surfaces need a map over three coordinates, and here there vary {varying}"
         )
-    given.summary(name)  # or says that there is none
-    values, serves = given.values[name], given.reachable
-    known = serves & np.isfinite(values)
+    index_map.statistics(name)  # or says that there is none
+    amounts, serves = index_map.values[name], index_map.reachable
+    known = serves & np.isfinite(amounts)
     if levels is None:
         shares = () if name == MARGIN.name else _SHARES
-        levels = np.unique(np.quantile(values[known], shares)).tolist()
+        levels = np.unique(np.quantile(amounts[known], shares)).tolist()
     # Undetermined poses have their nearest neighbour's value, so that interpolation stays finite.
     nearest = scipy.ndimage.distance_transform_edt(
         ~known, return_distances=False, return_indices=True
     )
-    filled = values[tuple(nearest)]
+    filled = amounts[tuple(nearest)]
     parts = []
-    if MARGIN.name in given.values:
-        closed = np.pad(given.values[MARGIN.name], 1, constant_values=-_BEYOND)
+    if MARGIN.name in index_map.values:
+        closed = np.pad(index_map.values[MARGIN.name], 1, constant_values=-_BEYOND)
         corners, triangles, *_ = measure(closed, 0.0)
-        corners = np.clip(corners - 1.0, 0.0, np.array(values.shape) - 1.0)
+        corners = np.clip(corners - 1.0, 0.0, np.array(amounts.shape) - 1.0)
         corner_values = scipy.ndimage.map_coordinates(filled, corners.T, order=1)
-        parts.append(_surface(given, None, corners, triangles, corner_values))
+        parts.append(_surface(index_map, None, corners, triangles, corner_values))
     for level in levels:
         if filled.min() < level < filled.max():
             with suppress(RuntimeError):  # no triangle between poses that serve
                 corners, triangles, *_ = measure(filled, level, mask=known)
                 corner_values = np.full(len(corners), level)
-                parts.append(_surface(given, level, corners, triangles, corner_values))
+                parts.append(_surface(index_map, level, corners, triangles, corner_values))
     return tuple(parts)
 
 
-def save_surfaces(given: Map, target: Path) -> Path:
+def save_surfaces(index_map: Map, target: Path) -> Path:
     """Write a file of the surfaces of a map's first index.
 
     Its points carry the index, under its name and unit. In VTK's files its triangles carry
     `surface`, 0 for the reach's, else the level's number from 1; STL holds no more than triangles.
     """
     (_, meshio), ending = checked_surfaces(), target.suffix.lower()
-    index = given.indices[0]
-    parts = surfaces(given, index.name)
+    index = index_map.indices[0]
+    parts = surfaces(index_map, index.name)
     starts = np.cumsum([0, *(len(part.points) for part in parts)])
     triangles = [part.triangles + start for part, start in zip(parts, starts, strict=False)]
     levels = sorted(part.level for part in parts if part.level is not None)
@@ -139,7 +144,7 @@ def save_surfaces(given: Map, target: Path) -> Path:
     )
     if ending != ".stl":
         # Names in these files have no blanks.
-        label = headed(index).replace(" [", "[").replace(" ", "_")
+        label = column_heading(index).replace(" [", "[").replace(" ", "_")
         mesh.point_data[label] = np.concatenate([part.values for part in parts])
     if ending.startswith(".vt"):
         mesh.cell_data["surface"] = [np.concatenate(kinds)]
@@ -162,7 +167,7 @@ def checked_surfaces() -> tuple[Any, Any]:
 
 
 def _surface(
-    index_map: Map, level: float | None, corners: Array, triangles: NDArray[Any], values: Array
+    index_map: Map, level: float | None, corners: Array, triangles: NDArray[Any], amounts: Array
 ) -> Surface:
     """Return a surface of places in the grid (P, 3), without the triangles that have no area."""
     axes = index_map.grid.axes
@@ -170,4 +175,4 @@ def _surface(
     points = np.asarray([axis.least for axis in axes] + corners * steps)
     a, b, c = np.moveaxis(corners[triangles], 1, 0)
     flat = (np.cross(b - a, c - a) == 0.0).all(axis=-1)
-    return Surface(level, points, triangles[~flat].astype(np.int64), values)
+    return Surface(level, points, triangles[~flat].astype(np.int64), amounts)

@@ -21,7 +21,8 @@ from typing import Any, Protocol, TypeVar
 
 from pteron.errors import DataError, PteronError
 from pteron.extras import import_extra
-from pteron.maps.held_interrupts import held_interrupts
+from pteron.processes import held_interrupts
+from pteron.progress import Progress
 from pteron.shapes import Workers
 
 _Chunk = TypeVar("_Chunk")
@@ -47,10 +48,10 @@ _AHEAD = 4
 class Store(Protocol[_Written]):
     """A place for a sweep's results. It crosses to other processes, which must reach it."""
 
-    def finished(self) -> Collection[int]:
+    def finished_chunks(self) -> Collection[int]:
         """Return the numbers of the chunks that are written."""
 
-    def write(self, number: int, result: _Written) -> None:
+    def write(self, number: int, rows: _Written) -> None:
         """Write what a chunk gave: when it returns the chunk is finished, before it is not."""
 
 
@@ -62,7 +63,7 @@ def sweep(
     scheduler: str | None = None,
     workers: Workers | None = None,
     threads: Workers = 1,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress | None = None,
 ) -> int:
     """Compute the chunks that a store has not yet, and write what each gives to the store.
 
@@ -109,7 +110,9 @@ def sweep(
     """
     if scheduler is not None and workers is not None:
         raise DataError("scheduler and workers given; a scheduler has its own workers: give one")
-    done = set(store.finished())
+    # A store that was written for version 0.1 calls them `finished`.
+    finished_chunks = getattr(store, "finished_chunks", None) or getattr(store, "finished")  # noqa: B009
+    done = set(finished_chunks())
     remaining = [k for k in range(len(chunks)) if k not in done]
     total, ready = len(chunks), len(chunks) - len(remaining)
     tell = progress or (lambda share: None)
@@ -168,7 +171,7 @@ def _run_elsewhere(
     """Do the tasks in other processes; yield after each."""
     distributed = _import_distributed()
 
-    def submitted(numbered_chunk: tuple[int, Any]) -> Future[None]:
+    def submit_chunk(numbered_chunk: tuple[int, Any]) -> Future[None]:
         # Each is a task of its own: that its result is none does not mean it is not needed.
         future: Future[None] = client.submit(task, *numbered_chunk, pure=False)
         return future
@@ -178,7 +181,7 @@ def _run_elsewhere(
     with _quiet(), _client(where, scheduler, workers) as client:
         with _told_if_lost(where):
             ahead = _AHEAD * max(1, sum(client.nthreads().values()))
-            pending = {submitted(numbered_chunk) for numbered_chunk in islice(tasks, ahead)}
+            pending = {submit_chunk(numbered_chunk) for numbered_chunk in islice(tasks, ahead)}
         alone = 0.0
         while pending:
             with _told_if_lost(where):
@@ -194,7 +197,7 @@ def _run_elsewhere(
                 _settle(future, where)
                 yield
                 with _told_if_lost(where):
-                    pending |= {submitted(numbered_chunk) for numbered_chunk in islice(tasks, 1)}
+                    pending |= {submit_chunk(numbered_chunk) for numbered_chunk in islice(tasks, 1)}
 
 
 def _settle(future: Future[None], where: str) -> None:

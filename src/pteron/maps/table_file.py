@@ -15,9 +15,10 @@ from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.maps.checksums import checksum
 from pteron.maps.grid import Axis, Grid
-from pteron.maps.map import ALL, Map, headed
+from pteron.maps.map import ALL, Map, column_heading
 from pteron.platforms.coordinates import COORDINATES
 from pteron.tables import Table, join_names, read_table, write_table
+from pteron.tolerances import SAME
 from pteron.workspace import BEYOND_LIMITS
 
 _STATUS = "status"
@@ -29,9 +30,6 @@ harmless."""
 
 _WRITER = "ARROW:schema"
 """Key that every file of a data frame has; where it is missing, the metadata are damaged."""
-
-_EQUAL = 1e-6
-"""Greatest difference of a coordinate's steps, over a step, for tables with few digits."""
 
 
 def write_map_table(index_map: Map, target: Path) -> Path:
@@ -48,7 +46,7 @@ def read_map_table(source: Path) -> Map:
     """Return the map of a table."""
     table = read_table(source)
     coordinates = {name: f"{name} [{at.unit}]" for name, at in COORDINATES.items()}
-    headings = {**coordinates, **{index.name: headed(index) for index in ALL.values()}}
+    headings = {**coordinates, **{index.name: column_heading(index) for index in ALL.values()}}
     columns = {name: _column(table, name, full) for name, full in headings.items()}
     columns = {name: column for name, column in columns.items() if column}
     names = tuple(name for name in COORDINATES if name in columns)
@@ -59,11 +57,11 @@ def read_map_table(source: Path) -> Map:
     status = _status_column(table, len(names))
     grid, order = _grid(table, names, poses)
     columns_of_indices = table.numbers([columns[name] for name in indices], "nan")[order]
-    values = {
+    index_values = {
         name: numbers.reshape(grid.shape)
         for name, numbers in zip(indices, columns_of_indices.T, strict=True)
     }
-    index_map = Map(source.stem, grid, values, status[order].reshape(grid.shape))
+    index_map = Map(source.stem, grid, index_values, status[order].reshape(grid.shape))
     if source.suffix.lower() != ".csv":
         _expect_whole(source, index_map)
     return index_map
@@ -98,10 +96,10 @@ def _grid(table: Table, names: tuple[str, ...], poses: Array) -> tuple[Grid, NDA
     middles: list[float] = []
     ranks = []
     for name, coordinates in zip(names, poses.T, strict=True):
-        values, numbers = np.unique(coordinates, return_inverse=True)
-        middles.append(0.5 * float(values[0]) + 0.5 * float(values[-1]))
-        if len(values) > 1:
-            axes.append(_axis(table, name, values))
+        levels, numbers = np.unique(coordinates, return_inverse=True)
+        middles.append(0.5 * float(levels[0]) + 0.5 * float(levels[-1]))
+        if len(levels) > 1:
+            axes.append(_axis(table, name, levels))
             ranks.append(numbers)
     grid = Grid(names, tuple(middles), tuple(axes))
     places = np.array(ranks, dtype=np.int64).reshape(len(axes), len(poses))
@@ -114,7 +112,7 @@ def _grid(table: Table, names: tuple[str, ...], poses: Array) -> tuple[Grid, NDA
             "are there already: drop them"
         )
     if grid.size > len(poses):
-        lost = dict(grid.held)
+        lost = dict(grid.fixed_coordinates)
         for axis, rank in zip(axes, _first_missing(grid.shape, places[:, order]), strict=True):
             lost[axis.name] = float(axis.values[rank])
         first_missing = ", ".join(f"{name} = {lost[name]:g}" for name in names)
@@ -133,25 +131,25 @@ def _first_missing(shape: tuple[int, ...], ranks: NDArray[np.int64]) -> tuple[in
     )
 
 
-def _axis(table: Table, name: str, values: Array) -> Axis:
+def _axis(table: Table, name: str, coordinates: Array) -> Axis:
     """Return the axis of a coordinate's values, after a check that their steps are equal."""
-    axis = Axis(name, float(values[0]), float(values[-1]), len(values))
-    differences = np.abs(values - axis.values)
-    if differences.max() > _EQUAL * (axis.greatest - axis.least) / (axis.count - 1):
+    axis = Axis(name, float(coordinates[0]), float(coordinates[-1]), len(coordinates))
+    differences = np.abs(coordinates - axis.values)
+    if differences.max() > SAME * (axis.greatest - axis.least) / (axis.count - 1):
         raise DataError(
-            f"{table.source}: {name} = {values[int(differences.argmax())]:g} is not in equal steps "
-            "with the others, so that these are not the poses of a grid"
+            f"{table.source}: {name} = {coordinates[int(differences.argmax())]:g} is not in equal "
+            "steps with the others, so that these are not the poses of a grid"
         )
     return axis
 
 
 def _checksum(index_map: Map) -> str:
     """Return the checksum of what a table holds of a map."""
-    values: dict[str, Any] = {
+    indices: dict[str, Any] = {
         name: np.where(np.isfinite(array), array, np.nan)
         for name, array in index_map.values.items()
     }
-    return checksum(index_map.grid.plain(), {**values, _STATUS: index_map.status})
+    return checksum(index_map.grid.plain(), {**indices, _STATUS: index_map.status})
 
 
 def _expect_whole(source: Path, index_map: Map) -> None:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from pteron.atomic import make_folder, write_bytes, write_text
 from pteron.errors import DataError, OutputError
 from pteron.maps.plan import expect_same
+from pteron.renamed import former_attribute
 from pteron.tables import table_bytes
 
 if TYPE_CHECKING:
@@ -64,15 +65,17 @@ class TableStore:
         else:
             write_text(file, json.dumps(plan_as_json, indent=1) + "\n")
 
-    def finished(self) -> frozenset[int]:
+    def finished_chunks(self) -> frozenset[int]:
         """Return the numbers of the chunks that are there as they were written."""
         return frozenset(number for number, _ in self._is_complete())
 
-    def write(self, number: int, result: pl.DataFrame) -> None:
+    finished = former_attribute("finished", "finished_chunks")
+
+    def write(self, number: int, rows: pl.DataFrame) -> None:
         """Write a chunk's rows, through a temporary file and a rename."""
-        data = table_bytes(result, self.folder / f"{number}{_ENDING}")
-        name = f"{number:08d}-{self._checksum(number, data)}{_ENDING}"
-        write_bytes(self.folder / name, data)
+        contents = table_bytes(rows, self.folder / f"{number}{_ENDING}")
+        name = f"{number:08d}-{self._checksum(number, contents)}{_ENDING}"
+        write_bytes(self.folder / name, contents)
 
     def scan(self) -> pl.LazyFrame:
         """Return all rows that are written, in the plan's order, read only as far as asked for.
@@ -107,5 +110,5 @@ class TableStore:
         except OSError:  # gone meanwhile, or it cannot be read
             return False
 
-    def _checksum(self, number: int, data: bytes) -> str:
-        return hashlib.sha256(f"{self._plan} {number} ".encode() + data).hexdigest()[:16]
+    def _checksum(self, number: int, contents: bytes) -> str:
+        return hashlib.sha256(f"{self._plan} {number} ".encode() + contents).hexdigest()[:16]

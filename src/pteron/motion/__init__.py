@@ -42,11 +42,14 @@ if TYPE_CHECKING:
     from pteron.motion.sizing.gearing import Span as Span
     from pteron.motion.sizing.motor_choice import (
         CommonFit as CommonFit,
-        Fit as Fit,
+        MotorFit as MotorFit,
         choose as choose,
     )
     from pteron.motion.sizing.motors import Motor as Motor, read_motors as read_motors
-    from pteron.motion.sizing.places import Place as Place, placed as placed
+    from pteron.motion.sizing.places import (
+        CyclePlace as CyclePlace,
+        motion_at_place as motion_at_place,
+    )
     from pteron.motion.sizing.size import size as size
     from pteron.motion.trajectories.checks import (
         check_motion as check_motion,

@@ -25,6 +25,7 @@ from pteron.motion.motion import Motion
 from pteron.motion.trajectories.replay import rows_of
 from pteron.shapes import Columns, PoseLike
 from pteron.tables import Table
+from pteron.tolerances import SAME
 from pteron.workspace import Box, Proof, conditions, home_pose
 from pteron.workspace.conditions import Condition
 from pteron.workspace.largest_proved import largest_proved
@@ -47,9 +48,6 @@ _SAMPLES, _HALVINGS = 2048, 8
 
 _STEP = 0.01
 """Longest step, s, of the motion: a third of the shortest time constant, 1/30 s, of the filters."""
-
-_EVEN = 1e-6
-"""Deviation of steps, as a share of them, from which on a table is interpolated to even steps."""
 
 _MANY = 5_000_000
 """Most samples of a motion."""
@@ -101,7 +99,7 @@ class Washout:
             expect(0.0 < setting < np.inf, name, repr(setting), "a number above 0")
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Cue(Motion):
     """A motion of the platform that shows a vehicle's, within a proved box of poses.
 
@@ -158,7 +156,7 @@ def cue(
         no steps keep it in the box.
     """
     robot = as_manipulator(robot)
-    if robot.platform.motion != "3T3R":
+    if not robot.platform.moves_freely:
         raise ModelError(
             f"a {robot.platform.motion} platform shows no vehicle's motion, which has six "
             "coordinates; take a 3T3R one",
@@ -202,7 +200,7 @@ def _even_times(time: Array, source: str) -> Array:
     """Return times with even steps, at most `_STEP`, from 0 to the last of those given, s."""
     steps = np.diff(time)
     count = len(time)
-    if np.ptp(steps) > _EVEN * steps.mean() or steps.mean() > _STEP:
+    if np.ptp(steps) > SAME * steps.mean() or steps.mean() > _STEP:
         count = int(np.ceil(time[-1] / min(float(np.median(steps)), _STEP))) + 1
     if count > _MANY:
         raise DataError(f"{source}: {time[-1]:.4g} s make {count} samples, at most {_MANY} serve")

@@ -14,13 +14,9 @@ from pteron.kinematics import inverse_kinematics
 from pteron.kinematics.evaluate import evaluate_kernel
 from pteron.legs import LegKind
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.renamed import former_attribute
 from pteron.shapes import PerJoint, PoseLike
-
-_SAME = 1e-9
-"""Distance within which two joints of a leg count as one point, over the leg's extent."""
-
-_COINCIDENT = 1e-9
-"""Distance within which two points of the platform count as one, m."""
+from pteron.tolerances import ROUNDING
 
 _FLAT = 1e-6
 """Thickness over width of a part below which it is flat."""
@@ -120,7 +116,7 @@ class Guide:
 
     Attributes
     ----------
-    slides : bool
+    is_prismatic : bool
         Whether it is a slider's guide, and not a crank's circle.
     axis : array, shape (3,)
         Unit vector along which the slider moves, or about which the crank, or a ram, turns.
@@ -129,9 +125,11 @@ class Guide:
         that only turns the platform, and of a ram, where it is fixed, K = 1.
     """
 
-    slides: bool
+    is_prismatic: bool
     axis: Array
     path: Array
+
+    slides = former_attribute("slides", "is_prismatic")
 
 
 def joint_points(robot: RobotLike, pose: PoseLike) -> JointPoints:
@@ -168,7 +166,7 @@ def joint_points(robot: RobotLike, pose: PoseLike) -> JointPoints:
     coordinates = inverse_kinematics(robot, poses)
     chain: Array = evaluate_kernel(robot, "joint_points", "raise", poses)
     points: Array = evaluate_kernel(robot, "platform_points", "raise", poses)
-    p, axes = robot.platform.at(poses)
+    p, axes = robot.platform.placement(poses)
     links = tuple(
         _links(leg, chain[..., i, :, :], coordinates[..., i], points[..., i, :])
         for i, leg in enumerate(robot.legs)
@@ -183,7 +181,7 @@ def joint_points(robot: RobotLike, pose: PoseLike) -> JointPoints:
         axes,
         coordinates,
         tuple(None if leg.bar is None else np.array(leg.bar) for leg in robot.legs),
-        robot.platform.directions if robot.platform.planar else None,
+        None if robot.platform.plane_normal is None else robot.platform.directions,
         tuple(leg.cylinder is not None for leg in robot.legs),
     )
 
@@ -193,7 +191,7 @@ def _links(leg: LegKind, chain: Array, coordinate: Array, end: Array) -> Array:
     start = chain[..., 0, :]
     if "p" in leg.bodies and leg.joint_axis is not None:
         start = start + np.multiply.outer(coordinate, leg.joint_axis)
-    same = _SAME * float(np.abs(end - start).max(initial=0.0))
+    same = ROUNDING * float(np.abs(end - start).max(initial=0.0))
     line = [start]
     if leg.cylinder is not None:
         way = end - start
@@ -218,7 +216,7 @@ def _parts(robot: Manipulator, poses: Array, p: Array) -> tuple[Part, ...]:
         arms, offsets = arms + offsets, np.zeros_like(offsets)
     parts = [Part(p, p[..., None, :] + platform.arms(_corners(arms), poses))]
     for hinge in _distinct(arms):
-        corners = _corners(offsets[np.abs(arms - hinge).max(axis=-1) <= _COINCIDENT])
+        corners = _corners(offsets[np.abs(arms - hinge).max(axis=-1) <= ROUNDING])
         if len(corners):
             hub = p + platform.arms(hinge[None], poses)[..., 0, :]
             parts.append(Part(hub, hub[..., None, :] + corners @ frame))
@@ -227,14 +225,14 @@ def _parts(robot: Manipulator, poses: Array, p: Array) -> tuple[Part, ...]:
 
 def _corners(arms: Array) -> Array:
     """Return the distinct arms (k, 3) that lead away from a hub, in order round its z axis."""
-    arms_out = _distinct(arms[np.abs(arms).max(axis=-1) > _COINCIDENT])
+    arms_out = _distinct(arms[np.abs(arms).max(axis=-1) > ROUNDING])
     offsets = arms_out - arms_out.mean(axis=0) if len(arms_out) else arms_out
     return arms_out[np.argsort(np.arctan2(offsets[:, 1], offsets[:, 0]), kind="stable")]
 
 
 def _distinct(points: Array) -> Array:
     """Return the distinct points (k, 3), each at its first place."""
-    differs = np.abs(points[:, None] - points).max(axis=-1) > _COINCIDENT
+    differs = np.abs(points[:, None] - points).max(axis=-1) > ROUNDING
     return points[[bool(differs[i, :i].all()) for i in range(len(points))]]
 
 
@@ -268,11 +266,11 @@ def joint_guides(robot: RobotLike, poses: PoseLike) -> tuple[Guide, ...]:
     points = joint_points(robot, array.reshape(-1, robot.freedom))
     guides = []
     for i, leg in enumerate(robot.legs):
-        coordinates, slides = points.coordinates[:, i], "p" in leg.bodies
+        coordinates, is_prismatic = points.coordinates[:, i], "p" in leg.bodies
         axis = np.array(leg.base_axis)
-        if not slides and not leg.goes_round:
+        if not is_prismatic and not leg.goes_round:
             path = points.links[i][0, :1]
-        elif slides:
+        elif is_prismatic:
             spare = _SPARE * leg.size
             limits = leg.limits or (coordinates.min() - spare, coordinates.max() + spare)
             path = np.array(leg.guide_point) + np.multiply.outer(np.array(limits), axis)
@@ -282,5 +280,5 @@ def joint_guides(robot: RobotLike, poses: PoseLike) -> tuple[Guide, ...]:
             center, end = points.links[i][0, :2]
             rotations = scipy.spatial.transform.Rotation.from_rotvec(np.outer(angles, axis))
             path = center + rotations.apply(end - center)
-        guides.append(Guide(slides, axis, path))
+        guides.append(Guide(is_prismatic, axis, path))
     return tuple(guides)

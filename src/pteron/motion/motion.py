@@ -9,13 +9,14 @@ from numpy.typing import ArrayLike
 
 from pteron.arguments import expect_to_fit
 from pteron.errors import DataError, shorten
-from pteron.html_table import Column, html_table
+from pteron.html_table import Column, Overview
 from pteron.kernels import Array, as_array
 from pteron.renamed import former_attribute
+from pteron.result import Result
 
 
-@dataclass(frozen=True, repr=False)
-class Motion:
+@dataclass(frozen=True, eq=False, repr=False)
+class Motion(Result):
     """A motion of the platform, sampled in time.
 
     Attributes
@@ -30,6 +31,8 @@ class Motion:
     DataError
         If there is no sample, or the rows of pose, velocity and acceleration are not T.
     """
+
+    ROWS = "time pose:1 velocity:1 acceleration:1"
 
     time: Array
     pose: Array
@@ -56,7 +59,11 @@ class Motion:
         rows = f"{len(self.time)} samples of {self.pose.shape[1]} coordinates"
         return f"<{type(self).__name__}: {self.duration:.6g} s, {rows}>"
 
-    def _repr_html_(self) -> str:
+    def summary(self) -> str:
+        """Return what the motion reaches, for people, as lines of text."""
+        return self._overview().text
+
+    def _overview(self) -> Overview:
         columns = [Column("coordinate", "number"), Column("from", "number")]
         columns += [Column(name, "number") for name in ("to", "speed", "acceleration")]
         extremes = (
@@ -65,7 +72,7 @@ class Motion:
         )
         rows = [(i, *map(float, row)) for i, row in enumerate(zip(*extremes, strict=True), start=1)]
         about = f"{self.duration:.6g} s, {len(self.time)} samples; what it reaches, in m, rad and s"
-        return html_table(type(self).__name__, about, columns, rows)
+        return Overview(type(self).__name__, about, columns, rows)
 
     def expect_ascending(self) -> None:
         """Refuse a motion whose times are fewer than two, or do not ascend.

@@ -50,7 +50,7 @@ def overloads(robot: RobotLike, forces: ArrayLike, speeds: ArrayLike) -> tuple[s
         # Rows that no pose serves are NaN.
         needed[quantity] = np.fmax.reduce(np.abs(moments[-1]), axis=0, initial=0.0)
     margins = drive_margins(robot, needed, *moments)
-    return tuple(margin.told("") for margin in margins if margin.margin < 1.0)
+    return tuple(margin.overload_text("") for margin in margins if margin.margin < 1.0)
 
 
 def overloads_of(robot: Manipulator, motion: Motion) -> tuple[str, ...]:

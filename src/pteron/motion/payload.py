@@ -15,13 +15,14 @@ from pteron.errors import DataError, ModelError, warn_unlikely
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 
 _HEAVY = 20.0
-"""Payload over the machine's moving mass above which it is likely in grams."""
+"""Payload over the machine's moving mass above which it is likely in grams: light parallel robots
+carry up to their own moving mass, presses and simulators up to ten times it."""
 
 
 def payload_warning(robot: Manipulator, mass: float) -> str:
     """Return a warning about an unlikely payload, kg, as a clause; else an empty text."""
     bodies = [body for leg in robot.legs for body in leg.bodies.values()]
-    moving = sum(body.values[0] for body in (*bodies, robot.platform.joined))
+    moving = sum(body.values[0] for body in (*bodies, robot.platform.total_inertia))
     if mass <= _HEAVY * moving:
         return ""
     return (
@@ -146,7 +147,7 @@ def add_payload(
         raise DataError(f"payload: {mass!r} given, a mass of 0 kg or more expected")
     platform, inertia_before = robot.platform, robot.platform.inertia
     center_of_mass = platform.tool if center is None else vector(center, "center")
-    if platform.slides and any(center_of_mass[:2]) and payload:
+    if platform.carries_on_axis and any(center_of_mass[:2]) and payload:
         place = "platform.tool" if center is None else "center"
         raise ModelError(
             f"{place} is {math.hypot(*center_of_mass[:2]):g} m off the axis of a platform that "

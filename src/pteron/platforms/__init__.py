@@ -6,7 +6,7 @@ from pteron.public import publish as _publish
 
 if TYPE_CHECKING:
     from pteron.platforms.motion import PlatformEquations as PlatformEquations
-    from pteron.platforms.parts import Bar as Bar, Geared as Geared
+    from pteron.platforms.parts import Bar as Bar, GearedPart as GearedPart
     from pteron.platforms.platform import Platform as Platform
 
 _publish(__name__)

@@ -105,7 +105,9 @@ def _force_faults(
     energy -= ca.dot(gravity, equations.mass_moment(motion, inertia))
     needs = equations.needs(motion, gravity, inertia)
     masses = [ca.SX(k + 1.0) for k in range(len(motion.points))]
-    extra_needs = equations.needs(motion, gravity, equations.carrying(inertia, masses)) - needs
+    extra_needs = (
+        equations.needs(motion, gravity, equations.add_point_masses(inertia, masses)) - needs
+    )
     pairs = zip(motion.points, motion.matrices, masses, strict=True)
     mass_forces = sum(ca.mtimes(a[:3, :].T, m * (c.acceleration - gravity)) for c, a, m in pairs)
     yield from mismatched_names(
@@ -115,6 +117,6 @@ def _force_faults(
                 ca.dot(needs, rates),
                 rate_of(energy),
             ),
-            "carrying: not what masses on the points need": (extra_needs, mass_forces),
+            "add_point_masses: not what masses on the points need": (extra_needs, mass_forces),
         }
     )

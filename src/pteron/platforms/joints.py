@@ -17,7 +17,7 @@ class PlatformJoint(NamedTuple):
 
     name: str
     """Name of its coordinate: one of the pose's, or a dependent one."""
-    slides: bool
+    is_prismatic: bool
     axis: Array
     """Unit vector (3,) where all coordinates are zero; joints before it move it."""
     values: Array
@@ -39,7 +39,7 @@ def platform_joints(platform: Platform, poses: Array) -> list[PlatformJoint]:
     axes |= dict(zip(platform.lengths, platform.directions, strict=True))
     by_name = {name: poses[..., i] for i, name in enumerate(platform.coordinates)}
     if len(names) > len(by_name):
-        p, axes_now = platform.at(poses)
+        p, axes_now = platform.placement(poses)
         x_direction = axes_now[..., 0, :] * np.sign(np.cos(by_name["pitch"]))[..., None]
         dependent = {
             "x": p @ x0,

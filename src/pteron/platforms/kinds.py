@@ -26,9 +26,6 @@ about a centre, on a ball joint or a universal joint, 1T2R is a tripod's."""
 AngleOrder = Literal["rpy", "xyz"]
 """rpy: R = Rz(yaw) Ry(pitch) Rx(roll). xyz: R = Rx(rx) Ry(ry) Rz(rz)."""
 
-TILTING: tuple[Motion, ...] = ("3T3R", "3R", "2R", "1T2R")
-"""The motions of platforms that turn about more axes than one."""
-
 _EQUATIONS: dict[str, type[PlatformEquations]] = {
     "3T": Translating,
     "3T1R": Turning,
@@ -41,6 +38,9 @@ _EQUATIONS: dict[str, type[PlatformEquations]] = {
 }
 XYZ: dict[str, type[PlatformEquations]] = {"3T3R": TurnsXYZ, "3R": CentredXYZ}
 """The classes for the angle order "xyz"."""
+
+TILTING = tuple(motion for motion, kind in _EQUATIONS.items() if kind.tilts)
+"""The motions of platforms that turn about more axes than one."""
 
 
 @cache

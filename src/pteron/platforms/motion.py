@@ -134,8 +134,22 @@ class PlatformEquations(ABC):
     """The pose's coordinates, in order."""
     kinds: ClassVar[tuple[str, ...]] = PlanarInertia.kinds
     """The kinds of its inertial parameters."""
+    freedom_text: ClassVar[str]
+    """What the platform does, for people: a verb, and its motion's name."""
     slides: ClassVar[bool] = False
     """Whether phi makes parts of the platform slide instead of turning it."""
+    tilts: ClassVar[bool] = False
+    """Whether it turns about more axes than one."""
+    axis_angle: ClassVar[str | None] = None
+    """The coordinate phi, about or along k; None where it has no angle, or others."""
+    spin_angle: ClassVar[str | None] = None
+    """The angle that turns it about k where all others are 0; None without."""
+    arm_axes: ClassVar[str] = "xy"
+    """The axes of its frame whose parts of a vector from P change as it turns: those across k."""
+    angle_range: ClassVar[float] = np.pi
+    """Largest size of an angle, rad, within which every orientation occurs."""
+    point_unit: ClassVar[str] = "m"
+    """The unit of its platform points: "m", or "m/rad" where phi makes them slide."""
     on_legs_alone: ClassVar[bool] = True
     """Whether the legs alone hold it, without a joint between it and the base."""
     wrench_columns: ClassVar[tuple[str, ...]] = ()
@@ -149,10 +163,10 @@ class PlatformEquations(ABC):
         frame: Sequence[Expression],
         platform_points: Sequence[Expression],
         fixed_offsets: Sequence[Expression],
-        more: Mapping[str, Any] | None = None,
+        quantities: Mapping[str, Any] | None = None,
     ) -> None:
         self.frame, self.points, self.fixed = frame, platform_points, fixed_offsets
-        self.more = more or {}
+        self.quantities = quantities or {}
         self.offsets = [
             self.offset(s, t) for s, t in zip(platform_points, fixed_offsets, strict=True)
         ]
@@ -173,7 +187,9 @@ class PlatformEquations(ABC):
         """Return the indices of the angles in a pose."""
         return np.flatnonzero(are_angles(cls.coordinates)).tolist()
 
-    def in_own_axes(self, pose: Expression) -> tuple[PlatformEquations, Expression] | None:
+    def change_to_platform_axes(
+        self, pose: Expression
+    ) -> tuple[PlatformEquations, Expression] | None:
         """Return the platform with vectors in its own axes, from P, and the axes (3, 3).
 
         None where that saves no operations.
@@ -214,22 +230,24 @@ class PlatformEquations(ABC):
         """Return mass times centre of mass, (3, K), in the base frame."""
         return mass_moment(motion.body, inertia)
 
-    def applied(self, motion: PlatformMotion, wrench: Expression) -> Expression:
+    def generalized_forces(self, motion: PlatformMotion, wrench: Expression) -> Expression:
         """Return the generalized forces (m, K) of a wrench, whose rows are `wrench_columns`."""
         return wrench
 
-    def constraint(self, motion: PlatformMotion) -> Expression:
-        """Return the constraint measure of the planes that constrain freedoms outside the pose.
+    def constraint(self, motion: PlatformMotion) -> Expression | None:
+        """Return the constraint measure of what constrains freedoms outside the pose.
 
-        It is 1 at best, 0 where a freedom is unconstrained.
+        It is 1 at best, 0 where a freedom is unconstrained; None where the legs' couples do it.
         """
-        return ca.SX(1)
+        return None
 
-    def held_rows(self, motion: PlatformMotion) -> Expression | None:
+    def plane_wrenches(self, motion: PlatformMotion) -> Expression | None:
         """Return the unit constraint wrenches (k, 6) of planes about P; None without planes."""
         return None
 
-    def carrying(self, inertia: PlatformMoments, masses: Sequence[Expression]) -> PlatformMoments:
+    def add_point_masses(
+        self, inertia: PlatformMoments, masses: Sequence[Expression]
+    ) -> PlatformMoments:
         """Return the platform's inertia with point masses (1, K), one a leg, at its points."""
         m, hx, hy, i = inertia
         for s, mass in zip(self.points, masses, strict=True):

@@ -42,19 +42,25 @@ def nearest_pose(platform: Platform, position: Array, rotation: Array) -> Array:
 
 
 def pose_nearest_frame(platform: Platform, pose: Array, axes: Array) -> Array:
-    """Return the pose (m,) near `pose` whose axes are nearest to a frame's, by Gauss-Newton.
+    """Return the pose (m,) near `pose` whose axes are nearest to a frame's.
 
     `axes` (3, 3) are the frame's, one a row, not necessarily feasible for the platform; the sum of
-    squared differences is minimised.
+    squared differences is minimised by Gauss-Newton; a single angle turns x to the frame's.
     """
     nearest, turns = np.array(pose, dtype=float), np.flatnonzero(platform.angular)
+    if platform.axis_angle is not None:
+        x, y, _ = np.array(platform.frame) @ axes[0]
+        difference = float(np.arctan2(y, x)) - nearest[turns]
+        nearest[turns] += (difference + np.pi) % (2.0 * np.pi) - np.pi
+        return nearest
     for _ in range(_TURN_STEPS):
         offsets = np.eye(len(nearest))[turns] * _TURN_APART
         ahead, behind = (
-            platform.at(nearest + side * offsets)[1].reshape(-1, 9) for side in (1.0, -1.0)
+            platform.placement(nearest + side * offsets)[1].reshape(-1, 9) for side in (1.0, -1.0)
         )
         slopes = (ahead - behind).T / (2.0 * _TURN_APART)
-        step = np.linalg.lstsq(slopes, (axes - platform.at(nearest)[1]).ravel(), rcond=None)[0]
+        misfit = (axes - platform.placement(nearest)[1]).ravel()
+        step = np.linalg.lstsq(slopes, misfit, rcond=None)[0]
         nearest[turns] += np.clip(step, -_TURN_MOST, _TURN_MOST)
         if np.abs(step).max(initial=0.0) < _TURN_ROUNDING:
             break

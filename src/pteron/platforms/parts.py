@@ -29,7 +29,7 @@ class Bar:
 
 
 @dataclass(frozen=True)
-class Geared:
+class GearedPart:
     """A balanced part of the platform, such as a tool, that a gear turns faster than the platform.
 
     Parameters

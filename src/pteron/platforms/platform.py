@@ -1,6 +1,6 @@
 """`Platform`, the moving platform of a machine: its freedom, axes, parts, inertia, limits and tool.
 
-Its constructor checks it; `at` and `tool_motion` give the positions of platform and tool.
+Its constructor checks it; `placement` and `tool_motion` give the positions of platform and tool.
 """
 
 from __future__ import annotations
@@ -23,12 +23,17 @@ from pteron.bodies.vectors import (
 from pteron.errors import ModelError
 from pteron.platforms.checked_fields import BASE_Z, checked_fields
 from pteron.platforms.coordinates import COORDINATES, Unit, are_angles
-from pteron.platforms.kinds import TILTING, AngleOrder, Motion, equations_class
+from pteron.platforms.kinds import XYZ, AngleOrder, Motion, equations_class
 from pteron.platforms.motion import PlatformEquations, PlatformMotion
-from pteron.platforms.parts import Bar, Geared, HeldPoint
+from pteron.platforms.parts import Bar, GearedPart, HeldPoint
+from pteron.renamed import former_attribute
+from pteron.tolerances import ROUNDING
 from pteron.toml import raise_faults
 
 Limits = tuple[float, float]
+
+_TILT = 0.5
+"""Largest angle of random poses of a platform with several, rad, where the file has no limits."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +66,7 @@ class Platform:
         The tool's centre point in the platform frame, m.
     bars : tuple of Bar
         Parts that move with the platform's hinges and do not turn.
-    geared : tuple of Geared
+    geared : tuple of GearedPart
         Parts that a gear turns with the platform.
     angle_order : {"rpy", "xyz"}
         Which angles a 3T3R or 3R platform has: roll, pitch and yaw, or rx, ry and rz.
@@ -81,7 +86,7 @@ class Platform:
     limits: Limits | tuple[Limits, ...] | None = None
     tool: Vector = (0.0, 0.0, 0.0)
     bars: tuple[Bar, ...] = ()
-    geared: tuple[Geared, ...] = ()
+    geared: tuple[GearedPart, ...] = ()
     angle_order: AngleOrder = "rpy"
     center: Vector | None = None
     second_axis: Vector | None = None
@@ -115,14 +120,14 @@ class Platform:
         return self.motion in ("3T1R", "2T1R")
 
     @property
-    def on_planes(self) -> bool:
+    def keeps_points_in_planes(self) -> bool:
         """Whether planes, in which its legs keep its points, fix its dependent coordinates."""
         return self.motion == "1T2R"
 
     @property
     def tilts(self) -> bool:
         """Whether it turns about more axes than one."""
-        return self.motion in TILTING
+        return self.kind.tilts
 
     @property
     def kind(self) -> type[PlatformEquations]:
@@ -169,6 +174,114 @@ class Platform:
         return columns or tuple(COORDINATES[name].wrench for name in self.coordinates)
 
     @property
+    def wrench_in_base_axes(self) -> bool:
+        """Whether a wrench is a force and a moment in base axes; else it is along coordinates."""
+        return bool(self.kind.wrench_columns)
+
+    def wrench_of(
+        self, force: NDArray[np.float64], moment: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Return the wrench (w,), as `wrench_columns` name it, of a force and a moment at P."""
+        if self.wrench_in_base_axes:
+            return np.concatenate([force, moment])
+        turning = [np.array(self.axis) @ moment] * len(self.angles)
+        return np.array([*(self.directions @ force), *turning])
+
+    def force_and_moment(
+        self, wrench: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the force and the moment at P (..., 3) in base axes of wrenches (..., w)."""
+        if self.wrench_in_base_axes:
+            return wrench[..., :3], wrench[..., 3:]
+        force = wrench[..., : len(self.lengths)] @ self.directions
+        if not self.rotation_axes:
+            return force, np.zeros(3)
+        return force, wrench[..., self.angular] @ np.array(self.rotation_axes)
+
+    @property
+    def inertia_names(self) -> tuple[str, ...]:
+        """Names of the moments of inertia that a body on it has: "I" about k, or six, "Ixx" ..."""
+        return tuple(name for name in self.kind.kinds if name.startswith("I"))
+
+    @property
+    def payload_axes(self) -> str:
+        """Axes of its frame along which a payload's centre of mass matters to its forces.
+
+        "" where it does not turn, or where a payload is on its axis, as on one that slides.
+        """
+        return self.arm_axes if self.rotation_axes else ""
+
+    @property
+    def carries_on_axis(self) -> bool:
+        """Whether a payload counts as on its axis: phi moves it, and no arm of it turns."""
+        return bool(self.angles) and not self.payload_axes
+
+    @property
+    def arm_axes(self) -> str:
+        """Axes of its frame whose parts of a vector from P change as it turns."""
+        return self.kind.arm_axes
+
+    @property
+    def angle_range(self) -> float:
+        """Largest size of an angle, rad, within which every orientation occurs."""
+        return self.kind.angle_range
+
+    @property
+    def angle_box(self) -> dict[str, Limits]:
+        """The range of each angle, by name, rad, from which random poses are drawn."""
+        if self.tilts:
+            return dict.fromkeys(self.angles, (-_TILT, _TILT)) | self.angle_limits
+        # Beyond half a turn phi counts where the platform's shaft makes several.
+        turn = max((np.pi, *(abs(end) for pair in self.angle_limits.values() for end in pair)))
+        return dict.fromkeys(self.angles, (-turn, turn))
+
+    @property
+    def plane_normal(self) -> Vector | None:
+        """The normal of the plane in which it moves and is drawn; None where it moves in space."""
+        return self.axis if self.lengths == ("x", "y") else None
+
+    @property
+    def turning_axis(self) -> Vector | None:
+        """The one axis about which it turns against its legs; None without, or with several."""
+        axes = self.rotation_axes
+        return axes[0] if len(axes) == 1 else None
+
+    @property
+    def axis_angle(self) -> str | None:
+        """The name of phi, about or along its axis; None where it has no angle, or others."""
+        return self.kind.axis_angle
+
+    @property
+    def spin_angle(self) -> str | None:
+        """The angle that turns it about its axis where all others are 0; None without."""
+        return self.kind.spin_angle
+
+    @property
+    def spin_axis(self) -> Vector | None:
+        """The axis fixed to the base about which `spin_angle` turns it at every pose, or None."""
+        return self.axis if self.spin_angle in ("phi", "yaw") else None
+
+    @property
+    def has_angle_order(self) -> bool:
+        """Whether its angles have several orders, of which `angle_order` is one."""
+        return self.motion in XYZ
+
+    @property
+    def moves_freely(self) -> bool:
+        """Whether every twist is feasible: six coordinates."""
+        return len(self.coordinates) == 6
+
+    def has_points_in_line(self, points: NDArray[np.float64]) -> bool:
+        """Return whether it turns about an axis through platform points (k, 3), up to rounding."""
+        size = ROUNDING * max(float(np.abs(points).max()), ROUNDING)
+        if not self.tilts:
+            return bool(np.ptp(points[:, :2], axis=0).max() <= size)
+        if len(self.angles) < 3:
+            return False
+        centred = points if self.center else points - points.mean(axis=0)
+        return bool(np.linalg.svd(centred, compute_uv=False)[1] <= size)
+
+    @property
     def rotation_axes(self) -> tuple[Vector, ...]:
         """Unit vectors that span the axes about which it turns against its legs."""
         if self.motion == "2R":
@@ -186,7 +299,9 @@ class Platform:
         unit_vectors = np.array([frame_axes[name] for name in self.lengths]).reshape(-1, 3)
         return np.eye(3) if len(unit_vectors) == 3 else unit_vectors
 
-    def at(self, poses: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def placement(
+        self, poses: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return P (..., 3) and the platform frame's axes (..., 3, 3), one a row, in base frame.
 
         For a platform that slides the axes are the tool's.
@@ -283,9 +398,9 @@ class Platform:
         """Return vectors (..., k, 3) from P to platform points (k, 3), without fixed offsets."""
         if self.slides:
             return np.asarray(poses[..., -1:, None] * (points @ np.array(self.frame)))
-        return np.asarray(points @ self.at(poses)[1])
+        return np.asarray(points @ self.placement(poses)[1])
 
-    def turned(self, turn: Callable[[Vector], Vector]) -> Platform:
+    def map_vectors(self, turn: Callable[[Vector], Vector]) -> Platform:
         """Return the platform with every base-frame vector v replaced by `turn(v)`.
 
         The frame of a 2R platform is the base frame at angles zero: its tool, inertia and platform
@@ -306,7 +421,7 @@ class Platform:
         )
 
     @property
-    def joined(self) -> PlanarInertia | SpatialInertia:
+    def total_inertia(self) -> PlanarInertia | SpatialInertia:
         """The platform's inertia including its bars and geared parts, for the equations.
 
         A bar counts as a point mass at its hinge; a gear of ratio n adds n^2 times the inertia.
@@ -321,9 +436,15 @@ class Platform:
         inertia += sum(part.ratio**2 * part.inertia for part in self.geared)
         return PlanarInertia(mass, (hx, hy), inertia)
 
-    def with_joined(self, inertia: PlanarInertia | SpatialInertia) -> Platform:
+    def with_total_inertia(self, inertia: PlanarInertia | SpatialInertia) -> Platform:
         """Return the platform with this inertia for all of it, without separate parts."""
         return replace(self, inertia=inertia, bars=(), geared=())
+
+    at = former_attribute("at", "placement")
+    turned = former_attribute("turned", "map_vectors")
+    joined = former_attribute("joined", "total_inertia")
+    with_joined = former_attribute("with_joined", "with_total_inertia")
+    on_planes = former_attribute("on_planes", "keeps_points_in_planes")
 
 
 @lru_cache(maxsize=64)

@@ -28,7 +28,12 @@ class Sliding(PlatformEquations):
     """
 
     coordinates = ("x", "y", "z", "phi")
-    slides = True
+    slides, point_unit = True, "m/rad"
+    axis_angle = spin_angle = "phi"
+    freedom_text = (
+        "translates in space and turns its tool, as two halves of it slide (3T1R, Schoenflies "
+        "motion)"
+    )
 
     def offset(self, s: Expression, t: Expression) -> Offset:
         x0, y0, _ = self.frame

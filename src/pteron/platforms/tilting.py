@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from typing import Any, ClassVar, NamedTuple
 
 import casadi as ca
+import numpy as np
 
 from pteron.bodies.inertia import SpatialInertia
 from pteron.bodies.motion import (
@@ -78,6 +79,7 @@ class Tilting(PlatformEquations):
 
     kinds = SpatialInertia.kinds
     wrench_columns = ("fx", "fy", "fz", "mx", "my", "mz")
+    tilts, arm_axes, angle_range = True, "xyz", 0.5 * np.pi
     order: ClassVar[tuple[str, ...]]
     """The angles' coordinates, in the order in which their turns follow each other."""
 
@@ -125,10 +127,14 @@ class Tilting(PlatformEquations):
             place = PointMotion(pose[:3], velocity[:3], acceleration[:3])
         return self.assemble_motion(place, turned, ca.SX.eye(6), turned.axes)
 
-    def in_own_axes(self, pose: Expression) -> tuple[PlatformEquations, Expression] | None:
+    def change_to_platform_axes(
+        self, pose: Expression
+    ) -> tuple[PlatformEquations, Expression] | None:
         if "x" not in self.coordinates:
             return None
-        in_own_frame = type(self)(ca.horzsplit(ca.SX.eye(3)), self.points, self.fixed, self.more)
+        in_own_frame = type(self)(
+            ca.horzsplit(ca.SX.eye(3)), self.points, self.fixed, self.quantities
+        )
         in_own_frame.based, zero = self, ca.SX.zeros(len(self.coordinates))
         return in_own_frame, self.rotation_in_own_axes(pose, zero, zero)[0].T
 
@@ -206,17 +212,23 @@ class Tilting(PlatformEquations):
         moment = ca.mtimes(motion.axes, inertia.h)
         return ca.mtimes(motion.body.position, inertia.m) + moment
 
-    def carrying(self, inertia: SpatialMoments, masses: Sequence[Expression]) -> SpatialMoments:
+    def add_point_masses(
+        self, inertia: SpatialMoments, masses: Sequence[Expression]
+    ) -> SpatialMoments:
         return inertia.with_points(self.points, masses)
 
-    def applied(self, motion: PlatformMotion, wrench: Expression) -> Expression:
+    def generalized_forces(self, motion: PlatformMotion, wrench: Expression) -> Expression:
         return ca.mtimes(motion.matrix.T, wrench)
+
+    def constraint(self, motion: PlatformMotion) -> Expression:
+        return ca.SX(1)  # there are none
 
 
 class RollPitchYaw(Tilting):
     """3T3R: R = Rz(yaw) Ry(pitch) Rx(roll)."""
 
-    coordinates = ("x", "y", "z", "roll", "pitch", "yaw")
+    coordinates, spin_angle = ("x", "y", "z", "roll", "pitch", "yaw"), "yaw"
+    freedom_text = "translates and turns in space any way (3T3R)"
     order = ("yaw", "pitch", "roll")
     joints = ("x", "y", "z", *order)
 
@@ -224,7 +236,8 @@ class RollPitchYaw(Tilting):
 class TurnsXYZ(Tilting):
     """3T3R: R = Rx(rx) Ry(ry) Rz(rz)."""
 
-    coordinates = ("x", "y", "z", "rx", "ry", "rz")
+    coordinates, spin_angle = ("x", "y", "z", "rx", "ry", "rz"), "rz"
+    freedom_text = "translates and turns in space any way (3T3R)"
     order = ("rx", "ry", "rz")
 
 
@@ -232,13 +245,14 @@ class _Centred(Tilting):
     """A platform whose point P stays at `center`, on a joint there."""
 
     on_legs_alone = False
+    freedom_text = "turns any way about a centre that stays (3R)"
 
     def motion(
         self, pose: Expression, velocity: Expression, acceleration: Expression
     ) -> PlatformMotion:
         turned = self.pose_rotation(pose, velocity, acceleration)
         zero = ca.SX(3, 1)
-        place = PointMotion(self.more["center"], zero, zero)
+        place = PointMotion(self.quantities["center"], zero, zero)
         return self.assemble_motion(place, turned, *self.basis(turned))
 
     def basis(self, turned: Rotation) -> tuple[Expression, Expression | None]:
@@ -249,14 +263,14 @@ class _Centred(Tilting):
 class CentredRollPitchYaw(_Centred):
     """3R: R = Rz(yaw) Ry(pitch) Rx(roll) about a ball joint."""
 
-    coordinates = ("roll", "pitch", "yaw")
+    coordinates, spin_angle = ("roll", "pitch", "yaw"), "yaw"
     order = joints = ("yaw", "pitch", "roll")
 
 
 class CentredXYZ(_Centred):
     """3R: R = Rx(rx) Ry(ry) Rz(rz) about a ball joint."""
 
-    coordinates = ("rx", "ry", "rz")
+    coordinates, spin_angle = ("rx", "ry", "rz"), "rz"
     order = ("rx", "ry", "rz")
 
 
@@ -264,10 +278,11 @@ class Universal(_Centred):
     """2R: R = Rot(axis, alpha) Rot(second_axis, beta) about a universal joint."""
 
     coordinates = ("alpha", "beta")
+    freedom_text = "turns about two axes through a centre that stays (2R)"
     order = ("alpha", "beta")
 
     def turn_axes(self) -> list[Expression]:
-        return [self.more["first_axis"], self.more["second_axis"]]
+        return [self.quantities["first_axis"], self.quantities["second_axis"]]
 
     def basis(self, turned: Rotation) -> tuple[Expression, Expression | None]:
         return ca.vertcat(ca.SX(3, 2), turned.axes), None

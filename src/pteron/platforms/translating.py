@@ -21,6 +21,7 @@ class Translating(PlatformEquations):
     """c = p + s: a leg's point is P's place and a constant vector."""
 
     coordinates: ClassVar[tuple[str, ...]] = ("x", "y", "z")
+    freedom_text = "translates in space and does not turn (3T)"
 
     def motion(
         self, pose: Expression, velocity: Expression, acceleration: Expression
@@ -48,3 +49,4 @@ class PlanarTranslating(Translating):
     """The same in the plane across k."""
 
     coordinates = ("x", "y")
+    freedom_text = "moves in a plane and does not turn (2T)"

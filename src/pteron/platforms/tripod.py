@@ -26,12 +26,13 @@ class Tripod(Tilting):
     """
 
     coordinates = ("z", "roll", "pitch")
+    freedom_text = "moves along its axis and tilts to every side (1T2R), a tripod's"
     order = ("yaw", "pitch", "roll")
     joints = ("x", "y", "z", *order)
 
     def __init__(self, *arguments: Any) -> None:
         super().__init__(*arguments)
-        self.planes: Sequence[HeldPlane] = self.more["planes"]
+        self.planes: Sequence[HeldPlane] = self.quantities["planes"]
         k = self.frame[2]
         normals = [plane.normal for plane in self.planes]
         pairs = [(1, 2), (2, 0), (0, 1)]
@@ -53,7 +54,7 @@ class Tripod(Tilting):
             a, b = a + weight * ca.dot(n, u), b - weight * ca.dot(ca.cross(n, u), k)
             c = c + weight * ca.dot(n, r)
         square = a * a + b * b
-        root = self.more["side"] * ca.sqrt(square - c * c)
+        root = self.quantities["side"] * ca.sqrt(square - c * c)
         return (a * c + b * root) / square, (b * c - a * root) / square
 
     def motion(
@@ -104,7 +105,7 @@ class Tripod(Tilting):
         dp = ca.mtimes(twist[:3, :], velocity)
         return self.assemble_motion(PointMotion(place, dp, ddp), turned, twist, None)
 
-    def held_rows(self, motion: PlatformMotion) -> Expression:
+    def plane_wrenches(self, motion: PlatformMotion) -> Expression:
         normals = [plane.normal.T for plane in self.planes]
         pairs = zip(normals, motion.point_twists, strict=True)
         return ca.vertcat(*(ca.mtimes(n, shift[:3, :]) for n, shift in pairs))
@@ -115,7 +116,7 @@ class Tripod(Tilting):
         It is the determinant of the planes' forces and moments about k over its upper bound.
         """
         x, y, k = self.frame
-        rows = self.held_rows(motion)
+        rows = self.plane_wrenches(motion)
         flat = ca.horzcat(*(ca.mtimes(rows[:, :3], v) for v in (x, y)), ca.mtimes(rows[:, 3:], k))
         center = sum(self.points) / len(self.points)
         square = sum(ca.dot(s - center, s - center) for s in self.points)

@@ -26,6 +26,8 @@ class Turning(PlatformEquations):
     """
 
     coordinates: ClassVar[tuple[str, ...]] = ("x", "y", "z", "phi")
+    axis_angle = spin_angle = "phi"
+    freedom_text = "translates in space and turns about one axis (3T1R, Schoenflies motion)"
 
     def motion(
         self, pose: Expression, velocity: Expression, acceleration: Expression
@@ -76,6 +78,7 @@ class PlanarTurning(Turning):
     """The same in the plane across k."""
 
     coordinates = ("x", "y", "phi")
+    freedom_text = "moves and turns in a plane (2T1R)"
 
 
 def _rotate_offset(

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
-from matplotlib.figure import Figure
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure, SubFigure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
@@ -24,6 +25,7 @@ from pteron.plots.canvas import (
     WARNING,
     blank,
     nice_step,
+    real_figure,
     stack,
     zero_line,
 )
@@ -49,10 +51,11 @@ _RESIDUALS = {"position": "position (mm)", "angle": "angles (mrad)"}
 
 def differences_figure(
     drawn: RobotLike,
-    found: RobotLike,
+    calibrated: RobotLike,
     pose: PoseLike | None = None,
     *,
     enlarge: float | None = None,
+    ax: Axes | SubFigure | None = None,
 ) -> Figure:
     """Return a machine in colours over another in grey, its differences from that one enlarged.
 
@@ -60,7 +63,7 @@ def differences_figure(
 
     Parameters
     ----------
-    drawn, found : Manipulator, name or path
+    drawn, calibrated : Manipulator, name or path
         Two machines with the same kinds of legs: the grey one, and the one whose joints are moved
         away from it.
     pose : array, shape (m,), optional
@@ -68,6 +71,8 @@ def differences_figure(
     enlarge : float, optional
         How many times differences are enlarged; by default a round number at which the greatest is
         well seen. The picture says it.
+    ax : Axes or SubFigure, optional
+        Axes of another figure, on which it is drawn; several panels take their place.
 
     Returns
     -------
@@ -89,7 +94,7 @@ def differences_figure(
     >>> found = replace(drawn, legs=(first, *drawn.legs[1:]))
     >>> figure = pteron.plots.differences_figure(drawn, found)
     """
-    machine, other = as_manipulator(drawn), as_manipulator(found)
+    machine, other = as_manipulator(drawn), as_manipulator(calibrated)
     expect_alike(machine, other)
     shown = home_pose(machine) if pose is None else finite_rows(machine, pose, "pose").ravel()
     points, there = joint_points(machine, shown), joint_points(other, shown)
@@ -99,7 +104,7 @@ def differences_figure(
     moved = enlarged_points(points, there, times)
     scene = scene_of(points, guides, gravity_of(machine))
     far = scene_of(moved, enlarged_guides(guides, joint_guides(other, shown), times), None)
-    sheet = _draw_in_grey(scene, points, f"differences {times:g} times enlarged")
+    sheet = _draw_in_grey(scene, points, f"differences {times:g} times enlarged", ax)
     for color, guide in zip(LEG_COLORS, far.guides, strict=False):
         sheet.line(guide.path, color, 1.6, raised=-0.2)
     draw_machine(sheet, far, moved)
@@ -109,7 +114,12 @@ def differences_figure(
 
 
 def tool_errors_figure(
-    robot: RobotLike, places: Array, errors: Array, *, enlarge: float | None = None
+    robot: RobotLike,
+    places: Array,
+    errors: Array,
+    *,
+    enlarge: float | None = None,
+    ax: Axes | SubFigure | None = None,
 ) -> Figure:
     """Return the machine in its home pose with the tool's errors as lines, enlarged.
 
@@ -121,6 +131,8 @@ def tool_errors_figure(
         Where the tool is asked to be, and from there to where it goes, m; NaN is left out.
     enlarge : float, optional
         How many times the errors are enlarged; by default as in `differences_figure`.
+    ax : Axes or SubFigure, optional
+        Axes of another figure, on which it is drawn; several panels take their place.
 
     Returns
     -------
@@ -134,7 +146,7 @@ def tool_errors_figure(
     greatest = float(np.linalg.norm(errors[known], axis=-1).max(initial=0.0))
     times = enlargement(greatest, scene.size) if enlarge is None else enlarge
     remark = f"errors {times:g} times enlarged, the greatest {1e3 * greatest:.3g} mm"
-    sheet = _draw_in_grey(scene, points, remark)
+    sheet = _draw_in_grey(scene, points, remark, ax)
     for place, error in zip(places[known], errors[known], strict=True):
         sheet.line(np.array([place, place + times * error]), WARNING, 1.3, raised=2.0)
         sheet.mark(place, WARNING, PAPER, 3.2, raised=2.1)
@@ -147,8 +159,10 @@ def row_residuals_figure(
     residuals: Array,
     kinds: Sequence[str],
     measured: NDArray[np.bool_],
-    kept: NDArray[np.bool_],
+    sound: NDArray[np.bool_],
     noise: dict[str, float],
+    *,
+    ax: Axes | SubFigure | None = None,
 ) -> Figure:
     """Return the residuals of measurements by row, each kind in a panel of its own.
 
@@ -158,10 +172,12 @@ def row_residuals_figure(
         m or rad, and which of them count.
     kinds : sequence of str, K
         "position", "angle", "height" or "distance".
-    kept : array of bool, shape (N,)
+    sound : array of bool, shape (N,)
         Rows that are no outliers; the others are red rings.
     noise : dict
         Standard deviation by kind, m or rad: the band is two of them to each side.
+    ax : Axes or SubFigure, optional
+        Axes of another figure, on which it is drawn; several panels take their place.
 
     Returns
     -------
@@ -170,14 +186,17 @@ def row_residuals_figure(
     named = np.array(kinds)
     shown = [kind for kind in noise if measured[:, named == kind].any()]
     labels = [_RESIDUALS.get(kind, f"{kind} (mm)") for kind in shown]
-    figure = blank(5.6, 0.8 + 1.7 * len(shown))
+    figure = blank(5.6, 0.8 + 1.7 * len(shown), ax)
     rows = np.arange(1, len(residuals) + 1)
     for kind, axes in zip(shown, stack(figure, "row", labels), strict=True):
         zero_line(axes)
         band = 2e3 * noise[kind]
         axes.axhspan(-band, band, color=MUTED, alpha=0.16, linewidth=0.0)
         for column in np.flatnonzero(named == kind):
-            for chosen, face, edge, size in ((kept, INK, INK, 2.6), (~kept, "none", WARNING, 5.0)):
+            for chosen, face, edge, size in (
+                (sound, INK, INK, 2.6),
+                (~sound, "none", WARNING, 5.0),
+            ):
                 here = chosen & measured[:, column]
                 (marks,) = axes.plot(
                     rows[here], 1e3 * residuals[here, column], "o", markersize=size
@@ -185,7 +204,7 @@ def row_residuals_figure(
                 marks.set(markerfacecolor=face, markeredgecolor=edge)
         axes.set_xlim(0.5, len(rows) + 0.5)
         axes.xaxis.set_major_locator(MaxNLocator(8, integer=True))
-    return figure
+    return real_figure(figure)
 
 
 def enlargement(difference: float, size: float) -> float:
@@ -204,9 +223,11 @@ def expect_alike(robot: Manipulator, other: Manipulator) -> None:
         )
 
 
-def _draw_in_grey(scene: Scene, points: JointPoints, title: str) -> MachineAxes:
+def _draw_in_grey(
+    scene: Scene, points: JointPoints, title: str, ax: Axes | SubFigure | None
+) -> MachineAxes:
     """Return axes of a new figure with a machine in grey, below a title."""
-    sheet = machine_figure(scene, title)
+    sheet = machine_figure(scene, title, ax)
     draw_surroundings(sheet, scene)
     for line, bar in zip(points.links, points.bars, strict=True):
         for ends in (*pairwise(line[:-1]), *rods(line, bar, scene.size)):

@@ -8,13 +8,12 @@ from __future__ import annotations
 from collections.abc import Hashable, Iterable, Sequence
 from io import BytesIO
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
-from matplotlib.gridspec import GridSpec
+from matplotlib.figure import Figure, SubFigure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.ticker import (
     AutoLocator,
@@ -26,9 +25,10 @@ from matplotlib.ticker import (
 )
 from numpy.typing import NDArray
 
+from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.platforms.coordinates import SHOWN, coordinate
-from pteron.plots.fonts import no_word_of_glyphs, take_fonts, warn_of_absent
+from pteron.plots.fonts import silence_glyph_warnings, take_fonts, warn_of_absent
 from pteron.short_numbers import power_of_ten
 
 Kind = TypeVar("Kind", bound=Hashable)
@@ -94,7 +94,7 @@ class Picture(Figure):
         saving, engine = self.canvas.is_saving(), self.get_layout_engine()
         if not saving:  # else `savefig` has done it
             take_fonts(self)
-        with no_word_of_glyphs():
+        with silence_glyph_warnings():
             if saving and isinstance(engine, ConstrainedLayoutEngine) and self._is_flat:
                 # Matplotlib draws all in vain to place the axes, then again with an idle engine.
                 engine.execute(self)
@@ -108,7 +108,7 @@ class Picture(Figure):
     def savefig(self, fname: Any, **options: Any) -> None:
         """Write the figure, with one warning of all letters that no font here has."""
         absent = take_fonts(self)
-        with no_word_of_glyphs():
+        with silence_glyph_warnings():
             super().savefig(fname, **options)
         # An .svg keeps text as text, for its reader's fonts.
         if str(options.get("format") or Path(str(fname)).suffix[1:]).lower() != "svg":
@@ -126,8 +126,90 @@ class Picture(Figure):
         display(shown, metadata={"image/png": size}, raw=True)
 
 
-def blank(width: float, height: float) -> Figure:
-    """Return a figure of so many inches, on white, with a canvas of its own."""
+class AxesPlace:
+    """Stands for a figure where a picture is drawn at the place of axes of another figure.
+
+    A picture of one panel is drawn on these axes themselves; of several, a subfigure takes their
+    place.
+    """
+
+    def __init__(self, ax: Axes | SubFigure) -> None:
+        self._axes = ax if isinstance(ax, Axes) else None
+        self._subfigure = ax if isinstance(ax, SubFigure) else None
+
+    @property
+    def figure(self) -> Any:
+        """The figure, or subfigure, that holds the picture."""
+        return self._subfigure or (self._axes and self._axes.figure)
+
+    def add_subplot(self, place: Any = None, **options: Any) -> Axes:
+        """Return the axes themselves for the whole place, else axes of a subfigure there."""
+        if self._axes is not None and place is None:
+            if (options.get("projection") == "3d") != (self._axes.name == "3d"):
+                former, self._axes = self._axes, self._add_there("add_subplot", **options)
+                former.remove()
+            return self._axes
+        return cast(Axes, self.subfigure().add_subplot(place, **options))
+
+    def add_gridspec(self, rows: int, columns: int, **options: Any) -> Any:
+        """Return the grid of a subfigure, or for one panel one whose place is None."""
+        if rows == columns == 1:
+            return dict.fromkeys((0, (0, 0)))
+        return self.subfigure().add_gridspec(rows, columns, **options)
+
+    def legend(self, **options: Any) -> Any:
+        """Put a legend above the axes, or above those of the subfigure."""
+        if self._axes is None:
+            return self.subfigure().legend(**options)
+        above = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0)}
+        return self._axes.legend(**options | above)
+
+    def get_size_inches(self) -> NDArray[np.float64]:
+        """Return the place's width and height, inches."""
+        place = self._axes or self.subfigure()
+        box = place.get_window_extent() if self._axes is not None else place.bbox
+        return np.array([box.width, box.height]) / float(self.figure.get_figure(root=True).dpi)
+
+    def set_layout_engine(self, _: str) -> None:
+        """Leave the other figure's layout as it is."""
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.figure if self._axes is not None else self.subfigure(), name)
+
+    def subfigure(self) -> Any:
+        """Return the subfigure, which takes the place of the axes the first time."""
+        if self._subfigure is None:
+            self._subfigure = self._add_there("add_subfigure")
+            assert self._axes is not None
+            self._axes.remove()
+            self._axes = None
+        return self._subfigure
+
+    def _add_there(self, method: str, **options: Any) -> Any:
+        """Add axes or a subfigure at the place of the axes in their figure's grid."""
+        assert self._axes is not None
+        place = self._axes.get_subplotspec()
+        if place is None:
+            raise DataError("ax: not in a grid; make it by subplots or add_subplot")
+        return getattr(self._axes.figure, method)(place, **options)
+
+
+def real_figure(figure: Figure | SubFigure) -> Figure:
+    """Return the figure, or subfigure, for which an `AxesPlace` stands; any other itself."""
+    place: Any = figure
+    return cast(Figure, place.figure if isinstance(place, AxesPlace) else place)
+
+
+def whole_figure(figure: Figure) -> Figure:
+    """Return the figure itself, or the subfigure that takes the place of axes."""
+    place: Any = figure
+    return cast(Figure, place.subfigure() if isinstance(place, AxesPlace) else place)
+
+
+def blank(width: float, height: float, ax: Axes | SubFigure | None = None) -> Figure:
+    """Return a figure of so many inches, on white, with its own canvas; or the place of `ax`."""
+    if ax is not None:
+        return cast(Figure, AxesPlace(ax))
     figure = Picture(figsize=(width, height), layout="constrained", facecolor="white")
     FigureCanvasAgg(figure)
     return figure
@@ -142,7 +224,7 @@ def pixels(figure: Figure) -> NDArray[np.uint8]:
 
 def plain_axes(figure: Figure, xlabel: str, ylabel: str, place: Any = None) -> Axes:
     """Return axes with a light grid and no frame but the two scales, at a place of a grid."""
-    axes = figure.add_subplot(place or 111)
+    axes = figure.add_subplot() if place is None else figure.add_subplot(place)
     axes.patch.set_alpha(0.0)
     axes.set_xlabel(xlabel, fontsize=FONT_SIZE, color=INK)
     axes.set_ylabel(ylabel, fontsize=FONT_SIZE, color=INK)
@@ -185,7 +267,7 @@ class _Numbers(ScalarFormatter):
         if label.get_text() != self._written:
             self._plain = label.get_text()
         power = super().get_offset().replace("\u2212", "-").partition("e")[2]
-        self._written = _with_power(self._plain, int(power or 0))
+        self._written = _label_with_power(self._plain, int(power or 0))
         label.set_text(self._written)
 
     def get_offset(self) -> str:
@@ -193,7 +275,7 @@ class _Numbers(ScalarFormatter):
         return ""
 
 
-def _with_power(label: str, power: int) -> str:
+def _label_with_power(label: str, power: int) -> str:
     """Return a label whose unit has a power of ten, if there is one."""
     if not power:
         return label
@@ -238,7 +320,7 @@ def panels(
 ) -> list[list[Axes]]:
     """Return rows of axes beside each other, all over one scale along x, named below the last."""
     rows, columns = len(ylabels), len(ylabels[0])
-    grid = GridSpec(rows, columns, figure=figure, height_ratios=ratios)
+    grid = figure.add_gridspec(rows, columns, height_ratios=ratios)
     axes_rows = [
         [plain_axes(figure, "", label, grid[i, j]) for j, label in enumerate(row)]
         for i, row in enumerate(ylabels)
@@ -316,10 +398,10 @@ def leg_curves(
             if label and i == alike[-1]:
                 label += f" (on {', '.join(names[j] for j in alike[:-1])})"
         axes.plot(time, values[:, i], label=label, **style)
-    all_of_time(axes, time)
+    fit_time_scale(axes, time)
 
 
-def all_of_time(axes: Axes, time: Array) -> None:
+def fit_time_scale(axes: Axes, time: Array) -> None:
     """Make the scale along x that of all of the time (T,); one instant has a second about it."""
     first, last = float(time[0]), float(time[-1])
     room = 0.0 if last > first else 0.5

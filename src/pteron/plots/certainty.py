@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, SubFigure
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path
 from numpy.typing import NDArray
@@ -30,6 +30,7 @@ from pteron.plots.canvas import (
     legend,
     log_scale,
     plain_axes,
+    real_figure,
     spot,
     zero_line,
 )
@@ -48,12 +49,16 @@ _REACH = 4.5
 """Width of a histogram to each side, in standard deviations."""
 
 
-def histogram_figure(residuals: Array) -> Figure:
+def histogram_figure(
+    residuals: Array,
+    *,
+    ax: Axes | SubFigure | None = None,
+) -> Figure:
     """Return the distribution of residuals, each in its standard deviation, and the normal one.
 
     Residuals have shape (R, n), NaN where there is none.
     """
-    figure = blank(5.4, 3.1)
+    figure = blank(5.4, 3.1, ax)
     axes = plain_axes(figure, "residual (standard deviations)", "density")
     fine = np.linspace(-_REACH, _REACH, 121)
     normal = np.exp(-(fine**2) / 2.0) / np.sqrt(2.0 * np.pi)
@@ -72,16 +77,21 @@ def histogram_figure(residuals: Array) -> Figure:
     axes.set_xlim(-_REACH, _REACH)
     axes.set_ylim(0.0, None)
     legend(figure, 1 + residuals.shape[1])
-    return figure
+    return real_figure(figure)
 
 
-def autocorrelation_figure(correlations: Array, bound: Array) -> Figure:
+def autocorrelation_figure(
+    correlations: Array,
+    bound: Array,
+    *,
+    ax: Axes | SubFigure | None = None,
+) -> Figure:
     """Return the autocorrelation of residuals, and the band in which white noise stays.
 
     Correlations (L, n) are those at lags 1 to L; white noise keeps below the bound (n,) nineteen
     times in twenty.
     """
-    figure = blank(5.4, 3.1)
+    figure = blank(5.4, 3.1, ax)
     axes = plain_axes(figure, "lag (equations)", "autocorrelation")
     lags = np.arange(1, len(correlations) + 1)
     edge = float(bound.max())
@@ -96,11 +106,16 @@ def autocorrelation_figure(correlations: Array, bound: Array) -> Figure:
     axes.set_ylim(-reach, reach)
     axes.set_xlim(0.0, len(correlations) + 1.0)
     legend(figure, correlations.shape[1])
-    return figure
+    return real_figure(figure)
 
 
 def certainty_figure(
-    names: Sequence[str], ratios: Array, weak: NDArray[np.bool_], inertial: int
+    names: Sequence[str],
+    ratios: Array,
+    weak: NDArray[np.bool_],
+    inertial: int,
+    *,
+    ax: Axes | SubFigure | None = None,
 ) -> Figure:
     """Return each value over its standard deviation, on a logarithmic scale.
 
@@ -108,7 +123,7 @@ def certainty_figure(
     the data hardly show them. The first `inertial` of them are inertial parameters.
     """
     p = len(names)
-    figure = blank(5.4, 0.7 + 0.185 * p)
+    figure = blank(5.4, 0.7 + 0.185 * p, ax)
     axes = row_axes(figure, names, "size of the value over its standard deviation")
     finite = ratios[np.isfinite(ratios)]
     high = 10.0 ** np.ceil(np.log10(max(float(finite.max(initial=1.0)), 100.0)))
@@ -124,14 +139,19 @@ def certainty_figure(
     axes.axvline(_CERTAIN, color=MUTED, linewidth=0.9, linestyle=(0, (4, 2)))
     axes.set_ylim(-0.8, p - 0.2)
     log_scale(axes, 0.1, high)
-    return figure
+    return real_figure(figure)
 
 
-def correlation_figure(names: Sequence[str], correlation: Array) -> Figure:
+def correlation_figure(
+    names: Sequence[str],
+    correlation: Array,
+    *,
+    ax: Axes | SubFigure | None = None,
+) -> Figure:
     """Return a matrix (p, p) of correlations: blue goes together, orange one for the other."""
     p = len(names)
     side = max(1.0 + 0.165 * p, 3.0)
-    figure = blank(side, side)
+    figure = blank(side, side, ax)
     axes = plain_axes(figure, "", "")
     axes.grid(visible=False)
     off = correlation - np.eye(p) * correlation
@@ -148,7 +168,7 @@ def correlation_figure(names: Sequence[str], correlation: Array) -> Figure:
     for spine in axes.spines.values():
         spine.set_visible(False)
     axes.set(xlim=(-0.6, p - 0.4), ylim=(p - 0.4, -0.6), aspect="equal")
-    return figure
+    return real_figure(figure)
 
 
 def _squares(axes: Axes, cells: NDArray[np.intp], color: str, alpha: float) -> None:

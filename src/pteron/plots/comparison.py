@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, SubFigure
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path
 from numpy.typing import NDArray
@@ -20,10 +20,11 @@ from pteron.plots.canvas import (
     LEG_COLORS,
     MUTED,
     PAPER,
-    all_of_time,
     blank,
+    fit_time_scale,
     log_scale,
     plain_axes,
+    real_figure,
     spot,
     stack,
     zero_line,
@@ -51,6 +52,7 @@ def comparison_figure(
     *,
     leg: int,
     joint: ActuatedJoint = SLIDER,
+    ax: Axes | SubFigure | None = None,
 ) -> Figure:
     """Return an actuator's measured and predicted force over time, and their difference below.
 
@@ -58,7 +60,7 @@ def comparison_figure(
     that are not `used` (T,) do not count and are shaded. `leg`, from 0, gives the colour, `joint`
     the words and units.
     """
-    figure = blank(4.4, 3.1)
+    figure = blank(4.4, 3.1, ax)
     color, unit = LEG_COLORS[leg], joint.force_unit
     labels = [f"{joint.force} ({unit})", f"residual ({unit})"]
     forces, residuals = stack(figure, "time (s)", labels, [2.1, 1.0])
@@ -76,19 +78,25 @@ def comparison_figure(
     for start, stop in np.minimum(edges, len(time) - 1).tolist():
         for axes in (forces, residuals):
             axes.axvspan(time[start], time[stop], color=GRID, alpha=0.75, linewidth=0.0, zorder=0.5)
-    all_of_time(residuals, time)
+    fit_time_scale(residuals, time)
     figure.align_ylabels([forces, residuals])
-    return figure
+    return real_figure(figure)
 
 
-def errors_figure(errors: Array, without_friction: Array, floor: Array) -> Figure:
+def errors_figure(
+    errors: Array,
+    without_friction: Array,
+    floor: Array,
+    *,
+    ax: Axes | SubFigure | None = None,
+) -> Figure:
     """Return the errors of a prediction beside the noise, on a logarithmic scale.
 
     The errors (n,) of the whole model and of that without friction and offset, and the noise, are
     in percent of the force's standard deviation.
     """
     n = len(errors)
-    figure = blank(4.8, 0.75 + 0.34 * n)
+    figure = blank(4.8, 0.75 + 0.34 * n, ax)
     axes = plain_axes(figure, "NRMS (% of the force's standard deviation)", "")
     axes.grid(visible=False, axis="y")
     every = np.concatenate([errors, without_friction, floor])
@@ -107,7 +115,7 @@ def errors_figure(errors: Array, without_friction: Array, floor: Array) -> Figur
     log_scale(axes, low, high)
     axes.set_ylim(-0.6, n - 0.4)
     axes.set_yticks(range(n), [f"actuator {n - y}" for y in range(n)], fontsize=FONT_SIZE)
-    return figure
+    return real_figure(figure)
 
 
 def residual_time_figure(
@@ -115,6 +123,8 @@ def residual_time_figure(
     residuals: Array,
     used: NDArray[np.bool_],
     joints: Sequence[ActuatedJoint] | None = None,
+    *,
+    ax: Axes | SubFigure | None = None,
 ) -> Figure:
     """Return the residuals of all actuators over a whole recording, one above the other.
 
@@ -122,7 +132,7 @@ def residual_time_figure(
     `used` (T, n) do not count: they are grey, and may lie outside.
     """
     n = residuals.shape[1]
-    figure = blank(3.8, 0.5 + 1.05 * n)
+    figure = blank(3.8, 0.5 + 1.05 * n, ax)
     units = [joint.force_unit for joint in joints or [SLIDER] * n]
     panels = stack(figure, "time (s)", [f"{i}  ({unit})" for i, unit in enumerate(units, start=1)])
     edges = np.unique(np.linspace(0, len(time), min(_COLUMNS, len(time)) + 1).astype(int))
@@ -136,9 +146,9 @@ def residual_time_figure(
             axes.fill_between(middle, low, high, facecolor=color, edgecolor=color, linewidth=0.6)
         size = float(np.nanmax(np.abs(counted), initial=0.0)) or 1.0
         axes.set_ylim(-1.15 * size, 1.15 * size)
-    all_of_time(panels[-1], time)
+    fit_time_scale(panels[-1], time)
     figure.align_ylabels(panels)
-    return figure
+    return real_figure(figure)
 
 
 def residual_speed_figure(
@@ -148,6 +158,7 @@ def residual_speed_figure(
     *,
     leg: int,
     joint: ActuatedJoint = SLIDER,
+    ax: Axes | SubFigure | None = None,
 ) -> Figure:
     """Return an actuator's residuals over its joint's speed: friction that is missing shows here.
 
@@ -155,7 +166,7 @@ def residual_speed_figure(
     not count: they are grey, and may lie outside. `leg`, from 0, gives the colour, `joint` the
     words and units.
     """
-    figure = blank(3.1, 2.4)
+    figure = blank(3.1, 2.4, ax)
     words = f"{joint.noun} speed ({joint.unit}/s)", f"residual ({joint.force_unit})"
     axes = plain_axes(figure, *words)
     zero_line(axes)
@@ -172,7 +183,7 @@ def residual_speed_figure(
     axes.set_ylim(-2.0 * size, 2.0 * size)
     reach = 1.04 * float(np.abs(speed).max()) or 1.0
     axes.set_xlim(-reach, reach)
-    return figure
+    return real_figure(figure)
 
 
 def _dots(axes: Axes, x: Array, y: Array, color: str) -> None:

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, SubFigure
 from numpy.typing import ArrayLike
 
 from pteron.kernels import Array
@@ -26,6 +26,7 @@ from pteron.plots.canvas import (
     leg_style,
     legend,
     plain_axes,
+    real_figure,
     spot,
     zero_line,
 )
@@ -55,6 +56,7 @@ def force_speed_figure(
     abilities: Sequence[Ability] = (),
     rms: tuple[Array, Array] | None = None,
     robot: RobotLike | None = None,
+    ax: Axes | SubFigure | None = None,
 ) -> Figure:
     """Return each drive's force over its speed, within its limits.
 
@@ -72,6 +74,8 @@ def force_speed_figure(
         Root mean squares of speed and force, drawn as a dot; by default those of the samples.
     robot : Manipulator, name or path, optional
         Says units and abilities where they are not given; without it all are sliders.
+    ax : Axes or SubFigure, optional
+        Axes of another figure, on which it is drawn; several panels take their place.
     """
     joints = joints_of(robot, forces)
     speeds = np.asarray(pick_machine_columns(robot, speeds, "joint_rates"), dtype=float)
@@ -81,7 +85,7 @@ def force_speed_figure(
     if rms is None:
         rms = np.sqrt((speeds**2).mean(axis=0)), np.sqrt((forces**2).mean(axis=0))
     groups = groups_of(units)
-    figure = blank(5.4, 3.4 * len(groups))
+    figure = blank(5.4, 3.4 * len(groups), ax)
     for k, ((rate, unit), legs) in enumerate(groups.items()):
         word = "torque" if unit == "N m" else "force"
         place = figure.add_gridspec(len(groups), 1)[k]
@@ -107,7 +111,7 @@ def force_speed_figure(
                 style: dict[str, Any] = {"ha": side, "va": level, "transform": axes.transAxes}
                 axes.text(x, y, "brakes", fontsize=FONT_SIZE, color=MUTED, **style)
     legend(figure, min(len(units), 4))
-    return figure
+    return real_figure(figure)
 
 
 def _abilities(robot: RobotLike | None) -> list[Ability]:
@@ -129,14 +133,19 @@ def _box(axes: Axes, ability: Ability, sizes: Sequence[float], color: str) -> No
             axes.plot(*ends, color=color, linewidth=1.0, linestyle=style)
 
 
-def power_figure(time: ArrayLike, power: ArrayLike) -> Figure:
+def power_figure(
+    time: ArrayLike,
+    power: ArrayLike,
+    *,
+    ax: Axes | SubFigure | None = None,
+) -> Figure:
     """Return the power (K, n) of all drives over time (K,), s, and their sum; W."""
     time, power = rows(time, power, "power")
-    figure = blank(5.4, 3.3)
+    figure = blank(5.4, 3.3, ax)
     axes = plain_axes(figure, "time (s)", "power (W)")
     zero_line(axes)
     axes.plot(time, power.sum(axis=1), label="all", color=INK, linewidth=2.0)
     count = power.shape[1]
     leg_curves(axes, time, power, range(count), 1.4, leg_numbers(count), "leg")
     legend(figure, count + 1)
-    return figure
+    return real_figure(figure)

@@ -89,11 +89,14 @@ class Gif:
             )
 
 
-def _hundredths(fps: float) -> float:
+def _rate_in_hundredths(fps: float) -> float:
     return 100.0 / max(round(100.0 / fps), _SHORTEST)
 
 
-ENCODERS = {".mp4": Encoder(Mp4, float, np.inf), ".gif": Encoder(Gif, _hundredths, _GIF_PIXELS)}
+ENCODERS = {
+    ".mp4": Encoder(Mp4, float, np.inf),
+    ".gif": Encoder(Gif, _rate_in_hundredths, _GIF_PIXELS),
+}
 """Encoders by the ending of the file."""
 
 

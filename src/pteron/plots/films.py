@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from base64 import b64encode
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from contextlib import closing
 from dataclasses import dataclass
 from html import escape
@@ -21,6 +21,8 @@ from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion import Motion
 from pteron.plots.film_encoders import ENCODERS, Pixels, checked_encoder
 from pteron.plots.film_frames import frames
+from pteron.progress import Progress
+from pteron.result import Result
 
 _SPEEDS = (1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01)
 """Speeds from which one is chosen where none is given; 1 is real time."""
@@ -38,8 +40,8 @@ _MOST = 20_000
 """Most frames of one film; a longer one is refused."""
 
 
-@dataclass(frozen=True)
-class Film:
+@dataclass(frozen=True, eq=False, repr=False)
+class Film(Result):
     """A film that has been written.
 
     Attributes
@@ -92,7 +94,7 @@ def film(
     size: tuple[int, int] = (960, 720),
     turns: float = 0.0,
     forces: ArrayLike | None = None,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress | None = None,
 ) -> Film:
     """Write a film of a machine that goes through a motion.
 
@@ -154,7 +156,7 @@ def film(
         raise DataError(
             f"size: {shorten(size)} given, two even numbers from {low} to {high} expected, pixels"
         )
-    if robot.platform.planar and turns:
+    if robot.platform.plane_normal is not None and turns:
         raise DataError(
             f"turns: {turns:g} given, but {robot.name} is planar and seen along its plane's "
             "normal; leave it out"
@@ -192,7 +194,7 @@ def write_film(
     count: int,
     size: tuple[int, int],
     rate: float,
-    progress: Callable[[float], None] | None,
+    progress: Progress | None,
 ) -> None:
     """Write so many pictures of a size as a film, whole or not at all."""
     # Made elsewhere: a film that is not finished leaves nothing behind.

@@ -47,7 +47,7 @@ def warn_of_absent(letters: str) -> None:
 
 
 @contextmanager
-def no_word_of_glyphs() -> Iterator[None]:
+def silence_glyph_warnings() -> Iterator[None]:
     """Silence matplotlib's own warnings of missing letters, several for each letter."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", r"(?s)(Glyph|Matplotlib currently does not).*")

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from math import inf
 
-from matplotlib.figure import Figure
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure, SubFigure
 from numpy.typing import ArrayLike
 
 from pteron.manipulator import RobotLike
@@ -15,6 +16,7 @@ from pteron.plots.canvas import (
     leg_curves,
     leg_numbers,
     legend,
+    real_figure,
     remark,
     stack,
     zero_line,
@@ -29,6 +31,7 @@ def forces_figure(
     turning_point: float | None = None,
     ylabel: str | None = None,
     robot: RobotLike | None = None,
+    ax: Axes | SubFigure | None = None,
 ) -> Figure:
     """Return the forces (T, n) of all legs, N or N m, over time (T,), s.
 
@@ -40,7 +43,7 @@ def forces_figure(
     time, forces = rows(time, pick_machine_columns(robot, forces, "forces"), "forces", len(joints))
     words = [ylabel or f"actuator {joint.force} ({joint.force_unit})" for joint in joints]
     groups = groups_of(words)
-    figure = blank(5.4, 3.3 if len(groups) == 1 else 1.2 + 1.6 * len(groups))
+    figure = blank(5.4, 3.3 if len(groups) == 1 else 1.2 + 1.6 * len(groups), ax)
     panels = stack(figure, "time (s)", list(groups))
     for axes, legs in zip(panels, groups.values(), strict=True):
         zero_line(axes)
@@ -51,4 +54,4 @@ def forces_figure(
         remark(panels[0], "out", (float(time[0]) + turning_point) / 2.0, inf, MUTED, 3.0)
         remark(panels[0], "back", (turning_point + float(time[-1])) / 2.0, inf, MUTED, 3.0)
     legend(figure, forces.shape[1])
-    return figure
+    return real_figure(figure)

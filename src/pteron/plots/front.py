@@ -9,12 +9,12 @@ from collections.abc import Mapping, Sequence
 from itertools import cycle
 
 import numpy as np
-from matplotlib.figure import Figure
-from matplotlib.gridspec import GridSpec
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure, SubFigure
 from numpy.typing import ArrayLike
 
 from pteron.errors import DataError
-from pteron.plots.canvas import INK, LEG_COLORS, PAPER, blank, legend, plain_axes, spot
+from pteron.plots.canvas import INK, LEG_COLORS, PAPER, blank, legend, plain_axes, real_figure, spot
 
 _WIDE, _TALL = 5.4, 3.5
 """Width and height of the figure with one panel, inches."""
@@ -33,6 +33,7 @@ def front_figure(
     *,
     start: ArrayLike | None = None,
     chosen: Mapping[str, int] | None = None,
+    ax: Axes | SubFigure | None = None,
 ) -> Figure:
     """Return the picture of a front: the first objective over each of the others.
 
@@ -46,6 +47,8 @@ def front_figure(
         Objectives of the machine that the search began with.
     chosen : mapping of str to int, optional
         Rows of `objectives` to point out, by what these designs are called.
+    ax : Axes or SubFigure, optional
+        Axes of another figure, on which it is drawn; several panels take their place.
 
     Returns
     -------
@@ -80,8 +83,8 @@ def front_figure(
         labels.append("design of the front")
         begun = None
     others = values.shape[1] - 1
-    figure = blank(_WIDE, _TALL + _PANEL * (others - 1))
-    grid = GridSpec(others, 1, figure=figure)
+    figure = blank(_WIDE, _TALL + _PANEL * (others - 1), ax)
+    grid = figure.add_gridspec(others, 1)
     for k in range(1, others + 1):
         axes = plain_axes(figure, labels[k], labels[0], grid[k - 1])
         order = np.argsort(values[:, k])
@@ -108,11 +111,15 @@ def front_figure(
             spot(axes, begun[k], begun[0], INK, PAPER, 11.0, marker="*", label=label, zorder=6)
         axes.margins(0.08)
     legend(figure, 3)
-    return figure
+    return real_figure(figure)
 
 
 def fronts_figure(
-    fronts: Mapping[str, ArrayLike], names: Sequence[str], units: Sequence[str]
+    fronts: Mapping[str, ArrayLike],
+    names: Sequence[str],
+    units: Sequence[str],
+    *,
+    ax: Axes | SubFigure | None = None,
 ) -> Figure:
     """Return the picture of several fronts of two objectives, the first over the second.
 
@@ -122,12 +129,14 @@ def fronts_figure(
         The two objectives of designs, by what these are.
     names, units : sequence of str
         Of the two objectives.
+    ax : Axes or SubFigure, optional
+        Axes of another figure, on which it is drawn; several panels take their place.
 
     Returns
     -------
     Figure
     """
-    figure = blank(_WIDE, _TALL)
+    figure = blank(_WIDE, _TALL, ax)
     labels = [_label(name, unit) for name, unit in zip(names, units, strict=True)]
     axes = plain_axes(figure, labels[1], labels[0])
     styles = zip(fronts.items(), cycle(LEG_COLORS), cycle(_MARKS), strict=False)
@@ -139,7 +148,7 @@ def fronts_figure(
         axes.lines[-1].set_label(name)
     axes.margins(0.08)
     legend(figure, 4)
-    return figure
+    return real_figure(figure)
 
 
 def _label(name: str, unit: str) -> str:

@@ -9,15 +9,14 @@ import numpy as np
 import scipy  # type: ignore[import-untyped]
 from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm, Normalize, to_hex, to_rgb
-from matplotlib.figure import Figure
-from matplotlib.gridspec import GridSpec
+from matplotlib.figure import Figure, SubFigure
 from matplotlib.patches import Patch
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.maps import Axis, Map, Summary
-from pteron.maps.map import ALL, MARGIN, cause
+from pteron.maps.map import MARGIN, cause
 from pteron.platforms.coordinates import coordinate
 from pteron.plots.canvas import (
     FONT_SIZE,
@@ -29,9 +28,11 @@ from pteron.plots.canvas import (
     axis_label,
     blank,
     plain_axes,
+    real_figure,
     shown_unit,
     spot,
 )
+from pteron.tolerances import EXACT, SAME
 from pteron.workspace import BEYOND_LIMITS, REACHABLE
 
 _WIDTH = 5.0
@@ -51,12 +52,6 @@ _HATCHES = {
 _WIDE = 20.0
 """Ratio of the greatest value to the median above which colours are logarithmic."""
 
-_ALIKE = 1e-6
-"""Relative difference below which two values look alike."""
-
-_TINY = 1e-12
-"""Added to the range of colours, so that it is not empty."""
-
 _LAST = 99.0
 """Percentile of the last colour where a few values are far off."""
 
@@ -64,7 +59,11 @@ _BELOW = 4.5
 """Sizes of a letter from the axes to the legend: the scale's numbers and its name stand there."""
 
 
-def map_figure(given: Map, *names: str) -> Figure:
+def map_figure(
+    index_map: Map,
+    *names: str,
+    ax: Axes | SubFigure | None = None,
+) -> Figure:
     """Return the picture of a map: a panel for each index, one below the other.
 
     Over one coordinate it is a curve, over two a plane. Over three it is the three planes through
@@ -74,10 +73,12 @@ def map_figure(given: Map, *names: str) -> Figure:
 
     Parameters
     ----------
-    given : Map
+    index_map : Map
         Over one to three coordinates.
     *names : str
         Its indices; by default all.
+    ax : Axes or SubFigure, optional
+        Axes of another figure, on which it is drawn; several panels take their place.
 
     Returns
     -------
@@ -95,14 +96,14 @@ def map_figure(given: Map, *names: str) -> Figure:
     >>> grid = pose_grid("delta", {"z": -0.9}, points=31)
     >>> figure = map_figure(map_index("delta", "condition", grid))
     """
-    chosen = names or tuple(given.values)
+    chosen = names or tuple(index_map.values)
     for name in chosen:
-        if name not in given.values:
-            raise DataError(f"{name}: is not in this map; it has {', '.join(given.values)}")
-    planes = _planes(given)
-    scales = {name: color_scale(given, name) for name in chosen}
+        if name not in index_map.values:
+            raise DataError(f"{name}: is not in this map; it has {', '.join(index_map.values)}")
+    planes = _planes(index_map)
+    scales = {name: color_scale(index_map, name) for name in chosen}
     panels = [(plane, name) for plane in planes for name in chosen]
-    return map_panels(panels, scales, {}, len(chosen) if len(planes) > 1 else 1)
+    return map_panels(panels, scales, {}, len(chosen) if len(planes) > 1 else 1, ax)
 
 
 def _planes(volume: Map) -> list[Map]:
@@ -119,26 +120,28 @@ def _planes(volume: Map) -> list[Map]:
     middle = np.unravel_index(int(depth.argmax()), depth.shape)
     places = [axis.values[i] for axis, i in zip(axes, middle, strict=True)]
     return [
-        volume.at(axis.name, float(place))
+        volume.slice_at(axis.name, float(place))
         for axis, place in zip(reversed(axes), reversed(places), strict=True)
     ]
 
 
 def color_scale(shown_map: Map, name: str) -> Normalize:
     """Return the scale of colours for the values of an index."""
-    factor = shown_unit(ALL[name].unit)[0]
+    factor = shown_unit(shown_map.index(name).unit)[0]
     known = (
         factor * shown_map.values[name][shown_map.reachable & np.isfinite(shown_map.values[name])]
     )
     if not len(known):
         return Normalize(0.0, 1.0)
     low, high = float(known.min()), float(known.max())
-    if high - low <= _ALIKE * max(abs(low), abs(high)):
-        return Normalize(0.9 * low, 1.1 * low + _TINY)
+    if high - low <= SAME * max(abs(low), abs(high)):
+        return Normalize(0.9 * low, 1.1 * low + EXACT)
     middle, last = np.percentile(known, [50.0, _LAST]).tolist()
     if low > 0.0 and high > _WIDE * middle:
         return LogNorm(low, last if last > low else high)
-    return Normalize(low, last if ALL[name].better == "less" and high > 3.0 * last else high)
+    return Normalize(
+        low, last if shown_map.index(name).better == "less" and high > 3.0 * last else high
+    )
 
 
 def map_panels(
@@ -146,21 +149,22 @@ def map_panels(
     scales: Mapping[str, Normalize],
     causes: Mapping[str, Any],
     columns: int = 1,
+    ax: Axes | SubFigure | None = None,
 ) -> Figure:
     """Return a figure of panels, whose legends have these causes too, there or not."""
     heights = [_height(plane) for plane, _ in panels[::columns]]
-    figure = blank(columns * _WIDTH, sum(heights))
-    grid = GridSpec(len(heights), columns, figure=figure, height_ratios=heights)
+    figure = blank(columns * _WIDTH, sum(heights), ax)
+    grid = figure.add_gridspec(len(heights), columns, height_ratios=heights)
     for k, (plane, name) in enumerate(panels):
         labels = [axis_label(axis.name) for axis in plane.grid.axes]
-        upright = labels[1] if len(labels) > 1 else _index_label(name)
+        upright = labels[1] if len(labels) > 1 else _index_label(plane, name)
         axes = plain_axes(figure, labels[0], upright, grid[divmod(k, columns)])
         axes.set_title(_title(plane), fontsize=FONT_SIZE, color=INK, loc="left")
         if len(labels) == 1:
             _curve(axes, plane, name)
         else:
             _plane(figure, axes, plane, name, scales[name], causes)
-    return figure
+    return real_figure(figure)
 
 
 def _height(plane: Map) -> float:
@@ -180,10 +184,10 @@ def _plane(
     """Draw an index over two coordinates."""
     axes.grid(visible=False)
     first, second = (_axis_values(axis) for axis in plane.grid.axes)
-    factor = shown_unit(ALL[name].unit)[0]
+    factor = shown_unit(plane.index(name).unit)[0]
     values = factor * np.ma.masked_invalid(plane.values[name].T)
     drawn = np.ma.masked_where(plane.status.T != REACHABLE, values)
-    better = ALL[name].better == "more"
+    better = plane.index(name).better == "more"
     mesh = axes.pcolormesh(
         first,
         second,
@@ -200,14 +204,14 @@ def _plane(
         mesh, ax=axes, fraction=0.05, pad=0.02, extend=_colorbar_extension(drawn, scale)
     )
     direction = "bright is better"
-    if drawn.count() and _is_constant(summary := plane.summary(name)):
+    if drawn.count() and _is_constant(summary := plane.statistics(name)):
         bar.set_ticks([factor * summary.best], labels=[f"{factor * summary.best:.4g}"])
         direction = "the same everywhere here"
     elif isinstance(scale, LogNorm):
         bar.ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         bar.ax.yaxis.set_major_formatter("{x:g}")
         bar.ax.yaxis.set_minor_formatter(NullFormatter())
-    bar.set_label(f"{_index_label(name)}\n{direction}", fontsize=FONT_SIZE, color=INK)
+    bar.set_label(f"{_index_label(plane, name)}\n{direction}", fontsize=FONT_SIZE, color=INK)
     bar.ax.tick_params(labelsize=FONT_SIZE - 1.0, colors=INK, color=MUTED)
     outline: Any = bar.outline
     outline.set_visible(False)
@@ -230,7 +234,7 @@ def _plane(
 def _colorbar_extension(drawn: Any, scale: Normalize) -> str:
     """Return the ends of a scale that a picture's values exceed, as matplotlib names them."""
     low, high = float(scale.vmin or 0.0), float(scale.vmax or 0.0)
-    slack = _ALIKE * (high - low)
+    slack = SAME * (high - low)
     under = drawn.count() > 0 and float(drawn.min()) < low - slack
     over = drawn.count() > 0 and float(drawn.max()) > high + slack
     return ("both" if over else "min") if under else ("max" if over else "neither")
@@ -271,7 +275,7 @@ def _hatch_unreachable(axes: Axes, plane: Map, name: str, causes: Mapping[str, A
 
 def _mark_best(axes: Axes, plane: Map, name: str, handles: list[Any]) -> None:
     """Mark the best pose of a plane, unless the index is constant."""
-    summary = plane.summary(name)
+    summary = plane.statistics(name)
     if _is_constant(summary):
         return
     factor = shown_unit(summary.unit)[0]
@@ -279,19 +283,19 @@ def _mark_best(axes: Axes, plane: Map, name: str, handles: list[Any]) -> None:
         shown_unit(axis.unit)[0] * summary.best_pose[plane.grid.coordinates.index(axis.name)]
         for axis in plane.grid.axes
     ]
-    label = f"best here: {factor * summary.best:.4g} {_unit(name)}".rstrip()
+    label = f"best here: {factor * summary.best:.4g} {_unit(plane, name)}".rstrip()
     spot(axes, at[0], at[1], PAPER, INK, 6.0, zorder=5, label=label, clip_on=False)
     handles.append(axes.lines[-1])
 
 
 def _is_constant(summary: Summary) -> bool:
-    return abs(summary.best - summary.worst) <= _ALIKE * abs(summary.best)
+    return abs(summary.best - summary.worst) <= SAME * abs(summary.best)
 
 
 def _curve(axes: Axes, curve: Map, name: str) -> None:
     """Draw an index over one coordinate."""
     place = _axis_values(curve.grid.axes[0])
-    factor = shown_unit(ALL[name].unit)[0]
+    factor = shown_unit(curve.index(name).unit)[0]
     serves = curve.reachable
     axes.plot(place, np.where(serves, factor * curve.values[name], np.nan), color=INK)
     axes.set(xlim=(place[0], place[-1]))
@@ -320,19 +324,19 @@ def _axis_values(axis: Axis) -> Array:
     return coordinate(axis.name).shown_factor * axis.values
 
 
-def _index_label(name: str) -> str:
-    unit = _unit(name)
-    return f"{ALL[name].title} ({unit})" if unit else ALL[name].title
+def _index_label(index_map: Map, name: str) -> str:
+    unit = _unit(index_map, name)
+    return f"{index_map.index(name).title} ({unit})" if unit else index_map.index(name).title
 
 
-def _unit(name: str) -> str:
+def _unit(index_map: Map, name: str) -> str:
     """Return the unit in which an index is shown."""
-    return shown_unit(ALL[name].unit)[1]
+    return shown_unit(index_map.index(name).unit)[1]
 
 
 def _title(shown_map: Map) -> str:
     """Return the machine's name, and the coordinates that are held."""
-    pairs = ((coordinate(name), value) for name, value in shown_map.grid.held.items())
+    pairs = ((coordinate(name), value) for name, value in shown_map.grid.fixed_coordinates.items())
     constants = (
         f"{c.symbol} = {c.shown_factor * value + 0.0:.4g}{' ' * (c.unit == 'm')}{c.shown_unit}"
         for c, value in pairs

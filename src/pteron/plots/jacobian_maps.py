@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import scipy  # type: ignore[import-untyped]
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, SubFigure
 from numpy.typing import ArrayLike, NDArray
 
 from pteron.errors import DataError
@@ -21,6 +21,7 @@ from pteron.plots.canvas import (
     axis_label,
     blank,
     plain_axes,
+    real_figure,
     remark,
 )
 
@@ -43,6 +44,7 @@ def condition_figure(
     condition: ArrayLike,
     *,
     names: tuple[str, str] = ("x", "y"),
+    ax: Axes | SubFigure | None = None,
 ) -> Figure:
     """Return the map of a condition number over two coordinates: dark is near a singularity.
 
@@ -57,6 +59,8 @@ def condition_figure(
         phi, are to be made alike first: else their condition number says nothing.
     names : (str, str)
         What the coordinates are; lengths are shown in mm, angles in degrees.
+    ax : Axes or SubFigure, optional
+        Axes of another figure, on which it is drawn; several panels take their place.
 
     Returns
     -------
@@ -77,7 +81,7 @@ def condition_figure(
     >>> condition = np.linalg.cond(np.nan_to_num(jacobians))  # infinite where not in reach
     >>> figure = pteron.plots.condition_figure(cut.first, cut.second, condition)
     """
-    figure, axes, x, y, values = _map(first, second, condition, names)
+    figure, axes, x, y, values = _map(first, second, condition, names, ax)
     drawn = np.ma.masked_invalid(np.clip(values, 1.0, _LEVELS[-1]))
     for level in _LEVELS[1:-1]:
         if (drawn > level).any():
@@ -87,7 +91,7 @@ def condition_figure(
         lines = axes.contour(x, y, drawn, levels=named, colors=[INK], linewidths=0.7)
         axes.clabel(lines, fmt="%g", fontsize=FONT_SIZE - 1.0, colors=[INK])
     _rim(axes, x, y, values)
-    return figure
+    return real_figure(figure)
 
 
 def singularities_figure(
@@ -96,6 +100,7 @@ def singularities_figure(
     determinant: ArrayLike,
     *,
     names: tuple[str, str] = ("x", "y"),
+    ax: Axes | SubFigure | None = None,
 ) -> Figure:
     """Return the map of a determinant's sign over two coordinates: it changes at singular poses.
 
@@ -111,6 +116,8 @@ def singularities_figure(
         Of any unit; NaN where there is none.
     names : (str, str)
         What the coordinates are; lengths are shown in mm, angles in degrees.
+    ax : Axes or SubFigure, optional
+        Axes of another figure, on which it is drawn; several panels take their place.
 
     Returns
     -------
@@ -131,7 +138,7 @@ def singularities_figure(
     >>> determinant = np.linalg.det(pteron.jacobian(robot, poses, on_failure="nan"))
     >>> figure = pteron.plots.singularities_figure(x, phi, determinant, names=("x", "phi"))
     """
-    figure, axes, x, y, values = _map(first, second, determinant, names)
+    figure, axes, x, y, values = _map(first, second, determinant, names, ax)
     # Near type I it goes to infinity, which hides nothing of its sign.
     size = float(np.nanmedian(np.abs(values))) if np.isfinite(values).any() else 1.0
     drawn = np.ma.masked_invalid(np.arctan(values / (size or 1.0)))
@@ -143,7 +150,7 @@ def singularities_figure(
     if drawn.min() < 0.0 < drawn.max():
         axes.contour(x, y, drawn, levels=[0.0], colors=[WARNING], linewidths=2.0)
     _rim(axes, x, y, values)
-    return figure
+    return real_figure(figure)
 
 
 def _middle(region: NDArray[np.bool_]) -> tuple[int, int]:
@@ -154,7 +161,11 @@ def _middle(region: NDArray[np.bool_]) -> tuple[int, int]:
 
 
 def _map(
-    first: ArrayLike, second: ArrayLike, values: ArrayLike, names: tuple[str, str]
+    first: ArrayLike,
+    second: ArrayLike,
+    values: ArrayLike,
+    names: tuple[str, str],
+    ax: Axes | SubFigure | None,
 ) -> tuple[Figure, Axes, Array, Array, Array]:
     """Return a figure, its axes, and what they show, in mm and degrees."""
     scaled, labels = [], []
@@ -170,7 +181,7 @@ def _map(
         raise DataError(f"values: shape {array.shape} given, ({len(y)}, {len(x)}) expected")
     alike = len(set(are_angles(names).tolist())) == 1
     height = _MARGIN + (_WIDTH - _MARGIN) * (float(np.ptp(y) / np.ptp(x)) if alike else 0.75)
-    figure = blank(_WIDTH, min(max(height, 1.8), 6.0))
+    figure = blank(_WIDTH, min(max(height, 1.8), 6.0), ax)
     axes = plain_axes(figure, *labels)
     axes.grid(visible=False)
     if alike:

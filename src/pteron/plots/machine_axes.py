@@ -41,7 +41,7 @@ class MachineAxes(ABC):
         self._drawn: list[Array] = []
 
     @abstractmethod
-    def _to_axes(self, points: Array, *, held: bool = True) -> Array:
+    def _to_axes(self, points: Array, *, extends: bool = True) -> Array:
         """Return points (..., 3) in the base frame as the axes have them; `fill` holds them."""
 
     @abstractmethod
@@ -68,11 +68,11 @@ class MachineAxes(ABC):
         self._drawn.clear()
 
     @property
-    def drawn(self) -> Array:
+    def drawn_points(self) -> Array:
         """The points (K, 2) or (K, 3) of all things, as the axes have them."""
         return np.vstack(self._drawn)
 
-    def hold(self, drawn: Array) -> None:
+    def reserve_space(self, drawn: Array) -> None:
         """Let `fill` leave space for points, (K, 2) or (K, 3), of other axes."""
         self._drawn.append(drawn)
 
@@ -89,7 +89,7 @@ class MachineAxes(ABC):
 
     def mark(self, point: Array, face: str, edge: str, size: float, raised: float = 0.03) -> None:
         """Draw a ring at a point."""
-        p = self._to_axes(point[None], held=False)
+        p = self._to_axes(point[None], extends=False)
         if self.measures:
             return
         look: dict[str, Any] = {"marker": "o", "markersize": self._weight * size}
@@ -103,7 +103,7 @@ class MachineAxes(ABC):
 
     def faces(self, faces: list[Array], color: str, alpha: float, raised: float = 0.0) -> None:
         """Draw polygons, all in one place of the order."""
-        placed = [self._to_axes(face, held=False) for face in faces]
+        placed = [self._to_axes(face, extends=False) for face in faces]
         if self.measures:
             return
         look: dict[str, Any] = {"facecolors": color, "edgecolors": PAPER, "linewidths": 0.6}

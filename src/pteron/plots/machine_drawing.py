@@ -14,7 +14,7 @@ from pteron.motion import Guide, JointPoints, Part
 from pteron.plots.canvas import INK, LEG_COLORS, MUTED, PAPER, REACH, nice_step
 from pteron.plots.machine_axes import MachineAxes
 from pteron.plots.plane_axes import PlaneAxes
-from pteron.plots.space_axes import SpaceAxes, upright
+from pteron.plots.space_axes import SpaceAxes, upright_rotation
 
 _PLATFORM_AXES = ("x\u2032", "y\u2032", "z\u2032")
 """x, y and z with a prime."""
@@ -91,7 +91,7 @@ def scene_of(points: JointPoints, guides: Sequence[Guide], gravity: Array | None
     if points.plane is None:
         upwards = points.axes.reshape(-1, 3, 3)[0, 2]
         vertical = upwards if gravity is None else -gravity
-        flat = everything @ upright(vertical).T
+        flat = everything @ upright_rotation(vertical).T
     else:
         flat = everything @ points.plane.T
         if gravity is not None:
@@ -173,7 +173,7 @@ def base_outline(points: JointPoints, guides: Sequence[Guide]) -> Array:
     """Return the centres (k, 3) of cranks' circles and rams' base joints, in order round them."""
     legs = zip(points.links, guides, points.rams, strict=True)
     turning = [
-        line for line, guide, ram in legs if ram or (not guide.slides and len(guide.path) > 1)
+        line for line, guide, ram in legs if ram or (not guide.is_prismatic and len(guide.path) > 1)
     ]
     base = np.array([line[..., 0, :].reshape(-1, 3)[0] for line in turning])
     if len(base) < 3:
@@ -192,7 +192,7 @@ def rods(line: Array, bar: Array | None, size: float) -> list[Array]:
 
 
 def _draw_guide(sheet: MachineAxes, guide: Guide) -> None:
-    if not guide.slides:
+    if not guide.is_prismatic:
         sheet.line(guide.path, MUTED, 0.9, raised=-0.01, style=(0, (2.0, 2.0)))
         return
     sheet.line(guide.path, MUTED, 3.4, raised=-0.01)
@@ -202,7 +202,7 @@ def _draw_guide(sheet: MachineAxes, guide: Guide) -> None:
 
 def _draw_leg(sheet: MachineAxes, points: JointPoints, guide: Guide, i: int, size: float) -> None:
     color, line = LEG_COLORS[i], points.links[i]
-    if guide.slides:
+    if guide.is_prismatic:
         sheet.faces(_block(line[0], guide.axis, size), color, 0.95)
     else:
         axle = _AXLE * size * guide.axis
@@ -213,14 +213,14 @@ def _draw_leg(sheet: MachineAxes, points: JointPoints, guide: Guide, i: int, siz
         sheet.line(ends, color, 3.0 if points.bars[i] is None else 2.0)
     for joint in line[::2] if points.rams[i] else line:
         sheet.mark(joint, PAPER, color, 5.0)
-    direction = guide.axis if guide.slides else line[1] - line[0]
+    direction = guide.axis if guide.is_prismatic else line[1] - line[0]
     away = sheet.side_direction(line[0] - points.reference, direction)
     sheet.text(line[0] + 0.075 * size * away, str(i + 1), color, bold=True)
 
 
 def _block(center: Array, direction: Array, size: float) -> list[Array]:
     """Return the six faces of a slider's block."""
-    frame = upright(direction)
+    frame = upright_rotation(direction)
     half = size * np.array([0.02, 0.02, 0.036])
     loop = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
     return [

@@ -7,7 +7,8 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure, SubFigure
 
 from pteron.arguments import expect
 from pteron.errors import DataError
@@ -15,7 +16,7 @@ from pteron.kernels import Array
 from pteron.kinematics.evaluate import finite_rows
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion import Guide, JointPoints, joint_guides, joint_points
-from pteron.plots.canvas import FONT_SIZE, INK, blank
+from pteron.plots.canvas import FONT_SIZE, INK, blank, whole_figure
 from pteron.plots.machine_axes import MachineAxes
 from pteron.plots.machine_drawing import (
     Scene,
@@ -46,6 +47,8 @@ _INSET = 0.02
 _TITLE = 0.24
 """Height of the title over a picture, inches."""
 
+_TITLE_STYLE: dict[str, Any] = {"ha": "center", "va": "bottom", "fontsize": FONT_SIZE, "color": INK}
+
 
 def draw(
     robot: RobotLike,
@@ -53,6 +56,7 @@ def draw(
     *,
     along: PoseLike | None = None,
     angle: str = "",
+    ax: Axes | SubFigure | None = None,
 ) -> Figure:
     """Return the machine in one pose: in space with the vertical upwards, or in its plane.
 
@@ -69,6 +73,8 @@ def draw(
         Poses of a motion, m and rad: the tool's path is drawn as a dotted line.
     angle : str
         Label of the platform frame's x axis, such as "\u03c6 = 10\u00b0".
+    ax : Axes or SubFigure, optional
+        Axes of another figure, on which it is drawn; several panels take their place.
 
     Returns
     -------
@@ -104,6 +110,7 @@ def draw(
         gravity=gravity_of(robot),
         path=None if way is None else joint_points(robot, way).tool,
         angle=angle,
+        ax=ax,
     )
 
 
@@ -119,6 +126,7 @@ def robot_figure(
     gravity: Array | None = None,
     path: Array | None = None,
     angle: str = "",
+    ax: Axes | SubFigure | None = None,
 ) -> Figure:
     """Return the machine in one pose: in space with the vertical upwards, or in its plane.
 
@@ -128,7 +136,7 @@ def robot_figure(
     upwards. `angle` is the label of the platform frame's x axis.
     """
     scene = scene_of(points, guides, gravity)
-    sheet = machine_figure(scene)
+    sheet = machine_figure(scene, ax=ax)
     draw_surroundings(sheet, scene)
     draw_machine(sheet, scene, points, angle)
     if path is not None:
@@ -138,13 +146,19 @@ def robot_figure(
     return sheet.figure
 
 
-def machine_figure(scene: Scene, title: str = "") -> MachineAxes:
+def machine_figure(
+    scene: Scene, title: str = "", ax: Axes | SubFigure | None = None
+) -> MachineAxes:
     """Return axes for a machine in an empty figure of the usual size."""
     height = _SPACE
     if scene.plane is not None:
         height = float(np.clip(0.6 + (_WIDTH - 0.6) * scene.aspect, 2.6, 5.6))
-    figure = blank(_WIDTH, height)
+    figure = blank(_WIDTH, height, ax)
     box = None
+    if title and ax is not None:
+        sheet = scene.sheet(figure)
+        sheet.axes.set_title(title, fontsize=FONT_SIZE, color=INK)
+        return sheet
     if title:
         figure.suptitle(title, fontsize=FONT_SIZE, color=INK)
         box = (0.0, 0.0, 1.0, 1.0 - 1.2 * _TITLE / height) if scene.plane is None else None
@@ -158,6 +172,7 @@ def poses_figure(
     titles: Sequence[str] = (),
     columns: int | None = None,
     along: PoseLike | None = None,
+    ax: Axes | SubFigure | None = None,
 ) -> Figure:
     """Return a machine in several poses beside each other, all seen from one place.
 
@@ -176,6 +191,8 @@ def poses_figure(
         Number of pictures in a row; by default up to four.
     along : array, shape (T, m), optional
         Poses of a motion, m and rad, whose tool's path is drawn in each picture.
+    ax : Axes or SubFigure, optional
+        Axes of another figure, on which it is drawn; several panels take their place.
 
     Returns
     -------
@@ -224,14 +241,14 @@ def poses_figure(
     rows = -(-count // columns)
     tall = _PANEL * (_SQUARE if scenes[0].plane is None else min(max(scenes[0].aspect, 0.4), 1.2))
     over = _TITLE if titles else 0.0
-    figure = blank(columns * _PANEL, rows * (tall + over))
+    figure = whole_figure(blank(columns * _PANEL, rows * (tall + over), ax))
     sheets = []
     for k, (scene, points) in enumerate(zip(scenes, every, strict=True)):
-        left, below = (k % columns) / columns, 1.0 - (k // columns + 1) / rows
+        x_start, below = (k % columns) / columns, 1.0 - (k // columns + 1) / rows
         share = tall / (tall + over) / rows
         sheet = scene.sheet(
             figure,
-            (left + _INSET / columns, below, (1.0 - 2 * _INSET) / columns, share),
+            (x_start + _INSET / columns, below, (1.0 - 2 * _INSET) / columns, share),
             small=True,
         )
         draw_surroundings(sheet, scene)
@@ -240,12 +257,11 @@ def poses_figure(
             draw_path(sheet, path)
         draw_directions(sheet, scene)
         if titles:
-            style: dict[str, Any] = {"ha": "center", "va": "bottom", "fontsize": FONT_SIZE}
-            figure.text(left + 0.5 / columns, below + share, titles[k], color=INK, **style)
+            figure.text(x_start + 0.5 / columns, below + share, titles[k], **_TITLE_STYLE)
         sheets.append(sheet)
-    together = np.vstack([sheet.drawn for sheet in sheets])
+    together = np.vstack([sheet.drawn_points for sheet in sheets])
     for sheet in sheets:
-        sheet.hold(together)
+        sheet.reserve_space(together)
         sheet.fill()
     return figure
 

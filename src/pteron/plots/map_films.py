@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from matplotlib.figure import Figure
@@ -14,6 +14,7 @@ from pteron.plots.canvas import pixels
 from pteron.plots.film_encoders import ENCODERS, Pixels
 from pteron.plots.films import Film, checked_film, write_film
 from pteron.plots.index_maps import color_scale, map_panels
+from pteron.progress import Progress
 
 _FPS = 10.0
 """Frames a second where nothing else is asked."""
@@ -23,12 +24,12 @@ _DPI = 160
 
 
 def map_film(
-    given: Map,
+    index_map: Map,
     name: str,
     path: str | Path,
     *,
     fps: float = _FPS,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress | None = None,
 ) -> Film:
     """Write a film that goes through the last coordinate of a map over three.
 
@@ -36,7 +37,7 @@ def map_film(
 
     Parameters
     ----------
-    given : Map
+    index_map : Map
         Over three coordinates.
     name : str
         The index.
@@ -61,13 +62,13 @@ def map_film(
         If the encoder of MP4 files is not there; the extra `film` brings it.
     """
     target = checked_film(path)
-    if len(given.grid.axes) != 3 or name not in given.values:
+    if len(index_map.grid.axes) != 3 or name not in index_map.values:
         raise DataError("a film needs a map over three coordinates, and an index that is in it")
-    last, scales = given.grid.axes[-1], {name: color_scale(given, name)}
+    last, scales = index_map.grid.axes[-1], {name: color_scale(index_map, name)}
     rate = ENCODERS[target.suffix.lower()].rate(fps)
 
     def drawn(value: float) -> Figure:
-        return map_panels([(given.at(last.name, value), name)], scales, given.causes)
+        return map_panels([(index_map.slice_at(last.name, value), name)], scales, index_map.causes)
 
     values = last.values.tolist()
     figure = drawn(values[0])

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 
 from pteron.kernels import Array
-from pteron.plots.canvas import nice_step, plain_axes
+from pteron.plots.canvas import Picture, nice_step, plain_axes
 from pteron.plots.machine_axes import MachineAxes
 
 _RIM = 0.06
@@ -49,7 +49,8 @@ class PlaneAxes(MachineAxes):
         super().__init__(axes, small=small)
         axes.set_aspect("equal")
         if box is not None:
-            figure.set_layout_engine("none")
+            if isinstance(figure, Picture):
+                figure.set_layout_engine("none")
             left, bottom, width, height = box
             if not small:
                 wide, tall = figure.get_size_inches()
@@ -63,7 +64,7 @@ class PlaneAxes(MachineAxes):
                 spine.set_visible(False)
         self._small, self._step, self.plane = small, step, plane
 
-    def _to_axes(self, points: Array, *, held: bool = True) -> Array:
+    def _to_axes(self, points: Array, *, extends: bool = True) -> Array:
         flat = np.asarray(1e3 * points @ self.plane.T)
         self._drawn.append(flat)
         return flat
@@ -83,7 +84,7 @@ class PlaneAxes(MachineAxes):
 
     def fill(self, angles: Sequence[float] = (0.0,)) -> None:
         """Let the scales end a rim beyond what was drawn."""
-        drawn = self.drawn
+        drawn = self.drawn_points
         low, high = drawn.min(axis=0), drawn.max(axis=0)
         rim = _RIM * float((high - low).max())
         low, high = low - rim, high + rim

@@ -31,7 +31,7 @@ from pteron.plots.canvas import (
     WARNING,
     legend,
 )
-from pteron.plots.fonts import no_word_of_glyphs, take_fonts
+from pteron.plots.fonts import silence_glyph_warnings, take_fonts
 
 Width = Literal["column", "page"]
 """Names of usual widths."""
@@ -94,9 +94,9 @@ def resize(figure: Figure, width: Width | float) -> Figure:
     Examples
     --------
     >>> import numpy as np
-    >>> from pteron.plots import power_figure, resized
+    >>> from pteron.plots import power_figure, resize
     >>> figure = power_figure(np.linspace(0.0, 1.0, 5), np.ones((5, 3)))
-    >>> [float(side) for side in resized(figure, "column").get_size_inches().round(1)]
+    >>> [float(side) for side in resize(figure, "column").get_size_inches().round(1)]
     [3.5, 2.7]
     """
     inches: Any = WIDTHS.get(width, 0.0) if isinstance(width, str) else width
@@ -122,15 +122,15 @@ def _set_width(figure: Figure, inches: float) -> Figure:
     ratio = inches / wide
     figure.set_size_inches(inches, tall * (ratio if shaped else ratio**0.5))
     take_fonts(figure)
-    with no_word_of_glyphs():
+    with silence_glyph_warnings():
         _fit_legend(figure, inches)
     figure.draw_without_rendering()
     for axes in figure.axes:
-        _thin(axes)
+        _thin_ticks(axes)
     return figure
 
 
-def _thin(axes: Axes) -> None:
+def _thin_ticks(axes: Axes) -> None:
     """Take out every second number of even scales while those along x run into each other."""
     while isinstance(axes.xaxis.get_major_locator(), MultipleLocator):
         numbers = [text.get_window_extent() for text in axes.get_xticklabels() if text.get_text()]
@@ -217,7 +217,7 @@ def svg(figure: Figure, *, name: str, title: str, widest: float = _ON_PAGE) -> M
     """
     if figure.get_size_inches()[0] > widest:
         _set_width(figure, widest)
-    text = _drawn(figure, facecolor="none")
+    text = _render_svg(figure, facecolor="none")
     text = text[text.index("<svg") :].rstrip()
     text = re.sub(r"\s*<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
     text = re.sub(r"<!--.*?-->\s*", "", text, flags=re.DOTALL)
@@ -243,10 +243,10 @@ def svg(figure: Figure, *, name: str, title: str, widest: float = _ON_PAGE) -> M
 
 def svg_file(figure: Figure) -> str:
     """Return a figure as the text of an SVG file that stands alone, on white, without a date."""
-    return _drawn(figure)
+    return _render_svg(figure)
 
 
-def _drawn(figure: Figure, **look: Any) -> str:
+def _render_svg(figure: Figure, **look: Any) -> str:
     buffer = StringIO()
     with mpl.rc_context(TEXT):
         figure.savefig(buffer, format="svg", metadata=NO_METADATA, **look)

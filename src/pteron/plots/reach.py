@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import scipy  # type: ignore[import-untyped]
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, SubFigure
 from matplotlib.path import Path
 from matplotlib.ticker import MultipleLocator
 
@@ -23,8 +23,10 @@ from pteron.plots.canvas import (
     blank,
     nice_step,
     plain_axes,
+    real_figure,
     spot,
 )
+from pteron.tolerances import ROUNDING
 from pteron.workspace import BEYOND_LIMITS, REACHABLE, ReachSlice
 
 _BANDS = 4
@@ -33,9 +35,6 @@ _BANDS = 4
 _TENTHS = [tenth / 10.0 for tenth in range(10)]
 """Levels of a measure's lines."""
 
-_TIE = 1e-9
-"""Difference of two legs' margins, m, up to which they are equal."""
-
 _SPECK = 2.0
 """Size, in cells of the grid, below which an outline is not drawn."""
 
@@ -43,13 +42,18 @@ _DASHES = ("-", "-", (0, (3, 2)), (0, (3, 2)), (0, (1, 1)), (0, (1, 1)))
 """Styles of lines of legs 1 to 6: lines which coincide, as those of mirrored legs do, both show."""
 
 
-def reach_figure(cut: ReachSlice, *, path: Array | None = None) -> Figure:
+def reach_figure(
+    cut: ReachSlice,
+    *,
+    path: Array | None = None,
+    ax: Axes | SubFigure | None = None,
+) -> Figure:
     """Return the map of a slice, with the poses (T, m), or their lengths, of a motion on it.
 
     In reach, the shade deepens with the margin. Outside, the colour is that of the leg that misses
     the pose by most; a line in a leg's colour is the end of its reach (type I).
     """
-    figure, axes, first, second = _sheet(cut)
+    figure, axes, first, second = _sheet(cut, ax)
 
     def fill(field: Array, color: str, alpha: float, level: float = 0.0) -> None:
         if field.max() > level:
@@ -70,18 +74,23 @@ def reach_figure(cut: ReachSlice, *, path: Array | None = None) -> Figure:
             edge = axes.contour(first, second, margin, levels=[0.0], colors=[LEG_COLORS[i]])
             edge.set(linestyles=[_DASHES[i]], linewidths=1.6)
     _finish(axes, cut, path)
-    return figure
+    return real_figure(figure)
 
 
 def measure_figure(
-    cut: ReachSlice, measure: Array, *, path: Array | None = None, levels: Sequence[float] = _TENTHS
+    cut: ReachSlice,
+    measure: Array,
+    *,
+    path: Array | None = None,
+    levels: Sequence[float] = _TENTHS,
+    ax: Axes | SubFigure | None = None,
 ) -> Figure:
     """Return the map of a measure (B, A) on a slice, where it is in reach.
 
     The shade deepens with the measure from level to level, by default tenths; every second line is
     named.
     """
-    figure, axes, first, second = _sheet(cut, lowest=0.0)
+    figure, axes, first, second = _sheet(cut, ax, lowest=0.0)
     # Drawn beyond the edge of the reach and cut off there, so that the edge is smooth.
     nearest = scipy.ndimage.distance_transform_edt(np.isnan(measure), return_indices=True)[1]
     extended = measure[tuple(nearest)]
@@ -108,16 +117,19 @@ def measure_figure(
     for region in drawn:
         region.set_clip_path(outline, axes.transData)
     _finish(axes, cut, path)
-    return figure
+    return real_figure(figure)
 
 
-def _sheet(cut: ReachSlice, lowest: float = 1.8) -> tuple[Figure, Axes, Array, Array]:
+def _sheet(
+    cut: ReachSlice, ax: Axes | SubFigure | None, lowest: float = 1.8
+) -> tuple[Figure, Axes, Array, Array]:
     """Return a figure, its axes with their scales, and both coordinates as people read them."""
     names = [coordinate(name) for name in cut.plane]
     first, second = names[0].shown_factor * cut.first, names[1].shown_factor * cut.second
     spans, same = np.array([np.ptp(first), np.ptp(second)]), names[0].unit == names[1].unit
     shape = float(spans[1] / spans[0]) if same else 1.0
-    figure = blank(3.9, min(max(0.6 + 3.3 * shape, lowest), 5.6) if lowest else 0.6 + 3.3 * shape)
+    height = 0.6 + 3.3 * shape
+    figure = blank(3.9, min(max(height, lowest), 5.6) if lowest else height, ax)
     axes = plain_axes(figure, *(f"{name.symbol} ({name.shown_unit})" for name in names))
     axes.grid(visible=False)
     axes.set_aspect("equal" if same else "auto")
@@ -146,7 +158,7 @@ def _territories(legs: Array) -> Iterator[tuple[Array, str]]:
     alike in the whole slice, as mirrored ones do, the first counts.
     """
     far = np.abs(legs[:, None] - legs).max(axis=(-2, -1))
-    first = [i for i in range(len(legs)) if not (far[i, :i] <= _TIE).any()]
+    first = [i for i in range(len(legs)) if not (far[i, :i] <= ROUNDING).any()]
     ranked, missed = legs[first], -legs.min(axis=0)
     for count in range(len(first), 0, -1):
         others = ranked[count:].min(axis=0, initial=np.inf)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, SubFigure
 from numpy.typing import ArrayLike
 
 from pteron.arguments import expect
@@ -23,6 +23,7 @@ from pteron.plots.canvas import (
     blank,
     groups_of,
     plain_axes,
+    real_figure,
     spot,
 )
 
@@ -43,6 +44,7 @@ def parameters_figure(
     intervals: ArrayLike | None = None,
     units: Sequence[str] = (),
     reference: ArrayLike | None = None,
+    ax: Axes | SubFigure | None = None,
 ) -> Figure:
     """Return the values of parameters with their intervals, each unit on a scale of its own.
 
@@ -59,6 +61,8 @@ def parameters_figure(
     reference : array, shape (p,), optional
         Values to compare with, such as the drawing's, shown as open rings. A value whose interval
         does not hold its reference is red.
+    ax : Axes or SubFigure, optional
+        Axes of another figure, on which it is drawn; several panels take their place.
 
     Returns
     -------
@@ -87,7 +91,7 @@ def parameters_figure(
         raise DataError(f"units: {len(units)} given, {len(names)} expected, one for each name")
     groups = groups_of(units or ["value"] * len(names))
     counts = [len(members) for members in groups.values()]
-    figure = blank(_WIDE, _HEAD * len(groups) + _ROW * len(names))
+    figure = blank(_WIDE, _HEAD * len(groups) + _ROW * len(names), ax)
     grid = figure.add_gridspec(len(groups), 1, height_ratios=[count + 1.0 for count in counts])
     for k, (unit, members) in enumerate(groups.items()):
         axes = row_axes(figure, [names[i] for i in members], unit, grid[k])
@@ -101,10 +105,15 @@ def parameters_figure(
                 ends = [numbers[i] - wide[i], numbers[i] + wide[i]]
                 axes.plot(ends, [y, y], color=color, linewidth=2.0, marker="|", markersize=6.0)
             spot(axes, numbers[i], y, color, PAPER, 5.0, markeredgewidth=0.6)
-    return figure
+    return real_figure(figure)
 
 
-def operations_figure(names: Sequence[str], counts: ArrayLike) -> Figure:
+def operations_figure(
+    names: Sequence[str],
+    counts: ArrayLike,
+    *,
+    ax: Axes | SubFigure | None = None,
+) -> Figure:
     """Return bars of counts, such as operations, each with its number.
 
     Parameters
@@ -113,6 +122,8 @@ def operations_figure(names: Sequence[str], counts: ArrayLike) -> Figure:
         Names of the p rows, from the top.
     counts : array, shape (p,)
         The counts, 0 or more.
+    ax : Axes or SubFigure, optional
+        Axes of another figure, on which it is drawn; several panels take their place.
 
     Returns
     -------
@@ -131,7 +142,7 @@ def operations_figure(names: Sequence[str], counts: ArrayLike) -> Figure:
     >>> figure = pteron.plots.operations_figure(["delta"], [kernel.operations])
     """
     numbers = _checked_values(names, counts, "counts")
-    figure = blank(_WIDE, 0.6 + 0.3 * len(names))
+    figure = blank(_WIDE, 0.6 + 0.3 * len(names), ax)
     axes = row_axes(figure, names, "operations")
     rows = np.arange(len(names))[::-1]
     axes.barh(rows, numbers, height=0.6, color=REACH)
@@ -141,7 +152,7 @@ def operations_figure(names: Sequence[str], counts: ArrayLike) -> Figure:
             f"{number:g}", (number, row), xytext=(4, 0), textcoords="offset points", **style
         )
     axes.set_xlim(0.0, 1.12 * float(numbers.max(initial=0.0)) or 1.0)
-    return figure
+    return real_figure(figure)
 
 
 def row_axes(figure: Figure, names: Sequence[str], xlabel: str, place: Any = None) -> Axes:

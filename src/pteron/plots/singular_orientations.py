@@ -5,7 +5,8 @@ from __future__ import annotations
 from math import inf
 
 import numpy as np
-from matplotlib.figure import Figure
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure, SubFigure
 
 from pteron.kernels import Array
 from pteron.plots.canvas import (
@@ -17,6 +18,7 @@ from pteron.plots.canvas import (
     WARNING,
     blank,
     plain_axes,
+    real_figure,
     remark,
     spot,
 )
@@ -32,13 +34,14 @@ def regularity_figure(
     *,
     home: float | None = None,
     used: tuple[float, float] | None = None,
+    ax: Axes | SubFigure | None = None,
 ) -> Figure:
     """Return the size of the type-II measure over the platform's angle, NaN where it has none.
 
     The angles (A,) ascend; the singular orientations, the angle of the home pose, and the least and
     greatest angle of a motion are marked. All are in rad.
     """
-    figure = blank(5.4, 2.9)
+    figure = blank(5.4, 2.9, ax)
     axes = plain_axes(figure, "orientation φ (degrees)", "type-II measure")
     degrees = np.degrees(angles)
     if used is not None:
@@ -59,4 +62,4 @@ def regularity_figure(
     axes.set_xlim(float(degrees[0]), float(degrees[-1]))
     axes.set_xticks(np.arange(-180, 181, 60))
     axes.set_ylim(0.0, 1.06)
-    return figure
+    return real_figure(figure)

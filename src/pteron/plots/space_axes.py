@@ -16,17 +16,20 @@ from mpl_toolkits.mplot3d.art3d import Line3D, Line3DCollection, Poly3DCollectio
 from mpl_toolkits.mplot3d.proj3d import proj_transform  # type: ignore[import-untyped]
 
 from pteron.kernels import Array
-from pteron.plots.canvas import GRID
+from pteron.plots.canvas import GRID, Picture
 from pteron.plots.machine_axes import MachineAxes
 
 _ELEVATION, _AZIMUTH = 24.0, -52.0
 """Degrees from which the machine is seen; `turn` adds to the azimuth."""
 
+_WHOLE = 0.0, 0.0, 1.0, 1.0
+"""The box that is all of a figure."""
+
 _MARGIN = 0.04
 """Margin on each side, as a share of the box that is filled."""
 
 
-def upright(vertical: Array) -> Array:
+def upright_rotation(vertical: Array) -> Array:
     """Return a rotation (3, 3) that takes a direction to z and keeps x, or y, near its place."""
     z = vertical / np.linalg.norm(vertical)
     near = np.eye(3)[0] if abs(z[0]) < 0.9 else np.eye(3)[1]
@@ -47,7 +50,7 @@ class SpaceAxes(MachineAxes):
         self,
         figure: Figure,
         vertical: Array,
-        box: tuple[float, float, float, float] = (0.0, 0.0, 1.0, 1.0),
+        box: tuple[float, float, float, float] = _WHOLE,
         *,
         small: bool = False,
     ) -> None:
@@ -56,7 +59,7 @@ class SpaceAxes(MachineAxes):
         super().__init__(axes, small=small)
         axes.set_axis_off()
         axes.set_proj_type("persp", focal_length=1.6)
-        self.rotation = upright(vertical)
+        self.rotation = upright_rotation(vertical)
         self._box = box
         self.turn(0.0)
 
@@ -73,9 +76,9 @@ class SpaceAxes(MachineAxes):
             [level * np.cos(azimuth), level * np.sin(azimuth), np.sin(elevation)]
         )
 
-    def _to_axes(self, points: Array, *, held: bool = True) -> Array:
+    def _to_axes(self, points: Array, *, extends: bool = True) -> Array:
         placed = np.asarray(points @ self.rotation.T)
-        if held:
+        if extends:
             self._drawn.append(placed)
         return placed
 
@@ -105,11 +108,14 @@ class SpaceAxes(MachineAxes):
 
         Later things leave them where they are.
         """
-        drawn = self.drawn
+        drawn = self.drawn_points
         low, high = drawn.min(axis=0), drawn.max(axis=0)
         self.axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
         self.axes.set_box_aspect(high - low)
-        self.figure.set_layout_engine("none")
+        if not isinstance(self.figure, Picture) and self._box == _WHOLE:
+            return  # the other figure's grid places them
+        if isinstance(self.figure, Picture):
+            self.figure.set_layout_engine("none")
         self.axes.set_position((0.0, 0.0, 1.0, 1.0))
         self.axes.apply_aspect()
         corners = np.array([self._figure_corners(drawn, angle) for angle in angles])
@@ -124,7 +130,7 @@ class SpaceAxes(MachineAxes):
         """Return the bounding corners in the figure of points (K, 3), seen from an angle."""
         self.turn(angle)
         x, y, _ = proj_transform(*points.T, self.axes.get_proj())
-        seen = self.figure.transFigure.inverted().transform(
+        seen = self.figure.transSubfigure.inverted().transform(
             self.axes.transData.transform(np.column_stack([x, y]))
         )
         return seen.min(axis=0), seen.max(axis=0)

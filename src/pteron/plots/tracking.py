@@ -5,19 +5,26 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from matplotlib.figure import Figure
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure, SubFigure
 from numpy.typing import ArrayLike
 
 from pteron.kernels import Array
 from pteron.platforms.coordinates import coordinate
-from pteron.plots.canvas import blank, groups_of, leg_curves, legend, stack, zero_line
+from pteron.plots.canvas import blank, groups_of, leg_curves, legend, real_figure, stack, zero_line
 from pteron.plots.joint_columns import rows
 
 _SCALES = ((1.0, ""), (1e3, "m"), (1e6, "µ"), (1e9, "n"))
 """Factors and prefixes of units."""
 
 
-def tracking_figure(time: ArrayLike, error: ArrayLike, names: Sequence[str]) -> Figure:
+def tracking_figure(
+    time: ArrayLike,
+    error: ArrayLike,
+    names: Sequence[str],
+    *,
+    ax: Axes | SubFigure | None = None,
+) -> Figure:
     """Return the errors (T, m) of the pose over time (T,), s.
 
     `names` are its coordinates; angles, in rad, have axes of their own, lengths are in m.
@@ -26,13 +33,13 @@ def tracking_figure(time: ArrayLike, error: ArrayLike, names: Sequence[str]) -> 
     groups = groups_of([coordinate(name).unit for name in names])
     scales = [_scale(error[:, columns]) for columns in groups.values()]
     labels = [f"error ({scales[k][1]}{unit})" for k, unit in enumerate(groups)]
-    figure = blank(5.4, 1.6 + 1.6 * len(groups))
+    figure = blank(5.4, 1.6 + 1.6 * len(groups), ax)
     panels = stack(figure, "time (s)", labels)
     for axes, columns, (factor, _) in zip(panels, groups.values(), scales, strict=True):
         zero_line(axes)
         leg_curves(axes, time, factor * error, columns, 1.4, names)
     legend(figure, len(names))
-    return figure
+    return real_figure(figure)
 
 
 def _scale(values: Array) -> tuple[float, str]:

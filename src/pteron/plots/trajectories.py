@@ -6,14 +6,24 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure, SubFigure
 from numpy.typing import ArrayLike
 
 from pteron.errors import DataError
 from pteron.kernels import Array, as_array
 from pteron.manipulator import RobotLike
 from pteron.platforms.coordinates import coordinate
-from pteron.plots.canvas import blank, groups_of, leg_curves, leg_numbers, legend, panels, zero_line
+from pteron.plots.canvas import (
+    blank,
+    groups_of,
+    leg_curves,
+    leg_numbers,
+    legend,
+    panels,
+    real_figure,
+    zero_line,
+)
 from pteron.plots.joint_columns import joints_of
 
 _ORDERS = ("", "/s", "/s²", "/s³", "/s⁴")
@@ -29,7 +39,12 @@ _WIDE, _TALL, _HEAD = 5.4, 1.35, 0.75
 """Width of the figure, height of each row, and of what is above and below the rows, inches."""
 
 
-def trajectory_figure(time: ArrayLike, *courses: ArrayLike, names: Sequence[str]) -> Figure:
+def trajectory_figure(
+    time: ArrayLike,
+    *courses: ArrayLike,
+    names: Sequence[str],
+    ax: Axes | SubFigure | None = None,
+) -> Figure:
     """Return a motion of the platform: pose, velocity, acceleration and jerk over time.
 
     Lengths and angles stand beside each other, derivatives below them.
@@ -42,6 +57,8 @@ def trajectory_figure(time: ArrayLike, *courses: ArrayLike, names: Sequence[str]
         The pose and, as many as there are, its derivatives; m, rad and s.
     names : sequence of str
         The pose's coordinates, `robot.coordinates`.
+    ax : Axes or SubFigure, optional
+        Axes of another figure, on which it is drawn; several panels take their place.
 
     Returns
     -------
@@ -66,10 +83,15 @@ def trajectory_figure(time: ArrayLike, *courses: ArrayLike, names: Sequence[str]
     """
     coordinates = [coordinate(name) for name in names]
     groups = groups_of([c.unit for c in coordinates])
-    return _courses_figure(time, courses, [c.symbol for c in coordinates], groups, _OF_POSE)
+    return _courses_figure(time, courses, [c.symbol for c in coordinates], groups, _OF_POSE, ax=ax)
 
 
-def joints_figure(time: ArrayLike, *courses: ArrayLike, robot: RobotLike | None = None) -> Figure:
+def joints_figure(
+    time: ArrayLike,
+    *courses: ArrayLike,
+    robot: RobotLike | None = None,
+    ax: Axes | SubFigure | None = None,
+) -> Figure:
     """Return the joints' coordinates over time, and below their speeds, accelerations and jerks.
 
     Parameters
@@ -80,6 +102,8 @@ def joints_figure(time: ArrayLike, *courses: ArrayLike, robot: RobotLike | None 
         The joint coordinates and, as many as there are, their derivatives; m or rad, and s.
     robot : Manipulator, name or path, optional
         Says which joints slide and which turn, beside each other; without it all slide.
+    ax : Axes or SubFigure, optional
+        Axes of another figure, on which it is drawn; several panels take their place.
 
     Returns
     -------
@@ -103,7 +127,7 @@ def joints_figure(time: ArrayLike, *courses: ArrayLike, robot: RobotLike | None 
     known = courses and np.ndim(courses[0]) == 2
     units = [joint.unit for joint in joints_of(robot, courses[0] if known else np.empty((0, 0)))]
     groups = groups_of(units)
-    return _courses_figure(time, courses, leg_numbers(len(units)), groups, _OF_JOINTS, "leg")
+    return _courses_figure(time, courses, leg_numbers(len(units)), groups, _OF_JOINTS, "leg", ax=ax)
 
 
 def _courses_figure(
@@ -113,6 +137,8 @@ def _courses_figure(
     groups: Mapping[Any, list[int]],
     words: Sequence[str],
     noun: str = "",
+    *,
+    ax: Axes | SubFigure | None = None,
 ) -> Figure:
     t = as_array(time, "time", ())
     values = [as_array(course, words[min(k, 4)], ()) for k, course in enumerate(courses)]
@@ -121,7 +147,7 @@ def _courses_figure(
         [f"{word} ({unit}{order})" for unit in groups]
         for word, order, _ in zip(words, _ORDERS, values, strict=False)
     ]
-    figure = blank(_WIDE, _HEAD + _TALL * len(values))
+    figure = blank(_WIDE, _HEAD + _TALL * len(values), ax)
     axes_rows = panels(figure, "time (s)", labels)
     for column in zip(*axes_rows, strict=True):
         figure.align_ylabels(column)
@@ -130,7 +156,7 @@ def _courses_figure(
             zero_line(axes)
             leg_curves(axes, t, course, columns, 1.6, names if course is values[0] else (), noun)
     legend(figure, len(names))
-    return figure
+    return real_figure(figure)
 
 
 def _expect_fitting(time: Array, values: list[Array], width: int, words: Sequence[str]) -> None:

@@ -10,6 +10,8 @@ from abc import ABC, abstractmethod
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from pteron.result import Result
+
 ROUNDING = 1e-13
 """Largest singular value, relative to the greatest, that counts as rounding, which is 1e-16 to
 1e-14. A rank that drops a larger one is called unclear."""
@@ -34,8 +36,8 @@ class NumericalRank:
         return f"{self.rank} (smallest singular value kept {smallest}, largest dropped {largest})"
 
 
-@dataclass(frozen=True)
-class Certificate(ABC):
+@dataclass(frozen=True, eq=False, repr=False)
+class Certificate(Result, ABC):
     """Base class of the certificates: method, number of base parameters, number of columns.
 
     Attributes
@@ -67,7 +69,7 @@ _UNCLEAR = (
 )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class NumericalCertificate(Certificate):
     """The rank as floating-point arithmetic sees it.
 
@@ -108,7 +110,7 @@ class NumericalCertificate(Certificate):
         )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class ExactCertificate(Certificate):
     """The rank in exact arithmetic.
 

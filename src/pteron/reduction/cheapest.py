@@ -85,12 +85,10 @@ def _cheapest_columns(robot: Manipulator) -> tuple[int, ...]:
                 independent(grouping, [*leg_columns, *order, *shared_columns], least=_NONZERO)[0]
             )
         )
-        # The columns of a platform that tilts are too many to exchange one by one.
-        tilts = robot.platform.tilts
+        # The columns of a spatial inertia are too many to exchange one by one.
+        many = len(robot.platform.inertia_names) > 1
         candidates.add(
-            start
-            if tilts
-            else _improve_by_exchange(model, grouping, start, [*leg_columns, *others])
+            start if many else _improve_by_exchange(model, grouping, start, [*leg_columns, *others])
         )
     return min(
         candidates, key=lambda base_columns: (_final_cost(robot, base_columns), base_columns)

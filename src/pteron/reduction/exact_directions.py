@@ -68,7 +68,7 @@ class Notes:
             self._note_approximated(f"{name}.{axis}", float(value), exact)
         return unit
 
-    def planar(self, name: str, x: float, y: float) -> tuple[Surd, Surd]:
+    def plane_vector(self, name: str, x: float, y: float) -> tuple[Surd, Surd]:
         """Return a vector in the platform's plane; its exact length is kept where it is simple."""
         simple = length(x), length(y)
         radius = length(float(np.hypot(x, y)))

@@ -116,7 +116,7 @@ class ExactGeometry:
     gravity: ExactVector
     platform: dict[str, tuple[Surd, ...]]
     axes: tuple[ExactVector, ...]
-    tilts: bool
+    arm_axes: str
     frame: Array
     recognised: tuple[str, ...]
     approximated: tuple[str, ...]
@@ -135,7 +135,7 @@ class ExactGeometry:
         values: dict[str, Surd] = {}
         for i, leg in enumerate(self.legs, start=1):
             values |= {f"{symbol}{i}": value for symbol, value in leg.lengths.items()}
-            for axis, value in zip("xyz" if self.tilts else "xy", leg.platform_point, strict=False):
+            for axis, value in zip(self.arm_axes, leg.platform_point, strict=False):
                 values[f"s{i}{axis}"] = value
         return values
 
@@ -191,7 +191,7 @@ def exact_geometry(robot: Manipulator) -> ExactGeometry:
     quantities = {name: (platform_values | exact)[name] for name in platform.quantities}
     missed = lost_right_angles(distinct, exact), describe_near_relations(distinct)
     remarks = map(tuple[str, ...], (notes.recognised, notes.approximated, *missed))
-    return ExactGeometry(legs, gravity, quantities, axes, platform.tilts, frame, *remarks)
+    return ExactGeometry(legs, gravity, quantities, axes, platform.arm_axes, frame, *remarks)
 
 
 def _exact_leg(
@@ -202,7 +202,7 @@ def _exact_leg(
     shift = np.array(leg.fixed_offset)
     if robot.platform.angles:
         shift = shift + np.array(robot.platform.center or (0.0, 0.0, 0.0))
-        x, y = notes.planar(f"s{i + 1}", *leg.platform_point[:2])
+        x, y = notes.plane_vector(f"s{i + 1}", *leg.platform_point[:2])
         s0 = (x, y, notes.length(f"s{i + 1}.z", leg.platform_point[2]))
     else:
         shift = shift + np.array(robot.platform.frame).T @ np.array(leg.platform_point)
@@ -240,7 +240,8 @@ def _fraction(value: float) -> Surd:
 def _best_frame(robot: Manipulator, vectors: list[Array]) -> Array:
     """Return the frame, as rows, in which most components of the vectors are simple."""
     frames = []
-    if robot.platform.turns or robot.platform.planar or robot.platform.planes:
+    platform = robot.platform
+    if platform.axis_angle or platform.plane_normal is not None or platform.planes:
         x0, _, k = (np.array(axis) for axis in robot.platform.frame)
         firsts = [x0]
         if not robot.platform.slides:

@@ -99,7 +99,7 @@ def rational_rows(
         for i, (leg, at) in enumerate(zip(topology.legs, places, strict=False)):
             sizes = {q.name: len(q.value) for q in leg.quantities}
             leg_values = {name: vector[at[name] : at[name] + size] for name, size in sizes.items()}
-            closed = leg.closing(leg_values, rng)
+            closed = leg.draw_closure(leg_values, rng)
             if closed is None:
                 return []
             w, sigma = closed

@@ -24,7 +24,7 @@ from pteron.reduction.numerical import qr_grouping, svd_grouping
 from pteron.reduction.result import BaseParameters
 from pteron.reduction.sharing import Sharing, default_order, leg_groups, share
 from pteron.reduction.transfers import transfers
-from pteron.shapes import OnFailure, PoseLike, Regressors, Seed
+from pteron.shapes import OnFailure, PoseLike, Regressors, Seed, seed_number
 
 Method = Literal["exact", "svd", "qr"]
 
@@ -97,7 +97,7 @@ def base_parameters(
     order = _order(columns, keep)
     # Neither bodies nor drives matter; a refusal tells the name.
     layout = replace(geometry_only(robot), name=robot.name)
-    grouping = _grouping(layout, method, tuple(order), groups, seed)
+    grouping = _grouping(layout, method, tuple(order), groups, seed_number(seed))
     names = [column.name for column in columns]
     lost = [name for name in keep or () if names.index(name) not in grouping.kept]
     if lost:

@@ -6,7 +6,7 @@ import json
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
-from typing import Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 from markupsafe import Markup
@@ -14,7 +14,7 @@ from markupsafe import Markup
 from pteron.arguments import expect_one_of
 from pteron.bodies.parameters import Parameter
 from pteron.errors import ModelError
-from pteron.html_table import Column, html_table
+from pteron.html_table import Column, Overview
 from pteron.json_values import fields_as_json
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator, parameters as values_of
@@ -24,6 +24,10 @@ from pteron.reduction.expressions import as_html, as_latex, as_sympy, as_text, t
 from pteron.reduction.grouping import Grouping, Shares
 from pteron.reduction.latex_table import latex_table
 from pteron.reduction.transfers import MassTransfer, transfers
+from pteron.result import Result
+
+if TYPE_CHECKING:
+    import polars as pl
 
 Form = Literal["text", "sympy", "latex", "html"]
 """Forms in which expressions are written."""
@@ -33,8 +37,8 @@ Symbols = bool | Literal["leg"]
 are alike. "leg": symbols of each leg's own."""
 
 
-@dataclass(frozen=True, repr=False)
-class BaseParameters:
+@dataclass(frozen=True, eq=False, repr=False)
+class BaseParameters(Result):
     """The parameters that alone act on the actuator forces, each a sum of inertial parameters.
 
     Attributes
@@ -86,7 +90,7 @@ class BaseParameters:
         columns, method = len(self.columns), self.certificate.method
         return f"<BaseParameters of {self.robot.name!r}: {self.rank} of {columns}, {method}>"
 
-    def _repr_html_(self) -> str:
+    def _overview(self) -> Overview:
         columns = [Column("", "number"), Column("base parameter", "long")]
         columns += [Column("value", "number"), Column("unit")]
         sums, values = self.expressions("html"), self.values()
@@ -98,7 +102,22 @@ class BaseParameters:
         ]
         about = f"{self.rank} base parameters of {len(self.columns)} inertial parameters"
         proof = self.certificate.summary().splitlines()[0]
-        return html_table(self.robot.name, about, columns, rows, [proof])
+        return Overview(self.robot.name, about, columns, rows, [proof])
+
+    def summary(self) -> str:
+        """Return each base parameter with its value, for people, and what proves the rank."""
+        units = (self.parameters[column].unit for column in self.kept)
+        rows = zip(self.expressions(), self.values(), units, strict=True)
+        lines = [f"{text} = {number:.5g} {unit}" for text, number, unit in rows]
+        return "\n".join([*lines, *self.certificate.summary().splitlines()])
+
+    def table(self) -> pl.DataFrame:
+        """Return a row for each base parameter: its name, sum, value and unit."""
+        import polars as pl
+
+        units = [self.parameters[column].unit for column in self.kept]
+        columns = {"name": self.names, "expression": self.expressions(), "value": self.values()}
+        return pl.DataFrame({**columns, "unit": units})
 
     @property
     def rank(self) -> int:

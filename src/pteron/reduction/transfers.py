@@ -14,7 +14,7 @@ from functools import partial
 from typing import Any
 
 from pteron.bodies.parameters import PLATFORM, Parameter
-from pteron.legs.kind import Transfer
+from pteron.legs.kind import LegTransfer
 from pteron.manipulator import Manipulator
 
 Values = Mapping[str, Any]
@@ -83,7 +83,7 @@ def transfers(robot: Manipulator, columns: Sequence[Parameter]) -> list[MassTran
 
 
 def _leg_entries(
-    transfer: Transfer, places: Mapping[tuple[str, str], Parameter], leg: int, values: Values
+    transfer: LegTransfer, places: Mapping[tuple[str, str], Parameter], leg: int, values: Values
 ) -> dict[Parameter, Any]:
     """Return the entries of a leg's transfer; legs count from 1."""
     return {

@@ -249,7 +249,7 @@ def _measures(robot: Manipulator, home: Array, volume: ReachVolume | None) -> Me
     else:
         # The plane of two axes of the base frame that is nearest to vertical, x before y.
         vertical = np.abs(robot.gravity if any(robot.gravity) else robot.platform.axis)
-        upright = not robot.platform.planar and vertical[1] <= vertical[2]
+        upright = "xz" in slice_planes(robot) and vertical[1] <= vertical[2]
         plane, box = "xz" if upright else "xy", volume.box
         half = (0.5 + _RIM) * (box[1] - box[0])
         extent = _extent(box, plane, half.tolist())
@@ -263,7 +263,7 @@ def _measures(robot: Manipulator, home: Array, volume: ReachVolume | None) -> Me
 
 def _orientations(robot: Manipulator, home: Array) -> Orientations | None:
     """Return the type-II measure over a single angle at home, where it depends on that."""
-    if len(robot.platform.angles) != 1:
+    if robot.platform.axis_angle is None:
         return None
     (turn,) = np.flatnonzero(robot.platform.angular).tolist()
     poses = np.tile(home, (_ANGLES, 1))

@@ -15,6 +15,7 @@ from pteron.motion import Guide, JointPoints, Motion, joint_guides, joint_points
 from pteron.platforms.coordinates import SHOWN
 from pteron.plots.machine_drawing import APART, base_outline, grid_step
 from pteron.report.quantities import coordinate
+from pteron.tolerances import SAME
 
 _A_SECOND = 60.0
 """Frames for a second of real time: as many as screens show."""
@@ -29,11 +30,8 @@ _DRAWN = 1000
 _DECIMALS = 6
 """Decimals of the data, m or rad."""
 
-_SAME = 1e-6
-"""Greatest gap between the ends of a closed motion, as a share of its size, or of its speed."""
-
 _LITTLE = 1e-3
-"""Least size (m, rad), or speed, that `_SAME` is a share of."""
+"""Least size (m, rad), or speed, that `SAME` is a share of."""
 
 
 @dataclass(frozen=True)
@@ -118,7 +116,7 @@ def is_closed(motion: Motion) -> bool:
     parts = motion.pose, motion.velocity
     sizes = [max(float(np.ptp(part, axis=0).max()), _LITTLE) for part in parts]
     return all(
-        bool(np.abs(part[-1] - part[0]).max() <= _SAME * size)
+        bool(np.abs(part[-1] - part[0]).max() <= SAME * size)
         for part, size in zip(parts, sizes, strict=True)
     )
 
@@ -162,7 +160,7 @@ def still_parts(robot: Manipulator, guides: Sequence[Guide], home: JointPoints) 
     the bodies where the file has them. `home` are the joints of one pose, from which the base of
     cranks and rams is known, and `grid` is the side of the squares, m.
     """
-    planar, gravity = robot.platform.planar, np.array(robot.gravity)
+    planar, gravity = robot.platform.plane_normal is not None, np.array(robot.gravity)
     strength = float(np.linalg.norm(gravity)) or 1.0
     up = -gravity / strength if gravity.any() else np.array(robot.platform.frame[2])
     return {
@@ -171,7 +169,7 @@ def still_parts(robot: Manipulator, guides: Sequence[Guide], home: JointPoints) 
         "gravity": picture_points(robot, gravity / strength),
         "grid": grid_step(home, guides),
         "guides": [picture_points(robot, guide.path) for guide in guides],
-        "slides": [guide.slides for guide in guides],
+        "slides": [guide.is_prismatic for guide in guides],
         "directions": _plain(np.array([guide.axis for guide in guides]) @ view_frame(robot).T),
         "bars": [None if bar is None else picture_points(robot, APART * bar) for bar in home.bars],
         "rams": home.rams,
@@ -206,13 +204,13 @@ def moving_parts(robot: Manipulator, points: JointPoints) -> dict[str, Any]:
 
 def picture_points(robot: Manipulator, points: Array) -> Any:
     """Return points (..., 3) of the base frame as pictures have them, as plain lists."""
-    flat = [1.0, 1.0, 0.0] if robot.platform.planar else 1.0
+    flat = 1.0 if robot.platform.plane_normal is None else [1.0, 1.0, 0.0]
     return _plain(points @ view_frame(robot).T * flat)
 
 
 def view_frame(robot: Manipulator) -> Array:
     """Return the axes (3, 3), one a row, along which pictures of a machine count points."""
-    return np.array(robot.platform.frame) if robot.platform.planar else np.eye(3)
+    return np.eye(3) if robot.platform.plane_normal is None else np.array(robot.platform.frame)
 
 
 def _plain(array: Array) -> Any:

@@ -10,6 +10,7 @@ from pteron.manipulator import Manipulator
 from pteron.report.motion_frames import Frames, scene
 from pteron.report.quantities import coordinate, force
 from pteron.report.typeset import embed_json, resource
+from pteron.tolerances import ROUNDING
 
 _SHORT = 3.0
 """Duration, s, below which a motion is slowed down for the eye."""
@@ -22,9 +23,6 @@ _PACES = (
     (60.0, 16.0, "16 times real speed"),
 )
 """Least duration of a motion, s, speed of its playback, and name of the speed."""
-
-_ROUNDING = 1e-9
-"""Distance of two points, m, up to which they are one."""
 
 
 def stage(robot: Manipulator, shown: Frames, **words: str) -> dict[str, Any]:
@@ -57,6 +55,6 @@ def gravity_words(robot: Manipulator) -> str:
     if not gravity.any():
         return "there is no gravity"
     x, y, _ = frame @ gravity / np.linalg.norm(gravity)
-    if np.hypot(x, y) <= _ROUNDING:
+    if np.hypot(x, y) <= ROUNDING:
         return "gravity acts along the normal"
     return "gravity acts along the arrow"

@@ -169,7 +169,7 @@ def bodies(robot: Manipulator) -> list[tuple[str, int | None, dict[str, float]]]
     for part in platform.geared:
         rows.append((f"geared part, ratio {compact(part.ratio)}", None, {"I": part.inertia}))
     if platform.bars or platform.geared:
-        rows.append(("platform with all of it", None, with_center(platform.joined)))
+        rows.append(("platform with all of it", None, with_center(platform.total_inertia)))
     return rows
 
 
@@ -204,11 +204,11 @@ def _angle_measures(report: Report) -> list[str]:
     if any(leg.goes_round for leg in legs):
         measures.append("a crank's angle measured as the way of its end")
     if radius is not None:
-        whose = "P" if report.robot.platform.tilts else "its axis"
+        platform = report.robot.platform
+        whose, angle = ("its axis", "angle \u03c6") if platform.axis_angle else ("P", "angles")
         way = f"a point {format_fixed(1e3 * radius)} mm from {whose} (the root mean square distance"
-        if report.robot.platform.slides:
+        if platform.kind.point_unit == "m/rad":
             way = f"what slides, {format_fixed(1e3 * radius)} mm/rad (the root mean square"
-        angle = "angles" if report.robot.platform.tilts else "angle \u03c6"
         measures.append(f"the platform's {angle} as the way of {way} of the platform points)")
     measures += [f"the {noun}'s angle as \u03c6, whatever its ratio" for noun in followers]
     return measures

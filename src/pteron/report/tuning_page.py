@@ -55,7 +55,7 @@ def tuning_page(tuning: Tuning, trials: pl.DataFrame) -> str:
         robot=robot,
         tuning=tuning,
         controller=controller,
-        kind=_KINDS.get(controller.what, controller.what.replace("_", " ").capitalize()),
+        kind=_KINDS.get(controller.law_name, controller.law_name.replace("_", " ").capitalize()),
         bandwidth=bandwidth,
         required=tuning.required,
         least=tuning.least,
@@ -89,7 +89,7 @@ def tuning_page(tuning: Tuning, trials: pl.DataFrame) -> str:
 def _gain_units(tuning: Tuning) -> list[str]:
     """Return the units of the gains of a joint, one for each kind; empty where joints differ."""
     units = {(leg.joint.force_unit, leg.joint.unit) for leg in tuning.robot.legs}
-    if tuning.controller.what == "computed_torque":
+    if tuning.controller.law_name == "computed_torque":
         return ["1/s\u00b2", "1/s"]
     if len(units) > 1:
         return ["", ""]

@@ -12,6 +12,7 @@ from pteron.kinematics import follow, inverse_kinematics
 from pteron.kinematics.limits import limited_joints
 from pteron.manipulator import Manipulator
 from pteron.report.quantities import readable
+from pteron.tolerances import ROUNDING, SAME
 from pteron.workspace.margins import distance_to_limits, joint_distances
 
 LEAST_TYPE_I = 0.01
@@ -19,9 +20,6 @@ LEAST_TYPE_I = 0.01
 
 _ENDS = 2.0 * LEAST_TYPE_I
 """Type-I measure below which a leg's reach is named as what stops the machine."""
-
-_ROUNDING = 1e-9
-"""Distance of a joint beyond its limit that counts as rounding, m or rad."""
 
 _PIECES = 32
 """Pieces into which a path is divided in each round of the search for its end."""
@@ -32,18 +30,17 @@ _ROUNDS = 5
 _STEPS = 8
 """Pieces of a path of the joints, along each of which the platform is followed."""
 
-_SAME_JOINT = 1e-6
-"""Difference of a joint's coordinate from the one asked for, m or rad, up to which it is met."""
-
 
 def is_allowed(robot: Manipulator, poses: Array) -> NDArray[np.bool_]:
     """Return whether poses (..., m) are in reach of all legs and within all limits, (...)."""
     measure = numeric(robot, "reach")(poses)[1]
     bent = (measure >= LEAST_TYPE_I).all(axis=-1)
-    return np.asarray(bent & (distance_to_limits(robot, poses).min(axis=-1) >= -_ROUNDING))
+    return np.asarray(bent & (distance_to_limits(robot, poses).min(axis=-1) >= -ROUNDING))
 
 
-def farthest(robot: Manipulator, start: Array, target: Array) -> tuple[Array, Array | None]:
+def farthest_reachable_pose(
+    robot: Manipulator, start: Array, target: Array
+) -> tuple[Array, Array | None]:
     """Return the last pose that the platform reaches on the straight path to another.
 
     A target that is allowed is always reached. With the pose comes one next to it that is not
@@ -75,7 +72,7 @@ def follow_joints(
         poses = follow(robot, way, pose, on_failure="nan")
         differences = np.abs(inverse_kinematics(robot, poses, on_failure="nan") - way)
         differences = np.where(rounds, np.abs((differences + np.pi) % turn - np.pi), differences)
-        return poses, is_allowed(robot, poses) & (differences <= _SAME_JOINT).all(axis=-1)
+        return poses, is_allowed(robot, poses) & (differences <= SAME).all(axis=-1)
 
     return _last_good_pose(try_shares, pose, _STEPS)
 
@@ -98,7 +95,7 @@ def _last_good_pose(
     return last, beyond
 
 
-def what_stops(robot: Manipulator, beyond: Array) -> str:
+def stop_reason(robot: Manipulator, beyond: Array) -> str:
     """Return the leg or limit that forbids a pose (m,), as a sentence without its full stop.
 
     A pose that nothing forbids is one at which an assembly mode ends.

@@ -11,7 +11,7 @@ import ipaddress
 import socket
 
 
-def is_here(host: str) -> bool:
+def is_local_address(host: str) -> bool:
     """Say whether only this machine can reach a host's address."""
     try:
         addresses = socket.getaddrinfo(host, None, type=socket.SOCK_STREAM)

@@ -86,7 +86,7 @@ class Live:
             self._wake.notify()
         self._thread.join()
 
-    def do(self, name: str, act: Callable[[], object]) -> None:
+    def queue_action(self, name: str, act: Callable[[], object]) -> None:
         """Queue an action; of waiting actions with one name only the last is done."""
         with self._wake:
             self._actions.pop(name, None)
@@ -122,7 +122,7 @@ class Live:
         session = self.session
         if isinstance(message, bytes):
             name = self._files.pop(tab, "")
-            self.do("load", lambda: session.load(name, message))
+            self.queue_action("load", lambda: session.load(name, message))
             return
         try:
             request = json.loads(message)
@@ -135,9 +135,9 @@ class Live:
             name, act = panel.action(session, message)
         except (DataError, ValueError, RecursionError) as error:
             reason = str(error)
-            self.do("refused", lambda: self._tell(reason))
+            self.queue_action("refused", lambda: self._tell(reason))
             return
-        self.do(name, act)
+        self.queue_action(name, act)
 
     def _push(self, drives: str) -> None:
         """Compile the equations of motion in a thread of its own, then begin the push."""
@@ -155,9 +155,9 @@ class Live:
         def compile_equations() -> None:
             with suppress(Exception):  # `begin` raises it again, and reports it
                 session.prepare_push(drives)
-            self.do("push", begin)
+            self.queue_action("push", begin)
 
-        self.do("prepare", prepare)
+        self.queue_action("prepare", prepare)
         threading.Thread(target=compile_equations, name="pteron push", daemon=True).start()
 
     def _tell(self, text: str) -> None:
@@ -261,9 +261,9 @@ class Live:
                 "warns": bool(state.message),
                 "readout": readout(state, numbers),
                 "plotted": {
-                    "forces": _finite(numbers.forces),
-                    "joints": panel.shown_joints(state.robot, numbers.joints),
-                    "power": _finite(numbers.power),
+                    "forces": _finite_or_none(numbers.forces),
+                    "joints": panel.joints_in_display_units(state.robot, numbers.joints),
+                    "power": _finite_or_none(numbers.power),
                 },
                 "legend": self._picture.legend(self._scale),
                 "spring": spring and [picture_points(state.robot, end) for end in spring],
@@ -300,7 +300,7 @@ class Live:
         self._send("slice", {"parts": parts, "map": map_})
 
 
-def _finite(values: Any) -> list[float | None]:
+def _finite_or_none(values: Any) -> list[float | None]:
     return [float(value) if np.isfinite(value) else None for value in values]
 
 

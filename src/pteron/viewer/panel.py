@@ -69,7 +69,7 @@ def values(session: Session, joints: Array) -> dict[str, Any]:
         "where": _pose_text(state.robot, state.pose),
         "label": _label(state.robot, state.pose),
         "pose": _tenths(pose_factors(state.robot) * state.pose),
-        "joints": _tenths(np.array(shown_joints(state.robot, joints))),
+        "joints": _tenths(np.array(joints_in_display_units(state.robot, joints))),
         "payload": f"{state.payload:g}",
         "payloadDoubt": state.payload_doubt,
         "mode": signs(leg.elbow for leg in state.robot.legs),
@@ -104,7 +104,7 @@ def _label(robot: Manipulator, pose: Array) -> str:
     return " ".join(format_fixed(x) + "°" * bool(angle) for x, angle in parts)
 
 
-def shown_joints(robot: Manipulator, joints: Array) -> list[float]:
+def joints_in_display_units(robot: Manipulator, joints: Array) -> list[float]:
     """Return joint coordinates (n,) in mm and degrees."""
     coordinates: list[float] = (_joint_factors(robot) * joints).tolist()
     return coordinates

@@ -115,7 +115,7 @@ class ViewerPicture:
         arrows, length = list[Arrow](), _SCREW * self.size
         for i, guide in enumerate(self._guides):
             for j, screw in enumerate(screws[i]):
-                at = points.links[i][0] if guide.slides and j == 0 else points.chain[i, j]
+                at = points.links[i][0] if guide.is_prismatic and j == 0 else points.chain[i, j]
                 turns = bool(np.linalg.norm(screw[:3]) > 0.5)
                 axis = screw[:3] if turns else screw[3:]
                 if np.isfinite([*at, *axis]).all() and axis.any():

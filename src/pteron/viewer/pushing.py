@@ -11,8 +11,8 @@ from pteron.kinematics import inverse_kinematics, joint_rates
 from pteron.manipulator import Manipulator
 from pteron.motion.simulation.plant import advance, drive_states
 from pteron.motion.simulation.stable_steps import allowed_step
-from pteron.viewer.boundary import is_allowed, what_stops
-from pteron.viewer.sliding import nearest
+from pteron.viewer.boundary import is_allowed, stop_reason
+from pteron.viewer.sliding import nearest_reachable_pose
 
 _NO_PULL = 1e-6
 """Gravity along the platform's lengths, m/s^2, up to which the machine does not fall."""
@@ -70,7 +70,7 @@ class Push:
         self._begin(pose, zeros)
         self._step = allowed_step(robot, pose, _STEP, usual=True)
         bodies = [body for leg in robot.legs for body in leg.bodies.values()]
-        self._mass = sum(body.values[0] for body in (*bodies, robot.platform.joined))
+        self._mass = sum(body.values[0] for body in (*bodies, robot.platform.total_inertia))
         # All machines fall equally fast: under a small one the spring must be stiffer to lift it.
         sag = _SAG * max(leg.size for leg in robot.legs)
         pull = float(np.linalg.norm(robot.platform.directions @ np.array(robot.gravity)))
@@ -92,7 +92,7 @@ class Push:
     def pull(self, grip: Array, spring_end: Array) -> None:
         """Attach the spring at `grip` (3,), m, if it is loose; hold its end (3,), m."""
         if self._arm is None:
-            place, axes = self._robot.platform.at(self.pose)
+            place, axes = self._robot.platform.placement(self.pose)
             self._arm = axes @ (grip - place)
         self._held = spring_end
 
@@ -119,8 +119,8 @@ class Push:
             if not np.isfinite(energy):
                 energy = self._energy(last_pose, rates)
             target = self.pose if np.isfinite(self.pose).all() else last_pose
-            last, beyond = nearest(robot, last_pose, target)
-            self.stops = what_stops(robot, target if beyond is None else beyond)
+            last, beyond = nearest_reachable_pose(robot, last_pose, target)
+            self.stops = stop_reason(robot, target if beyond is None else beyond)
             slide = (last - last_pose) / (periods * _PERIOD)
             resting = self._energy(last, 0.0 * slide)
             most, kinetic = max(energy - resting, 0.0), self._energy(last, slide) - resting
@@ -146,7 +146,7 @@ class Push:
         rates = joint_rates(robot, pose, velocity, on_failure="nan").actuated
         rotors = np.array([leg.drive.inertia if leg.drive else 0.0 for leg in robot.legs])
         if self._arm is not None:
-            place, axes = robot.platform.at(pose)
+            place, axes = robot.platform.placement(pose)
             stretch = float(np.linalg.norm(self._held - place - self._arm @ axes))
         bodies = kinetic_energy(robot, pose, velocity, on_failure="nan")
         bodies = bodies + potential_energy(robot, pose, on_failure="nan")
@@ -164,7 +164,7 @@ class Push:
 
     def _grip(self) -> tuple[Array, Array]:
         """Return where the spring is fixed, and the arm from P to it, in the base frame."""
-        place, axes = self._robot.platform.at(self.pose)
+        place, axes = self._robot.platform.placement(self.pose)
         arm = np.zeros(3) if self._arm is None else self._arm @ axes
         return place + arm, arm
 
@@ -173,12 +173,9 @@ class Push:
         platform, force = self._robot.platform, np.zeros(3)
         grip, arm = self._grip()
         if self._arm is not None:
-            ahead = self._robot.platform.at(self.pose + 1e-6 * self.velocity)
+            ahead = self._robot.platform.placement(self.pose + 1e-6 * self.velocity)
             speed = (ahead[0] + self._arm @ ahead[1] - grip) / 1e-6
             damping = 2.0 * _DAMPING * np.sqrt(self.stiffness * self._mass)
             force = self.stiffness * (self._held - grip) - damping * speed
         moment = np.cross(arm, force)
-        if platform.tilts:
-            return np.concatenate([force, moment])
-        turning = [np.array(platform.axis) @ moment] * len(platform.angles)
-        return np.array([*(platform.directions @ force), *turning])
+        return platform.wrench_of(force, moment)

@@ -15,7 +15,7 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, Protocol
 
 from pteron.errors import DataError, shorten
-from pteron.viewer.guard import is_here, refusal
+from pteron.viewer.guard import is_local_address, refusal
 
 if TYPE_CHECKING:
     from websockets.http11 import Request, Response
@@ -109,9 +109,9 @@ class Server:
         """Start the server on the first free port from `port` on, or if it is 0 on any."""
         from websockets.sync.server import serve
 
-        self._handlers, self._host, self._here = handlers, host, is_here(host)
+        self._handlers, self._host, self._here = handlers, host, is_local_address(host)
         logger = logging.getLogger("pteron.viewer.server")
-        logger.addFilter(_worth_telling)
+        logger.addFilter(_is_significant)
         free = free_port(host, port)
         family = socket.getaddrinfo(host or None, free, type=socket.SOCK_STREAM)[0][0]
         self._server = serve(
@@ -226,6 +226,6 @@ def _is_free(family: int, address: Any, port: int) -> bool:
     return True
 
 
-def _worth_telling(record: logging.LogRecord) -> bool:
+def _is_significant(record: logging.LogRecord) -> bool:
     """Say whether a record of the log matters: browsers open connections that they do not use."""
     return record.levelno >= logging.ERROR and record.getMessage() != "opening handshake failed"

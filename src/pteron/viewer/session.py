@@ -124,15 +124,15 @@ class Session:
                 low[lengths], high[lengths] = bounding_box(robot, home)
         margin = _MARGIN * (high - low)
         low, high = low - margin, high + margin
-        if platform.tilts:
-            # Beyond 90 degrees the same orientations come again.
-            turns = ~lengths
-            low[turns] = np.maximum(low[turns], -np.pi / 2.0)
-            high[turns] = np.minimum(high[turns], np.pi / 2.0)
-            if platform.limits:
-                low[turns], high[turns] = np.transpose(platform.limits)
-        elif platform.rotation_axes:
-            low[~lengths], high[~lengths] = platform.limits or (-np.pi, np.pi)
+        if platform.rotation_axes:
+            # Beyond it the same orientations come again.
+            most, turns = platform.angle_range, ~lengths
+            whole_turn = platform.turning_axis is not None
+            low[turns] = -most if whole_turn else np.maximum(low[turns], -most)
+            high[turns] = most if whole_turn else np.minimum(high[turns], most)
+            for name, limits in platform.angle_limits.items():
+                i = platform.coordinates.index(name)
+                low[i], high[i] = limits
         self.pose_range = np.array([low, high])
         joints = inverse_kinematics(robot, self.examples)
         low, high = joints.min(axis=0), joints.max(axis=0)
@@ -178,14 +178,9 @@ class Session:
         if axis is None:
             target[~platform.angular] = platform.directions @ point
         elif platform.angles:
-            place, axes = platform.at(target)
+            place, axes = platform.placement(target)
             turned = axes @ _rotation(axes[axis], point - place).T
-            if platform.tilts:
-                target = pose_nearest_frame(platform, target, turned)
-            else:
-                x, y, _ = np.array(platform.frame) @ turned[0]
-                angle = float(np.arctan2(y, x)) - target[platform.angular]
-                target[platform.angular] += (angle + np.pi) % (2.0 * np.pi) - np.pi
+            target = pose_nearest_frame(platform, target, turned)
         self.set_pose(target)
 
     def type_pose(self, text: str) -> None:

@@ -15,7 +15,7 @@ from pteron.manipulator import Manipulator
 from pteron.plots.printing import svg
 from pteron.plots.reach import reach_figure
 from pteron.workspace import reach_slice
-from pteron.workspace.reach_slices import Plane, slice_planes
+from pteron.workspace.reach_slices import Plane, slice_coordinates
 
 POINTS = 111
 """Points along each side of a slice."""
@@ -32,13 +32,13 @@ NONE = "none"
 
 def choices(robot: Manipulator) -> dict[str, Plane | None]:
     """Return the choices of a slice: none, "xy" of two lengths, or a pair of names."""
-    planes, lengths = slice_planes(robot), set(robot.platform.lengths)
-    if robot.platform.tilts:
-        pairs = combinations(robot.coordinates, 2)
-        planes = tuple("".join(pair) if set(pair) <= lengths else pair for pair in pairs)
-    return {NONE: None} | {
-        plane if isinstance(plane, str) else ", ".join(plane): plane for plane in planes
-    }
+    planes: dict[str, Plane | None] = {NONE: None}
+    for first, second in combinations(slice_coordinates(robot), 2):
+        if {first, second} <= set(robot.platform.lengths):
+            planes[first + second] = first + second
+        else:
+            planes[f"{first}, {second}"] = first, second
+    return planes
 
 
 def slice_parts(

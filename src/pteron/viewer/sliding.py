@@ -7,7 +7,7 @@ import scipy  # type: ignore[import-untyped]
 
 from pteron.kernels import Array, numeric
 from pteron.manipulator import Manipulator
-from pteron.viewer.boundary import farthest, is_allowed
+from pteron.viewer.boundary import farthest_reachable_pose, is_allowed
 from pteron.workspace.margins import distance_to_limits
 
 _ROUNDS = 40
@@ -32,7 +32,9 @@ _BACK = 3
 """Steps back into what is allowed after a step along a curved boundary."""
 
 
-def nearest(robot: Manipulator, start: Array, target: Array) -> tuple[Array, Array | None]:
+def nearest_reachable_pose(
+    robot: Manipulator, start: Array, target: Array
+) -> tuple[Array, Array | None]:
     """Return the reachable pose near a target (m,), from a start (m,), by sliding.
 
     It goes straight as far as it can, then along the boundary while it comes nearer: a step is the
@@ -40,7 +42,7 @@ def nearest(robot: Manipulator, start: Array, target: Array) -> tuple[Array, Arr
     the platform. With the pose comes one beyond it, which is not allowed; None where the target is
     come to.
     """
-    pose, beyond = farthest(robot, start, target)
+    pose, beyond = farthest_reachable_pose(robot, start, target)
     if beyond is None:
         return pose, None
     weights = _weights(robot)
@@ -60,14 +62,14 @@ def nearest(robot: Manipulator, start: Array, target: Array) -> tuple[Array, Arr
                 break
             trial = trial + _step(robot, trial, np.zeros_like(trial), weights)
         if not is_allowed(robot, trial):
-            trial = farthest(robot, pose, trial)[0]
+            trial = farthest_reachable_pose(robot, pose, trial)[0]
         if distance_to_target(trial) < distance_to_target(pose) - _LEAST * distance:
             pose = trial
         else:
             radius *= 0.25
             if radius < _LEAST * distance:
                 break
-    return pose, farthest(robot, pose, target)[1]
+    return pose, farthest_reachable_pose(robot, pose, target)[1]
 
 
 def _weights(robot: Manipulator) -> Array:

@@ -16,12 +16,10 @@ from pteron.manipulator.variants import with_elbows
 from pteron.motion import Motion
 from pteron.motion.payload import add_payload as loaded_robot, payload_warning
 from pteron.platforms.coordinates import SHOWN
-from pteron.viewer.boundary import distance_text, follow_joints, is_allowed, what_stops
-from pteron.viewer.sliding import nearest
+from pteron.tolerances import SAME
+from pteron.viewer.boundary import distance_text, follow_joints, is_allowed, stop_reason
+from pteron.viewer.sliding import nearest_reachable_pose
 from pteron.workspace import home_pose
-
-_SAME_POSE = 1e-6
-"""Difference of two poses, m or rad, up to which they are one assembly mode."""
 
 _METRES = 3.0
 """Largest length, mm, up to which it is asked whether what was typed is in m."""
@@ -78,11 +76,11 @@ def move_platform(state: ViewerState, target: Array) -> ViewerState:
     """Return the machine at rest in another pose (m,), or as near to it as it slides."""
     if not np.isfinite(target).all():
         return replace(state, message="The pose is to have finite numbers.")
-    last, beyond = nearest(state.robot, state.pose, target)
+    last, beyond = nearest_reachable_pose(state.robot, state.pose, target)
     if beyond is None:
         return _stop_at(state, target)
     distance = distance_text(state.robot, last, target)
-    why = what_stops(state.robot, beyond)
+    why = stop_reason(state.robot, beyond)
     return _stop_at(state, last, f"{why}. The platform is {distance} from the pose asked for.")
 
 
@@ -98,7 +96,7 @@ def move_joint(state: ViewerState, i: int, value: float) -> ViewerState:
     if beyond is None:
         return _stop_at(state, last)
     leg = state.robot.legs[i]
-    why = what_stops(state.robot, beyond if np.isfinite(beyond).all() else last)
+    why = stop_reason(state.robot, beyond if np.isfinite(beyond).all() else last)
     return _stop_at(state, last, f"{why}. The {leg.joint.noun} of leg {i + 1} stops there.")
 
 
@@ -116,14 +114,14 @@ def current_assembly(state: ViewerState, poses: Array) -> int | None:
     differences = np.abs(poses - state.pose)
     around = np.abs((differences + np.pi) % (2.0 * np.pi) - np.pi)
     differences = np.where(state.robot.wraps, around, differences)
-    near = np.flatnonzero((differences <= _SAME_POSE).all(axis=-1))
+    near = np.flatnonzero((differences <= SAME).all(axis=-1))
     return int(near[0]) if len(near) else None
 
 
 def switch_assembly(state: ViewerState, pose: Array) -> ViewerState:
     """Return the machine in another assembly mode, that of a pose with the same joints."""
     if not is_allowed(state.robot, pose):
-        why = what_stops(state.robot, pose)
+        why = stop_reason(state.robot, pose)
         return replace(state, message=f"This assembly mode is not possible. {why}.")
     return _stop_at(state, pose)
 

@@ -46,7 +46,7 @@ class Viewer:
         handlers: dict[str, Any] = {"/": live}
         if beside:
             every = (live, *beside)
-            handlers = {"/": lambda: _side_by_side([page.name for page in every])}
+            handlers = {"/": lambda: _render_side_by_side([page.name for page in every])}
             handlers |= {f"/{k}": page for k, page in enumerate(every, start=1)}
         self._server: Server | None = Server(host, port, handlers)
         self.port = self._server.port
@@ -96,12 +96,12 @@ class Viewer:
     def move_to(self, pose: PoseLike) -> None:
         """Move the platform to a pose (m,), m and rad, or as near to it as it goes."""
         target = np.asarray(pose, dtype=float)
-        self._live.do("move_to", lambda: self._live.session.set_pose(target))
+        self._live.queue_action("move_to", lambda: self._live.session.set_pose(target))
 
     def play(self, motion: Motion | Simulation, title: str = "motion") -> None:
         """Play a motion, or what a simulation did, again and again."""
         path = motion.motion if isinstance(motion, Simulation) else motion
-        self._live.do("load", lambda: self._live.session.take(path, title))
+        self._live.queue_action("load", lambda: self._live.session.take(path, title))
 
     def wait(self, timeout: float | None = None) -> bool:
         """Wait until all that was asked for is done and sent to the page; say whether it is.
@@ -122,7 +122,7 @@ class Viewer:
             self._server = None
 
 
-def _side_by_side(names: Sequence[str]) -> str:
+def _render_side_by_side(names: Sequence[str]) -> str:
     return template("beside.html.j2", "viewer").render(names=names)
 
 

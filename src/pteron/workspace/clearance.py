@@ -12,6 +12,7 @@ from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.kinematics.evaluate import evaluate_kernel
 from pteron.manipulator import Manipulator, Radii, RobotLike, as_manipulator
+from pteron.result import Result
 from pteron.shapes import OnFailure, PoseLike
 from pteron.workspace.conditions import Condition
 
@@ -28,8 +29,8 @@ Thickness = Radii | Mapping[str, float] | float
 """Radii, some of them by name, or one for all bodies, m."""
 
 
-@dataclass(frozen=True)
-class Clearance:
+@dataclass(frozen=True, eq=False, repr=False)
+class Clearance(Result):
     """Distances between bodies, pair by pair.
 
     Attributes
@@ -41,6 +42,8 @@ class Clearance:
         From surface to surface, m; negative where the capsules overlap, down to minus the sum of
         their radii.
     """
+
+    ROWS = "distances:1"
 
     pairs: tuple[tuple[str, str], ...]
     distances: Array

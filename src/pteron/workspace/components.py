@@ -11,18 +11,17 @@ import scipy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
 from pteron.kernels import Array
+from pteron.result import Result
+from pteron.tolerances import ROUNDING
 from pteron.workspace.paving import Paving
 
 _CELLS = 1 << 22
 """Most cells of the lattice in which parts are sought: a paving that needs more gets a coarser
 lattice, in which a cell is inside only where boxes fill it."""
 
-_ROUNDING = 1e-9
-"""Share of a cell by which its corners and what fills it may be off, from rounding."""
 
-
-@dataclass(frozen=True)
-class Component:
+@dataclass(frozen=True, eq=False, repr=False)
+class Component(Result):
     """A part of the workspace in which a path leads from any pose to any other.
 
     Attributes
@@ -43,8 +42,8 @@ class Component:
     group: int
 
 
-@dataclass(frozen=True)
-class Components:
+@dataclass(frozen=True, eq=False, repr=False)
+class Components(Result):
     """The parts of a workspace.
 
     Attributes
@@ -60,6 +59,8 @@ class Components:
         Share of the volume proved inside that `parts` hold. The rest is in parts left out, or in
         none where the paving's smallest boxes are finer than the lattice in which parts are sought.
     """
+
+    ROWS = "parts"
 
     parts: tuple[Component, ...] = field(repr=False)
     groups: int
@@ -149,11 +150,11 @@ def lattice(paving: Paving, most: int = _CELLS) -> Lattice:
     )
     while np.prod(np.ceil((high - low) * 2.0**finest) + 1.0) > most:
         finest[finest.argmax()] -= 1
-    first = np.floor(low * 2.0**finest + _ROUNDING).astype(np.int64)
-    shape = np.ceil(high * 2.0**finest - _ROUNDING).astype(np.int64) - first
+    first = np.floor(low * 2.0**finest + ROUNDING).astype(np.int64)
+    shape = np.ceil(high * 2.0**finest - ROUNDING).astype(np.int64) - first
     inner, undecided = (_filled_shares(boxes, finest, first, tuple(shape)) for boxes in sizes)
     size = extent / 2.0**finest
-    full = inner > 1.0 - _ROUNDING
+    full = inner > 1.0 - ROUNDING
     return Lattice(start + first * size, size, full, inner + undecided > 0.0)
 
 

@@ -18,6 +18,7 @@ import scipy  # type: ignore[import-untyped]
 from pteron.kernels import Array
 from pteron.kernels.bisection import bisect_condition
 from pteron.kernels.one_thread import one_thread
+from pteron.tolerances import EXACT
 from pteron.workspace.boxes import vary_coordinates
 from pteron.workspace.lattice_minima import failing_places
 from pteron.workspace.shape_samples import Samples, Shape, lattice
@@ -28,9 +29,6 @@ _PER_ROW = 3
 
 _ROUNDS = 12
 """Most rounds; after them the best unknowns so far, which keep all conditions, are the result."""
-
-_ROUNDING = 1e-12
-"""A condition's value above minus this counts as kept."""
 
 _FIRST_STEP = 0.25
 """Step of the first round, as a share of the unknowns' bounds."""
@@ -106,7 +104,7 @@ class Program:
 
     def keeps(self, samples: Samples, z: Array) -> bool:
         """Return whether all rows are kept; one that is NaN, out of reach, is not."""
-        return bool((self.rows(samples, z) >= -_ROUNDING).all())
+        return bool((self.rows(samples, z) >= -EXACT).all())
 
     def failing_samples(self, z: Array) -> Samples:
         """Return points of the shape that fail between those of a lattice that do not.
@@ -142,7 +140,7 @@ class Program:
         rows = self.conditions.rows(geometry, vary_coordinates(fixed, grid), self.side)
         known = self.failing if self.failing is not None else self.orientations[:0]
         known = known[(known[:, count:] == fixed[count:]).all(axis=1)]
-        fails = self.conditions.rows(geometry, known, self.side) > _ROUNDING
+        fails = self.conditions.rows(geometry, known, self.side) > EXACT
         known = known[~fails.all(axis=-1), :count]
         return rows, np.concatenate([failing_places(slopes, axes, rows), known])
 

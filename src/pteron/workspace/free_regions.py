@@ -18,6 +18,7 @@ from pteron.kernels import Array, as_array, bounds, numeric
 from pteron.kernels.bisection import bisect_condition
 from pteron.kinematics.architecture import is_singular_everywhere
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.result import Result
 from pteron.workspace.boxes import halve_boxes
 from pteron.workspace.conditions import conditions
 from pteron.workspace.regions import Box
@@ -42,8 +43,8 @@ _SINGULAR = 1e-10
 """Largest measure of a pose that counts as singular."""
 
 
-@dataclass(frozen=True)
-class FreeRegion:
+@dataclass(frozen=True, eq=False, repr=False)
+class FreeRegion(Result):
     """Whether a region of poses is free of type-II singularities.
 
     Attributes

@@ -23,6 +23,8 @@ from pteron.kinematics.sampling import search_ball
 from pteron.kinematics.simplex_ascent import climb
 from pteron.kinematics.singularities import best_type_ii
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.result import Result
+from pteron.tolerances import ROUNDING
 from pteron.workspace.holding import expect_regular
 from pteron.workspace.home_starts import (
     axis_poses,
@@ -87,15 +89,12 @@ preferred."""
 _LEVEL = 0.75
 """Share of the best margin from which on a level pose of a platform that tilts is preferred."""
 
-_SAME = 1e-9
-"""Differences of margins that are rounding."""
-
 _MIDDLE = 0.9
 """The share that the middle between equals must have: from there the machine moves every way."""
 
 
-@dataclass(frozen=True)
-class HomePoses:
+@dataclass(frozen=True, eq=False, repr=False)
+class HomePoses(Result):
     """The home of a machine, and its image on the other side of the base.
 
     Attributes
@@ -285,16 +284,25 @@ def _starts(robot: Manipulator, candidates: Array) -> Array:
     return np.concatenate(starts)
 
 
+def has_exact_home(robot: Manipulator) -> bool:
+    """Return whether home is a pose of its own: named in the file, or level where it tilts."""
+    return robot.home is not None or bool(_tilting_angles(robot).any())
+
+
+def _tilting_angles(robot: Manipulator) -> NDArray[np.bool_]:
+    """Return which coordinates (m,) are 0 where the platform is level: none if it cannot tilt."""
+    return robot.platform.angular & robot.platform.tilts
+
+
 def _refine_level_starts(robot: Manipulator, starts: Array) -> Array:
     """Return level poses of locally best margins, from those starts (S, m) that are level.
 
     There are none of a platform that does not tilt: all its starts are improved as they are.
     """
-    moved = ~robot.platform.angular
-    level = starts[~starts[:, robot.platform.angular].any(axis=-1)]
-    if not robot.platform.tilts or not moved.any():
+    tilting = _tilting_angles(robot)
+    if not tilting.any() or tilting.all():
         return starts[:0]
-    return _refine_poses(robot, level, moved)
+    return _refine_poses(robot, starts[~starts[:, tilting].any(axis=-1)], ~tilting)
 
 
 def _simplest(robot: Manipulator, refined: Array, candidates: Array) -> Array:
@@ -318,7 +326,7 @@ def _simplest(robot: Manipulator, refined: Array, candidates: Array) -> Array:
     if worth.max(initial=0.0) >= _AXIS * most:
         best = _least_travel(robot, on_axis[worth >= _WORTH * worth.max()])
     least = _WORTH * float(_worth(robot, best))
-    for k in range(robot.freedom if robot.platform.tilts else 0):
+    for k in range(robot.freedom if _tilting_angles(robot).any() else 0):
         middle = np.where(np.arange(robot.freedom) == k, 0.0, best)
         best = middle if _worth(robot, middle) >= least else best
     decade = 10.0 ** np.ceil(np.log10(longest_leg(robot)))
@@ -339,13 +347,13 @@ def _least_travel(robot: Manipulator, poses: Array) -> Array:
 
 def _best_level_poses(robot: Manipulator, poses: Array) -> Array:
     """Return locally best poses whose angles are all 0; none where the platform does not tilt."""
-    moved = ~robot.platform.angular
-    level = poses * moved
-    if not robot.platform.tilts:
+    tilting = _tilting_angles(robot)
+    if not tilting.any():
         return poses[:0]
-    if moved.any():
+    level = poses * ~tilting
+    if not tilting.all():
         order = np.argsort(-_worth(robot, level), kind="stable")
-        level = _refine_poses(robot, level[order[:_LEVELLED]], moved)
+        level = _refine_poses(robot, level[order[:_LEVELLED]], ~tilting)
     return level
 
 
@@ -357,17 +365,17 @@ def _move_onto_axis(robot: Manipulator, poses: Array) -> Array:
     """
     center, _ = search_ball(robot)
     directions, axis = robot.platform.directions, np.array(robot.platform.axis)
-    lengths, count = len(center), len(robot.legs)
-    if robot.platform.tilts and poses[:, robot.platform.angular].any():
+    lengths, count, tilting = len(center), len(robot.legs), _tilting_angles(robot)
+    if poses[:, tilting].any():
         return poses[:0]  # the turn would turn their angles too
     offsets, direction = poses[:, :lengths] - center, directions @ axis
     # Legs of a hexapod may stand in pairs, or in two halves.
-    folds = [count, *(k for k in (3, 2) if k < count)] if robot.platform.tilts else [count]
+    folds = [count, *(k for k in (3, 2) if k < count)] if tilting.any() else [count]
     for fold in folds:
         turn = rotation_matrices(2.0 * np.pi / fold * axis)
         images = poses.copy()
         images[:, :lengths] = center + offsets @ (directions @ turn @ directions.T).T
-        if np.allclose(_worth(robot, images), _worth(robot, poses), rtol=0.0, atol=_SAME):
+        if np.allclose(_worth(robot, images), _worth(robot, poses), rtol=0.0, atol=ROUNDING):
             images[:, :lengths] = center + np.outer(offsets @ direction, direction)
             return images
     return poses[:0]

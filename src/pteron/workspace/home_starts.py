@@ -53,12 +53,14 @@ def axis_poses(robot: Manipulator) -> Array:
     direction = platform.directions @ np.array(platform.axis)
     if not np.linalg.norm(direction) > _ACROSS:
         return np.zeros((1, robot.freedom))
-    turns = len(platform.angles) in (1, 3)
-    angles = np.arange(_TURNS if turns else 1) * 2.0 * np.pi / _TURNS
+    spin = platform.spin_angle
+    angles = np.arange(1 if spin is None else _TURNS) * 2.0 * np.pi / _TURNS
     poses = np.zeros((len(angles), _HEIGHTS, robot.freedom))
-    poses[..., -1] += ((angles + np.pi) % (2.0 * np.pi) - np.pi)[:, None] if turns else 0.0
+    if spin is not None:
+        turns = (angles + np.pi) % (2.0 * np.pi) - np.pi
+        poses[..., platform.coordinates.index(spin)] = turns[:, None]
     middle = np.mean([leg.platform_point for leg in robot.legs], axis=0)
-    offsets = middle @ np.nan_to_num(platform.at(poses[:, 0])[1])
+    offsets = middle @ np.nan_to_num(platform.placement(poses[:, 0])[1])
     heights = radius * np.linspace(-1.0, 1.0, _HEIGHTS)
     poses[..., :count] = (
         center - (offsets @ platform.directions.T)[:, None] + np.outer(heights, direction)
@@ -113,7 +115,7 @@ def sides(robot: Manipulator, poses: Array) -> Array:
         if not size > _ACROSS * np.linalg.norm(down):
             return np.zeros(len(poses))
         up = -gravity_part / size
-    place, axes = platform.at(poses)
+    place, axes = platform.placement(poses)
     points = np.mean([leg.platform_point for leg in robot.legs], axis=0) @ axes
     points += place + np.mean([leg.fixed_offset for leg in robot.legs], axis=0)
     joints = np.nan_to_num(numeric(robot, "joint_coordinates")(poses)[0])

@@ -14,6 +14,7 @@ from pteron.kernels import Array
 from pteron.kinematics.evaluate import finite_pose
 from pteron.kinematics.sampling import search_ball
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.result import Result
 from pteron.shapes import PoseLike
 from pteron.workspace.conditions import Condition, conditions
 from pteron.workspace.fit import Fit, largest_fit, proved_fit
@@ -30,8 +31,8 @@ _SHARES = 40
 """Greatest number of times that a shape is made smaller by the tolerance until it is proved."""
 
 
-@dataclass(frozen=True)
-class Inscribed:
+@dataclass(frozen=True, eq=False, repr=False)
+class Inscribed(Result):
     """The largest shape that was found in the workspace.
 
     Attributes

@@ -135,7 +135,7 @@ def _place_warnings(robot: Manipulator) -> Iterator[str]:
 
 def _crossing_warnings(robot: Manipulator, home: Array) -> Iterator[str]:
     """Yield pairs of legs whose links cross at home, of machines that move in space."""
-    if robot.platform.planar:
+    if robot.platform.plane_normal is not None:
         return
     links = [_segments(points) for points in numeric(robot, "joint_points")(home)[0]]
     for (i, first), (j, second) in combinations(enumerate(links, start=1), 2):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pteron.dynamics import drive_forces, mass_matrix
+from pteron.dynamics.joint_space import moved_inertias
 from pteron.kernels import Array
 from pteron.kinematics import jacobian
 from pteron.manipulator import Manipulator
@@ -17,8 +18,7 @@ def load_warnings(robot: Manipulator, pose: Array) -> tuple[str, ...]:
     """Return warnings about the drives under their load in a pose (m,), at rest."""
     zero_rates = np.zeros(robot.freedom)
     holding = np.abs(drive_forces(robot, pose, zero_rates, zero_rates))
-    inverse = np.linalg.inv(jacobian(robot, pose))
-    moved_masses = np.diag(inverse.T @ mass_matrix(robot, pose) @ inverse)
+    moved_masses = moved_inertias(jacobian(robot, pose), mass_matrix(robot, pose))
     warnings = []
     for i, leg in enumerate(robot.legs):
         if (drive := leg.drive) is None:

@@ -15,14 +15,13 @@ from pteron.kinematics.sampling import joint_limits, type_ii_sizes
 from pteron.kinematics.singularities import best_type_ii
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.renamed import former_attribute
+from pteron.result import Result
 from pteron.shapes import Numbers, PerJoint, PoseLike
-
-_ROUNDING = 1e-9
-"""Difference of shares that is rounding."""
+from pteron.tolerances import ROUNDING
 
 
-@dataclass(frozen=True)
-class PoseMargins:
+@dataclass(frozen=True, eq=False, repr=False)
+class PoseMargins(Result):
     """Margins of poses to singularities and joint limits; each is 1 at best, 0 there.
 
     Attributes
@@ -39,6 +38,8 @@ class PoseMargins:
     least : array, shape (...)
         The least of them all, which is what `home_pose` makes as large as it can.
     """
+
+    ROWS = "least type_ii type_i:1 joints:1"
 
     type_i: PerJoint
     type_ii: Numbers
@@ -102,7 +103,7 @@ def least_margin_text(robot: Manipulator, pose: Array) -> str:
 
 def _first_least(margins: Array) -> int:
     """Return the first leg, from 1, with the least of values (n,): those of equal legs round."""
-    return int((margins <= margins.min() + _ROUNDING).argmax()) + 1
+    return int((margins <= margins.min() + ROUNDING).argmax()) + 1
 
 
 @lru_cache(maxsize=64)
@@ -136,8 +137,8 @@ def _levers(robot: Manipulator) -> tuple[Array, NDArray[np.bool_]]:
     return levers, np.array([leg.reach_bound is None for leg in robot.legs])
 
 
-@dataclass(frozen=True)
-class JointRanges:
+@dataclass(frozen=True, eq=False, repr=False)
+class JointRanges(Result):
     """The part of its range that each joint uses.
 
     Attributes
@@ -149,6 +150,8 @@ class JointRanges:
     within : array of bool, shape (n,)
         Whether the range lies within the limits; True where there are none.
     """
+
+    ROWS = "least greatest within"
 
     least: Array
     greatest: Array

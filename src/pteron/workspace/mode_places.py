@@ -12,6 +12,7 @@ from pteron.kernels import Array, geometry_only
 from pteron.kinematics import inverse_kinematics, random_poses
 from pteron.manipulator import Manipulator, working_modes
 from pteron.manipulator.variants import with_elbows
+from pteron.tolerances import ROUNDING
 from pteron.workspace.margins import pose_margins
 
 _DRAWN = 300
@@ -23,9 +24,6 @@ _MOST = 8
 _UPRIGHT = 0.1
 """Height of the platform over its base, as a share of a leg's length, from which it is clearly
 above or below."""
-
-_LEVEL = 1e-9
-"""Share of gravity along the platform's directions of motion up to which it moves level."""
 
 _ALIKE = 0.7
 """Share of the best margin from which on a mode serves as well: of those one hangs, most likely."""
@@ -77,7 +75,7 @@ def mode_places(robot: Manipulator, home: Array) -> tuple[ModePlace, ...]:
     file_elbows = tuple(leg.elbow for leg in robot.legs)
     choices = [leg.branches for leg in robot.legs]
     down, directions = np.array(robot.gravity), robot.platform.directions
-    upright = _LEVEL * float(np.linalg.norm(down))
+    upright = ROUNDING * float(np.linalg.norm(down))
     if prod(map(len, choices)) == 1 or not np.linalg.norm(directions @ down) > upright:
         return ()
     modes = [tuple(leg.elbow for leg in mode.legs) for mode in working_modes(robot)]
@@ -114,7 +112,7 @@ def _depth(robot: Manipulator, pose: Array) -> float:
     for leg, q in zip(robot.legs, inverse_kinematics(robot, pose), strict=True):
         slides = leg.joint.unit == "m" and leg.joint_axis is not None
         base += np.array(leg.guide_point) + (q * np.array(leg.joint_axis) if slides else 0.0)
-    offset = robot.platform.at(pose)[0] - base / len(robot.legs)
+    offset = robot.platform.placement(pose)[0] - base / len(robot.legs)
     return float(offset @ np.array(robot.gravity) / np.linalg.norm(robot.gravity))
 
 

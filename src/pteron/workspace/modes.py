@@ -14,6 +14,7 @@ from pteron.kernels import Array
 from pteron.kernels.bisection import bisect_condition
 from pteron.kinematics.evaluate import finite_pose
 from pteron.manipulator import RobotLike, as_manipulator, working_modes
+from pteron.result import Result
 from pteron.shapes import PoseLike
 from pteron.workspace.boxes import halve_boxes
 from pteron.workspace.conditions import EDGES, IntervalTest, condition_margins, interval_test
@@ -29,8 +30,8 @@ _MOST = 200_000
 """Most boxes about an edge of reach in which a contact is sought; with more it is not decided."""
 
 
-@dataclass(frozen=True)
-class Contact:
+@dataclass(frozen=True, eq=False, repr=False)
+class Contact(Result):
     """Whether a machine can go over from one working mode to another through a type-I singularity.
 
     Attributes

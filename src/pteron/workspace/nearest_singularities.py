@@ -23,6 +23,8 @@ from pteron.kinematics.architecture import architecture, expect_regular
 from pteron.kinematics.evaluate import finite_pose
 from pteron.kinematics.sampling import search_ball
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.progress import Progress
+from pteron.result import Result
 from pteron.shapes import PoseLike
 from pteron.workspace.enclosing import enclosing_box
 from pteron.workspace.nearest_vanishing import SINGULAR, Nearest, Search
@@ -35,8 +37,8 @@ By = Literal["translation", "rotation"]
 """The motion that leads to the singular pose, alone."""
 
 
-@dataclass(frozen=True)
-class NearestSingularity:
+@dataclass(frozen=True, eq=False, repr=False)
+class NearestSingularity(Result):
     """The nearest singular pose of one kind.
 
     Attributes
@@ -79,7 +81,7 @@ def nearest_singularities(
     pose: PoseLike,
     *,
     most: int = _MOST,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress | None = None,
 ) -> tuple[NearestSingularity, ...]:
     """Return the nearest singular poses of each kind, by translation and by rotation alone.
 
@@ -201,6 +203,6 @@ def _search(
         pose = reference.copy()
         pose[moving] += turn
         return Nearest(pose, 0.0, abs(turn) * (1.0 - SINGULAR))
-    horizon = np.pi if robot.platform.slides else np.inf
+    horizon = np.inf if robot.platform.rotation_axes else np.pi
     box = reference[moving] + np.pi * np.array([[-1.0], [1.0]])
     return Search(vanishing, reference, moving, box, report).run(horizon, most)

@@ -19,6 +19,7 @@ import scipy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
 from pteron.kernels import Array
+from pteron.tolerances import EXACT
 from pteron.workspace.boxes import halve_boxes, vary_coordinates
 from pteron.workspace.vanishing import Vanishing
 
@@ -63,9 +64,6 @@ _RESTARTS = 4
 
 _CLOSE = 5e-3
 """Share of the distance to which it is searched."""
-
-_ROUNDING = 1e-12
-"""Share of a distance that rounding may take from a bound."""
 
 _EDGE = 1e-9
 """Roots, and squares of type-I measures, below zero that count as in reach, as a share of the
@@ -130,7 +128,7 @@ class Search:
             if best is not None and len(self.moving) > 1:
                 best = self._retract(best)
                 nearest = self._length(best)
-        bound = float(distances.min(initial=nearest)) * (1.0 - _ROUNDING)
+        bound = float(distances.min(initial=nearest)) * (1.0 - EXACT)
         if best is None:
             return Nearest(None, np.nan, bound)
         return Nearest(self._pose(best), float(self._values(best[None])[0][0, 0]), bound)

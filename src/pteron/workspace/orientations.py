@@ -11,12 +11,13 @@ from pteron.errors import DataError, ModelError
 from pteron.kernels import Array
 from pteron.kinematics.evaluate import finite_pose
 from pteron.manipulator import RobotLike, as_manipulator, working_modes
+from pteron.result import Result
 from pteron.shapes import PoseLike
 from pteron.workspace.paving import paving
 
 
-@dataclass(frozen=True)
-class VolumesOverAngles:
+@dataclass(frozen=True, eq=False, repr=False)
+class VolumesOverAngles(Result):
     """The volume of the workspace at each of several orientations, in each of several modes.
 
     Attributes
@@ -31,11 +32,23 @@ class VolumesOverAngles:
         Unit of both.
     """
 
+    ROWS = "angles inner_volumes:1 outer_volumes:1"
+
     angles: Array
     elbows: tuple[tuple[int, ...], ...]
     inner: Array
     outer: Array
     unit: str
+
+    @property
+    def inner_volumes(self) -> Array:
+        """`inner`, a row for each angle."""
+        return self.inner.T
+
+    @property
+    def outer_volumes(self) -> Array:
+        """`outer`, a row for each angle."""
+        return self.outer.T
 
 
 def volumes_over_angles(
@@ -74,14 +87,14 @@ def volumes_over_angles(
 
     Examples
     --------
-    >>> from pteron.workspace import over_angles
-    >>> found = over_angles("3-prr", [0.0, 0.0, 0.0], [0.0, 0.5], tolerance=0.2)
+    >>> from pteron.workspace import volumes_over_angles
+    >>> found = volumes_over_angles("3-prr", [0.0, 0.0, 0.0], [0.0, 0.5], tolerance=0.2)
     >>> found.inner.shape, found.unit
     ((1, 2), 'm^2')
     """
     robot = as_manipulator(robot)
     reference = finite_pose(robot, pose, "pose")
-    if len(robot.platform.angles) != 1:
+    if robot.platform.axis_angle is None:
         raise ModelError("the platform does not turn: it has one orientation", subject=robot.name)
     angle_row = np.asarray(angles, dtype=float)
     if angle_row.ndim != 1 or not len(angle_row) or not np.isfinite(angle_row).all():

@@ -17,6 +17,7 @@ from pteron.kernels import Array, as_array
 from pteron.kinematics.architecture import expect_regular
 from pteron.kinematics.evaluate import finite_pose
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.result import Result
 from pteron.shapes import PoseLike
 from pteron.workspace.boxes import halve_boxes, vary_coordinates
 from pteron.workspace.conditions import Condition, IntervalTest, conditions, interval_test
@@ -33,8 +34,8 @@ _SMALLEST = 1e-18
 """Volume below which boxes are not halved."""
 
 
-@dataclass(frozen=True)
-class Paving:
+@dataclass(frozen=True, eq=False, repr=False)
+class Paving(Result):
     """The workspace of a machine, at one orientation or over an interval of them, in boxes.
 
     Attributes
@@ -58,6 +59,8 @@ class Paving:
     complete : bool
         Whether the tolerance was met before there were too many boxes.
     """
+
+    ROWS = "inner:2"
 
     robot: Manipulator = field(repr=False)
     conditions: tuple[Condition, ...] = field(repr=False)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -14,6 +13,8 @@ from pteron.kernels import Array, numeric
 from pteron.kinematics.architecture import expect_regular
 from pteron.kinematics.limits import limited_joints
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.progress import Progress
+from pteron.result import Result
 from pteron.workspace.boxes import halve_boxes
 from pteron.workspace.conditions import (
     Condition,
@@ -34,8 +35,8 @@ _THINNEST = 1e-9
 """Share of the region's sides below which a box is not halved."""
 
 
-@dataclass(frozen=True)
-class Proof:
+@dataclass(frozen=True, eq=False, repr=False)
+class Proof(Result):
     """The proof that a region lies in the workspace, or a pose of it that does not.
 
     Attributes
@@ -116,7 +117,7 @@ def prove(
     type_ii: float = 0.0,
     given: tuple[Condition, ...] | None = None,
     most: int = 1_000_000,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress | None = None,
 ) -> Proof:
     """Prove that every pose of a region keeps reach, limits and floors, or show one that does not.
 
@@ -195,11 +196,7 @@ def prove(
             return Proof(True, robot, region, required, boxes=examined)
         counterexample = _find_counterexample(robot, test, region, boxes)
         if counterexample is not None:
-            margins = condition_margins(robot, required, counterexample)
-            # Out of reach limits are undefined: the cause is the reach.
-            fails = margins < 0.0
-            fails = fails if fails.any() else np.isnan(margins)
-            failed = tuple(required[c] for c in np.flatnonzero(fails))
+            failed = _failed_conditions(robot, required, counterexample)
             return Proof(
                 False, robot, region, required, counterexample, causes=failed, boxes=examined
             )
@@ -210,6 +207,16 @@ def prove(
                 None, robot, region, required, None, boxes[smallest], causes=causes, boxes=examined
             )
         boxes, open_bits = halve_boxes(boxes, sizes), np.repeat(open_bits, 2)
+
+
+def _failed_conditions(
+    robot: Manipulator, required: tuple[Condition, ...], pose: Array
+) -> tuple[Condition, ...]:
+    """Return the conditions that a pose violates; out of reach limits have no margin."""
+    margins = condition_margins(robot, required, pose)
+    fails = margins < 0.0
+    fails = fails if fails.any() else np.isnan(margins)
+    return tuple(required[c] for c in np.flatnonzero(fails))
 
 
 def expect_space(robot: Manipulator, name: str) -> None:

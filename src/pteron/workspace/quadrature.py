@@ -5,7 +5,8 @@ It is an estimate at sampled poses; `paving` gives bounds that are proved.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,7 @@ from pteron.kernels import Array
 from pteron.kernels.bisection import bisect_condition
 from pteron.kinematics.evaluate import finite_pose
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.result import Result
 from pteron.shapes import PoseLike
 from pteron.workspace.conditions import Condition, conditions, keeps
 from pteron.workspace.volume import bounding_box
@@ -29,13 +31,18 @@ _CHUNK = 4096
 """Lines evaluated at a time."""
 
 
-class Quadrature(NamedTuple):
+@dataclass(frozen=True, eq=False, repr=False)
+class Quadrature(Result):
     """A volume by quadrature."""
 
     volume: float
     """m^3; of a planar machine an area, m^2."""
     error: float
     """Its difference from that of half as many lines each way: an estimate, no bound."""
+
+    def __iter__(self) -> Iterator[float]:
+        """Yield both, as ``volume, error = quadrature_volume(..)`` takes them."""
+        return iter((self.volume, self.error))
 
 
 def quadrature_volume(

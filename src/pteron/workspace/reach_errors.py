@@ -25,7 +25,7 @@ _TOUCH = 1e-6
 
 def why_unreachable(robot: Manipulator) -> ModelError:
     """Return the error for a machine that reaches no pose, or none within its joints' limits."""
-    if not np.isfinite(robot.platform.at(np.zeros(robot.freedom))[0]).all():
+    if not np.isfinite(robot.platform.placement(np.zeros(robot.freedom))[0]).all():
         return ModelError(
             "no pose is in reach of all legs: their planes have no place for the points of a level "
             "platform; turn directions, or move guide points nearer to its axis",

@@ -13,6 +13,7 @@ from pteron.errors import DataError
 from pteron.kernels import Array, numeric
 from pteron.kinematics.evaluate import finite_pose
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.result import Result
 from pteron.shapes import PoseLike
 from pteron.workspace.boxes import vary_coordinates
 from pteron.workspace.volume import bounding_box
@@ -33,8 +34,8 @@ Plane = str | tuple[str, str]
 """The two coordinates of the pose that vary: "xy", "xz", "yz", or a pair of names."""
 
 
-@dataclass(frozen=True)
-class ReachSlice:
+@dataclass(frozen=True, eq=False, repr=False)
+class ReachSlice(Result):
     """A grid of poses that differ in two of their coordinates.
 
     Attributes
@@ -55,6 +56,8 @@ class ReachSlice:
     places : (int, int)
         Where the two coordinates stand in a pose.
     """
+
+    ROWS = "margin status poses:1 leg_margins:1"
 
     plane: Plane
     center: Array
@@ -77,15 +80,18 @@ def slice_planes(robot: Manipulator) -> tuple[Plane, ...]:
     Of a platform that tilts they are those of its lengths with two of its angles, or all pairs of
     coordinates where these are few.
     """
-    if robot.platform.planar:
-        return ("xy",)
-    if not robot.platform.tilts:
-        return "xy", "xz", "yz"
-    angles, lengths = robot.platform.angles, robot.platform.lengths
-    if len(lengths) == 3:
-        return "xy", "xz", "yz", (angles[0], angles[1])
+    lengths = robot.platform.lengths
+    angles = [name for name in slice_coordinates(robot) if name not in lengths]
+    planes = tuple(first + second for first, second in combinations(lengths, 2))
+    if planes or not angles:
+        return *planes, *combinations(angles[:2], 2)
     mixed = ((angle, length) for length in lengths for angle in angles)
     return *combinations(angles, 2), *mixed
+
+
+def slice_coordinates(robot: Manipulator) -> tuple[str, ...]:
+    """Return the coordinates of which a slice may vary any two: lengths, and angles that tilt."""
+    return robot.coordinates if robot.platform.tilts else robot.platform.lengths
 
 
 def reach_slice(
@@ -133,16 +139,13 @@ def reach_slice(
     (np.int64(0), np.float64(0.095))
     """
     robot = as_manipulator(robot)
-    planes = slice_planes(robot)
-    names = tuple(plane)
-    if robot.platform.tilts:
-        if len(set(names)) != 2 or not set(names) <= set(robot.coordinates):
-            raise DataError(
-                f"plane: {plane!r} given, two of {', '.join(robot.coordinates)} expected"
-            )
-    elif plane not in planes:
-        valid = ", ".join(f'"{option}"' for option in planes)
-        raise DataError(f"plane: {plane!r} is not one of {valid}")
+    planes, names, varying = slice_planes(robot), tuple(plane), slice_coordinates(robot)
+    if varying == robot.platform.lengths:
+        if plane not in planes:
+            valid = ", ".join(f'"{option}"' for option in planes)
+            raise DataError(f"plane: {plane!r} is not one of {valid}")
+    elif len(set(names)) != 2 or not set(names) <= set(varying):
+        raise DataError(f"plane: {plane!r} given, two of {', '.join(varying)} expected")
     expect(points >= 2, "points", points, "at least 2")
     expect_to_fit("points", points, 2.0 * points**2 * (robot.freedom + robot.joint_count))
     pose = finite_pose(robot, center, "center")

@@ -48,8 +48,8 @@ def screw_lengths(robot: RobotLike, pose: PoseLike) -> PerJoint:
     robot = as_manipulator(robot)
     poses = finite_rows(robot, pose, "pose")
     lengths = np.zeros((*poses.shape[:-1], robot.joint_count))
-    place, axes = robot.platform.at(poses)
-    start = robot.platform.at(np.zeros(robot.freedom))[1]
+    place, axes = robot.platform.placement(poses)
+    start = robot.platform.placement(np.zeros(robot.freedom))[1]
     for i, leg in enumerate(robot.legs):
         if leg.screw_lead is None:
             continue

@@ -9,9 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pteron.kernels import Array
-
-_RIM = 1e-9
-"""Share by which a point may lie outside of a shape, for rounding."""
+from pteron.tolerances import ROUNDING
 
 
 class Shape(NamedTuple):
@@ -73,7 +71,7 @@ def shape_samples(shape: Shape, orientations: Array, count: int) -> Samples:
     """Return the points of a lattice, and of the rim, in a shape at every orientation (A, m)."""
     grid = np.stack(np.meshgrid(*lattice(shape, count), indexing="ij"), axis=-1)
     units = grid.reshape(-1, len(shape.half))
-    units = np.vstack([units[shape.gauge(units) <= 1.0 + _RIM], shape.rim])
+    units = np.vstack([units[shape.gauge(units) <= 1.0 + ROUNDING], shape.rim])
     poses = np.repeat(orientations, len(units), axis=0)
     poses[:, : units.shape[1]] = 0.0
     return Samples(poses, np.tile(units, (len(orientations), 1)), np.ones(len(poses)))

@@ -19,7 +19,9 @@ from pteron.kernels import Array
 from pteron.kernels.program_cache import cached_result
 from pteron.kinematics.evaluate import finite_pose
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.progress import Progress
 from pteron.renamed import former_attribute
+from pteron.result import Result
 from pteron.shapes import PoseLike
 from pteron.workspace.conditions import Condition, conditions, keeps
 from pteron.workspace.largest_proved import largest_proved
@@ -119,8 +121,8 @@ class TiltedBall:
         return poses
 
 
-@dataclass(frozen=True)
-class LargestTilt:
+@dataclass(frozen=True, eq=False, repr=False)
+class LargestTilt(Result):
     """The largest tilt, or ball, that is proved to lie in the workspace.
 
     Attributes
@@ -161,7 +163,7 @@ def largest_tilt(
     radius: float = 0.0,
     tolerance: float = 5e-3,
     given: tuple[Condition, ...] | None = None,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress | None = None,
 ) -> LargestTilt:
     """Return the largest tilt to every side at a place that is proved to lie in the workspace.
 
@@ -208,7 +210,7 @@ def largest_ball(
     tilt: float = 0.0,
     tolerance: float = 5e-3,
     given: tuple[Condition, ...] | None = None,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress | None = None,
 ) -> LargestTilt:
     """Return the largest ball of places at each of which every tilt up to a given one is reached.
 
@@ -253,10 +255,11 @@ def _expect_tilting(robot: RobotLike, pose: PoseLike) -> tuple[Manipulator, Arra
         abs(dot(platform.axis, platform.second_axis)) <= PARALLEL_TOLERANCE
         and max(abs(platform.axis[2]), abs(platform.second_axis[2])) <= PARALLEL_TOLERANCE
     )
-    if not platform.tilts or not upright:
+    tilts = platform.tilts
+    if not tilts or not upright:
         raise ModelError(
             f"a {platform.motion} platform has no tilt to every side"
-            + ("" if platform.tilts else "; this is about platforms that tilt")
+            + ("" if tilts else "; this is about platforms that tilt")
             + ("" if upright else ": its axes are not level and at right angles"),
             subject=machine.name,
         )

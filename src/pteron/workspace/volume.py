@@ -14,7 +14,9 @@ from pteron.kernels import Array, numeric
 from pteron.kinematics.evaluate import finite_pose
 from pteron.kinematics.sampling import search_ball
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.result import Result
 from pteron.shapes import PoseLike, Seed
+from pteron.tolerances import ROUNDING
 from pteron.workspace.boxes import vary_coordinates
 from pteron.workspace.margins import distance_to_limits
 
@@ -52,12 +54,9 @@ _BACK = 101
 _OPTIONS = {"ftol": 1e-10, "maxiter": 200}
 """Options of the optimiser SLSQP."""
 
-_TOUCH = 1e-9
-"""Metres by which the legs' reach must overlap to count as common."""
 
-
-@dataclass(frozen=True)
-class ReachVolume:
+@dataclass(frozen=True, eq=False, repr=False)
+class ReachVolume(Result):
     """The set of positions of P in reach at one orientation, within the joints' limits.
 
     The tool's centre point reaches the same set, moved by where it is from P.
@@ -140,9 +139,9 @@ def bounding_box(robot: RobotLike, pose: PoseLike) -> Array:
     inside = depths(positions).min(axis=-1)
     # Where next to nothing is in reach, the deepest positions are moved inside first.
     starts = positions[np.argsort(-inside)[:_STARTS]]
-    if not (inside > _TOUCH).any():
+    if not (inside > ROUNDING).any():
         starts = np.array([deepest(depths, start) for start in starts])
-        starts = starts[depths(starts).min(axis=-1) > _TOUCH]
+        starts = starts[depths(starts).min(axis=-1) > ROUNDING]
         if not len(starts):
             raise ModelError(
                 "no position is in reach of all legs, within the joints' limits, at the "
@@ -150,10 +149,10 @@ def bounding_box(robot: RobotLike, pose: PoseLike) -> Array:
                 subject=robot.name,
             )
     inside_positions = np.vstack(
-        [positions[inside > _TOUCH], starts[depths(starts).min(axis=-1) > _TOUCH]]
+        [positions[inside > ROUNDING], starts[depths(starts).min(axis=-1) > ROUNDING]]
     )
     if any(
-        (depths(inside_positions + way).min(axis=-1) > _TOUCH).any()
+        (depths(inside_positions + way).min(axis=-1) > ROUNDING).any()
         for way in _endless_translations(robot, radius)
     ):
         raise ModelError(
@@ -203,7 +202,7 @@ def _front(
         inside = inside[np.argsort(inside @ objective)[:_FRONT]]
         tried = np.repeat(inside, 20 * _FRONT // len(inside), axis=0)
         tried = tried + spread * rng.normal(size=tried.shape)
-        inside = np.vstack([inside, tried[depths(tried).min(axis=-1) > _TOUCH]])
+        inside = np.vstack([inside, tried[depths(tried).min(axis=-1) > ROUNDING]])
         spread *= _NEARER
     return inside[np.argsort(inside @ objective)]
 

@@ -22,7 +22,7 @@ class LegStance:
 
     Attributes
     ----------
-    slides, carries : tuple
+    prismatic, carries : tuple
         For each joint before the cut: whether it slides, and the body it carries, by letter.
     axes, points : tuple of array, shape (3,)
         Axis, and a point on it, of each of these joints, m.
@@ -41,7 +41,7 @@ class LegStance:
         The place in the chain of the driven joint, if it is among them.
     """
 
-    slides: tuple[bool, ...]
+    prismatic: tuple[bool, ...]
     carries: tuple[str, ...]
     axes: tuple[Array, ...]
     points: tuple[Array, ...]
@@ -90,7 +90,7 @@ def leg_stances(robot: Manipulator, poses: Array) -> list[LegStance]:
 def shaft_ratio(robot: Manipulator, i: int) -> float:
     """Return the actuated joint's angle per radian of phi, of a leg that follows the angle."""
     motion = _states(robot)[1].legs[i]
-    return float(ca.evalf(ca.SX(motion.driven.gear)))
+    return float(ca.evalf(ca.SX(motion.actuated_joint.gear)))
 
 
 def _numbers_before_the_cut(robot: Manipulator, i: int, motion: LegMotion) -> tuple[int, ...]:
@@ -101,6 +101,12 @@ def _numbers_before_the_cut(robot: Manipulator, i: int, motion: LegMotion) -> tu
         raise ModelError(
             f"leg {i + 1}: {leg.type}: its chain's joints carry {carried}, but its bodies are "
             f"{list(motion.bodies)}; let each body's joint name it (Joint.body)",
+            subject=robot.name,
+        )
+    if not carried:
+        raise ModelError(
+            f"leg {i + 1}: a {leg.type} leg has no bodies, and an engine moves nothing else; give "
+            "its kind a body, however light",
             subject=robot.name,
         )
     last = max((k for k, joint in enumerate(motion.chain) if joint.body), default=-1)

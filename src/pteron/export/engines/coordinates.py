@@ -51,8 +51,8 @@ def coordinates(opened: Tree, poses: PoseLike) -> Array:
             driven = k == home.driven
             name = robot.joint_names[i] if driven else f"leg{i + 1}_joint{k}"
             values[name] = joints[:, i] if driven else angle
-    p, axes = robot.platform.at(flat)
-    home_p, home_axes = robot.platform.at(opened.home)
+    p, axes = robot.platform.placement(flat)
+    home_p, home_axes = robot.platform.placement(opened.home)
     for body in opened.bodies:
         for joint in body.joints:
             if joint.follows is not None:
@@ -70,11 +70,11 @@ def _leg(home: LegStance, away: LegStance) -> list[Array]:
     count = len(away.end)
     turn, shift = np.broadcast_to(np.eye(3), (count, 3, 3)), np.zeros((count, 3))
     motions: list[Array] = []
-    for k, (slides, axis, point) in enumerate(
-        zip(home.slides, home.axes, home.points, strict=True)
+    for k, (is_prismatic, axis, point) in enumerate(
+        zip(home.prismatic, home.axes, home.points, strict=True)
     ):
         now = turn @ axis
-        if slides:
+        if is_prismatic:
             after, where = _next_point(home, k), _next_point(away, k)
             by = np.einsum("ki,ki->k", now, where - turn @ after - shift)
             shift = shift + by[:, None] * now

@@ -14,16 +14,15 @@ from pteron.kinematics.evaluate import finite_pose
 from pteron.kinematics.sampling import type_ii_sizes
 from pteron.manipulator import Manipulator
 from pteron.shapes import PoseLike
+from pteron.tolerances import ROUNDING
 from pteron.workspace import home_pose
+from pteron.workspace.home import has_exact_home
 
 _GOOD = 0.1
 """Least singularity measures at which the middle of the joints' ranges is taken."""
 
 _SEARCHES = ((200, 0.3), (200, 0.02), (200, 0.0))
 """Numbers of random poses, and least measures of them, that are tried in turn otherwise."""
-
-_ALIKE = 1e-9
-"""Difference below which two measures count as equal."""
 
 
 def chosen_home(robot: Manipulator, home: PoseLike | None) -> Array:
@@ -40,8 +39,7 @@ def chosen_home(robot: Manipulator, home: PoseLike | None) -> Array:
         If the machine is singular at every pose.
     """
     if home is None:
-        named = robot.platform.tilts or robot.home is not None
-        return home_pose(robot) if named else np.array(_middle(robot))
+        return home_pose(robot) if has_exact_home(robot) else np.array(_middle(robot))
     pose = finite_pose(robot, home, "home")
     inverse_kinematics(robot, pose)
     return pose.copy()
@@ -78,7 +76,7 @@ def _middle(robot: Manipulator) -> tuple[float, ...]:
 
 def _best(worth: Array) -> int:
     """Return the first of the best, so that rounding does not choose between mirrored poses."""
-    return int((worth >= worth.max() - _ALIKE).argmax())
+    return int((worth >= worth.max() - ROUNDING).argmax())
 
 
 def _worth(robot: Manipulator, poses: Array) -> Array:

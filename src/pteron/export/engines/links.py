@@ -11,9 +11,7 @@ from pteron.export.engines.formatting import look, row
 from pteron.export.engines.inertia import massless_inertia
 from pteron.export.engines.parts import BASE, BodyShape, Tree, TreeBody, TreeJoint
 from pteron.kernels import Array
-
-_SAME = 1e-6
-"""Distance below which points count as one, m."""
+from pteron.tolerances import SAME
 
 
 class Link(NamedTuple):
@@ -91,7 +89,7 @@ def link_shape(shape: BodyShape, body: TreeBody | None) -> LinkShape:
     length = float(np.linalg.norm(axis))
     kind = {"box": "box"}.get(shape.kind, "cylinder")
     turn = np.eye(3)
-    if length < _SAME:
+    if length < SAME:
         kind = "sphere"
     else:
         z = axis / length

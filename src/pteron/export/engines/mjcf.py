@@ -27,15 +27,13 @@ from pteron.kernels import Array
 from pteron.kernels.code import render_template
 from pteron.manipulator import RobotLike, as_manipulator
 from pteron.shapes import PoseLike
+from pteron.tolerances import SAME
 
 STEP = 2e-4
 """The file's step of integration, s."""
 
 STIFFNESS = 0.2
 """The rate at which the loops' constraints pull gaps back, times the step."""
-
-_SAME = 1e-6
-"""Distance below which a shape's ends count as equal, m."""
 
 
 def export_mjcf(
@@ -106,7 +104,7 @@ def mjcf(opened: Tree, *, step: float = STEP) -> str:
         | {motor.joint: motor for motor in opened.motors},
         hold=_hold(opened),
         local=lambda body, points: points if body is None else body_frame_points(body, points),
-        same=lambda shape: np.ptp(shape.ends, axis=0).max() < _SAME,
+        same=lambda shape: np.ptp(shape.ends, axis=0).max() < SAME,
         half=lambda shape: float(np.linalg.norm(shape.ends[1] - shape.ends[0])) / 2.0,
         moments=_moments,
         frame_texts=lambda body: _frame_texts(opened, body),
@@ -152,7 +150,7 @@ def _sites(opened: Tree) -> list[list[tuple[str, Array]]]:
     for closing in opened.closings:
         sites[closing.one].append((f"{closing.name}_end", closing.point))
         sites[closing.other].append((f"{closing.name}_seat", closing.point))
-    p, axes = opened.robot.platform.at(opened.home)
+    p, axes = opened.robot.platform.placement(opened.home)
     sites[0].append(("tool", p + np.array(opened.robot.platform.tool) @ axes))
     return sites
 
@@ -167,8 +165,9 @@ def _scene(opened: Tree) -> dict[str, Any]:
     low, high = points.min(axis=0), points.max(axis=0)
     center, extent = (low + high) / 2.0, float(np.linalg.norm(high - low))
     floor = center + (float((points @ up).min()) - center @ up - 0.08 * opened.size) * up
-    if opened.robot.platform.planar and abs(opened.robot.platform.frame[2] @ up) < 0.5:
-        toward = np.array(opened.robot.platform.frame[2])
+    normal = opened.robot.platform.plane_normal
+    if normal is not None and abs(normal @ up) < 0.5:
+        toward = np.array(normal)
     else:
         side = np.cross(up, np.eye(3)[np.argmin(np.abs(up))])
         side /= np.linalg.norm(side)

@@ -15,6 +15,7 @@ import numpy as np
 from pteron.kernels import Array
 from pteron.legs import Drive
 from pteron.manipulator import Manipulator
+from pteron.renamed import former_attribute
 
 BASE = -1
 """The parent of a body that hangs on the base."""
@@ -28,7 +29,7 @@ class TreeJoint:
     ----------
     name : str
         For actuated joints as in the robot's logs, for the platform's as in its pose.
-    slides : bool
+    is_prismatic : bool
         Whether it slides along its axis, and does not turn about it.
     axis, point : array, shape (3,)
         Unit vector, and a point on it, m, at the home pose.
@@ -41,12 +42,14 @@ class TreeJoint:
     """
 
     name: str
-    slides: bool
+    is_prismatic: bool
     axis: Array
     point: Array
     home: float = 0.0
     limits: tuple[float, float] | None = None
     follows: tuple[str, float] | None = None
+
+    slides = former_attribute("slides", "is_prismatic")
 
 
 @dataclass(frozen=True)
@@ -245,7 +248,7 @@ def bodies_at_zero(tree: Tree) -> tuple[TreeBody, ...]:
 def displacement(joint: TreeJoint, by: float) -> Array:
     """Return the displacement (4, 4) of a body whose joint moves by so many m or rad."""
     moved = np.eye(4)
-    if joint.slides:
+    if joint.is_prismatic:
         moved[:3, 3] = by * joint.axis
     else:
         cross = np.cross(np.eye(3), joint.axis)

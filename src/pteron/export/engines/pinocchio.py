@@ -117,7 +117,7 @@ def pinocchio_source(opened: Tree) -> str:
     """Return the text of the Python file."""
     robot = opened.robot
     coupled = [body for body in opened.bodies if body.joints[0].follows is not None]
-    if any(body.joints[0].slides for body in coupled):
+    if any(body.joints[0].is_prismatic for body in coupled):
         raise ModelError(
             "the halves of its platform slide by phi, which takes coupled joints, and Pinocchio's "
             "constrained dynamics have none; export it as MJCF, SDF or URDF",

@@ -1,7 +1,7 @@
 """The platform's bodies in the opened mechanism: its main part, parts that do not turn, gears.
 
 Platforms that slide have two halves. All bodies together have the platform's mass, first moment and
-moment of inertia (`Platform.joined`).
+moment of inertia (`Platform.total_inertia`).
 """
 
 from __future__ import annotations
@@ -25,9 +25,7 @@ from pteron.kernels import Array
 from pteron.manipulator import Manipulator
 from pteron.platforms import Platform
 from pteron.platforms.joints import platform_joints
-
-_COINCIDENT = 1e-9
-"""Distance within which two hinges count as one, m; m/rad where the platform slides."""
+from pteron.tolerances import ROUNDING
 
 _SIDE = 0.05
 """Side of the cube that stands for a part that does not turn, m."""
@@ -44,23 +42,23 @@ def platform_bodies(robot: Manipulator, pose: Array) -> Pieces:
     platform = robot.platform
     if platform.slides:
         return _sliding_platform(robot, pose)
-    if platform.turns:
+    if platform.turning_axis is not None:
         return _turning_platform(robot, pose)
     joints = _joints(platform, pose)
-    if isinstance(platform.joined, SpatialInertia):
-        body = _tilting_body(platform, pose, joints, platform.joined)
+    if isinstance(platform.total_inertia, SpatialInertia):
+        body = _tilting_body(platform, pose, joints, platform.total_inertia)
     else:
-        body = _plane_body(platform, pose, joints, *central_inertia(platform.joined))
+        body = _plane_body(platform, pose, joints, *central_inertia(platform.total_inertia))
     return [body], [0] * len(robot.legs), []
 
 
 def _turning_platform(robot: Manipulator, pose: Array) -> Pieces:
     """Return a platform that turns, its gears, and the parts that hang on its hinges."""
     platform = robot.platform
-    p, axes = platform.at(pose)
+    p, axes = platform.placement(pose)
     # What of a leg's fixed offset is along the axis turns with the platform as well as not.
     offsets = [cross(leg.fixed_offset, platform.axis) for leg in robot.legs]
-    hung = [bool(np.abs(offset).max() > _COINCIDENT) for offset in offsets]
+    hung = [bool(np.abs(offset).max() > ROUNDING) for offset in offsets]
     points = [np.array(leg.platform_point) for leg in robot.legs]
     hinges = _distinct([point for point, hangs in zip(points, hung, strict=True) if hangs])
     masses, shares, remainder = _part_masses(platform, hinges, len(platform.geared))
@@ -90,10 +88,10 @@ def _sliding_platform(robot: Manipulator, pose: Array) -> Pieces:
     """
     platform = robot.platform
     turned, angle = _angle(platform, pose)
-    p, _ = platform.at(pose)
+    p, _ = platform.placement(pose)
     frame = np.array(platform.frame)
     points = [np.array(leg.platform_point) for leg in robot.legs]
-    halves = _distinct([point for point in points if np.abs(point).max() > _COINCIDENT])
+    halves = _distinct([point for point in points if np.abs(point).max() > ROUNDING])
     masses, shares, remainder = _part_masses(platform, halves, 2 + len(platform.geared))
     mass, center, about = remainder
     *moves, turn = _joints(platform, pose)
@@ -114,7 +112,7 @@ def _sliding_platform(robot: Manipulator, pose: Array) -> Pieces:
         follows = (turned, by)
         joint = TreeJoint(f"{name}_slide", True, direction, at, by * angle, None, follows)
         bodies.append(_still_body(platform, name, 0, [joint], at, part_mass))
-    slide = [np.abs(point).max() > _COINCIDENT for point in points]
+    slide = [np.abs(point).max() > ROUNDING for point in points]
     carried = [
         first + _axis_index(halves, point) if away else 0
         for point, away in zip(points, slide, strict=True)
@@ -155,12 +153,12 @@ def _part_masses(
 
 def _joints(platform: Platform, pose: Array) -> list[TreeJoint]:
     """Return the joints by which the platform moves, the tool's where its halves slide."""
-    p, moved, joints = platform.at(pose)[0], np.eye(4), []
+    p, moved, joints = platform.placement(pose)[0], np.eye(4), []
     limits = platform.angle_limits
-    for name, slides, axis, value in platform_joints(platform, pose):
+    for name, is_prismatic, axis, value in platform_joints(platform, pose):
         axis = moved[:3, :3] @ axis
-        joint = TreeJoint(name, slides, axis, p, float(value), limits.get(name))
-        if not slides:
+        joint = TreeJoint(name, is_prismatic, axis, p, float(value), limits.get(name))
+        if not is_prismatic:
             moved = displacement(joint, float(value)) @ moved
         joints.append(joint)
     return joints
@@ -181,7 +179,7 @@ def _plane_body(
     about: float,
 ) -> TreeBody:
     """Return a body that turns with the platform; its centre (2,) is in the platform's frame."""
-    p, axes = platform.at(pose)
+    p, axes = platform.placement(pose)
     moments = plane_moments(mass, about, max(float(np.linalg.norm(center)), _SIDE))
     at = p + center @ axes[:2]
     return TreeBody("platform", BASE, tuple(joints), p, axes.T, mass, at, moments, 0)
@@ -191,7 +189,7 @@ def _tilting_body(
     platform: Platform, pose: Array, joints: Sequence[TreeJoint], inertia: SpatialInertia
 ) -> TreeBody:
     """Return a platform that turns about any axis."""
-    p, axes = platform.at(pose)
+    p, axes = platform.placement(pose)
     center = np.array(inertia.center_of_mass)
     moments, products = spatial_moments(inertia, max(float(np.linalg.norm(center)), _SIDE))
     at = p + center @ axes
@@ -210,7 +208,7 @@ def _still_body(
 
 def _gears(platform: Platform, pose: Array, masses: Array, against: float) -> list[TreeBody]:
     """Return what gears turn, on a body that itself turns by `against` times the angle."""
-    p, axes = platform.at(pose)
+    p, axes = platform.placement(pose)
     turned, angle = _angle(platform, pose) if platform.geared else ("", 0.0)
     bodies = []
     for j, (part, mass) in enumerate(zip(platform.geared, masses, strict=True), start=1):
@@ -224,7 +222,7 @@ def _gears(platform: Platform, pose: Array, masses: Array, against: float) -> li
 
 def _share_axis(first: Array, second: Array) -> bool:
     """Return whether two places of the platform are on one axis of it."""
-    return bool(np.abs(first - second)[:2].max() <= _COINCIDENT)
+    return bool(np.abs(first - second)[:2].max() <= ROUNDING)
 
 
 def _distinct(places: Sequence[Array]) -> list[Array]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from pteron.export.engines.parts import BASE, BodyShape, Tree, TreeBody
 from pteron.kernels import Array
+from pteron.tolerances import SAME
 
 _THICK = 0.011
 """Radius of a link, as a share of the machine's size; other shapes are in proportion."""
@@ -21,9 +22,6 @@ _SPARE = 0.25
 
 _OVERLAP = 0.55
 """Length of each of the two parts of a telescopic body, as a share of the whole."""
-
-_SAME = 1e-6
-"""Distance below which points count as one, m."""
 
 
 def add_shapes(opened: Tree) -> Tree:
@@ -51,14 +49,14 @@ def _leg(
     origins = [*(body.origin for body in bodies), end]
     for k, body in enumerate(bodies):
         start, stop, radius = origins[k], origins[k + 1], thick
-        slides = body.joints[-1].slides
-        if slides and k == 0:
+        is_prismatic = body.joints[-1].is_prismatic
+        if is_prismatic and k == 0:
             axis = 2.6 * thick * body.joints[-1].axis
             shapes.append([BodyShape("box", np.array([start - axis, start + axis]), 1.9 * thick)])
             continue
-        if np.linalg.norm(stop - start) < _SAME:  # the next one slides in this one
+        if np.linalg.norm(stop - start) < SAME:  # the next one slides in this one
             stop, radius = start + _OVERLAP * (end - start), 1.4 * thick
-        elif slides:
+        elif is_prismatic:
             start = stop - _OVERLAP * (stop - start)
         ends = np.array([start, stop])
         if bar is None or k < len(bodies) - 1:
@@ -74,7 +72,7 @@ def _leg(
 def _stand(first: TreeBody, size: float) -> list[BodyShape]:
     """Return the fixed part of a leg's first joint: a guide, or an axle."""
     joint, thick = first.joints[0], _THICK * size
-    if joint.slides:
+    if joint.is_prismatic:
         low, high = joint.limits or (joint.home - _SPARE * size, joint.home + _SPARE * size)
         reach = np.array([[low - joint.home - 3.0 * thick], [high - joint.home + 3.0 * thick]])
         return [BodyShape("cylinder", joint.point + reach * joint.axis, 0.8 * thick)]
@@ -85,7 +83,7 @@ def _stand(first: TreeBody, size: float) -> list[BodyShape]:
 def _platform(opened: Tree, looks: list[list[BodyShape]], thick: float) -> None:
     """Add the shapes of the platform's bodies: arms from their origins to where others close."""
     platform, bodies = opened.robot.platform, opened.bodies
-    p, axes = platform.at(opened.home)
+    p, axes = platform.placement(opened.home)
     axis = axes[2]
     for closing in opened.closings:
         for k in (closing.one, closing.other):
@@ -94,10 +92,10 @@ def _platform(opened: Tree, looks: list[list[BodyShape]], thick: float) -> None:
     hub = np.array([p - 0.8 * thick * axis, p + 0.8 * thick * axis])
     looks[0].append(BodyShape("cylinder", hub, 2.2 * thick))
     tool = p + np.array(platform.tool) @ axes
-    if np.linalg.norm(tool - p) > _SAME:
+    if np.linalg.norm(tool - p) > SAME:
         looks[0].append(_arm(p, tool, 0.8 * thick))
     for k, body in enumerate(bodies):
-        if body.color == 0 and body.parent != BASE and not body.joints[0].slides:
+        if body.color == 0 and body.parent != BASE and not body.joints[0].is_prismatic:
             # What turns about P: a block, so that it is seen to turn.
             half = 2.4 * thick * body.axes[:, 0]
             middle = body.origin - 2.2 * thick * axis

@@ -27,9 +27,7 @@ from pteron.legs.kind import LegKind
 from pteron.manipulator import RobotLike, as_manipulator
 from pteron.manipulator.readings import refuse_readings
 from pteron.shapes import PoseLike
-
-_NONE = 1e-9
-"""Sine between two directions below which they count as parallel."""
+from pteron.tolerances import ROUNDING
 
 
 def tree(robot: RobotLike, home: PoseLike | None = None) -> Tree:
@@ -71,7 +69,7 @@ def tree(robot: RobotLike, home: PoseLike | None = None) -> Tree:
     pose = chosen_home(robot, home)
     stances = leg_stances(robot, pose)
     _expect_axes(stances, pose)
-    size = _size(stances, robot.platform.at(pose)[0])
+    size = _size(stances, robot.platform.placement(pose)[0])
     bodies, carriers, closings = platform_bodies(robot, pose)
     names = robot.joint_names
     motors = []
@@ -130,15 +128,15 @@ def _leg(
     """Return a leg's bodies, of which `count` others come before."""
     bodies: list[TreeBody] = []
     waiting: list[TreeJoint] = []
-    joints = stance.numbers, stance.slides, stance.carries, stance.axes, stance.points
-    for k, slides, letter, axis, point in zip(*joints, strict=True):
+    joints = stance.numbers, stance.prismatic, stance.carries, stance.axes, stance.points
+    for k, is_prismatic, letter, axis, point in zip(*joints, strict=True):
         if k == stance.driven:
             home, name, limits = float(stance.coordinate), actuated, leg.limits
-            if slides:  # its point is where its coordinate is zero
+            if is_prismatic:  # its point is where its coordinate is zero
                 point = point + home * axis
         else:
             home, name, limits = 0.0, f"leg{number}_joint{k}", None
-        waiting.append(TreeJoint(name, slides, axis, point, home, limits))
+        waiting.append(TreeJoint(name, is_prismatic, axis, point, home, limits))
         if not letter:
             continue
         parent = count + len(bodies) - 1 if bodies else BASE
@@ -173,7 +171,7 @@ def _frame_along(x: Array, z: Array | None = None) -> Array:
     """Return axes as columns (3, 3): x along a vector, and z near another one."""
     x = x / np.linalg.norm(x)
     normal = None if z is None else z - (z @ x) * x
-    if normal is None or np.linalg.norm(normal) < _NONE:
+    if normal is None or np.linalg.norm(normal) < ROUNDING:
         normal = np.cross(x, np.eye(3)[np.argmin(np.abs(x))])
     normal = normal / np.linalg.norm(normal)
     return np.column_stack([x, np.cross(normal, x), normal])

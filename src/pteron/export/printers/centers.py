@@ -12,7 +12,7 @@ import numpy as np
 from pteron.equations.machine import Machine
 from pteron.export.printers.sections import differs
 from pteron.kernels import Array
-from pteron.legs.leg import Sphere
+from pteron.legs.leg import SphereLocus
 from pteron.manipulator import Manipulator
 
 SAME = 1e-6
@@ -33,7 +33,7 @@ class Center:
     radius: float
 
     @property
-    def slides(self) -> bool:
+    def is_prismatic(self) -> bool:
         """Whether it moves along a line."""
         return self.across is None
 
@@ -42,7 +42,7 @@ class Center:
         """Return the centre for a leg; None if P moves on no sphere while its joint is held."""
         q = ca.SX.sym("q")
         locus, offset = machine.legs[leg].locus(q), machine.platform.offsets[leg]
-        if not isinstance(locus, Sphere):
+        if not isinstance(locus, SphereLocus):
             return None
         function = ca.Function(
             "center", [q], [locus.center - offset.a - offset.constant, locus.radius]

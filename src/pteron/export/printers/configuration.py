@@ -86,9 +86,9 @@ def _values(robot: Manipulator) -> dict[str, Any]:
     centers = [Center.from_leg(machine, i) for i in range(3)]
     if all(center is not None for center in centers):
         known_centers = [center for center in centers if center is not None]
-        if all(center.slides for center in known_centers):
+        if all(center.is_prismatic for center in known_centers):
             return delta(robot, known_centers)
-        if not any(center.slides for center in known_centers):
+        if not any(center.is_prismatic for center in known_centers):
             return rotary(robot, known_centers)
     raise ModelError(
         f"{robot.name}: its legs are neither all linear in the pose, nor those of a Delta with "

@@ -94,7 +94,9 @@ class LinearDelta:
         """
         machine = Machine.numeric(robot)
         centers = [Center.from_leg(machine, i) for i in range(len(robot.legs))]
-        sliding_centers = [center for center in centers if center is not None and center.slides]
+        sliding_centers = [
+            center for center in centers if center is not None and center.is_prismatic
+        ]
         if robot.platform.coordinates != ("x", "y", "z") or len(sliding_centers) != 3:
             raise ModelError(
                 f"{robot.name}: no linear Delta, whose platform moves x, y and z by three rods on "

@@ -261,7 +261,7 @@ def _place_leg(
     def turn_vector(v: Vector) -> Vector:
         return (cos * v[0] - sin * v[1], sin * v[0] + cos * v[1], v[2])
 
-    moved = leg.turned(turn_vector)
+    moved = leg.map_vectors(turn_vector)
     out = np.array([*moved.guide_point[:2], 0.0]) / math.hypot(*moved.guide_point[:2])
     names = [quantity.name for quantity in leg.quantities if quantity.role == "length"]
     bodies = dict(moved.bodies)

@@ -108,7 +108,7 @@ def bodies_of(base: BaseParameters) -> Bodies:
     _, sharing = share(robot, groups)
     # A telescope has no length: its parts count as long as a link.
     sizes = [leg.size / max(len(leg.extents), 1) for leg in robot.legs if leg.size > 0.0]
-    counted = 3 if robot.platform.tilts else 2
+    counted = len(robot.platform.arm_axes)
     radius = max(float(np.linalg.norm(leg.platform_point[:counted])) for leg in robot.legs)
     mean = float(np.mean(sizes))
     half = 0.5 * (radius if radius > 1e-3 * mean else _SMALL_PLATFORM * mean)
@@ -174,7 +174,7 @@ def real_bodies(robot: Manipulator, values: ArrayLike | None = None) -> tuple[st
         columns = list(place.values())
         first = data[columns[0]]
         legs, platform = robot.legs, robot.platform
-        kind = legs[first.legs[0] - 1].bodies[first.body] if first.legs else platform.joined
+        kind = legs[first.legs[0] - 1].bodies[first.body] if first.legs else platform.total_inertia
         try:
             kind.of_values(vector[columns].tolist())
         except ModelError as error:

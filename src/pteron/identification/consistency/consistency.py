@@ -9,10 +9,11 @@ import numpy as np
 
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
+from pteron.result import Result
 
 
-@dataclass(frozen=True)
-class Consistency:
+@dataclass(frozen=True, eq=False, repr=False)
+class Consistency(Result):
     """Real bodies that reproduce identified base parameters, or come closest to them.
 
     Attributes

@@ -10,13 +10,14 @@ import scipy  # type: ignore[import-untyped]
 
 from pteron.identification.estimators.estimate import Estimate
 from pteron.identification.observation import Observations
+from pteron.result import Result
 
 LEVEL = 0.05
 """Usual level of the test."""
 
 
-@dataclass(frozen=True)
-class Essential:
+@dataclass(frozen=True, eq=False, repr=False)
+class Essential(Result):
     """The essential parameters, and the test that left the others out.
 
     Attributes
@@ -32,6 +33,8 @@ class Essential:
     level : float
         The level of the test.
     """
+
+    ROWS = "estimate"
 
     names: tuple[str, ...]
     dropped: tuple[str, ...]

@@ -17,6 +17,7 @@ from pteron.identification.observation import Observations
 from pteron.json_values import fields_as_json
 from pteron.kernels import Array
 from pteron.renamed import former_attribute
+from pteron.result import Result
 
 _LAGS = 20
 """Lags of the residuals' autocorrelation that are tested."""
@@ -25,8 +26,8 @@ _LEVEL = 0.01
 """Chance at which white residuals would be called coloured."""
 
 
-@dataclass(frozen=True)
-class Whiteness:
+@dataclass(frozen=True, eq=False, repr=False)
+class Whiteness(Result):
     """The test of Ljung and Box on each actuator's residuals.
 
     Attributes
@@ -37,6 +38,8 @@ class Whiteness:
         The chance that white noise looks less white.
     """
 
+    ROWS = "autocorrelation p_values"
+
     autocorrelation: Array
     p_values: Array
 
@@ -46,8 +49,8 @@ class Whiteness:
         return bool((self.p_values > _LEVEL / len(self.p_values)).all())
 
 
-@dataclass(frozen=True)
-class Estimate:
+@dataclass(frozen=True, eq=False, repr=False)
+class Estimate(Result):
     """Estimated values of a model.
 
     Attributes
@@ -75,6 +78,8 @@ class Estimate:
     residuals : array, shape (R, n)
         F - W values at the rows of the observations, in units of the noise before the filter, N.
     """
+
+    ROWS = "names values deviations units"
 
     method: str
     names: tuple[str, ...]

@@ -11,16 +11,15 @@ from pteron.errors import DataError
 from pteron.identification.estimators.qr import qr_factor
 from pteron.identification.observation import Observations
 from pteron.kernels import Array
+from pteron.result import Result
+from pteron.tolerances import EXACT
 
 TOLERANCE = 1e-8
 """Independent part of a column of length one, relative to the first, that counts as rounding."""
 
-_ROUNDING = 1e-12
-"""Length of a column, relative to the longest, that counts as zero."""
 
-
-@dataclass(frozen=True)
-class Reduced:
+@dataclass(frozen=True, eq=False, repr=False)
+class Reduced(Result):
     """The independent columns of a regressor, and the others as combinations of them.
 
     Attributes
@@ -83,7 +82,7 @@ def independent_columns(observations: Observations, *, tolerance: float = TOLERA
     """
     triangle_factor = qr_factor(observations)
     # Columns that vanish but for rounding would be independent once they are scaled.
-    acts = triangle_factor.scale > _ROUNDING * triangle_factor.scale.max()
+    acts = triangle_factor.scale > EXACT * triangle_factor.scale.max()
     _, factor, order = scipy.linalg.qr(
         triangle_factor.factor * acts, mode="economic", pivoting=True
     )

@@ -11,14 +11,15 @@ from pteron.identification.observation import triangle
 from pteron.kernels import Array
 from pteron.kinematics.evaluate import evaluate_unchecked
 from pteron.reduction import BaseParameters
+from pteron.result import Result
 
 _ROWS = 100
 """Rows that are decomposed at a time: so few that the linear algebra library stays in one thread;
 several, on a machine that is busy, can take a hundred times as long."""
 
 
-@dataclass(frozen=True)
-class Conditioning:
+@dataclass(frozen=True, eq=False, repr=False)
+class Conditioning(Result):
     """Condition numbers: how well a motion's forces tell the base parameters apart.
 
     Attributes

@@ -24,6 +24,7 @@ from pteron.identification.logs import Description, write_description
 from pteron.json_values import fields_as_json
 from pteron.kinematics import assembly_mode
 from pteron.manipulator.machine_record import machine_record
+from pteron.result import Result
 from pteron.tables import write_table
 
 _SLOWER = 5.0
@@ -56,8 +57,8 @@ class Start:
     finished: bool
 
 
-@dataclass(frozen=True, eq=False)
-class Excitation:
+@dataclass(frozen=True, eq=False, repr=False)
+class Excitation(Result):
     """A trajectory that shows the base parameters well, and keeps the limits.
 
     Attributes

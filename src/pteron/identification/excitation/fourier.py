@@ -17,13 +17,14 @@ from pteron.kinematics.evaluate import evaluate_unchecked
 from pteron.manipulator import Manipulator
 from pteron.motion import Motion
 from pteron.motion.trajectories.fourier import fourier_curve
+from pteron.result import Result
 
 Space = Literal["platform", "joints"]
 """The coordinates of a series: those of the platform's pose, or of the joints."""
 
 
-@dataclass(frozen=True, eq=False)
-class FourierMotion:
+@dataclass(frozen=True, eq=False, repr=False)
+class FourierMotion(Result):
     """A periodic motion, q(t) = center + sum over h of a_h cos(h w t) + b_h sin(h w t).
 
     w = 2 pi / period. It is the finite Fourier series of Swevers et al. (1997), whose coefficients

@@ -18,6 +18,7 @@ from pteron.kernels import Array
 from pteron.manipulator import Manipulator
 from pteron.motion import pick_and_place
 from pteron.motion.trajectories.cycle import Cycle, moves
+from pteron.result import Result
 
 _LEAST_CYCLES = 4
 """Least number of cycles."""
@@ -47,8 +48,8 @@ _AT_REST = 1e4
 """Duration of a cycle in which nothing but gravity is felt, s."""
 
 
-@dataclass(frozen=True, eq=False)
-class RepeatedCycle:
+@dataclass(frozen=True, eq=False, repr=False)
+class RepeatedCycle(Result):
     """Pick-and-place cycles one after the other; each begins and ends at rest in the same pose.
 
     Attributes

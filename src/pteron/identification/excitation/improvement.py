@@ -2,16 +2,10 @@
 
 from __future__ import annotations
 
-import os
-import pickle
-import subprocess
-import sys
 import time
-from collections.abc import Generator, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack, suppress
+from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
-from queue import SimpleQueue
 from typing import NamedTuple
 
 import numpy as np
@@ -21,6 +15,7 @@ from pteron.identification.excitation.margins import relative_margins
 from pteron.identification.excitation.random_motions import within_limits
 from pteron.identification.excitation.search_program import Setting, minimised
 from pteron.kernels import Array
+from pteron.processes import LostWorkerError, WorkerPool
 
 _NEAR = 0.5
 """A limit whose margin at the start is above this share of its size is left out until it is
@@ -119,81 +114,30 @@ def improved(starts: Sequence[Improvement], workers: int) -> Generator[Stage, No
     A start whose process fails is improved here; where the iteration is given up, all are ended.
     """
     if workers > 1:
-        starts = yield from _in_processes(starts, workers)
+        starts = yield from _improve_in_processes(starts, workers)
     for start in starts:
         yield from start.stages()
 
 
-def serve() -> None:
-    """Improve the starts that come on standard input; their stages go to standard output."""
-    # Whatever else is printed, by a solver say, must not mix with the answers.
-    answers = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)
-    with answers, suppress(EOFError):
-        while True:
-            for stage in pickle.load(sys.stdin.buffer).stages():
-                pickle.dump(stage, answers)
-                answers.flush()
-
-
-def _in_processes(
+def _improve_in_processes(
     starts: Sequence[Improvement], workers: int
 ) -> Generator[Stage, None, list[Improvement]]:
     """Yield every stage of all starts, and return those starts whose processes fail."""
-    waiting, failed = list(reversed(starts)), []
-    messages: SimpleQueue[Stage | None] = SimpleQueue()
-
-    def work(process: subprocess.Popen[bytes]) -> None:
-        assert process.stdin is not None
-        assert process.stdout is not None
-        try:
-            while waiting:
-                failed.append(start := waiting.pop())
-                pickle.dump(start, process.stdin)
-                process.stdin.flush()
-                while not (stage := pickle.load(process.stdout)).ended:
-                    messages.put(stage)
-                messages.put(stage)
-                failed.remove(start)
-        except (OSError, EOFError, IndexError, pickle.UnpicklingError):
-            pass  # what it was to do has failed, or nothing is left
-        finally:
-            messages.put(None)
-
-    with ExitStack() as ends:
-        # Last in, first out: no processes, then no threads that wait for them.
-        pool = ends.enter_context(ThreadPoolExecutor(workers))
-        works = []
-        for _ in range(workers):
-            process = _started()
-            ends.callback(_end, process)
-            works.append(pool.submit(work, process))
-        for _ in works:
-            yield from iter(messages.get, None)
-        for each in works:
-            each.result()
-    return failed + waiting
+    remaining = dict(enumerate(starts))
+    with suppress(LostWorkerError), WorkerPool(workers, script=False) as pool:
+        for k, stage in pool.messages(_send_stages, starts):
+            if stage.ended:
+                del remaining[k]
+            yield stage
+    return list(remaining.values())
 
 
-def _started() -> subprocess.Popen[bytes]:
-    # A program of its own: neither CasADi's state and the threads of compilations are inherited,
-    # as in a fork, nor is the caller's script run again, as by `multiprocessing`.
-    code = f"import sys; sys.path[:] = {sys.path!r}; from {__name__} import serve; serve()"
-    return subprocess.Popen(
-        [sys.executable, "-c", code],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        # One thread each, and an interrupt from the keyboard is for the caller to deal with.
-        env={**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"},
-        start_new_session=True,
-    )
-
-
-def _end(process: subprocess.Popen[bytes]) -> None:
-    process.kill()
-    with suppress(OSError), process:
-        pass
+def _send_stages(start: Improvement, send: Callable[[Stage], None]) -> Stage:
+    """Send the result of each stage but the last one, which is returned."""
+    for stage in start.stages():
+        if not stage.ended:
+            send(stage)
+    return stage
 
 
 def _near(motion: FourierMotion, setting: Setting) -> tuple[str, ...]:

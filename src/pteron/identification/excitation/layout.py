@@ -20,6 +20,7 @@ from pteron.identification.logs.description import AngleUnit, LengthUnit, TimeUn
 from pteron.manipulator import Manipulator
 from pteron.manipulator.readings import reading_scales, to_readings
 from pteron.tables import Dialect
+from pteron.tolerances import SAME
 
 Contents = Literal["all", "joints", "poses"]
 """Contents of a file beside time: everything, the joint coordinates, or the poses."""
@@ -29,9 +30,6 @@ _PER_UNIT: dict[str, float] = {**PER_SECOND, "mm": 1e3, "um": 1e6, "deg": 180.0 
 
 _MOST_SAMPLES = 10_000_000
 """Greatest number of samples of a file."""
-
-_ROUNDING = 1e-6
-"""Share of a sample that counts as rounding."""
 
 
 @dataclass(frozen=True)
@@ -127,7 +125,7 @@ class Layout:
         self.description(robot)
         samples = movement.duration * rate
         expect_to_fit("rate", rate, 8.0 * samples * (robot.freedom + robot.joint_count))
-        ticks = np.arange(math.ceil(samples - _ROUNDING) + 1)
+        ticks = np.arange(math.ceil(samples - SAME) + 1)
         state = movement.states(ticks / rate)
         joints, scales = to_readings(robot, state.joints), reading_scales(robot)
         values = {"joints": [joints], "poses": [state.pose]}.get(self.contents) or [

@@ -27,6 +27,7 @@ from pteron.kernels import Array, as_array
 from pteron.manipulator import Manipulator
 from pteron.motion.motion import Motion
 from pteron.motion.trajectories.cycle import quintic
+from pteron.result import Result
 
 _LENGTHS = (1, 2, 4, 8)
 """Lengths of a lead in periods, tried in turn: after a whole number it ends where it began. One is
@@ -64,8 +65,8 @@ class Lead(NamedTuple):
     phase: float
 
 
-@dataclass(frozen=True, eq=False)
-class LedMotion:
+@dataclass(frozen=True, eq=False, repr=False)
+class LedMotion(Result):
     """Rest, lead-in, some periods, lead-out, rest: a motion that a controller can run.
 
     If the lead takes whole periods, as from `found_lead`, the motion ends in the pose in which it

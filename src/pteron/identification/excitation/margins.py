@@ -26,14 +26,15 @@ from pteron.kinematics.evaluate import evaluate_unchecked
 from pteron.kinematics.limits import limited_joints
 from pteron.kinematics.singularities import best_type_ii
 from pteron.manipulator import Manipulator
+from pteron.result import Result
 from pteron.workspace.margins import joint_distances
 
 _REFINED = 33
 """Samples between the neighbours of the tightest sample, by which its time is refined."""
 
 
-@dataclass(frozen=True)
-class Margin:
+@dataclass(frozen=True, eq=False, repr=False)
+class Margin(Result):
     """The least margin of a motion to one limit.
 
     Attributes
@@ -57,8 +58,8 @@ class Margin:
     unit: str
 
 
-@dataclass(frozen=True)
-class Margins:
+@dataclass(frozen=True, eq=False, repr=False)
+class Margins(Result):
     """The least margin to every limit that is in force.
 
     Attributes
@@ -68,6 +69,8 @@ class Margins:
     samples : int
         Instants of the motion at which limits are evaluated; more near the tightest ones.
     """
+
+    ROWS = "each"
 
     each: tuple[Margin, ...]
     samples: int

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, get_args
@@ -30,8 +30,9 @@ from pteron.identification.excitation.random_motions import random_excitation
 from pteron.identification.excitation.search_program import Criterion, Setting
 from pteron.kernels import Array, columns_of
 from pteron.manipulator import RobotLike, as_manipulator
+from pteron.progress import Progress
 from pteron.reduction import BaseParameters, base_parameters
-from pteron.shapes import Seed, Workers
+from pteron.shapes import Seed, Workers, seed_number
 
 _MOST_WORKERS = 4
 """Processes, at most, where their number is not given."""
@@ -74,7 +75,7 @@ def optimal_excitation(
     seed: Seed = 0,
     seconds: float = 60.0,
     workers: Workers | None = None,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress | None = None,
 ) -> Excitation:
     """Return a periodic trajectory from whose forces the base parameters are seen best.
 
@@ -162,6 +163,7 @@ def optimal_excitation(
     base = base or base_parameters(robot)
     motion: dict[str, Any] = {"space": space, "harmonics": harmonics, "period": period}
     motion["limits"] = limits
+    seed = seed_number(seed)
     search = _Search(criterion, base, progress or (lambda share: None))
     interrupted = False
     begin = time.monotonic()
@@ -220,7 +222,7 @@ class _Search:
 
     criterion: Criterion
     base: BaseParameters
-    progress: Callable[[float], None]
+    progress: Progress
     short: Array = field(default_factory=lambda: np.zeros(1))
     """The lengths of columns (p,) below which a parameter is shown too little."""
     drawn: list[_Candidate] = field(default_factory=list)

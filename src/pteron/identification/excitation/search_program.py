@@ -47,10 +47,8 @@ _ITERATIONS = 200
 """Most iterations."""
 
 _SETTLED = 1e-6
-"""Decrease of the measure, a logarithm, below which a step is not worth it."""
-
-_RADIUS = 0.2
-"""Radius of the first trust region, over the sizes of motions."""
+"""Decrease of the measure, a logarithm, at which the iteration has converged: of the condition
+number's last digit."""
 
 
 @dataclass(frozen=True)
@@ -93,8 +91,7 @@ def minimised(
     minimum = sequential_minimum(
         NonlinearProgram(measured, constraints.values, constraints.slopes),
         (start / size).ravel(),
-        radius=_RADIUS,
-        settled=_SETTLED,
+        tolerance=_SETTLED,
         iterations=_ITERATIONS,
         stop=lambda: time.monotonic() > deadline,
     )

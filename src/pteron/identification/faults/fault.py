@@ -10,6 +10,7 @@ import numpy as np
 from pteron.json_values import fields_as_json
 from pteron.kernels import Array
 from pteron.renamed import former_attribute
+from pteron.result import Result
 
 FaultName = Literal[
     "delay",
@@ -42,17 +43,20 @@ ORDER: tuple[FaultName, ...] = (
 """The order in which faults are mended, and named: what comes first distorts what comes later."""
 
 _SHIFT = 1.0
-"""Change of a value by a fault, in standard deviations, above which the fault matters."""
+"""Change of a value by a fault, in standard deviations, above which the fault matters: a smaller
+one is within the interval that is stated anyway."""
 
 _CYCLE = 1.0
-"""Error in a reference cycle's forces, percent, above which a fault matters."""
+"""Error in a reference cycle's forces, percent, above which a fault matters: a third of what an
+engineer who feeds forces forward would notice beside friction."""
 
 _HALF_STEP = (0.4, 0.6)
 """Steps of the log between which a delay is half a step, as where forces are held: one that is held
 from one sample to the next belongs to the instant between them. What is less is of sampling too."""
 
 _CYCLE_OF_SAMPLING = 3.0
-"""Percent of a reference cycle's forces above which a delay of sampling matters all the same."""
+"""Percent of a reference cycle's forces above which a delay of sampling matters all the same: the
+limit of what `identify` trusts."""
 
 _SAMPLING = (
     "The {late} are half a sample ({size_ms:.3g} ms) late for the {early}, as where "
@@ -150,8 +154,8 @@ def describe_held_forces(delay: float) -> str:
     return _SAMPLING.format(late=late, early=early, size_ms=1e3 * abs(delay))
 
 
-@dataclass(frozen=True)
-class IsolatedFault:
+@dataclass(frozen=True, eq=False, repr=False)
+class IsolatedFault(Result):
     """A fault that the residuals show.
 
     Attributes
@@ -177,6 +181,8 @@ class IsolatedFault:
     as_well : tuple of str
         Other faults that explain the residuals as well.
     """
+
+    ROWS = "labels sizes deviations"
 
     fault: FaultName
     labels: tuple[str, ...]

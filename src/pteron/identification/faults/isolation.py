@@ -30,13 +30,12 @@ from pteron.identification.signals.preprocessing import LATEST
 from pteron.json_values import fields_as_json
 from pteron.kernels import Array
 from pteron.renamed import former_attribute
+from pteron.result import Result
+from pteron.tolerances import ROOT_OF_ROUNDING
 
 _ROWS, _MORE = 20_000, 100_000
 """Number of rows of all logs that are searched, those in which the joints move most; and the number
 where these have too little motion."""
-
-_EXACT = 1e-7
-"""Residuals, over the forces, below which they are rounding and show no faults."""
 
 _ROUNDS = 6
 """Greatest number of times that a delay is corrected and sought again."""
@@ -53,8 +52,8 @@ _NAMED = 0.05
 has no noise, and the sampling itself makes them."""
 
 
-@dataclass(frozen=True)
-class FaultIsolation:
+@dataclass(frozen=True, eq=False, repr=False)
+class FaultIsolation(Result):
     """The faults that a fit's residuals show.
 
     Attributes
@@ -85,6 +84,8 @@ class FaultIsolation:
     factor : float
         Forces of the bodies over those of the drawing, where all have that factor in common.
     """
+
+    ROWS = "faults"
 
     tried: tuple[str, ...]
     faults: tuple[IsolatedFault, ...]
@@ -248,7 +249,7 @@ def _found_faults(
     """Return the fit without faults, and the faults that residuals show beside each other."""
     columns = parts[0].model
     largest = max(float(np.abs(part.log.forces).max()) for part in parts)
-    exact = np.abs(estimate.residuals).max() < _EXACT * largest
+    exact = np.abs(estimate.residuals).max() < ROOT_OF_ROUNDING * largest
     plain, found_faults = search_faults(columns, observations, () if exact else None, noise)
     if any(fault.family is DELAY for fault in found_faults):
         # Columns hold for small delays: other faults are sought after a long one is corrected.

@@ -9,25 +9,25 @@ from numpy.typing import NDArray
 
 from pteron.errors import DataError
 from pteron.identification.logs.log import Finding, Kind
+from pteron.tolerances import ROUNDING
 
 _CLIPPED_ROWS = 3
-"""Rows for which a force holds its extreme value, in each of the stretches that tell of
-clipping."""
+"""Rows for which a force holds its extreme value, in each of the stretches that tell of clipping:
+two equal rows are common where forces are rounded."""
 
 _CLIPPED_RUNS = 2
-"""Stretches from which on a force counts as clipped."""
+"""Stretches from which on a force counts as clipped: one may be the machine at rest against a
+stop."""
 
 _FROZEN_ROWS = 1000
-"""Rows for which a channel stays, and beyond which it counts as frozen if a joint moves."""
+"""Rows for which a channel stays, and beyond which it counts as frozen if a joint moves: a second
+of a log at 1 kHz, much longer than a joint stands at its reversal."""
 
 _MOVED = 0.01
-"""Share of its span by which a joint must move meanwhile."""
+"""Share of its span by which a joint must move meanwhile: more than any noise of an encoder."""
 _RESTED = 10.0
 """Factor on that share at the beginning and the end of a log: a motion starts slowly, and not with
 all joints at once."""
-
-_ROUNDING = 1e-9
-"""Difference from a declared limit that counts as rounding, over the limits' size."""
 
 Values = NDArray[np.float64]
 """Values of a channel, or of all joints, row by row."""
@@ -78,7 +78,7 @@ class Channel:
         self._greatest = max(self._greatest, float(values.max()))
         if self._limits is not None:
             low, high = self._limits
-            rounding = _ROUNDING * max(abs(low), abs(high))
+            rounding = ROUNDING * max(abs(low), abs(high))
             beyond = (values <= low + rounding) | (values >= high - rounding)
             if not self._beyond:
                 self._first_beyond = self._rows + int(np.argmax(beyond))

@@ -8,16 +8,18 @@ from itertools import pairwise
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from pteron.errors import DataError
 from pteron.identification.errors import OfLog
-from pteron.identification.logs.description import Description
+from pteron.identification.logs.description import Description, joint_symbols
 from pteron.kernels import as_array
+from pteron.kernels.named_columns import column_names, pick_columns
 from pteron.legs.kind import SLIDER, ActuatedJoint
 from pteron.legs.reading import Reading
+from pteron.manipulator import RobotLike, as_manipulator
 from pteron.renamed import former_attribute
-from pteron.shapes import Int, PerCoordinate, PerJoint, Series
+from pteron.shapes import Columns, Int, JointsLike, PerCoordinate, PerJoint, PoseLike, Series
 
 _WIDE = 1.5
 """Length of a time step, in usual steps, beyond which a sample may be missing."""
@@ -156,6 +158,85 @@ class Log(OfLog):
             )
         if (late := np.flatnonzero(np.diff(self.time) <= 0.0)).size:
             raise DataError(f"{self.place(int(late[0]) + 1)}: the time does not rise here")
+
+    @classmethod
+    def of(
+        cls,
+        robot: RobotLike,
+        time: ArrayLike | Columns,
+        joints: JointsLike | None = None,
+        forces: JointsLike | None = None,
+        *,
+        pose: PoseLike | None = None,
+        payload: ArrayLike | None = None,
+        source: str = "log",
+        description: Description | None = None,
+    ) -> Log:
+        """Return a log of arrays or tables, with the names of a machine's joints and coordinates.
+
+        Parameters
+        ----------
+        robot : Manipulator, name or path
+            The machine that moved.
+        time : array, shape (T,), or table
+            s, rising. Or one table of all: columns t, joints, forces, and those of pose and payload
+            where there are any, named as in files of logs.
+        joints : array or table, shape (T, n), optional
+            Joint coordinates, m; rad at a crank.
+        forces : array or table, shape (T, n), optional
+            Actuator forces, N; N m at a crank.
+        pose : array or table, shape (T, m), optional
+            Measured poses, m and rad.
+        payload : array of int, shape (T,), optional
+            1 where the payload is carried, 0 where not.
+        source : str
+            Name in messages.
+        description : Description, optional
+            Facts beside the numbers, such as the period.
+
+        Raises
+        ------
+        DataError
+            If a column is missing, or as the constructor.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from pteron.identification import Log
+        >>> time, joints, forces = np.arange(3) / 1000.0, np.zeros((3, 3)), np.ones((3, 3))
+        >>> Log.of("tripteron", time, joints, forces).joint_names
+        ('rho1', 'rho2', 'rho3')
+        """
+        machine = as_manipulator(robot)
+        if joints is None and forces is None:
+            table = time
+            names = set(column_names(table))
+            if not names:
+                raise DataError(
+                    f"{source}: time alone given; give joints and forces too, or one table of all"
+                )
+            time, joints, forces = _column(table, "t", source), table, table
+            if pose is None and names.issuperset(machine.coordinates):
+                pose = table
+            if payload is None and "payload" in names:
+                payload = _column(table, "payload", source)
+        if joints is None or forces is None:
+            missing = "joints" if joints is None else "forces"
+            raise DataError(f"{source}: {missing}: missing; a column for each joint expected")
+        n, names_of = machine.joint_count, machine.column_names
+        return cls(
+            source,
+            np.asarray(time),
+            as_array(joints, f"{source}: joints", (n,), columns=names_of["joints"]),
+            as_array(forces, f"{source}: forces", (n,), columns=names_of["forces"]),
+            pose=None
+            if pose is None
+            else as_array(pose, f"{source}: pose", (machine.freedom,), columns=names_of["pose"]),
+            payload=None if payload is None else np.asarray(payload),
+            description=description or Description(),
+            symbols=joint_symbols(machine),
+            coordinates=machine.coordinates,
+        )
 
     def _rows_of_numbers(self, name: str, values: Any) -> Any:
         """Return an array of the log as numbers, a row for each time."""
@@ -402,3 +483,8 @@ class TimeStamps:
             )
             findings.append(Finding("jitter", message, row + 1, self._column, self._uneven))
         return tuple(findings)
+
+
+def _column(table: Any, name: str, source: str) -> NDArray[np.float64]:
+    """Return a column of a table as an array (T,)."""
+    return np.asarray(pick_columns(table, (name,), source))[..., 0]

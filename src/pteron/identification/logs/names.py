@@ -89,9 +89,9 @@ def parse_column_name(name: str) -> Called | None:
 
     Examples
     --------
-    >>> called("Rho_1 (mm)")
+    >>> parse_column_name("Rho_1 (mm)")
     Called(word='rho', number=1, family='Rho_# (mm)', unit='mm')
-    >>> called("/joint_states/position[0]").number
+    >>> parse_column_name("/joint_states/position[0]").number
     0
     """
     match = _OF_AXIS.fullmatch(name) or _NUMBERED.fullmatch(name)

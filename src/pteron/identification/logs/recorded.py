@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from pteron.errors import DataError
 from pteron.identification.logs.log import Log, gaps
 from pteron.identification.logs.spikes import LONGEST
+from pteron.tolerances import ROUNDING
 
 _STRONGEST = 1e9
 """Largest force that a cell may hold, N."""
@@ -25,9 +26,6 @@ _STILL = 0.1
 _ALIKE = 0.02
 """Largest difference between the jumps of one encoder, or between a jump and a turn, over the
 jump."""
-
-_TIES = 1e-9
-"""Difference of forces, over their span, below which they count as equal."""
 
 _LEAST = 0.005
 """Least share of the samples at the extreme value, for a force to be at its limit."""
@@ -58,7 +56,7 @@ def check_recorded(log: Log) -> None:
     constant = [
         f"{name} is {force[0]:g} throughout"
         for name, force in zip(log.force_names, log.forces.T, strict=True)
-        if len(force) > 1 and np.ptp(force) <= _TIES * np.abs(force).max(initial=0.0)
+        if len(force) > 1 and np.ptp(force) <= ROUNDING * np.abs(force).max(initial=0.0)
     ]
     if constant:
         raise log.fault(
@@ -93,7 +91,7 @@ def saturation_sentences(log: Log) -> tuple[str, ...]:
             continue
         for word, signed in (("largest", moving), ("least", -moving)):
             values, counts = np.unique(signed, return_counts=True)
-            first = values >= values[-1] - _TIES * np.ptp(force)
+            first = values >= values[-1] - ROUNDING * np.ptp(force)
             top, below = int(counts[first].sum()), counts[~first]
             if top < _LEAST * len(moving) or not below.size or top < _LEVEL * below[-1]:
                 continue

@@ -8,14 +8,11 @@ import scipy  # type: ignore[import-untyped]
 from pteron.identification.logs.spikes import runs
 from pteron.identification.signals.filters import position_noise
 from pteron.kernels import Array
+from pteron.tolerances import SAME
 
 _NOISE = 6.0
 """Distance of two positions, in standard deviations of their noise, below which they are the
 same."""
-
-_ROUNDING = 1e-6
-"""Distance, as a share of the joint's span, below which positions are the same whatever their
-noise."""
 
 _SPIKES = 10
 """Samples in a row that may be elsewhere without an end of the repetition."""
@@ -61,7 +58,7 @@ def repeating_rows(time: Array, joints: Array, period: float) -> slice | None:
     rate = (len(time) - 1) / float(time[-1] - time[0])
     after = scipy.interpolate.make_interp_spline(time, joints, k=5)(time[:last] + period)
     span = np.ptp(joints, axis=0)
-    near = np.maximum(_NOISE * position_noise(joints), _ROUNDING * span)
+    near = np.maximum(_NOISE * position_noise(joints), SAME * span)
     same = (np.abs(after - joints[:last]) <= near).all(axis=1)
     ends = np.pad(same, _SPIKES, mode="edge")
     same = scipy.ndimage.binary_closing(ends, np.ones(_SPIKES + 1))[_SPIKES:-_SPIKES]

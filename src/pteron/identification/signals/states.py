@@ -21,6 +21,7 @@ from pteron.kernels import Array
 from pteron.kinematics import assembly_modes, direct_kinematics, follow, mode_of
 from pteron.kinematics.evaluate import evaluate_unchecked
 from pteron.manipulator import Manipulator
+from pteron.result import Result
 from pteron.shapes import PoseLike, Poses
 from pteron.workspace import home_pose
 
@@ -54,8 +55,8 @@ class FullMotion(NamedTuple):
         return cls(*path, joints, rates, evaluate_unchecked(robot, "joint_accelerations", *path)[0])
 
 
-@dataclass(frozen=True)
-class States:
+@dataclass(frozen=True, eq=False, repr=False)
+class States(Result):
     """States at R samples: of the joints, where they were measured, and of the platform.
 
     Attributes
@@ -69,6 +70,10 @@ class States:
     payload : array of int, shape (R,)
         The phase: 0 without payload.
     """
+
+    ROWS = (
+        "time pose:1 velocity:1 acceleration:1 joints:1 joint_rates:1 joint_accelerations:1 payload"
+    )
 
     time: Array
     joints: Array

@@ -13,9 +13,7 @@ from pteron.errors import DataError
 from pteron.kernels.loop_code import LinkedLaw
 from pteron.manipulator import RobotLike
 from pteron.manipulator.readings import reading_scales, reading_zeros
-
-_SAME = 1e-9
-"""Relative difference of two periods that is rounding."""
+from pteron.tolerances import ROUNDING
 
 
 @dataclass(frozen=True)
@@ -82,12 +80,12 @@ class Exported:
 
     def law(self, model: RobotLike) -> ExportedLaw | ExportedCustomLaw:
         """Return its law, which runs in the loop alone."""
-        plain_law, what = self.controller.law(model), self.controller.what
+        plain_law, law_name = self.controller.law(model), self.controller.law_name
         header, source, function = self._text  # type: ignore[attr-defined]
         tables = []
         for port in plain_law.program.inputs:
             if port.shared:
-                stem = function.removesuffix(what)
+                stem = function.removesuffix(law_name)
                 names = (f"{function}_{port.name}", f"{stem}{port.name}")
                 names_there = [
                     name for name in names if re.search(rf"extern const double {name}\[", header)
@@ -119,7 +117,7 @@ class Exported:
         period_match = re.search(
             rf"\b{table}\[\d+\] = {{[^}}]*?([-+.\w]+),?\s*/\* period \*/", source
         )
-        if period_match and abs(float(period_match[1]) - self.period) > _SAME * self.period:
+        if period_match and abs(float(period_match[1]) - self.period) > ROUNDING * self.period:
             raise DataError(
                 f"{self.folder}: {table} is for a period of {float(period_match[1]):g} s, the "
                 f"controller's is {self.period:g} s; export it again, or give the controller that "
@@ -128,10 +126,10 @@ class Exported:
 
     def _read_code(self) -> tuple[str, str, str]:
         """Return header and source, without the line that includes it, and the function."""
-        what = self.controller.what
+        law_name = self.controller.law_name
         for path in sorted(Path(self.folder).glob("*.h")):
             header = path.read_text(encoding="utf-8")
-            signature = re.search(rf"\bint (\w+_{what})\((\w+ )*(double|float)", header)
+            signature = re.search(rf"\bint (\w+_{law_name})\((\w+ )*(double|float)", header)
             if signature and path.with_suffix(".c").exists():
                 if signature[3] == "float":
                     raise DataError(
@@ -139,11 +137,12 @@ class Exported:
                     )
                 if not re.search(rf"{signature[1]}\([^)]*\bforces\b", header):
                     raise DataError(
-                        f'{path}: {what} gives commands of the motors; export with output="force"'
+                        f"{path}: {law_name} gives commands of the motors; export with "
+                        'output="force"'
                     )
                 source = path.with_suffix(".c").read_text(encoding="utf-8")
                 return header, re.sub(r'#include "[^"]*"', "", source), signature[1]
         raise DataError(
-            f"{self.folder}: no C of {what} there; write it with pteron.export_c(robot, "
+            f"{self.folder}: no C of {law_name} there; write it with pteron.export_c(robot, "
             "[controller], folder)"
         )

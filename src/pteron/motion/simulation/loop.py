@@ -34,9 +34,11 @@ from pteron.motion.simulation.stops import (
     why_not_further,
 )
 from pteron.motion.trajectories.limits import limits_of
+from pteron.progress import Progress
+from pteron.tolerances import ROUNDING
 
-_WHOLE = 1e-9
-"""Part of a sample, from rounding, by which a delay of whole samples may miss them."""
+_BLOCK = 1000
+"""Samples after which a run returns from compiled code: some 10 ms, at most a second."""
 
 _ASKED, _MOVED = 1.0, 2.0
 """Fault codes of a run: no force command, or the state could not be integrated further."""
@@ -104,10 +106,10 @@ class Timing:
             for delay in (self.delay, self.sensing)
         )
         reading_time = period - reading_age
-        reading_time = late if abs(reading_time - late) < _WHOLE * period else reading_time
+        reading_time = late if abs(reading_time - late) < ROUNDING * period else reading_time
         bounds = [0.0, min(late, reading_time), max(late, reading_time), period]
         spans, step = np.diff(bounds), min(self.step, period)
-        counts = [int(np.ceil(span / step - _WHOLE)) for span in spans]
+        counts = [int(np.ceil(span / step - ROUNDING)) for span in spans]
         lengths = [float(span) / max(n, 1) for span, n in zip(spans, counts, strict=True)]
         force_span = 0 if late == 0.0 else 2 if late > reading_time else 1
         return [*lengths, period], [
@@ -121,9 +123,9 @@ class Timing:
 
 def split_delay(delay: float, period: float) -> tuple[float, int]:
     """Return a delay's part of a sample, and its whole samples."""
-    samples = int(delay / period + _WHOLE)
+    samples = int(delay / period + ROUNDING)
     part = max(delay - samples * period, 0.0)
-    return (part if part > _WHOLE * period else 0.0), samples
+    return (part if part > ROUNDING * period else 0.0), samples
 
 
 def run_simulation(
@@ -136,6 +138,7 @@ def run_simulation(
     timing: Timing,
     *,
     limits: bool,
+    progress: Progress | None = None,
 ) -> Simulation:
     """Simulate; `limits` says whether joints' limits and singularities of type II end it.
 
@@ -165,7 +168,7 @@ def run_simulation(
     ask, memories = None, [memory]
     if isinstance(source, ControlLaw) and law is None:
         ask = _callback(source, reference, n, memories)
-    _run_segments(simulator, arrays, outputs, loads, timing, times, counts, ask)
+    _run_segments(simulator, arrays, outputs, loads, timing, times, counts, ask, progress)
     end = int(arrays["done"].item())
     columns = _simulation_columns(robot, {name: array[0, :end] for name, array in outputs.items()})
     why = _fault_text(robot, arrays, columns["joints"], has_callback=ask is not None)
@@ -199,25 +202,32 @@ def _run_segments(
     times: list[float],
     counts: list[int],
     ask: Callable[[int, int, Array], Array] | None,
+    progress: Progress | None,
 ) -> None:
-    """Run the loop with the machine of each payload in turn; it fills `outputs`."""
+    """Run the loop with the machine of each payload in turn; it fills `outputs`.
+
+    It returns from compiled code after `_BLOCK` samples, for interrupts and progress.
+    """
     count = len(loads.masses)
     changes = np.flatnonzero(np.diff(loads.masses)) + 1
-    for first, stop in pairwise([0, *changes.tolist(), count]):
-        machine = loads.machines[float(loads.masses[first])]
-        inputs = arrays | machine_numbers(machine, simulator.plant, "plant") | outputs
-        inputs |= {
-            name: inputs[name][:, first:stop]
-            for name in (*outputs, "reference", "given", "noise", "wrench")
-            if inputs[name].shape[1] > 1
-        }
+    for start, end in pairwise([0, *changes.tolist(), count]):
+        machine = loads.machines[float(loads.masses[start])]
+        numbers = arrays | machine_numbers(machine, simulator.plant, "plant") | outputs
         advance_state = (
             AdaptivePlant(machine, timing.tolerance).go if timing.method == "dop853" else None
         )
-        call_counts = [*counts, first, int(stop == count)]
-        simulator.run(inputs, stop - first, times, call_counts, ask, go=advance_state)
-        if arrays["fault"].any():
-            return
+        for first, stop in pairwise([*range(start, end, _BLOCK), end]):
+            inputs = numbers | {
+                name: numbers[name][:, first:stop]
+                for name in (*outputs, "reference", "given", "noise", "wrench")
+                if numbers[name].shape[1] > 1
+            }
+            call_counts = [*counts, first, int(stop == count)]
+            simulator.run(inputs, stop - first, times, call_counts, ask, go=advance_state)
+            if arrays["fault"].any():
+                return
+            if progress is not None:
+                progress(stop / count)
 
 
 def _simulation_columns(robot: Manipulator, columns: dict[str, Array]) -> dict[str, Array]:

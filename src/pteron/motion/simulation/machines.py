@@ -21,7 +21,7 @@ from pteron.manipulator import (
     parameters,
 )
 from pteron.motion.payload import with_payload
-from pteron.shapes import Seed
+from pteron.shapes import Seed, seed_number
 
 _MOST = 10_000_000
 """Most machines at once."""
@@ -192,6 +192,7 @@ def machines_about(
     total = max(place) + 1
     changes = variations(robot) if lengths or directions else ()
     ends = np.cumsum([total, len(names) * n, 1, len(changes)])
+    seed = seed_number(seed)
     every = [np.random.default_rng((seed, i)).uniform(-1.0, 1.0, ends[-1]) for i in range(count)]
     body_factors, drive_factors, payload_factors, geometry_factors = np.split(
         np.stack(every), ends[:-1], axis=1

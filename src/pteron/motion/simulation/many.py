@@ -30,6 +30,7 @@ from pteron.motion.simulation.sensors import (
 )
 from pteron.motion.simulation.simulate import STEP, check_delay, check_positive, reference_of
 from pteron.motion.simulation.stable_steps import allowed_step
+from pteron.result import Result
 from pteron.shapes import Workers
 
 if TYPE_CHECKING:
@@ -42,8 +43,8 @@ _WHY = ("", "no forces were asked for", "a leg came to the edge of its reach, or
 """Why a machine ended, by its fault."""
 
 
-@dataclass(frozen=True)
-class Batch:
+@dataclass(frozen=True, eq=False, repr=False)
+class Batch(Result):
     """Figures of many simulated machines, a row each, over the samples that each has.
 
     Attributes
@@ -61,6 +62,8 @@ class Batch:
     files : tuple of Path
         The samples, if they were asked for.
     """
+
+    ROWS = "samples rms:1 largest:1 force:1 stopped"
 
     machines: Machines
     samples: NDArray[np.int64]

@@ -22,6 +22,7 @@ from pteron.motion.simulation.plant import Method
 from pteron.motion.simulation.sensors import Sensors
 from pteron.motion.simulation.simulation import Simulation
 from pteron.motion.simulation.stable_steps import allowed_step
+from pteron.progress import Progress
 from pteron.shapes import JointsLike, PoseLike
 
 STEP = 1e-4
@@ -78,6 +79,7 @@ def simulate(
     method: Method = "rk4",
     tolerance: float = 1e-10,
     error: float | None = None,
+    progress: Progress | None = None,
 ) -> Simulation:
     """Simulate a machine with its drives under a controller, or under given forces, or free.
 
@@ -132,6 +134,8 @@ def simulate(
         Greatest error of the poses that the steps may cause at any sample, m and rad: the steps are
         shortened, from `step` on, until twice in a row no pose changes by more than half of it. For
         "rk4".
+    progress : callable, optional
+        Takes the share of the samples that is done; with `error` anew for each length of step.
 
     Returns
     -------
@@ -185,7 +189,8 @@ def simulate(
 
     def run_with(timing: Timing) -> Simulation:
         arguments = (pose, velocity), reference, source, loads, sensors, timing
-        return run_simulation(robot, *arguments, limits=limits and controller is not None)
+        ends = limits and controller is not None
+        return run_simulation(robot, *arguments, limits=ends, progress=progress)
 
     return run_with(timing) if error is None else _refine_steps(run_with, timing, error, period)
 

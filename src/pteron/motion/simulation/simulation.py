@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pteron.html_table import Column, html_table
+from pteron.html_table import Column, Overview
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
 from pteron.manipulator.readings import reading_scales, to_readings
@@ -15,13 +15,14 @@ from pteron.motion.motion import Motion
 from pteron.motion.simulation.motor_forces import limit_to_motors
 from pteron.motion.trajectories.limits import limits_of
 from pteron.renamed import former_attribute
+from pteron.result import Result
 
 if TYPE_CHECKING:
     import polars as pl
 
 
-@dataclass(frozen=True, repr=False)
-class Simulation:
+@dataclass(frozen=True, eq=False, repr=False)
+class Simulation(Result):
     """A machine's motion under the forces of its drives, at each sample of the controller.
 
     Attributes
@@ -77,7 +78,11 @@ class Simulation:
         rows = f"{self.time[-1]:.6g} s, {len(self.time)} samples"
         return f"<Simulation of {self.robot.name!r}: {rows}{end}>"
 
-    def _repr_html_(self) -> str:
+    def summary(self) -> str:
+        """Return errors and drives' loads, for people, as lines of text."""
+        return self._overview().text
+
+    def _overview(self) -> Overview:
         headings = ("error, rms", "error, largest", "peak speed", "peak force", "at its limit")
         columns = [Column("coordinate"), *(Column(name, "number") for name in headings[:2])]
         columns += [Column("joint"), *(Column(name, "number") for name in headings[2:])]
@@ -104,7 +109,7 @@ class Simulation:
         ]
         about = f"simulated for {self.time[-1]:.6g} s, {len(self.time)} samples"
         notes = [f"Stopped: {self.stopped}"] if self.stopped else []
-        return html_table(self.robot.name, about, columns, rows, notes)
+        return Overview(self.robot.name, about, columns, rows, notes)
 
     @property
     def error(self) -> Array:

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from pteron.dynamics import mass_matrix
+from pteron.dynamics.joint_space import joint_mobilities, mass_with_rotors
 from pteron.equations.drives import Drives, drives_of
 from pteron.equations.transmissions import DriveKind
 from pteron.errors import DataError, PteronError
@@ -52,7 +53,7 @@ def _longest_stable_step(
     if drives.viscous.any() or kind.bends or any(kind.lugre):
         rows, mass = jacobian(robot, poses), mass_matrix(robot, poses)
         if machines is not None:
-            index = np.einsum("...ij,...ji->...", rows, np.linalg.solve(mass, rows.mT)).argmax()
+            index = joint_mobilities(rows, mass).sum(axis=-1).argmax()
             rows = rows.reshape(-1, *rows.shape[-2:])[index]
             places = as_array(poses, "poses", (robot.freedom,)).reshape(-1, robot.freedom)
             each = Evaluated("mass", program(robot, "mass_matrix"))(
@@ -99,8 +100,7 @@ def _step_of_drives(
                 longest = longest[0], f"leg {soft.argmax() + 1}: the stiffness of its transmission"
     if any(kind.lugre):
         rotors = np.where(kind.elastic, 0.0, drives.inertia)
-        mass = mass + rows.mT @ (rotors[..., None] * rows)
-        mobilities = np.einsum("...ij,...ji->...i", rows, np.linalg.solve(mass, rows.mT))
+        mobilities = joint_mobilities(rows, mass_with_rotors(rows, mass, rotors))
         for i, leg in enumerate(robot.legs):
             if leg.drive and leg.drive.lugre:
                 ease = 1.0 / drives.inertia[..., i] if kind.elastic[i] else mobilities[..., i]

@@ -11,13 +11,11 @@ from pteron.kinematics.singularities import best_type_ii
 from pteron.manipulator import Manipulator
 from pteron.motion.motion import pose_text
 from pteron.shapes import PerJoint
+from pteron.tolerances import ROUNDING
 from pteron.workspace.margins import joint_distances
 
 _FAST = 1e3
 """Speed, m/s or rad/s, beyond which the numbers count as diverging."""
-
-_ROUNDING = 1e-9
-"""Distance beyond a joint's limit that counts as rounding, m or rad."""
 
 
 def why_not_further(robot: Manipulator, pose: Array, velocity: Array) -> str:
@@ -37,8 +35,8 @@ def why_not_further(robot: Manipulator, pose: Array, velocity: Array) -> str:
 
 def first_beyond_limits(robot: Manipulator, poses: Array, joints: PerJoint) -> int | None:
     """Return the first of some poses (T, m) at which a joint is beyond its limits, or None."""
-    beyond = (joint_distances(robot, joints) < -_ROUNDING).any(axis=-1)
-    beyond |= (numeric(robot, "passive_room")(poses)[1] < -_ROUNDING).any(axis=-1)
+    beyond = (joint_distances(robot, joints) < -ROUNDING).any(axis=-1)
+    beyond |= (numeric(robot, "passive_room")(poses)[1] < -ROUNDING).any(axis=-1)
     return int(beyond.argmax()) if beyond.any() else None
 
 

@@ -13,35 +13,29 @@ from typing import TYPE_CHECKING
 import numpy as np
 import scipy  # type: ignore[import-untyped]
 
-from pteron.html_table import Column, html_table
+from pteron.html_table import Column, Overview
 from pteron.json_values import fields_as_json
 from pteron.kernels import Array
 from pteron.legs import Drive
 from pteron.legs.motor_limits import motor_peak
 from pteron.manipulator import Manipulator
 from pteron.motion.sizing.drive_margins import DriveMargin, drive_margins
-from pteron.motion.sizing.places import Place
+from pteron.motion.sizing.places import CyclePlace
+from pteron.renamed import former_attribute
+from pteron.result import Result
 from pteron.shapes import PerJoint
+from pteron.tolerances import ROUNDING
 
 if TYPE_CHECKING:
     import polars as pl
-
-_STILL = 1e-9
-"""Share of the fastest joint's acceleration below which a joint counts as still: rounding."""
 
 HOLDING = 100.0
 """Ratio to the best one of the places where a joint moves, up to which a ratio is sought if it
 rests at others."""
 
-_SAME = 1e-9
-"""Relative difference below which ratios are the same."""
 
-_NONE = 1e-9
-"""Share of the drives' energy below which its net sum counts as zero: rounding."""
-
-
-@dataclass(frozen=True, repr=False)
-class Sizing:
+@dataclass(frozen=True, eq=False, repr=False)
+class Sizing(Result):
     """The load on a machine's drives over one cycle: motions and rests, at one place or at several.
 
     Everything is at the joints, per leg: N and m/s of a slider, N m and rad/s of a crank, but for
@@ -64,7 +58,7 @@ class Sizing:
     load_inertia : array, shape (2, n)
         Least and greatest inertia of the rigid bodies at each joint, the other joints being held:
         the diagonal of J^-T M J^-1; kg or kg m^2.
-    places : tuple of Place
+    places : tuple of CyclePlace
         Where the cycle is done; empty where it is done as it stands.
     assumed_friction : array, shape (n,)
         Dry friction that was assumed where the machine's file has none, N or N m.
@@ -77,14 +71,18 @@ class Sizing:
     accelerations: Array
     dwell: float
     load_inertia: Array
-    places: tuple[Place, ...]
+    places: tuple[CyclePlace, ...]
     assumed_friction: PerJoint
 
     def __repr__(self) -> str:
         """Return the sizing in a line; `table` has it all."""
         return f"<Sizing of {self.robot.name!r}: a cycle of {self.duration:.6g} s>"
 
-    def _repr_html_(self) -> str:
+    def summary(self) -> str:
+        """Return the loads of each drive, for people, as lines of text."""
+        return self._overview().text
+
+    def _overview(self) -> Overview:
         headings = ("peak force", "rms force", "peak speed", "peak power", "mean power")
         columns = [Column("joint"), *(Column(name, "number") for name in headings)]
         columns_of_numbers = (
@@ -100,7 +98,7 @@ class Sizing:
             cells = (f"{number:.4g} {unit}" for number, unit in zip(row, units, strict=True))
             rows.append((name, *cells))
         about = f"drives over a cycle of {self.duration:.6g} s"
-        return html_table(self.robot.name, about, columns, rows, self.overloads)
+        return Overview(self.robot.name, about, columns, rows, self.overloads)
 
     @property
     def duration(self) -> float:
@@ -112,11 +110,14 @@ class Sizing:
         """Load forces: `forces` without the motors' inertia, so independent of the ratio."""
         return self.forces - self.rotor_inertia * self.accelerations
 
-    def at(self, place: int) -> Sizing:
+    def select_place(self, place: int) -> Sizing:
         """Return the sizing at one of several places, by its index."""
         parts = (self.forces, self.speeds, self.accelerations)
         forces, speeds, accelerations = (part[:, place] for part in parts)
         return replace(self, forces=forces, speeds=speeds, accelerations=accelerations, places=())
+
+    at = former_attribute("at", "select_place")
+    where = former_attribute("where", "place_text")
 
     def worst(self, quantity: str) -> PerJoint:
         """Return, for each drive, the index in `places` where a quantity is greatest.
@@ -147,15 +148,15 @@ class Sizing:
     def _greatest(self, quantity: str) -> PerJoint:
         return np.asarray(self._quantities_at_places[quantity].max(axis=0))
 
-    def integral(self, values: Array) -> Array:
+    def integral(self, samples: Array) -> Array:
         """Return the integral over the cycle, by Simpson's rule, of values (K, ...) at `time`."""
         spans = (self.time[2::2] - self.time[:-2:2]) / 6.0
-        ends = values[:-2:2] + 4.0 * values[1::2] + values[2::2]
+        ends = samples[:-2:2] + 4.0 * samples[1::2] + samples[2::2]
         return np.asarray(np.tensordot(spans, ends, axes=1))
 
-    def mean(self, values: Array) -> Array:
+    def mean(self, samples: Array) -> Array:
         """Return the mean over the cycle of values (K, ...) at `time`."""
-        return np.asarray(self.integral(values) / self.duration)
+        return np.asarray(self.integral(samples) / self.duration)
 
     @property
     def peak_forces(self) -> PerJoint:
@@ -218,7 +219,7 @@ class Sizing:
             self._quantities_at_places[f"{key}_energy"].sum(axis=1) for key in ("given", "braked")
         )
         net = float((driving - braking).max())
-        return net if abs(net) > _NONE * float(driving.max()) else 0.0
+        return net if abs(net) > ROUNDING * float(driving.max()) else 0.0
 
     @property
     def mean_power(self) -> PerJoint:
@@ -278,17 +279,17 @@ class Sizing:
         """Loads beyond the drives' limits, a line each: which leg, which limit, and by how much."""
         exceeded = [margin for margin in self.margins if margin.margin < 1.0]
         exceeded.sort(key=lambda margin: margin.quantity == "rms_force")
-        return tuple(margin.told(self.where(margin)) for margin in exceeded)
+        return tuple(margin.overload_text(self.place_text(margin)) for margin in exceeded)
 
-    def where(self, one: DriveMargin) -> str:
+    def place_text(self, margin: DriveMargin) -> str:
         """Return in words at which of several places a margin is so small; else an empty text."""
         if not self.places:
             return ""
-        leg = one.leg - 1
-        if one.quantity == "force_at_speed":
+        leg = margin.leg - 1
+        if margin.quantity == "force_at_speed":
             peak = motor_peak(self.drives[leg], self.forces[..., leg], self.speeds[..., leg])
             return f" {self.places[peak.at % len(self.places)]}"
-        return f" {self.places[self.worst(one.quantity)[leg]]}"
+        return f" {self.places[self.worst(margin.quantity)[leg]]}"
 
     def table(self) -> pl.DataFrame:
         """Return a table, one row a leg: SI units, at the joint but for motor_torque.
@@ -358,7 +359,7 @@ def best_ratio(sizing: Sizing, leg: int, rotor_inertia: float) -> float:
     295.1
     """
     force, _, acceleration = sizing.squares(leg)
-    moving = acceleration > _STILL**2 * max(
+    moving = acceleration > ROUNDING**2 * max(
         float(sizing.squares(i)[2].max()) for i in range(1, sizing.robot.joint_count + 1)
     )
     if rotor_inertia == 0.0 or not moving.any():
@@ -367,14 +368,14 @@ def best_ratio(sizing: Sizing, leg: int, rotor_inertia: float) -> float:
     least, most = float(optimal_ratios.min()), float(optimal_ratios.max())
     if not moving.all():  # where it only holds, more is better
         most *= HOLDING
-    if most - least <= _SAME * most:
+    if most - least <= ROUNDING * most:
         return most
     # The greatest of convex functions of i^2.
     solution = scipy.optimize.minimize_scalar(
         lambda log: float(mean_squares(sizing, leg, math.exp(log), rotor_inertia).max()),
         bounds=(math.log(least), math.log(most)),
         method="bounded",
-        options={"xatol": _SAME},
+        options={"xatol": ROUNDING},
     )
     return math.exp(solution.x)
 

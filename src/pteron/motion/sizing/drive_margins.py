@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import NamedTuple
+from dataclasses import dataclass
 
 from pteron.kernels import Array
 from pteron.legs import Drive
 from pteron.legs.motor_limits import motor_peak
 from pteron.manipulator import Manipulator
+from pteron.renamed import former_attribute
+from pteron.result import Result
 from pteron.shapes import PerJoint
 
 
-class DriveMargin(NamedTuple):
+@dataclass(frozen=True, eq=False, repr=False)
+class DriveMargin(Result):
     """A limit of a drive in the machine's file over the cycle's load, at the joint."""
 
     leg: int
@@ -27,12 +30,14 @@ class DriveMargin(NamedTuple):
     needed: float
     unit: str
 
+    told = former_attribute("told", "overload_text")
+
     @property
     def margin(self) -> float:
         """The limit over what is needed: from 1 on it is enough."""
         return self.most / self.needed if self.needed > 0.0 else math.inf
 
-    def told(self, where: str) -> str:
+    def overload_text(self, where: str) -> str:
         """Return in a line that the limit is too small for what is needed at a place."""
         needed = f"{self.needed:.4g} {self.unit}"
         if self.quantity == "rms_force":

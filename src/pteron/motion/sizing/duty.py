@@ -15,6 +15,7 @@ import numpy as np
 
 from pteron.arguments import expect_to_fit
 from pteron.dynamics import drive_forces, mass_matrix
+from pteron.dynamics.joint_space import moved_inertias
 from pteron.errors import DataError, SingularPose, UnreachablePose
 from pteron.kernels import Array
 from pteron.kinematics import jacobian, joint_accelerations, joint_rates
@@ -22,7 +23,7 @@ from pteron.legs import Drive
 from pteron.manipulator import Manipulator
 from pteron.motion.motion import Motion
 from pteron.motion.sizing.drive_loads import Sizing
-from pteron.motion.sizing.places import Course, Place
+from pteron.motion.sizing.places import Course, CyclePlace
 from pteron.motion.trajectories.tool import Curve
 
 _SAMPLES = 241
@@ -70,20 +71,20 @@ class DutyCycle:
             )
         return replace(self, motions=tuple(motions))
 
-    def loads_at(self, places: Sequence[Place] = ()) -> Sizing:
+    def loads_at(self, places: Sequence[CyclePlace] = ()) -> Sizing:
         """Return the loads at places, or as it stands if none is given."""
         curves: list[Curve] = [(m.pose, m.velocity, m.acceleration) for m in self.motions]
         if places:
             count = sum(2.0 * curve[0].size for curve in curves)
             expect_to_fit("places", len(places), 10.0 * count * len(places))
-            curves = list(self.course.at(places))
+            curves = list(self.course.curves_at(places))
             try:
                 return self._loads_of_curves(curves, places)
             except (UnreachablePose, SingularPose) as error:
                 raise DataError(f"places: {places[error.index[-1]]}: {error}") from None
         return self._loads_of_curves(curves, places)
 
-    def _loads_of_curves(self, curves: Sequence[Curve], places: Sequence[Place]) -> Sizing:
+    def _loads_of_curves(self, curves: Sequence[Curve], places: Sequence[CyclePlace]) -> Sizing:
         """Return the loads over motions (T, m), or (T, W, m) of places."""
         clock, inertias = float(self.motions[0].time[0]), []
         blocks: list[tuple[Array, ...]] = []
@@ -138,11 +139,8 @@ class DutyCycle:
 
     def _inertia(self, poses: Array) -> tuple[Array, Array]:
         """Return the least and the greatest inertia that each joint moves (n,), the others held."""
-        inverse = np.linalg.inv(jacobian(self.robot, poses))
-        joint_inertias = np.einsum(
-            "...ai,...ab,...bi->...i", inverse, mass_matrix(self.robot, poses), inverse
-        )
-        joint_inertias = joint_inertias.reshape(-1, self.robot.joint_count)
+        rows, mass = jacobian(self.robot, poses), mass_matrix(self.robot, poses)
+        joint_inertias = moved_inertias(rows, mass).reshape(-1, self.robot.joint_count)
         return joint_inertias.min(axis=0), joint_inertias.max(axis=0)
 
     def _assumed_friction(self, forces: Array) -> Array:

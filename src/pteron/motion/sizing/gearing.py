@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pteron.motion.sizing.drive_loads import Sizing, mean_squares
+from pteron.renamed import former_attribute
 
 
 class Span(NamedTuple):
@@ -29,9 +30,12 @@ class Span(NamedTuple):
         """Say whether a ratio is one of them."""
         return isinstance(ratio, float) and self.least <= ratio <= self.greatest
 
-    def within(self, other: Span) -> Span:
+    def intersect(self, other: Span) -> Span:
         """Return the intersection of both spans."""
         return Span(max(self.least, other.least), min(self.greatest, other.greatest))
+
+
+Span.within = former_attribute("within", "intersect")  # type: ignore[attr-defined]
 
 
 NONE = Span(math.inf, 0.0)

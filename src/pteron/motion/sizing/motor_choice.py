@@ -13,13 +13,12 @@ from pteron.arguments import expect
 from pteron.motion.sizing.drive_loads import HOLDING, Sizing, best_ratio, mean_squares
 from pteron.motion.sizing.gearing import Span, peak_span, rated_span, speed_span, torques
 from pteron.motion.sizing.motors import Motor
+from pteron.result import Result
+from pteron.tolerances import ROUNDING
 
-_SAME = 1e-9
-"""Relative difference below which ratios are the same."""
 
-
-@dataclass(frozen=True)
-class Fit:
+@dataclass(frozen=True, eq=False, repr=False)
+class MotorFit(Result):
     """A motor at a joint over a cycle: the ratios at which it serves, and its margins.
 
     Attributes
@@ -74,8 +73,8 @@ class Fit:
         }
 
 
-@dataclass(frozen=True)
-class CommonFit:
+@dataclass(frozen=True, eq=False, repr=False)
+class CommonFit(Result):
     """A motor at several legs over a cycle, behind the same ratio at each.
 
     Attributes
@@ -89,23 +88,25 @@ class CommonFit:
     ratio : float
         The one among them at which the largest of the legs' root mean square torques is least,
         rad/m or rad/rad.
-    fits : tuple of Fit
+    fits : tuple of MotorFit
         The motor at each leg, at this ratio.
     """
+
+    ROWS = "fits"
 
     legs: tuple[int, ...]
     motor: Motor
     span: Span
     ratio: float
-    fits: tuple[Fit, ...]
+    fits: tuple[MotorFit, ...]
 
     @property
-    def worst(self) -> Fit:
+    def worst(self) -> MotorFit:
         """The leg where its least margin is smallest."""
         return min(self.fits, key=lambda fit: fit.margin)
 
 
-def choose(sizing: Sizing, motors: Sequence[Motor], *, margin: float = 1.0) -> tuple[Fit, ...]:
+def choose(sizing: Sizing, motors: Sequence[Motor], *, margin: float = 1.0) -> tuple[MotorFit, ...]:
     """Return how each motor suits each joint: first what serves, the smallest motor before others.
 
     A motor serves at a ratio if, times the margin, its root mean square torque over the cycle, the
@@ -126,7 +127,7 @@ def choose(sizing: Sizing, motors: Sequence[Motor], *, margin: float = 1.0) -> t
 
     Returns
     -------
-    tuple of Fit
+    tuple of MotorFit
         One for each joint and motor, joint by joint.
 
     Raises
@@ -170,8 +171,8 @@ def _order(fit: CommonFit) -> tuple[bool, float]:
 def _fit(sizing: Sizing, legs: tuple[int, ...], motor: Motor, margin: float) -> CommonFit:
     span = fast = Span(0.0, math.inf)
     for leg in legs:
-        fast = fast.within(speed_span(sizing, leg, motor.max_speed / margin))
-        span = span.within(serving_span(sizing, leg, motor, margin))
+        fast = fast.intersect(speed_span(sizing, leg, motor.max_speed / margin))
+        span = span.intersect(serving_span(sizing, leg, motor, margin))
     least, greatest = span if span else fast
     ratio = min(max(_best_ratio(sizing, legs, motor.rotor_inertia), least), greatest)
     if not math.isfinite(ratio):  # the joints only hold: any ratio from the least on serves
@@ -184,8 +185,8 @@ def serving_span(sizing: Sizing, leg: int, motor: Motor, margin: float) -> Span:
     """Return the ratios at which a motor keeps its speed and its torques."""
     rotor = motor.rotor_inertia
     span = speed_span(sizing, leg, motor.max_speed / margin)
-    span = span.within(rated_span(sizing, leg, rotor, motor.rated_torque / margin))
-    return span.within(peak_span(sizing, leg, rotor, motor.peak_torque / margin))
+    span = span.intersect(rated_span(sizing, leg, rotor, motor.rated_torque / margin))
+    return span.intersect(peak_span(sizing, leg, rotor, motor.peak_torque / margin))
 
 
 def _best_ratio(sizing: Sizing, legs: tuple[int, ...], rotor_inertia: float) -> float:
@@ -197,7 +198,7 @@ def _best_ratio(sizing: Sizing, legs: tuple[int, ...], rotor_inertia: float) -> 
     least, most = min(moving), max(moving)
     if len(moving) < len(optimal_ratios):  # where a leg only holds, more is better
         most *= HOLDING
-    if most - least <= _SAME * most:
+    if most - least <= ROUNDING * most:
         return most
 
     def largest(log: float) -> float:
@@ -207,17 +208,17 @@ def _best_ratio(sizing: Sizing, legs: tuple[int, ...], rotor_inertia: float) -> 
     # The largest of convex functions of i^2, which all fall before these bounds and rise behind.
     bounds = math.log(least), math.log(most)
     solution = scipy.optimize.minimize_scalar(
-        largest, bounds=bounds, method="bounded", options={"xatol": _SAME}
+        largest, bounds=bounds, method="bounded", options={"xatol": ROUNDING}
     )
     return math.exp(solution.x)
 
 
-def fit_at(sizing: Sizing, leg: int, motor: Motor, span: Span, ratio: float) -> Fit:
+def fit_at(sizing: Sizing, leg: int, motor: Motor, span: Span, ratio: float) -> MotorFit:
     """Return a motor's margins at a ratio."""
     rotor = motor.rotor_inertia
     rms, peak = torques(sizing, leg, ratio, rotor)
     load_inertia = float(sizing.load_inertia[1, leg - 1])
-    return Fit(
+    return MotorFit(
         leg,
         motor,
         span,

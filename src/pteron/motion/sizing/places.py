@@ -24,6 +24,8 @@ from pteron.motion.motion import Motion, pose_text
 from pteron.motion.trajectories.cycle import moves
 from pteron.motion.trajectories.scaling import keeps_margin, least_margin
 from pteron.motion.trajectories.tool import Curve, pose_motion, tool_motion
+from pteron.result import Result
+from pteron.tolerances import ROUNDING
 from pteron.workspace import Box, Region, bounding_box, home_pose
 
 TURNS = 12
@@ -38,13 +40,10 @@ _SPREAD = 300
 _TILT = np.pi / 2.0
 """Largest angle, rad, tried of a platform that moves along fewer than two directions."""
 
-_ROUNDING = 1e-9
-"""Distance from a region's border that is rounding, m and rad."""
-
 
 @checked_arguments
-@dataclass(frozen=True)
-class Place:
+@dataclass(frozen=True, eq=False, repr=False)
+class CyclePlace(Result):
     """A place of a cycle.
 
     Parameters
@@ -101,7 +100,7 @@ class Course:
         relative = tuple((c[0] - middle, *c[1:]) for c in curves)
         return cls(robot, middle, relative, axis, _yaw(robot, axis))
 
-    def at(self, places: Sequence[Place]) -> Iterator[Curve]:
+    def curves_at(self, places: Sequence[CyclePlace]) -> Iterator[Curve]:
         """Yield each motion's poses and their derivatives (T, W, m) at places."""
         platform = self.robot.platform
         lengths = ~platform.angular
@@ -157,7 +156,7 @@ def region_fits(course: Course, region: Region | None) -> tuple[Array, Fits]:
     return box, partial(keeps_margin, robot, least=least_margin(robot, home))
 
 
-def places_in(course: Course, box: Array, fits: Fits) -> tuple[Place, ...]:
+def places_in(course: Course, box: Array, fits: Fits) -> tuple[CyclePlace, ...]:
     """Return places at which the whole of a course lies in a region.
 
     They are on a grid that goes to the ends of the region's box, for turns by 30 degrees; the
@@ -168,12 +167,12 @@ def places_in(course: Course, box: Array, fits: Fits) -> tuple[Place, ...]:
     candidates = []
     for turn in map(float, turns):
         low, high = box - course.extent(turn)
-        if (low > high + _ROUNDING).any():
+        if (low > high + ROUNDING).any():
             continue
-        varies = high - low > 2.0 * _ROUNDING
-        low, high = low + _ROUNDING * varies, high - _ROUNDING * varies
+        varies = high - low > 2.0 * ROUNDING
+        low, high = low + ROUNDING * varies, high - ROUNDING * varies
         counts = np.where(varies, _COUNTS.get(int(varies.sum()), 2), 1)
-        grid = [Place(pose, turn) for pose in product(*map(np.linspace, low, high, counts))]
+        grid = [CyclePlace(pose, turn) for pose in product(*map(np.linspace, low, high, counts))]
         if turn and course.yaw.any() and not (varies & (course.yaw != 0.0)).any():
             candidates += [with_platform(place, course.yaw, turn) for place in grid]
         candidates += grid
@@ -182,7 +181,7 @@ def places_in(course: Course, box: Array, fits: Fits) -> tuple[Place, ...]:
     return (*accepted, *(place for place in others if stays(course, place, fits)))
 
 
-def _quasirandom_places(course: Course, box: Array) -> Iterator[Place]:
+def _quasirandom_places(course: Course, box: Array) -> Iterator[CyclePlace]:
     """Yield places evenly spread over a box and all turns, each other with its platform turned.
 
     They are the quasirandom sequence of M. Roberts, "The unreasonable effectiveness of quasirandom
@@ -196,26 +195,26 @@ def _quasirandom_places(course: Course, box: Array) -> Iterator[Place]:
     for k, (*units, part) in enumerate((0.5 + np.arange(_SPREAD)[:, None] * steps) % 1.0):
         turn = 2.0 * np.pi * part if course.axis is not None else 0.0
         low, high = box - course.extent(turn)
-        if (low <= high + _ROUNDING).all():
-            place = Place(tuple(map(float, low + units * np.maximum(high - low, 0.0))), turn)
-            turns = k % 2 and not (high - low > 2.0 * _ROUNDING)[course.yaw != 0.0].any()
+        if (low <= high + ROUNDING).all():
+            place = CyclePlace(tuple(map(float, low + units * np.maximum(high - low, 0.0))), turn)
+            turns = k % 2 and not (high - low > 2.0 * ROUNDING)[course.yaw != 0.0].any()
             yield with_platform(place, course.yaw, turn) if turns else place
 
 
-def stays(course: Course, place: Place, fits: Fits) -> bool:
+def stays(course: Course, place: CyclePlace, fits: Fits) -> bool:
     """Say whether the whole of a course lies in a region at a place."""
-    return all(fits(poses[:, 0]) for poses, *_ in course.at([place]))
+    return all(fits(poses[:, 0]) for poses, *_ in course.curves_at([place]))
 
 
-def with_platform(place: Place, yaw: Array, turn: float) -> Place:
+def with_platform(place: CyclePlace, yaw: Array, turn: float) -> CyclePlace:
     """Return a place whose platform is turned by at most half a turn, as `Course.yaw` has it."""
     pose = np.array(place.pose) + yaw * np.angle(np.exp(1j * turn))
-    return Place(tuple(map(float, pose)), place.turn)
+    return CyclePlace(tuple(map(float, pose)), place.turn)
 
 
 def neighbours(
-    place: Place, steps: Array, turn: float, yaw: Array, *, oblique: bool
-) -> Iterator[Place]:
+    place: CyclePlace, steps: Array, turn: float, yaw: Array, *, oblique: bool
+) -> Iterator[CyclePlace]:
     """Yield a place's neighbours: a step (m,) along each coordinate, and a turn, to both sides.
 
     A turn is that of the path alone, and that of the platform, too. In a region whose boundary is
@@ -223,20 +222,20 @@ def neighbours(
     """
     for side in (1.0, -1.0):
         if turn:
-            turned_place = Place(place.pose, place.turn + side * turn)
+            turned_place = CyclePlace(place.pose, place.turn + side * turn)
             yield turned_place
             if yaw.any():
                 yield with_platform(turned_place, yaw, side * turn)
         for i in np.flatnonzero(steps):
             coordinates = list(place.pose)
             coordinates[i] += side * float(steps[i])
-            yield Place(tuple(coordinates), place.turn)
+            yield CyclePlace(tuple(coordinates), place.turn)
     moving = np.flatnonzero(steps)
     for signs in product((1.0, -1.0), repeat=len(moving)) if oblique and len(moving) < 4 else ():
         pose = np.array(place.pose)
         pose[moving] += signs * steps[moving]
         for side in (0.0, 1.0, -1.0) if turn else (0.0,):
-            neighbour = Place(tuple(map(float, pose)), place.turn + side * turn)
+            neighbour = CyclePlace(tuple(map(float, pose)), place.turn + side * turn)
             yield with_platform(neighbour, yaw, side * turn) if yaw.any() else neighbour
 
 
@@ -245,9 +244,9 @@ def _axis(robot: Manipulator) -> Array | None:
     platform = robot.platform
     if len(platform.lengths) < 2:
         return None
-    if not platform.planar:
+    if platform.plane_normal is None:
         return moves(robot, None, 1)[0][1]
-    level = not (np.abs(platform.directions @ np.array(robot.gravity)) > _ROUNDING).any()
+    level = not (np.abs(platform.directions @ np.array(robot.gravity)) > ROUNDING).any()
     return np.array(platform.axis) if level else None
 
 
@@ -255,15 +254,11 @@ def _yaw(robot: Manipulator, axis: Array | None) -> Array:
     """Return by how much a pose grows where the platform turns by 1 rad about an axis."""
     platform, rates = robot.platform, np.zeros(robot.freedom)
     last = len(rates) - 1
-    if (
-        axis is None
-        or not platform.angles
-        or (platform.tilts and platform.coordinates[-1] != "yaw")
-    ):
+    about = platform.spin_axis
+    if axis is None or about is None:
         return rates
-    about = platform.frame[2] if platform.tilts else platform.axis
     cosine = float(np.dot(about, axis))
-    rates[last] = np.sign(cosine) if abs(cosine) > 1.0 - _ROUNDING else 0.0
+    rates[last] = np.sign(cosine) if abs(cosine) > 1.0 - ROUNDING else 0.0
     return rates
 
 
@@ -272,10 +267,10 @@ def _is_in_box(region: Region, poses: Array) -> NDArray[np.bool_]:
     if not isinstance(region, Box):
         return np.zeros(poses.shape[:-1], dtype=bool)
     low, high = region.box
-    return np.asarray(((poses >= low - _ROUNDING) & (poses <= high + _ROUNDING)).all(axis=-1))
+    return np.asarray(((poses >= low - ROUNDING) & (poses <= high + ROUNDING)).all(axis=-1))
 
 
-def expect_places_of(robot: Manipulator, places: Sequence[Place]) -> tuple[Place, ...]:
+def expect_places_of(robot: Manipulator, places: Sequence[CyclePlace]) -> tuple[CyclePlace, ...]:
     """Return the places after a check: at least one, each with the machine's coordinates."""
     expect(places, "places", "none", "at least one")
     for i, place in enumerate(places):
@@ -287,7 +282,7 @@ def expect_places_of(robot: Manipulator, places: Sequence[Place]) -> tuple[Place
     return tuple(places)
 
 
-def placed(robot: RobotLike, motion: Motion, place: Place) -> Motion:
+def motion_at_place(robot: RobotLike, motion: Motion, place: CyclePlace) -> Motion:
     """Return a motion at another place: it keeps its shape and its time.
 
     Parameters
@@ -296,7 +291,7 @@ def placed(robot: RobotLike, motion: Motion, place: Place) -> Motion:
         The machine.
     motion : Motion
         The motion.
-    place : Place
+    place : CyclePlace
         Where its middle is to be, and how it is turned.
 
     Returns
@@ -305,11 +300,11 @@ def placed(robot: RobotLike, motion: Motion, place: Place) -> Motion:
 
     Examples
     --------
-    >>> from pteron.motion import Place, pick_and_place, placed
+    >>> from pteron.motion import CyclePlace, motion_at_place, pick_and_place
     >>> cycle = pick_and_place("delta", samples=51)
-    >>> placed("delta", cycle, Place((0.1, 0.0, -0.8))).pose.mean(axis=0).round(2)
+    >>> motion_at_place("delta", cycle, CyclePlace((0.1, 0.0, -0.8))).pose.mean(axis=0).round(2)
     array([ 0.1,  0. , -0.8])
     """
     robot = as_manipulator(robot)
-    (curve,) = Course.from_motions(robot, [motion]).at(expect_places_of(robot, [place]))
+    (curve,) = Course.from_motions(robot, [motion]).curves_at(expect_places_of(robot, [place]))
     return Motion(motion.time, *(part[:, 0] for part in curve))

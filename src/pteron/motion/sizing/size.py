@@ -23,7 +23,7 @@ from pteron.motion.sizing.drive_loads import Sizing
 from pteron.motion.sizing.duty import DutyCycle
 from pteron.motion.sizing.places import (
     TURNS,
-    Place,
+    CyclePlace,
     expect_places_of,
     neighbours,
     places_in,
@@ -52,7 +52,7 @@ def size(
     *,
     dwell: float | Sequence[float] = 0.0,
     wrench: ArrayLike | None = None,
-    places: Region | Sequence[Place] | Literal["workspace"] | None = None,
+    places: Region | Sequence[CyclePlace] | Literal["workspace"] | None = None,
     friction: float = 0.0,
 ) -> Sizing:
     """Return the load of a cycle on each drive: its forces and speeds, and their integrals.
@@ -68,7 +68,7 @@ def size(
     wrench : array, shape (m,), optional
         Load on the platform at P all along: a force in N and, where it turns, a moment about k
         in N m; of a platform that tilts a force and a moment, (6,).
-    places : Region, sequence of Place or "workspace", optional
+    places : Region, sequence of CyclePlace or "workspace", optional
         Where else the cycle is done, as a whole: at all places and turns about the vertical at
         which it stays in a region of poses, or in the workspace (with `least_margin` to
         singularities, at the home pose's angles), the platform turned as the path is, or not. A
@@ -123,7 +123,7 @@ def size(
 
 
 def _size_at_places(
-    cycle: DutyCycle, places: Region | Sequence[Place] | Literal["workspace"]
+    cycle: DutyCycle, places: Region | Sequence[CyclePlace] | Literal["workspace"]
 ) -> Sizing:
     """Return the loads at given places, or at those of a region, and nearer about the worst."""
     cycle = cycle.thin_out()
@@ -132,7 +132,7 @@ def _size_at_places(
     robot, course = cycle.robot, cycle.course
     box, fits = region_fits(course, places if isinstance(places, Region) else None)
     known = dict.fromkeys(places_in(course, box, fits))
-    itself = Place(tuple(course.middle.tolist()))
+    itself = CyclePlace(tuple(course.middle.tolist()))
     if not isinstance(places, Region) or stays(course, itself, fits):
         known[itself] = None
     if not known:
@@ -142,7 +142,7 @@ def _size_at_places(
             f"region {pose_text(np.ptp(box, axis=0))} ({' '.join(robot.coordinates)}, m and rad)"
         )
     sizing = cycle.loads_at(tuple(known))
-    worst: dict[tuple[str, int], tuple[float, Place]] = {}
+    worst: dict[tuple[str, int], tuple[float, CyclePlace]] = {}
     free = np.ptp(box, axis=0) > np.ptp(course.extent(0.0), axis=0) + _ROUNDING
     steps, turn = (
         free * np.ptp(box, axis=0) / 8.0,

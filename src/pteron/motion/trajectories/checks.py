@@ -21,13 +21,11 @@ from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.motion import Motion, pose_text
 from pteron.motion.trajectories.minima import first_below, least_along
 from pteron.motion.trajectories.path import Path, poses_of
+from pteron.tolerances import ROUNDING
 from pteron.workspace.margins import joint_distances
 
 _SAMPLES = 1001
 """Number of poses of a path evaluated before its margins are refined between them."""
-
-_ROUNDING = 1e-9
-"""Distance beyond a limit, or out of reach, that counts as rounding, m or rad."""
 
 _MILLIMETRES = 20.0
 """A pose out of a leg's reach by more than so many leg sizes is likely in millimetres."""
@@ -153,7 +151,7 @@ def _reach_failure(curve: _Curve, marks: Array) -> _Failure | None:
     shortfall = -float(np.nanmin(curve.value("reach", fine)[:, i]))
     leg = curve.robot.legs[i]
     error: PteronError
-    if shortfall <= _ROUNDING:
+    if shortfall <= ROUNDING:
         error = SingularPose(
             f"{curve.place_text(at)}: singular for leg {i + 1}: {leg.singular_text} (type I); take "
             "another path",
@@ -181,13 +179,13 @@ def _joint_failure(curve: _Curve, marks: Array) -> _Failure | None:
     def margin(at: Array) -> Array:
         return joint_distances(curve.robot, curve.value("joint_coordinates", at))
 
-    first = first_below(margin, marks, -_ROUNDING)
+    first = first_below(margin, marks, -ROUNDING)
     if first is None:
         return None
     at, i, _ = first
     leg = curve.robot.legs[i]
     assert leg.limits is not None
-    excess = -float(least_along(margin, marks, -_ROUNDING)[1][i])
+    excess = -float(least_along(margin, marks, -ROUNDING)[1][i])
     unit, (low, high) = leg.joint.unit, leg.limits
     fault = (
         f"leg {i + 1}: its {leg.joint.noun} passes its limits, {low:g} to {high:g} {unit}, by up "
@@ -199,11 +197,11 @@ def _passive_failure(curve: _Curve, marks: Array) -> _Failure | None:
     def margin(at: Array) -> Array:
         return curve.value("passive_room", at, 1)
 
-    first = first_below(margin, marks, -_ROUNDING)
+    first = first_below(margin, marks, -ROUNDING)
     if first is None:
         return None
     at, i, _ = first
-    places, least = least_along(margin, marks, -_ROUNDING)
+    places, least = least_along(margin, marks, -ROUNDING)
     worst = curve.poses(places[i : i + 1])[0]
     leg, fault = i + 1, f"leg {i + 1} passes a passive joint's limits"
     for joint in limited_joints(curve.robot, worst):

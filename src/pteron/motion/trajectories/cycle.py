@@ -16,6 +16,7 @@ from pteron.kernels import Array, as_array
 from pteron.manipulator import Manipulator
 from pteron.motion.trajectories.tool import arm_motion, carries, pose_motion, tool_path
 from pteron.platforms import Platform
+from pteron.tolerances import ROUNDING
 
 LIFT = 0.025
 """Height of the standard cycle, m."""
@@ -29,9 +30,6 @@ _LIFT_ENDS = 0.4
 _ACROSS_BEGINS = 0.15
 """Share of the way out after which the platform sets off across: to start before it is up rounds
 the corners and saves time."""
-
-_NONE = 1e-9
-"""Share of a vector below which a component counts as zero."""
 
 
 def quintic(tau: Array, begin: float, end: float) -> tuple[Array, Array, Array]:
@@ -190,14 +188,14 @@ def moves(
     vertical); two, to and fro, in an upright plane.
     """
     platform, gravity = robot.platform, np.array(robot.gravity)
-    axis = np.array(platform.axis)
-    level = platform.directions.T @ platform.directions if platform.planar else np.eye(3)
+    axis, planar = np.array(platform.axis), platform.plane_normal is not None
+    level = platform.directions.T @ platform.directions if planar else np.eye(3)
     weight = level @ gravity
     strength = float(np.linalg.norm(weight))
     upright: Array | None = None
-    if strength > _NONE * float(np.linalg.norm(gravity)):
+    if strength > ROUNDING * float(np.linalg.norm(gravity)):
         upright = -weight / strength
-    elif not platform.planar:
+    elif not planar:
         upright = axis
     if len(platform.lengths) == 1:  # a tripod, which moves along its axis however it is mounted
         upright = -axis if axis @ gravity > 0.0 else axis
@@ -207,16 +205,16 @@ def moves(
     if direction is not None:
         vector = as_array(direction, "direction", (3,))
         first = level @ vector
-        if not np.linalg.norm(first) > _NONE * np.linalg.norm(vector):
-            place = " in the machine's plane" if platform.planar else ""
+        if not np.linalg.norm(first) > ROUNDING * np.linalg.norm(vector):
+            place = " in the machine's plane" if planar else ""
             raise DataError(f"direction: {vector.tolist()} has no horizontal part{place}")
         count = 1
     else:
         x, y, _ = (level @ axis for axis in platform.frame)
         first = x if np.linalg.norm(x) > 0.5 else y
-        if not np.linalg.norm(first) > _NONE:  # a platform that moves up at most
+        if not np.linalg.norm(first) > ROUNDING:  # a platform that moves up at most
             return ((np.zeros(3), axis if upright is None else upright),)
-        if platform.planar and upright is not None:
+        if planar and upright is not None:
             count = min(count, 2)
     first = first / np.linalg.norm(first)
     second = np.cross(axis if upright is None else upright, first)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -24,9 +25,8 @@ from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.motion import pose_text
 from pteron.motion.trajectories.limits import MotionLimits
 from pteron.motion.trajectories.tool import Curve, tool_path
-
-_ROUNDING = 1e-12
-"""Relative excess over a drive's limit that counts as rounding."""
+from pteron.result import Result
+from pteron.tolerances import EXACT
 
 _CREEP = 1e-30
 """Rate of either sign that a reversing joint gets instead of 0, for dry friction both ways."""
@@ -178,9 +178,9 @@ def most_rate(
     if not np.isfinite(least):
         least = float(np.nanmin(edge[(square > 0.0) | (square == 0.0)], initial=np.inf))
     # Friction may pass a limit between two speeds where what is slower, and faster, keeps it.
-    step = _ROUNDING
+    step = EXACT
     while np.isfinite(least):
-        over = square * least**2 + root * least > margin + _ROUNDING * np.abs(margin)
+        over = square * least**2 + root * least > margin + EXACT * np.abs(margin)
         if not over.any():
             break
         # An edge may be off by rounding: it is left by a step, the longer the more were taken.
@@ -210,7 +210,8 @@ def _expect_strength(
     )
 
 
-class Peak(NamedTuple):
+@dataclass(frozen=True, eq=False, repr=False)
+class Peak(Result):
     """The largest size of a quantity in a motion, beside its limit."""
 
     name: str

@@ -147,7 +147,7 @@ def fourier_motion(robot: RobotLike, series: FourierSeries, step: float = STEP) 
     >>> import pteron
     >>> from pteron.motion import FourierSeries, fourier_motion
     >>> swing = FourierSeries((0.0, 0.0, 0.0), ((0.05, 0.0, 0.0),), ((0.0, 0.05, 0.0),), 2.0)
-    >>> fourier_motion(pteron.load("tripteron"), swing).repeated(3).duration
+    >>> fourier_motion(pteron.load("tripteron"), swing).repeat(3).duration
     6.0
     """
     robot = as_manipulator(robot)

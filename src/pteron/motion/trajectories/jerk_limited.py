@@ -23,9 +23,7 @@ from pteron.motion.trajectories.time_law import STEP, limit_motion, sample_curve
 from pteron.motion.trajectories.timed_path import Timed
 from pteron.motion.trajectories.tool import Curve
 from pteron.shapes import PoseLike
-
-_NEAR = 1e-6
-"""Tolerance, m or rad, of the motion's last pose about the target pose."""
+from pteron.tolerances import SAME
 
 _FAST = 1e6
 """Limit that Ruckig gets for a joint without one, m/s or rad/s."""
@@ -102,7 +100,7 @@ def jerk_limited(
     # The shorter way round, where the limits of a crank leave one.
     free = [leg.goes_round and leg.limits is None for leg in robot.legs]
     last = np.where(free, first + _wrap_half_turn(last - first), last)
-    if np.abs(last - first).max() <= _NEAR:
+    if np.abs(last - first).max() <= SAME:
         raise DataError("end: the joints are at start's already; give another pose")
     planned = _plan_trajectory(first, last, motion_limits, jerks)
 
@@ -154,7 +152,7 @@ def _expect_modes(robot: Manipulator, motion: Motion, planned: Any, end: Array) 
     joint_errors = np.where(
         [leg.joint.unit == "rad" for leg in robot.legs], _wrap_half_turn(joint_errors), joint_errors
     )
-    if max(np.abs(end_error).max(), np.abs(joint_errors).max()) > _NEAR:
+    if max(np.abs(end_error).max(), np.abs(joint_errors).max()) > SAME:
         raise _lost_error(
             "end: the joints' path leads to another assembly or working mode there; go by way of "
             "another pose"

@@ -21,12 +21,10 @@ from pteron.kinematics.evaluate import finite_rows
 from pteron.manipulator import RobotLike, as_manipulator
 from pteron.motion.trajectories.tool import Curve, pose_motion, tool_motion
 from pteron.platforms import Platform
+from pteron.tolerances import ROUNDING
 
 TURN = 0.1
 """Metres of path that one radian of the platform's rotation counts as."""
-
-_SAME = 1e-9
-"""Lengths of path below this count as zero, m."""
 
 _SHARP = -0.9
 """Cosine between the directions before and after a corner below which the platform stops there."""
@@ -159,8 +157,8 @@ def line_path(robot: RobotLike, poses: ArrayLike, corner: float = 0.0) -> LinePa
     )
     directions = np.diff(places, axis=0)
     sizes = np.linalg.norm(directions * path_weights(robot.platform), axis=-1)
-    if (sizes <= _SAME).any():
-        k = int(np.argmax(sizes <= _SAME))
+    if (sizes <= ROUNDING).any():
+        k = int(np.argmax(sizes <= ROUNDING))
         raise DataError(f"poses: {k + 2} is the same as {k + 1}; leave one of them out")
     return _round_corners(robot.platform, places, directions / sizes[:, None], sizes, corner)
 
@@ -185,7 +183,7 @@ def _round_corners(
         cut = min(corner, sizes[k] / 2.0, sizes[k + 1] / 2.0) if rounds else 0.0
         there = places[k + 1] - cut * directions[k]
         line = float(np.linalg.norm((there - here) * weights))
-        if line > _SAME:
+        if line > ROUNDING:
             controls.append(here + np.linspace(0.0, 1.0, 6)[:, None] * (there - here))
             knots.append(knots[-1] + line)
         corners.append(knots[-1] + cut)

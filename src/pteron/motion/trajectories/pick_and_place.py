@@ -27,7 +27,7 @@ _ZOOMS = 4
 """Grid refinements of the search for the peak acceleration, each 1/500 as wide as the last."""
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class PickAndPlace(Motion):
     """A pick-and-place cycle: up, across and down, and the same path back.
 

@@ -140,10 +140,10 @@ def polynomial_motion(
     Examples
     --------
     >>> import pteron
-    >>> from pteron.motion import along, limits_of, line_path
+    >>> from pteron.motion import limits_of, line_path, polynomial_motion
     >>> robot = pteron.load("tripteron")
     >>> path = line_path(robot, [[0.0, 0.0, 0.0], [0.1, 0.0, 0.0]])
-    >>> along(robot, path, limits=limits_of(robot, acceleration=5.0)).duration
+    >>> polynomial_motion(robot, path, limits=limits_of(robot, acceleration=5.0)).duration
     0.34
     """
     robot = as_manipulator(robot)

@@ -76,7 +76,7 @@ _SLOWEST = 1e-4
 """Share of the largest s'^2 below which no tangent of its root is taken."""
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class TimeOptimal(Motion):
     """A motion along a path in next to the shortest time.
 
@@ -128,11 +128,12 @@ def time_optimal(
     Examples
     --------
     >>> import pteron
-    >>> from pteron.motion import along, limits_of, line_path, time_optimal
+    >>> from pteron.motion import limits_of, line_path, polynomial_motion, time_optimal
     >>> robot = pteron.load("tripteron")
     >>> path = line_path(robot, [[0.0, 0.0, 0.0], [0.1, 0.05, 0.0], [0.1, 0.0, 0.1]], 0.02)
     >>> limits = limits_of(robot, force=60.0, speed=1.0)
-    >>> time_optimal(robot, path, limits).duration < along(robot, path, limits=limits).duration
+    >>> slower = polynomial_motion(robot, path, limits=limits)
+    >>> time_optimal(robot, path, limits).duration < slower.duration
     True
     """
     robot = as_manipulator(robot)

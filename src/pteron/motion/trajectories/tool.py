@@ -39,7 +39,10 @@ def tool_path(platform: Platform, pose: Array, first: Array, second: Array) -> C
 
 
 def _shift_curve(platform: Platform, curve: Curve, side: float) -> Curve:
-    if not carries(platform) or not any(platform.tool if platform.tilts else platform.tool[:2]):
+    turning = [
+        part for axis, part in zip("xyz", platform.tool, strict=True) if axis in platform.arm_axes
+    ]
+    if not carries(platform) or not any(turning):
         return curve
     angular = platform.angular
     shifted = tuple(part.copy() for part in curve)
@@ -51,7 +54,7 @@ def _shift_curve(platform: Platform, curve: Curve, side: float) -> Curve:
 
 def carries(platform: Platform) -> bool:
     """Say whether the pose's lengths can hold the tool in place while its angles change."""
-    return bool(platform.angles) and (not platform.tilts or len(platform.lengths) == 3)
+    return bool(platform.angles) and set(platform.arm_axes) <= set(platform.lengths)
 
 
 def arm_motion(platform: Platform, angles: Array, rates: Array, growths: Array) -> Curve:
@@ -60,7 +63,7 @@ def arm_motion(platform: Platform, angles: Array, rates: Array, growths: Array) 
     The k components are along the pose's lengths; angles, rates and growths, their second
     derivatives, are (..., j). The platform is one that `carries` its tool.
     """
-    if platform.tilts:
+    if platform.axis_angle is None:
         state = (_pose_of_angles(platform, part) for part in (angles, rates, growths))
         return platform.tool_motion(*state)
     x, y = (platform.directions @ axis for axis in platform.frame[:2])

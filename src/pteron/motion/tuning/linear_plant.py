@@ -21,11 +21,12 @@ from pteron.manipulator import Manipulator, RobotLike, as_manipulator, parameter
 from pteron.motion.simulation.plant import motor_states
 from pteron.motion.simulation.sensors import encoder_of
 from pteron.renamed import former_attribute
+from pteron.result import Result
 from pteron.shapes import PoseLike
 
 
-@dataclass(frozen=True)
-class LinearPlant:
+@dataclass(frozen=True, eq=False, repr=False)
+class LinearPlant(Result):
     """A machine with its drives near a state: s' = A s + B F, and C s is what its encoders tell.
 
     s are small changes of (q, q'), then of the motors' coordinates and rates where transmissions
@@ -46,6 +47,8 @@ class LinearPlant:
     differenced : array, shape (n, S)
         Coordinates of which rates are the differences, where encoders tell no rates.
     """
+
+    ROWS = "matrix:1 inputs:1"
 
     robot: Manipulator
     pose: Array
@@ -106,8 +109,8 @@ def linearise(
     Examples
     --------
     >>> import pteron
-    >>> from pteron.motion import linearised
-    >>> plant = linearised("tripteron", [0.0, 0.0, 0.0])
+    >>> from pteron.motion import linearise
+    >>> plant = linearise("tripteron", [0.0, 0.0, 0.0])
     >>> plant.matrix.shape, plant.inputs.shape
     ((6, 6), (6, 3))
     """

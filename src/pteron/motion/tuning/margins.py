@@ -11,6 +11,7 @@ import scipy  # type: ignore[import-untyped]
 
 from pteron.kernels import Array
 from pteron.motion.tuning.sampled_loop import SampledLoop
+from pteron.result import Result
 
 _AT_ONE = 1e-7
 """Distance from the unit circle within which a pole is on it: of what a law never learns, z = 1
@@ -30,8 +31,8 @@ _MOST = 60.0, 1000.0
 """Greatest delay, in periods, and gain of the search; beyond them a margin is infinite."""
 
 
-@dataclass(frozen=True)
-class LoopMargins:
+@dataclass(frozen=True, eq=False, repr=False)
+class LoopMargins(Result):
     """Gain, phase and delay that a sampled loop bears until it is unstable.
 
     At each drive, the other loops closed: `gain`, the factor on its force above 1, `phase`, rad,
@@ -52,6 +53,8 @@ class LoopMargins:
     >>> bool(margins.common_gain <= margins.gain.min())
     True
     """
+
+    SHOWN = "gain phase delay crossover common_gain common_delay disk slowest"
 
     loop: SampledLoop
 

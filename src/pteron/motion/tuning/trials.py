@@ -19,6 +19,7 @@ from pteron.motion.motion import Motion
 from pteron.motion.simulation import Sensors, Simulation, simulate
 from pteron.motion.trajectories.limits import limits_of
 from pteron.motion.trajectories.tool import tool_path
+from pteron.result import Result
 
 if TYPE_CHECKING:
     import polars as pl
@@ -37,8 +38,8 @@ _UNKNOWN = (float("nan"),) * 7
 """Figures of a trial that did not come to its end."""
 
 
-@dataclass(frozen=True)
-class GainTrial:
+@dataclass(frozen=True, eq=False, repr=False)
+class GainTrial(Result):
     """A machine's motion under a controller, and the rest at its end, in figures.
 
     Attributes

@@ -25,6 +25,8 @@ from pteron.motion.tuning.linear_law import linearised_law
 from pteron.motion.tuning.linear_plant import linearise
 from pteron.motion.tuning.margins import LoopMargins
 from pteron.motion.tuning.sampled_loop import SampledLoop
+from pteron.progress import Progress, Steps
+from pteron.result import Result
 from pteron.workspace.margins import joint_distances
 
 if TYPE_CHECKING:
@@ -39,6 +41,12 @@ _PLACES = 24
 _DAMPINGS = 1.0, 1.4, 2.0, 2.8, 4.0, 5.6
 """Factors on the damping that are tried one after the other until a bandwidth serves: a joint that
 is nine times as heavy as its gains suppose has a third of the damping, at any bandwidth."""
+
+_STEPS = {"Linearising": 1.0, "Searching": 1.0}
+"""The steps of tuning, and how their times compare."""
+
+_USUAL_TRIALS = 20
+"""Bandwidths that a search tries as a rule; their number is not known before."""
 
 _FINER, _EXACT = 0.8, 1e-4
 """Factor between bandwidths tried from above, and relative length of the last bisection."""
@@ -80,8 +88,8 @@ class Required:
         return float(min(factor, delay / self.delay if self.delay else np.inf))
 
 
-@dataclass(frozen=True)
-class Tuning:
+@dataclass(frozen=True, eq=False, repr=False)
+class Tuning(Result):
     """A machine's controller with its stability margins at poses and moments of a motion.
 
     Attributes
@@ -157,6 +165,7 @@ def tune(
     model: RobotLike | None = None,
     sensors: Sensors | None = None,
     delay: float = 0.0,
+    progress: Progress | None = None,
 ) -> Tuning:
     """Return the controller of the greatest bandwidth that has the margins asked for everywhere.
 
@@ -186,6 +195,8 @@ def tune(
         The encoders, whose rates lag; by default rates are exact.
     delay : float
         From a sample to the drives' force, s.
+    progress : callable, optional
+        Takes the share of the work that is done, a `Share` with the name of its step.
 
     Returns
     -------
@@ -213,19 +224,26 @@ def tune(
     required, sensors = required or Required(), sensors or Sensors()
     late = delay + sensors.delay + sensors.samples * controller.period
     states, moments = _states(robot, motion, poses)
+    steps = Steps(progress, _STEPS)
+    plants = []
+    for i, state in enumerate(states):
+        steps.report("Linearising", i / len(states))
+        plants.append(linearise(robot, *state))
     search = _Search(
         robot,
         as_manipulator(model) if model is not None else robot,
         controller,
         required,
         states,
-        [linearise(robot, *state) for state in states],
+        plants,
         {"delay": late, "share": rate_shares(sensors, robot, controller.period)},
+        steps,
     )
     chosen = search.choose_controller()
     every = range(len(states))
     loops = tuple(search.loop(chosen, i) for i in every)
     margins = tuple(LoopMargins(loop) for loop in loops)
+    steps.end()
     return Tuning(robot, chosen, required, states, moments, loops, margins)
 
 
@@ -257,6 +275,7 @@ class _Search:
     states: Array
     plants: Sequence[Any]
     how: dict[str, Any]
+    steps: Steps
 
     def loop(self, controller: Controller, i: int) -> SampledLoop:
         law = linearised_law(controller.law(self.model), *self.states[i])
@@ -317,6 +336,7 @@ class _Search:
         def share(bandwidth: float) -> float:
             attempt = replace(controller, bandwidth=bandwidth)
             tried.append((self.share(attempt, few)[0], attempt))
+            self.steps.report("Searching", len(tried) / (len(tried) + _USUAL_TRIALS))
             return tried[-1][0]
 
         while True:  # bisect at few states; add the one that serves least at what is found

@@ -124,7 +124,7 @@ def _figures(result: Calibration) -> dict[str, Any]:
         poses = random_poses(robot, _ARROWS, seed=0)
         errors, _ = result.errors(poses)
         if np.abs(errors).max(initial=0.0, where=np.isfinite(errors)) > 0.0:
-            place, axes = robot.platform.at(poses)
+            place, axes = robot.platform.placement(poses)
             tools = place + robot.platform.tool @ axes
             figures["arrows"] = tool_errors_figure(robot, tools, errors)
     return figures

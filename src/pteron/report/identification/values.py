@@ -124,7 +124,7 @@ def body_rows(result: Identification) -> tuple[ReportedBody, ...]:
             leg.bodies.items(), other.bodies.values(), strict=True
         )
     ]
-    body, cad = (_values(robot.platform.joined) for robot in (identified, drawn))
+    body, cad = (_values(robot.platform.total_inertia) for robot in (identified, drawn))
     return (*rows, ReportedBody("platform", None, body, cad, (PLATFORM, None) in border))
 
 

@@ -1,0 +1,216 @@
+"""`prove_best_design`: the best design of a kind that can be proved, with its worst margins."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pteron.design.candidate import Candidate
+from pteron.design.cycle_places import Places
+from pteron.design.kind_search import pareto_ratings
+from pteron.design.load_margins import DENSE, margins_of
+from pteron.design.proofs import is_clear, kind_proofs, proof_sentence
+from pteron.design.rating import KindEvaluator, Rating
+from pteron.design.tool_errors import elasticity, greatest_errors, joint_errors, tolerances
+from pteron.design.workspace_samples import sample_poses
+from pteron.errors import PteronError
+from pteron.indices import Tolerances, stiffness
+from pteron.kernels import Array
+from pteron.manipulator import Manipulator
+from pteron.manipulator.saving import text_of
+from pteron.motion import Path, limits_of, time_optimal
+from pteron.workspace import Proof, clearance
+
+_WORST = 8
+"""Number of worst sample poses that local refinement starts from."""
+
+_TRIED = 9
+"""Number of designs that are proved in turn: ranks 1, 2, 4, 8, ..., as neighbours fail alike."""
+
+
+def prove_best_design(evaluator: KindEvaluator, ratings: list[Rating]) -> Candidate:
+    """Return the best design of a search that can be proved, or why there is none."""
+    objectives = evaluator.job.objectives
+    first, second = shown_objectives(objectives)[:2]
+    good = sorted(
+        (r for r in ratings if not r.misses), key=lambda r: (r.figures[first], r.figures[second])
+    )
+    counts = len(ratings), len(good)
+    if not good:
+        nearest = min(ratings, key=lambda rating: rating.cost(objectives[0]))
+        return Candidate(evaluator.kind.name, False, tuple(nearest.shortfalls.values()), *counts)
+    why, tight = "", None
+    for rating in (good[2**k - 1] for k in range(_TRIED) if 2**k <= len(good)):
+        proofs, rating.robot = kind_proofs(evaluator, rating)
+        bad = next((p for p in proofs if p.counterexample is not None), None)
+        why = str(bad) if bad is not None else _cell_violation(evaluator, rating)
+        if not why:
+            best = pareto_ratings(good, shown_objectives(objectives))
+            candidate = _candidate(evaluator, rating, proofs, counts, best)
+            why = _exceeded_limit(evaluator, candidate)
+            if not why and candidate.least_margin >= evaluator.job.motors.margin:
+                return candidate
+            # Where no design keeps the whole margin between the search's places, the best serves.
+            tight = tight or (None if why else candidate)
+    return tight or Candidate(evaluator.kind.name, False, (f"no proof ({why})",), *counts)
+
+
+def _cell_violation(evaluator: KindEvaluator, rating: Rating) -> str:
+    """Return the bound of the cell that a design violates between samples, in words; else empty."""
+    robot = rating.machine
+
+    def extents(poses: Array) -> Array:
+        return evaluator.machine_space.extents(robot, rating.middle + poses, rating.middle)
+
+    sizes, misses = evaluator.machine_space.judge_extents(evaluator.worst(robot, extents, DENSE)[0])
+    rating.figures |= sizes
+    return "".join(f"not so: {words}" for _, words in list(misses.values())[:1])
+
+
+def _exceeded_limit(evaluator: KindEvaluator, candidate: Candidate) -> str:
+    """Return the limit that a design exceeds between its sample poses, in words; else empty."""
+    job, figures = evaluator.job, candidate.figures
+    bounds = {"error": job.accuracy, "deflection": job.stiffness}
+    for name, limit in bounds.items():
+        if limit is not None and figures[name] > limit.most:
+            return f"not so: {name} of {1e3 * figures[name]:.3g} mm, {1e3 * limit.most:g} mm asked"
+    if figures["clearance"] < job.floors.clearance:
+        return f"not so: a clearance of {1e3 * figures['clearance']:.3g} mm"
+    least = candidate.least_margin
+    return f"not so: the drives' margin is {least:.3g} at {candidate.worst}" if least < 1.0 else ""
+
+
+def shown_objectives(objectives: Sequence[str]) -> list[str]:
+    """Return the objectives, of one alone with another that decides between equals."""
+    other = "moving_mass" if objectives[0] != "moving_mass" else "footprint"
+    return list(objectives) if len(objectives) > 1 else [objectives[0], other]
+
+
+def _candidate(
+    evaluator: KindEvaluator,
+    rating: Rating,
+    proofs: list[Proof],
+    counts: tuple[int, int],
+    best: list[Rating],
+) -> Candidate:
+    robot = rating.machine
+    loaded_robot = evaluator.add_payload(robot)
+    figures = dict(rating.figures)
+    time = evaluator.kind.numbers(rating.values).get("time")
+    margins = margins_of(evaluator, loaded_robot, rating.middle, time)
+    figures |= margins.figures
+
+    def least(values_of: Callable[[Array], ArrayLike]) -> float:
+        def column(poses: Array) -> Array:
+            return np.reshape(values_of(rating.middle + poses), (-1, 1))
+
+        return float(evaluator.worst(robot, column, DENSE, _WORST)[0][0])
+
+    figures["clearance"] = least(lambda poses: clearance(robot, poses).least)
+    if (accuracy := evaluator.job.accuracy) is not None:
+        errors = _tolerances(evaluator, rating)
+        figures["error"] = -least(lambda poses: -greatest_errors(accuracy, robot, poses, errors))
+    if evaluator.job.stiffness is not None:
+        gears = [option.gearbox.stiffness for option in rating.options]
+        springs = elasticity(evaluator.sections(rating), gears)
+        stiff = least(lambda poses: stiffness(robot, poses, springs).least)
+        figures["deflection"] = float(evaluator.job.stiffness.force / stiff)
+    times = _shortest_times(evaluator, loaded_robot, rating, margins.place)
+    objectives = shown_objectives(evaluator.job.objectives)
+    return Candidate(
+        evaluator.kind.name,
+        True,
+        (),
+        *counts,
+        proof_sentence(evaluator, proofs),
+        _clear_words(evaluator, robot, rating.middle),
+        _dimensions(robot),
+        {name: figure for name, figure in (figures | times).items() if np.isfinite(figure)},
+        tuple(option.name for option in rating.options),
+        margins.worst,
+        tuple({name: r.figures[name] for name in objectives} for r in best),
+        text_of(replace(robot, name=f"{evaluator.kind.name}-chosen")),
+        tuple(rating.middle.tolist()),
+    )
+
+
+def _clear_words(evaluator: KindEvaluator, robot: Manipulator, middle: Array) -> str:
+    least, samples = evaluator.job.floors.clearance, sample_poses(evaluator.job, robot, DENSE)
+    count = len(samples) + len(evaluator.between)
+    distance_words = f"come nearer than {1e3 * least:g} mm" if least else "touch"
+    if not len(evaluator.between) and is_clear(evaluator, robot, middle):
+        return f"proved: no two links, guides or the platform {distance_words}"
+    return (
+        f"at {count} sample poses and about the worst of them no two links, guides or the "
+        f"platform {distance_words}: seen there, without a proof"
+    )
+
+
+def _dimensions(robot: Manipulator) -> dict[str, float]:
+    """Return the radii and lengths of a machine, m."""
+    axis, frame = np.array(robot.platform.axis), np.array(robot.platform.frame)
+    flat = np.eye(3) - np.outer(axis, axis)
+    guides = np.array([leg.guide_point for leg in robot.legs])
+    points = np.array([np.array(g.platform_point) @ frame + g.fixed_offset for g in robot.legs])
+    sizes = {
+        "base radius": float(np.linalg.norm((guides - guides.mean(axis=0)) @ flat, axis=1).max()),
+        "platform radius": float(np.linalg.norm(points @ flat, axis=1).max()),
+    }
+    words = {"upper": "crank", "lower": "rod"}
+    for quantity in (q for leg in robot.legs for q in leg.quantities if q.role == "length"):
+        word = words.get(quantity.name.split("_")[0], quantity.name)
+        sizes[word] = max(sizes.get(word, 0.0), float(quantity.value[0]))
+    strokes = [g.limits[1] - g.limits[0] for g in robot.legs if g.limits and g.joint.unit == "m"]
+    return sizes | ({"stroke": max(strokes)} if strokes else {})
+
+
+def _tolerances(evaluator: KindEvaluator, rating: Rating) -> Tolerances:
+    """Return the tolerances of a design with its drives."""
+    accuracy = evaluator.job.accuracy
+    assert accuracy is not None  # who asks has some
+    gears = np.array([(o.gearbox.ratio, o.gearbox.backlash) for o in rating.options])
+    return tolerances(accuracy, joint_errors(accuracy, *gears.T).tolist())
+
+
+def _shortest_times(
+    evaluator: KindEvaluator, robot: Manipulator, rating: Rating, place: tuple[Places, int] | None
+) -> dict[str, float]:
+    """Return the shortest time of the cycle at its worst place with these drives, s."""
+    if place is None:
+        return {}
+    cycle, k = place
+    path = _ShiftedPath(cycle.select_places(np.array([k])), rating.middle)
+    # Drives are left what the margin asks for.
+    share, drive_limits = evaluator.job.motors.margin, limits_of(robot)
+    limits = replace(
+        drive_limits, force=drive_limits.force / share, speed=drive_limits.speed / share
+    )
+    with suppress(PteronError):  # TOPP-RA is an extra
+        return {"shortest_time": time_optimal(robot, path, limits).duration}
+    return {}
+
+
+class _ShiftedPath(Path):
+    """A path from the middle of a workspace at one place."""
+
+    def __init__(self, place: Places, middle: Array) -> None:
+        self._place, self._middle, self._path = place, middle, place.path
+
+    @property
+    def length(self) -> float:
+        return self._path.length
+
+    @property
+    def rests(self) -> tuple[float, ...]:
+        return self._path.rests
+
+    def at(self, s: Array) -> tuple[Array, Array, Array]:
+        pose, first, second = (part[0] for part in self._place.curves(*self._path.at(s)))
+        return self._middle + pose, first, second
+
+    def place(self, s: float) -> str:
+        return self._path.place(s)

@@ -1,0 +1,132 @@
+"""`Candidate`: one kind of machine after the search, with its figures in numbers and in words."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from pteron.renamed import former_attribute
+from pteron.result import Result
+
+MARGINS = {"rated": "rated torque", "peak": "peak torque", "speed": "speed"}
+"""The margins of drives, in words."""
+
+_FIGURES = {
+    "price": ("price (as in lists)", 1.0),
+    "cycle_time": ("cycle (s)", 1.0),
+    "shortest_time": ("shortest (s)", 1.0),
+    "error": ("error (mm)", 1e3),
+    "deflection": ("gives way (mm)", 1e3),
+    "clearance": ("clear (mm)", 1e3),
+    "moving_mass": ("mass (kg)", 1.0),
+    "energy": ("energy (J)", 1.0),
+}
+"""Figures of a candidate that are shown: their headings and factors."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Candidate(Result):
+    """One kind of machine after the search: its best design, or why there is none.
+
+    Attributes
+    ----------
+    kind : str
+        In the catalog.
+    serves : bool
+        Whether a design keeps all that is asked.
+    why : tuple of str
+        Where none does: what the nearest misses, and how far.
+    evaluated, kept : int
+        Designs that were rated, and those of them that keep all that is asked.
+    proved : str
+        What is proved of the workspace, in words.
+    clear : str
+        Whether it is proved, or sampled, that no two bodies touch.
+    dimensions : dict
+        m, by name.
+    figures : dict
+        Price, masses, energy, margins, error, deflection and times; SI units.
+    drives : tuple of str
+        Motor and gearbox of each leg.
+    worst : str
+        The place and direction at which the drives' margin is least.
+    front : tuple of dict
+        The objectives of designs that no other of the kind betters in everything.
+    robot : str
+        The machine's file, with its drives; empty where there is none.
+    middle : tuple of float
+        The pose in the middle of its workspace.
+    """
+
+    kind: str
+    serves: bool
+    why: tuple[str, ...]
+    evaluated: int
+    kept: int
+    proved: str = ""
+    clear: str = ""
+    dimensions: dict[str, float] = field(default_factory=dict)
+    figures: dict[str, float] = field(default_factory=dict)
+    drives: tuple[str, ...] = ()
+    worst: str = ""
+    front: tuple[dict[str, float], ...] = ()
+    robot: str = ""
+    middle: tuple[float, ...] = ()
+
+    def __repr__(self) -> str:
+        """Return the candidate in a line."""
+        counts = f"{self.kept} of {self.evaluated} designs keep all that is asked"
+        return f"<Candidate of {self.kind!r}: {counts}>"
+
+    @property
+    def least_margin(self) -> float:
+        """The least of the drives' margins."""
+        return min(self.figures.get(f"{name}_margin", np.inf) for name in MARGINS)
+
+    def summary(self) -> str:
+        """Return in a line how many designs keep all that is asked, or what the nearest misses."""
+        if not self.serves:
+            return f"{self.kind} falls out: the nearest design has {'; '.join(self.why)}"
+        return f"{self.kind}: {self.kept} of {self.evaluated} designs keep all that is asked"
+
+    @property
+    def figure_texts(self) -> dict[str, str]:
+        """Rounded figures of a machine that serves, by the headings of a table."""
+        row = {"margin": _ratio(self.least_margin)}
+        for name, (heading, factor) in _FIGURES.items():
+            if (figure := self.figures.get(name)) is not None and (name != "cycle_time" or figure):
+                row[heading] = (
+                    f"{factor * figure:.0f}" if figure > 1e3 else f"{factor * figure:.3g}"
+                )
+        return row
+
+    @property
+    def drive_text(self) -> str:
+        """Motors and gearboxes in a line."""
+        return ", ".join(f"{count} x {name}" for name, count in Counter(self.drives).items())
+
+    @property
+    def dimension_text(self) -> str:
+        """The dimensions of the machine in a line, mm."""
+        lengths = ", ".join(
+            f"{name} {1e3 * length:.0f}" for name, length in self.dimensions.items()
+        )
+        extents = (f"{1e3 * self.figures[name]:.0f}" for name in ("width", "depth", "height"))
+        return f"{lengths}; it moves within {' x '.join(extents)}"
+
+    @property
+    def margin_text(self) -> str:
+        """The drives' margins and the place of the least, in a line."""
+        names = {f"{name}_margin": word for name, word in MARGINS.items()}
+        known = {word: self.figures[name] for name, word in names.items() if name in self.figures}
+        ratios = ", ".join(f"{word} {_ratio(margin)}" for word, margin in known.items())
+        return f"{ratios}; least at {self.worst}" if self.worst else ratios
+
+    data = former_attribute("data", "as_dict")
+
+
+def _ratio(margin: float) -> str:
+    """Return a margin with three significant digits."""
+    return f"{margin:.{2 if margin < 10.0 else 1 if margin < 100.0 else 0}f}"

@@ -1,0 +1,306 @@
+"""`choose_machine`: kinds of machines for one job, each with its best design, side by side."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pteron.atomic import write_text
+from pteron.design.best_design import prove_best_design
+from pteron.design.candidate import Candidate
+from pteron.design.drive_options import GEARBOXES, MOTORS, Options, read_lists
+from pteron.design.job import Job
+from pteron.design.kind_search import search_kind
+from pteron.design.kinds import Kind, fitting_kinds
+from pteron.design.rating import KindEvaluator
+from pteron.errors import DataError, PteronError
+from pteron.html_table import Overview, frame_overview
+from pteron.json_values import json_ready
+from pteron.kernels.one_thread import one_thread
+from pteron.kernels.program_cache import EQUATIONS, name_of
+from pteron.manipulator import load
+from pteron.manipulator.saving import text_of
+from pteron.processes import WorkerPool
+from pteron.progress import Progress, Share
+from pteron.renamed import former_attribute
+from pteron.result import Result
+
+if TYPE_CHECKING:
+    import polars as pl
+
+_SEARCH = 0.9
+"""Share of a kind's work that is its search."""
+
+_SMALL = 0.05
+"""Metres that a workspace counts as where it is smaller, a single pose for one: its machine is of
+the size of its parts."""
+
+_SOURCES = (*EQUATIONS, "design", "dynamics", "indices", "kinematics", "motion", "workspace")
+"""The packages that a kept kind depends on: of other code it is searched again."""
+
+_KEPT = "kinds"
+"""Folder of the kinds that are finished, in that of the results."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Choice(Result):
+    """The kinds of machines searched for a task, each with its best design.
+
+    Attributes
+    ----------
+    job : Job
+        The job.
+    candidates : tuple of Candidate
+        The best first, by the first objective; those that do not serve last.
+    resumed : tuple of str
+        Kinds that an earlier run had finished.
+    """
+
+    job: Job
+    candidates: tuple[Candidate, ...]
+    resumed: tuple[str, ...] = ()
+
+    @property
+    def best(self) -> Candidate | None:
+        """The best kind by the first objective; None where none serves."""
+        return self.candidates[0] if self.candidates and self.candidates[0].serves else None
+
+    def summary(self) -> str:
+        """Return the verdict on each kind, for people, as lines of text."""
+        return "\n".join(candidate.summary() for candidate in self.candidates)
+
+    def table(self) -> pl.DataFrame:
+        """Return a table, a row for each kind: whether it serves, and its figures in SI units."""
+        import polars as pl
+
+        rows = [{"kind": c.kind, "serves": c.serves, **c.figures} for c in self.candidates]
+        return pl.DataFrame(rows, infer_schema_length=None)
+
+    def _overview(self) -> Overview:
+        best = "no kind does what is asked" if self.best is None else f"{self.best.kind} is best"
+        return frame_overview("Kinds of machines", best, self.table(), self.summary().splitlines())
+
+    def robots(self) -> dict[str, str]:
+        """Return the machines' files by their names."""
+        return {
+            f"{candidate.kind}.toml": candidate.robot
+            for candidate in self.candidates
+            if candidate.serves
+        }
+
+    def assumption_lines(self) -> list[str]:
+        """Return the assumptions behind the choice, a line each."""
+        motors, links = self.job.motors, self.job.links
+        examples = [] if motors.list else ["The motors are the package's examples, not products."]
+        stocks = ", ".join(dict.fromkeys([*links.upper, *links.lower]))
+        errors = self.job.accuracy
+        left_out = errors is not None and not errors.has_part_errors
+        exact = ["The tool's error is that of encoders and gearboxes: links count as exact."]
+        return [
+            *examples,
+            "A price is the sum of those in the lists of motors and gearboxes, in their currency.",
+            f"Drives are chosen for {motors.margin:g} times what is asked, with dry friction of "
+            f"{motors.friction:.0%} of their rated torque; the least margins are told as they are "
+            "between the places of the search, too.",
+            f"Links are cut from {stocks}; the platform is half of an aluminium disc "
+            f"{1e3 * links.plate:g} mm thick; a carriage has {links.carriage:g} kg.",
+            f"Guides are {2e3 * links.guide:g} mm wide, cylinders of rams as cranks; a ram is "
+            "at most 1.7 times its least length; where links may meet, a pair of rods counts as "
+            "one; ball joints have no cones.",
+            "The shortest time is that of the cycle at its worst place with this margin of peak "
+            "torque and speed; again and again the rated torque may not allow it.",
+            *(exact if left_out else []),
+        ]
+
+    data = former_attribute("data", "as_dict")
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return everything as plain data, SI units."""
+        contents = {
+            "objectives": list(self.job.objectives),
+            "kinds": [candidate.as_dict() for candidate in self.candidates],
+            "job": self.job.model_dump(mode="json", exclude_none=True),
+        }
+        return dict(json_ready(contents))
+
+
+def choose_machine(
+    job: Job,
+    *,
+    folder: str | Path | None = None,
+    workers: int = 1,
+    progress: Progress | None = None,
+    begun: Callable[[Sequence[str], Sequence[str]], None] | None = None,
+    finished: Callable[[Candidate], None] | None = None,
+) -> Choice:
+    """Search all kinds of machines for one that does a job, with its dimensions and drives.
+
+    Each kind is a machine of the catalog whose size, proportions, links and place under the
+    workspace vary. A design must keep reach, floors and limits over the workspace, its room, and
+    have drives for all cycles at every place and in every direction; of what is left the best is
+    proved by intervals.
+
+    Parameters
+    ----------
+    job : Job
+        What the machine must do; see `read_job`.
+    folder : str or Path, optional
+        Folder of finished kinds; the same call goes on where it was ended.
+    workers : int
+        Processes that do the work.
+    progress : callable, optional
+        Takes the share that is done, a `Share` whose step is the kind.
+    begun : callable, optional
+        Takes the kinds that are searched, and those that an earlier run had finished.
+    finished : callable, optional
+        Takes each kind that is finished.
+
+    Returns
+    -------
+    Choice
+
+    Raises
+    ------
+    DataError
+        If no kind can do the motion, a cycle does not fit into the workspace, a list of motors
+        cannot be read, or a price is asked for of motors that have none.
+    """
+    evaluators = evaluators_of(job)
+    store = _CandidateStore(None if folder is None else Path(folder) / _KEPT, job, evaluators)
+    candidates = {name: known for name in evaluators if (known := store.find(name)) is not None}
+    resumed = tuple(candidates)
+    shares = {name: float(name in candidates) for name in evaluators}
+
+    def tell(name: str, share: float) -> None:
+        shares[name] = share if name in candidates else _SEARCH * share
+        if progress is not None:
+            progress(Share(sum(shares.values()) / len(shares), name))
+
+    remaining = {
+        name: evaluator for name, evaluator in evaluators.items() if name not in candidates
+    }
+    if begun is not None:
+        begun(tuple(remaining), resumed)
+    if progress is not None and remaining:  # what was done before is not this run's
+        progress(Share(sum(shares.values()) / len(shares), next(iter(remaining))))
+    for name, candidate in _search_kinds(remaining, workers, tell):
+        candidates[name] = candidate
+        store.keep(candidate)
+        tell(name, 1.0)
+        if finished is not None:
+            finished(candidate)
+    objective = job.objectives[0]
+    order = sorted(
+        candidates.values(), key=lambda v: (not v.serves, v.figures.get(objective, np.inf), v.kind)
+    )
+    return Choice(job, tuple(order), resumed)
+
+
+def evaluators_of(job: Job) -> dict[str, KindEvaluator]:
+    """Return the job for each kind that can do the motion."""
+    space = job.workspace
+    names = fitting_kinds(job.kinds, job.lengths, space.turn is not None, space.tilts)
+    files = (
+        job.file(job.motors.list or str(MOTORS)),
+        job.file(job.motors.gearboxes or str(GEARBOXES)),
+    )
+    motors, gearboxes = read_lists(*files)
+    options = {
+        unit: Options.combine(motors, gearboxes, unit, job.motors.friction) for unit in ("rad", "m")
+    }
+    unpriced = [o.name for some in options.values() for o in some.all if not np.isfinite(o.price)]
+    if unpriced and ("price" in job.objectives or job.most.price is not None):
+        raise DataError(
+            f"price: asked for, but {unpriced[0]} has none; add a column price, or ask for "
+            '"rated_power"'
+        )
+    names = [name for name in names if _has_drives(name, options, job)]
+    needed = 2.0 * float(job.workspace.half.max())
+    tool = job.payload.tool
+    kinds = (Kind(name, max(needed, _SMALL), job.links, tool, job.free) for name in names)
+    evaluators = {kind.name: KindEvaluator(job, kind, options) for kind in kinds}
+    for evaluator in evaluators.values():
+        try:
+            evaluator.add_payload(evaluator.kind.robot)
+        except PteronError as error:
+            raise DataError(f"payload: {error}") from None
+    return evaluators
+
+
+def _has_drives(name: str, options: Mapping[str, Options], job: Job) -> bool:
+    """Return whether all joints of a kind have gearboxes; refuse a kind that the task names."""
+    units = {leg.joint.unit for leg in load(name).legs}
+    lacking = [unit for unit in sorted(units) if not options[unit].all]
+    if lacking and job.kinds is not None:
+        raise DataError(
+            f'{job.motors.gearboxes}: no gearbox with joint = "{lacking[0]}", as {name} needs'
+        )
+    return not lacking
+
+
+def _candidate(evaluator: KindEvaluator, progress: Progress) -> Candidate:
+    search = evaluator.job.search
+    with one_thread():
+        return prove_best_design(
+            evaluator, search_kind(evaluator, search.evaluations, search.seed, progress)
+        )
+
+
+def _search_kinds(
+    evaluators: Mapping[str, KindEvaluator], workers: int, tell: Callable[[str, float], None]
+) -> Iterator[tuple[str, Candidate]]:
+    """Yield kinds and candidates in the order in which their searches end."""
+    if workers < 2 or len(evaluators) < 2:
+        for name, evaluator in evaluators.items():
+            yield name, _candidate(evaluator, partial(tell, name))
+        return
+    names = list(evaluators)
+    with WorkerPool(workers) as pool:
+        for k, message in pool.messages(_candidate, list(evaluators.values())):
+            if isinstance(message, Candidate):
+                yield names[k], message
+            else:
+                tell(names[k], message)
+
+
+class _CandidateStore:
+    """Finished kinds in a folder, each with a digest of all that it depends on."""
+
+    def __init__(
+        self, folder: Path | None, job: Job, evaluators: Mapping[str, KindEvaluator]
+    ) -> None:
+        self._folder, self._job, self._cases = folder, job, evaluators
+
+    def _digest(self, name: str) -> str:
+        job = self._job.model_dump(mode="json", exclude={"kinds"})
+        options = {unit: repr(some.all) for unit, some in self._cases[name].options.items()}
+        text = json.dumps(
+            [name, job, options, text_of(self._cases[name].kind.robot)], sort_keys=True
+        )
+        return str(name_of("kind", text, sources=_SOURCES))
+
+    def find(self, name: str) -> Candidate | None:
+        """Return a kind that an earlier run has finished."""
+        if self._folder is None or not (file := self._folder / f"{name}.json").is_file():
+            return None
+        try:
+            record = json.loads(file.read_text(encoding="utf-8"))
+            if record.pop("digest", None) != self._digest(name):
+                return None
+            lists = {key: tuple(record[key]) for key in ("why", "drives", "front", "middle")}
+            return Candidate(**record | lists)
+        except (ValueError, TypeError, KeyError):
+            return None
+
+    def keep(self, candidate: Candidate) -> None:
+        """Keep a finished kind."""
+        if self._folder is not None:
+            record = json_ready(candidate.as_dict() | {"digest": self._digest(candidate.kind)})
+            self._folder.mkdir(parents=True, exist_ok=True)
+            write_text(self._folder / f"{candidate.kind}.json", json.dumps(record, indent=1) + "\n")

@@ -1,1 +1,0 @@
-"""The choice of a kind of machine, its dimensions and its drives for what it must do."""

@@ -1,0 +1,131 @@
+"""Refinement of a design by gradients: one objective improves under all other requirements."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pteron.design.design import Design
+from pteron.design.proofs import counterexamples, prove_design
+from pteron.design.spec import ROUNDING
+from pteron.design.task import Task
+from pteron.design.variables import geometry_slopes, slopes_of
+from pteron.errors import ModelError
+from pteron.kernels import Array
+from pteron.kinematics.sampling import search_ball
+from pteron.workspace.exchange import POINTS, Program, improve_unknowns
+from pteron.workspace.shape_samples import Samples, fixed_samples, shape_samples
+
+_EXCHANGES = 8
+"""Most times that counterexamples of the result's proof join its conditions."""
+
+_SPARE = 1e-4
+"""Share by which a workspace that floats is kept larger than it must be: then all of it is proved,
+and not all but its rim."""
+
+_FIRST = 5
+"""Points along a cube's edge in the first program."""
+
+
+def improve_design(task: Task, point: Sequence[float], objective: int) -> list[float]:
+    """Return a design with a better objective, or the same where none is found.
+
+    The unknowns are the variables together with the cube's centre and edge. Quantities of the
+    machine alone are held to first order, those of its poses are not: the caller evaluates the
+    design again. Where a proof of the workspace or the cube fails, the design is sought once more,
+    with the counterexample among its conditions.
+    """
+    spec, start = task.spec, np.array(point)
+    target = spec.objectives[objective]
+    try:
+        design = prove_design(Design(task, task.machine(point))).design
+        slopes = _Slopes(task, design, start)
+        target_slopes = slopes.slopes_of_quantity(target.quantity)
+        if target_slopes is None or not target_slopes.any() or design.margin < -ROUNDING:
+            return list(point)
+        geometry = geometry_slopes(task.robot, task.variables, point)
+    except ModelError:  # at the end of what can be made
+        return list(point)
+    center, radius = search_ball(design.robot)
+    lengths = len(center)
+    seeks = task.seeks_place
+    shape, least = task.shape
+    fit, reach = np.zeros(lengths + 1), np.zeros((lengths + 1, 2))
+    if seeks:
+        fit = np.append(design.cube.center, design.cube.edge)
+        reach = np.append(center, radius)[:, None] + [-radius, radius]
+        reach[-1, 0] = min((1.0 + _SPARE) * least, fit[-1])
+    z0 = np.append(start, fit)
+    program = Program(
+        task.conditions,
+        design.cube.side if seeks else design.side,
+        z0,
+        design.geometry,
+        geometry,
+        target.sign * target_slopes,
+        np.vstack([task.ranges.T, reach]),
+        shape,
+        task.orientations if seeks else task.orientations[:0],
+        tuple(slopes.bounds(objective, z0)),
+    )
+    first, dense = (_condition_samples(design, lengths, count) for count in (_FIRST, POINTS))
+    for _ in range(_EXCHANGES):
+        z = improve_unknowns(program, first, dense)
+        variables: list[float] = z[: len(start)].tolist()
+        missed = counterexamples(Design(task, task.machine(variables)), z[len(start) : -1], z[-1])
+        if not len(missed.inside):
+            break
+        first = first.join(missed)
+    return variables
+
+
+def _condition_samples(design: Design, lengths: int, count: int) -> Samples:
+    """Return poses of the workspace, of the cube, or of both, as the search asks for them."""
+    task = design.task
+    moving = shape_samples(task.shape[0], task.orientations, count)
+    if task.spec.workspace is None or task.floats:
+        return moving
+    fixed = fixed_samples(design.poses, lengths)
+    return fixed.join(moving) if task.seeks_cube else fixed
+
+
+@dataclass(frozen=True)
+class _Slopes:
+    """Slopes of quantities by the unknowns about one design."""
+
+    task: Task
+    design: Design
+    start: Array
+
+    def slopes_of_quantity(self, name: str) -> Array | None:
+        """Return a quantity's slopes (V + k + 1,), or None where it has none."""
+        task, tail = self.task, len(self.task.robot.platform.lengths) + 1
+        if name in ("cube", "scale"):
+            edge = task.shape[1] if name == "scale" else 1.0
+            return np.append(np.zeros(len(self.start) + tail - 1), 1.0 / edge)
+        alone = task.quantities[name].of_machine
+        if alone is None:
+            return None
+        slopes = slopes_of(
+            lambda v: alone(task.machine(v.tolist())), task.variables, self.start.tolist()
+        )
+        return np.append(slopes, np.zeros(tail))
+
+    def bounds(self, objective: int, z0: Array) -> list[tuple[Array, float]]:
+        """Return linear bounds that hold other objectives and requirements with known slopes."""
+        bounds = []
+        for k, target in enumerate(self.task.spec.objectives):
+            row = self.slopes_of_quantity(target.quantity)
+            if k != objective and row is not None:
+                bounds.append((-target.sign * row, float(-target.sign * row @ z0)))
+        for requirement in self.task.spec.requirements:
+            row = self.slopes_of_quantity(requirement.quantity)
+            if row is None:
+                continue
+            now = self.design.quantity(requirement.quantity)
+            for bound, side in ((requirement.least, 1.0), (requirement.most, -1.0)):
+                if bound is not None:
+                    bounds.append((side * row, float(side * (row @ z0 + bound - now))))
+        return bounds

@@ -1,0 +1,151 @@
+"""The search for the best design of one kind: spread evenly, then evolved, then refined."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import islice, product
+
+import numpy as np
+import scipy  # type: ignore[import-untyped]
+
+from pteron.design.evolution import latin_hypercube, pareto_front
+from pteron.design.rating import KindEvaluator, Rating
+from pteron.kernels import Array, sharing_programs
+from pteron.progress import Progress
+
+_POPULATION = 3
+"""Size of the population, for each number that a design has."""
+
+_SPREAD = 6
+"""Random designs at the start, for each member of the population."""
+
+_REFINED = 0.25
+"""Share of the evaluations for Nelder and Mead's method."""
+
+_WEIGHT, _CROSSING = (0.4, 0.9), 0.8
+"""Range of the weight of differences, and the share of numbers that they change."""
+
+
+def search_kind(
+    evaluator: KindEvaluator,
+    evaluations: int,
+    seed: int,
+    progress: Progress | None = None,
+) -> list[Rating]:
+    """Return all designs that the search rated; each objective gets an equal share of them.
+
+    For each objective a Latin hypercube of designs gives the first population of differential
+    evolution (Storn and Price, Journal of Global Optimization 11, 1997); then every stock of the
+    links is tried, and Nelder and Mead's method improves the other numbers. `progress` is called
+    with the share of the evaluations that is done.
+    """
+    ratings: list[Rating] = []
+    low, high = evaluator.kind.ranges
+    counts = evaluator.kind.counts
+    objectives = evaluator.job.objectives
+
+    def rate(units: Array) -> Rating:
+        ratings.append(evaluator.rate(low + np.clip(units, 0.0, 1.0) * (high - low)))
+        if progress is not None:
+            progress(len(ratings) / evaluations)
+        return ratings[-1]
+
+    with sharing_programs(evaluator.kind.like):
+        for k, objective in enumerate(objectives):
+            rng = np.random.default_rng((seed, k))
+            end = evaluations * (k + 1) // len(objectives)
+            _evolve(rate, ratings, rng, end, objective, (low, high))
+            start = min(ratings, key=lambda rating: rating.cost(objective))
+            _refine(rate, ratings, (start.values - low) / (high - low), end, objective, counts)
+    return ratings
+
+
+def _evolve(
+    rate: Callable[[Array], Rating],
+    ratings: list[Rating],
+    rng: np.random.Generator,
+    end: int,
+    objective: str,
+    ranges: tuple[Array, Array],
+) -> None:
+    """Rate designs by differential evolution, until `_REFINED` of those up to `end` are left.
+
+    The population begins with the best designs rated so far, whatever they were rated for.
+    """
+    size = len(ranges[0])
+    count = _POPULATION * size
+    first = min(_SPREAD * count, (end - len(ratings)) // 2)
+    for units in latin_hypercube(rng, max(first, 1), size):
+        rate(units)
+    # The best so far, whichever objective they were sought for.
+    known = sorted(ratings, key=lambda rating: rating.cost(objective))[:count]
+    low, high = ranges
+    units = np.array([(rating.values - low) / (high - low) for rating in known])
+    costs = np.array([rating.cost(objective) for rating in known])
+    start = len(ratings)
+    while len(units) > 1 and len(ratings) < end - int(_REFINED * (end - start)):
+        for i in range(len(units)):
+            a, b = units[rng.choice(len(units), 2, replace=False)]
+            weight = rng.uniform(*_WEIGHT)
+            trial = units[i] + weight * (units[costs.argmin()] - units[i]) + weight * (a - b)
+            crossed = rng.random(size) < _CROSSING
+            crossed[rng.integers(size)] = True
+            trial = np.where(crossed, trial, units[i])
+            trial = np.where((trial < 0.0) | (trial > 1.0), rng.random(size), trial)
+            cost = rate(trial).cost(objective)
+            if cost <= costs[i]:
+                units[i], costs[i] = trial, cost
+
+
+def _refine(
+    rate: Callable[[Array], Rating],
+    ratings: list[Rating],
+    start: Array,
+    end: int,
+    objective: str,
+    counts: Array,
+) -> None:
+    """Improve a design from `start` until `end` designs are rated.
+
+    `counts` are the numbers of choices of each of its values, 0 for one that varies freely.
+    """
+
+    def cost(units: Array) -> float:
+        return rate(units).cost(objective)
+
+    free = counts == 0
+    stocks = [(np.arange(count) + 0.5) / count for count in counts[~free]]
+    least = np.inf
+    for choice in islice(product(*stocks), max(end - len(ratings), 0)):
+        trial = start.copy()
+        trial[~free] = choice
+        if (trial_cost := cost(trial)) < least:
+            least, best = trial_cost, trial
+    while len(ratings) < end:
+        simplex = best[free] + np.vstack(
+            [
+                np.zeros(free.sum()),
+                0.05 * np.where(best[free] > 0.5, -1.0, 1.0) * np.eye(free.sum()),
+            ]
+        )
+
+        def with_choices(units: Array, best: Array = best) -> Array:
+            trial = best.copy()
+            trial[free] = np.clip(units, 0.0, 1.0)
+            return trial
+
+        options = {"maxfev": end - len(ratings), "initial_simplex": simplex, "xatol": 1e-4}
+        answer = scipy.optimize.minimize(
+            lambda units, with_choices=with_choices: cost(with_choices(units)),
+            best[free],
+            method="Nelder-Mead",
+            options=options | {"fatol": 1e-6},
+        )
+        best = with_choices(answer.x)
+
+
+def pareto_ratings(ratings: list[Rating], objectives: list[str]) -> list[Rating]:
+    """Return the designs that keep all requirements and that no other of them dominates."""
+    good = [rating for rating in ratings if not rating.misses]
+    costs = np.array([[rating.figures[name] for name in objectives] for rating in good])
+    return [good[k] for k in pareto_front(costs)]

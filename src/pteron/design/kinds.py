@@ -1,0 +1,276 @@
+"""Kinds of machines: each one of the catalog, of another size and other proportions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from pteron.bodies.vectors import Vector
+from pteron.design.requirement_tables import LinksTable
+from pteron.errors import DataError
+from pteron.kernels import Array
+from pteron.kinematics.sampling import search_ball
+from pteron.manipulator import Manipulator, Radii, load
+from pteron.manipulator.dimensions import Stock, cut_links
+from pteron.toml import joined_faults
+from pteron.workspace import home_pose
+
+KINDS: dict[str, tuple[str, str]] = {
+    "delta": ("base_radius platform_radius crank", "z"),
+    "linear-delta": ("base_radius platform_radius", "z"),
+    "orthoglide": ("", "xyz"),
+    "tripteron": ("crank", "xyz"),
+    "delta-4": ("base_radius platform_radius crank", "z"),
+    "h4": ("base_radius crank", "yz"),
+    "par4": ("base_radius crank", "z"),
+    "quadrupteron": ("crank", "xyz"),
+    "hexa": ("base_radius platform_radius crank", "z"),
+    "hexaglide": ("base_radius platform_radius", "yz"),
+    "stewart": ("base_radius platform_radius", "z"),
+    "five-bar": ("base_radius crank", "y"),
+    "3-rrr": ("base_radius platform_radius crank", "xy"),
+    "3-prr": ("base_radius platform_radius", "xy"),
+    "3-rpr": ("base_radius platform_radius", "xy"),
+}
+"""The dimensions of each kind that vary beside the size, and the coordinates of its place that do:
+the others are those of its plane or axis of symmetry."""
+
+_POWERS = {"m": 3, "g": 4, "I": 5}
+"""Exponents of the size by which masses, first and second moments scale."""
+
+_RATIO = 0.4, 2.5
+"""Least and greatest dimension over that of the catalog's machine of the same size."""
+
+_SIZE = 0.25, 8.0
+"""Least and greatest size of a machine over that of the workspace."""
+
+_ALUMINIUM = 2700.0
+"""kg/m^3."""
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of machine, whose designs are few numbers.
+
+    Attributes
+    ----------
+    name : str
+        In the catalog.
+    needed : float
+        The workspace's greatest side, m.
+    links : LinksTable
+        What moving parts are made of.
+    tool : vector
+        The tool's centre point in the platform's frame, m.
+    free : bool
+        Whether a cycle's time is one of the numbers.
+    """
+
+    name: str
+    needed: float
+    links: LinksTable
+    tool: Vector = (0.0, 0.0, 0.0)
+    free: bool = False
+
+    @cached_property
+    def robot(self) -> Manipulator:
+        """The catalog's machine; sliders have no limits, as these follow from the task.
+
+        So are ball joints, whose cones follow from a machine's proportions.
+        """
+        template = load(self.name)
+        legs = []
+        for leg in template.legs:
+            cones = (f"{end}_cone" for end in ("base", "tip", "platform"))
+            ends = dict.fromkeys(cone for cone in cones if hasattr(leg, cone))
+            legs.append(replace(leg, **ends | ({"limits": None} if slides(leg) else {})))
+        platform = replace(template.platform, tool=self.tool)
+        return replace(template, legs=tuple(legs), platform=platform, radii=None)
+
+    @cached_property
+    def like(self) -> Manipulator:
+        """The machine whose programs serve all machines of the kind."""
+        return replace(self.robot, name="any")
+
+    @cached_property
+    def reach(self) -> tuple[Array, float]:
+        """The catalog machine's home pose, and the radius of its reach, m."""
+        template = load(self.name)
+        return home_pose(template), float(search_ball(template)[1])
+
+    @cached_property
+    def variables(self) -> dict[str, tuple[float, float]]:
+        """The numbers by name, with the least and the greatest value; sizes and times as logs."""
+        dimensions, places = KINDS[self.name]
+        size = self.needed / self.reach[1]
+        ranges = {"size": (np.log(_SIZE[0] * size), np.log(_SIZE[1] * size))}
+        ranges |= dict.fromkeys(dimensions.split(), (np.log(_RATIO[0]), np.log(_RATIO[1])))
+        ranges |= dict.fromkeys(places, (-0.6, 0.6))
+        ranges |= {key: (0.0, len(stock) - 1e-9) for key, stock in self._choices.items()}
+        return ranges | ({"time": (np.log(0.05), np.log(5.0))} if self.free else {})
+
+    @property
+    def stocks(self) -> dict[str, list[str]]:
+        """The stock that upper and lower links may be cut from."""
+        return {"upper": self.links.upper, "lower": self.links.lower}
+
+    @cached_property
+    def _choices(self) -> dict[str, Sequence[str]]:
+        keys = {part_key for leg in self.robot.legs for part_key, *_ in leg.extents.values()}
+        return {key: stock for key, stock in self.stocks.items() if key in keys and len(stock) > 1}
+
+    @property
+    def ranges(self) -> Array:
+        """Least and greatest value of each number (2, V)."""
+        return np.array(list(self.variables.values())).T
+
+    @property
+    def counts(self) -> Array:
+        """Numbers of things to choose from (V,); 0 of a measure."""
+        return np.array([len(self._choices.get(name, ())) for name in self.variables])
+
+    def numbers(self, point: Array) -> dict[str, float]:
+        """Return the numbers by name: sizes relative to the catalog's, times in s."""
+        return {
+            name: float(setting if name in "xyz" or name in self._choices else np.exp(setting))
+            for name, setting in zip(self.variables, point, strict=True)
+        }
+
+    def machine(self, point: Array) -> tuple[Manipulator, Array]:
+        """Return the machine of a design, and the pose in the middle of its workspace.
+
+        Raises
+        ------
+        ModelError
+            If there is no such machine.
+        """
+        numbers = self.numbers(point)
+        size, (home, reach) = numbers["size"], self.reach
+        middle = np.where(self.robot.platform.angular, 0.0, size * home)
+        for i, letter in enumerate(self.robot.coordinates):
+            if letter in numbers and letter in "xyz":
+                middle[i] += numbers[letter] * size * reach
+            elif letter == "x" or (letter == "y" and "z" in KINDS[self.name][1]):
+                middle[i] = 0.0
+        return _build_machine(self.robot, numbers, self._stock(point), self.links), middle
+
+    def link_stocks(self, point: Array) -> dict[str, str]:
+        """Return the names of the stock of upper and lower links."""
+        numbers = self.numbers(point)
+        return {key: names[int(numbers.get(key, 0.0))] for key, names in self.stocks.items()}
+
+    def _stock(self, point: Array) -> dict[str, Stock]:
+        return {key: Stock.parse(name) for key, name in self.link_stocks(point).items()}
+
+    def with_travel(self, leg: Any, travel: tuple[float, float], point: Array) -> Any:
+        """Return a leg whose joint goes from one end to another, m; a ram's tubes are as long."""
+        limited = replace(leg, limits=travel)
+        if slides(leg):
+            return limited
+        return limited.with_bodies(_bodies(limited, 1.0, self._stock(point), self.links))
+
+
+def slides(leg: Any) -> bool:
+    """Return whether a leg's joint slides on a guide, whose length follows from the travel."""
+    return leg.joint.unit == "m" and bool(_lengths(leg))
+
+
+def _lengths(leg: Any) -> set[str]:
+    keys = leg.every_key().items()
+    return {name for name, key in keys if key.role == "length" and getattr(leg, name) is not None}
+
+
+def _build_machine(
+    robot: Manipulator, numbers: Mapping[str, float], stocks: Mapping[str, Stock], links: LinksTable
+) -> Manipulator:
+    """Return a machine of another size, proportions and parts.
+
+    Lengths grow with the size, other inertias than those of links, platform and carriages with
+    its powers.
+    """
+    size, platform = numbers["size"], robot.platform
+    axis, frame = np.array(platform.axis), np.array(platform.frame)
+    flat = np.eye(3) - np.outer(axis, axis)
+    wider = np.eye(3) + (numbers.get("base_radius", 1.0) - 1.0) * flat
+    outer = np.eye(3) + (numbers.get("platform_radius", 1.0) - 1.0) * flat
+    about = np.mean([leg.guide_point for leg in robot.legs], axis=0)
+    legs, radius = [], 0.03
+    for leg in robot.legs:
+        dimensions: dict[str, Any] = {}
+        lengths = _lengths(leg)
+        for key, lengths_of_key in leg.metres.items():
+            parts = np.array(lengths_of_key)
+            if key == "guide_point":
+                parts = about + wider @ (parts - about)
+            elif key == "platform_point":
+                parts = parts @ frame @ outer @ frame.T
+            elif key == "fixed_offset":
+                parts = outer @ parts
+            if key in lengths and key.startswith("upper"):
+                parts = numbers.get("crank", 1.0) * parts
+            dimensions[key] = float(size * parts[0]) if key in lengths else tuple(size * parts)
+        other = replace(leg, **dimensions)
+        at = np.array(other.platform_point) @ frame + other.fixed_offset
+        radius = max(radius, float(np.linalg.norm(flat @ at)))
+        legs.append(other.with_bodies(_bodies(other, size, stocks, links)))
+    mass = 0.5 * np.pi * radius**2 * links.plate * _ALUMINIUM
+    moments = {"m": mass, "I": mass * radius**2 / 2.0, "Izz": mass * radius**2 / 2.0}
+    moments |= dict.fromkeys(("Ixx", "Iyy"), mass * radius**2 / 4.0)
+    plate = platform.inertia.of_values([moments.get(k, 0.0) for k in platform.inertia.kinds])
+    bars = tuple(
+        replace(bar, mass=size**3 * bar.mass, hinge=tuple(size * outer @ bar.hinge))
+        for bar in platform.bars
+    )
+    carried = replace(platform, bars=bars, inertia=plate)
+    upper, lower = (stocks[key].outer / 2.0 for key in ("upper", "lower"))
+    radii = Radii(links.guide, upper, lower, links.plate / 2.0)
+    return replace(robot, legs=tuple(legs), platform=carried, radii=radii)
+
+
+def _bodies(
+    leg: Any, size: float, stocks: Mapping[str, Stock], links: LinksTable
+) -> dict[str, Any]:
+    """Return the bodies of a leg: links cut from stock, a carriage, or grown with the size."""
+    bodies = {}
+    for letter, body in leg.bodies.items():
+        powers = (_POWERS["I" if k[0] == "I" else "g" if "g" in k else "m"] for k in body.kinds)
+        grown = [v * size**p for v, p in zip(body.values, powers, strict=True)]
+        bodies[letter] = body.of_values(grown)
+        if slides(leg) and letter == "p":
+            bodies[letter] = body.of_values([links.carriage] + [0.0] * (len(grown) - 1))
+    return bodies | cut_links(leg, stocks)
+
+
+def fitting_kinds(names: Sequence[str] | None, lengths: int, turn: bool, tilt: bool) -> list[str]:
+    """Return the kinds that have the freedoms of a task; all that the task names must have them.
+
+    Raises
+    ------
+    DataError
+        If one that is asked for cannot do it, or none can.
+    """
+    faults, kinds = [], []
+    for name in KINDS if names is None else names:
+        platform = load(name).platform
+        lacks = [
+            text
+            for text, holds in (
+                (f"moves along {' '.join(platform.lengths)} only", len(platform.lengths) < lengths),
+                ("does not turn", turn and not platform.angles),
+                ("does not tilt", tilt and len(platform.angles) < 3),
+            )
+            if holds
+        ]
+        if not lacks:
+            kinds.append(name)
+        elif names is not None:
+            faults.append(f"kinds: {name} {' and '.join(lacks)}, but the job asks for more")
+    if not kinds and not faults:
+        faults.append("no kind of machine in the catalog has these freedoms")
+    if faults:
+        raise DataError(joined_faults(faults))
+    return kinds

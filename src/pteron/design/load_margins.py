@@ -1,0 +1,127 @@
+"""The margins of a design's drives at the worst places and in the worst directions of its job."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from pteron.design.cycle_places import Places, neighbour_places
+from pteron.design.drive_options import duty_cycle_mean
+from pteron.design.machine_space import tool_places
+from pteron.design.rating import KindEvaluator
+from pteron.design.workspace_samples import refine_worst_values
+from pteron.design.worst_cases import worst_forces, worst_speeds
+from pteron.dynamics import drive_forces
+from pteron.kernels import Array
+from pteron.kinematics import jacobian
+from pteron.manipulator import Manipulator
+
+DENSE = 7
+"""Poses along each side of the box in the final evaluation of a design."""
+
+_ROUNDS, _KEPT = 4, 3
+"""Rounds of refinement of a cycle's places, and number of worst ones kept in each."""
+
+_NOTHING = 1e-9
+"""Lower bound of loads by which limits are divided, against 0/0."""
+
+
+@dataclass
+class LoadMargins:
+    """LoadMargins of drives: their limits over their loads.
+
+    Attributes
+    ----------
+    figures : dict
+        The least margin of rated torque, of peak torque and of speed, by name.
+    least : float
+        The least of them all.
+    worst : str
+        The motion and place of the least margin, in words.
+    place : tuple of Places and int, or None
+        The places of the cycle with the least margin, and the number of the worst one.
+    """
+
+    figures: dict[str, float] = field(default_factory=dict)
+    least: float = np.inf
+    worst: str = ""
+    place: tuple[Places, int] | None = None
+
+    def take(self, name: str, limits: Array, loads: Array) -> Array:
+        """Return the margins (B,), limits (n,) over loads (B, n), and keep the least."""
+        margins = np.asarray((limits / np.maximum(loads, _NOTHING)).min(axis=-1))
+        self.note(name, float(margins.min()))
+        return margins
+
+    def note(self, name: str, margin: float) -> None:
+        """Keep a margin if it is the least of its name."""
+        self.figures[name] = min(self.figures.get(name, np.inf), margin)
+
+    def note_place(
+        self, margin: float, words: str, place: tuple[Places, int] | None = None
+    ) -> None:
+        """Keep motion and place of a margin if it is the least of all."""
+        if margin < self.least:
+            self.least, self.worst, self.place = margin, words, place or self.place
+
+
+def margins_of(
+    evaluator: KindEvaluator, robot: Manipulator, middle: Array, time: float | None
+) -> LoadMargins:
+    """Return the margins of the drives of a machine that carries the job's payload.
+
+    Friction and rotors count, and cycles that may be anywhere are taken at all their outermost
+    places. `middle` (m,) is the pose in the middle of the workspace; `time`, s, is the duration of
+    cycles that are given none.
+    """
+    drives = [leg.drive for leg in robot.legs if leg.drive is not None]
+    most, rated, fastest = (
+        np.array([getattr(drive, name) or np.inf for drive in drives])
+        for name in ("max_force", "rated_force", "max_speed")
+    )
+    least_margins, squares, shares = LoadMargins(), [], evaluator.shares(time)
+    for cycle in evaluator.every_cycle:
+        duration = cycle.duration or time or 1.0
+        places, greatest = cycle.both_ways(), np.zeros(robot.joint_count)
+        for step in range(_ROUNDS + 1):
+            states = evaluator.states(places, middle, duration)
+            forces = drive_forces(robot, *states)
+            rates = np.einsum("bkij,bkj->bki", jacobian(robot, states[0]), states[1])
+            means = np.trapezoid(forces**2, axis=1) / (forces.shape[1] - 1) * duration
+            means = (means + cycle.dwell * forces[:, -1] ** 2) / (duration + cycle.dwell)
+            greatest = np.maximum(greatest, means.max(axis=0))
+            every = [
+                least_margins.take("peak_margin", most, np.abs(forces).max(axis=1)),
+                least_margins.take("speed_margin", fastest, np.abs(rates).max(axis=1)),
+            ]
+            if not len(shares):
+                every.append(least_margins.take("rated_margin", rated, np.sqrt(means)))
+            k = int(np.min(every, axis=0).argmin())
+            least_margins.note_place(float(np.min(every)), places.words(k), (places, k))
+            worst = np.unique(np.argsort([*every, *-means.T], axis=1)[:, :_KEPT])
+            places = neighbour_places(evaluator.job, places, worst, 0.5 ** (step + 1))
+        squares.append(greatest)
+    if len(shares):
+        load = np.sqrt(duty_cycle_mean(np.array(squares), shares))
+        least = float(least_margins.take("rated_margin", rated, load[None])[0])
+        least_margins.note_place(least, "the rated torque of the whole duty cycle")
+    required = evaluator.job.motion
+    if required.acceleration or required.speed:
+        speed = max(required.speed, _NOTHING)
+
+        def motion_margins(places: Array) -> Array:
+            poses = middle + places
+            forces = worst_forces(robot, poses, speed, required.acceleration)
+            loads = np.hstack([forces, worst_speeds(robot, poses, speed)])
+            return np.append(most, fastest) / np.maximum(loads, _NOTHING)
+
+        margins, where = refine_worst_values(evaluator.job, robot, motion_margins, DENSE, keep=2)
+        least_margins.note("peak_margin", float(margins[: len(most)].min()))
+        least_margins.note("speed_margin", float(margins[len(most) :].min()))
+        worst_pose = middle + where[int(margins.argmin())]
+        place = np.subtract(*tool_places(robot, np.array([worst_pose, middle])))
+        at = ", ".join(f"{1e3 * x:+.0f}" for x in place[: len(robot.platform.lengths)])
+        words = f"the motion in any direction, at ({at}) mm"
+        least_margins.note_place(float(margins.min()), words)
+    return least_margins

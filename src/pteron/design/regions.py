@@ -1,0 +1,175 @@
+"""Required workspaces as regions that proofs take, as shapes that are placed, as sample poses."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pteron.design.rating import KindEvaluator
+from pteron.design.workspace_samples import orientations, poses_about_tool
+from pteron.design.workspace_tables import WorkspaceTable
+from pteron.kernels import Array
+from pteron.manipulator import Manipulator
+from pteron.motion.trajectories.tool import arm_motion, carries, tool_motion
+from pteron.platforms import Platform
+from pteron.workspace import Box, Cylinder, Region
+from pteron.workspace.shape_samples import Shape
+
+_RING = 24
+"""Points round a cylinder's rim."""
+
+
+def workspace_shape(workspace: WorkspaceTable, count: int) -> tuple[Shape, float]:
+    """Return the shape of a workspace in `count` coordinates, and its edge: the greatest side."""
+    sides = np.array(workspace.dimensions(count))
+    edge = float(sides.max())
+    half = sides / edge
+    if workspace.shape != "cylinder":
+        return Shape(half, lambda v: np.abs(v / half).max(axis=-1), np.empty((0, count))), edge
+    axis = "xyz".index(workspace.axis)
+    radial = [k for k in range(3) if k != axis]
+    turns = 2.0 * np.pi * np.arange(_RING) / _RING
+    rim = np.zeros((5, _RING, 3))
+    rim[..., radial] = half[radial] * np.stack([np.cos(turns), np.sin(turns)], axis=-1)
+    rim[..., axis] = half[axis] * np.linspace(-1.0, 1.0, 5)[:, None]
+
+    def gauge(vectors: Array) -> Array:
+        scaled = vectors / half
+        away = np.linalg.norm(scaled[..., radial], axis=-1)
+        return np.asarray(np.maximum(away, np.abs(scaled[..., axis])))
+
+    return Shape(half, gauge, rim.reshape(-1, 3)), edge
+
+
+def workspace_poses(workspace: WorkspaceTable, angles: Array, samples: int | None = None) -> Array:
+    """Return poses (N, m) over a workspace at orientations (A, m); with 2 samples its corners."""
+    positions = _positions(workspace, samples or workspace.samples)
+    poses = np.repeat(angles, len(positions), axis=0)
+    poses[:, : positions.shape[1]] = np.tile(positions, (len(angles), 1))
+    return poses
+
+
+def _positions(workspace: WorkspaceTable, count: int) -> Array:
+    line = np.linspace(-1.0, 1.0, count)
+    if workspace.shape != "cylinder":
+        low, high = (np.array(end) for end in workspace.ends)
+        units = np.array(list(product(line, repeat=len(low))))
+        return np.asarray((low + high) / 2.0 + units * (high - low) / 2.0)
+    assert workspace.radius is not None  # the shape says so
+    assert workspace.height is not None
+    axis = "xyz".index(workspace.axis)
+    turns = np.linspace(0.0, 2.0 * np.pi, 4 * count, endpoint=False)
+    radii = np.linspace(0.0, workspace.radius, max(2, (count + 1) // 2))
+    points = [
+        (r * np.cos(a), r * np.sin(a), h * workspace.height / 2.0)
+        for h in line
+        for r in radii
+        for a in (turns if r else turns[:1])
+    ]
+    # The last is along the axis.
+    order = [(axis + 1) % 3, (axis + 2) % 3, axis]
+    positions = np.empty((len(points), 3))
+    positions[:, order] = points
+    return np.asarray(positions + np.array(workspace.center))
+
+
+def workspace_region(table: WorkspaceTable, pose: Array, share: float = 1.0) -> Region:
+    """Return a workspace that has its place, at the orientation of a pose, or a share of it."""
+    if table.shape == "cylinder":
+        assert table.radius is not None  # the shape says so
+        assert table.height is not None
+        x, y, z = np.eye(3)["xyz".index(table.axis)].tolist()
+        center = placed_pose(pose, np.array(table.center))
+        return Cylinder(center, share * table.radius, share * table.height, (x, y, z))
+    low, high = (np.array(end) for end in table.ends)
+    inset = 0.5 * (1.0 - share) * (high - low)
+    return Box(placed_pose(pose, low + inset), placed_pose(pose, high - inset))
+
+
+def placed_pose(pose: Array, position: Array) -> tuple[float, ...]:
+    """Return a position with the angle of a pose."""
+    return (*position.tolist(), *pose[len(position) :].tolist())
+
+
+@dataclass(frozen=True)
+class TurnedTool:
+    """Poses whose tool is in a box, for a platform that turns about an axis beside the tool.
+
+    Parameters
+    ----------
+    of_tool : Box
+        Positions of the tool, as `tool_motion` has them, then the angle of the turn, m and rad.
+    platform : Platform
+        The platform that carries the tool.
+    """
+
+    of_tool: Box
+    platform: Platform
+
+    @property
+    def box(self) -> Array:
+        """Least and greatest pose (2, m)."""
+        low, high = self.of_tool.box
+        at, away = self._arm(low[None], high[None])
+        return np.array([low - at[0] - away[0], high - at[0] + away[0]])
+
+    def holds(self, poses: Array) -> NDArray[np.bool_]:
+        """Return which poses (..., m) lie in it."""
+        zeros = np.zeros_like(poses)
+        return self.of_tool.holds(tool_motion(self.platform, poses, zeros, zeros)[0])
+
+    def misses(self, low: Array, high: Array) -> NDArray[np.bool_]:
+        """Return which boxes with corners (B, m) certainly have none of these poses."""
+        at, away = self._arm(low, high)
+        return self.of_tool.misses(low + at - away, high + at + away)
+
+    def _arm(self, low: Array, high: Array) -> tuple[Array, Array]:
+        """Return the arm (B, m) from P to the tool at a box's middle angle, and its greatest error.
+
+        Over half the box's range of angles the arm's end moves by its length times that at most.
+        """
+        platform, angular = self.platform, self.platform.angular
+        middle, half = 0.5 * (low + high)[:, angular], 0.5 * (high - low)[:, -1:]
+        zeros = np.zeros_like(middle)
+        at, away = np.zeros_like(low), np.zeros_like(low)
+        at[:, ~angular] = arm_motion(platform, middle, zeros, zeros)[0]
+        away[:, ~angular] = (1.0 + 1e-12) * np.hypot(*platform.tool[:2]) * half
+        return at, away
+
+
+def kind_regions(evaluator: KindEvaluator, robot: Manipulator, middle: Array) -> list[Region]:
+    """Return the workspace as regions: each pose of a list, else a box or cylinder an orientation.
+
+    A range of turns without tilts is a coordinate of one box.
+    """
+    space, count = evaluator.job.workspace, len(robot.platform.lengths)
+    if space.poses is not None:
+        return [Box(tuple(pose), tuple(pose)) for pose in middle + evaluator.poses]
+    if space.turn is not None and not space.tilts and space.radius is None:
+        return [_turned_box(evaluator, robot, middle)]
+    boxes: list[Region] = []
+    half = np.zeros(robot.freedom)
+    half[:count] = evaluator.half[:count]
+    for pose in middle + poses_about_tool(robot, orientations(evaluator.job, robot)):
+        if space.radius is not None and space.height is not None:
+            boxes.append(Cylinder(tuple(pose.tolist()), space.radius, space.height))
+        else:
+            boxes.append(Box(tuple((pose - half).tolist()), tuple((pose + half).tolist())))
+    return boxes
+
+
+def _turned_box(evaluator: KindEvaluator, robot: Manipulator, middle: Array) -> Region:
+    """Return the box of positions and turns of a workspace with a range of turns."""
+    platform, count = robot.platform, len(robot.platform.lengths)
+    assert evaluator.job.workspace.turn is not None  # the caller has checked it
+    zeros = np.zeros((1, robot.freedom))
+    level = tool_motion(platform, middle[None], zeros, zeros)[0][0]
+    low, high = level.copy(), level.copy()
+    low[:count] -= evaluator.half[:count]
+    high[:count] += evaluator.half[:count]
+    low[-1], high[-1] = evaluator.job.workspace.turn
+    box = Box(tuple(low.tolist()), tuple(high.tolist()))
+    return TurnedTool(box, platform) if carries(platform) and any(platform.tool[:2]) else box

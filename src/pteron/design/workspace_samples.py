@@ -1,0 +1,215 @@
+"""Sample poses and cycles of a job, relative to the middle of its workspace, for a kind.
+
+Places are those of the tool's centre point: where the platform turns, P moves against it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import product
+
+import numpy as np
+
+from pteron.bodies.vectors import rotation_matrices
+from pteron.design.job import Job
+from pteron.kernels import Array
+from pteron.kinematics import pose_of
+from pteron.manipulator import Manipulator
+from pteron.motion.trajectories.tool import Curve, pose_motion, tool_motion
+
+_ALONG, _ALONG_TILTED = 4, 3
+"""Poses along each side of a box; where it is met at several tilts."""
+
+_ROUND = 12
+"""Poses round a cylinder."""
+
+_RIM = 6
+"""Directions round the rim of a cone of tilts."""
+
+INSIDE = 1e-9
+"""Tolerance of a place in the workspace, m or rad."""
+
+_ROUNDS = 4
+"""Halvings of the refinement's step."""
+
+
+def platform_curve(robot: Manipulator, *curve: Array) -> Curve:
+    """Return places of the tool from the middle, and two derivatives, as those of P."""
+    pose, first, second = pose_motion(robot.platform, *curve)
+    zeros = np.zeros((1, robot.freedom))
+    return pose + tool_motion(robot.platform, zeros, zeros, zeros)[0], first, second
+
+
+def poses_about_tool(robot: Manipulator, angles: Array) -> Array:
+    """Return poses (A, m) that turn about the tool, relative to the workspace's middle."""
+    poses = np.zeros((len(angles), robot.freedom))
+    poses[:, len(robot.platform.lengths) :] = angles
+    return platform_curve(robot, poses, np.zeros_like(poses), np.zeros_like(poses))[0]
+
+
+def sample_poses(job: Job, robot: Manipulator, count: int | None = None) -> Array:
+    """Return poses (N, m) over the workspace and its orientations, from its middle."""
+    return _poses_at(job, robot, _places(job, robot, count or _positions_along(job)))
+
+
+def refine_worst_values(
+    job: Job,
+    robot: Manipulator,
+    values_of: Callable[[Array], Array],
+    samples: int | None = None,
+    keep: int = 1,
+    besides: Array | None = None,
+) -> tuple[Array, Array]:
+    """Return the minimum of each column of values (C,), and its pose (C, m).
+
+    `values_of` gives the values (B, C) at poses (B, m), which are from the middle. They are taken
+    at `sample_poses`, and then ever nearer about those that are worst in a column, `keep` of each:
+    what is worst near a singularity is worst in a valley that samples miss. Poses `besides` those
+    of the workspace count as they are.
+    """
+    samples, space = samples or _positions_along(job), job.workspace
+    count = len(robot.platform.lengths)
+    places = _places(job, robot, samples)
+    rows = values_of(_poses_at(job, robot, places))
+    steps = np.zeros(robot.freedom)
+    steps[:count] = job.workspace.half[:count] / (samples - 1)
+    if space.tilt is not None:
+        steps[count : count + 2] = 0.5 * space.tilt
+    if space.turn is not None and space.directions is None:
+        steps[-1] = 0.25 * (space.turn[1] - space.turn[0])
+    if space.poses is not None:
+        steps[:count] = 0.0
+    ways = _neighbour_steps(steps, count)
+    for _ in range(_ROUNDS if steps.any() else 0):
+        worst = np.unique(np.argsort(rows, axis=0)[:keep])
+        near = (places[worst][:, None] + steps * ways).reshape(-1, robot.freedom)
+        places = _clip_to_workspace(job, near, count)
+        rows = values_of(_poses_at(job, robot, places))
+        steps /= 2.0
+    poses = _poses_at(job, robot, places)
+    if besides is not None and len(besides):
+        poses, rows = np.vstack([poses, besides]), np.vstack([rows, values_of(besides)])
+    return rows.min(axis=0), poses[rows.argmin(axis=0)]
+
+
+def _neighbour_steps(steps: Array, count: int) -> Array:
+    """Return the neighbours of a place (W, m), in steps: any, but if it tilts in part of it."""
+    several = [(-1.0, 0.0, 1.0) if step else (0.0,) for step in steps]
+    if not steps[count:-1].any():
+        return np.array(list(product(*several)))
+    fixed = [(0.0,)] * len(steps)
+    parts = (several[:count] + fixed[count:], fixed[:count] + several[count:])
+    return np.unique(np.vstack([list(product(*part)) for part in parts]), axis=0)
+
+
+def _clip_to_workspace(job: Job, places: Array, count: int) -> Array:
+    """Return places (N, m) clipped to the workspace."""
+    space, half, clipped = job.workspace, job.workspace.half[:count], places.copy()
+    if space.poses is None:
+        clipped[:, :count] = np.clip(clipped[:, :count], -half, half)
+    if space.radius is not None:
+        clipped[:, :2] = _clip_to_radius(clipped[:, :2], space.radius)
+    if space.tilt is not None:
+        clipped[:, count : count + 2] = _clip_to_radius(clipped[:, count : count + 2], space.tilt)
+    if space.turn is not None and space.directions is None:
+        clipped[:, -1] = np.clip(clipped[:, -1], *space.turn)
+    return np.unique(clipped, axis=0)
+
+
+def _clip_to_radius(points: Array, radius: float) -> Array:
+    """Return points (N, 2) drawn into a circle."""
+    shares = np.minimum(1.0, radius / np.maximum(np.hypot(*points.T), 1e-12))
+    return np.asarray(points * shares[:, None])
+
+
+def _positions_along(job: Job) -> int:
+    return _ALONG_TILTED if job.workspace.tilts else _ALONG
+
+
+def _places(job: Job, robot: Manipulator, count: int) -> Array:
+    """Return places (N, m): of the tool from the middle, and angles of the platform.
+
+    Of a cone of tilts the angles are how far the platform leans to x and to y, and its turn.
+    """
+    points = _positions(job, count)[:, : len(robot.platform.lengths)]
+    angles = orientations(job, robot)
+    if job.workspace.tilt is not None:
+        leans = [(*lean, turn) for turn in _turns(job) for lean in _leans(job.workspace.tilt)]
+        angles = np.array(leans)
+    return np.hstack([np.tile(points, (len(angles), 1)), np.repeat(angles, len(points), axis=0)])
+
+
+def _poses_at(job: Job, robot: Manipulator, places: Array) -> Array:
+    count = len(robot.platform.lengths)
+    angles = places[:, count:]
+    if job.workspace.tilt is not None:
+        angles = _tilted_angles(robot, angles[:, :2])
+        angles[:, -1] += places[:, -1]
+    poses = poses_about_tool(robot, angles)
+    poses[:, :count] += places[:, :count]
+    return poses
+
+
+def pad_to_xyz(rows: object) -> Array:
+    """Return rows of two or three numbers with three."""
+    array = np.asarray(rows, dtype=float)
+    return np.pad(array, ((0, 0), (0, 3 - array.shape[1])))
+
+
+def _positions(job: Job, count: int) -> Array:
+    space, half = job.workspace, job.workspace.half
+    if space.poses is not None:
+        points = pad_to_xyz(space.poses)
+        return np.asarray(points - 0.5 * (points.min(axis=0) + points.max(axis=0)))
+    line = np.linspace(-1.0, 1.0, count)
+    upright = line if half[2] else np.zeros(1)
+    if space.radius is None:
+        return np.array(list(product(line, line, upright))) * half
+    turns = 2.0 * np.pi * np.arange(_ROUND) / _ROUND
+    circle = [(0.0, 0.0), *((np.cos(a), np.sin(a)) for a in turns)]
+    circle += [(0.5 * x, 0.5 * y) for x, y in circle[1::3]]
+    return np.array([(x, y, z) for x, y in circle for z in upright]) * half
+
+
+def orientations(job: Job, robot: Manipulator) -> Array:
+    """Return angles (A, a) of the platform that the workspace asks for; tilts at each turn."""
+    return np.concatenate([turn_angles(tilts(job, robot), angle) for angle in _turns(job)])
+
+
+def _turns(job: Job) -> list[float]:
+    turn = job.workspace.turn
+    return [0.0] if turn is None else [*([0.0] if turn[0] < 0.0 < turn[1] else []), *turn]
+
+
+def tilts(job: Job, robot: Manipulator) -> Array:
+    """Return angles (A, a) of the tilts: of a cone those of its middle and round its rim."""
+    space, count = job.workspace, len(robot.platform.angles)
+    if space.tilt is not None:
+        return _tilted_angles(robot, _leans(space.tilt))
+    if space.directions is None:
+        return np.zeros((1, count))
+    directions = np.array(space.directions)
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    away = np.linalg.norm(directions[:, :2], axis=1, keepdims=True)
+    angle = np.arctan2(away, directions[:, 2:])
+    return _tilted_angles(robot, directions[:, :2] / np.where(away > 0.0, away, 1.0) * angle)
+
+
+def _leans(tilt: float) -> Array:
+    """Return leans (L, 2) to x and y, rad: none, and round the rim of a cone."""
+    rim = 2.0 * np.pi * np.arange(_RIM) / _RIM
+    return np.vstack([np.zeros((1, 2)), tilt * np.c_[np.cos(rim), np.sin(rim)]])
+
+
+def _tilted_angles(robot: Manipulator, leans: Array) -> Array:
+    """Return the angles (L, a) of a platform that leans to x and y (L, 2): the shortest turn."""
+    vectors = np.c_[-leans[:, 1], leans[:, 0], np.zeros(len(leans))]
+    matrices = rotation_matrices(vectors)
+    return np.array(pose_of(robot, np.zeros(3), matrices)[:, -len(robot.platform.angles) :])
+
+
+def turn_angles(angles: Array, turn: float) -> Array:
+    """Return angles (A, a) turned further about the upright."""
+    if not angles.shape[1]:
+        return angles
+    return np.asarray(angles + turn * np.eye(angles.shape[1])[-1])

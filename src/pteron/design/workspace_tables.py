@@ -1,0 +1,250 @@
+"""Tables of a workspace, and of the cell around it: of a search's file, and of a task's."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Annotated, Any, Literal, Self
+
+import numpy as np
+from pydantic import AfterValidator, Field, model_validator
+
+from pteron.bodies.tables import Number, Three, TomlTable, Two, key
+from pteron.design.load_tables import Least, Positive
+from pteron.kernels import Array
+
+_FAR = 20.0
+"""Length, m, from which a workspace or a cell was probably given in millimetres."""
+
+_COARSE = 0.02
+"""Error, m, from which it was probably given in millimetres."""
+
+_LEANS = 1.5
+"""Angle, rad, that a tilt must be below."""
+
+_TURNS = 7.0
+"""Angle, rad, from which a turn was probably given in degrees."""
+
+
+def _expect_near(coordinates: Any) -> Any:
+    """Refuse lengths, m, that are too large for a cell."""
+    lengths = np.abs(coordinates).ravel()
+    if lengths.max() > _FAR:
+        raise ValueError(f"{lengths.max():g} m given: are these mm?")
+    return coordinates
+
+
+def _fine(error: float) -> float:
+    """Refuse errors, m, that are too large for a machine."""
+    if error > _COARSE:
+        raise ValueError(f"{error:g} m given: is this mm?")
+    return error
+
+
+def _expect_tilt(angle: float) -> float:
+    if angle >= _LEANS:
+        raise ValueError(f"{angle:g} rad given, below {_LEANS:g} expected: is this in degrees?")
+    return angle
+
+
+def expect_near_points(points: list[tuple[float, ...]]) -> list[tuple[float, ...]]:
+    """Refuse points whose first two coordinates, lengths in m, are too large for a cell."""
+    _expect_near([point[:2] for point in points])
+    return points
+
+
+Near = Annotated[Positive, AfterValidator(_expect_near)]
+"""A length above 0 and of a cell's size, m."""
+
+Fine = Annotated[Positive, AfterValidator(_fine)]
+"""A greatest error above 0, m."""
+
+Place = Annotated[Three, AfterValidator(_expect_near)]
+"""A place in a cell, m."""
+
+
+class WorkspaceTable(TomlTable):
+    """`[workspace]`: the region in which the machine must work.
+
+    A box given by its sides, a cube or a cylinder may have no center: then it floats, and each
+    design has it where the machine's margins are largest.
+    """
+
+    low: tuple[Number, ...] | None = key("a box's least x, y, z, m", None)
+    high: tuple[Number, ...] | None = key("a box's greatest x, y, z, m", None)
+    sides: tuple[Positive, ...] | None = key("of a box, in place of these, m", None)
+    center: tuple[Number, ...] | None = key(
+        "of a box of sides, a cube or a cylinder, m; left out, it floats", None
+    )
+    edge: Positive | None = key("of a cube, m", None)
+    radius: Positive | None = key("of a cylinder, m", None)
+    height: Positive | None = key("of a cylinder, m", None)
+    axis: Literal["x", "y", "z"] = key("of a cylinder", "z")
+    samples: Annotated[int, Field(ge=2, le=41, strict=True)] = key(
+        "poses along each of its sides", 5
+    )
+
+    @model_validator(mode="after")
+    def _one_shape(self) -> Self:
+        keys = ("low", "high", "sides", "center", "edge", "radius", "height")
+        keys_present = {key for key in keys if getattr(self, key) is not None}
+        valid_sets = ({"low", "high"}, {"sides"}, {"edge"}, {"radius", "height"})
+        if keys_present not in valid_sets and keys_present - {"center"} not in valid_sets[1:]:
+            raise ValueError(
+                f"{', '.join(sorted(keys_present)) or 'nothing'} given; a box has low and high, or "
+                "sides, a cube edge, a cylinder radius and height; these three have a center, or "
+                "float"
+            )
+        pairs = ((self.low, self.high), (self.sides, self.center))
+        if any(a is not None and b is not None and len(a) != len(b) for a, b in pairs):
+            raise ValueError("unlike numbers of coordinates given")
+        if self.low is not None and not all(
+            a < b for a, b in zip(self.low, self.high or (), strict=True)
+        ):
+            raise ValueError(f"low {list(self.low)} is not below high {list(self.high or ())}")
+        return self
+
+    @property
+    def shape(self) -> Literal["box", "cube", "cylinder"]:
+        """The kind of workspace."""
+        if self.radius is not None:
+            return "cylinder"
+        return "cube" if self.edge is not None else "box"
+
+    @property
+    def floats(self) -> bool:
+        """Whether its place is free."""
+        return self.low is None and self.center is None
+
+    def with_center(self, center: Iterable[float]) -> Self:
+        """Return the workspace at another center, m."""
+        return self.model_copy(update={"center": tuple(map(float, center))})
+
+    def dimensions(self, count: int) -> tuple[float, ...]:
+        """Return the sides (count,) of the box around it, m."""
+        if self.low is not None and self.high is not None:
+            return tuple(b - a for a, b in zip(self.low, self.high, strict=True))
+        if self.radius is not None and self.height is not None:
+            return tuple(
+                self.height if letter == self.axis else 2.0 * self.radius for letter in "xyz"
+            )
+        return self.sides or (self.edge or 0.0,) * count
+
+    @property
+    def ends(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Least and greatest coordinates of the box around a placed workspace, m."""
+        if self.low is not None and self.high is not None:
+            return self.low, self.high
+        center = self.center or ()
+        halves = [side / 2.0 for side in self.dimensions(len(center))]
+        ends = tuple(
+            zip(*((x - h, x + h) for x, h in zip(center, halves, strict=True)), strict=True)
+        )
+        return ends[0], ends[1]
+
+    @property
+    def lengths(self) -> int | None:
+        """Number of its coordinates; None if it fits any number."""
+        return len(self.low or self.sides or self.center or ()) or (3 if self.radius else None)
+
+
+class ToolWorkspaceTable(TomlTable):
+    """`[workspace]`: the positions of the tool's centre point: a box, a cylinder or a list."""
+
+    size: Annotated[tuple[Near, ...], Field(min_length=2, max_length=3)] | None = key(
+        "sides of a box, m; two for a flat one", None
+    )
+    radius: Near | None = key("of an upright cylinder, m", None)
+    height: Near | None = key("of the cylinder, m", None)
+    poses: Annotated[list[tuple[Number, ...]], Field(min_length=1)] | None = key(
+        "positions, all of which must be met: x y z, m", None
+    )
+    center: Place | None = key(
+        "its middle in the cell, m; left out, it may be anywhere in the cell", None
+    )
+    turn: Two | None = key("least and greatest turn about the upright, rad", None)
+    tilt: Annotated[Positive, AfterValidator(_expect_tilt)] | None = key(
+        "of the platform to every side, rad: it fills a cone", None
+    )
+    directions: Annotated[list[Three], Field(min_length=1)] | None = key(
+        "of the platform's z, at each of which it must work; level is [0, 0, 1]", None
+    )
+
+    @model_validator(mode="after")
+    def _one_shape(self) -> Self:
+        keys = ("size", "radius", "height", "poses")
+        keys_present = [key for key in keys if getattr(self, key) is not None]
+        if keys_present not in (["size"], ["radius", "height"], ["poses"]):
+            raise ValueError(
+                f"{', '.join(keys_present) or 'nothing'} given; a box has size, a cylinder radius "
+                "and height, anything else a list of poses"
+            )
+        if self.poses is not None and {len(vector) for vector in self.poses} not in ({2}, {3}):
+            raise ValueError("poses: each has x y, or x y z")
+        _expect_near(self.poses or 0.0)
+        if self.turn is not None and not self.turn[0] < self.turn[1]:
+            raise ValueError(f"turn: {list(self.turn)} given, [low, high] expected, rad")
+        if self.turn is not None and max(map(abs, self.turn)) > _TURNS:
+            raise ValueError(f"turn: {list(self.turn)} rad given: are these degrees?")
+        if self.directions is not None and not all(vector[2] > 0.0 for vector in self.directions):
+            raise ValueError("directions: each leads upwards; z above 0 expected")
+        return self
+
+    @property
+    def half(self) -> Array:
+        """Half the sides (3,) of the box around the workspace, m."""
+        if self.poses is not None:
+            sides = np.ptp(np.array(self.poses), axis=0)
+        elif self.radius is not None and self.height is not None:
+            sides = np.array([2.0 * self.radius, 2.0 * self.radius, self.height])
+        else:
+            sides = np.array(self.size)
+        return np.pad(0.5 * sides, (0, 3 - len(sides)))
+
+    def meets(self, low: Array, high: Array) -> bool:
+        """Say whether the tool may enter a box, corners (3,) from the workspace's middle, m."""
+        if self.poses is not None:
+            poses = np.pad(self.poses, ((0, 0), (0, 3 - len(self.poses[0]))))
+            poses = poses - 0.5 * (poses.min(axis=0) + poses.max(axis=0))
+            return bool(((poses > low) & (poses < high)).all(axis=1).any())
+        half = self.half
+        if not ((low < half) & (high > -half) | (half == 0.0) & (low < 0.0) & (high > 0.0)).all():
+            return False
+        nearest = np.hypot(*np.clip(0.0, low, high)[:2])
+        return self.radius is None or bool(nearest < self.radius)
+
+    @property
+    def tilts(self) -> bool:
+        """Whether the platform must tilt."""
+        return self.tilt is not None or self.directions is not None
+
+    @property
+    def words(self) -> str:
+        """The shape of the workspace in words."""
+        if self.size is not None:
+            return f"workspace {' x '.join(f'{1e3 * x:g}' for x in self.size)} mm"
+        if self.poses is not None:
+            return f"workspace of {len(self.poses)} pose{'s' if len(self.poses) > 1 else ''}"
+        return f"workspace: cylinder of radius {self.radius:g} m, height {self.height:g} m"
+
+
+class KeepOutTable(TomlTable):
+    """`[[keep_out]]`: a box in which no part of the machine may be."""
+
+    low: Place = key("m; from the middle of a workspace that floats")
+    high: Place = key("m")
+
+    @model_validator(mode="after")
+    def _rises(self) -> Self:
+        if not all(a < b for a, b in zip(self.low, self.high, strict=True)):
+            raise ValueError(f"low {list(self.low)} is not below high {list(self.high)}")
+        return self
+
+
+class CellTable(TomlTable):
+    """`[cell]`: the space for the machine."""
+
+    footprint: tuple[Near, Near] | None = key("along x and y, m", None)
+    height: Near | None = key("m", None)
+    low: Place | None = key("of a cell with a place of its own, m", None)
+    high: Place | None = key("m", None)
+    margin: Least = key("half the width of bodies about their middle lines, m", 0.03)

@@ -1,0 +1,59 @@
+"""What installed packages add to Pteron, as entry points; `EXTENSION_GROUPS` says what they may be.
+
+A package is imported when its name is asked for, not before.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from pteron.errors import ModelError
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
+
+EXTENSION_GROUPS = {
+    "pteron.legs": "a kind of leg",
+    "pteron.indices": "an index of performance",
+    "pteron.export": "an export",
+    "pteron.design": "a quantity of designs",
+}
+"""Groups of entry points, and what each of their names stands for."""
+
+
+def extension_names(group: str) -> tuple[str, ...]:
+    """Return the names of a group that installed packages have, sorted."""
+    return tuple(sorted({entry_point.name for entry_point in _entry_points(group)}))
+
+
+def load_extension(group: str, name: str) -> Any:
+    """Return what an installed package has under a name of a group; None if no package has it.
+
+    Raises
+    ------
+    ModelError
+        If the package cannot be imported.
+    """
+    entry_point = _entry_point(group, name)
+    if entry_point is None:
+        return None
+    try:
+        return entry_point.load()
+    except Exception as error:
+        raise ModelError(f"{entry_point.value}: {type(error).__name__}: {error}") from error
+
+
+def extension_value(group: str, name: str) -> str:
+    """Return where an entry point says that its object is, such as "my_legs:SliderRod"."""
+    entry_point = _entry_point(group, name)
+    return "" if entry_point is None else entry_point.value
+
+
+def _entry_point(group: str, name: str) -> EntryPoint | None:
+    return next((point for point in _entry_points(group) if point.name == name), None)
+
+
+def _entry_points(group: str) -> tuple[EntryPoint, ...]:
+    from importlib.metadata import entry_points
+
+    return tuple(entry_points(group=group))

@@ -1,0 +1,207 @@
+"""Processes of this computer that share work, and end with the process that started them."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import signal
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from multiprocessing import active_children, get_context, parent_process
+from threading import Thread, current_thread, main_thread
+from types import ModuleType
+from typing import Any, TypeVar
+
+from pteron.errors import PteronError
+
+_Job = TypeVar("_Job")
+
+_LOOK = 0.2
+"""Seconds after which a wait looks for Ctrl-C and for messages."""
+
+_ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+"""Environment of the processes: together they have a thread for each core, and no more."""
+
+
+class LostWorkerError(PteronError):
+    """A process that did a part of the work was ended from outside, or could not start."""
+
+
+class WorkerPool(ProcessPoolExecutor):
+    """Processes that leave Ctrl-C to this one, and end with it or where the work is broken off.
+
+    Parameters
+    ----------
+    workers : int
+        Number of processes. Each starts when there is work for it.
+    shared : object, optional
+        First argument of the calls of `start`. It crosses to each process once, which keeps it.
+    script : bool
+        Whether they run the caller's script, where its functions and classes are. It must then
+        ask for them under ``if __name__ == "__main__":``.
+
+    Raises
+    ------
+    PteronError
+        If `shared` cannot cross to other processes; `start` if they cannot import it.
+    """
+
+    def __init__(self, workers: int, shared: Any = None, *, script: bool = True) -> None:
+        context = get_context("spawn")
+        self._messages, self._script = context.SimpleQueue(), script
+        try:
+            pickled = pickle.dumps(shared)
+        except (pickle.PicklingError, AttributeError, TypeError) as error:
+            raise _import_error(error) from None
+        super().__init__(workers, context, _initialise_worker, (pickled, self._messages))
+        self._others = set(active_children())
+
+    def submit(self, function: Any, /, *arguments: Any, **options: Any) -> Future[Any]:
+        """Give the processes a call, and start one where none is free."""
+        main = sys.modules["__main__"]
+        with held_interrupts(), _environment(_ONE_THREAD):
+            try:
+                if not self._script:
+                    sys.modules["__main__"] = ModuleType("__main__")
+                return super().submit(function, *arguments, **options)
+            except (BrokenProcessPool, OSError):
+                raise _lost_worker() from None
+            finally:
+                sys.modules["__main__"] = main
+
+    def start(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
+        """Call a function in one of the processes, with what they share as its first argument."""
+        return self.submit(_call_with_shared, function, *arguments)
+
+    def messages(
+        self, function: Callable[[_Job, Callable[[Any], None]], Any], jobs: Sequence[_Job]
+    ) -> Iterator[tuple[int, Any]]:
+        """Yield the messages and the result of each call, as (index of the job, message).
+
+        `function` takes a job and a callable that sends a message; its result comes last.
+        """
+        pending = {self.submit(_call, function, k, job): k for k, job in enumerate(jobs)}
+        while pending:
+            ready, _ = wait(pending, _LOOK, FIRST_COMPLETED)
+            while not self._messages.empty():
+                yield self._messages.get()
+            for future in ready:
+                yield pending.pop(future), result_of(future)
+
+    def __exit__(self, kind: Any, *error: Any) -> bool | None:
+        """End the processes, at once where the work is broken off."""
+        if kind is not None:
+            for process in set(active_children()) - self._others:
+                process.terminate()
+        return super().__exit__(kind, *error)
+
+
+def result_of(future: Future[Any]) -> Any:
+    """Return the result of a call once it is there; raise what the call raised.
+
+    Raises
+    ------
+    LostWorkerError
+        If one of the pool's processes was ended.
+    """
+    # Polars, once imported, lets a wait without end go on through Ctrl-C.
+    while not wait([future], _LOOK).done:
+        pass
+    try:
+        return future.result()
+    except BrokenProcessPool:
+        raise _lost_worker() from None
+
+
+def _lost_worker() -> LostWorkerError:
+    return LostWorkerError(
+        "a process that did a part of the work was ended: is there enough memory? what is "
+        "finished is kept in the folder, if one is given: run it again"
+    )
+
+
+_shared: Any = None
+_queue: Any = None
+
+
+def _import_error(error: Exception) -> PteronError:
+    return PteronError(
+        f"other processes cannot take part: {type(error).__name__}: {error}; define functions and "
+        "classes at the top of a module that can be imported, or do the work without workers"
+    )
+
+
+def _initialise_worker(pickled: bytes, messages: Any) -> None:
+    """Ignore SIGINT, exit when the parent does, and keep what the calls share."""
+    global _shared, _queue
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    Thread(target=_exit_with_parent, daemon=True).start()
+    _queue = messages
+    try:
+        _shared = pickle.loads(pickled)
+    except Exception as error:  # whatever an import raises is for the caller to see
+        _shared = _import_error(error)
+
+
+def _exit_with_parent() -> None:
+    """End this process when its parent has ended, even if that was killed."""
+    parent = parent_process()
+    assert parent is not None  # this one was spawned
+    parent.join()
+    os._exit(1)
+
+
+def _call_with_shared(function: Callable[..., Any], *arguments: Any) -> Any:
+    if isinstance(_shared, PteronError):
+        raise _shared
+    return function(_shared, *arguments)
+
+
+def _call(function: Callable[[Any, Callable[[Any], None]], Any], k: int, job: Any) -> Any:
+    return function(job, lambda message: _queue.put((k, message)))
+
+
+@contextmanager
+def _environment(variables: Mapping[str, str]) -> Iterator[None]:
+    """Set variables of the environment for the processes that are started meanwhile."""
+    before = {name: os.environ.get(name) for name in variables}
+    os.environ.update(variables)
+    try:
+        yield
+    finally:
+        for name, setting in before.items():
+            if setting is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = setting
+
+
+@contextmanager
+def held_interrupts() -> Iterator[None]:
+    """Hold Ctrl-C back: here for so long, in processes that are started meanwhile for good.
+
+    A process imports for seconds before it can be told to ignore it, and one that is broken off
+    while it is started complains. Python's tracker of resources unblocks signals as it starts: it
+    must run before, as it does once there is a pool of processes.
+    """
+    heard: list[int] = []
+    usual = signal.getsignal(signal.SIGINT)
+    # Signals are handled in the main thread alone; a handler that is not Python's stays.
+    mine = usual is not None and current_thread() is main_thread()
+    if mine:
+        signal.signal(signal.SIGINT, lambda number, _: heard.append(number))
+    masks = hasattr(signal, "pthread_sigmask")
+    if masks:
+        mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        if masks:
+            signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+        if mine:
+            signal.signal(signal.SIGINT, usual)
+        if heard:
+            signal.raise_signal(signal.SIGINT)
