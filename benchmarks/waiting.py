@@ -113,7 +113,7 @@ def main() -> None:
     commands = [name for name in selected if name in _COMMANDS]
     if commands:
         print_commands(states, commands, rounds)
-    for name in sections.keys() & set(selected):
+    for name in [name for name in sections if name in selected]:
         for state in states:
             sections[name](state, rounds)
 
