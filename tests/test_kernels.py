@@ -62,6 +62,8 @@ def test_unknown_functions_and_options_out_of_place_are_refused_with_the_choices
         pteron.compile(ROBOT, "jacobian", base=base)
     with pytest.raises(ModelError, match='base: a choice for one machine; use grade "specialised"'):
         pteron.compile(ROBOT, "inverse_dynamics", base=base, grade="general")
+    with pytest.raises(pteron.ModelError, match="where a machine's numbers are zero"):
+        pteron.compile(ROBOT, "constraint", grade="general")
 
 
 @lru_cache

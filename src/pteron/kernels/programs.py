@@ -71,11 +71,11 @@ SELECTED = ("base_regressor", "adaptive", "adaptive_drives")
 _SHARED = ("geometry", "stored", "gains", "parameters", "base_parameters", "drives", "actuators")
 """Inputs of which one value serves a whole batch."""
 
-_BY_CASES = ("constraint", "passive_friction")
+BY_CASES = ("constraint", "passive_friction")
 """Functions whose equations are others where numbers, such as couples along an axis, are zero: they
 have no general program."""
 
-_OF_ONE_MACHINE = (*_BY_CASES, "clearances", "least_clearances", "reactions", "beams", "room")
+_OF_ONE_MACHINE = (*BY_CASES, "clearances", "least_clearances", "reactions", "beams", "room")
 """Functions whose equations depend on a machine's stored numbers, such as which limits are beyond
 half a turn: a general program has those of one machine."""
 
@@ -136,7 +136,7 @@ def numeric_program(
 ) -> Program:
     """Return the program that computes numbers: general within `sharing_programs`."""
     like = ALIKE.get()
-    own = _OF_ONE_MACHINE if like is True else _BY_CASES
+    own = _OF_ONE_MACHINE if like is True else BY_CASES
     if like is None or columns is not None or what in own:
         plain = plain or like is not None
         return program(robot, what, columns, wrench=wrench, guarded=guarded, plain=plain)

@@ -23,6 +23,7 @@ from pteron.kernels.kernel import Array, Kernel
 from pteron.kernels.numba import Jitted
 from pteron.kernels.program_cache import Program
 from pteron.kernels.programs import (
+    BY_CASES,
     Columns,
     general_program,
     geometry_only,
@@ -208,6 +209,11 @@ def _cached_kernel(
     elif grade == "general":
         if wrench:
             raise ModelError('wrench: not with grade "general"; use "specialised" or "parametric"')
+        if what in BY_CASES:
+            raise ModelError(
+                f"grade: {what!r} has other equations where a machine's numbers are zero, so that "
+                'no topology shares it; use "specialised" or "parametric"'
+            )
         built = general_program(robot, what)
         own = {port.name for port in built.inputs} & {"geometry", "stored"}
         fixed |= {name: FIXED[name](robot) for name in own}
