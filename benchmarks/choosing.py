@@ -31,7 +31,7 @@ from pteron.design.kind_search import search_kind
 from pteron.design.rating import Rating
 from pteron.dynamics import drive_forces
 from pteron.indices import Tolerances, pose_error
-from pteron.kernels import Array, alike
+from pteron.kernels import Array, sharing_programs
 from pteron.kinematics import inverse_kinematics, joint_rates
 from pteron.legs import Drive
 from pteron.manipulator import Manipulator
@@ -248,7 +248,7 @@ def against_chance() -> None:
             own = least(search_kind(evaluator, _EVALUATIONS, seed), objective)
             rng, (low, high) = np.random.default_rng(1000 + seed), evaluator.kind.ranges
             drawn = low + rng.random((10 * _EVALUATIONS, len(low))) * (high - low)
-            with alike(evaluator.kind.like):
+            with sharing_programs(evaluator.kind.like):
                 other = least([evaluator.rate(values) for values in drawn], objective)
             ratios.append(own / other if np.isfinite(other) else 0.0)
             print(f"job {seed}, {name}: {objective} {own:.4g}, by chance {other:.4g}", flush=True)

@@ -21,7 +21,7 @@ import numpy as np
 from measuring import Array, States, quick
 
 import pteron
-from pteron.kernels import alike, numeric
+from pteron.kernels import numeric, sharing_programs
 
 os.environ.setdefault("PTERON_KERNELS", "vm")  # each machine is asked a few times
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
@@ -120,7 +120,7 @@ def look(motion: str, kind: str, seed: int, worst: Worst) -> None:
     likes = {elbows(like): like for like in pteron.working_modes(first)}
     for mode in pteron.working_modes(robot):
         if mode != robot:
-            with alike(likes[elbows(mode)]):
+            with sharing_programs(likes[elbows(mode)]):
                 compare(mode, drawn(mode, home, 10, seed), worst)
 
 

@@ -68,6 +68,10 @@ _EDITED = {
 
 _MACHINES = "delta", "hexa"
 
+_FAMILIAR = 3
+"""Edits before those that count: C code of a topology's programs is compiled when it has been worth
+it, not in the first run."""
+
 _ANALYSES = {"nearest_singularities": 60.0, "largest_tilt": 10.0, "largest_ball": 10.0}
 """Functions of `pteron.workspace`, of a machine and its home pose; the CPU seconds asked for."""
 
@@ -109,7 +113,7 @@ def main() -> None:
     commands = [name for name in selected if name in _COMMANDS]
     if commands:
         print_commands(states, commands, rounds)
-    for name in sections.keys() & set(selected):
+    for name in [name for name in sections if name in selected]:
         for state in states:
             sections[name](state, rounds)
 
@@ -160,10 +164,7 @@ def _edit_seconds(
     def run() -> float:
         return _run(["-m", "pteron", *command.split()], state, folder / "cache", folder)[0]
 
-    cold, _ = run(), run()  # a second run compiles what the first one only began to need
-    again = [run() for _ in range(rounds)]
-    edited = []
-    for _ in range(rounds):
+    def edit() -> None:
         text = re.sub(
             r"(?<=lower_length = )[\d.]+",
             lambda number: f"{1.001 * float(number[0]):.6f}",
@@ -171,7 +172,16 @@ def _edit_seconds(
             count=1,
         )
         robot.write_text(text)
+
+    cold = run()
+    for _ in range(_FAMILIAR):
+        edit()
+        run()
+    edited, again = [], []
+    for _ in range(rounds):
+        edit()
         edited.append(run())
+        again.append(run())
     return cold, float(np.median(again)), float(np.median(edited))
 
 

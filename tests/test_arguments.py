@@ -8,7 +8,7 @@ import pytest
 
 import pteron
 from pteron import identification, indices, maps, motion, workspace
-from pteron.kernels import bounded, bounds
+from pteron.kernels import bounded_function, bounds
 
 
 class Odd:
@@ -22,7 +22,7 @@ def public_functions():
     spaces = [pteron, *(getattr(pteron, name) for name in dir(pteron))]
     spaces = [space for space in spaces if inspect.ismodule(space)]
     public = (getattr(space, name) for space in spaces for name in space.__all__)
-    return sorted({*filter(inspect.isfunction, public), bounded, bounds}, key=called)
+    return sorted({*filter(inspect.isfunction, public), bounded_function, bounds}, key=called)
 
 
 def called(function):

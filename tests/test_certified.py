@@ -32,10 +32,10 @@ from pteron.workspace import (
     largest_tilt,
     mode_contacts,
     mode_pavings,
-    over_angles,
     paving,
     prove,
     quadrature_volume,
+    volumes_over_angles,
 )
 from pteron.workspace.conditions import keeps
 from pteron.workspace.margins import distance_to_limits
@@ -466,7 +466,7 @@ def test_parts_that_are_apart_are_told_and_how_modes_meet():
 
 
 def test_volumes_over_angles_are_those_of_each_orientation():
-    found = over_angles("3-prr", np.zeros(3), [0.0, 2.0], tolerance=0.3)
+    found = volumes_over_angles("3-prr", np.zeros(3), [0.0, 2.0], tolerance=0.3)
     one = paving("3-prr", np.zeros(3), tolerance=0.3)
     assert (found.inner[0, 0], found.outer[0, 0]) == (one.inner_volume, one.outer_volume)
     whole = paving(
@@ -476,4 +476,4 @@ def test_volumes_over_angles_are_those_of_each_orientation():
     assert whole.inner_volume < 0.2 * found.outer[0, 0] * 1.05
     assert components(whole).connected
     with pytest.raises(ModelError, match="the platform does not turn"):
-        over_angles("delta", [0.0, 0.0, -0.9], [0.0])
+        volumes_over_angles("delta", [0.0, 0.0, -0.9], [0.0])

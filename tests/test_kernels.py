@@ -27,13 +27,13 @@ from pteron.kernels import (
     NoSquareRoot,
     PrimeField,
     RationalField,
-    alike,
     columns_of,
     count_operations,
     evaluate,
     general_program,
     numeric,
     program,
+    sharing_programs,
 )
 from pteron.manipulator import load, with_dimensions
 from pteron.workspace import pose_margins
@@ -425,7 +425,7 @@ def test_machines_that_are_alike_share_general_programs():
         )
 
     own = results()
-    with alike(robot):
+    with sharing_programs(robot):
         for found, expected in zip(results(), own, strict=True):
             np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-14)
         assert "geometry" in numeric(other, "jacobian").fixed

@@ -228,7 +228,9 @@ MADE = {
     "trial": lambda: motion.trial("five-bar", _cycle(), ComputedTorque()),
     "tuning": lambda: motion.tune("five-bar", poses=[HOME]),
     "volume": lambda: workspace.reach_volume("five-bar", HOME, count=500),
-    "volumes": lambda: workspace.over_angles("3-prr", [0.0, 0.0, 0.0], [0.0, 0.5], tolerance=0.3),
+    "volumes": lambda: workspace.volumes_over_angles(
+        "3-prr", [0.0, 0.0, 0.0], [0.0, 0.5], tolerance=0.3
+    ),
 }
 """Calls that return results of every class."""
 

@@ -63,7 +63,7 @@ def test_a_surd_times_a_fraction(q, s, factor):
 def test_a_surd_within_a_prime_field(q, s):
     field = PrimeField(PRIME)
     assume(all(is_square(p, PRIME) for p in sympy.factorint(s)))
-    value = Surd(q, s).within(field)
+    value = Surd(q, s).field_element(field)
     assert field.multiply(value, value) == field.number(q * q * s)
 
 
@@ -74,16 +74,16 @@ def test_roots_multiply_within_every_field():
     for prime in primes:
         if all(is_square(p, prime) for p in (2, 3, 5)):
             field = PrimeField(prime)
-            two, three, six = (Surd(Fraction(1), s).within(field) for s in (2, 3, 6))
+            two, three, six = (Surd(Fraction(1), s).field_element(field) for s in (2, 3, 6))
             assert field.multiply(two, three) == six
             served += 1
     assert served > 50
 
 
 def test_a_root_within_the_rational_numbers_must_be_rational():
-    assert Surd(Fraction(2, 3)).within(RationalField()) == Fraction(2, 3)
+    assert Surd(Fraction(2, 3)).field_element(RationalField()) == Fraction(2, 3)
     with pytest.raises(NoSquareRoot):
-        Surd(Fraction(2, 3), 5).within(RationalField())
+        Surd(Fraction(2, 3), 5).field_element(RationalField())
 
 
 @SETTINGS
@@ -327,7 +327,7 @@ def test_a_unit_vector_across_d_in_a_field(name):
     )
     field = PrimeField(prime)
     for leg in exact.legs:
-        values = leg.within(field)
+        values = leg.field_elements(field)
         a, d = values["plane_axis"], values["direction"]
         assert sum(x * x for x in a) % prime == 1
         assert sum(x * y for x, y in zip(a, d, strict=True)) % prime == 0

@@ -44,7 +44,7 @@ from pteron.kernels import (
 from pteron.kernels.c import Code, compiler
 from pteron.kernels.choice import SharedCode, TieredKernel
 from pteron.kernels.program_cache import cached_program
-from pteron.kernels.programs import bare
+from pteron.kernels.programs import geometry_only
 
 ROBOT = CATALOG["quadrupteron"]
 DYNAMICS = "inverse_dynamics"
@@ -765,8 +765,8 @@ def test_a_second_start_builds_no_program(fresh):
         return cached_program(key, build)
 
     one, close, foreign = (
-        (bare(ROBOT), 0.1),
-        (bare(ROBOT), np.nextafter(0.1, 1.0).item()),
+        (geometry_only(ROBOT), 0.1),
+        (geometry_only(ROBOT), np.nextafter(0.1, 1.0).item()),
         Foreign(),
     )
     for key in (one, close, one, (foreign,), (foreign,)):

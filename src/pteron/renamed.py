@@ -71,6 +71,12 @@ RENAMED = {
         "preprocessing_of": "pteron.identification.signals.preprocessing_for_log",
         "FourierSeries": "pteron.identification.signals.FittedSeries",
     },
+    "pteron.kernels": {
+        "alike": "pteron.kernels.sharing_programs",
+        "bare": "pteron.kernels.geometry_only",
+        "bounded": "pteron.kernels.bounded_function",
+        "specialised": "pteron.kernels.specialise_program",
+    },
     "pteron.motion": {
         "Fit": "pteron.motion.MotorFit",
         "Place": "pteron.motion.CyclePlace",
@@ -86,6 +92,7 @@ RENAMED = {
     "pteron.workspace": {
         "Reserve": "pteron.workspace.PoseMargins",
         "reserve": "pteron.workspace.pose_margins",
+        "over_angles": "pteron.workspace.volumes_over_angles",
     },
     "pteron.identification.estimators": {
         "weighted": "pteron.identification.estimators.weighted_least_squares",

@@ -23,6 +23,9 @@ PARALLEL_TOLERANCE = 1e-9
 _ROUNDING = 4 * math.ulp(1.0)
 """Tolerance of the length of a vector that stays bit for bit: rounding."""
 
+_SMALL_ANGLE = 1e-3
+"""Angle, rad, up to which sin(a/2)/a is a series: its next term is below 2e-24."""
+
 _UPRIGHT = 1e-15
 """Tolerance of the cosine of two perpendicular unit vectors: rounding."""
 
@@ -180,3 +183,24 @@ def complement(axes: ArrayLike) -> NDArray[np.float64]:
     _, sizes, rows = np.linalg.svd(matrix) if len(matrix) else (None, np.zeros(0), np.eye(3))
     spanning: NDArray[np.float64] = rows[int((sizes > ROUNDING).sum()) :]
     return spanning
+
+
+def rotation_matrices(vectors: ArrayLike) -> NDArray[np.float64]:
+    """Return the matrices (..., 3, 3) of rotations about vectors (..., 3), by their lengths, rad.
+
+    By the quaternions (x, y, z, w) and to the bits of SciPy's `Rotation`, which is slow to import.
+    """
+    x, y, z = np.moveaxis(np.asarray(vectors, dtype=float), -1, 0)
+    angle = np.sqrt(x * x + y * y + z * z)
+    square = angle * angle
+    small = angle <= _SMALL_ANGLE
+    series = 0.5 - square / 48.0 + square * square / 3840.0
+    share = np.where(small, series, np.sin(0.5 * angle) / np.where(small, 1.0, angle))
+    x, y, z, w = share * x, share * y, share * z, np.cos(0.5 * angle)
+    xx, yy, zz, ww = x * x, y * y, z * z, w * w
+    rows = [
+        [xx - yy - zz + ww, 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)],
+        [2.0 * (x * y + z * w), -xx + yy - zz + ww, 2.0 * (y * z - x * w)],
+        [2.0 * (x * z - y * w), 2.0 * (y * z + x * w), -xx - yy + zz + ww],
+    ]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)

@@ -22,7 +22,7 @@ from pteron.equations.variations import slope_matrix
 from pteron.kernels import NoSquareRoot, PrimeField, general_program
 from pteron.kernels.fields import Evaluation
 from pteron.kernels.geometry_slopes import slopes_program
-from pteron.kernels.programs import bare
+from pteron.kernels.programs import geometry_only
 from pteron.reduction.elimination import dependencies
 from pteron.reduction.exact import primes_of
 from pteron.reduction.exact_directions import rational_unit
@@ -117,8 +117,8 @@ class _ModularSlopes(MachineSlopes):
         self.start = replace(start, turn=np.eye(3), shift=np.zeros(3))
         self.prime, self.rng, self.field = prime, rng, PrimeField(prime)
         geometry = exact_geometry(robot)
-        self.own, self.vector = geometry.frame, geometry.within(self.field)
-        deltas = general_program(bare(robot), "discriminants").function
+        self.own, self.vector = geometry.frame, geometry.field_elements(self.field)
+        deltas = general_program(geometry_only(robot), "discriminants").function
         self.deltas = Evaluation(deltas, self.field, [self.vector])
         self.turning_joints = [leg.joint.unit == "rad" for leg in robot.legs]
         full_program = slopes_program(robot).function
@@ -201,7 +201,9 @@ class _ModularSlopes(MachineSlopes):
         outward = point - (axis @ point) * axis
         size = np.linalg.norm(outward)
         u, k = (
-            np.array([n.within(self.field) for n in rational_unit(self.own @ v)], dtype=object)
+            np.array(
+                [n.field_element(self.field) for n in rational_unit(self.own @ v)], dtype=object
+            )
             for v in (outward / size if size > 0.0 else np.eye(3)[0], axis)
         )
         return u, np.cross(k, u)

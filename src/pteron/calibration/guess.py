@@ -10,9 +10,9 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-import scipy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
+from pteron.bodies.vectors import rotation_matrices
 from pteron.calibration.measurements import TOOL, Measurements, Place, ReferencePlane
 from pteron.equations.variations import Variation, vary_geometry
 from pteron.manipulator import Manipulator
@@ -139,7 +139,7 @@ class UnknownBlock:
             tilted = normal + plane_axes(normal) @ step[:2]
             plane = np.append(tilted / np.linalg.norm(tilted), offset + step[2])
             return replace(guess, planes={**guess.planes, self.name: plane})
-        turn = scipy.spatial.transform.Rotation.from_rotvec(step[3:]).as_matrix() @ guess.turn
+        turn = rotation_matrices(step[3:]) @ guess.turn
         return replace(guess, turn=turn, shift=guess.shift + step[:3])
 
     def values(self, guess: Guess) -> Array:

@@ -101,7 +101,7 @@ def parsed_command(
         if "machine" in arguments:
             quiet = "warns" in vars(command)  # the command tells the file's warnings itself
             passed["machine"] = load_robot(values["robot"], values["elbows"], quiet=quiet)
-        with _alike() if general else nullcontext():
+        with _share_programs() if general else nullcontext():
             outcome = command(**passed)
             if outcome is not None:
                 outcome.tell(as_json=values["json"])
@@ -111,10 +111,10 @@ def parsed_command(
     return run
 
 
-def _alike() -> AbstractContextManager[None]:
-    from pteron.kernels import alike
+def _share_programs() -> AbstractContextManager[None]:
+    from pteron.kernels import sharing_programs
 
-    return alike()
+    return sharing_programs()
 
 
 def _is_group(hint: Any) -> bool:

@@ -17,7 +17,7 @@ from pteron.design.workspace_tables import WorkspaceTable
 from pteron.design.worst_cases import worst_forces, worst_speeds
 from pteron.equations.machine import numbers
 from pteron.errors import PteronError
-from pteron.kernels import Array, alike
+from pteron.kernels import Array, sharing_programs
 from pteron.kinematics.sampling import joint_limits, search_ball
 from pteron.manipulator import Manipulator, parameters
 from pteron.motion import Motion, Sizing, size
@@ -121,7 +121,7 @@ class Design(Result):
             return workspace_poses(self.workspace, self.task.orientations, count)
         shape = cube(len(self.cube.center))
         lattice = shape_samples(shape, self.task.orientations, count)
-        return lattice.at(self.cube.center, self.cube.edge)
+        return lattice.shape_poses(self.cube.center, self.cube.edge)
 
     @cached_property
     def joints(self) -> Array:
@@ -301,7 +301,7 @@ class Design(Result):
         if nowhere and (self.workspace is None or self.task.floats):
             return np.nan, "there is no cube" if self.workspace is None else "it fits nowhere"
         try:
-            with alike(self.task.robot):
+            with sharing_programs(self.task.robot):
                 amount = float(quantity.of(self))
         except PteronError as error:
             where = "in a cycle, " if quantity.cover == "cycles" else ""

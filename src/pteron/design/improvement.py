@@ -77,7 +77,7 @@ def improve_design(task: Task, point: Sequence[float], objective: int) -> list[f
         missed = counterexamples(Design(task, task.machine(variables)), z[len(start) : -1], z[-1])
         if not len(missed.inside):
             break
-        first = first.joined(missed)
+        first = first.join(missed)
     return variables
 
 
@@ -88,7 +88,7 @@ def _condition_samples(design: Design, lengths: int, count: int) -> Samples:
     if task.spec.workspace is None or task.floats:
         return moving
     fixed = fixed_samples(design.poses, lengths)
-    return fixed.joined(moving) if task.seeks_cube else fixed
+    return fixed.join(moving) if task.seeks_cube else fixed
 
 
 @dataclass(frozen=True)

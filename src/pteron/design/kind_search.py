@@ -10,7 +10,7 @@ import scipy  # type: ignore[import-untyped]
 
 from pteron.design.evolution import latin_hypercube, pareto_front
 from pteron.design.rating import KindEvaluator, Rating
-from pteron.kernels import Array, alike
+from pteron.kernels import Array, sharing_programs
 from pteron.progress import Progress
 
 _POPULATION = 3
@@ -50,7 +50,7 @@ def search_kind(
             progress(len(ratings) / evaluations)
         return ratings[-1]
 
-    with alike(evaluator.kind.like):
+    with sharing_programs(evaluator.kind.like):
         for k, objective in enumerate(objectives):
             rng = np.random.default_rng((seed, k))
             end = evaluations * (k + 1) // len(objectives)

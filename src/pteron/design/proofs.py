@@ -18,7 +18,7 @@ from pteron.design.rating import KindEvaluator, Rating
 from pteron.design.regions import kind_regions, placed_pose, workspace_region
 from pteron.design.spec import ROUNDING
 from pteron.design.task import Task
-from pteron.kernels import Array, alike
+from pteron.kernels import Array, sharing_programs
 from pteron.manipulator import Manipulator, Radii
 from pteron.result import Result
 from pteron.workspace import Box, Proof, Region, interference, prove
@@ -213,7 +213,7 @@ def counterexamples(design: Design, center: Array, edge: float) -> Samples:
     inside, fixed = inside.reshape(-1, size), fixed.reshape(-1, size)
     units = (inside[:, :lengths] - center) / (0.5 * edge or 1.0)
     inside[:, :lengths] = 0.0
-    return Samples(inside, units, np.ones(len(inside))).joined(fixed_samples(fixed, lengths))
+    return Samples(inside, units, np.ones(len(inside))).join(fixed_samples(fixed, lengths))
 
 
 def workspace_share(design: Design, proof: Proof) -> float:
@@ -229,7 +229,7 @@ def workspace_share(design: Design, proof: Proof) -> float:
 
 def _proof(design: Design, region: Region) -> Proof:
     floors = design.task.floors
-    with alike(design.task.robot):
+    with sharing_programs(design.task.robot):
         return prove(design.robot, region, type_i=floors.type_i, type_ii=floors.type_ii, most=_MOST)
 
 

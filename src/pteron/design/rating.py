@@ -147,7 +147,7 @@ class KindEvaluator:
         return [[i for i, g in enumerate(legs) if (g.type, g.joint.unit) == k] for k in kinds]
 
     def rate(self, point: Array) -> Rating:
-        """Return how the machine of a design does the job; call it within `alike(kind.like)`."""
+        """Return how the machine of a design does the job; call it within `sharing_programs`."""
         rating = Rating(np.asarray(point, dtype=float))
         try:
             robot, rating.middle = self.kind.machine(point)

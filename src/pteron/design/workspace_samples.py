@@ -9,8 +9,8 @@ from collections.abc import Callable
 from itertools import product
 
 import numpy as np
-import scipy  # type: ignore[import-untyped]
 
+from pteron.bodies.vectors import rotation_matrices
 from pteron.design.job import Job
 from pteron.kernels import Array
 from pteron.kinematics import pose_of
@@ -204,7 +204,7 @@ def _leans(tilt: float) -> Array:
 def _tilted_angles(robot: Manipulator, leans: Array) -> Array:
     """Return the angles (L, a) of a platform that leans to x and y (L, 2): the shortest turn."""
     vectors = np.c_[-leans[:, 1], leans[:, 0], np.zeros(len(leans))]
-    matrices = scipy.spatial.transform.Rotation.from_rotvec(vectors).as_matrix()
+    matrices = rotation_matrices(vectors)
     return np.array(pose_of(robot, np.zeros(3), matrices)[:, -len(robot.platform.angles) :])
 
 

@@ -13,9 +13,9 @@ from functools import lru_cache
 from typing import Any, Literal
 
 import numpy as np
-import scipy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
+from pteron.bodies.vectors import rotation_matrices
 from pteron.equations.machine import number_places, numbers
 from pteron.errors import ModelError
 from pteron.legs import LegKind
@@ -169,7 +169,7 @@ def vary_geometry(robot: Manipulator, changes: Sequence[Variation], amounts: Arr
             new_components[change.axis] += amount
             fields[change.key] = tuple(new_components)
     for (i, key), turn in turns.items():
-        matrix = scipy.spatial.transform.Rotation.from_rotvec(turn).as_matrix()
+        matrix = rotation_matrices(turn)
         keys = rotating_keys(robot.legs[i], key) if i >= 0 else [key]
         if i < 0 and robot.platform.x_axis is not None:
             keys.append("x_axis")
@@ -212,7 +212,7 @@ def varied_numbers(robot: Manipulator, changes: Sequence[Variation], amounts: Ar
         else:
             geometry[:, places[change.leg][change.key] + (change.axis or 0)] += amount
     for (leg, key), turn in turns.items():
-        matrices = scipy.spatial.transform.Rotation.from_rotvec(turn).as_matrix()
+        matrices = rotation_matrices(turn)
         for row in _rotating_rows(robot, leg, key, places[leg]):
             at = slice(row, row + 3)
             geometry[:, at] = np.einsum("bij,bj->bi", matrices, geometry[:, at])

@@ -18,7 +18,7 @@ from pteron.export.descriptions import banner
 from pteron.export.functions import has_drives
 from pteron.export.names import prefix_of
 from pteron.export.start_pose import good_poses, keeps_limits, start_pose
-from pteron.kernels import program, specialised
+from pteron.kernels import program, specialise_program
 from pteron.kernels.code import render_template
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator, parameters
 from pteron.manipulator.readings import refuse_readings
@@ -92,7 +92,7 @@ def casadi_functions(robot: RobotLike) -> dict[str, ca.Function]:
 
 def _plain(robot: Manipulator, name: str, what: str) -> ca.Function:
     """Return a function of the library's table, its matrices with their rows as rows."""
-    library = specialised(
+    library = specialise_program(
         program(robot, what, wrench=what in _LOADED), {"parameters": parameters(robot)}
     )
     symbols = library.function.sx_in()

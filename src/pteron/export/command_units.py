@@ -73,7 +73,7 @@ def convert_forces(function: Program, robot: Manipulator, output: Output) -> Pro
     ports[place] = replace(ports[place], name=NAMES[output])
     scale = ca.reshape(ca.DM(factors(robot, output)), results[place].shape)
     results[place] = results[place] * scale
-    return Program.of(function.name, symbols, function.inputs, results, ports)
+    return Program.from_expressions(function.name, symbols, function.inputs, results, ports)
 
 
 _PER_READING = {
@@ -109,7 +109,7 @@ def convert_joints(function: Program, robot: Manipulator) -> Program:
             power = _PER_READING.get(port.name, 0)
             results.append(scale_joints(result, power) if power else result)
     ports = function.inputs, results, function.outputs
-    return Program.of(function.name, symbols, *ports)
+    return Program.from_expressions(function.name, symbols, *ports)
 
 
 def command_meaning(robot: Manipulator, output: Output) -> str:

@@ -29,7 +29,7 @@ from pteron.kernels import (
     Program,
     graph_of,
     program,
-    specialised as with_values,
+    specialise_program as with_values,
 )
 from pteron.kernels.graph import CONSTANT
 from pteron.kinematics import inverse_kinematics, random_poses
@@ -268,7 +268,7 @@ def _drop_status(law: Program) -> Program:
     """Return a program without its last output, all others the same to the bit."""
     symbols = law.function.sx_in()
     results = law.function.call(symbols)[:-1]
-    return Program.of(law.name, symbols, law.inputs, results, law.outputs[:-1])
+    return Program.from_expressions(law.name, symbols, law.inputs, results, law.outputs[:-1])
 
 
 def _table(

@@ -24,7 +24,7 @@ from pteron.kernels import (
     columns_of,
     count_operations,
     program,
-    specialised as with_values,
+    specialise_program as with_values,
 )
 from pteron.legs import Drive, LegKind, Stribeck
 from pteron.manipulator import Manipulator
@@ -179,9 +179,9 @@ def _payload_program(robot: Manipulator, base: BaseParameters) -> Program:
         Port(f"loaded_{_NAME}", (base.rank,)),
         base_symbols + ca.mtimes(grouping, load_parameters.T),
     )
-    return Program.of(
+    return Program.from_expressions(
         load.name, [mass, center, inertia, base_symbols], ports, [loaded_values], [loaded]
-    ).optimised()
+    ).optimise()
 
 
 def _substitute_parameters(function: Program, matrix: Array) -> Program:
@@ -193,4 +193,6 @@ def _substitute_parameters(function: Program, matrix: Array) -> Program:
     taken = list(symbols)
     taken[place] = ca.mtimes(ca.sparsify(ca.SX(ca.DM(matrix))), symbols[place])
     results = function.function.call(taken)
-    return Program.of(function.name, symbols, ports, results, function.outputs).optimised()
+    return Program.from_expressions(
+        function.name, symbols, ports, results, function.outputs
+    ).optimise()

@@ -7,4 +7,4 @@ from pteron.public import publish as _publish
 
 # The others serve the floors above, in inner loops.
 
-_publish(__name__, checked=("bounded", "bounds", "compile"))
+_publish(__name__, checked=("bounded_function", "bounds", "compile"))

@@ -1,7 +1,7 @@
 from pteron.kernels.bounds import (
     UNBOUNDED as UNBOUNDED,
     Bounded as Bounded,
-    bounded as bounded,
+    bounded_function as bounded_function,
     bounds as bounds,
 )
 from pteron.kernels.choice import numeric as numeric
@@ -28,12 +28,12 @@ from pteron.kernels.programs import (
     REDUCIBLE as REDUCIBLE,
     SELECTED as SELECTED,
     Columns as Columns,
-    alike as alike,
-    bare as bare,
     general_program as general_program,
+    geometry_only as geometry_only,
     layout_of as layout_of,
     program as program,
-    specialised as specialised,
+    sharing_programs as sharing_programs,
+    specialise_program as specialise_program,
 )
 from pteron.kernels.targets import (
     OTHER_LAYOUT as OTHER_LAYOUT,

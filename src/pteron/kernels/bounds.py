@@ -78,36 +78,50 @@ class Bounded:
         nodes = [elements[r] for r in rows]
         least, most, defined, continuous = enclose_nodes(graph, nodes, [low], [high], len(low))
         moving = np.flatnonzero((low != high).any(axis=0)).tolist()
+        # Rows that are continuous in the same boxes share what they have in common.
+        groups: dict[bytes, list[int]] = {}
         for at, r in enumerate(rows):
-            boxes = np.flatnonzero(continuous[:, at])
-            if len(boxes) and not occurs_once(graph, elements[r], moving):
-                slopes = {i: graph.outputs[-1][r * size + i] for i in moving}
-                inner = _mean_value(graph, elements[r], slopes, low[boxes], high[boxes])
-                least[boxes, at] = np.fmax(least[boxes, at], inner.low)
-                most[boxes, at] = np.fmin(most[boxes, at], inner.high)
+            if continuous[:, at].any() and not occurs_once(graph, elements[r], moving):
+                groups.setdefault(continuous[:, at].tobytes(), []).append(at)
+        for group in groups.values():
+            boxes = np.flatnonzero(continuous[:, group[0]])
+            inner = _mean_values(
+                graph,
+                [nodes[at] for at in group],
+                {i: [graph.outputs[-1][rows[at] * size + i] for at in group] for i in moving},
+                low[boxes],
+                high[boxes],
+            )
+            places = np.ix_(boxes, np.array(group))
+            least[places] = np.fmax(least[places], inner.low)
+            most[places] = np.fmin(most[places], inner.high)
         return least, most, defined
 
 
-def _mean_value(
-    graph: Graph, node: int, slopes: Mapping[int, int], low: Array, high: Array
+def _mean_values(
+    graph: Graph, nodes: Sequence[int], slopes: Mapping[int, Sequence[int]], low: Array, high: Array
 ) -> Interval:
-    """Return f(m) + f'(X) (X - m); NaN where f' may be undefined in a part of the box."""
+    """Return f(m) + f'(X) (X - m) of nodes, (B, N); NaN where f' may be undefined in the box."""
     count = len(low)
     with np.errstate(all="ignore"):  # of boxes without an end
         middle = 0.5 * low + 0.5 * high
-    at, upper, *_ = (part[:, 0] for part in enclose_nodes(graph, [node], [middle], [middle], count))
-    least, most, known, _ = enclose_nodes(graph, list(slopes.values()), [low], [high], count)
+    at, upper, *_ = enclose_nodes(graph, nodes, [middle], [middle], count)
+    slope_nodes = [node for nodes_ in slopes.values() for node in nodes_]
+    shape = count, len(slopes), len(nodes)
+    least, most, known = (
+        part.reshape(shape) for part in enclose_nodes(graph, slope_nodes, [low], [high], count)[:3]
+    )
     with np.errstate(all="ignore"):
         total = Interval(at, upper)
         for k, i in enumerate(slopes):
-            center = Interval(middle[:, i], middle[:, i])
-            way = subtract(Interval(low[:, i], high[:, i]), center)
+            center = Interval(middle[:, i : i + 1], middle[:, i : i + 1])
+            way = subtract(Interval(low[:, i : i + 1], high[:, i : i + 1]), center)
             total = add(total, multiply(Interval(least[:, k], most[:, k]), way))
     useful = known.all(axis=1)
     return Interval(*(np.where(useful, bound, np.nan) for bound in total[:2]))
 
 
-def bounded(robot: RobotLike, what: str) -> Bounded:
+def bounded_function(robot: RobotLike, what: str) -> Bounded:
     """Return a function of a machine's poses, in its plain form, for `bounds`.
 
     Raises
@@ -175,7 +189,7 @@ def bounds(robot: RobotLike, what: str, boxes: ArrayLike) -> dict[str, Enclosure
     >>> round(float(found.low), 3), round(float(found.high), 3), bool(found.defined)
     (0.646, 0.65, True)
     """
-    function = bounded(robot, what)
+    function = bounded_function(robot, what)
     corners = as_array(boxes, "boxes", (2, function.function.size1_in(0)))
     if not (corners[..., 0, :] <= corners[..., 1, :]).all():
         raise DataError("boxes: a least value is above the greatest, or NaN")

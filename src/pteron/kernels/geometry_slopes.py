@@ -15,7 +15,7 @@ from pteron.bodies.motion import Expression
 from pteron.equations.machine import Machine
 from pteron.kernels.choice import TieredKernel, tiered_kernel
 from pteron.kernels.program_cache import Program, cached_program
-from pteron.kernels.programs import bare
+from pteron.kernels.programs import geometry_only
 from pteron.manipulator import Manipulator, RobotLike
 
 
@@ -29,13 +29,13 @@ def slopes_program(robot: RobotLike) -> Program:
     or axes that are part of the geometry, also `shifts` (6, k): its twist, at a given pose, against
     the geometry.
     """
-    layout = bare(robot)
+    layout = geometry_only(robot)
     return cached_program(_key(layout), lambda: _build_program(layout))
 
 
 def slopes_kernel(robot: RobotLike) -> TieredKernel:
     """Return the kernel of that function."""
-    return _kernel(bare(robot))
+    return _kernel(geometry_only(robot))
 
 
 def slope_columns(robot: Manipulator) -> list[range]:
@@ -89,4 +89,4 @@ def _build_program(layout: Manipulator) -> Program:
             point_slopes, sum(ca.mtimes(ca.skew(a), da) for a, da in pairs) / 2
         )
     inputs = {"geometry": geometry, "pose": pose}
-    return Program.of_named("geometry_slopes", inputs, outputs, shared=("geometry",))
+    return Program.from_named_expressions("geometry_slopes", inputs, outputs, shared=("geometry",))

@@ -17,7 +17,7 @@ from pteron.kernels.choice import VARIABLE
 from pteron.kernels.kernel import Array
 from pteron.kernels.loop_code import PARTS, LinkedLaw, LoopCode
 from pteron.kernels.program_cache import Program
-from pteron.kernels.programs import bare, general_program, motion_program, program
+from pteron.kernels.programs import general_program, geometry_only, motion_program, program
 from pteron.kernels.samples import Ask, Evaluated, Plant, run_samples
 from pteron.kernels.targets import FIXED
 from pteron.manipulator import Manipulator
@@ -78,7 +78,7 @@ class Loop:
         general: bool = False,
     ) -> None:
         self.kind = DriveKind.from_robot(robot)
-        self.plant = _plant(bare(robot), self.kind, general)
+        self.plant = _plant(geometry_only(robot), self.kind, general)
         self.sensed = general_program(robot, "sensed") if general else program(robot, "sensed")
         self.law, self.linked = law, linked
 

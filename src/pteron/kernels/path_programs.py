@@ -17,7 +17,7 @@ from pteron.equations.machine import Machine
 from pteron.equations.pose_paths import Closed, PathState, advance_path, numbers, rows
 from pteron.kernels.choice import TieredKernel, tiered_kernel
 from pteron.kernels.program_cache import Program
-from pteron.kernels.programs import bare
+from pteron.kernels.programs import geometry_only
 from pteron.manipulator import Manipulator
 
 Parts = tuple[tuple[float, ...], tuple[float, ...]]
@@ -47,9 +47,9 @@ def path_kernel(closed: Closed, start: Parts | None) -> TieredKernel:
         after, correction = advance_path(
             closed, ends[0], ends[1], PathState.from_vector(at, closed)
         )
-        return Program.of_named(
+        return Program.from_named_expressions(
             "path_step", inputs, {"after": after.vector(), "left": correction}
-        ).optimised()
+        ).optimise()
 
     return tiered_kernel(("path_step", *closed, start), build)
 
@@ -61,16 +61,16 @@ def rows_kernel(closed: Closed) -> TieredKernel:
     def build() -> Program:
         z, machine = ca.SX.sym("z", closed.size), ca.SX.sym("machine", closed.numbers)
         slopes, missed = rows(closed, numbers(machine), numbers(z))
-        return Program.of_named(
+        return Program.from_named_expressions(
             "path_rows", {"z": z, "machine": machine}, {"rows": slopes, "missed": missed}
-        ).optimised()
+        ).optimise()
 
     return tiered_kernel(("path_rows", *closed), build)
 
 
 def spheres_kernel(robot: Manipulator) -> TieredKernel:
     """Return the kernel of the spheres on which joints hold platform points; see `closing`."""
-    return _spheres(bare(robot))
+    return _spheres(geometry_only(robot))
 
 
 @lru_cache(maxsize=64)
@@ -78,8 +78,8 @@ def _spheres(robot: Manipulator) -> TieredKernel:
     def build() -> Program:
         joints = ca.SX.sym("joints", robot.joint_count)
         centers, squares = held_spheres(Machine.numeric(robot), joints)
-        return Program.of_named(
+        return Program.from_named_expressions(
             "held_spheres", {"joints": joints}, {"centers": centers, "squares": squares}
-        ).optimised()
+        ).optimise()
 
     return tiered_kernel(("held_spheres", robot), build)

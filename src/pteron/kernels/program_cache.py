@@ -42,7 +42,7 @@ class Program:
     outputs: tuple[Port, ...]
 
     @classmethod
-    def of(
+    def from_expressions(
         cls,
         name: str,
         symbols: Sequence[Expression],
@@ -55,7 +55,7 @@ class Program:
         return cls(name, ca.Function(name, symbols, results, *names), (*inputs,), (*outputs,))
 
     @classmethod
-    def of_named(
+    def from_named_expressions(
         cls,
         name: str,
         given: Mapping[str, Expression],
@@ -66,14 +66,14 @@ class Program:
         inputs = [Port(key, element.shape[:1], key in shared) for key, element in given.items()]
         outputs = [Port(key, shape_of(element)) for key, element in found.items()]
         dense = ca.cse([ca.densify(element).T for element in found.values()])
-        return cls.of(name, list(given.values()), inputs, dense, outputs)
+        return cls.from_expressions(name, list(given.values()), inputs, dense, outputs)
 
     @property
     def text(self) -> str:
         """The program as it is written on disk; equal programs have equal texts."""
         return _serialise_program(self)
 
-    def optimised(self) -> Self:
+    def optimise(self) -> Self:
         """Return the program after the passes that save operations."""
         return replace(self, function=optimise_function(self.function))
 

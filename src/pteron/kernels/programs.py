@@ -80,8 +80,8 @@ _OF_ONE_MACHINE = (*_BY_CASES, "clearances", "least_clearances", "reactions", "b
 half a turn: a general program has those of one machine."""
 
 ALIKE: ContextVar[Manipulator | Literal[True] | None] = ContextVar("alike", default=None)
-"""The machine whose general programs are used for others of its topology, within `alike`; True:
-each machine's topology has its own."""
+"""The machine whose general programs are used for others of its topology, within
+`sharing_programs`; True: each machine's topology has its own."""
 
 Columns = tuple[tuple[int, ...], ...]
 """For each column of a base regressor, the inertial parameters whose columns it adds up."""
@@ -120,7 +120,9 @@ def program(
         raise ModelError(f"base: {what!r} has no use for it; it goes with {useful}")
     if what not in LOADED and wrench:
         raise ModelError(f"wrench: {what!r} has no use for it; it goes with {', '.join(LOADED)}")
-    return _cached_program(bare(robot), _Form(what, wrench, guarded, plain, named), columns)
+    return _cached_program(
+        geometry_only(robot), _Form(what, wrench, guarded, plain, named), columns
+    )
 
 
 def numeric_program(
@@ -132,7 +134,7 @@ def numeric_program(
     guarded: bool = False,
     plain: bool = False,
 ) -> Program:
-    """Return the program with which numbers are computed: `program`, general within `alike`."""
+    """Return the program that computes numbers: general within `sharing_programs`."""
     like = ALIKE.get()
     own = _OF_ONE_MACHINE if like is True else _BY_CASES
     if like is None or columns is not None or what in own:
@@ -142,7 +144,7 @@ def numeric_program(
 
 
 @contextmanager
-def alike(robot: RobotLike | None = None) -> Iterator[None]:
+def sharing_programs(robot: RobotLike | None = None) -> Iterator[None]:
     """Make the public functions fast for many machines of one topology, each used a few times.
 
     In this context they evaluate programs whose geometry is an input, so that nothing is built for
@@ -152,16 +154,16 @@ def alike(robot: RobotLike | None = None) -> Iterator[None]:
     Examples
     --------
     >>> import pteron
-    >>> from pteron.kernels import alike
+    >>> from pteron.kernels import sharing_programs
     >>> from pteron.manipulator import with_dimensions
-    >>> with alike("delta"):
+    >>> with sharing_programs("delta"):
     ...     for crank in (0.3, 0.4):
     ...         robot = with_dimensions("delta", crank=crank)
     ...         print(pteron.inverse_kinematics(robot, [0.0, 0.0, -0.9]).round(3))
     [0.183 0.183 0.183]
     [0.006 0.006 0.006]
     """
-    token = ALIKE.set(True if robot is None else bare(robot))
+    token = ALIKE.set(True if robot is None else geometry_only(robot))
     try:
         yield
     finally:
@@ -169,12 +171,12 @@ def alike(robot: RobotLike | None = None) -> Iterator[None]:
 
 
 def layout_of(robot: RobotLike) -> Manipulator:
-    """Return the machine whose geometry programs have: the machine itself, or that of `alike`."""
+    """Return the machine whose geometry programs have: itself, or that of `sharing_programs`."""
     like = ALIKE.get()
-    return like if isinstance(like, Manipulator) else bare(robot)
+    return like if isinstance(like, Manipulator) else geometry_only(robot)
 
 
-def specialised(given: Program, values: dict[str, NDArray[np.float64]]) -> Program:
+def specialise_program(given: Program, values: dict[str, NDArray[np.float64]]) -> Program:
     """Return a plain program with numbers in place of some of its inputs, after the pass."""
     symbols = given.function.sx_in()
     folded = [
@@ -185,10 +187,10 @@ def specialised(given: Program, values: dict[str, NDArray[np.float64]]) -> Progr
     remaining = [(symbol, port) for symbol, port in pairs if port.name not in values]
     results = ca.cse([ca.densify(element) for element in given.function.call(folded)])
     symbols, inputs = [symbol for symbol, _ in remaining], [port for _, port in remaining]
-    return Program.of(given.name, symbols, inputs, results, given.outputs).optimised()
+    return Program.from_expressions(given.name, symbols, inputs, results, given.outputs).optimise()
 
 
-def bare(robot: RobotLike) -> Manipulator:
+def geometry_only(robot: RobotLike) -> Manipulator:
     """Return the machine with unit inertia and no drives: those of one geometry share programs."""
     return _cached_geometry_only(as_manipulator(robot))
 
@@ -254,7 +256,7 @@ def motion_program(robot: Manipulator, kind: DriveKind, general: bool = False) -
 
     `kind` has the features of the drives. If `general`, geometry and gravity are an input too.
     """
-    layout = bare(robot)
+    layout = geometry_only(robot)
     key = ("motion", layout, kind, *(["general"] if general else []))
     return cached_program(key, partial(_motion, layout, kind, general))
 

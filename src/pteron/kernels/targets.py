@@ -22,7 +22,13 @@ from pteron.kernels.jax import Traced
 from pteron.kernels.kernel import Array, Kernel
 from pteron.kernels.numba import Jitted
 from pteron.kernels.program_cache import Program
-from pteron.kernels.programs import Columns, bare, general_program, program, specialised
+from pteron.kernels.programs import (
+    Columns,
+    general_program,
+    geometry_only,
+    program,
+    specialise_program,
+)
 from pteron.kernels.vm import VirtualMachine
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator, parameters
 
@@ -45,7 +51,7 @@ FIXED: dict[str, Callable[[Manipulator], Array]] = {
     "drives": drive_numbers,
     "actuators": actuator_numbers,
     "geometry": lambda robot: np.array(numbers(robot)),
-    "stored": lambda robot: np.array(stored_numbers(bare(robot))),
+    "stored": lambda robot: np.array(stored_numbers(geometry_only(robot))),
 }
 """The inputs that have a machine's own values unless a call gives others."""
 
@@ -194,7 +200,7 @@ def _cached_kernel(
             fixed[port.name] = np.array(base_values)
     derived: dict[str, ca.Function] = {}
     if folded:
-        built, fixed = specialised(built, fixed), {}
+        built, fixed = specialise_program(built, fixed), {}
     elif base_values is not None and target not in _TRANSPARENT and "base_parameters" in fixed:
         # Operations on base parameters alone are evaluated once.
         built, derived["base_parameters"] = hoist_invariants(built, "base_parameters")
@@ -220,7 +226,7 @@ def _instantiate_kernel(
     if order != sorted(order):
         symbols, inputs = built.function.sx_in(), [built.inputs[k] for k in order]
         outputs, reordered = built.function.call(symbols), [symbols[k] for k in order]
-        built = Program.of(built.name, reordered, inputs, outputs, built.outputs)
+        built = Program.from_expressions(built.name, reordered, inputs, outputs, built.outputs)
     return kind(built.name, built.function, built.inputs, built.outputs, fixed, dtype, threads)
 
 

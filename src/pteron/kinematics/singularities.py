@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from pteron.equations.machine import closure_of
 from pteron.errors import DataError, SingularPose
-from pteron.kernels import Array, as_array, bare, numeric
+from pteron.kernels import Array, as_array, geometry_only, numeric
 from pteron.kernels.bisection import bisect_condition
 from pteron.kernels.program_cache import cached_result
 from pteron.kinematics.architecture import expect_regular, is_singular_everywhere
@@ -54,7 +54,7 @@ def best_type_ii(robot: Manipulator) -> float:
     It is the best of many random poses, the foremost of them improved by Nelder and Mead's method.
     Limits do not count: it is a measure of the geometry, which another limit leaves as it is.
     """
-    key = "best_type_ii", bare(robot)
+    key = "best_type_ii", geometry_only(robot)
     return cached_result(key, ("kinematics",), lambda: _best_type_ii(robot))
 
 

@@ -12,7 +12,7 @@ from pteron.bodies.motion import Expression
 from pteron.bodies.parameters import JOINED, OWN
 from pteron.equations.machine import Machine
 from pteron.equations.virtual_work import inverse_dynamics
-from pteron.kernels import Array, Port, bare, count_operations, program
+from pteron.kernels import Array, Port, count_operations, geometry_only, program
 from pteron.kernels.graph import graph_of
 from pteron.kernels.hoisting import hoist_invariants
 from pteron.kernels.program_cache import cached_result
@@ -64,7 +64,7 @@ def cheapest_parameters(robot: RobotLike) -> BaseParameters:
 @lru_cache(maxsize=32)
 def _cheapest_parameters(robot: Manipulator) -> BaseParameters:
     columns = parameter_data(robot)
-    key, packages = ("cheapest", bare(robot)), ("kinematics", "reduction")
+    key, packages = ("cheapest", geometry_only(robot)), ("kinematics", "reduction")
     best = cached_result(key, packages, lambda: _cheapest_columns(robot))
     return base_parameters(robot, keep=[columns[k].name for k in best])
 

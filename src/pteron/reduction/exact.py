@@ -20,7 +20,7 @@ import numpy as np
 
 from pteron.bodies.parameters import Parameter
 from pteron.errors import ModelError, SingularPose
-from pteron.kernels import Array, PrimeField, bare
+from pteron.kernels import Array, PrimeField, geometry_only
 from pteron.kinematics import is_singular_everywhere
 from pteron.kinematics.jacobian_keys import alternatives, jacobian_keys
 from pteron.manipulator import Manipulator
@@ -82,12 +82,12 @@ class _ExactRegressor:
 
     def rows(self, prime: int, states: int) -> list[list[int]]:
         """Return the rows at random states, modulo a prime."""
-        rows = modular_rows(bare(self.robot), self.geometry, prime, states, self.rng)
+        rows = modular_rows(geometry_only(self.robot), self.geometry, prime, states, self.rng)
         return _shared_rows(rows, self.sharing)
 
     def rational_rows(self) -> list[list[Fraction]]:
         """Return the rows at random rational configurations; none where there are none."""
-        rows = rational_rows(bare(self.robot), self.geometry, _RATIONAL_CHECKS, self.rng)
+        rows = rational_rows(geometry_only(self.robot), self.geometry, _RATIONAL_CHECKS, self.rng)
         return _shared_rows(rows, self.sharing)
 
     def mass_vectors(self, prime: int) -> list[dict[int, int]]:
@@ -241,10 +241,10 @@ def _certificate(
 ) -> ExactCertificate:
     """Return what was computed and checked, with the probability that a false vector passes."""
     robot, geometry = regressor.robot, regressor.geometry
-    degree = degree_bound(bare(robot))
+    degree = degree_bound(geometry_only(robot))
     # A pose is drawn among the 1 in 2^n whose n radicands are squares, and the 2^n choices of their
     # roots multiply the degree.
-    odds = min(1.0, degree * 4.0 ** roots(bare(robot)) / fresh) ** _MODULAR_CHECKS
+    odds = min(1.0, degree * 4.0 ** roots(geometry_only(robot)) / fresh) ** _MODULAR_CHECKS
     numerical = None
     if geometry.approximated or geometry.recognised or geometry.nearly:
         with suppress(ModelError):  # no states are found
@@ -288,7 +288,7 @@ def _modular(
 ) -> dict[int, int]:
     """Return a transfer's null vector modulo a prime, by column."""
     field = PrimeField(prime)
-    symbols = {name: value.within(field) for name, value in geometry.symbols().items()}
+    symbols = {name: value.field_element(field) for name, value in geometry.symbols().items()}
     entries = {columns.index(c): v % prime for c, v in transfer.evaluate(symbols).items()}
     return {column: value for column, value in entries.items() if value}
 

@@ -143,7 +143,7 @@ def lost_right_angles(vectors: dict[str, Array], exact: dict[str, ExactVector]) 
     ]
 
 
-def near_relations(vectors: dict[str, Array]) -> list[str]:
+def describe_near_relations(vectors: dict[str, Array]) -> list[str]:
     """Return in words the pairs of directions that are nearly parallel or at right angles."""
     relations = []
     for (a, u), (b, v) in combinations(vectors.items(), 2):

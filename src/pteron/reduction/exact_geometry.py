@@ -28,9 +28,9 @@ from pteron.reduction.exact_directions import (
     ZERO,
     ExactVector,
     Notes,
+    describe_near_relations,
     exact_directions,
     lost_right_angles,
-    near_relations,
     times,
 )
 from pteron.reduction.surds import Surd, direction_cosine
@@ -67,18 +67,20 @@ class ExactLeg:
             number for value in (*self.values.values(), self.platform_point) for number in value
         ]
 
-    def within(self, field: Field[Element]) -> dict[str, list[Element]]:
+    def field_elements(self, field: Field[Element]) -> dict[str, list[Element]]:
         """Return the quantities and the platform point in a field, by name."""
-        d = [c.within(field) for c in self.direction]
+        d = [c.field_element(field) for c in self.direction]
         elements = {}
         for name, value in self.values.items():
             if value:
-                elements[name] = [number.within(field) for number in value]
+                elements[name] = [number.field_element(field) for number in value]
             else:
                 program = _plane_axis(*pole([float(c) for c in self.direction]))
                 elements[name] = evaluate(program, field, [d])[0]
         points = {"platform_point": self.platform_point, "fixed_offset": (ZERO, ZERO, ZERO)}
-        return elements | {k: [number.within(field) for number in v] for k, v in points.items()}
+        return elements | {
+            k: [number.field_element(field) for number in v] for k, v in points.items()
+        }
 
 
 @dataclass(frozen=True)
@@ -137,16 +139,16 @@ class ExactGeometry:
                 values[f"s{i}{axis}"] = value
         return values
 
-    def within(self, field: Field[Element]) -> list[Element]:
+    def field_elements(self, field: Field[Element]) -> list[Element]:
         """Return the geometry vector of `Machine.symbolic` in a field."""
         numbers = [
             number
             for leg in self.legs
-            for values in leg.within(field).values()
+            for values in leg.field_elements(field).values()
             for number in values
         ]
         vectors = (*self.axes, *self.platform.values(), self.gravity)
-        return numbers + [number.within(field) for vector in vectors for number in vector]
+        return numbers + [number.field_element(field) for vector in vectors for number in vector]
 
 
 @lru_cache(maxsize=6)
@@ -187,7 +189,7 @@ def exact_geometry(robot: Manipulator) -> ExactGeometry:
     # The whole machine but its platform's frame turns with a joint that has axes of its own.
     axes = _rational_rotation(frame) if "second_axis" in platform.quantities else UNIT
     quantities = {name: (platform_values | exact)[name] for name in platform.quantities}
-    missed = lost_right_angles(distinct, exact), near_relations(distinct)
+    missed = lost_right_angles(distinct, exact), describe_near_relations(distinct)
     remarks = map(tuple[str, ...], (notes.recognised, notes.approximated, *missed))
     return ExactGeometry(legs, gravity, quantities, axes, platform.arm_axes, frame, *remarks)
 

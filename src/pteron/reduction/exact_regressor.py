@@ -41,7 +41,7 @@ def modular_rows(
     ZeroDivisionError
         If no pose can be used, as for a machine that is singular everywhere.
     """
-    vector = tuple(geometry.within(PrimeField(prime)))
+    vector = tuple(geometry.field_elements(PrimeField(prime)))
     rows, state = _cached_rows(topology, vector, prime, states, rng.getstate())
     rng.setstate(state)
     return rows
@@ -87,7 +87,7 @@ def rational_rows(
     if topology.platform.planes:
         return []
     field = RationalField()
-    vector = geometry.within(field)
+    vector = geometry.field_elements(field)
     points = Evaluation(general_program(topology, "platform_points").function, field, [vector])
     program = Evaluation(general_program(topology, "regressor").function, field)
     places = number_places(topology)
@@ -150,36 +150,38 @@ class _DegreeField:
         self.degrees: list[int] = []
         self.names: dict[Any, int] = {}
 
-    def of(self, numerator: int, powers: dict[int, int], *operation: Any) -> _Degree:
-        """Return a value that is computed by the operation and operands `told`."""
+    def make_degree(self, numerator: int, powers: dict[int, int], *operation: Any) -> _Degree:
+        """Return a value, named by the operation and operands that compute it."""
         return _Degree(numerator, powers, self.names.setdefault(operation, len(self.names)))
 
-    def over(self, powers: Mapping[int, int], a: _Degree) -> int:
+    def degree_over(self, powers: Mapping[int, int], a: _Degree) -> int:
         """Return the degree of a value's numerator over a multiple of its denominator."""
         missing = (n - a.powers.get(k, 0) for k, n in powers.items())
         pairs = zip(powers, missing, strict=True)
         return a.numerator + sum(self.degrees[k] * n for k, n in pairs)
 
     def number(self, value: Fraction | int) -> _Degree:
-        return self.of(0, {}, value)
+        return self.make_degree(0, {}, value)
 
     def variable(self, name: str) -> _Degree:
-        return self.of(1, {}, name)
+        return self.make_degree(1, {}, name)
 
     def add(self, a: _Degree, b: _Degree) -> _Degree:
         powers = common_powers((a, b))
-        degree = max(self.over(powers, a), self.over(powers, b))
-        return self.of(degree, powers, "add", a.name, b.name)
+        degree = max(self.degree_over(powers, a), self.degree_over(powers, b))
+        return self.make_degree(degree, powers, "add", a.name, b.name)
 
     def subtract(self, a: _Degree, b: _Degree) -> _Degree:
-        return self.add(a, b)._replace(name=self.of(0, {}, "subtract", a.name, b.name).name)
+        return self.add(a, b)._replace(
+            name=self.make_degree(0, {}, "subtract", a.name, b.name).name
+        )
 
     def multiply(self, a: _Degree, b: _Degree) -> _Degree:
         powers = {k: a.powers.get(k, 0) + b.powers.get(k, 0) for k in {**a.powers, **b.powers}}
-        return self.of(a.numerator + b.numerator, powers, "multiply", a.name, b.name)
+        return self.make_degree(a.numerator + b.numerator, powers, "multiply", a.name, b.name)
 
     def divide(self, a: _Degree, b: _Degree) -> _Degree:
-        inverse = self.of(b.numerator, {}, "numerator", b.name).name
+        inverse = self.make_degree(b.numerator, {}, "numerator", b.name).name
         self.degrees += [0] * (inverse + 1 - len(self.degrees))
         self.degrees[inverse] = b.numerator
         powers = {k: n - b.powers.get(k, 0) for k, n in a.powers.items()}
@@ -189,12 +191,12 @@ class _DegreeField:
         )
         powers = {k: n for k, n in powers.items() if n > 0}
         powers[inverse] = powers.get(inverse, 0) + 1
-        return self.of(numerator, powers, "divide", a.name, b.name)
+        return self.make_degree(numerator, powers, "divide", a.name, b.name)
 
     def square_root(self, a: _Degree) -> _Degree:
         powers = {k: -(-n // 2) for k, n in a.powers.items()}
-        twice = self.over({k: 2 * n for k, n in powers.items()}, a)
-        return self.of(-(-twice // 2), powers, "root", a.name)
+        twice = self.degree_over({k: 2 * n for k, n in powers.items()}, a)
+        return self.make_degree(-(-twice // 2), powers, "root", a.name)
 
 
 def common_powers(values: Iterable[_Degree]) -> dict[int, int]:
@@ -228,7 +230,7 @@ def _degree_bound(topology: Manipulator) -> int:
     ]
     entries = evaluate(program, field, [constants, *states])[0]
     return max(
-        max(field.over(common_powers(row), entry) for entry in row)
+        max(field.degree_over(common_powers(row), entry) for entry in row)
         for row in _split_rows(entries, topology)
     )
 

@@ -14,7 +14,7 @@ from typing import Literal, get_args
 from pteron.arguments import expect_one_of
 from pteron.bodies.parameters import Parameter
 from pteron.errors import ModelError
-from pteron.kernels import OTHER_LAYOUT, bare, same_layout
+from pteron.kernels import OTHER_LAYOUT, geometry_only, same_layout
 from pteron.kernels.program_cache import cached_result
 from pteron.kinematics.evaluate import evaluate_kernel
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
@@ -96,7 +96,7 @@ def base_parameters(
     columns, sharing = share(robot, groups)
     order = _order(columns, keep)
     # Neither bodies nor drives matter; a refusal tells the name.
-    layout = replace(bare(robot), name=robot.name)
+    layout = replace(geometry_only(robot), name=robot.name)
     grouping = _grouping(layout, method, tuple(order), groups, seed_number(seed))
     names = [column.name for column in columns]
     lost = [name for name in keep or () if names.index(name) not in grouping.kept]
@@ -105,7 +105,7 @@ def base_parameters(
             f"keep: {', '.join(lost)} cannot be kept: zero, or dependent on the columns named "
             "before; leave it out"
         )
-    return BaseParameters.of(robot, columns, sharing, grouping)
+    return BaseParameters.from_grouping(robot, columns, sharing, grouping)
 
 
 @lru_cache(maxsize=256)
@@ -114,7 +114,7 @@ def _grouping(
 ) -> Grouping:
     """Return the grouping of a machine's columns, in an order of preference."""
 
-    def found() -> Grouping:
+    def compute_grouping() -> Grouping:
         columns, sharing = share(layout, groups)
         if method == "exact":
             by_mass = transfers(layout, columns)
@@ -122,7 +122,7 @@ def _grouping(
         return _NUMERICAL[method](layout, order, sharing, seed)
 
     key = "grouping", layout, method, order, groups, seed, version("sympy")
-    return cached_result(key, ("kinematics", "reduction"), found)
+    return cached_result(key, ("kinematics", "reduction"), compute_grouping)
 
 
 def _order(columns: Sequence[Parameter], keep: Sequence[str] | None) -> list[int]:

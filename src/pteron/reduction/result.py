@@ -66,14 +66,14 @@ class BaseParameters(Result):
     shares: Shares = field(compare=False)
 
     @classmethod
-    def of(
+    def from_grouping(
         cls,
         robot: Manipulator,
         columns: tuple[Parameter, ...],
         sharing: Array,
         grouping: Grouping,
     ) -> BaseParameters:
-        """Assemble the result from what a method found; `sharing` is (N, columns)."""
+        """Return the base parameters of a grouping; `sharing` is (N, columns)."""
         mean = (sharing / sharing.sum(axis=0)).T
         return cls(
             robot=robot,
@@ -144,7 +144,7 @@ class BaseParameters(Result):
         return tuple(transfers(self.robot, self.parameters))
 
     @cached_property
-    def _named(self) -> dict[str, Any]:
+    def _symbol_values(self) -> dict[str, Any]:
         """The value of each geometric symbol, in symbols of which equal values share one."""
         from pteron.reduction.symbols import named_values  # SymPy
 
@@ -153,18 +153,18 @@ class BaseParameters(Result):
     @cached_property
     def _symbolic(self) -> Shares:
         """The shares in symbols of the geometry, those that are equal in one."""
-        return self._in_symbols(self._named)
+        return self._symbolic_shares(self._symbol_values)
 
     @cached_property
-    def _by_leg(self) -> Shares:
+    def _leg_shares(self) -> Shares:
         """The shares in symbols of the geometry, each leg with its own."""
         if not self.shared_symbols:
             return self._symbolic
         from pteron.reduction.symbols import named_values  # SymPy
 
-        return self._in_symbols(named_values(exact_geometry(self.robot), shared=False))
+        return self._symbolic_shares(named_values(exact_geometry(self.robot), shared=False))
 
-    def _in_symbols(self, named: dict[str, Any]) -> Shares:
+    def _symbolic_shares(self, named: dict[str, Any]) -> Shares:
         if not isinstance(self.certificate, ExactCertificate):
             raise ModelError(
                 f'symbols: not known to method "{self.certificate.method}"; use method="exact"'
@@ -188,7 +188,7 @@ class BaseParameters(Result):
     def geometry_values(self) -> dict[str, float]:
         """The geometric symbols of the expressions, and their values in metres."""
         values = self.leg_geometry_values.items()
-        return {name: value for name, value in values if str(self._named[name]) == name}
+        return {name: value for name, value in values if str(self._symbol_values[name]) == name}
 
     @property
     def leg_geometry_values(self) -> dict[str, float]:
@@ -200,7 +200,7 @@ class BaseParameters(Result):
     def shared_symbols(self) -> dict[str, tuple[str, ...]]:
         """The geometric symbols that stand for several values, equal but for their sign."""
         bearers: dict[str, tuple[str, ...]] = {}
-        for name, value in self._named.items():
+        for name, value in self._symbol_values.items():
             bearer = str(value).lstrip("-")
             if bearer not in (name, "0"):
                 bearers[bearer] = (*bearers.get(bearer, ()), name)
@@ -235,7 +235,9 @@ class BaseParameters(Result):
         expect_one_of(get_args(Form), ModelError, form=form)
         if symbols not in (False, True, "leg"):
             raise ModelError(f'symbols: {symbols!r} is not True, False or "leg"')
-        shares = self._by_leg if symbols == "leg" else self._symbolic if symbols else self.shares
+        shares = (
+            self._leg_shares if symbols == "leg" else self._symbolic if symbols else self.shares
+        )
         sums = [terms_of(column, shares) for column in self.kept]
         if form == "sympy":
             return tuple(as_sympy(self.columns, terms) for terms in sums)

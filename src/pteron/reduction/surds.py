@@ -50,7 +50,7 @@ class Surd:
         """Return the number times a rational one."""
         return Surd(self.q * factor, self.s)
 
-    def within(self, field: Field[Element]) -> Element:
+    def field_element(self, field: Field[Element]) -> Element:
         """Return the number as an element of a field.
 
         The root of s is the product of the roots of its primes, so that sqrt(2) sqrt(3) = sqrt(6)

@@ -11,7 +11,7 @@ import numpy as np
 
 from pteron.equations.machine import closure_of
 from pteron.errors import ModelError
-from pteron.kernels import Array, numeric
+from pteron.kernels import Array, geometry_only, numeric
 from pteron.kernels.program_cache import cached_result
 from pteron.kinematics import singular_orientations
 from pteron.kinematics.jacobian_at import JacobianAtPose, jacobian_at
@@ -165,7 +165,7 @@ class Report:
 
 
 def _volume(robot: Manipulator, home: Array) -> ReachVolume:
-    key = "reach_volume", robot, tuple(home.tolist()), version("scipy")
+    key = "reach_volume", geometry_only(robot), tuple(home.tolist()), version("scipy")
     return cached_result(key, ("kinematics", "workspace"), lambda: reach_volume(robot, home))
 
 
@@ -220,9 +220,13 @@ def _slices(robot: Manipulator, home: Array, volume: ReachVolume | None) -> tupl
 
 
 def _tilt(robot: Manipulator, home: Array) -> float | None:
-    with suppress(ModelError):  # it does not tilt, or not from the level
-        return largest_tilt(robot, home).tilt
-    return None
+    def tilt() -> float | None:
+        with suppress(ModelError):  # it does not tilt, or not from the level
+            return largest_tilt(robot, home).tilt
+        return None
+
+    key = "largest tilt", geometry_only(robot), tuple(home.tolist())
+    return cached_result(key, ("kinematics", "workspace"), tilt)
 
 
 def _extent(box: Array, plane: Plane, half: Sequence[float]) -> tuple[float, float, float, float]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from pteron.kernels import geometry_only
 from pteron.kernels.program_cache import cached_result
 from pteron.reduction import FORMS, BaseParameters, model_forms
 
@@ -54,7 +55,7 @@ def costs(base: BaseParameters) -> tuple[Cost, ...]:
     """
     every = range(base.selection.shape[0])
     counts = cached_result(
-        ("costs", base.robot, base.parameters, base.kept),
+        ("costs", geometry_only(base.robot), base.parameters, base.kept),
         ("kinematics", "reduction"),
         lambda: {key: kernel.operations for key, kernel in model_forms(base).items()},
     )

@@ -45,7 +45,7 @@ from pteron.workspace.nearest_singularities import (
 )
 from pteron.workspace.orientations import (
     VolumesOverAngles as VolumesOverAngles,
-    over_angles as over_angles,
+    volumes_over_angles as volumes_over_angles,
 )
 from pteron.workspace.paving import Paving as Paving, paving as paving
 from pteron.workspace.proofs import Proof as Proof, prove as prove

@@ -141,7 +141,7 @@ def lattice(paving: Paving, most: int = _CELLS) -> Lattice:
     """Return a paving as a lattice, as fine as the smallest boxes, or as `most` cells allow."""
     moving = [paving.robot.coordinates.index(axis) for axis in paving.axes]
     start, extent = paving.box[0, moving], (paving.box[1] - paving.box[0])[moving]
-    sizes = [list(paving.by_size(boxes)) for boxes in (paving.inner, paving.boundary)]
+    sizes = [list(paving.group_by_size(boxes)) for boxes in (paving.inner, paving.boundary)]
     finest = np.array([depth for depth, _ in chain(*sizes)]).max(axis=0, initial=0)
     nonempty = np.concatenate([paving.inner, paving.boundary])
     low, high = (

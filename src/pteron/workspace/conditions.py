@@ -20,7 +20,7 @@ from pteron.arguments import expect
 from pteron.equations.edges import Edge, edges
 from pteron.equations.machine import Machine
 from pteron.errors import DataError
-from pteron.kernels import Array, bounded, layout_of, numeric
+from pteron.kernels import Array, bounded_function, layout_of, numeric
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 
 
@@ -169,7 +169,7 @@ class IntervalTest:
         self.all = np.uint64((1 << len(self.given)) - 1)
         self._rows = []
         for condition in self.given:
-            function = bounded(robot, condition.what)
+            function = bounded_function(robot, condition.what)
             self._rows.append((function, function.rows(condition.output)[condition.element]))
 
     def __call__(

@@ -100,7 +100,7 @@ class Program:
     def rows(self, samples: Samples, z: Array) -> Array:
         """Return the rows (N, R) at unknowns z."""
         geometry, center, edge = self.parts(z)
-        return self.conditions.rows(geometry, samples.at(center, edge), self.side)
+        return self.conditions.rows(geometry, samples.shape_poses(center, edge), self.side)
 
     def keeps(self, samples: Samples, z: Array) -> bool:
         """Return whether all rows are kept; one that is NaN, out of reach, is not."""
@@ -156,7 +156,7 @@ def improve_unknowns(program: Program, samples: Samples, dense: Samples) -> Arra
     start where that does not keep the conditions itself. The same is found whatever the number of
     threads: a proof of it can be done again.
     """
-    everywhere, feasible = samples.joined(dense), program.start
+    everywhere, feasible = samples.join(dense), program.start
     if not program.keeps(everywhere, feasible):
         return feasible
     pairs, share = _worst_rows(program.rows(everywhere, feasible)), _FIRST_STEP
@@ -167,7 +167,7 @@ def improve_unknowns(program: Program, samples: Samples, dense: Samples) -> Arra
         failing_samples = program.failing_samples(feasible + length * (z - feasible))
         if len(failing_samples.inside):
             sample_count = len(everywhere.inside)
-            everywhere = everywhere.joined(failing_samples)
+            everywhere = everywhere.join(failing_samples)
             failing = program.rows(failing_samples, feasible + length * (z - feasible)).argmin(
                 axis=1
             )
@@ -237,7 +237,10 @@ def _solve_subproblem(
         z = np.frombuffer(key)
         geometry, center, edge = program.parts(z)
         row_values, by_pose, *by_geometry = program.conditions.slopes(
-            geometry, chosen.at(center, edge), program.side, by_geometry=program.slopes.size > 0
+            geometry,
+            chosen.shape_poses(center, edge),
+            program.side,
+            by_geometry=program.slopes.size > 0,
         )
         by_center = by_pose[..., :lengths] * chosen.inside[:, None, None]
         by_edge = 0.5 * np.einsum("irl,il->ir", by_center, chosen.units)[..., None]

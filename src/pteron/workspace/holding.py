@@ -9,7 +9,7 @@ import numpy as np
 
 from pteron.dynamics import inverse_dynamics
 from pteron.errors import ModelError
-from pteron.kernels import Array, bare
+from pteron.kernels import Array, geometry_only
 from pteron.kinematics.ram_figures import similarity
 from pteron.kinematics.sampling import draw_poses
 from pteron.kinematics.singular_distance import coordinate_distances
@@ -70,7 +70,7 @@ class Holding:
 def measure_holding(robot: Manipulator, home: Array) -> Holding:
     """Return how the drives hold the platform at home (m,) and about it."""
     poses = home[None]
-    length, distance, everywhere = _singular_distances(bare(robot), tuple(home.tolist()))
+    length, distance, everywhere = _singular_distances(geometry_only(robot), tuple(home.tolist()))
     nearby = _poses_near_home(robot, home)
     weight = _weight(robot)
     relative_forces = (
@@ -130,7 +130,7 @@ def expect_regular(robot: Manipulator, home: Array) -> None:
     ModelError
         If no pose is farther from singular coordinates than files are rounded to.
     """
-    length, _, everywhere = _singular_distances(bare(robot), tuple(home.tolist()))
+    length, _, everywhere = _singular_distances(geometry_only(robot), tuple(home.tolist()))
     rounding = rounding_tolerance(length)
     if everywhere > rounding:
         return

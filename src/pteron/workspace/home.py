@@ -12,11 +12,11 @@ from functools import lru_cache
 from itertools import product
 
 import numpy as np
-import scipy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
+from pteron.bodies.vectors import rotation_matrices
 from pteron.errors import ModelError
-from pteron.kernels import Array, bare
+from pteron.kernels import Array, geometry_only
 from pteron.kernels.program_cache import cached_result
 from pteron.kinematics import inverse_kinematics, singular_orientations
 from pteron.kinematics.sampling import search_ball
@@ -182,7 +182,7 @@ def home_poses(robot: RobotLike) -> HomePoses:
         expect_regular(robot, np.array(robot.home))
         return HomePoses(robot.home, None, named=True)
     # Neither bodies nor drives matter; a refusal tells the name.
-    return HomePoses(*_cached_home_poses(replace(bare(robot), name=robot.name)))
+    return HomePoses(*_cached_home_poses(replace(geometry_only(robot), name=robot.name)))
 
 
 def expect_usable(robot: Manipulator, pose: Array) -> None:
@@ -204,7 +204,7 @@ def expect_usable(robot: Manipulator, pose: Array) -> None:
 @lru_cache(maxsize=256)
 def _cached_home_poses(robot: Manipulator) -> tuple[tuple[float, ...], tuple[float, ...] | None]:
     """Return both poses, worked out before, in another process too, or now."""
-    key, packages = ("home_poses", bare(robot)), ("kinematics", "workspace")
+    key, packages = ("home_poses", geometry_only(robot)), ("kinematics", "workspace")
     return cached_result(key, packages, lambda: _both_sides(robot))
 
 
@@ -372,7 +372,7 @@ def _move_onto_axis(robot: Manipulator, poses: Array) -> Array:
     # Legs of a hexapod may stand in pairs, or in two halves.
     folds = [count, *(k for k in (3, 2) if k < count)] if tilting.any() else [count]
     for fold in folds:
-        turn = scipy.spatial.transform.Rotation.from_rotvec(2.0 * np.pi / fold * axis).as_matrix()
+        turn = rotation_matrices(2.0 * np.pi / fold * axis)
         images = poses.copy()
         images[:, :lengths] = center + offsets @ (directions @ turn @ directions.T).T
         if np.allclose(_worth(robot, images), _worth(robot, poses), rtol=0.0, atol=ROUNDING):

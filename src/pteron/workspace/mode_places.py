@@ -8,7 +8,7 @@ from math import prod
 
 import numpy as np
 
-from pteron.kernels import Array, bare
+from pteron.kernels import Array, geometry_only
 from pteron.kinematics import inverse_kinematics, random_poses
 from pteron.manipulator import Manipulator, working_modes
 from pteron.manipulator.variants import with_elbows
@@ -82,7 +82,7 @@ def mode_places(robot: Manipulator, home: Array) -> tuple[ModePlace, ...]:
     if len(modes) > _MOST:
         other = tuple(-s if len(c) > 1 else s for s, c in zip(file_elbows, choices, strict=True))
         modes = list(dict.fromkeys([file_elbows, other, modes[0], modes[-1]]))
-    poses = np.vstack([random_poses(bare(robot), _DRAWN, type_i=0.0, type_ii=0.0), home])
+    poses = np.vstack([random_poses(geometry_only(robot), _DRAWN, type_i=0.0, type_ii=0.0), home])
     least = _UPRIGHT * max(leg.size for leg in robot.legs)
     candidates = []
     for signs in modes:

@@ -117,9 +117,10 @@ class Search:
             boxes = np.concatenate([halve_boxes(batch), others])
             distances = self._distances(boxes)
             boxes, distances = boxes[distances < nearest], distances[distances < nearest]
-            known = np.isfinite(nearest)  # before a place is found there is nothing to reach
-            proved = distances.min(initial=nearest) / ((1.0 - _CLOSE) * nearest) if known else 0.0
-            self._report(min(max(examined / most, proved), 1.0))
+            proved = (
+                float(distances.min(initial=nearest)) / nearest if 0.0 < nearest < np.inf else 0.0
+            )
+            self._report(min(max(examined / most, proved / (1.0 - _CLOSE)), 1.0))
         if len(boxes) and distances.min() < (1.0 - _CLOSE) * nearest:
             order = np.argsort(distances, kind="stable")
             last = np.concatenate([order[:_LAST], order[:: max(1, len(order) // _LAST)]])

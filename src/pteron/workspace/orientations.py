@@ -51,7 +51,7 @@ class VolumesOverAngles(Result):
         return self.outer.T
 
 
-def over_angles(
+def volumes_over_angles(
     robot: RobotLike,
     pose: PoseLike,
     angles: ArrayLike,
@@ -87,8 +87,8 @@ def over_angles(
 
     Examples
     --------
-    >>> from pteron.workspace import over_angles
-    >>> found = over_angles("3-prr", [0.0, 0.0, 0.0], [0.0, 0.5], tolerance=0.2)
+    >>> from pteron.workspace import volumes_over_angles
+    >>> found = volumes_over_angles("3-prr", [0.0, 0.0, 0.0], [0.0, 0.5], tolerance=0.2)
     >>> found.inner.shape, found.unit
     ((1, 2), 'm^2')
     """

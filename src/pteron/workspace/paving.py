@@ -114,7 +114,7 @@ class Paving(Result):
         shares = {str(c): float(s) for c, s in zip(self.conditions, alone, strict=True) if s}
         return dict(sorted(shares.items(), key=lambda pair: -pair[1]))
 
-    def by_size(self, boxes: Array) -> Iterator[tuple[NDArray[np.int64], NDArray[np.int64]]]:
+    def group_by_size(self, boxes: Array) -> Iterator[tuple[NDArray[np.int64], NDArray[np.int64]]]:
         """Yield the places (P, k) of boxes (B, 2, k) of one size, in the lattice of all such boxes.
 
         Before them comes how often each side of the whole was halved, (k,).
@@ -132,7 +132,7 @@ class Paving(Result):
         return [
             (verdict, depth, np.sort(_keys(cells, depth)))
             for boxes, verdict in ((self.inner, 1), (self.boundary, 0))
-            for depth, cells in self.by_size(boxes)
+            for depth, cells in self.group_by_size(boxes)
         ]
 
     def locate(self, poses: ArrayLike) -> NDArray[np.int8]:

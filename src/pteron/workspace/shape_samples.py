@@ -46,14 +46,14 @@ class Samples:
     units: Array
     inside: Array
 
-    def at(self, center: Array, edge: float) -> Array:
+    def shape_poses(self, center: Array, edge: float) -> Array:
         """Return the poses (N, m) for a shape."""
         poses = self.poses.copy()
         lengths = self.units.shape[1]
         poses[:, :lengths] += self.inside[:, None] * (center + 0.5 * edge * self.units)
         return poses
 
-    def joined(self, other: Samples) -> Samples:
+    def join(self, other: Samples) -> Samples:
         """Return both, one after the other."""
         return Samples(
             np.vstack([self.poses, other.poses]),

@@ -13,7 +13,7 @@ from functools import cached_property, lru_cache
 import casadi as ca
 import numpy as np
 
-from pteron.kernels import TARGETS, Array, Kernel, Port, bare, general_program
+from pteron.kernels import TARGETS, Array, Kernel, Port, general_program, geometry_only
 from pteron.kernels.c import compiler
 from pteron.kernels.targets import FIXED
 from pteron.manipulator import Manipulator
@@ -119,7 +119,7 @@ class SmoothConditions:
 
 def smooth_conditions(robot: Manipulator, required: tuple[Condition, ...]) -> SmoothConditions:
     """Return the rows of conditions for all machines that have the topology of one."""
-    return _cached_conditions(bare(robot), required)
+    return _cached_conditions(geometry_only(robot), required)
 
 
 _cached_conditions = lru_cache(maxsize=16)(SmoothConditions)

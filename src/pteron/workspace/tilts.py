@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import lru_cache
+from importlib.metadata import version
 
 import numpy as np
 import scipy  # type: ignore[import-untyped]
@@ -14,9 +16,11 @@ from pteron.arguments import expect, expect_share
 from pteron.bodies.vectors import PARALLEL_TOLERANCE, dot
 from pteron.errors import ModelError
 from pteron.kernels import Array
+from pteron.kernels.program_cache import cached_result
 from pteron.kinematics.evaluate import finite_pose
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.progress import Progress
+from pteron.renamed import former_attribute
 from pteron.result import Result
 from pteron.shapes import PoseLike
 from pteron.workspace.conditions import Condition, conditions, keeps
@@ -92,10 +96,12 @@ class TiltedBall:
         least = np.maximum(np.maximum(low[:, self.angles], -high[:, self.angles]), 0.0)
         return np.asarray(far | (np.cos(least).prod(axis=-1) < math.cos(self.tilt) - 1e-12))
 
-    def sampled(self) -> Array:
+    sampled = former_attribute("sampled", "sample_poses")
+
+    def sample_poses(self) -> Array:
         """Return poses (K, m) spread over it, a third of them on its rim."""
         free = len(self.lengths) + 2
-        shares = scipy.stats.qmc.Sobol(free, seed=0).random(_SAMPLES)
+        shares = _sobol_points(free)
         tilt = self.tilt * np.sqrt(shares[:, 0])
         tilt[: _SAMPLES // 3] = self.tilt
         azimuth = 2.0 * np.pi * shares[:, 1]
@@ -135,6 +141,19 @@ class LargestTilt(Result):
     radius: float
     region: TiltedBall
     proof: Proof = field(repr=False)
+
+
+@lru_cache(maxsize=4)
+def _sobol_points(count: int) -> Array:
+    """Return scrambled Sobol points (_SAMPLES, count), from disk if they are there.
+
+    SciPy's statistics are slow to import.
+    """
+
+    def draw() -> Array:
+        return np.asarray(scipy.stats.qmc.Sobol(count, seed=0).random(_SAMPLES))
+
+    return cached_result(("sobol", count, _SAMPLES, version("scipy")), (), draw)
 
 
 def largest_tilt(
@@ -266,9 +285,9 @@ def _largest_region(
         radius, tilt = sizes(size)
         return TiltedBall(tuple(reference.tolist()), radius, tilt, lengths, angles)
 
-    if not keeps(robot, required, region(0.0).sampled()).all():
+    if not keeps(robot, required, region(0.0).sample_poses()).all():
         raise ModelError(
-            f"not even the middle, pose {region(0.0).sampled()[-1].tolist()}, serves",
+            f"not even the middle, pose {region(0.0).sample_poses()[-1].tolist()}, serves",
             subject=robot.name,
         )
     shares = ((1.0 - tolerance) ** k for k in range(1, _SHARES + 1))
@@ -276,7 +295,7 @@ def _largest_region(
         robot,
         required,
         region,
-        lambda size: region(size).sampled(),
+        lambda size: region(size).sample_poses(),
         most,
         _HALVINGS,
         shares,

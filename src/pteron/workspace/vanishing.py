@@ -15,7 +15,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from pteron.kernels import Array, Port, bounded, bounds
+from pteron.kernels import Array, Port, bounded_function, bounds
 from pteron.kernels.bounds import Bounded
 from pteron.kernels.graph import INPUT, expression, graph_of
 from pteron.manipulator import Manipulator
@@ -104,7 +104,7 @@ class Smooth(NamedTuple):
 
 @lru_cache(maxsize=256)
 def _smooth(robot: Manipulator, kind: Kind, leg: int) -> Smooth:
-    graph = graph_of(bounded(robot, _PROGRAM[kind]).function)
+    graph = graph_of(bounded_function(robot, _PROGRAM[kind]).function)
     pose = ca.SX.sym("pose", robot.freedom)
     radicands, roots = [], []
     expressions: list[ca.SX] = []
@@ -129,7 +129,7 @@ def _smooth(robot: Manipulator, kind: Kind, leg: int) -> Smooth:
         top = graph.nodes[top].arguments[0]
     radicand_column, root_column = ca.vertcat(*radicands), ca.vertcat(*roots)
     variables = ca.vertcat(pose, root_column)
-    (squares,) = bounded(robot, "squared_type_i").function.call([pose])
+    (squares,) = bounded_function(robot, "squared_type_i").function.call([pose])
     outputs = ca.vertcat(numerator, radicand_column, ca.vec(squares))
     return Smooth(
         Bounded(

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-import scipy  # type: ignore[import-untyped]
 
+from pteron.bodies.vectors import rotation_matrices
 from pteron.export.engines.chains import LegStance, leg_stances
 from pteron.export.engines.parts import Tree
 from pteron.kernels import Array, as_array
@@ -87,7 +87,7 @@ def _leg(home: LegStance, away: LegStance) -> list[Array]:
                 np.einsum("ki,ki->k", np.cross(normal, now), here),
             )
             center = turn @ point + shift
-            turned = scipy.spatial.transform.Rotation.from_rotvec(by[:, None] * now).as_matrix()
+            turned = rotation_matrices(by[:, None] * now)
             turn = turned @ turn
             shift = center + np.einsum("kij,kj->ki", turned, shift - center)
         motions.append(by)

@@ -13,10 +13,10 @@ from functools import partial
 from itertools import product
 
 import numpy as np
-import scipy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
 from pteron.arguments import checked_arguments, expect
+from pteron.bodies.vectors import rotation_matrices
 from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
@@ -119,7 +119,7 @@ class Course:
         directions = self.robot.platform.directions
         if self.axis is None:
             return np.eye(len(directions))
-        matrix = scipy.spatial.transform.Rotation.from_rotvec(turn * self.axis).as_matrix()
+        matrix = rotation_matrices(turn * self.axis)
         return np.asarray(directions @ matrix @ directions.T)
 
     def extent(self, turn: float) -> Array:

@@ -10,7 +10,7 @@ import numpy as np
 
 from pteron.controllers import Law
 from pteron.equations.drives import drive_numbers
-from pteron.kernels import Array, Columns, bare, program
+from pteron.kernels import Array, Columns, geometry_only, program
 from pteron.kernels.targets import columns_of
 from pteron.kinematics import inverse_kinematics, joint_rates
 from pteron.manipulator import Manipulator, parameters
@@ -60,7 +60,7 @@ def linearised_law(law: Law, pose: Array, velocity: Array, acceleration: Array) 
         "drives": drive_numbers(with_linear_drives(model)),
     }
     columns = None if law.base is None else columns_of(law.base)
-    function = _derivatives(bare(model), law.what, columns)
+    function = _derivatives(geometry_only(model), law.what, columns)
     derivatives = function(*(inputs[name] for name in function.name_in()))
     by_memory, by_joints = (np.asarray(part, dtype=float) for part in derivatives)
     n = model.joint_count

@@ -12,7 +12,7 @@ import scipy  # type: ignore[import-untyped]
 from pteron.dynamics import drive_forces
 from pteron.equations.drives import drive_numbers
 from pteron.equations.transmissions import DriveKind, actuator_numbers
-from pteron.kernels import Array, bare, program
+from pteron.kernels import Array, geometry_only, program
 from pteron.kernels.programs import motion_program
 from pteron.kinematics import jacobian
 from pteron.kinematics.evaluate import finite_pose
@@ -134,7 +134,7 @@ def linearise(
         "drives": drive_numbers(smooth),
         "actuators": actuator_numbers(smooth),
     }
-    function = _derivatives(bare(robot), kind)
+    function = _derivatives(geometry_only(robot), kind)
     derivatives = function(*(inputs[name] for name in function.name_in()))
     system, driven, turned = (np.asarray(part, dtype=float) for part in derivatives)
     rows, m = jacobian(robot, state[0]), robot.freedom
