@@ -75,7 +75,8 @@ def key_of(package, **options):
     [
         (PACKAGE / "kernels" / "programs.py", EQUATIONS),
         pytest.param(
-            *(Path(home.__file__), (*EQUATIONS, "kinematics", "workspace")), marks=NIGHTLY
+            *(Path(home.__file__), (*EQUATIONS, "dynamics", "kinematics", "workspace")),
+            marks=NIGHTLY,
         ),
     ],
     ids=["programs", "home poses"],
