@@ -788,8 +788,11 @@ def test_what_is_no_rotation_is_refused():
 @pytest.mark.parametrize("name", sorted(CATALOG))
 def test_a_machine_goes_through_text_and_dictionary_without_loss(name):
     robot = pteron.load(name)
-    assert pteron.loads(pteron.dumps(robot)) == robot
-    assert pteron.from_dict(json.loads(json.dumps(pteron.to_dict(robot)))) == robot
+    assert pteron.manipulator.loads(pteron.manipulator.dumps(robot)) == robot
+    assert (
+        pteron.manipulator.from_dict(json.loads(json.dumps(pteron.manipulator.to_dict(robot))))
+        == robot
+    )
 
 
 OWNER = {
@@ -806,7 +809,7 @@ def test_data_of_the_owner_stay_with_the_machine_and_do_not_count(tmp_path):
     assert owned == robot
     assert hash(owned) == hash(robot)
     for copy in (
-        pteron.loads(pteron.dumps(owned)),
+        pteron.manipulator.loads(pteron.manipulator.dumps(owned)),
         pteron.load(pteron.save(owned, tmp_path / "owned.toml")),
         pickle.loads(pickle.dumps(owned)),
         with_dimensions(owned, rod=1.0),
@@ -833,10 +836,13 @@ def test_data_of_the_owner_that_no_file_can_hold_are_named():
 @pytest.mark.parametrize(
     ("read", "words"),
     [
-        (lambda: pteron.loads("a = "), "the text: "),
-        (lambda: pteron.loads("name = 'x'"), "platform: missing"),
-        (lambda: pteron.from_dict({"name": "x"}), "the tables: 2 faults"),
-        (lambda: pteron.from_dict({"owner": 3}), "owner: 3 given, a table expected: [owner]\n"),
+        (lambda: pteron.manipulator.loads("a = "), "the text: "),
+        (lambda: pteron.manipulator.loads("name = 'x'"), "platform: missing"),
+        (lambda: pteron.manipulator.from_dict({"name": "x"}), "the tables: 2 faults"),
+        (
+            lambda: pteron.manipulator.from_dict({"owner": 3}),
+            "owner: 3 given, a table expected: [owner]\n",
+        ),
     ],
 )
 def test_a_text_or_dictionary_that_is_no_machine_has_its_faults_named(read, words):

@@ -63,7 +63,7 @@ def work_on_a_delta():
     law = FeedForwardPD(bandwidth=20.0, period=2e-4)
     poses = pteron.random_poses(robot, 40)
     readings = pteron.inverse_kinematics(robot, poses) + np.array([0.001, 0.0, 0.0])
-    measured = Measurements.of(robot, readings, poses=poses)
+    measured = Measurements.from_readings(robot, readings, poses=poses)
     return {
         "simulate": lambda tell: simulate(robot, motion, law, progress=tell),
         "tune": lambda tell: tune(robot, motion, progress=tell),

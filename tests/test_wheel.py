@@ -36,7 +36,7 @@ def test_every_file_of_the_package_is_in_the_wheel_and_nothing_else(wheel: ZipFi
     packed = {name for name in wheel.namelist() if ".dist-info/" not in name}
     assert packed == expected
     kinds = {name.rpartition(".")[2] for name in packed}
-    assert kinds <= {"py", "typed", "toml", "j2", "css", "js", "svg", "json", "npz", "csv"}
+    assert kinds <= {"py", "typed", "toml", "j2", "css", "js", "svg", "json", "npz", "pyi", "csv"}
 
 
 def test_the_wheel_names_every_extra_and_the_command(wheel: ZipFile):

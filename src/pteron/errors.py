@@ -159,7 +159,7 @@ def shorten(value: object, *, bare: bool = False, longest: int = _LONGEST) -> st
 
     Examples
     --------
-    >>> shown("1,5"), shown("rho1\x1b[31m", bare=True), shown([1.0] * 9)
+    >>> shorten("1,5"), shorten("rho1\x1b[31m", bare=True), shorten([1.0] * 9)
     ("'1,5'", 'rho1\\x1b[31m', '[1.0, 1.0, 1.0, 1.0, 1.0, 1.0, ...]')
     """
     if isinstance(value, str):

@@ -1,22 +1,23 @@
 """`publish`, the last line of each package's `__init__.py`: it lists the package's public names.
 
-What the file imports for type checkers alone is imported at its first use: a program loads what it
-calls, and no more.
+The names of the package's stub, `__init__.pyi`, are imported at their first use: a program loads
+what it calls, and no more.
 """
 
 from __future__ import annotations
 
-import dis
+import ast
 import sys
 from collections.abc import Collection, Mapping
 from importlib import import_module
 from importlib.util import find_spec
-from types import CodeType, FunctionType, ModuleType
+from pathlib import PurePath
+from types import FunctionType, ModuleType
 from typing import Any
 
 from pteron.renamed import former_name
 
-_OTHERS = {"annotations", "TYPE_CHECKING"}
+_OTHERS = {"annotations"}
 """Names that an `__init__.py` imports for itself."""
 
 
@@ -40,8 +41,8 @@ def publish(
 ) -> None:
     """List a package's public names, for completion and ``import *``.
 
-    These are the names that the file imports or defines: those under ``if TYPE_CHECKING:`` are
-    imported at their first use, the others at once. An import that hands a name on says so to
+    These are the names that the file imports or defines, and those that its stub `__init__.pyi`
+    imports, which are imported at their first use. An import that hands a name on says so to
     readers and type checkers alike: ``import size as size``. A name with an underscore is the
     file's own.
 
@@ -56,8 +57,7 @@ def publish(
     """
     module = sys.modules[package]
     names = vars(module)
-    # From the code, not from the source: applications may be shipped without it.
-    places = _places(names["__loader__"].get_code(package))
+    places = _places(names)
     extras = extras or {}
     lacking = {name for name, needed in extras.items() if find_spec(needed) is None}
     own = (name for name in names.keys() - _OTHERS if not name.startswith("_"))
@@ -95,20 +95,16 @@ def publish(
     module.__class__ = _Package
 
 
-def _places(code: CodeType) -> dict[str, tuple[str, str]]:
-    """Return the module of each name that is imported for type checkers, and its name there."""
-    places: dict[str, tuple[str, str]] = {}
-    condition, end, module, called = False, -1, "", ""
-    for step in dis.get_instructions(code):
-        if step.opname.startswith("POP_JUMP") and condition:
-            end = max(end, int(step.argval))
-        elif step.opname == "IMPORT_NAME":
-            module = step.argval
-        elif step.opname == "IMPORT_FROM":
-            called = step.argval
-        elif step.opname == "STORE_NAME" and called and step.offset < end:
-            places[step.argval] = module, called
-            called = ""
-        if step.opname not in ("CACHE", "TO_BOOL", "NOT_TAKEN"):
-            condition = step.opname == "LOAD_NAME" and step.argval == "TYPE_CHECKING"
-    return places
+def _places(names: Mapping[str, Any]) -> dict[str, tuple[str, str]]:
+    """Return the module of each name that a package's stub imports, and its name there."""
+    stub = PurePath(names["__file__"]).with_suffix(".pyi")
+    try:
+        text = names["__loader__"].get_data(str(stub))
+    except OSError:  # it imports all of its names at once
+        return {}
+    imports = (line for line in ast.parse(text).body if isinstance(line, ast.ImportFrom))
+    return {
+        alias.asname or alias.name: (str(line.module), alias.name)
+        for line in imports
+        for alias in line.names
+    }

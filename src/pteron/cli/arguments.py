@@ -72,11 +72,11 @@ def group_numbers(args: Sequence[str], valued: Collection[str]) -> list[str]:
 
     Examples
     --------
-    >>> regrouped(["robot", "-0.1", "0", "--json", "2"], [])
+    >>> group_numbers(["robot", "-0.1", "0", "--json", "2"], [])
     ['robot', '--json', '--', '-0.1', '0', '2']
-    >>> regrouped(["robot", "--pose", "-1", "2", "--out", "-3"], ["--pose", "--out"])
+    >>> group_numbers(["robot", "--pose", "-1", "2", "--out", "-3"], ["--pose", "--out"])
     ['robot', '--pose=-1,2', '--out', '-3']
-    >>> regrouped(["robot", "--to", "0", "b", "-1", "--json"], [])
+    >>> group_numbers(["robot", "--to", "0", "b", "-1", "--json"], [])
     ['robot', '--to=0,b,-1', '--json']
     """
     options: list[str] = []

@@ -26,8 +26,11 @@ from pteron.kernels.passes import optimise_function
 
 _PACKAGE = Path(__file__).parent.parent
 
-EQUATIONS = ("bodies", "closures", "equations", "kernels", "legs", "manipulator", "platforms")
-"""The packages that a program depends on, to the last bit."""
+EQUATIONS = (
+    *("bodies", "closures", "equations", "kernels", "legs", "manipulator", "platforms"),
+    "tolerances",
+)
+"""The packages and modules that a program depends on, to the last bit."""
 
 _Result = TypeVar("_Result")
 

@@ -1,32 +1,5 @@
 """Kinds of legs, one file each; `legs.leg` is the page to read before writing another."""
 
-from typing import TYPE_CHECKING
-
 from pteron.public import publish as _publish
-
-if TYPE_CHECKING:
-    from pteron.legs.cones import Cone as Cone
-    from pteron.legs.drive import (
-        Drive as Drive,
-        Elastic as Elastic,
-        LuGre as LuGre,
-        Stribeck as Stribeck,
-        Wave as Wave,
-        Winding as Winding,
-    )
-    from pteron.legs.installed import KINDS as KINDS, Leg as Leg
-    from pteron.legs.kind import LegKind as LegKind
-    from pteron.legs.prr import PRR as PRR
-    from pteron.legs.prrr import PRRR as PRRR
-    from pteron.legs.prs import PRS as PRS
-    from pteron.legs.pss import PSS as PSS
-    from pteron.legs.reading import Reading as Reading
-    from pteron.legs.rpr import RPR as RPR
-    from pteron.legs.rps import RPS as RPS
-    from pteron.legs.rrr import RRR as RRR
-    from pteron.legs.rrs import RRS as RRS
-    from pteron.legs.rss import RSS as RSS
-    from pteron.legs.rupu import RUPU as RUPU
-    from pteron.legs.ups import UPS as UPS
 
 _publish(__name__)

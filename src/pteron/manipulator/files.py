@@ -120,9 +120,9 @@ def loads(text: str) -> Manipulator:
 
     Examples
     --------
-    >>> import pteron
-    >>> robot = pteron.load("delta")
-    >>> pteron.loads(pteron.dumps(robot)) == robot
+    >>> from pteron.manipulator import dumps, load, loads
+    >>> robot = load("delta")
+    >>> loads(dumps(robot)) == robot
     True
     """
     return _warned(*read_machine(text.encode(), "the text", "the text"), "the text")
@@ -153,10 +153,10 @@ def from_dict(tables: Mapping[str, Any]) -> Manipulator:
 
     Examples
     --------
-    >>> import pteron
-    >>> tables = pteron.to_dict(pteron.load("delta"))
+    >>> from pteron.manipulator import from_dict, to_dict
+    >>> tables = to_dict("delta")
     >>> tables["legs"][0]["upper_length"] = 0.25
-    >>> pteron.from_dict(tables).legs[0].upper_length
+    >>> from_dict(tables).legs[0].upper_length
     0.25
     """
     document = dict(tables)

@@ -49,8 +49,8 @@ def dumps(robot: RobotLike) -> str:
 
     Examples
     --------
-    >>> import pteron
-    >>> pteron.dumps("delta").splitlines()[2]
+    >>> from pteron.manipulator import dumps
+    >>> dumps("delta").splitlines()[2]
     'name = "delta"'
     """
     return text_of(as_manipulator(robot))
@@ -71,8 +71,8 @@ def to_dict(robot: RobotLike) -> dict[str, Any]:
 
     Examples
     --------
-    >>> import pteron
-    >>> pteron.to_dict("delta")["platform"]["motion"]
+    >>> from pteron.manipulator import to_dict
+    >>> to_dict("delta")["platform"]["motion"]
     '3T'
     """
     return document_of(as_manipulator(robot))

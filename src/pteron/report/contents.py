@@ -166,7 +166,9 @@ class Report:
 
 def _volume(robot: Manipulator, home: Array) -> ReachVolume:
     key = "reach_volume", geometry_only(robot), tuple(home.tolist()), version("scipy")
-    return cached_result(key, ("kinematics", "workspace"), lambda: reach_volume(robot, home))
+    return cached_result(
+        key, ("dynamics", "kinematics", "workspace"), lambda: reach_volume(robot, home)
+    )
 
 
 def contents(robot: Manipulator, motion: Playback | None = None) -> Report:
@@ -226,7 +228,7 @@ def _tilt(robot: Manipulator, home: Array) -> float | None:
         return None
 
     key = "largest tilt", geometry_only(robot), tuple(home.tolist())
-    return cached_result(key, ("kinematics", "workspace"), tilt)
+    return cached_result(key, ("dynamics", "kinematics", "workspace"), tilt)
 
 
 def _extent(box: Array, plane: Plane, half: Sequence[float]) -> tuple[float, float, float, float]:

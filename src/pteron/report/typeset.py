@@ -98,7 +98,7 @@ def value_with_uncertainty(value: float, half: float) -> tuple[str, str]:
 
     Examples
     --------
-    >>> measured(1.2361326, 0.012752), measured(-0.004113744, 4.4e-05)
+    >>> value_with_uncertainty(1.2361326, 0.012752), value_with_uncertainty(-0.004113744, 4.4e-05)
     (('1.236', '0.013'), ('−0.004114', '0.000044'))
     """
     if not isfinite(half) or half <= abs(value) * 10.0 ** (1 - _DIGITS):

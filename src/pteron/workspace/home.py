@@ -204,7 +204,7 @@ def expect_usable(robot: Manipulator, pose: Array) -> None:
 @lru_cache(maxsize=256)
 def _cached_home_poses(robot: Manipulator) -> tuple[tuple[float, ...], tuple[float, ...] | None]:
     """Return both poses, worked out before, in another process too, or now."""
-    key, packages = ("home_poses", geometry_only(robot)), ("kinematics", "workspace")
+    key, packages = ("home_poses", geometry_only(robot)), ("dynamics", "kinematics", "workspace")
     return cached_result(key, packages, lambda: _both_sides(robot))
 
 

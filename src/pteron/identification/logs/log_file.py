@@ -43,6 +43,7 @@ from pteron.identification.logs.sizes import (
 from pteron.identification.logs.spikes import MARGIN, Spikes
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.manipulator.readings import from_readings, reading_scales
+from pteron.progress import Progress
 from pteron.tables import CsvFile, Dialect, ParquetFile, open_table
 
 _FEWEST = 50
@@ -341,7 +342,7 @@ def read_log(
     robot: RobotLike,
     *,
     description: Description | str | Path | None = None,
-    progress: Callable[[int], None] | None = None,
+    progress: Progress | None = None,
 ) -> Log:
     """Read a whole log: t, rho1.., force1.. (at cranks theta, torque), x y z phi if measured.
 
@@ -354,7 +355,7 @@ def read_log(
     description : Description or path, optional
         The description; the TOML file of the same stem where it is not given.
     progress : callable, optional
-        Called with the number of rows just read.
+        Takes the share of the rows that is read.
 
     Returns
     -------
@@ -383,4 +384,16 @@ def read_log(
     (500, (500, 3), 1000, ())
     """
     robot = as_manipulator(robot)
-    return open_log(path, robot, description=description).read(progress)
+    file = open_log(path, robot, description=description)
+    if progress is None:
+        return file.read()
+    total, done = file.rows_estimate or 1, 0
+
+    def count_rows(rows: int) -> None:
+        nonlocal done
+        done += rows
+        progress(min(done / total, 1.0))
+
+    log = file.read(count_rows)
+    progress(1.0)
+    return log

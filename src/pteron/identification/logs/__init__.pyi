@@ -1,0 +1,21 @@
+from pteron.identification.logs.description import (
+    Description as Description,
+    KnownPayload as KnownPayload,
+    joint_symbols as joint_symbols,
+)
+from pteron.identification.logs.description_file import (
+    find_description as find_description,
+    read_description as read_description,
+    write_description as write_description,
+)
+from pteron.identification.logs.log import (
+    Finding as Finding,
+    Log as Log,
+    join_logs as join_logs,
+)
+from pteron.identification.logs.log_file import (
+    LogFile as LogFile,
+    open_log as open_log,
+    read_log as read_log,
+)
+from pteron.identification.logs.writing import write_log as write_log

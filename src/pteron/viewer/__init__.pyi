@@ -1,0 +1,1 @@
+from pteron.viewer.view import Viewer as Viewer, view as view
