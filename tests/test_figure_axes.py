@@ -151,6 +151,13 @@ def test_a_subfigure_takes_several_panels():
     assert plots.trajectory_figure(T, WAVES, names=("x", "y", "z", "phi"), ax=first) is first
     assert len(first.axes) == 2
     assert not second.axes
+    for name in ("power_figure", "draw", "poses_figure", "map_figure"):
+        page = Figure(figsize=(9.0, 4.5), layout="constrained")
+        place, other = page.subfigures(1, 2)
+        assert getattr(plots, name)(*ARGUMENTS[name](), ax=place) is place
+        assert place.axes
+        assert not other.axes
+        page.draw_without_rendering()
 
 
 def test_axes_without_a_grid_are_refused():

@@ -149,7 +149,8 @@ class AxesPlace:
                 former, self._axes = self._axes, self._add_there("add_subplot", **options)
                 former.remove()
             return self._axes
-        return cast(Axes, self.subfigure().add_subplot(place, **options))
+        places = () if place is None else (place,)
+        return cast(Axes, self.subfigure().add_subplot(*places, **options))
 
     def add_gridspec(self, rows: int, columns: int, **options: Any) -> Any:
         """Return the grid of a subfigure, or for one panel one whose place is None."""
