@@ -36,7 +36,7 @@ from pteron.identification.excitation import (
 )
 from pteron.identification.excitation.conditioning import condition_of_long
 from pteron.identification.excitation.limits import UNITS
-from pteron.identification.excitation.random_motions import within_limits
+from pteron.identification.excitation.random_motions import shrink_into_limits
 from pteron.identification.excitation.search_program import measure
 from pteron.identification.logs import read_log
 
@@ -350,7 +350,7 @@ def test_a_motion_beyond_its_limits_is_shrunk_about_its_center_until_it_keeps_th
     motion = drawn("tripteron", "platform")
     coefficients = motion.coefficients
     coefficients[1:] *= 1.5
-    found = within_limits(motion.with_coefficients(coefficients), Limits())
+    found = shrink_into_limits(motion.with_coefficients(coefficients), Limits())
     assert found.center == pytest.approx(motion.center)
     assert found.coefficients[1:] == pytest.approx(motion.coefficients[1:], rel=0.02)
     assert margins(found, Limits(), 20_000).kept

@@ -21,9 +21,9 @@ from pteron.cli.main import app
 from pteron.identification import identify, identify_payload
 from pteron.identification.excitation import (
     FourierMotion,
-    Layout,
     LedMotion,
     Limits,
+    MotionLayout,
     found_lead,
     held_out_cycle,
     optimal_excitation,
@@ -211,7 +211,9 @@ def test_limits_come_from_the_drives_where_they_are_known():
 # Files, and the logs of what they hold
 
 
-def written_log(folder: Path, movement, layout: Layout, stem: str, *, delay: float = 0.0) -> Path:
+def written_log(
+    folder: Path, movement, layout: MotionLayout, stem: str, *, delay: float = 0.0
+) -> Path:
     """Write the log that a machine makes of a movement, beside the description of its motion.
 
     It has the layout of the motion's file and torques or forces behind; its clock begins at 1000 s,
@@ -246,7 +248,7 @@ class Later:
         return self._movement.states(inside)
 
 
-LAYOUT = Layout(
+LAYOUT = MotionLayout(
     joint_columns=("Axis 1", "Axis 2"),
     length_unit="mm",
     angle_unit="deg",
@@ -293,8 +295,8 @@ def test_the_log_of_what_was_written_gives_the_parameters_back(name: str, tmp_pa
 @CLIENTS
 def test_a_log_that_never_repeats_is_taken_as_it_is(tmp_path: Path):
     found = excited("delta")
-    log = written_log(tmp_path, found.with_leads(2), Layout(separator=";"), "log")
-    about = found.write_toml(tmp_path / "log.toml", 2, Layout(separator=";"))
+    log = written_log(tmp_path, found.with_leads(2), MotionLayout(separator=";"), "log")
+    about = found.write_toml(tmp_path / "log.toml", 2, MotionLayout(separator=";"))
     about.write_text(about.read_text().replace("period = 2.0", "period = 1.37"))
     result = identify(driven("delta"), read_log(log, driven("delta")), cad=None)
     assert result.preprocessing[0].derivatives != "periodic"
@@ -332,7 +334,7 @@ def test_a_payload_is_found_from_logs_that_lead_in_and_out():
 )
 def test_a_file_may_hold_the_joints_or_the_poses_alone(contents: str, names: list[str]):
     found = excited("five-bar")
-    frame = found.frame(RATE, 1, Layout(contents=contents, length_unit="um", time_unit="us"))
+    frame = found.frame(RATE, 1, MotionLayout(contents=contents, length_unit="um", time_unit="us"))
     assert frame.columns == names
     led = found.with_leads(1)
     state = led.states(np.array([1.0]))
@@ -347,7 +349,7 @@ def test_units_are_those_of_each_joint():
     robot = driven("mixed")
     found = excited("mixed")
     plain = found.frame(RATE)
-    other = found.frame(RATE, 1, Layout(length_unit="mm", angle_unit="deg"))
+    other = found.frame(RATE, 1, MotionLayout(length_unit="mm", angle_unit="deg"))
     for leg, name in zip(robot.legs, robot.joint_names, strict=True):
         factor = 1e3 if leg.joint.unit == "m" else 180.0 / np.pi
         for order in ("", "d", "dd"):
@@ -355,7 +357,7 @@ def test_units_are_those_of_each_joint():
             assert column == pytest.approx(factor * plain[f"{order}{name}"].to_numpy())
     for name in robot.force_names:
         assert (other[name] == plain[name]).all()
-    description = Layout(length_unit="mm", angle_unit="deg").description(robot)
+    description = MotionLayout(length_unit="mm", angle_unit="deg").description(robot)
     assert (description.joint_unit, description.joint_angle_unit) == ("mm", "deg")
 
 
@@ -372,7 +374,7 @@ def test_units_are_those_of_each_joint():
 )
 def test_a_layout_that_cannot_be_is_refused(given: dict, words: str):
     with pytest.raises(pteron.DataError, match=words):
-        excited("delta").frame(RATE, 1, Layout(**given))
+        excited("delta").frame(RATE, 1, MotionLayout(**given))
 
 
 def run(line: str):

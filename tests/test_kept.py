@@ -27,6 +27,7 @@ PLAIN = {
         "progress",
         "public",
         "renamed",
+        "result",
         "shapes",
         "templates",
         "thresholds",

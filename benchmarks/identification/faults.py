@@ -407,7 +407,7 @@ def judged(name: str, fault: str, seed: int) -> Said:
     _, rates, seconds = commanded(case)
     pose = case.motion.at(case.time).pose.mean(axis=0)
     extent = Extent(pose, np.abs(rates).max(axis=0), np.abs(seconds).max(axis=0))
-    cycle = ReferenceCycle.about_mean_pose(case.motion.robot, extent, size=_SIZE)
+    cycle = ReferenceCycle.from_mean_pose(case.motion.robot, extent, size=_SIZE)
     assert cycle is not None
     s = cycle.states
     joints = s.joints, s.joint_rates, s.joint_accelerations

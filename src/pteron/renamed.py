@@ -61,6 +61,9 @@ RENAMED = {
         "Trial": "pteron.identification.FaultIsolation",
         "playback": "pteron.playback",
     },
+    "pteron.identification.excitation": {
+        "Layout": "pteron.identification.excitation.MotionLayout",
+    },
     "pteron.identification.faults": {
         "Suspicion": "pteron.identification.faults.IsolatedFault",
         "Trial": "pteron.identification.faults.FaultIsolation",

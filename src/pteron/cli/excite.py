@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 
     from pteron.identification.excitation import (
         Excitation,
-        Layout,
         Limits,
         Margins,
+        MotionLayout,
         RepeatedCycle,
     )
     from pteron.manipulator import Manipulator
@@ -92,14 +92,14 @@ class _FileOptions:
     decimal: Literal[".", ","] = "."
 
     @property
-    def layout(self) -> Layout:
+    def layout(self) -> MotionLayout:
         """The layout of the table."""
-        from pteron.identification.excitation import Layout
+        from pteron.identification.excitation import MotionLayout
 
         names = None if self.columns is None else tuple(n.strip() for n in self.columns.split(","))
         separator = "\t" if self.separator == "tab" else self.separator
         units = self.length_unit, self.angle_unit, self.time_unit
-        return Layout(self.contents, names, *units, separator, self.decimal)
+        return MotionLayout(self.contents, names, *units, separator, self.decimal)
 
 
 @dataclass(frozen=True)

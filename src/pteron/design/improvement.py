@@ -15,7 +15,7 @@ from pteron.design.variables import geometry_slopes, slopes_of
 from pteron.errors import ModelError
 from pteron.kernels import Array
 from pteron.kinematics.sampling import search_ball
-from pteron.workspace.exchange import POINTS, Program, improve_unknowns
+from pteron.workspace.exchange import POINTS, SemiInfiniteProgram, improve_unknowns
 from pteron.workspace.shape_samples import Samples, fixed_samples, shape_samples
 
 _EXCHANGES = 8
@@ -58,7 +58,7 @@ def improve_design(task: Task, point: Sequence[float], objective: int) -> list[f
         reach = np.append(center, radius)[:, None] + [-radius, radius]
         reach[-1, 0] = min((1.0 + _SPARE) * least, fit[-1])
     z0 = np.append(start, fit)
-    program = Program(
+    program = SemiInfiniteProgram(
         task.conditions,
         design.cube.side if seeks else design.side,
         z0,

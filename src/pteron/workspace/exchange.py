@@ -50,7 +50,7 @@ POINTS = 13
 
 
 @dataclass(frozen=True)
-class Program:
+class SemiInfiniteProgram:
     """A semi-infinite program: an affine objective, conditions at all points, affine bounds.
 
     The unknowns are variables of the geometry (V,), perhaps none, then the shape's centre (k,) and
@@ -146,7 +146,7 @@ class Program:
 
 
 @one_thread()
-def improve_unknowns(program: Program, samples: Samples, dense: Samples) -> Array:
+def improve_unknowns(program: SemiInfiniteProgram, samples: Samples, dense: Samples) -> Array:
     """Return unknowns of a smaller objective, which keep the conditions at all samples.
 
     Each round goes towards the solution of a program with few conditions as far as all of them are
@@ -181,7 +181,9 @@ def improve_unknowns(program: Program, samples: Samples, dense: Samples) -> Arra
     return feasible
 
 
-def _feasible_step(program: Program, samples: Samples, feasible: Array, z: Array) -> float:
+def _feasible_step(
+    program: SemiInfiniteProgram, samples: Samples, feasible: Array, z: Array
+) -> float:
     """Return how far one may go from good unknowns to others, as a share of the step."""
     if program.keeps(samples, z):
         return 1.0
@@ -193,7 +195,7 @@ def _feasible_step(program: Program, samples: Samples, feasible: Array, z: Array
 
 
 def _cut_step(
-    program: Program, samples: Samples, feasible: Array, z: Array, length: float
+    program: SemiInfiniteProgram, samples: Samples, feasible: Array, z: Array, length: float
 ) -> float:
     """Return a shorter step, at whose end nothing fails between the samples either."""
     for _ in range(_CUTS):
@@ -218,7 +220,7 @@ def _worst_rows(rows: Array) -> set[tuple[int, int]]:
 
 
 def _solve_subproblem(
-    program: Program,
+    program: SemiInfiniteProgram,
     samples: Samples,
     pairs: Sequence[tuple[int, int]],
     feasible: Array,

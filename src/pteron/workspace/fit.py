@@ -9,7 +9,7 @@ import numpy as np
 import scipy  # type: ignore[import-untyped]
 
 from pteron.kernels import Array
-from pteron.workspace.exchange import POINTS, Program, improve_unknowns
+from pteron.workspace.exchange import POINTS, SemiInfiniteProgram, improve_unknowns
 from pteron.workspace.proofs import Proof
 from pteron.workspace.shape_samples import Shape, shape_samples
 from pteron.workspace.smooth_conditions import SmoothConditions
@@ -90,8 +90,8 @@ def largest_fit(
     """
     lengths, size = len(ball[0]), ball[1]
 
-    def program(fit: Fit) -> Program:
-        return Program(
+    def program(fit: Fit) -> SemiInfiniteProgram:
+        return SemiInfiniteProgram(
             conditions,
             fit.side,
             np.append(fit.center, fit.edge),
@@ -167,7 +167,7 @@ def _least(rows: Array) -> float:
 
 
 def _fits_on_grid(
-    program: Callable[[Fit], Program], ball: tuple[Array, float], side: float, most: int
+    program: Callable[[Fit], SemiInfiniteProgram], ball: tuple[Array, float], side: float, most: int
 ) -> list[Fit]:
     """Return about the largest cubes: their middles are the grid's points furthest from failure."""
     low, high = ball[0] - ball[1], ball[0] + ball[1]

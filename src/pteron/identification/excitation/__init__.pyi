@@ -11,7 +11,7 @@ from pteron.identification.excitation.held_out import (
     held_out_cycle as held_out_cycle,
 )
 from pteron.identification.excitation.layout import (
-    Layout as Layout,
+    MotionLayout as MotionLayout,
     check_sampling as check_sampling,
 )
 from pteron.identification.excitation.leads import (

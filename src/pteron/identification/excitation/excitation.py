@@ -13,7 +13,7 @@ from pteron.equations.machine import closure_of
 from pteron.identification.excitation.conditioning import Conditioning
 from pteron.identification.excitation.fourier import FourierMotion
 from pteron.identification.excitation.held_out import RepeatedCycle, held_out_cycle
-from pteron.identification.excitation.layout import Layout, check_sampling
+from pteron.identification.excitation.layout import MotionLayout, check_sampling
 from pteron.identification.excitation.leads import Lead, LedMotion
 from pteron.identification.excitation.limits import Limits
 from pteron.identification.excitation.margins import Margins
@@ -149,7 +149,7 @@ class Excitation(Result):
         path: str | Path,
         rate: float = 1000.0,
         periods: int = 3,
-        layout: Layout | None = None,
+        layout: MotionLayout | None = None,
         held_out: RepeatedCycle | None = None,
         slow: LedMotion | None = None,
     ) -> list[Path]:
@@ -167,7 +167,7 @@ class Excitation(Result):
             Samples a second.
         periods : int
             How many periods there are between lead-in and lead-out.
-        layout : Layout, optional
+        layout : MotionLayout, optional
             Columns, units and how a CSV file is written.
         held_out : RepeatedCycle, optional
             Such as `held_out` returns.
@@ -181,27 +181,31 @@ class Excitation(Result):
         DataError
             If there would be no sample, or the layout does not fit the machine.
         """
-        layout = layout or Layout()
+        layout = layout or MotionLayout()
         check_sampling(self.motion.period, rate, periods)
         paths = motion_paths(path, layout)
         motions: dict[Path, tuple[Movement, Description]] = {
             paths[0]: (self.with_leads(periods), self._description(periods, layout))
         }
         if held_out is not None:
-            motions[paths[1]] = held_out, _described(held_out, layout)
+            motions[paths[1]] = held_out, _describe(held_out, layout)
         if slow is not None:
-            motions[paths[2]] = slow, _described(slow, layout)
+            motions[paths[2]] = slow, _describe(slow, layout)
         return write_motions(motions, layout, rate)
 
     def frame(
-        self, rate: float = 1000.0, periods: int = 1, layout: Layout | None = None
+        self, rate: float = 1000.0, periods: int = 1, layout: MotionLayout | None = None
     ) -> pl.DataFrame:
         """Return the trajectory from rest to rest, sampled for a controller (see `write_csv`)."""
         check_sampling(self.motion.period, rate, periods)
-        return (layout or Layout()).frame(self.with_leads(periods), rate)
+        return (layout or MotionLayout()).frame(self.with_leads(periods), rate)
 
     def write_csv(
-        self, path: str | Path, rate: float = 1000.0, periods: int = 1, layout: Layout | None = None
+        self,
+        path: str | Path,
+        rate: float = 1000.0,
+        periods: int = 1,
+        layout: MotionLayout | None = None,
     ) -> Path:
         """Write the trajectory for a controller to a CSV (or Parquet) file, from rest to rest.
 
@@ -212,21 +216,23 @@ class Excitation(Result):
 
         Parameters and errors are those of `write`.
         """
-        layout = layout or Layout()
+        layout = layout or MotionLayout()
         return write_table(self.frame(rate, periods, layout), path, layout.dialect)
 
-    def write_toml(self, path: str | Path, periods: int = 1, layout: Layout | None = None) -> Path:
+    def write_toml(
+        self, path: str | Path, periods: int = 1, layout: MotionLayout | None = None
+    ) -> Path:
         """Write what an evaluation of the log needs, of as many periods as `write_csv` wrote.
 
         That is the period, where the periodic part begins and ends (s from the first row), the
         assembly mode (from 1), and the layout. Where modes have no number throughout, a log is in
         that of the home pose unless it says otherwise, as the motion is.
         """
-        return write_description(self._description(periods, layout or Layout()), path)
+        return write_description(self._description(periods, layout or MotionLayout()), path)
 
-    def _description(self, periods: int, layout: Layout) -> Description:
+    def _description(self, periods: int, layout: MotionLayout) -> Description:
         led = self.with_leads(periods)
-        described = _described(led, layout)
+        described = _describe(led, layout)
         return replace(described, period=self.motion.period, start=led.start, end=led.end)
 
     def as_dict(self) -> dict[str, Any]:
@@ -250,7 +256,7 @@ class Excitation(Result):
         }
 
 
-def _described(movement: Movement, layout: Layout) -> Description:
+def _describe(movement: Movement, layout: MotionLayout) -> Description:
     """Return the description of a movement's log."""
     return replace(layout.description(movement.robot), assembly_mode=_mode_of(movement))
 

@@ -12,8 +12,8 @@ import numpy as np
 
 from pteron.identification.excitation.fourier import FourierMotion
 from pteron.identification.excitation.margins import relative_margins
-from pteron.identification.excitation.random_motions import within_limits
-from pteron.identification.excitation.search_program import Setting, minimised
+from pteron.identification.excitation.random_motions import shrink_into_limits
+from pteron.identification.excitation.search_program import Setting, minimise
 from pteron.kernels import Array
 from pteron.processes import LostWorkerError, WorkerPool
 
@@ -79,14 +79,14 @@ class Improvement:
         plan, setting, remaining = self.plan, self.setting, self.seconds
         safe = current = self.start
         # The limits that the program keeps, by name, and instants (E,) beside its own samples, s
-        watched, instants = _near(current, setting), np.empty(0)
+        watched, instants = _near_limits(current, setting), np.empty(0)
         for stage in range(plan.stages):
             if remaining <= 0.0:
                 yield Stage(self.number, stage, None, ended=True, finished=False)
                 return
             begin, sharp = time.monotonic(), len(plan.doublings) - 1
             doublings = plan.doublings[min(stage, sharp)]
-            coefficients = minimised(
+            coefficients = minimise(
                 setting, current.coefficients, doublings, watched, instants, remaining
             )
             feasible, good = None, False
@@ -94,7 +94,7 @@ class Improvement:
             if coefficients is not None:
                 # A motion that does not keep the limits yet is still a place to go on from.
                 motion = self.start.with_coefficients(coefficients)
-                feasible = within_limits(motion, setting.limits)
+                feasible = shrink_into_limits(motion, setting.limits)
                 violated, further_instants = _violations(motion, setting)
                 good = not violated or (feasible is not None and not plan.thorough)
                 safe, current = feasible or safe, feasible or motion
@@ -108,7 +108,7 @@ class Improvement:
                 return
 
 
-def improved(starts: Sequence[Improvement], workers: int) -> Generator[Stage, None, None]:
+def improve_starts(starts: Sequence[Improvement], workers: int) -> Generator[Stage, None, None]:
     """Yield every stage of all starts, done by so many processes; by this one if one.
 
     A start whose process fails is improved here; where the iteration is given up, all are ended.
@@ -140,7 +140,7 @@ def _send_stages(start: Improvement, send: Callable[[Stage], None]) -> Stage:
     return stage
 
 
-def _near(motion: FourierMotion, setting: Setting) -> tuple[str, ...]:
+def _near_limits(motion: FourierMotion, setting: Setting) -> tuple[str, ...]:
     """Return the limits that the motion is near to; the platform's place is always watched."""
     margins, always = _margins(motion, setting)[0], ("type_i", "type_ii")
     return tuple(name for name, values in margins.items() if name in always or values.min() < _NEAR)

@@ -1,4 +1,4 @@
-"""Layout of the file of a motion for a controller: columns, units, dialect of CSV."""
+"""MotionLayout of the file of a motion for a controller: columns, units, dialect of CSV."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _MOST_SAMPLES = 10_000_000
 
 
 @dataclass(frozen=True)
-class Layout:
+class MotionLayout:
     """Columns and units of a motion's file; a log in the same layout is read by its TOML file.
 
     Parameters

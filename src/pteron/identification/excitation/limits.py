@@ -128,7 +128,7 @@ class Limits:
             expect(fits(value), "limits", f"{name} {value:g}", expected)
 
 
-def per_joint(limits: Limits, name: str, robot: Manipulator) -> Array:
+def joint_limits(limits: Limits, name: str, robot: Manipulator) -> Array:
     """Return a limit of each joint (n,), infinite where there is none."""
     setting = getattr(limits, name)
     values = np.atleast_1d(np.array(np.inf if setting is None else setting, dtype=float))

@@ -15,8 +15,8 @@ from pteron.identification.excitation.limits import (
     PER_JOINT,
     Limits,
     joint_clearances,
+    joint_limits,
     joint_sizes,
-    per_joint,
     unit_of,
 )
 from pteron.identification.excitation.movement import Movement
@@ -125,7 +125,7 @@ def relative_margins(motion: Movement, limits: Limits, times: Array) -> dict[str
     """Return the margins at times (T,), each over its limit's size: (T, n), or (T, 1)."""
     robot = motion.robot
     # Half its range for a joint, 1 for the two measures, else the limit itself.
-    sizes = {name: per_joint(limits, name, robot) for name in PER_JOINT}
+    sizes = {name: joint_limits(limits, name, robot) for name in PER_JOINT}
     sizes["joint_clearance"] = joint_sizes(robot)
     absolute = _margins_of(robot, limits, motion.states(times))
     relative = {}
@@ -150,7 +150,7 @@ def check_rest(robot: Manipulator, home: Array, limits: Limits) -> None:
         whose = "the platform" if name == "type_ii" else f"leg {leg + 1}"
         setting = getattr(limits, name)
         if name == "force":
-            limit_text, has = f"at most {setting}", per_joint(limits, name, robot)[leg] - margin
+            limit_text, has = f"at most {setting}", joint_limits(limits, name, robot)[leg] - margin
         else:
             limit_text, has = f"at least {setting:g}", setting + margin
         raise ModelError(
@@ -179,8 +179,10 @@ def _margins_of(robot: Manipulator, limits: Limits, state: FullMotion) -> dict[s
     if _limits_passive(robot):
         passive = evaluate_unchecked(robot, "passive_room", state.pose)[0]
         margins["passive_clearance"] = passive - limits.passive_clearance
-    margins["speed"] = per_joint(limits, "speed", robot) - np.abs(state.rates)
-    margins["acceleration"] = per_joint(limits, "acceleration", robot) - np.abs(state.accelerations)
+    margins["speed"] = joint_limits(limits, "speed", robot) - np.abs(state.rates)
+    margins["acceleration"] = joint_limits(limits, "acceleration", robot) - np.abs(
+        state.accelerations
+    )
     if limits.force is not None:
         drives, zeros = drives_of(robot), np.zeros_like(state.pose)
         moving = evaluate_unchecked(robot, "inverse_dynamics", *state[:3])
@@ -189,5 +191,5 @@ def _margins_of(robot: Manipulator, limits: Limits, state: FullMotion) -> dict[s
         needed = np.maximum(np.abs(moving + drives.offset), np.abs(static + drives.offset))
         # Dry friction counts in full, whichever way a joint moves.
         dry = drives.coulomb + drives.stribeck
-        margins["force"] = per_joint(limits, "force", robot) - dry - needed
+        margins["force"] = joint_limits(limits, "force", robot) - dry - needed
     return {name: np.where(np.isnan(values), -np.inf, values) for name, values in margins.items()}

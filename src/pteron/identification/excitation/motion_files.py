@@ -7,7 +7,7 @@ from pathlib import Path
 
 from pteron.atomic import write_files
 from pteron.errors import OutputError
-from pteron.identification.excitation.layout import Layout
+from pteron.identification.excitation.layout import MotionLayout
 from pteron.identification.excitation.movement import Movement
 from pteron.identification.logs import Description, find_description
 from pteron.identification.logs.description_file import description_text
@@ -17,7 +17,7 @@ _BESIDE = "-held-out", "-slow"
 """Endings of the files beside the motion's: cycles held out for validation, and slow passages."""
 
 
-def motion_paths(path: str | Path, layout: Layout | None = None) -> tuple[Path, Path, Path]:
+def motion_paths(path: str | Path, layout: MotionLayout | None = None) -> tuple[Path, Path, Path]:
     """Return the paths of a motion, held-out cycles and slow passages, if all can be written.
 
     Raises
@@ -41,7 +41,7 @@ def motion_paths(path: str | Path, layout: Layout | None = None) -> tuple[Path, 
 
 
 def write_motions(
-    motions: Mapping[Path, tuple[Movement, Description]], layout: Layout, rate: float
+    motions: Mapping[Path, tuple[Movement, Description]], layout: MotionLayout, rate: float
 ) -> list[Path]:
     """Write motions and the descriptions of their logs, all of them or none.
 

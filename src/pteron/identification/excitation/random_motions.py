@@ -111,20 +111,20 @@ def random_excitation(
     offset = _SPREAD * size * rng.uniform(-1.0, 1.0, n)
     shape = rng.normal(size=(2 * harmonics, n)) * sizes(robot, space)
 
-    def still(pose: Array) -> FourierMotion:
+    def rest_motion(pose: Array) -> FourierMotion:
         center = (
             pose if space == "platform" else evaluate_unchecked(robot, "joint_coordinates", pose)
         )
         return FourierMotion(robot, space, period, center, *np.zeros((2, harmonics, n)))
 
     for _ in range(_HALVINGS):
-        resting = still(middle + offset)
+        resting = rest_motion(middle + offset)
         if is_clear(resting, limits, 2, _COARSE_CLEAR) and (
             motion := _largest(resting, shape, limits)
         ):
             return motion
         offset = 0.5 * offset
-    motion = _largest(still(middle), shape, limits)
+    motion = _largest(rest_motion(middle), shape, limits)
     if motion is None:
         raise ModelError(
             f"limits: no motion of {robot.name} about its home pose keeps them all; loosen those "
@@ -147,53 +147,53 @@ def is_clear(motion: Movement, limits: Limits, samples: int, clear: float = _CLE
     return all(float(values.min()) >= clear for values in margins.values())
 
 
-def within_limits(motion: FourierMotion, limits: Limits) -> FourierMotion | None:
+def shrink_into_limits(motion: FourierMotion, limits: Limits) -> FourierMotion | None:
     """Return the motion shrunk about its center as little as it takes to keep the limits, or None.
 
     None is enough around a place that a leg cannot reach.
     """
 
-    def kept(scale: float) -> bool:
-        return is_clear(_scaled(motion, scale), limits, _FINE * motion.harmonics)
+    def keeps_limits(scale: float) -> bool:
+        return is_clear(_scale(motion, scale), limits, _FINE * motion.harmonics)
 
     high = 1.0
     for low in _SCALES:
-        if kept(low):
+        if keeps_limits(low):
             break
         high = low
     else:
         return None
     while high - low > _RESOLUTION * (1.0 - low):
-        low, high = _halved(kept, low, high)
-    return _scaled(motion, low)
+        low, high = _halve(keeps_limits, low, high)
+    return _scale(motion, low)
 
 
 def _largest(center_motion: FourierMotion, shape: Array, limits: Limits) -> FourierMotion | None:
     """Return the motion of that shape about a center, as large as it can be; None without room."""
 
-    def sized(scale: float) -> FourierMotion:
+    def resize(scale: float) -> FourierMotion:
         return center_motion.with_coefficients(np.vstack([center_motion.center, scale * shape]))
 
-    def kept(scale: float) -> bool:
-        return is_clear(sized(scale), limits, _COARSE * center_motion.harmonics, _COARSE_CLEAR)
+    def keeps_limits(scale: float) -> bool:
+        return is_clear(resize(scale), limits, _COARSE * center_motion.harmonics, _COARSE_CLEAR)
 
     low, high = 0.0, 1.0
     for _ in range(_DOUBLINGS):
-        if not kept(high):
+        if not keeps_limits(high):
             break
         high *= 2.0
     for _ in range(_BISECTIONS):
-        low, high = _halved(kept, low, high)
-    return within_limits(sized(low), limits) if low else None
+        low, high = _halve(keeps_limits, low, high)
+    return shrink_into_limits(resize(low), limits) if low else None
 
 
-def _halved(kept: Callable[[float], bool], low: float, high: float) -> tuple[float, float]:
+def _halve(keeps_limits: Callable[[float], bool], low: float, high: float) -> tuple[float, float]:
     """Return the half of an interval of scales in which the largest one that is kept lies."""
     middle = 0.5 * (low + high)
-    return (middle, high) if kept(middle) else (low, middle)
+    return (middle, high) if keeps_limits(middle) else (low, middle)
 
 
-def _scaled(motion: FourierMotion, scale: float) -> FourierMotion:
+def _scale(motion: FourierMotion, scale: float) -> FourierMotion:
     coefficients = motion.coefficients
     coefficients[1:] *= scale
     return motion.with_coefficients(coefficients)

@@ -22,7 +22,7 @@ from pteron.identification.excitation.conditioning import (
 )
 from pteron.identification.excitation.excitation import IDENTIFIES, Excitation, Start
 from pteron.identification.excitation.fourier import FourierMotion, Space
-from pteron.identification.excitation.improvement import ROUNDS, Improvement, Round, improved
+from pteron.identification.excitation.improvement import ROUNDS, Improvement, Round, improve_starts
 from pteron.identification.excitation.leads import found_lead
 from pteron.identification.excitation.limits import Limits
 from pteron.identification.excitation.margins import margins
@@ -170,7 +170,7 @@ def optimal_excitation(
     try:
         for k, seeds in enumerate(np.random.SeedSequence(seed).spawn(draws)):
             rng = np.random.default_rng(seeds)
-            search.drawn.append(search.judged(random_excitation(robot, **motion, seed=rng)))
+            search.drawn.append(search.judge_motion(random_excitation(robot, **motion, seed=rng)))
             search.report(_SEEN * (k + 1) / draws)
             late = time.monotonic() - begin > _DRAWING * seconds
             if late and len(search.drawn) >= _FEWEST:
@@ -231,7 +231,7 @@ class _Search:
     seen: float = 0.0
     """The share of the work that is done."""
 
-    def judged(self, motion: FourierMotion) -> _Candidate:
+    def judge_motion(self, motion: FourierMotion) -> _Candidate:
         root = information_root(motion, self.base)
         return _Candidate(motion, conditioning_of(root, self.base.values(motion.robot)), root)
 
@@ -274,13 +274,13 @@ class _Search:
         tasks = [Improvement(k, self.setting, plan, motion, each) for k, motion in motions]
         seen, share = self.seen, [0.0] * len(starts)
         weight = (1.0 - seen) if plan.thorough else _FIRST * (1.0 - seen)
-        with closing(improved(tasks, workers)) as stages:
+        with closing(improve_starts(tasks, workers)) as stages:
             for stage in stages:
                 share[stage.number] = 1.0 if stage.ended else stage.done / (plan.stages + 1)
                 start = starts[stage.number]
                 start.finished = start.finished or (stage.finished and plan.thorough)
                 if stage.found is not None:
-                    start.best = min(start.best, self.judged(stage.found), key=self.cost)
+                    start.best = min(start.best, self.judge_motion(stage.found), key=self.cost)
                 self.report(seen + weight * sum(share) / len(share))
 
     def report(self, share: float) -> None:

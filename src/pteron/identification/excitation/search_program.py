@@ -21,8 +21,8 @@ from pteron.identification.excitation.fourier import Space
 from pteron.identification.excitation.limits import (
     Limits,
     joint_clearances,
+    joint_limits,
     joint_sizes,
-    per_joint,
 )
 from pteron.identification.excitation.random_motions import sizes
 from pteron.identification.excitation.sequential import NonlinearProgram, sequential_minimum
@@ -66,7 +66,7 @@ class Setting:
     """Column lengths (p,), root mean square, below which a column is short: `condition_of_long`."""
 
 
-def minimised(
+def minimise(
     setting: Setting,
     start: Array,
     doublings: int,
@@ -84,12 +84,12 @@ def minimised(
     constraints = _Kept(setting, watched, np.concatenate([_instants(setting), extra]))
     deadline = time.monotonic() + seconds
 
-    def measured(z: Array) -> tuple[float, Array]:
+    def measure(z: Array) -> tuple[float, Array]:
         value, gradient = cost(z.reshape(start.shape))
         return float(_numbers(value).item()), _numbers(gradient).ravel()
 
     minimum = sequential_minimum(
-        NonlinearProgram(measured, constraints.values, constraints.slopes),
+        NonlinearProgram(measure, constraints.values, constraints.slopes),
         (start / size).ravel(),
         tolerance=_SETTLED,
         iterations=_ITERATIONS,
@@ -122,18 +122,18 @@ class _Kept:
 
     def values(self, z: Array) -> Array:
         """Return the margins (R,)."""
-        path_values = _numbers(self._path(*self._along(z))).T
+        path_values = _numbers(self._path(*self._evaluate_rows(z))).T
         return self._sides(path_values - self._low, self._high - path_values)
 
     def slopes(self, z: Array) -> Array:
         """Return their derivatives by the variables (R, v)."""
         count, limits, n = self._rows.shape[1], len(self._low), len(self._size)
-        blocks = _numbers(self._slopes(*self._along(z))).T.reshape(count, 3, n, limits)
+        blocks = _numbers(self._slopes(*self._evaluate_rows(z))).T.reshape(count, 3, n, limits)
         derivatives = np.einsum("tdig,dtk->tgki", blocks * self._size[:, None], self._rows)
         derivatives = derivatives.reshape(count, limits, -1)
         return self._sides(derivatives, -derivatives)
 
-    def _along(self, z: Array) -> list[Array]:
+    def _evaluate_rows(self, z: Array) -> list[Array]:
         coefficients = z.reshape(-1, len(self._size)) * self._size
         return [(rows @ coefficients).T for rows in self._rows]
 
@@ -206,12 +206,16 @@ def _path(
     passive = program(robot, "passive_room").function(pose)[0].T
     limit_terms["passive_clearance"] = passive, limits.passive_clearance + _BACK_OFF, np.inf
     for name, value in (("speed", rates), ("acceleration", seconds)):
-        limit_terms[name] = value / per_joint(limits, name, robot), _BACK_OFF - 1.0, 1.0 - _BACK_OFF
+        limit_terms[name] = (
+            value / joint_limits(limits, name, robot),
+            _BACK_OFF - 1.0,
+            1.0 - _BACK_OFF,
+        )
     dynamics, zeros = program(robot, "inverse_dynamics").function, ca.SX(pose.shape[0], 1)
     drives, values = Drives(*map(ca.DM, drives_of(robot))), ca.DM(parameters(robot))
     moving = dynamics(*state, values).T + drives.inertia * seconds + drives.viscous * rates
     static = dynamics(pose, zeros, zeros, values).T
-    most = ca.DM(per_joint(limits, "force", robot)) - (drives.coulomb + drives.stribeck)
+    most = ca.DM(joint_limits(limits, "force", robot)) - (drives.coulomb + drives.stribeck)
     needed = ca.vertcat(*((forces + drives.offset) / most for forces in (moving, static)))
     limit_terms["force"] = needed, _BACK_OFF - 1.0, 1.0 - _BACK_OFF
     values, *sides = zip(*(limit_terms[name] for name in watched), strict=True)

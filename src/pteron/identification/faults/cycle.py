@@ -57,7 +57,7 @@ class ReferenceCycle:
     in_order: bool = True
 
     @classmethod
-    def about_mean_pose(
+    def from_mean_pose(
         cls, robot: Manipulator, extent: Extent, *, size: float = 1.0
     ) -> ReferenceCycle | None:
         """Return the cycle about a motion's mean pose, or home, as fast as the motion itself.

@@ -30,7 +30,7 @@ def expected_errors(
 
     The first two are those of the `other` motion where it has larger ones; NaN without a cycle.
     """
-    cycle = ReferenceCycle.about_mean_pose(columns.model.robot, Extent.from_states(states))
+    cycle = ReferenceCycle.from_mean_pose(columns.model.robot, Extent.from_states(states))
     uncertain, spoiled, each = _cycle_errors(columns, cycle, estimate, plain, found_faults)
     if cycle is not None and len(other.states) > 0:
         # What a cycle spares another motion of the same range may show.
