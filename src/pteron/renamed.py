@@ -124,7 +124,7 @@ RENAMED = {
         "Plane": "pteron.calibration.ReferencePlane",
     },
 }
-"""Names of version 0.1 by package, and where each of them is now."""
+"""Former names by package, and where each of them is now."""
 
 UNTIL = "0.4"
 """The first version without them."""
@@ -150,7 +150,7 @@ def former_name(package: str, name: str) -> Any:
     ...     warnings.simplefilter("always")
     ...     series = signals.FourierSeries
     >>> print(told[0].message)
-    pteron.identification.signals.FourierSeries goes with version 0.3; write
+    pteron.identification.signals.FourierSeries goes with version 0.4; write
     from pteron.identification.signals import FittedSeries
     """
     present = RENAMED.get(package, {}).get(name)
