@@ -31,6 +31,7 @@ class Reading:
 
 
 def _not_zero(value: object, key: str) -> float:
+    """Return a number converted to float; raise ModelError if it is 0."""
     converted = number(value, key)
     if converted == 0.0:
         raise ModelError(f"{key}: 0 given, another number expected")
