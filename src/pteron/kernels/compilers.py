@@ -90,6 +90,7 @@ def end_all() -> None:
 
 
 def _end(process: subprocess.Popen[str]) -> None:
+    """Kill a compiler with all processes of its group; on Windows the compiler alone."""
     with suppress(OSError):
         if sys.platform == "win32":
             process.kill()

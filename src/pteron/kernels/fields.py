@@ -216,12 +216,14 @@ class Evaluation(Generic[Element]):
         return compute
 
     def _initial_elements(self, inputs: Sequence[Sequence[Element]]) -> list[Element]:
+        """Return the elements by node: of precomputed nodes, and the inputs of a state."""
         elements = self._known.copy()
         for k, port, element in self._inputs:
             elements[k] = inputs[port][element]
         return elements
 
     def _compute_steps(self, elements: list[Element], steps: Iterable[int]) -> None:
+        """Compute the elements of steps, in place and in their order."""
         for k in steps:
             operation, arguments = self._steps[k]
             if len(arguments) == 2:
@@ -304,6 +306,7 @@ class Exact(Kernel):
     """
 
     def _evaluate(self, *values: ArrayLike, **fixed: ArrayLike) -> Any:
+        """Return the outputs of a single state as arrays of fractions."""
         by_port = self._values_by_port(values, fixed)
         inputs = []
         for port in self.ports:

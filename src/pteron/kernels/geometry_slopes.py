@@ -57,14 +57,17 @@ def slope_columns(robot: Manipulator) -> list[range]:
 
 @lru_cache(maxsize=16)
 def _kernel(layout: Manipulator) -> TieredKernel:
+    """Return the kernel of slopes of a layout, cached."""
     return tiered_kernel(_key(layout), lambda: _build_program(layout))
 
 
 def _key(layout: Manipulator) -> tuple[str, Manipulator]:
+    """Return the cache key of a layout's slopes."""
     return "geometry_slopes", layout
 
 
 def _build_program(layout: Manipulator) -> Program:
+    """Return the program of joints and their derivatives by pose (n, n) and geometry."""
     machine, geometry = Machine.symbolic(layout)
     pose = ca.SX.sym("pose", layout.freedom)
     state = machine.state(pose)

@@ -70,6 +70,7 @@ def either(a: Mask, b: Mask) -> Mask:
 
 
 def _marks(*intervals: Interval) -> tuple[Mask, Mask, Mask]:
+    """Return the union of the masks of operands: maybe or never defined, with a jump."""
     maybe, never, jump = intervals[0][2:]
     for other in intervals[1:]:
         maybe, never = either(maybe, other.maybe), either(never, other.never)
@@ -78,18 +79,22 @@ def _marks(*intervals: Interval) -> tuple[Mask, Mask, Mask]:
 
 
 def _round_down(x: Bound) -> Bound:
+    """Return a lower bound of a correctly rounded result, by a relative ulp."""
     return x - np.abs(x) * _ULP
 
 
 def _round_up(x: Bound) -> Bound:
+    """Return an upper bound of a correctly rounded result, by a relative ulp."""
     return x + np.abs(x) * _ULP
 
 
 def _lower_bound(x: Bound, share: float = _ULP) -> Bound:
+    """Return a lower bound of a result with a relative error of `share`, or an underflow."""
     return x - (np.abs(x) * share + _UNDERFLOW)
 
 
 def _upper_bound(x: Bound, share: float = _ULP) -> Bound:
+    """Return an upper bound of a result with a relative error of `share`, or an underflow."""
     return x + (np.abs(x) * share + _UNDERFLOW)
 
 
@@ -131,10 +136,12 @@ def _finite_product(x: Bound, y: Bound) -> Bound:
 
 
 def _least_of(bounds: list[Bound]) -> Bound:
+    """Return the least of four bounds, element by element."""
     return np.minimum(np.minimum(bounds[0], bounds[1]), np.minimum(bounds[2], bounds[3]))
 
 
 def _greatest_of(bounds: list[Bound]) -> Bound:
+    """Return the greatest of four bounds, element by element."""
     return np.maximum(np.maximum(bounds[0], bounds[1]), np.maximum(bounds[2], bounds[3]))
 
 
@@ -233,6 +240,7 @@ def maximum(a: Interval, b: Interval) -> Interval:
 
 
 def _mask_or_none(mask: Any) -> Mask:
+    """Return the mask as an array (K,); None if it marks no box."""
     mask = np.atleast_1d(mask)
     return mask if mask.any() else None
 

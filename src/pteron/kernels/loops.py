@@ -212,6 +212,7 @@ def machine_numbers(robot: Manipulator, part: Program, name: str) -> dict[str, A
 
 @lru_cache(maxsize=256)
 def _numbers(robot: Manipulator, what: str) -> Array:
+    """Return the numbers of a machine for an input, (1, 1, k), read-only and cached."""
     array = FIXED[what](robot).reshape(1, 1, -1)
     array.setflags(write=False)  # all runs of the machine read it
     return array
