@@ -19,6 +19,7 @@ Count = Annotated[int, Field(ge=1, strict=True)]
 
 
 def _only_x(entries: Any) -> Any:
+    """Return the entries after a check that a rod's centre of mass has x only."""
     if isinstance(entries, list) and len(entries) > 1:
         raise ValueError(f"{shorten(entries)} given, a list of 1 number expected: a rod has x only")
     return entries

@@ -130,6 +130,7 @@ class Custom:
 
     @cached_property
     def _program(self) -> Program:
+        """The law as a program of columns, outputs sorted by name; DataError if C lacks a part."""
         try:
             function = self.function.expand()
         except RuntimeError:

@@ -114,6 +114,7 @@ class PlatformMotion(NamedTuple):
 
     @property
     def _angular_inverse(self) -> Expression:
+        """The inverse of the angles' matrix E, (3, 3), by its adjugate."""
         a, b, c = ca.horzsplit(self.angular)
         adj = ca.horzcat(ca.cross(b, c), ca.cross(c, a), ca.cross(a, b))
         return adj.T / ca.dot(a, adj[:, 0])

@@ -63,6 +63,7 @@ def cheapest_parameters(robot: RobotLike) -> BaseParameters:
 
 @lru_cache(maxsize=32)
 def _cheapest_parameters(robot: Manipulator) -> BaseParameters:
+    """Return the base parameters of the cheapest columns, cached in memory and on disk."""
     columns = parameter_data(robot)
     key, packages = ("cheapest", geometry_only(robot)), ("kinematics", "reduction")
     best = cached_result(key, packages, lambda: _cheapest_columns(robot))
@@ -70,6 +71,7 @@ def _cheapest_parameters(robot: Manipulator) -> BaseParameters:
 
 
 def _cheapest_columns(robot: Manipulator) -> tuple[int, ...]:
+    """Return the columns of the base whose inverse dynamics need the fewest operations."""
     columns = parameter_data(robot)
     base = base_parameters(robot)
     grouping = _unitless_grouping(robot, base)

@@ -272,6 +272,7 @@ def _certificate(
 
 
 def _no_dynamics_error(robot: Manipulator) -> SingularPose:
+    """Return the error for a machine that is singular at every pose."""
     return SingularPose(
         "singular at every pose (type II), so that it has no inverse dynamics and no base "
         "parameters; change what the Jacobian depends on, a leg's "

@@ -98,6 +98,7 @@ def fitted_shares(
 
 
 def _least_squares(scaled: _Scaled, base_columns: list[int], dropped: list[int]) -> Array:
+    """Return the shares (b, d) of dropped columns in the base columns, by least squares."""
     shares = np.linalg.lstsq(scaled.matrix[:, base_columns], scaled.matrix[:, dropped], rcond=None)[
         0
     ]

@@ -91,6 +91,7 @@ class BaseParameters(Result):
         return f"<BaseParameters of {self.robot.name!r}: {self.rank} of {columns}, {method}>"
 
     def _overview(self) -> Overview:
+        """Return the overview table: base parameters, their values and units, and the proof."""
         columns = [Column("", "number"), Column("base parameter", "long")]
         columns += [Column("value", "number"), Column("unit")]
         sums, values = self.expressions("html"), self.values()
@@ -165,6 +166,7 @@ class BaseParameters(Result):
         return self._symbolic_shares(named_values(exact_geometry(self.robot), shared=False))
 
     def _symbolic_shares(self, named: dict[str, Any]) -> Shares:
+        """Return the shares with symbols; ModelError if the certificate is not exact."""
         if not isinstance(self.certificate, ExactCertificate):
             raise ModelError(
                 f'symbols: not known to method "{self.certificate.method}"; use method="exact"'
