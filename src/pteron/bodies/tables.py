@@ -92,7 +92,7 @@ class _Body(TomlTable):
             raise ModelError(f"{key}.{error}" if key else str(error)) from None
 
     def _build_from_first_moment(self) -> Any:
-        """Build the inertia from the first moment; raise its own message where that is at fault."""
+        """Return the inertia of a first moment; ModelError with advice if that is too large."""
         try:
             return self.kind(self.mass, self.first_moment, self.inertia)
         except ModelError as error:
@@ -125,7 +125,7 @@ class PlanarBody(_Body):
 
 
 class RodBody(_Body):
-    """The same of a rod, whose vectors have one component."""
+    """`{ mass, inertia, center_of_mass or first_moment }` of a rod, whose vectors have x only."""
 
     kind = RodInertia
     inertia: Number = Field(description="about the origin, not the centre of mass, kg m^2")
@@ -134,7 +134,7 @@ class RodBody(_Body):
 
 
 class SpatialBody(_Body):
-    """The same of a body that turns about any axis."""
+    """`{ mass, inertia, center_of_mass or first_moment }` of a body that turns about any axis."""
 
     kind = SpatialInertia
     inertia: Six = Field(

@@ -160,7 +160,7 @@ class PteronVectorEnv(VectorEnv[Numbers, Numbers, Numbers]):
         self._steps = np.where(chosen, 0, self._steps)
 
     def step(self, actions: Numbers) -> tuple[Numbers, Numbers, Numbers, Numbers, dict[str, Any]]:
-        """Let all machines go on for a period, but for those that start anew."""
+        """Advance all machines by a period, except those that start a new episode."""
         if self._state is None:
             raise DataError("step before reset; call reset first")
         starting = self._done

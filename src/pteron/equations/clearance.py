@@ -207,7 +207,7 @@ def _has_upper(leg: LegKind) -> bool:
 
 
 def _first(robot: Manipulator, body: Body) -> bool:
-    """Return whether a link is the one that begins at the slider."""
+    """Return whether a link is the first of its leg: the upper, or the only link."""
     return body.kind == "upper" or not _has_upper(robot.legs[body.leg - 1])
 
 

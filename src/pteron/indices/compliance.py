@@ -82,7 +82,7 @@ class Stiffness(Result):
 
     @property
     def greatest(self) -> Numbers:
-        """The same in the best direction."""
+        """Force over the tool's displacement in the best direction, N/m, without a moment."""
         with np.errstate(divide="ignore"):
             return np.asarray(1.0 / np.maximum(self._principal_compliances[..., 0], 0.0))
 

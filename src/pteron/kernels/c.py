@@ -114,7 +114,7 @@ def module_source(
 
 
 def module_of(template: str, values: Mapping[str, Any], dtype: str, block: int = 32) -> str:
-    """Return the C of a template of a module, of what `module_values` returns."""
+    """Return the C code of a module's template with the values of `module_values`."""
     real = "float" if dtype == "float32" else "double"
     return render_template("pteron.kernels", template, real=real, block=block, **values)
 
@@ -254,7 +254,7 @@ class Compiled(ArrayKernel):
 
     @cached_property
     def code(self) -> Code:
-        """Its C code, and what is compiled from it."""
+        """The C code and its compiled module."""
         return Code(self.name, self.function, self.ports, self.outputs, self.dtype)
 
     @property

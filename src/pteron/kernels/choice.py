@@ -221,7 +221,7 @@ class TieredKernel(VirtualMachine):
 
     @property
     def is_compiled(self) -> bool:
-        """Whether the C code is there."""
+        """Whether the C code is loaded, so that calls run it."""
         return self.tier.ready
 
     def _evaluate(self, *values: ArrayLike, **fixed: ArrayLike) -> Any:

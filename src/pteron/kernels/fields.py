@@ -104,7 +104,7 @@ class PrimeField:
         return a * pow(b, -1, self.prime) % self.prime
 
     def square_root(self, a: int) -> int:
-        """Return one of the two square roots, always the same one."""
+        """Return the square root a^((p + 1) / 4), or raise `NoSquareRoot`."""
         root = pow(a, (self.prime + 1) // 4, self.prime)
         if root * root % self.prime != a:
             raise NoSquareRoot
@@ -199,7 +199,7 @@ class Evaluation(Generic[Element]):
             yield known[k]
 
     def _code_of(self, steps: list[int]) -> Callable[[list[Element]], None]:
-        """Return what computes steps: Python code, four times as fast, modulo a prime."""
+        """Return a function that computes steps; modulo a prime compiled, four times as fast."""
         if not isinstance(self._field, PrimeField):
             return lambda elements: self._compute_steps(elements, steps)
         lines = []

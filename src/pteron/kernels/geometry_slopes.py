@@ -34,12 +34,12 @@ def slopes_program(robot: RobotLike) -> Program:
 
 
 def slopes_kernel(robot: RobotLike) -> TieredKernel:
-    """Return the kernel of that function."""
+    """Return the kernel of `slopes_program`."""
     return _kernel(geometry_only(robot))
 
 
 def slope_columns(robot: Manipulator) -> list[range]:
-    """Return, for each leg, the numbers of the geometry that its slopes are against.
+    """Return the indices of the geometry by which each leg's coordinate is differentiated.
 
     All legs have as many: those of a shorter leg include some of its neighbour's, whose slopes are
     zero. Where planes hold the platform every leg's coordinate hangs on all legs; and on what the

@@ -224,18 +224,18 @@ def angle(y: Interval, x: Interval) -> Interval:
 
 
 def _stepwise(function: Callable[[Bound], Bound], a: Interval) -> Interval:
-    """Return a function that grows in steps, such as floor or sign, which jumps between them."""
+    """Return the interval of a step function (floor, sign), with its jumps."""
     low, high = function(a.low), function(a.high)
     return Interval(low, high, a.maybe, a.never, either(a.jump, _mask_or_none(low != high)))
 
 
 def minimum(a: Interval, b: Interval) -> Interval:
-    """Return the lesser."""
+    """Return the lesser of a and b."""
     return Interval(np.minimum(a.low, b.low), np.minimum(a.high, b.high), *_marks(a, b))
 
 
 def maximum(a: Interval, b: Interval) -> Interval:
-    """Return the greater."""
+    """Return the greater of a and b."""
     return Interval(np.maximum(a.low, b.low), np.maximum(a.high, b.high), *_marks(a, b))
 
 
@@ -246,7 +246,7 @@ def _mask_or_none(mask: Any) -> Mask:
 
 
 def _truth(certain: Any, impossible: Any, *intervals: Interval) -> Interval:
-    """Return 1 where a test surely holds, 0 where it surely does not, and between them else."""
+    """Return 1 where a test surely holds, 0 where it surely does not, else [0, 1]."""
     low, high = np.where(certain, 1.0, 0.0), np.where(impossible, 0.0, 1.0)
     maybe, never, jump = _marks(*intervals)
     return Interval(low, high, maybe, never, either(jump, _mask_or_none(low != high)))
@@ -269,12 +269,12 @@ def is_equal(a: Interval, b: Interval) -> Interval:
 
 
 def is_zero(a: Interval) -> Interval:
-    """Return whether a is zero, of a test."""
+    """Return whether a is zero: 1, 0, or [0, 1] where it may be."""
     return _truth((a.low == 0.0) & (a.high == 0.0), (a.low > 0.0) | (a.high < 0.0), a)
 
 
 def is_nonzero(a: Interval) -> Interval:
-    """Return whether a is not zero, of a test."""
+    """Return whether a is not zero: 1, 0, or [0, 1] where it may be."""
     return is_zero(is_zero(a))
 
 

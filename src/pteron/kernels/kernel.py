@@ -58,7 +58,7 @@ class Port:
 
 
 class Kernel(ABC):
-    """Something that can be called with batches of states.
+    """Base class of a callable that evaluates a function for batches of states.
 
     A target subclasses it; see `pteron.kernels.targets`.
 

@@ -219,7 +219,7 @@ class LoopCode:
         return ctypes.CDLL(str(entry(name, _LIBRARY, self._build)))
 
     def load(self) -> None:
-        """Load the library, compiled where it is not kept.
+        """Load the library; compile it first if it is not in the cache.
 
         Raises
         ------

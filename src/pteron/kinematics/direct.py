@@ -105,7 +105,7 @@ def direct_kinematics(
 def assembly_mode(
     robot: RobotLike, pose: PoseLike, *, all_branches: bool = False
 ) -> NDArray[np.int64]:
-    """Return which of the poses with its joint coordinates a pose is.
+    """Return a pose's assembly mode: its index among the poses of its joint coordinates.
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ def assembly_mode(
 
 
 def working_mode(robot: RobotLike, pose: PoseLike, joints: JointsLike) -> NDArray[np.int64]:
-    """Return on which side the elbow of each leg is where a pose has given joint coordinates.
+    """Return the side of each leg's elbow, 1 or -1, at which a pose has joint coordinates.
 
     Parameters
     ----------

@@ -220,7 +220,7 @@ def twist(
 def velocity_of(
     robot: RobotLike, pose: PoseLike, twist: ArrayLike, *, on_failure: OnFailure = "raise"
 ) -> PerCoordinate:
-    """Return the pose's derivative that goes with a twist of the platform.
+    """Return the pose's derivative for a twist of the platform.
 
     Parameters
     ----------

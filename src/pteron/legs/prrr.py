@@ -105,7 +105,7 @@ class PRRR(LegKind):
 
     @property
     def e(self) -> Vector:
-        """The slider's direction, also where it was left to its default."""
+        """The slider's direction; `direction` by default."""
         return self.slider_direction or self.direction
 
     @property

@@ -236,7 +236,7 @@ class PlatformEquations(ABC):
         return wrench
 
     def constraint(self, motion: PlatformMotion) -> Expression | None:
-        """Return the constraint measure of what constrains freedoms outside the pose.
+        """Return the constraint measure of the freedoms outside the pose.
 
         It is 1 at best, 0 where a freedom is unconstrained; None where the legs' couples do it.
         """

@@ -49,7 +49,7 @@ class Translating(PlatformEquations):
 
 
 class PlanarTranslating(Translating):
-    """The same in the plane across k."""
+    """2T: c = p + s in the plane perpendicular to k."""
 
     coordinates = ("x", "y")
     freedom_text = "moves in a plane and does not turn (2T)"

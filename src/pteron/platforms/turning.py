@@ -78,7 +78,7 @@ class Turning(PlatformEquations):
 
 
 class PlanarTurning(Turning):
-    """The same in the plane across k."""
+    """2T1R: c = p + R(phi) s0 + t0 in the plane perpendicular to k."""
 
     coordinates = ("x", "y", "phi")
     freedom_text = "moves and turns in a plane (2T1R)"

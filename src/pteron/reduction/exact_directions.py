@@ -159,7 +159,7 @@ def describe_near_relations(vectors: dict[str, Array]) -> list[str]:
 
 
 def _perpendicular(a: ExactVector, b: ExactVector) -> bool:
-    """Say whether a . b = 0 exactly: for each radicand its terms must sum to zero."""
+    """Return whether a . b = 0 exactly: for each radicand its terms must sum to zero."""
     sums: dict[int, Fraction] = {}
     for x, y in zip(a, b, strict=True):
         term = Surd.root(Fraction(x.s * y.s), 1.0)

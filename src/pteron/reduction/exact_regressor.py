@@ -31,7 +31,7 @@ Element = TypeVar("Element")
 def modular_rows(
     topology: Manipulator, geometry: ExactGeometry, prime: int, states: int, rng: random.Random
 ) -> list[list[int]]:
-    """Return the regressor's rows at random states modulo a prime, for the machine's own guides.
+    """Return the regressor's rows at random states modulo a prime, guide points exact.
 
     A pose can be used if every leg's discriminant Delta is a square, as for one pose in 2^n;
     velocity and acceleration are free.
@@ -116,7 +116,7 @@ def rational_rows(
 
 
 def is_square(value: int, prime: int) -> bool:
-    """Say whether a residue is a square (Euler's criterion)."""
+    """Return whether a residue is a square (Euler's criterion)."""
     return pow(value, (prime - 1) // 2, prime) <= 1
 
 
