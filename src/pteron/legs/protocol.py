@@ -40,7 +40,7 @@ search makes thousands of machines and a chain does not depend on a leg's number
 
 @lru_cache(maxsize=64)
 def _chain_breaches(leg: LegKind, axes: tuple[Vector, ...]) -> tuple[str, ...]:
-    """Return the breaches in a leg's bodies and driven joint; () if no point is in reach either."""
+    """Return the breaches in a leg's bodies and driven joint; () also if no point is in reach."""
     motion = _motion(leg, axes)
     if motion is None:
         return ()  # nowhere in reach, which is reported where a pose is used

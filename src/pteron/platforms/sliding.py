@@ -43,7 +43,7 @@ class Sliding(PlatformEquations):
     def motion(
         self, pose: Expression, velocity: Expression, acceleration: Expression
     ) -> PlatformMotion:
-        """Return the motion; a point slides by phi along its offset, its axes are fixed."""
+        """Return the motion: points slide by phi along their offsets, the axes do not rotate."""
         p, dp, ddp = (v[:3] for v in (pose, velocity, acceleration))
         phi, rate, growth = pose[3], velocity[3], acceleration[3]
         points, matrices = [], []

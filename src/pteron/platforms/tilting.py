@@ -118,7 +118,7 @@ class Tilting(PlatformEquations):
     def motion(
         self, pose: Expression, velocity: Expression, acceleration: Expression
     ) -> PlatformMotion:
-        """Return the motion of P and the rotation about any axis; the twist is P's."""
+        """Return the motion of a platform whose quasi-velocities are the twist of P."""
         if self.based is not None:
             to_own_axes, turned = self.based.rotation_in_own_axes(pose, velocity, acceleration)
             rates = (ca.mtimes(to_own_axes, v[:3]) for v in (velocity, acceleration))
@@ -230,7 +230,7 @@ class Tilting(PlatformEquations):
         return ca.mtimes(motion.matrix.T, wrench)
 
     def constraint(self, motion: PlatformMotion) -> Expression:
-        """Return 1: the pose has all freedoms."""
+        """Return 1: there are no freedoms outside the pose to constrain."""
         return ca.SX(1)  # there are none
 
 
