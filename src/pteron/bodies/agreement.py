@@ -39,6 +39,7 @@ def mismatched_names(pairs: Mapping[str, tuple[Expression, Expression]]) -> Iter
 
 
 def _evaluate_at_zero(expression: Expression) -> NDArray[np.float64]:
+    """Return the elements of an expression at time 0, as a vector (n,) of floats."""
     return np.asarray(
         ca.DM(ca.evalf(ca.substitute(ca.densify(ca.SX(expression)), TIME, 0)))
     ).ravel()

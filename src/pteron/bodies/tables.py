@@ -19,6 +19,7 @@ Count = Annotated[int, Field(ge=1, strict=True)]
 
 
 def _only_x(entries: Any) -> Any:
+    """Return the entries after a check that a rod's centre of mass has x only."""
     if isinstance(entries, list) and len(entries) > 1:
         raise ValueError(f"{shorten(entries)} given, a list of 1 number expected: a rod has x only")
     return entries
@@ -91,7 +92,7 @@ class _Body(TomlTable):
             raise ModelError(f"{key}.{error}" if key else str(error)) from None
 
     def _build_from_first_moment(self) -> Any:
-        """Build the inertia from the first moment; raise its own message where that is at fault."""
+        """Return the inertia of a first moment; ModelError with advice if that is too large."""
         try:
             return self.kind(self.mass, self.first_moment, self.inertia)
         except ModelError as error:
@@ -124,7 +125,7 @@ class PlanarBody(_Body):
 
 
 class RodBody(_Body):
-    """The same of a rod, whose vectors have one component."""
+    """`{ mass, inertia, center_of_mass or first_moment }` of a rod, whose vectors have x only."""
 
     kind = RodInertia
     inertia: Number = Field(description="about the origin, not the centre of mass, kg m^2")
@@ -133,7 +134,7 @@ class RodBody(_Body):
 
 
 class SpatialBody(_Body):
-    """The same of a body that turns about any axis."""
+    """`{ mass, inertia, center_of_mass or first_moment }` of a body that turns about any axis."""
 
     kind = SpatialInertia
     inertia: Six = Field(

@@ -107,7 +107,7 @@ def unit_vector(values: Sequence[object], key: str) -> Vector:
 
 
 def perpendicular(values: Sequence[object], axis: Vector, key: str, other: str) -> Vector:
-    """Return `values` as `unit_vector` does, made perpendicular to a unit vector to rounding.
+    """Return `values` normalised, after a check, and perpendicular to `axis` up to rounding.
 
     Perpendicularity is checked before the length, so that the message can propose a vector that
     satisfies both.

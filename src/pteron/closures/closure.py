@@ -38,7 +38,7 @@ class Closure(ABC):
     @classmethod
     @abstractmethod
     def fits(cls, legs: Sequence[type[LegEquations]], platform: type[PlatformEquations]) -> bool:
-        """Return whether this kind of closure serves machines of such legs and platform."""
+        """Return whether this kind of closure fits machines with these legs and platform."""
 
     @property
     @abstractmethod

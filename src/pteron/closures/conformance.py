@@ -19,7 +19,7 @@ from pteron.platforms import Platform
 def faults(
     legs: Sequence[LegKind], platform: Platform, pose: ArrayLike, seed: int = 0
 ) -> tuple[str, ...]:
-    """Return what is wrong with the closure of legs under a platform, one line for each fault.
+    """Return the faults of the closure of legs under a platform, a line each; () without.
 
     Parameters
     ----------

@@ -35,6 +35,7 @@ class ConstantRows(Closure):
 
     @classmethod
     def fits(cls, legs: Sequence[type[LegEquations]], platform: type[PlatformEquations]) -> bool:
+        """Return whether all rows are constant under a platform with z that does not tilt."""
         constant = all(leg.row_is_constant for leg in legs)
         return (
             constant and issubclass(platform, Translating | Turning) and "z" in platform.coordinates
@@ -67,6 +68,7 @@ class ConstantRows(Closure):
 
     @cached_property
     def _vanishes(self) -> bool:
+        """Whether det J vanishes at every pose, relative to its factors; of a numerical machine."""
         sizes = np.linalg.svd(np.array(ca.evalf(self.rows)), compute_uv=False)
         if sizes[-1] <= _VANISHING * sizes[0] or self.orientation is None:
             return bool(sizes[-1] <= _VANISHING * sizes[0])
@@ -80,6 +82,7 @@ class ConstantRows(Closure):
 
     @property
     def modes(self) -> int:
+        """The number of assembly modes: 2 if the platform has an angle, else 1."""
         return 2 if self._has_angle else 1
 
     def measure_of(
@@ -116,6 +119,7 @@ class ConstantRows(Closure):
     def rates(
         self, joints: Expression, platform: PlatformMotion, legs: Sequence[LegMotion]
     ) -> Expression:
+        """Return x' (m, K) of joint rates (n, K), the angle's rate first, by the null vector N."""
         if self.orientation is None:
             return ca.mtimes(self.right_inverse.T, joints)
         column = self._column(platform)
@@ -173,4 +177,5 @@ def _sparse_inverse(rows: Expression) -> Expression:
 
 
 def _delete_row(rows: Expression, i: int) -> Expression:
+    """Return a matrix without its row i."""
     return ca.vertcat(*(rows[j, :] for j in range(rows.shape[0]) if j != i))

@@ -182,5 +182,6 @@ class _LQFactors(NamedTuple):
 
 
 def _reflect(x: Expression, mirror: tuple[Expression, Expression]) -> Expression:
+    """Return x (n, K) reflected by a Householder mirror, its vector and factor."""
     v, factor = mirror
     return x - ca.mtimes(v, ca.mtimes(v.T, x) * factor)

@@ -39,6 +39,7 @@ def meeting_points(
 
 
 def _meeting_in_space(loci: Sequence[Locus]) -> tuple[Expression, Expression]:
+    """Return the common points (3, 1 or 2) of three planes and spheres, and their validity."""
     spheres = [locus for locus in loci if isinstance(locus, SphereLocus)]
     planes = [(locus.normal, locus.offset) for locus in loci if isinstance(locus, PlaneLocus)]
     if not spheres:
@@ -64,6 +65,7 @@ def _meeting_in_space(loci: Sequence[Locus]) -> tuple[Expression, Expression]:
 def _meeting_in_plane(
     loci: Sequence[Locus], platform: PlatformEquations
 ) -> tuple[Expression, Expression]:
+    """Return the common points (2, 2) of two circles and lines in the plane; the validity."""
     circles, lines = [], []
     for locus in loci:
         assert not isinstance(locus, AngleLocus)
@@ -90,6 +92,7 @@ def _meeting_in_plane(
 def _mirrored_points(
     middle: Expression, step: Expression, validity: Expression
 ) -> tuple[Expression, Expression]:
+    """Return the points on both sides of a middle, as columns, NaN if invalid; the validity."""
     return ca.horzcat(*(middle + side * step + validity for side in (-1, 1))), validity
 
 

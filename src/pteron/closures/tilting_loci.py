@@ -27,6 +27,7 @@ class TiltingLoci(Closure):
 
     @classmethod
     def fits(cls, legs: Sequence[type[LegEquations]], platform: type[PlatformEquations]) -> bool:
+        """Return whether the platform tilts."""
         return platform.tilts
 
     @property
@@ -37,6 +38,7 @@ class TiltingLoci(Closure):
         return 16 if "z" in self.platform.coordinates else 8
 
     def poses(self, joints: Expression) -> Expression:
+        """Raise ModelError: there is no closed form."""
         raise ModelError(
             "direct_kinematics: these legs have no closed form of it under a platform that tilts; "
             '"direct_step" follows the pose from one that is near'

@@ -40,6 +40,7 @@ class TurningLoci(Closure):
 
     @classmethod
     def fits(cls, legs: Sequence[type[LegEquations]], platform: type[PlatformEquations]) -> bool:
+        """Return whether the platform has a single angle, phi."""
         return platform.axis_angle is not None
 
     @property
@@ -48,6 +49,7 @@ class TurningLoci(Closure):
         return self._mode_count
 
     def poses(self, joints: Expression) -> Expression:
+        """Return the poses as columns (m, k), if a leg determines phi or all loci are planes."""
         loci = [leg.locus(q) for leg, q in zip(self.legs, ca.vertsplit(joints), strict=True)]
         offsets = self.platform.offsets
         for angle_locus in loci:

@@ -151,7 +151,7 @@ def scales_of(robot: Manipulator, motion: Moves | None) -> AdaptationScales:
 
 @lru_cache(maxsize=32)
 def typical_scales(robot: Manipulator) -> AdaptationScales:
-    """Return the excitation by a typical motion, the same for the same machine.
+    """Return the excitation by a typical random motion, reproducible for a machine.
 
     It is random: the poses among many in which the legs are bent best, at 0.5 m/s and 5 m/s^2.
     """

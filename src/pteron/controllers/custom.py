@@ -130,6 +130,7 @@ class Custom:
 
     @cached_property
     def _program(self) -> Program:
+        """The law as a program of columns, outputs sorted by name; DataError if C lacks a part."""
         try:
             function = self.function.expand()
         except RuntimeError:
@@ -190,7 +191,7 @@ class CustomLaw:
         }
 
     def memory(self, pose: Array, velocity: Array) -> Array:
-        """Return what it keeps before the first sample, (K,)."""
+        """Return the initial memory (K,), before the first sample."""
         initial = self.controller.memory
         numbers = initial(pose, velocity) if callable(initial) else initial
         size = sum(port.size for port in self.program.inputs if port.name == _MEMORY[0])

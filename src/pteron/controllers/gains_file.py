@@ -131,4 +131,5 @@ def read_gains(robot: RobotLike, path: str | Path) -> Controller:
 
 
 def _numbers(kind: type[Controller]) -> list[str]:
+    """Return the names of a controller's fields that a file holds: all but its motion."""
     return [field.name for field in fields(kind) if field.name != "motion"]

@@ -59,6 +59,7 @@ def joint_masses(robot: RobotLike) -> Array:
 
 @lru_cache(maxsize=64)
 def _joint_masses(robot: Manipulator) -> Array:
+    """Return the effective masses (n,) over light poses, read-only and cached."""
     poses = light_poses(robot)
     rows = jacobian(robot, poses)
     masses = mass_with_rotors(rows, mass_matrix(robot, poses), drives_of(robot).inertia)

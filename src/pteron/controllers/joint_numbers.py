@@ -34,6 +34,7 @@ def positive_numbers(name: str, numbers: PerJoint | None) -> float | tuple[float
 
 
 def _positive_number(message: str, argument: object) -> float:
+    """Return an argument as a float; raise DataError if it is not a finite number above 0."""
     number = number_or_nan(argument)
     if isinstance(argument, str | bool) or not (np.isfinite(number) and number > 0.0):
         raise DataError(message.format(shorten(argument)))

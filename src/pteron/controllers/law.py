@@ -126,6 +126,7 @@ class Law:
 
     @cached_property
     def _kernel(self) -> TieredKernel:
+        """The kernel of the control law for the model."""
         return numeric(self.model, self.what, base=self.base)
 
     def estimates(self, memory: Array) -> Array:
@@ -176,11 +177,13 @@ class Law:
         return tuple(names)
 
     def _sizes(self, layout: Layout) -> dict[str, int]:
+        """Return the sizes of the parts of a law's gains or memory, by name."""
         freedom = self.model.freedom
         inertial = 0 if self.base is None else self.base.selection.shape[1]
         return lengths(layout[self.what], freedom, estimate_count(self.what, freedom, inertial))
 
     def _parts(self, layout: Layout, vector: Array) -> dict[str, Array]:
+        """Return the parts of a vector of gains or memory (..., k), by name."""
         sizes = self._sizes(layout)
         bounds = np.cumsum(list(sizes.values()))[:-1]
         return dict(zip(sizes, np.split(vector, bounds, axis=-1), strict=True))

@@ -124,7 +124,7 @@ def drive_forces(
     smooth: bool = False,
     on_failure: OnFailure = "raise",
 ) -> PerJoint:
-    """Return what the drives must give: `inverse_dynamics`, friction and the motors' inertia.
+    """Return the drives' forces: `inverse_dynamics`, friction and the motors' inertia.
 
     F + ratio^2 rotor_inertia q'' + (coulomb + stribeck exp(-(q'/v_s)^2)) s(q') + viscous q' +
     offset, by each leg's `drive`; a leg without one has neither friction nor a rotor.
@@ -183,7 +183,7 @@ def drive_accelerations(
     *,
     on_failure: OnFailure = "raise",
 ) -> PerCoordinate:
-    """Return the platform's acceleration under what the drives give.
+    """Return the platform's acceleration under the drives' forces, with friction and rotors.
 
     The inverse of `drive_forces` with ``smooth=True``: friction and the motors' inertia take their
     part of the forces.

@@ -22,6 +22,6 @@ def joint_mobilities(rows: _Array, mass: _Array) -> _Array:
 
 
 def moved_inertias(rows: _Array, mass: _Array) -> _Array:
-    """Return the diagonal (..., n) of J^-T M J^-1: what a joint moves, the others being locked."""
+    """Return the inertias (..., n) of joints with the others locked: diag(J^-T M J^-1)."""
     inverse = np.linalg.inv(rows)
     return np.asarray(np.einsum("...ai,...ab,...bi->...i", inverse, mass, inverse))

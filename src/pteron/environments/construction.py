@@ -90,7 +90,7 @@ def _home(robot: Manipulator) -> Array:
 
 
 def _forces(robot: Manipulator, home: Array) -> Array:
-    """Return what an action of 1 gives, (n,)."""
+    """Return the drives' forces (n,) for an action of 1, N or N m."""
     zero_rates = np.zeros(robot.freedom)
     rows = jacobian(robot, home)
     mass = mass_with_rotors(rows, mass_matrix(robot, home), drives_of(robot).inertia)

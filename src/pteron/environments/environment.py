@@ -103,7 +103,7 @@ class PteronEnv(gymnasium.Env[Numbers, Numbers]):
         return self.world.observations(self._state), self._info(self.world.distance(self._state))
 
     def step(self, action: Numbers) -> tuple[Numbers, float, bool, bool, dict[str, Any]]:
-        """Let the machine go on for a period under the drives' forces."""
+        """Advance the machine by a period under the drives' forces."""
         if self._state is None:
             raise DataError("step before reset; call reset first")
         self._state, distance, reward, ended = self.world.advance(self._state, action)
@@ -113,6 +113,7 @@ class PteronEnv(gymnasium.Env[Numbers, Numbers]):
         return self.world.observations(self._state), float(reward), bool(ended), False, info
 
     def _info(self, distance: Any) -> dict[str, Any]:
+        """Return the distance to the target, m, and whether it is within the tolerance."""
         return {"distance": float(distance), "is_success": bool(distance < self.world.tolerance)}
 
     def render(self) -> NDArray[np.uint8] | None:

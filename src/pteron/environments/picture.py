@@ -28,6 +28,7 @@ class EnvironmentPicture:
 
     @cached_property
     def _guides(self) -> tuple[Guide, ...]:
+        """The guides of the machine's joints, from random poses of the world."""
         generators = [np.random.default_rng(seed) for seed in range(_POSES)]
         return joint_guides(self._world.robot, self._world.start_episodes(generators, None).pose)
 
@@ -42,10 +43,12 @@ class EnvironmentPicture:
 
     @cached_property
     def _size(self) -> tuple[float, float]:
+        """The width and height of the figure of the machine at home, in inches."""
         width, height = self._drawn(self._world.home, self._world.home).get_size_inches()
         return float(width), float(height)
 
     def _drawn(self, pose: Array, target: Array) -> Figure:
+        """Return the figure of the machine in a pose, with a line from its tool to the target."""
         robot = self._world.robot
         points = joint_points(robot, pose)
         figure = robot_figure(

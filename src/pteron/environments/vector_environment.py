@@ -127,6 +127,7 @@ class PteronVectorEnv(VectorEnv[Numbers, Numbers, Numbers]):
         )
 
     def _mask(self, mask: Any) -> Bools:
+        """Return the checked mask (E,) of environments to reset; without a mask, all."""
         if mask is None:
             return np.ones(self.num_envs, dtype=bool)
         chosen = np.asarray(mask)
@@ -139,6 +140,7 @@ class PteronVectorEnv(VectorEnv[Numbers, Numbers, Numbers]):
         return chosen
 
     def _seeds(self, seed: int | Sequence[int | None] | None) -> list[int | None]:
+        """Return a seed for each environment, consecutive if `seed` is an integer; None: random."""
         if seed is None:
             return [None] * self.num_envs
         if isinstance(seed, np.ndarray):
@@ -150,6 +152,7 @@ class PteronVectorEnv(VectorEnv[Numbers, Numbers, Numbers]):
         return [None if number is None else int(number) for number in seed]
 
     def _start(self, chosen: Bools, options: dict[str, Any] | None) -> None:
+        """Start new episodes in the chosen environments; the others are unchanged."""
         generators = [self._generators[i] for i in np.flatnonzero(chosen).tolist()]
         new = self.world.start_episodes([rng for rng in generators if rng is not None], options)
         self._state = new if self._state is None else self._state.put(chosen, new)
@@ -157,7 +160,7 @@ class PteronVectorEnv(VectorEnv[Numbers, Numbers, Numbers]):
         self._steps = np.where(chosen, 0, self._steps)
 
     def step(self, actions: Numbers) -> tuple[Numbers, Numbers, Numbers, Numbers, dict[str, Any]]:
-        """Let all machines go on for a period, but for those that start anew."""
+        """Advance all machines by a period, except those that start a new episode."""
         if self._state is None:
             raise DataError("step before reset; call reset first")
         starting = self._done
@@ -181,6 +184,7 @@ class PteronVectorEnv(VectorEnv[Numbers, Numbers, Numbers]):
         return self.world.observations(self._state), reward, ended, late, infos
 
     def _infos(self, distance: NDArray[Any], known: Bools) -> dict[str, Any]:
+        """Return the infos of the vector API, with masks of where the values are known."""
         return {
             "distance": np.where(known, distance, 0.0),
             "_distance": known.copy(),

@@ -221,6 +221,7 @@ class World:
 
     @cached_property
     def _side(self) -> float:
+        """The sign of the type-II measure at home, with the size."""
         return float(numeric(self.robot, "type_ii")(self.home)[0])
 
     def _pose(self, key: str, option: Any) -> Array:

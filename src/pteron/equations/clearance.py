@@ -85,6 +85,7 @@ def least_clearances(machine: Machine, pose: Expression) -> Expression:
 
 
 def _kinds(a: Body, b: Body) -> tuple[Kind, Kind]:
+    """Return the kinds of two bodies, in the order of `Kind`."""
     first, second = sorted((a.kind, b.kind), key=get_args(Kind).index)
     return first, second
 
@@ -121,10 +122,12 @@ def squared_distance(first: Segment, second: Segment) -> Expression:
 
 
 def _clip_to_unit(share: Expression) -> Expression:
+    """Return a number clipped to the range from 0 to 1."""
     return ca.fmin(ca.fmax(share, 0), 1)
 
 
 def _segments(machine: Machine, state: State) -> Iterator[tuple[Body, list[Segment]]]:
+    """Yield the bodies of legs and platform with the segments of their centre lines."""
     robot = machine.robot
     for i, (leg, motion) in enumerate(zip(robot.legs, state.legs, strict=True), start=1):
         yield from _leg_segments(i, leg, motion, state.platform.points[i - 1].position)
@@ -136,6 +139,7 @@ def _segments(machine: Machine, state: State) -> Iterator[tuple[Body, list[Segme
 def _leg_segments(
     i: int, leg: LegKind, motion: LegMotion, c: Expression
 ) -> Iterator[tuple[Body, list[Segment]]]:
+    """Yield the guide and the links of leg i, from 1, with the segments of their centre lines."""
     if "p" in motion.bodies and leg.limits is not None and leg.joint_axis is not None:
         r, e = ca.SX(list(leg.guide_point)), ca.SX(list(leg.joint_axis))
         low, high = leg.limits
@@ -198,15 +202,17 @@ def _share_a_joint(robot: Manipulator, a: Body, b: Body) -> bool:
 
 
 def _has_upper(leg: LegKind) -> bool:
+    """Return whether a leg has an upper link, crank or cylinder."""
     return "u" in leg.names
 
 
 def _first(robot: Manipulator, body: Body) -> bool:
-    """Return whether a link is the one that begins at the slider."""
+    """Return whether a link is the first of its leg: the upper, or the only link."""
     return body.kind == "upper" or not _has_upper(robot.legs[body.leg - 1])
 
 
 def _share_platform_point(robot: Manipulator, i: int, j: int) -> bool:
+    """Return whether legs i and j, from 1, meet the platform in the same point."""
     first, second = (
         np.array([*leg.platform_point, *leg.fixed_offset])
         for leg in (robot.legs[i - 1], robot.legs[j - 1])

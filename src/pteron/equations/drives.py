@@ -84,6 +84,7 @@ def friction(drives: Drives, rates: Expression, *, smooth: bool) -> Expression:
 
 
 def _ahead(rates: Expression) -> Expression:
+    """Return 1 where a rate is positive, else 0."""
     return ca.if_else(rates > 0, 1, 0)
 
 

@@ -79,6 +79,7 @@ def point_jacobian(machine: Machine, state: State) -> Expression:
 
 
 def _point_jacobian_in_space(machine: Machine, state: State) -> Expression:
+    """Return the Jacobian of the platform points in space, by the Cholesky root of their metric."""
     matrices = [matrix[:3, :] for matrix in state.platform.matrices]
     lower = _root(sum(ca.mtimes(matrix.T, matrix) for matrix in matrices) / len(matrices))
     rows = _with_joints_in_metres(machine, _jacobian(state), ca.SX(1))
@@ -97,6 +98,7 @@ def _jacobian(state: State) -> Expression:
 
 
 def _lengths_of(machine: Machine) -> int:
+    """Return the number of lengths in the pose."""
     return int(machine.platform.directions.shape[1])
 
 
@@ -110,6 +112,7 @@ def _with_joints_in_metres(
 
 
 def _root_or_one(square: Expression) -> Expression:
+    """Return the square root, or 1 where the square is 0."""
     return ca.sqrt(square + (square == 0))
 
 
@@ -124,6 +127,7 @@ def condition_points(machine: Machine, state: State) -> Expression:
 
 
 def _ratio(matrix: Expression) -> Expression:
+    """Return the ratio of a matrix' largest to smallest singular value."""
     sigmas = singular_values(matrix)
     return largest(sigmas) / smallest(sigmas)
 

@@ -80,6 +80,7 @@ def adaptive_drives(s: Sample) -> Answer:
 
 
 def _adaptive_law(s: Sample, estimate: Expression, drives: Drives) -> Answer:
+    """Return forces and memory of Slotine and Li's law; friction and inertia are `drives`'."""
     slope, pose, learnt = s.gains["slope"], s.middle_pose, s.memory["learnt"]
     z = s.error_rate + slope * s.error
     rates, accelerations = joint_motion(s.middle)

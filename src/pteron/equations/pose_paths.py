@@ -203,6 +203,7 @@ def _predict_pose(at: PathState, patch: Sequence[Number], interval: Expression) 
 def _select(
     is_accepted: Expression, accepted: list[Number], rejected: list[Number]
 ) -> list[Number]:
+    """Return the complex numbers of a step if it is accepted, else the others."""
     return [
         Number(ca.if_else(is_accepted, a.re, b.re), ca.if_else(is_accepted, a.im, b.im))
         for a, b in zip(accepted, rejected, strict=True)
@@ -210,6 +211,7 @@ def _select(
 
 
 def _square(v: Sequence[Number]) -> Expression:
+    """Return the squared norm of a complex vector."""
     total = ca.SX(0)
     for part in v:
         total = total + part.re * part.re + part.im * part.im
@@ -310,14 +312,17 @@ def _solve_by_elimination(rows: list[list[Number]], size: int) -> list[list[Numb
 
 
 def _plus(p: Quaternion, q: Quaternion) -> list[Number]:
+    """Return the sum of two quaternions or vectors."""
     return [a + b for a, b in zip(p, q, strict=True)]
 
 
 def _minus(p: Quaternion, q: Quaternion) -> list[Number]:
+    """Return the difference of two quaternions or vectors."""
     return [a - b for a, b in zip(p, q, strict=True)]
 
 
 def _dot(u: Sequence[Number], v: Sequence[Number]) -> Number:
+    """Return the sum of products of two complex vectors, without conjugation."""
     first, *products = (a * b for a, b in zip(u, v, strict=True))
     for term in products:
         first = first + term

@@ -69,7 +69,7 @@ class Motors(NamedTuple):
 
 
 class _DriveOutputs(NamedTuple):
-    """What each drive does at its motor and its joint, a list of n scalars each."""
+    """The drives' forces at motors and joints and their state rates, n scalars each."""
 
     motor_forces: list[Expression]
     """With ripple and cogging, less LuGre's friction."""

@@ -19,7 +19,7 @@ from pteron.manipulator import Manipulator
 
 @lru_cache(maxsize=256)
 def topology_of(robot: Manipulator) -> Manipulator:
-    """Return a machine with NaN for every number: all machines of one topology have the same."""
+    """Return a machine with NaN for every number, equal for all machines of a topology."""
     return with_stored_numbers(robot, iter(lambda: nan, None))
 
 

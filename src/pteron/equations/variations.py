@@ -126,6 +126,7 @@ def _turns(robot: Manipulator, leg: int, key: str, direction: Sequence[float]) -
 
 
 def _possible(robot: Manipulator, variation: Variation) -> bool:
+    """Return whether the geometry admits a variation by the trial amount."""
     try:
         vary_geometry(robot, (variation,), np.array([_TRIAL_AMOUNT]))
     except ModelError:

@@ -82,12 +82,13 @@ class Stiffness(Result):
 
     @property
     def greatest(self) -> Numbers:
-        """The same in the best direction."""
+        """Force over the tool's displacement in the best direction, N/m, without a moment."""
         with np.errstate(divide="ignore"):
             return np.asarray(1.0 / np.maximum(self._principal_compliances[..., 0], 0.0))
 
     @property
     def _principal_compliances(self) -> Array:
+        """The eigenvalues (..., k) of the compliance between forces and displacements, m/N."""
         k = self.lengths
         part = self.compliance[..., :k, :k]
         known = np.isfinite(part).all(axis=(-2, -1))
@@ -330,6 +331,7 @@ def _beam_energy(section: Section, arm: Array, way: Array, axis: Array) -> Array
 
 
 def _square(rows: Array) -> Array:
+    """Return the products r r^T (B, n, n) of rows (B, n)."""
     return np.asarray(rows[:, :, None] * rows[:, None, :])
 
 

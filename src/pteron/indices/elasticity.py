@@ -156,6 +156,7 @@ class Elasticity:
     of_legs = former_attribute("of_legs", "leg_springs")
 
     def _repeat_for_legs(self, robot: Manipulator, name: str) -> tuple[Any, ...]:
+        """Return a setting for each leg; ModelError if a tuple has not a value for each leg."""
         setting = getattr(self, name)
         if not isinstance(setting, tuple):
             return (setting,) * robot.joint_count

@@ -66,7 +66,7 @@ def evaluate(
 def values_in_reach(
     robot: Manipulator, index: Index, poses: Array, in_reach: NDArray[np.bool_]
 ) -> Array:
-    """Return what an index's own function gives at poses (..., m); NaN at those out of reach."""
+    """Return an index's values at poses (..., m); NaN at those out of reach."""
     values = np.full(poses.shape[:-1], np.nan)
     if in_reach.any():
         values[in_reach] = function_values(robot, index, poses[in_reach])

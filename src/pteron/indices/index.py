@@ -152,7 +152,7 @@ def expect_index(robot: RobotLike, name: str | Index) -> Index:
 
 
 def function_values(robot: Manipulator, index: Index, poses: Array) -> Array:
-    """Return what an index's own function gives at poses (N, m) in reach.
+    """Return the values (N,) of an index's function at poses (N, m) in reach.
 
     Raises
     ------

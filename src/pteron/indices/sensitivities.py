@@ -178,7 +178,7 @@ def _dimensions(robot: Manipulator) -> Iterator[_Dimension]:
 
 
 def _platform_dimensions(robot: Manipulator) -> Iterator[_Dimension]:
-    """Yield the same of the point and the directions about which the platform turns."""
+    """Yield the dimensions of the point and directions about which the platform turns."""
     changes = [change for change in variations(robot) if change.leg < 0]
     directions = slope_matrix(robot, changes, slope_terms(robot, changes), np.array(numbers(robot)))
     for change, direction in zip(changes, directions.T, strict=True):

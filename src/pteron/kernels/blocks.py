@@ -111,6 +111,7 @@ class Block:
         ]
 
     def _is_late(self, port: Port) -> bool:
+        """Return whether an output belongs to the second part, which `later` names."""
         return port.name in (self.later or ())
 
     @property
@@ -123,10 +124,12 @@ class Block:
 
     @cached_property
     def _graph(self) -> Graph:
+        """The program's graph of operations, with exponentials in plain arithmetic."""
         return graph_of(with_lowered_exponentials(self.program.function), self.program.inputs)
 
     @cached_property
     def _shared_nodes(self) -> frozenset[int]:
+        """The operations that inputs of the machine alone determine: its states share them."""
         graph = self._graph
         return frozenset(k for k in graph.operations() if graph.nodes[k].shared)
 
@@ -164,6 +167,7 @@ class Block:
         return {k: row for row, k in enumerate(sorted(read & self._shared_nodes))}
 
     def _names(self) -> list[str]:
+        """Return each node's name in C: an element of the inputs, a constant or a variable."""
         ports = self.program.inputs
 
         def name(i: int, j: int) -> str:
@@ -193,6 +197,7 @@ class Block:
 
 
 def _starts(ports: Sequence[Port]) -> dict[str, int]:
+    """Return each port's first row in an array in which the ports are stacked."""
     starts, row = {}, 0
     for port in ports:
         starts[port.name] = row

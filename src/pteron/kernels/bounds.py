@@ -135,6 +135,7 @@ def bounded_function(robot: RobotLike, what: str) -> Bounded:
 
 @lru_cache(maxsize=256)
 def _cached_bounded_function(robot: Manipulator, what: str) -> Bounded:
+    """Return the function of the pose alone, for bounds, cached by machine and name."""
     built = numeric_program(robot, what, plain=True)
     names = [port.name for port in built.inputs]
     if "pose" not in names or set(names) - {"pose", *FIXED}:

@@ -82,6 +82,7 @@ def compiler() -> tuple[str, ...] | None:
 
 @lru_cache(maxsize=4)
 def _command(setting: str, path: str) -> tuple[str, ...] | None:
+    """Return the compiler's executable and options; None if CC is invalid or not installed."""
     try:
         words = shlex.split(setting) or ["cc" if shutil.which("cc", path=path) else "gcc"]
     except ValueError:
@@ -113,7 +114,7 @@ def module_source(
 
 
 def module_of(template: str, values: Mapping[str, Any], dtype: str, block: int = 32) -> str:
-    """Return the C of a template of a module, of what `module_values` returns."""
+    """Return the C code of a module's template with the values of `module_values`."""
     real = "float" if dtype == "float32" else "double"
     return render_template("pteron.kernels", template, real=real, block=block, **values)
 
@@ -164,17 +165,20 @@ class Code:
 
     @cached_property
     def _key(self) -> tuple[Any, ...]:
+        """The cache key of the source: all that the C code depends on."""
         function, outputs = self._program
         parts = self.name, function.serialize(), self.ports, outputs, self.dtype
         return "c source", *parts, version("jinja2")
 
     def _write_source(self) -> str:
+        """Return the C source of the module."""
         function, outputs = self._program
         graph = graph_of(with_lowered_exponentials(function), self.ports)
         return module_source(self.name, graph, self.ports, outputs, self.dtype)
 
     @property
     def _entry(self) -> str:
+        """The name of the library in the cache; ModelError without a compiler."""
         command = compiler()
         if command is None:
             setting = os.environ.get("CC")
@@ -201,6 +205,7 @@ class Code:
         return self._module
 
     def _load_module(self) -> ModuleType:
+        """Return the compiled library as a Python module, from the cache or compiled on demand."""
         path = str(entry(self._entry, _LIBRARY, self._build))
         loader = ExtensionFileLoader("pteron_kernel", path)
         spec = importlib.util.spec_from_file_location("pteron_kernel", path, loader=loader)
@@ -216,6 +221,7 @@ class Code:
         return module
 
     def _build(self, folder: Path) -> None:
+        """Compile the source to the library in a folder; ModelError if the compiler fails."""
         command = compiler()
         assert command is not None  # `_entry` has asked
         headers = (f"-I{path}" for path in (sysconfig.get_path("include"), np.get_include()))
@@ -248,7 +254,7 @@ class Compiled(ArrayKernel):
 
     @cached_property
     def code(self) -> Code:
-        """Its C code, and what is compiled from it."""
+        """The C code and its compiled module."""
         return Code(self.name, self.function, self.ports, self.outputs, self.dtype)
 
     @property
@@ -257,10 +263,12 @@ class Compiled(ArrayKernel):
         return self.code.source
 
     def _evaluate(self, *values: ArrayLike, **fixed: ArrayLike) -> Any:
+        """Evaluate a first call; bind the compiled function as `call` for all later ones."""
         # Threads are for batches: `evaluate_checked` splits them.
         most = 2 * SHARE if self.threads > 1 else sys.maxsize
         self.call = self.code.bound(self.fixed, self.evaluate_checked, most)
         return self.call(*values, **fixed)
 
     def _run(self, batch: int, inputs: Sequence[Array], outputs: Sequence[Array]) -> None:
+        """Fill `outputs` from `inputs` by the compiled function."""
         self.code.module.run(*inputs, *outputs)

@@ -191,6 +191,7 @@ def _root() -> Path:
 
 @lru_cache(maxsize=1)
 def _private() -> Path:
+    """Return a temporary directory of this process, removed at its exit."""
     folder = Path(tempfile.mkdtemp(prefix="pteron-"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     return folder
@@ -209,6 +210,7 @@ def _prepare_work_folder() -> tuple[Path, Path]:
 
 
 def _work_folder(root: Path) -> Path:
+    """Return a new work folder in the cache, marked by this computer's name and the process id."""
     folder = Path(tempfile.mkdtemp(prefix=_WORK, dir=root))
     (folder / _MARK).write_text(f"{platform.node()} {os.getpid()}", encoding="utf-8")
     return folder
@@ -279,4 +281,5 @@ def _move_into_place(work: Path, target: Path, file: str) -> Path:
 
 
 def _hash(path: Path) -> str:
+    """Return the SHA-256 digest of a file, in hexadecimal."""
     return hashlib.sha256(path.read_bytes()).hexdigest()

@@ -77,6 +77,7 @@ def numeric(
 def _cached_kernel(
     robot: Manipulator, what: str, columns: Columns | None, wrench: bool, like: object
 ) -> TieredKernel:
+    """Return the kernel of a function, cached; if `like` is set, its C code is loaded if cached."""
     kernel = kernel_with_status(robot, what, VirtualMachine, columns, wrench=wrench)
     tier = _tier(numeric_program(robot, what, columns, wrench=wrench, guarded=True))
     if like is not None:
@@ -112,6 +113,7 @@ def _tier(built: Program) -> SharedCode:
 
 
 def _tier_of(code: Code) -> SharedCode:
+    """Return the shared code with its patience: endless if `PTERON_KERNELS=vm`."""
     return SharedCode(code, math.inf if os.environ.get(VARIABLE) == "vm" else _PATIENCE)
 
 
@@ -173,6 +175,7 @@ class SharedCode:
         self._patience = _PATIENCE
 
     def _load(self) -> None:
+        """Load or compile the module and set `ready`; a failure is ignored, `ready` stays False."""
         try:
             _ = self.code.module
             self.ready = True
@@ -182,6 +185,7 @@ class SharedCode:
             pass
 
     def _load_and_release(self, taken: threading.Semaphore) -> None:
+        """Load the module in a worker thread, and release its semaphore in any case."""
         try:
             self._load()
         finally:
@@ -217,16 +221,18 @@ class TieredKernel(VirtualMachine):
 
     @property
     def is_compiled(self) -> bool:
-        """Whether the C code is there."""
+        """Whether the C code is loaded, so that calls run it."""
         return self.tier.ready
 
     def _evaluate(self, *values: ArrayLike, **fixed: ArrayLike) -> Any:
+        """Evaluate on the virtual machine until the C code is ready, then bind `call` to it."""
         if not self.tier.ready:
             return self.evaluate_checked(*values, **fixed)
         self.call = self.tier.code.bound(self.fixed, self.evaluate_checked)
         return self.call(*values, **fixed)
 
     def _evaluate_one_state(self, values: Sequence[Any]) -> Any:
+        """Evaluate a single state on the virtual machine, and count its time."""
         begin = time.perf_counter()
         outputs = super()._evaluate_one_state(values)
         if outputs is not None:
@@ -234,6 +240,7 @@ class TieredKernel(VirtualMachine):
         return outputs
 
     def _run(self, batch: int, inputs: Sequence[Array], outputs: Sequence[Array]) -> None:
+        """Fill `outputs` in chunks of states, in C as soon as its code is ready."""
         for start in range(0, batch, self._chunk):
             stop = min(start + self._chunk, batch)
             part = slice_states(inputs, outputs, start, stop)

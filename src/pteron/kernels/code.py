@@ -224,6 +224,7 @@ def render_template(package: str, template: str, **values: Any) -> str:
 
 @lru_cache(maxsize=4)
 def _environment(package: str) -> jinja2.Environment:
+    """Return the Jinja environment of a package's templates, cached."""
     import jinja2  # here, since `import pteron` does without
 
     return jinja2.Environment(

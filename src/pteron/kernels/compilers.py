@@ -21,7 +21,7 @@ _CHANGES = threading.RLock()
 
 
 def _begin_in_a_fork() -> None:
-    """Let a forked process run compilers: those that run are its parent's."""
+    """Reset lock and list of running commands in a forked process: they are its parent's."""
     global _CHANGES
     _CHANGES = threading.RLock()
     _RUNNING.clear()
@@ -32,7 +32,7 @@ if hasattr(os, "register_at_fork"):
 
 
 def run(command: Sequence[str]) -> subprocess.CompletedProcess[str]:
-    """Run a command to its end, and return its code and what it printed."""
+    """Run a command to its end; return its exit code and output."""
     # Messages may be in any language and encoding; what cannot be read of them does not matter.
     process = subprocess.Popen(
         command,
@@ -90,6 +90,7 @@ def end_all() -> None:
 
 
 def _end(process: subprocess.Popen[str]) -> None:
+    """Kill a compiler with all processes of its group; on Windows the compiler alone."""
     with suppress(OSError):
         if sys.platform == "win32":
             process.kill()

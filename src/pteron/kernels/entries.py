@@ -90,6 +90,7 @@ def state_entry(
 
 
 def _entry_of(build: Any, inputs: tuple[str, ...], outputs: str, needs: tuple[Need, ...]) -> Entry:
+    """Return the entry of a function whose results have names, separated by blanks in `outputs`."""
     names = outputs.split()
 
     def build_outputs(m: Machine, v: Symbols) -> Outputs:

@@ -55,11 +55,13 @@ def exponential_function() -> ca.Function:
 
 
 def _tanh(x: Expression) -> Expression:
+    """Return the hyperbolic tangent of x, by the exponential of -2 |x|, which does not overflow."""
     small = exponential(-2 * ca.fabs(x))
     return _sign(x) * (1 - small) / (1 + small)
 
 
 def _sign(x: Expression) -> Expression:
+    """Return the sign of x: 1, -1, or 0 at zero."""
     return ca.if_else(x > 0, 1, 0) - ca.if_else(x < 0, 1, 0)
 
 

@@ -104,7 +104,7 @@ class PrimeField:
         return a * pow(b, -1, self.prime) % self.prime
 
     def square_root(self, a: int) -> int:
-        """Return one of the two square roots, always the same one."""
+        """Return the square root a^((p + 1) / 4), or raise `NoSquareRoot`."""
         root = pow(a, (self.prime + 1) // 4, self.prime)
         if root * root % self.prime != a:
             raise NoSquareRoot
@@ -199,7 +199,7 @@ class Evaluation(Generic[Element]):
             yield known[k]
 
     def _code_of(self, steps: list[int]) -> Callable[[list[Element]], None]:
-        """Return what computes steps: Python code, four times as fast, modulo a prime."""
+        """Return a function that computes steps; modulo a prime compiled, four times as fast."""
         if not isinstance(self._field, PrimeField):
             return lambda elements: self._compute_steps(elements, steps)
         lines = []
@@ -216,12 +216,14 @@ class Evaluation(Generic[Element]):
         return compute
 
     def _initial_elements(self, inputs: Sequence[Sequence[Element]]) -> list[Element]:
+        """Return the elements by node: of precomputed nodes, and the inputs of a state."""
         elements = self._known.copy()
         for k, port, element in self._inputs:
             elements[k] = inputs[port][element]
         return elements
 
     def _compute_steps(self, elements: list[Element], steps: Iterable[int]) -> None:
+        """Compute the elements of steps, in place and in their order."""
         for k in steps:
             operation, arguments = self._steps[k]
             if len(arguments) == 2:
@@ -304,6 +306,7 @@ class Exact(Kernel):
     """
 
     def _evaluate(self, *values: ArrayLike, **fixed: ArrayLike) -> Any:
+        """Return the outputs of a single state as arrays of fractions."""
         by_port = self._values_by_port(values, fixed)
         inputs = []
         for port in self.ports:

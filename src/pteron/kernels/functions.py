@@ -63,6 +63,7 @@ def _as_matrix(matrix: Expression) -> tuple[Expression, tuple[int, ...]]:
 
 
 def _set_payload(m: Machine, v: Symbols) -> Outputs:
+    """Return the machine's inertial parameters with a load's mass and inertia on its platform."""
     platform, inertial = m.robot.platform, v["parameters"]
     on_axis, inertia = platform.carries_on_axis, ca.vertsplit(v["inertia"])
     center = ca.SX(3, 1) if on_axis else v["center"]
@@ -78,6 +79,7 @@ def _rigid(m: Machine, v: Symbols, at: Any) -> Expression:
 
 
 def _inverse_dynamics(m: Machine, v: Symbols) -> Outputs:
+    """Return the actuator forces (n,) of a motion, N or N m."""
     return {"forces": _rigid(m, v, state(m, v))}
 
 
@@ -88,16 +90,19 @@ def _dynamics_arguments(m: Machine, v: Symbols) -> Any:
 
 
 def _forward_dynamics(m: Machine, v: Symbols) -> Outputs:
+    """Return the pose's acceleration (n,) under actuator forces, without the drives' losses."""
     return {"acceleration": lagrangian.forward_dynamics(m, *_dynamics_arguments(m, v))}
 
 
 def _drive_forces(m: Machine, v: Symbols, *, smooth: bool) -> Outputs:
+    """Return the drives' forces (n,): of the rigid bodies, and of friction and rotors."""
     at, drive_numbers = state(m, v), drives.Drives.from_vector(v["drives"])
     moving = drives.joint_motion(at)
     return {"forces": _rigid(m, v, at) + drives.drive_forces(drive_numbers, *moving, smooth=smooth)}
 
 
 def _joint_feed_forward(m: Machine, v: Symbols) -> Outputs:
+    """Return the drives' forces (n,) of a motion of the joints, and the pose of these joints."""
     moving = v["joint_rates"], v["joint_accelerations"]
     pose, *_ = closing.direct_step(m, v["joints"], v["pose"], TYPE_II)
     at = m.state(pose, *kinematics.platform_rates(m, pose, *moving))
@@ -106,6 +111,7 @@ def _joint_feed_forward(m: Machine, v: Symbols) -> Outputs:
 
 
 def _drive_accelerations(m: Machine, v: Symbols) -> Outputs:
+    """Return the pose's acceleration (n,) under the drives' forces, with friction and rotors."""
     drive_numbers = drives.Drives.from_vector(v["drives"])
     return {
         "acceleration": drives.drive_accelerations(m, *(*_dynamics_arguments(m, v), drive_numbers))
@@ -137,6 +143,7 @@ def _control_outputs(m: Machine, v: Symbols, *, what: str) -> Outputs:
 
 
 def _law(name: str) -> Entry:
+    """Return the entry of a control law; adaptive laws take no inertial parameters as input."""
     known = () if "learnt" in control.MEMORY[name] else ("parameters",)
     return Entry((*_SAMPLE, *known, "drives"), partial(_control_outputs, what=name), NEEDS_TYPE_II)
 
@@ -147,11 +154,13 @@ def _forces(m: Machine, v: Symbols, *, name: str) -> Outputs:
 
 
 def _regressor(m: Machine, v: Symbols) -> Outputs:
+    """Return the matrix (n, K) whose product with the parameters is the actuator forces."""
     selection = v.get("selection", ca.SX.eye(len(m.parameters)))
     return {"regressor": _as_matrix(inverse_dynamics(m, state(m, v), selection))}
 
 
 def _paper_terms(m: Machine, v: Symbols) -> Outputs:
+    """Return the terms of the inverse dynamics in the paper's form, by their names there."""
     parts = regressor.terms(m, state(m, v))
     return {
         "jacobian": parts.jacobian,
@@ -205,6 +214,7 @@ INTERNAL = ("driven_motion",)
 
 
 def _driven_motion(m: Machine, v: Symbols) -> Outputs:
+    """Return the rates of the states of a machine and its actuators under stick-slip friction."""
     kind: transmissions.DriveKind = v["kind"]
     sides = sticking.Sides(v["side"], v["hold"], v["brake"]) if kind.dry else None
     drive_numbers = drives.Drives.from_vector(v["drives"])
@@ -219,19 +229,23 @@ def _driven_motion(m: Machine, v: Symbols) -> Outputs:
 
 
 def _sensed_joints(at: Any) -> Any:
+    """Return the joint coordinates and rates of a state, (n,) each."""
     return control.coordinates(at), drives.joint_motion(at)[0]
 
 
 def _geometric_index(m: Machine, v: Symbols, *, what: str) -> Outputs:
+    """Return a geometric performance index at a pose, by its name."""
     return {"value": indices.GEOMETRIC_INDICES[what](m, state(m, v))}
 
 
 def _kappa(m: Machine, v: Symbols) -> Outputs:
+    """Return the index kappa at a pose, with the mass matrix there."""
     mass = lagrangian.mass_matrix(m, v["pose"], v["parameters"])
     return {"value": indices.kappa(m, state(m, v), mass)}
 
 
 def _homogeneous_jacobian(m: Machine, v: Symbols) -> Outputs:
+    """Return the Jacobian with joints and rotations in metres, and its length L, m."""
     homogeneous = indices.homogeneous(m, state(m, v))
     return {"jacobian": homogeneous.matrix, "length": homogeneous.length}
 
@@ -243,6 +257,7 @@ def _pad_rows(columns: Sequence[Expression], count: int) -> Expression:
 
 
 def _reactions(m: Machine, v: Symbols) -> Outputs:
+    """Return the equations of the joints' reaction forces, by name, with the points of each leg."""
     equilibrium = reactions.equilibrium(m, state(m, v), v["parameters"])
     wrenches = [
         [ca.vertcat(at.force, at.moment) for at in leg.wrenches] for leg in equilibrium.legs
@@ -266,6 +281,7 @@ def _reactions(m: Machine, v: Symbols) -> Outputs:
 
 
 def _beams(m: Machine, v: Symbols) -> Outputs:
+    """Return the legs' links as beams, by name; their rods' couples are rows (n, 3)."""
     beams = reactions.beams(m, state(m, v))
     *links, couples = beams._asdict().items()
     return {**dict(links), "couples": _as_matrix(ca.horzcat(*couples[1]).T)}

@@ -34,12 +34,12 @@ def slopes_program(robot: RobotLike) -> Program:
 
 
 def slopes_kernel(robot: RobotLike) -> TieredKernel:
-    """Return the kernel of that function."""
+    """Return the kernel of `slopes_program`."""
     return _kernel(geometry_only(robot))
 
 
 def slope_columns(robot: Manipulator) -> list[range]:
-    """Return, for each leg, the numbers of the geometry that its slopes are against.
+    """Return the indices of the geometry by which each leg's coordinate is differentiated.
 
     All legs have as many: those of a shorter leg include some of its neighbour's, whose slopes are
     zero. Where planes hold the platform every leg's coordinate hangs on all legs; and on what the
@@ -57,14 +57,17 @@ def slope_columns(robot: Manipulator) -> list[range]:
 
 @lru_cache(maxsize=16)
 def _kernel(layout: Manipulator) -> TieredKernel:
+    """Return the kernel of slopes of a layout, cached."""
     return tiered_kernel(_key(layout), lambda: _build_program(layout))
 
 
 def _key(layout: Manipulator) -> tuple[str, Manipulator]:
+    """Return the cache key of a layout's slopes."""
     return "geometry_slopes", layout
 
 
 def _build_program(layout: Manipulator) -> Program:
+    """Return the program of joints and their derivatives by pose (n, n) and geometry."""
     machine, geometry = Machine.symbolic(layout)
     pose = ca.SX.sym("pose", layout.freedom)
     state = machine.state(pose)

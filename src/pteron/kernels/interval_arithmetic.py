@@ -70,6 +70,7 @@ def either(a: Mask, b: Mask) -> Mask:
 
 
 def _marks(*intervals: Interval) -> tuple[Mask, Mask, Mask]:
+    """Return the union of the masks of operands: maybe or never defined, with a jump."""
     maybe, never, jump = intervals[0][2:]
     for other in intervals[1:]:
         maybe, never = either(maybe, other.maybe), either(never, other.never)
@@ -78,18 +79,22 @@ def _marks(*intervals: Interval) -> tuple[Mask, Mask, Mask]:
 
 
 def _round_down(x: Bound) -> Bound:
+    """Return a lower bound of a correctly rounded result, by a relative ulp."""
     return x - np.abs(x) * _ULP
 
 
 def _round_up(x: Bound) -> Bound:
+    """Return an upper bound of a correctly rounded result, by a relative ulp."""
     return x + np.abs(x) * _ULP
 
 
 def _lower_bound(x: Bound, share: float = _ULP) -> Bound:
+    """Return a lower bound of a result with a relative error of `share`, or an underflow."""
     return x - (np.abs(x) * share + _UNDERFLOW)
 
 
 def _upper_bound(x: Bound, share: float = _ULP) -> Bound:
+    """Return an upper bound of a result with a relative error of `share`, or an underflow."""
     return x + (np.abs(x) * share + _UNDERFLOW)
 
 
@@ -131,10 +136,12 @@ def _finite_product(x: Bound, y: Bound) -> Bound:
 
 
 def _least_of(bounds: list[Bound]) -> Bound:
+    """Return the least of four bounds, element by element."""
     return np.minimum(np.minimum(bounds[0], bounds[1]), np.minimum(bounds[2], bounds[3]))
 
 
 def _greatest_of(bounds: list[Bound]) -> Bound:
+    """Return the greatest of four bounds, element by element."""
     return np.maximum(np.maximum(bounds[0], bounds[1]), np.maximum(bounds[2], bounds[3]))
 
 
@@ -217,28 +224,29 @@ def angle(y: Interval, x: Interval) -> Interval:
 
 
 def _stepwise(function: Callable[[Bound], Bound], a: Interval) -> Interval:
-    """Return a function that grows in steps, such as floor or sign, which jumps between them."""
+    """Return the interval of a step function (floor, sign), with its jumps."""
     low, high = function(a.low), function(a.high)
     return Interval(low, high, a.maybe, a.never, either(a.jump, _mask_or_none(low != high)))
 
 
 def minimum(a: Interval, b: Interval) -> Interval:
-    """Return the lesser."""
+    """Return the lesser of a and b."""
     return Interval(np.minimum(a.low, b.low), np.minimum(a.high, b.high), *_marks(a, b))
 
 
 def maximum(a: Interval, b: Interval) -> Interval:
-    """Return the greater."""
+    """Return the greater of a and b."""
     return Interval(np.maximum(a.low, b.low), np.maximum(a.high, b.high), *_marks(a, b))
 
 
 def _mask_or_none(mask: Any) -> Mask:
+    """Return the mask as an array (K,); None if it marks no box."""
     mask = np.atleast_1d(mask)
     return mask if mask.any() else None
 
 
 def _truth(certain: Any, impossible: Any, *intervals: Interval) -> Interval:
-    """Return 1 where a test surely holds, 0 where it surely does not, and between them else."""
+    """Return 1 where a test surely holds, 0 where it surely does not, else [0, 1]."""
     low, high = np.where(certain, 1.0, 0.0), np.where(impossible, 0.0, 1.0)
     maybe, never, jump = _marks(*intervals)
     return Interval(low, high, maybe, never, either(jump, _mask_or_none(low != high)))
@@ -261,12 +269,12 @@ def is_equal(a: Interval, b: Interval) -> Interval:
 
 
 def is_zero(a: Interval) -> Interval:
-    """Return whether a is zero, of a test."""
+    """Return whether a is zero: 1, 0, or [0, 1] where it may be."""
     return _truth((a.low == 0.0) & (a.high == 0.0), (a.low > 0.0) | (a.high < 0.0), a)
 
 
 def is_nonzero(a: Interval) -> Interval:
-    """Return whether a is not zero, of a test."""
+    """Return whether a is not zero: 1, 0, or [0, 1] where it may be."""
     return is_zero(is_zero(a))
 
 

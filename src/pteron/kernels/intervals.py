@@ -53,6 +53,7 @@ class Boxed(Kernel):
     """
 
     def _evaluate(self, *values: ArrayLike, **fixed: ArrayLike) -> Any:
+        """Return an `Enclosure` of each output in boxes (..., 2, n), the ends of each input."""
         by_port = self._values_by_port(values, fixed)
         arrays = []
         for port in self.ports:
@@ -140,6 +141,7 @@ def _walk(
     columns: Sequence[Sequence[Sequence[Array]]],
     part: slice,
 ) -> list[Interval | None]:
+    """Return the intervals of the nodes in a slice of the boxes; None at nodes not needed."""
     intervals: list[Interval | None] = [None] * len(graph.nodes)
     for k in needed:
         node = graph.nodes[k]

@@ -67,6 +67,7 @@ class Traced(Kernel):
 
     @cached_property
     def _jitted_function(self) -> Callable[..., Any]:
+        """The compiled function of JAX arrays, with leading axes broadcast."""
         jax = import_extra("jax", "jax", 'target: "jax" needs JAX')
         jnp = jax.numpy
 
@@ -97,6 +98,7 @@ class Traced(Kernel):
         return compiled
 
     def _evaluate(self, *values: Any, **fixed: Any) -> Any:
+        """Evaluate the kernel on arrays or tracers, after checks of shapes and digits."""
         traced, by_port = self._jitted_function, self._values_by_port(values, fixed)
         for port in self.ports:
             by_port[port.name] = pick_columns(

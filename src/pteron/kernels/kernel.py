@@ -58,7 +58,7 @@ class Port:
 
 
 class Kernel(ABC):
-    """Something that can be called with batches of states.
+    """Base class of a callable that evaluates a function for batches of states.
 
     A target subclasses it; see `pteron.kernels.targets`.
 
@@ -187,6 +187,7 @@ class ArrayKernel(Kernel):
         """Fill `outputs` (batch, size) from `inputs` (batch, size), or (size,) where shared."""
 
     def _evaluate(self, *values: ArrayLike, **fixed: ArrayLike) -> Any:
+        """Evaluate the kernel; a target may override it with a faster first call."""
         return self.evaluate_checked(*values, **fixed)
 
     def evaluate_checked(self, *values: ArrayLike, **fixed: ArrayLike) -> Any:
@@ -283,6 +284,7 @@ def as_array(
 
 
 def _convert_to_floats(raw: ArrayLike, name: str, dtype: str) -> Array:
+    """Return an input as an aligned array of floats; DataError if it is not real numbers."""
     raw = require_unmasked(raw, name)
     try:
         array = np.asarray(raw)

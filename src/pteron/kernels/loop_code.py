@@ -145,6 +145,7 @@ class LoopCode:
 
     @cached_property
     def _blocks(self) -> list[Block]:
+        """The blocks of the plant, and of sensors and law where the loop has them."""
         parts = {"sensed": self.sensed, "law": self.law}
         blocks = [Block(name, part) for name, part in parts.items() if part is not None]
         # Machines side by side rarely slide all at once, and one part fills the pipeline better.
@@ -199,6 +200,7 @@ class LoopCode:
 
     @cached_property
     def _names(self) -> list[str]:
+        """The names of the arrays of the C function, in the order of its arguments."""
         numbers = (
             f"{block.name}_{port.name}" for block in self._blocks for port in block.machine_inputs
         )
@@ -206,6 +208,7 @@ class LoopCode:
 
     @cached_property
     def _library(self) -> ctypes.CDLL:
+        """The compiled library of the loop, from the cache or compiled on demand."""
         command = c_compiler()
         assert command is not None  # whoever runs it has asked
         # By what the source is made of: to make it takes longer than all else of a first call.
@@ -216,7 +219,7 @@ class LoopCode:
         return ctypes.CDLL(str(entry(name, _LIBRARY, self._build)))
 
     def load(self) -> None:
-        """Load the library, compiled where it is not kept.
+        """Load the library; compile it first if it is not in the cache.
 
         Raises
         ------
@@ -226,6 +229,7 @@ class LoopCode:
         _ = self._library
 
     def _build(self, folder: Path) -> None:
+        """Compile the source to the library in a folder; ModelError if the compiler fails."""
         advice = "set CC to another compiler, or PTERON_KERNELS=vm"
         flags, sources = [*FLAGS, *LINKED], {"loop.c": self.source}
         what = "the simulation's loop"

@@ -39,7 +39,7 @@ Arrays = dict[str, Array]
 def _pieces(
     arrays: Mapping[str, Array], samples: int, counts: Sequence[int], machines: int
 ) -> Iterator[tuple[Mapping[str, Array], int, Sequence[int]]]:
-    """Yield a run in pieces, each with its number of samples and its `counts`."""
+    """Yield the pieces of a run: arrays, number of samples and `counts` of each."""
     *fixed, first, end = counts
     size = max(1, _PIECE // (max(1, machines) * max(1, sum(counts[:PARTS]))))
     if size >= samples:
@@ -84,7 +84,7 @@ class Loop:
 
     @property
     def is_compiled(self) -> bool:
-        """Whether C makes the steps."""
+        """Whether the steps run in C."""
         return os.environ.get(VARIABLE) != "vm" and c_compiler() is not None
 
     def run(
@@ -153,7 +153,7 @@ class Loop:
                 ended.set()
 
     def idle(self, robot: Manipulator, state: Array, late: int = 0, behind: int = 0) -> Arrays:
-        """Return what `run` takes of machines in states (B, 1, Y): no loads, limits or encoders.
+        """Return `run`'s arrays for states (B, 1, Y) without loads, limits or encoders.
 
         Commands are so many samples late, and readings so many behind.
         """
@@ -176,7 +176,7 @@ class Loop:
         }
 
     def _can_run(self, lanes: int) -> bool:
-        """Return whether C makes the steps: a compiler that fails costs speed, not results."""
+        """Return whether the steps run in C; False if the compiler fails."""
         if not self.is_compiled:
             return False
         try:
@@ -212,6 +212,7 @@ def machine_numbers(robot: Manipulator, part: Program, name: str) -> dict[str, A
 
 @lru_cache(maxsize=256)
 def _numbers(robot: Manipulator, what: str) -> Array:
+    """Return the numbers of a machine for an input, (1, 1, k), read-only and cached."""
     array = FIXED[what](robot).reshape(1, 1, -1)
     array.setflags(write=False)  # all runs of the machine read it
     return array

@@ -98,11 +98,13 @@ def _has_labels(array: Any) -> bool:
 
 
 def _columns_from_labels(array: Any) -> dict[str, Any]:
+    """Return the columns of an xarray array by the labels of its last axis."""
     axis = array.dims[-1]
     return {str(label): array.sel({axis: label}).values for label in array.coords[axis].values}
 
 
 def _column(raw: Any, name: str) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """Return a column as floats; DataError if it is not real numbers."""
     try:
         if (array := np.asarray(raw)).dtype.kind not in "biufO":
             raise TypeError

@@ -44,6 +44,7 @@ class Jitted(ArrayKernel):
 
     @property
     def _entry(self) -> str:
+        """The name of the module in the cache; ModelError if Numba is not installed."""
         if importlib.util.find_spec("numba") is None:
             raise ModelError(
                 f'target: "numba" needs Numba, which is not installed; {install_command("numba")}'
@@ -56,6 +57,7 @@ class Jitted(ArrayKernel):
 
     @cached_property
     def _module(self) -> ModuleType:
+        """The compiled module, from the cache or written on demand."""
         name = self._entry
 
         def build(folder: Path) -> None:
@@ -65,6 +67,7 @@ class Jitted(ArrayKernel):
         return _load(entry(name, _FILE, build), name)
 
     def _evaluate(self, *values: ArrayLike, **fixed: ArrayLike) -> Any:
+        """Evaluate a first call; bind the compiled function as `call` for all later ones."""
         self.call = self._direct()
         return self.call(*values, **fixed)
 
@@ -98,6 +101,7 @@ class Jitted(ArrayKernel):
         return call if order == sorted(order) else evaluate_any
 
     def _run(self, batch: int, inputs: Sequence[Array], outputs: Sequence[Array]) -> None:
+        """Fill `outputs` from `inputs` by the compiled function."""
         # To Numba an array that must not be written is of another type.
         writable = [array if array.flags.writeable else array.copy() for array in inputs]
         self._module.run(*writable, *outputs)
@@ -121,6 +125,7 @@ def _load(path: Path, name: str) -> ModuleType:
 
 
 def _source(name: str, graph: Graph, inputs: Sequence[Port], outputs: Sequence[Port]) -> str:
+    """Return the Python source of the module that Numba compiles."""
     language = Language(
         PYTHON | {"sin": "sine({0})", "cos": "cosine({0})"},
         form="{0} = {1}",

@@ -97,7 +97,7 @@ def _cost(graph: TermGraph, roots: list[int]) -> int:
 
 
 def _flatten_terms(old: TermGraph, roots: list[int]) -> tuple[TermGraph, list[int]]:
-    """Return the graph with sums that one sum alone uses merged into it; products likewise."""
+    """Return the graph with nested sums, and products, merged where they have a single use."""
     uses = old.uses(roots)
 
     def rule(new: TermGraph, k: int, values: list[int]) -> int:
@@ -159,7 +159,7 @@ def _sum_of_products(graph: TermGraph, terms: list[tuple[int, tuple[int, ...]]])
 
 
 def _share_pairs(graph: TermGraph, roots: list[int]) -> tuple[TermGraph, list[int]]:
-    """Return the graph with the pairs that several sums or products hold as nodes of their own."""
+    """Return the graph with a node for each pair of operands that sums or products share."""
     order = graph.order(roots)
     for kind in ("sum", "product"):
         _name_pairs(graph, kind, [k for k in order if graph.is_kind(kind, k)])
@@ -167,7 +167,7 @@ def _share_pairs(graph: TermGraph, roots: list[int]) -> tuple[TermGraph, list[in
 
 
 def _name_pairs(graph: TermGraph, kind: str, owners: Sequence[int]) -> None:
-    """Replace each pair that several of the owners hold by a node, most frequent first."""
+    """Replace each pair of operands that several owners share by a node, in place."""
     lists = {k: list(graph.operands[k]) for k in owners}
     holders: dict[tuple[int, int], dict[int, None]] = defaultdict(dict)
     for k, operands in lists.items():
@@ -214,7 +214,7 @@ def _pair(a: int, b: int) -> tuple[int, int]:
 
 
 def _sign_of(pair: tuple[int, int], values: list[int]) -> int:
-    """Return the sign with which the values hold a pair, 0 where they do not."""
+    """Return the sign with which the values contain a pair; 0 if they do not."""
     a, b = pair
     if a == b:
         return int(values.count(a) > 1)

@@ -75,6 +75,8 @@ def spheres_kernel(robot: Manipulator) -> TieredKernel:
 
 @lru_cache(maxsize=64)
 def _spheres(robot: Manipulator) -> TieredKernel:
+    """Return the kernel of the spheres that the joints' coordinates constrain, cached."""
+
     def build() -> Program:
         joints = ca.SX.sym("joints", robot.joint_count)
         centers, squares = held_spheres(Machine.numeric(robot), joints)

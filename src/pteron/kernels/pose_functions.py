@@ -39,26 +39,31 @@ from pteron.kernels.entries import (
 
 
 def _inverse_kinematics(m: Machine, pose: Expression) -> Expression:
+    """Return the joint coordinates (n,) of a pose, m or rad; NaN out of reach."""
     # A slider's equation has a value out of reach too; `reach_validity` makes it NaN there.
     return kinematics.inverse_position(m, pose) + kinematics.reach_validity(m, pose)
 
 
 def _poses(m: Machine, v: Symbols, *, reached: bool) -> Outputs:
+    """Return the poses (modes, n) of joint coordinates in closed form; NaN where there is none."""
     poses = kinematics.direct_position(m, v["joints"], reached=reached).T
     return {"poses": (poses, poses.shape)}
 
 
 def _closure_rows(m: Machine, v: Symbols) -> Outputs:
+    """Return the rows of the closures with the joints fixed, with their origin and size, m."""
     closures = closing.closure_rows(m, v["joints"])
     rows = {name: (part, part.shape) for name, part in closures._asdict().items()}
     return {**rows, "origin": closures.origin, "size": closures.size}
 
 
 def _direct_step(m: Machine, joints: Expression, pose: Expression) -> Any:
+    """Return the pose of joint coordinates near a pose, by Newton's method; see `closing`."""
     return closing.direct_step(m, joints, pose, TYPE_II)
 
 
 def _followed_step(m: Machine, joints: Expression, pose: Expression) -> Any:
+    """Return the pose of joint coordinates, across singularities, and its type-II measure."""
     step = closing.converged_step(m, joints, pose, TYPE_II)
     return step.pose, step.measure
 
@@ -71,16 +76,19 @@ def _leg_equation(
 
 
 def _reach(m: Machine, pose: Expression) -> Any:
+    """Return the legs' margins, m, type-I measures and spreads, (n,) each."""
     reaches = kinematics.reach(m, pose)
     names = ("margin", "type_i", "spread")
     return [ca.vertcat(*(getattr(leg, name) for leg in reaches)) for name in names]
 
 
 def _room(m: Machine, pose: Expression) -> Expression:
+    """Return the legs' edge conditions at a pose, not negative within reach."""
     return ca.vertcat(*(edge.value for edge in edges(m, pose)))
 
 
 def _platform(m: Machine, pose: Expression) -> Any:
+    """Return the platform's motion at a pose with zero rates."""
     return m.platform.motion(pose, *[ca.SX.zeros(m.freedom)] * 2)
 
 
@@ -90,19 +98,23 @@ def platform_points(m: Machine, pose: Expression) -> Expression:
 
 
 def _type_ii(m: Machine, v: Symbols) -> Outputs:
+    """Return the type-II measure of a pose: 0 at a singularity."""
     at = state(m, v)
     return {"type_ii": m.closure.measure(at.platform, at.legs)}
 
 
 def _twist(m: Machine, pose: Expression, velocity: Expression) -> Expression:
+    """Return the twist (6,) of the platform, m/s and rad/s."""
     return ca.mtimes(_platform(m, pose).twist_rows, velocity)
 
 
 def _velocity_of_twist(m: Machine, pose: Expression, twist: Expression) -> Any:
+    """Return the pose's rates (n,) of a twist (6,), and the remainder that it cannot follow."""
     return _platform(m, pose).velocity_of(twist)
 
 
 def _joint_motion(m: Machine, v: Symbols) -> Outputs:
+    """Return the motion of actuated joints, links and passive joints up to an order."""
     at, order = state(m, v), int("acceleration" in v)
     links, passive = kinematics.link_turning(at, order), kinematics.passive_motion(at, order)
     return {

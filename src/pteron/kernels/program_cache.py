@@ -144,6 +144,7 @@ def name_of(*key: Any, sources: tuple[str, ...] = EQUATIONS) -> str | None:
 
 
 def _parse_program(text: str) -> Program | None:
+    """Return the program of a cached text; None if the text is not valid."""
     try:
         record = json.loads(text)
         ports = (
@@ -158,6 +159,7 @@ def _parse_program(text: str) -> Program | None:
 
 
 def _serialise_program(program: Program) -> str:
+    """Return the text of a program for the cache, JSON."""
     ports = {
         name: [asdict(port) for port in part]
         for name, part in (("inputs", program.inputs), ("outputs", program.outputs))
@@ -181,6 +183,7 @@ def _canonical_key(part_: Any) -> str | None:
 
 
 def _source(packages: tuple[str, ...]) -> str:
+    """Return the digests of packages' sources, joined in a text."""
     return " ".join(_digest(name) for name in sorted(packages))
 
 

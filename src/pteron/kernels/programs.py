@@ -197,6 +197,7 @@ def geometry_only(robot: RobotLike) -> Manipulator:
 
 @lru_cache(maxsize=256)
 def _cached_geometry_only(robot: Manipulator) -> Manipulator:
+    """Return the machine with trivial masses, and without drives, readings, tools or name."""
     ones = ("m", "I", "Ixx", "Iyy", "Izz")
 
     def plain(body: Any) -> Any:
@@ -226,10 +227,12 @@ class _Form(NamedTuple):
 
 @lru_cache(maxsize=512)
 def _cached_program(robot: Manipulator, form: _Form, columns: Columns | None) -> Program:
+    """Return the program of a machine's function, cached in memory and on disk."""
     return cached_program((robot, form, columns), partial(_build_program, robot, form, columns))
 
 
 def _build_program(robot: Manipulator, form: _Form, columns: Columns | None) -> Program:
+    """Return the program; of base parameters, the form that needs fewer operations."""
     machine = Machine.numeric(robot)
     if columns is None:
         return _program(machine, form=form)
@@ -262,6 +265,7 @@ def motion_program(robot: Manipulator, kind: DriveKind, general: bool = False) -
 
 
 def _motion(robot: Manipulator, kind: DriveKind, general: bool) -> Program:
+    """Return the program of the plant's motion under its actuators, of a machine or general."""
     n = robot.joint_count
     names = [*(("side", "hold") if kind.dry else ()), *(name for name, _ in kind.extra_states)]
     extra = {name: ca.SX.sym(name, n) for name in names}
@@ -285,12 +289,14 @@ def general_program(robot: RobotLike, what: str) -> Program:
 
 
 def _general(robot: Manipulator, form: _Form) -> Program:
+    """Return the program of a topology; of the machine itself for `_OF_ONE_MACHINE`."""
     layout = robot if form.what in _OF_ONE_MACHINE else topology_of(robot)
     return _cached_general(layout, form)
 
 
 @lru_cache(maxsize=256)
 def _cached_general(layout: Manipulator, form: _Form) -> Program:
+    """Return the program of a topology, cached in memory and on disk."""
     return cached_program(("general", layout, form), partial(_build_general, layout, form))
 
 
@@ -383,6 +389,7 @@ def _input_symbols(
 
 
 def _shared_last(name: str) -> int:
+    """Return the sort key of an input: -1 for a state's, else its position in `_SHARED`."""
     return _SHARED.index(name) if name in _SHARED else -1
 
 
@@ -436,4 +443,5 @@ def _statuses(
 
 
 def _is_nan(expression: Expression) -> bool:
+    """Return whether an expression is the constant NaN."""
     return bool(expression.is_constant()) and bool(np.isnan(float(expression)))

@@ -125,7 +125,7 @@ class Plant:
         arrays: Mapping[str, Array],
         alive: Array,
     ) -> None:
-        """Make steps of Runge and Kutta's method; a machine that cannot go on stays."""
+        """Advance states by Runge-Kutta steps; a machine whose motion is invalid stays."""
         y, side, clock = (arrays[name][:, 0] for name in ("state", "side", "clock"))
         m = self.split(y)["pose"].shape[1]
         for _ in range(steps):

@@ -67,6 +67,7 @@ def reduced_sincos() -> ca.Function:
 
 
 def _polynomial(coefficients: tuple[float, ...], x: Any) -> Any:
+    """Return the value of a polynomial at x, by Horner's scheme; the constant is first."""
     total: Any = coefficients[-1]
     for coefficient in reversed(coefficients[:-1]):
         total = coefficient + x * total

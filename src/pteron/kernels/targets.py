@@ -191,6 +191,7 @@ def _cached_kernel(
     dtype: str,
     threads: int,
 ) -> Kernel:
+    """Return the kernel of a target, cached, with the machine's numbers as fixed inputs."""
     folded = grade == "specialised"
     built = program(robot, what, columns, wrench=wrench, plain=folded)
     fixed: dict[str, Array] = {}
@@ -227,6 +228,7 @@ def _cached_kernel(
 def _instantiate_kernel(
     kind: type[Kernel], built: Program, fixed: dict[str, Array], dtype: str, threads: int
 ) -> Kernel:
+    """Return a kernel of a program, whose inputs are reordered: fixed ones come last."""
     # Fixed inputs come last, so that a call may append them to what it is given.
     order = sorted(range(len(built.inputs)), key=lambda k: built.inputs[k].name in fixed)
     if order != sorted(order):

@@ -50,7 +50,7 @@ class TermGraph:
         return number
 
     def replace(self, k: int, *node: Any) -> None:
-        """Put another node of the same value and kind in the place of one."""
+        """Replace node k, in place, by a node of the same value and kind."""
         self.nodes[k], self.operands[k] = node, node[1:]
         self._orders.clear()
 
@@ -125,14 +125,14 @@ class TermGraph:
         return self.product([a, self.inverse(b)])
 
     def reciprocal(self, operand: int) -> int:
-        """Return 1/x as an operation of its own."""
+        """Return the value of 1/x as a separate operation."""
         c = self.constant_of(operand)
         return (
             self.constant(1.0 / c) if c else sign_of(operand) * self.add("reciprocal", abs(operand))
         )
 
     def inverse(self, operand: int) -> int:
-        """Return 1/x as a factor: the reciprocal where there is one, or else a division."""
+        """Return 1/x as a factor: the reciprocal if the graph has it, else a division."""
         c = self.constant_of(operand)
         if c:
             return self.constant(1.0 / c)
@@ -171,7 +171,7 @@ class TermGraph:
         return Counter(map(abs, chain(roots, operands)))
 
     def rebuild(self, roots: Iterable[int], rule: Rule) -> tuple[TermGraph, list[int]]:
-        """Return a graph made from this one by a rule, node by node."""
+        """Return the graph that a rule builds from this, node by node, and its roots' values."""
         new = TermGraph()
         new_values: dict[int, int] = {}
         for k in self.order(roots):

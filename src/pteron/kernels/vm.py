@@ -171,10 +171,12 @@ class VirtualMachine(ArrayKernel):
 
     @cached_property
     def _lowered_function(self) -> ca.Function:
+        """The function in plain arithmetic."""
         return _lower(self.function)
 
     @cached_property
     def _thread_memory(self) -> threading.local:
+        """Each thread's buffers of a single state and its batch interpreter."""
         return threading.local()
 
     def evaluate_checked(self, *values: ArrayLike, **fixed: ArrayLike) -> Any:
@@ -200,6 +202,7 @@ class VirtualMachine(ArrayKernel):
         return copies[0] if len(copies) == 1 else copies
 
     def _run(self, batch: int, inputs: Sequence[Array], outputs: Sequence[Array]) -> None:
+        """Fill `outputs`: batches by the interpreter, what remains by functions of few states."""
         shared = tuple(i for i, port in enumerate(self.ports) if port.shared)
         function = self._lowered_function
         remainder = batch % LENGTH
@@ -256,11 +259,13 @@ def _with_lowered_sines(function: ca.Function) -> ca.Function:
 def _sine_or_cosine(
     place: int, exact: Callable[[Expression], Expression], angle: Expression
 ) -> Expression:
+    """Return the sine (place 0) or cosine (1) of `sincos`, within its limit of the angle."""
     return ca.if_else(ca.fabs(angle) <= LIMIT, reduced_sincos()(angle)[place], exact(angle))
 
 
 @lru_cache(maxsize=512)
 def _map_states(function: ca.Function, shared: tuple[int, ...], size: int) -> ca.Function:
+    """Return a function of `size` states side by side, cached."""
     return function.map(f"{function.name()}_block", "serial", size, list(shared), [])
 
 
@@ -271,6 +276,7 @@ def _evaluate_calls(
     starts: range,
     step: int,
 ) -> None:
+    """Call a mapped function at each start, with its inputs and outputs as views of the arrays."""
     buffer, evaluate = function.buffer()
     for i, array in enumerate(inputs):
         if array.ndim == 1:

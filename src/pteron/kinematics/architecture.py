@@ -119,6 +119,7 @@ def architecture(robot: RobotLike) -> Architecture:
 
 @lru_cache(maxsize=256)
 def _architecture(robot: Manipulator) -> Architecture:
+    """Return whether a machine is singular at every pose, with reason, proof and measures."""
     poses = _poses(robot)
     measures = type_ii_sizes(robot, poses)
     constraints = np.abs(numeric(robot, "constraint")(poses)[0])
@@ -166,6 +167,7 @@ def expect_regular(robot: Manipulator) -> None:
 
 @lru_cache(maxsize=256)
 def _is_singular_everywhere(robot: Manipulator) -> bool:
+    """Return whether det J vanishes at all poses, in closed form or by random poses."""
     known = closure_of(robot).vanishes()
     if known is not None:
         return known
@@ -280,6 +282,7 @@ def _always_free(rows: Array) -> Array | None:
 
 
 def _round_components(axis: Array) -> list[float]:
+    """Return an axis rounded to three decimals, without negative zeros."""
     return [round(float(v), 3) + 0.0 for v in axis]
 
 

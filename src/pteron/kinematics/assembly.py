@@ -98,6 +98,7 @@ def every_pose(robot: Manipulator, joints: Array, most: int) -> Array:
 
 
 def _poses(robot: Manipulator, joints: Array, most: int) -> Array:
+    """Return the poses (B, most, m) of joints (B, n), sorted; NaN where there are fewer."""
     slides = robot.platform.slides
     zeroth, first, second, origin, size, _ = numeric(robot, "closure_rows")(joints)
     rows = np.stack([zeroth, first, second], axis=-1)
@@ -169,12 +170,14 @@ def _form(rows: Array, slides: bool) -> Array:
 
 
 def _form_at(form: Array, alpha: Array) -> Array:
+    """Return G (..., n, n) at alpha, rad, from its parts of `_form`."""
     c, s = np.cos(alpha)[..., None, None], np.sin(alpha)[..., None, None]
     total: Array = form[..., 0] * (c * c) + form[..., 1] * (c * s) + form[..., 2] * (s * s)
     return total
 
 
 def _rows_at(rows: Array, phi: Array | float, slides: bool) -> Array:
+    """Return the rows (..., n, d + 2) at phi from their parts in phi, or in cos and sin."""
     first, second = (phi, phi**2) if slides else (np.cos(phi), np.sin(phi))
     first, second = (np.asarray(f)[..., None, None] for f in (first, second))
     return rows[..., 0] + first * rows[..., 1] + second * rows[..., 2]
@@ -212,6 +215,7 @@ def _points(
 
 
 def _quadric(x: Array, y: Array) -> Array:
+    """Return 0.5 (x_0 y_last + x_last y_0) - v . w (K,) of rows (x_0, v, x_last), (K, d + 2)."""
     inner = (x[:, 1:-1] * y[:, 1:-1]).sum(axis=-1)
     return np.asarray(0.5 * (x[:, 0] * y[:, -1] + x[:, -1] * y[:, 0]) - inner)
 

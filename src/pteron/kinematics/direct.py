@@ -105,7 +105,7 @@ def direct_kinematics(
 def assembly_mode(
     robot: RobotLike, pose: PoseLike, *, all_branches: bool = False
 ) -> NDArray[np.int64]:
-    """Return which of the poses with its joint coordinates a pose is.
+    """Return a pose's assembly mode: its index among the poses of its joint coordinates.
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ def assembly_mode(
 
 
 def working_mode(robot: RobotLike, pose: PoseLike, joints: JointsLike) -> NDArray[np.int64]:
-    """Return on which side the elbow of each leg is where a pose has given joint coordinates.
+    """Return the side of each leg's elbow, 1 or -1, at which a pose has joint coordinates.
 
     Parameters
     ----------
@@ -217,6 +217,7 @@ def mode_of(robot: RobotLike, pose: tuple[float, ...]) -> int:
 
 @lru_cache(maxsize=64)
 def _mode_of(robot: Manipulator, pose: tuple[float, ...]) -> int:
+    """Return the column of `assembly_modes` that is nearest to a pose, cached."""
     joints: PerJoint = evaluate_kernel(robot, "inverse_kinematics", "raise", np.array(pose))
     return int(nearest(robot, assembly_modes(robot, joints, all_branches=True), np.array(pose)))
 
@@ -233,6 +234,7 @@ def nearest(robot: RobotLike, poses: Array, pose: Array) -> NDArray[np.int64]:
 
 
 def _rows(robot: Manipulator, joints: Array, *, all_branches: bool) -> Poses:
+    """Return the poses of joints, sorted where the closure does not keep the order of modes."""
     poses = assembly_modes(robot, joints, all_branches=all_branches)
     return poses if closure_of(robot).keeps_modes else sort_poses(poses)
 

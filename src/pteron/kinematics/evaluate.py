@@ -98,6 +98,7 @@ def finite_pose(robot: Manipulator, raw: PoseLike, name: str) -> Array:
 
 
 def _not_finite(name: str, array: Array, index: tuple[int, ...]) -> DataError:
+    """Return the error for an element that is not finite, or not of a sensible size."""
     expected = "a finite number" if not np.isfinite(array[index]) else "a number of sensible size"
     return DataError(f"{name}{list(index)}: {array[index]} given, {expected} expected")
 
@@ -174,6 +175,7 @@ def _bad_pose(
     *,
     far: bool,
 ) -> PteronError:
+    """Return the error that explains a bad pose: out of reach or singular, with leg and measure."""
     where = place("pose", index)
     margin, type_i, spread, _ = numeric(robot, "reach")(pose)
     if "rows" in needs:

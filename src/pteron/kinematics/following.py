@@ -115,6 +115,7 @@ def _follow_halved_steps(
 
 
 def _end_of_mode(joints: Array, k: int) -> UnreachablePose:
+    """Return the error for the sample k to which the platform does not follow."""
     text = ", ".join(f"{coordinate:.6g}" for coordinate in joints[k])
     return UnreachablePose(
         f"joints[{k}]: the platform does not follow to the joint coordinates [{text}]: "

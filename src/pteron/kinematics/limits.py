@@ -73,5 +73,6 @@ def limited_joints(robot: RobotLike, pose: PoseLike) -> tuple[LimitedJoint, ...]
 
 
 def _passive_limited_joint(leg: int, at: Passive) -> LimitedJoint:
+    """Return the limited joint of a leg's passive joint, with its coordinate in the pose."""
     limits = at.least, at.most, at.only_most
     return LimitedJoint(leg, at.noun, False, at.unit, float(at.value), *limits)

@@ -65,6 +65,7 @@ def modular_geometry(robot: Manipulator, field: PrimeField) -> list[int] | None:
 
 
 def _decimal(number: float) -> Fraction:
+    """Return a number rounded to `_DIGITS` decimals, as a fraction."""
     return Fraction(repr(round(float(number), _DIGITS)))
 
 
@@ -81,6 +82,7 @@ def _unit(vector: Sequence[float], field: PrimeField) -> list[int] | None:
 
 
 def _signed_root(square: Fraction, negative: bool, field: PrimeField) -> int:
+    """Return a residue whose square is a fraction's, with a sign."""
     product = square.numerator * square.denominator
     root = reduce(mul, (_prime_root(p, field) for p in _prime_factors(product)), 1)
     share = field.divide(root % field.prime, field.number(square.denominator))

@@ -220,7 +220,7 @@ def twist(
 def velocity_of(
     robot: RobotLike, pose: PoseLike, twist: ArrayLike, *, on_failure: OnFailure = "raise"
 ) -> PerCoordinate:
-    """Return the pose's derivative that goes with a twist of the platform.
+    """Return the pose's derivative for a twist of the platform.
 
     Parameters
     ----------
@@ -329,6 +329,7 @@ def twist_jacobian(
 
 
 def _expect_form(form: str) -> None:
+    """Raise DataError if a form is not among the known forms."""
     if form not in _SHAPES:
         raise DataError(f"form: {form!r} is none of {', '.join(_SHAPES)}")
 
@@ -369,6 +370,7 @@ def _matrix(robot: Manipulator, rotations: Array, form: RotationForm) -> Array:
 
 
 def _stack_rows(rows: list[list[Array]]) -> Array:
+    """Return a matrix (..., j, k) from rows of arrays (...), broadcast."""
     return np.stack([np.stack(np.broadcast_arrays(*row), axis=-1) for row in rows], axis=-2)
 
 

@@ -121,6 +121,7 @@ def real_poses(closed: Closed, machines: Array) -> RealPoses:
 
 
 def _real_poses(known: Generic, machines: Array, first: int) -> RealPoses:
+    """Return the real poses of machines, by up to `_TRIALS` random turns of each machine."""
     rng = np.random.default_rng(1)
     remaining, move = np.arange(len(machines)), np.zeros(len(machines), dtype=bool)
     which, poses = np.empty(0, dtype=np.int64), np.empty((0, known.closed.size))
@@ -163,6 +164,7 @@ _Step = Callable[[Array, Array], tuple[Array, Array]]
 
 
 def _step(known: Generic) -> _Step:
+    """Return the compiled step along the paths from a known machine."""
     machine = known.machine
     return path_kernel(known.closed, (tuple(machine.real.tolist()), tuple(machine.imag.tolist())))
 
@@ -229,10 +231,12 @@ def _initial_states(z: Array) -> Array:
 
 
 def _parts(z: Complex) -> Array:
+    """Return the real and imaginary parts (..., 2 d) of complex numbers (..., d)."""
     return np.concatenate([z.real, z.imag], axis=-1)
 
 
 def _complex(parts: Array, d: int) -> Complex:
+    """Return complex numbers (..., d) from their parts, the first 2 d columns."""
     return parts[..., :d] + 1j * parts[..., d : 2 * d]
 
 
@@ -334,6 +338,7 @@ def _are_duplicates(which: NDArray[np.int64], z: Array, radius: Array) -> NDArra
 
 
 def _unit_quaternion(rng: np.random.Generator) -> Array:
+    """Return a random unit quaternion (4,), uniform over rotations."""
     drawn = rng.normal(size=4)
     return np.asarray(drawn / np.linalg.norm(drawn))
 

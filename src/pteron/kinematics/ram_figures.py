@@ -82,11 +82,13 @@ def _similar(base: Array, top: Array) -> tuple[Array, float]:
 
 
 def _vanishes(rows: Array, rank: int) -> bool:
+    """Return whether a matrix has a rank of at most `rank`, up to rounding."""
     sigmas = np.linalg.svd(rows, compute_uv=False)
     return bool(sigmas[rank] <= ROUNDING * sigmas[0])
 
 
 def _homogeneous_coordinates(figure: Array) -> Array:
+    """Return the points (n, d) with a leading 1, (n, d + 1)."""
     return np.hstack([np.ones((len(figure), 1)), figure])
 
 

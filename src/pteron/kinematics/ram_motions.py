@@ -16,7 +16,7 @@ from pteron.manipulator import Manipulator
 
 
 def self_motions_of_rams(robot: Manipulator) -> tuple[str, ...]:
-    """Return at which poses a hexapod's platform can move while its rams are held, one line a kind.
+    """Return phrases of the poses at which a hexapod's platform moves with its rams fixed.
 
     It is proved up to rounding of the points.
     """

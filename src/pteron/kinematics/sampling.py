@@ -384,7 +384,7 @@ def _too_small_measures_phrase(robot: Manipulator, sample: _Sample, conditions: 
 
 
 def _rarely_kept_limits_phrase(robot: Manipulator, poses: Array) -> str:
-    """Return a list, as text, of the passive joints that rarely keep their limits at poses."""
+    """Return a phrase that lists the joints which rarely are within their limits at poses."""
     pose, machine = ca.SX.sym("pose", robot.freedom), Machine.numeric(robot)
     angles, *legs = passive_joints(machine, pose)
     if joints_limit_reach(robot):

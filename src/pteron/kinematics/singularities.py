@@ -59,6 +59,8 @@ def best_type_ii(robot: Manipulator) -> float:
 
 
 def _best_type_ii(robot: Manipulator) -> float:
+    """Return the largest type-II measure of poses in reach, by local searches from random poses."""
+
     def measure(poses: Array) -> Array:
         reached = ~np.isnan(numeric(robot, "reach")(poses)[1]).any(axis=-1)
         return np.where(reached, type_ii_sizes(robot, poses), 0.0)

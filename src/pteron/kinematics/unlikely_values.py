@@ -17,7 +17,7 @@ _WOUND = 6.0 * np.pi
 
 
 def unlikely_length(robot: Manipulator) -> float:
-    """Return the length, m, above which one of a pose or a part was likely in millimetres."""
+    """Return the length, m, above which a number is likely in millimetres."""
     return 10.0 * max(
         hypot(*leg.guide_point) + leg.size + hypot(*leg.platform_point) for leg in robot.legs
     )
@@ -60,7 +60,7 @@ def unlikely_values(
 
 
 def _turn(limits: tuple[float, float] | None, least: float) -> float:
-    """Return the angle beyond which degrees are likelier, at least one: more where limits allow."""
+    """Return the angle, rad, beyond which degrees are likelier: `least`, or larger limits."""
     return max((least, *map(abs, limits or ())))
 
 

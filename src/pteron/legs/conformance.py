@@ -91,6 +91,7 @@ def faults(
 
 
 def _joint_faults(at: _LegInMotion) -> Iterator[str]:
+    """Yield the faults of rates, accelerations and rows of coordinate and chain's joints."""
     motion = at.motion
     row = motion.row / motion.divisor
     pairs = {
@@ -126,6 +127,7 @@ def _screw(kind: str, axis: Expression, point: Expression, c: Expression) -> Exp
 
 
 def _body_faults(at: _LegInMotion) -> Iterator[str]:
+    """Yield the faults of the bodies' rows, accelerations and axes against exact derivatives."""
     for letter, body in at.motion.bodies.items():
         velocity = ca.mtimes(body.velocity_row, at.twist)
         turning = ca.mtimes(body.turning_row, at.twist)
@@ -148,6 +150,7 @@ def _body_faults(at: _LegInMotion) -> Iterator[str]:
 
 
 def _force_faults(at: _LegInMotion) -> Iterator[str]:
+    """Yield the faults of `needs` against `needs_of_bodies`, and of its power against energy."""
     state = at.point, at.rotation, at.gravity, at.inertia
     needs, body_needs = at.equations.needs(*state), at.equations.needs_of_bodies(*state)
     point_needs = (
@@ -178,6 +181,7 @@ def _force_faults(at: _LegInMotion) -> Iterator[str]:
 
 
 def _locus_faults(at: _LegInMotion) -> Iterator[str]:
+    """Yield a fault if c is not on the leg's locus at the joint's coordinate."""
     locus, c = at.equations.locus(at.motion.coordinate), at.point.position
     if isinstance(locus, PlaneLocus):
         pair = ca.dot(locus.normal, c), locus.offset

@@ -65,6 +65,7 @@ class CrankLeg(LegKind):
 
     @property
     def quantities(self) -> tuple[LegQuantity, ...]:
+        """The geometry of crank and last link; the angle is the nearest to `middle`, rad."""
         # The crank's angle is the one nearest to the middle of its limits, else in (-pi, pi].
         low, high = self.limits or (0.0, 0.0)
         inside = -math.pi < low and high <= math.pi
@@ -86,13 +87,16 @@ class CrankLeg(LegKind):
 
     @property
     def joint_axis(self) -> Vector:
+        """The unit vector about which the crank turns."""
         return self.direction
 
     @property
     def crank_at_zero(self) -> Vector:
+        """The unit vector along which the crank points at angle 0."""
         return self.zero_direction
 
     def zero_at(self, zero: float) -> dict[str, Any]:
+        """Return the `zero_direction` for which the crank's angle counts from `zero`, rad."""
         return {"zero_direction": self._direction_at(zero)}
 
     def _direction_at(self, angle: float) -> Vector:
@@ -104,14 +108,17 @@ class CrankLeg(LegKind):
 
     @property
     def lever(self) -> float:
+        """The crank's length, m: the metres that its end moves per rad."""
         return self.upper_length
 
     @property
     def reach_bound(self) -> ReachBound:
+        """A ball about the guide point, with the sum of the links' lengths as its radius, m."""
         return ReachBound(self.guide_point, None, self.size)
 
     @property
     def extents(self) -> dict[str, tuple[str, float, float, str]]:
+        """The usual range of x of the centres of mass of crank and last link, m."""
         last = self.names["l"]
         return {
             "u": ("upper", 0.0, self.upper_length, f"its axis and the {last}"),
@@ -119,6 +126,7 @@ class CrankLeg(LegKind):
         }
 
     def transfers(self, gravity: Vector) -> tuple[LegTransfer, ...]:
+        """Return the transfers of a crank on a fixed axis and of the joint between both links."""
         last = self.names["l"]
         transfer_list = [
             LegTransfer("the crank{} turns about a fixed axis", {("m", "u"): (1, ())}),
@@ -223,6 +231,7 @@ class CrankEquations(LegEquations):
         return v if v.shape[0] == 3 else ca.mtimes(self.plane, v)
 
     def motion(self, point: PointMotion, rotation: RotationMotion) -> LegMotion:
+        """Return the motion of the leg; q' = row (c', omega) / (b . g), the crank's rate, rad/s."""
         at = self.state(point)
         l_u, g, b = (self.to_base_frame(v) for v in (at.l_u, at.g, at.b))
         full, square = point_rows(b.T), at.rate * at.rate
@@ -250,6 +259,7 @@ class CrankEquations(LegEquations):
         )
 
     def exported_terms(self, point: PointMotion, rotation: RotationMotion) -> dict[str, Expression]:
+        """Return the closure's named terms w, u, n2, h, quarter, root, and the crank's vectors."""
         w, at = point.position - self.r, self.state(point)
         u, h, quarter = self._triangle(w)
         n2, root = ca.dot(u, u), ca.sqrt(quarter)
@@ -258,6 +268,7 @@ class CrankEquations(LegEquations):
         return {**closing, **crank, "theta_rate2": at.rate * at.rate}
 
     def reach(self, c: Expression) -> Reach:
+        """Return the reach by the least and greatest distance of c from the crank's circle."""
         w = c - self.r
         u, _, quarter = self._triangle(w)
         near, far = (ca.sqrt(square) for square in self._distances(w))
@@ -271,6 +282,7 @@ class CrankEquations(LegEquations):
         return (n - self.lu) ** 2 + height**2, (n + self.lu) ** 2 + height**2
 
     def edges(self, c: Expression) -> dict[str, Expression]:
+        """Return the margins of ll^2, m^2, to the squared distances of c from the circle."""
         near, far = self._distances(c - self.r)
         longest = self.ll * self.ll
         return {"stretched": longest - near, "folded": far - longest}
@@ -304,6 +316,7 @@ class CrankEquations(LegEquations):
         return ca.cos(turn) * self.zero + ca.sin(turn) * quarter_turn(self.zero)
 
     def lever(self, length: Expression) -> Expression:
+        """Return the crank's length, m per rad."""
         return self.lu
 
     def tip(self, q: Expression) -> Expression:

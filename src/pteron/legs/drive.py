@@ -76,7 +76,7 @@ class LuGre:
 
 @dataclass(frozen=True)
 class Elastic:
-    """A transmission that bends between motor and joint: k d + c d' of what it is bent, d.
+    """An elastic transmission between motor and joint: force k d + c d' at a deflection d.
 
     Parameters
     ----------

@@ -68,6 +68,7 @@ def _drive_number(drive: Drive | None, place: str) -> float | None:
 
 
 def _units(leg: LegKind) -> dict[str, str]:
+    """Return the units of a leg's drive numbers by quantity, linear or rotary."""
     slides = leg.joint.unit == "m"
     return {
         "joint": leg.joint.unit,

@@ -86,6 +86,7 @@ def keys_of(*groups: str) -> dict[str, Key]:
 
 
 def _key(*, default: Any = ..., optional: bool = False, **about: Any) -> Key:
+    """Return a key from its TOML entry; the default of an optional key is None."""
     default_value = tuple(default) if isinstance(default, list) else default
     return Key(**about, default=None if optional else default_value)
 

@@ -40,6 +40,7 @@ search makes thousands of machines and a chain does not depend on a leg's number
 
 @lru_cache(maxsize=64)
 def _chain_breaches(leg: LegKind, axes: tuple[Vector, ...]) -> tuple[str, ...]:
+    """Return the breaches in a leg's bodies and driven joint; () also if no point is in reach."""
     motion = _motion(leg, axes)
     if motion is None:
         return ()  # nowhere in reach, which is reported where a pose is used
@@ -107,4 +108,5 @@ def _driven_joint_breaches(leg: LegKind, motion: LegMotion) -> Iterator[str]:
 
 
 def _numbers(row: Expression) -> NDArray[np.float64]:
+    """Return the values of a constant row (1, n) as floats (n,)."""
     return np.asarray(ca.DM(ca.evalf(ca.densify(row)))).ravel()

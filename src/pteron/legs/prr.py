@@ -31,6 +31,7 @@ from pteron.legs.slide import SlideEquations, SlideLeg, SlideState
 
 
 def _check_elbow(limits: tuple[float, float] | None) -> None:
+    """Raise ModelError if limits of the elbow's angle exceed -pi/2 to pi/2."""
     check_elbow(limits, -0.5 * math.pi, 0.5 * math.pi)
 
 
@@ -57,6 +58,7 @@ class PRR(SlideLeg):
     def passive_joints(
         self, motion: LegMotion, zero_axes: Expression, axes: Expression
     ) -> list[Passive]:
+        """Return the joint of slider and link if it has limits; its angle is 0 along the slider."""
         # The branch keeps the link ahead of the slider along sigma e.
         ahead, link = self.elbow * ca.SX(ca.vertcat(*self.slider_direction)), motion.links[1]
         sideways = ca.cross(ca.SX(ca.vertcat(*self.plane_normal)), ahead)
@@ -64,6 +66,7 @@ class PRR(SlideLeg):
         return joint_limit("link", "rad", angle, self.elbow_limits, self.lower_length)
 
     def with_platform_frame(self, frame: Sequence[Vector]) -> Self:
+        """Return the leg with a missing `direction`, its plane's normal: the platform's z."""
         if self.direction is not None:
             return self
         axis = frame[2]
@@ -72,6 +75,7 @@ class PRR(SlideLeg):
 
     @property
     def quantities(self) -> tuple[LegQuantity, ...]:
+        """The geometry of slider and link in their plane."""
         d = self.plane_normal
         return (
             LegQuantity("guide_point", "point", self.guide_point),
@@ -84,14 +88,17 @@ class PRR(SlideLeg):
 
     @property
     def plane_normal(self) -> Vector:
+        """The unit normal of the plane in which the leg moves."""
         assert self.direction is not None  # the manipulator has given it
         return self.direction
 
     def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
+        """Return the plane's normal, about which the leg leaves the platform free to turn."""
         return (self.plane_normal,)
 
     @classmethod
     def random_link(cls, values: Mapping[str, Sequence[Fraction]], rng: Random) -> list[Fraction]:
+        """Return the link in a random direction of the leg's plane (3,), in fractions."""
         a, (x, y) = values["plane_axis"], random_vector(values["lower_length"][0], 2, rng)
         return [x * p + y * q for p, q in zip(a, cross(values["direction"], a), strict=True)]
 
@@ -107,9 +114,11 @@ class PRREquations(SlideEquations):
         self.plane = plane_of(direction, plane_axis)
 
     def to_link_space(self, v: Expression) -> Expression:
+        """Return the components (2, K) of a vector (3, K) in the leg's plane."""
         return ca.mtimes(self.plane.T, v)
 
     def to_base_frame(self, v: Expression) -> Expression:
+        """Return a vector (2, K) of the leg's plane in the base frame (3, K)."""
         return ca.mtimes(self.plane, v)
 
     def link(
@@ -130,6 +139,7 @@ class PRREquations(SlideEquations):
         return body, joints, (turning.rate, turning.acceleration)
 
     def locus(self, q: Expression) -> CircleLocus:
+        """Return the circle of c about the slider at q, m; its radius is the link's length."""
         return CircleLocus(self.r + q * self.e, self.ll)
 
     def needs(

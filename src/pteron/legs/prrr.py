@@ -58,6 +58,7 @@ _LEAST_SLIDE = 1e-6
 
 
 def _check_slide(e: Vector | None, d: Vector) -> None:
+    """Raise ModelError if the slider's axis e is perpendicular to the revolute axes d."""
     if e is not None and abs(dot(d, e)) < _LEAST_SLIDE:
         raise ModelError(
             f"slider_direction: {list(e)} is perpendicular to direction {list(d)}, so that the "
@@ -104,11 +105,12 @@ class PRRR(LegKind):
 
     @property
     def e(self) -> Vector:
-        """The slider's direction, also where it was left to its default."""
+        """The slider's direction; `direction` by default."""
         return self.slider_direction or self.direction
 
     @property
     def quantities(self) -> tuple[LegQuantity, ...]:
+        """The geometry of slider and links."""
         return (
             LegQuantity("guide_point", "point", self.guide_point),
             LegQuantity("direction", "direction", self.direction, "d"),
@@ -120,39 +122,47 @@ class PRRR(LegKind):
         )
 
     def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
+        """Return the axes of R3 and, if the platform turns, of the joint along its axis."""
         return (self.direction,) if axis is None else (self.direction, axis)
 
     def passive_joints(
         self, motion: LegMotion, zero_axes: Expression, axes: Expression
     ) -> list[Passive]:
+        """Return the elbow R2 if it has limits; its angle between the links is in rad."""
         angle = angle_between(*motion.links)
         return joint_limit("elbow", "rad", angle, self.elbow_limits, self.lower_length)
 
     @property
     def joint_axis(self) -> Vector:
+        """The unit vector along which the slider moves."""
         return self.e
 
     def zero_at(self, zero: float) -> dict[str, Any]:
+        """Return the `guide_point` for which the slider's coordinate counts from `zero`, m."""
         return {"guide_point": shift_point(self.guide_point, self.e, zero)}
 
     @property
     def reach_bound(self) -> ReachBound:
+        """A cylinder about the slider's line through the guide point, m."""
         slant = abs(dot(self.direction, self.e))
         return ReachBound(self.guide_point, self.e, self.size / slant)
 
     @property
     def reach_text(self) -> str:
+        """The range of both links' span, as a clause for messages."""
         shortest = abs(self.upper_length - self.lower_length)
         return f"its links span {shortest:.4g} to {self.size:.4g} m across direction"
 
     @property
     def extents(self) -> dict[str, tuple[str, float, float, str]]:
+        """The usual range of x of both links' centres of mass, m."""
         return {
             "u": ("upper", 0.0, self.upper_length, "R1, where it begins, and R2"),
             "l": ("lower", -self.lower_length, 0.0, "R2 and R3, where its x is zero"),
         }
 
     def transfers(self, gravity: Vector) -> tuple[LegTransfer, ...]:
+        """Return the transfers between slider and upper link, and at the elbow of both links."""
         transfer_list = [
             LegTransfer(
                 "slider and upper link{} move as one along the guide",
@@ -243,6 +253,7 @@ class PRRREquations(LegEquations):
         return _PlanarLinks(l_u, l_l, rows, upper, lower, ddu)
 
     def motion(self, point: PointMotion, rotation: RotationMotion) -> LegMotion:
+        """Return the motion of the leg; rho' = d_bar . c', so that its row is constant."""
         at = self._state(point)
         rho = ca.dot(self.d_bar, point.position - self.r)  # Eq. (4)
         rate, sliding = (ca.dot(self.d_bar, v) for v in (point.velocity, point.acceleration))
@@ -265,6 +276,7 @@ class PRRREquations(LegEquations):
         return LegMotion(rho, rate, sliding, row, ca.SX(1), bodies, chain, links, angles)
 
     def exported_terms(self, point: PointMotion, rotation: RotationMotion) -> dict[str, Expression]:
+        """Return the closure's named terms, and those of each link's rate and acceleration."""
         at = self._state(point)
         u = at.l_u + at.l_l
         delta = squared_reach(self.lu, self.ll, ca.dot(u, u))
@@ -283,17 +295,20 @@ class PRRREquations(LegEquations):
         return {**terms, "v": v}
 
     def reach(self, c: Expression) -> Reach:
+        """Return the reach: both links span from |lu - ll| to lu + ll across d, m."""
         u = ca.mtimes(self.projection, c - self.r)
         n, delta = ca.sqrt(ca.dot(u, u)), squared_reach(self.lu, self.ll, ca.dot(u, u))
         margin = ca.fmin(self.lu + self.ll - n, n - ca.fabs(self.lu - self.ll))
         return Reach(margin, delta, (2 * self.lu * self.ll) ** 2, n)
 
     def edges(self, c: Expression) -> dict[str, Expression]:
+        """Return the conditions of a closed triangle; zero where links are stretched or folded."""
         u = ca.mtimes(self.projection, c - self.r)
         stretched, folded = edges_of_reach(self.lu, self.ll, ca.dot(u, u))
         return {"stretched": stretched, "folded": folded}
 
     def locus(self, q: Expression) -> PlaneLocus:
+        """Return the plane of c, d_bar . c = q + d_bar . r, which the links do not change."""
         size = ca.fabs(q) + ca.dot(ca.fabs(self.d_bar), ca.fabs(self.r))
         return PlaneLocus(self.d_bar, q + ca.dot(self.d_bar, self.r), size)
 

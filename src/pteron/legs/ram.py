@@ -17,6 +17,7 @@ _CYLINDER = 0.9
 
 
 def _check_limits(limits: tuple[float, float]) -> None:
+    """Raise ModelError if the least length of a ram, m, is not above 0."""
     if limits[0] <= 0.0:
         raise ModelError(f"limits: least length {limits[0]:g} m given; a ram is longer than 0")
 
@@ -44,22 +45,27 @@ class RamLeg(LegKind):
 
     @property
     def cylinder(self) -> float:
+        """The length of the cylinder in pictures, m: a constant share of the ram's least length."""
         return _CYLINDER * self.limits[0]
 
     @property
     def size(self) -> float:
+        """The ram's greatest length, m."""
         return self.limits[1]
 
     @property
     def reach_bound(self) -> ReachBound:
+        """A ball about the guide point, with the ram's greatest length as its radius, m."""
         return ReachBound(self.guide_point, None, self.limits[1])
 
     @property
     def reach_text(self) -> str:
+        """Why a ram does not reach a point, as a clause for messages: its ends coincide."""
         return "its ram has no length"
 
     @property
     def extents(self) -> dict[str, tuple[str, float, float, str]]:
+        """The usual range of x of the centres of mass of cylinder and piston, m."""
         shortest = self.limits[0]
         return {
             "u": ("upper", 0.0, shortest, "the joint on the base and the shortest ram's end"),

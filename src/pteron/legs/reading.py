@@ -11,7 +11,7 @@ from pteron.toml import keep_checked
 
 @dataclass(frozen=True)
 class Reading:
-    """The relation of a joint's coordinate to what its drive reads: q = zero + scale reading.
+    """The relation of a joint's coordinate to its drive's reading: q = zero + scale reading.
 
     Calibration writes it where the leg's geometry cannot take a zero or a scale.
 
@@ -31,6 +31,7 @@ class Reading:
 
 
 def _not_zero(value: object, key: str) -> float:
+    """Return a number converted to float; raise ModelError if it is 0."""
     converted = number(value, key)
     if converted == 0.0:
         raise ModelError(f"{key}: 0 given, another number expected")

@@ -48,10 +48,12 @@ class RPR(RamLeg):
     keys: ClassVar = keys_of("ram", "RPR")
 
     def with_platform_frame(self, frame: Sequence[Vector]) -> Self:
+        """Return the leg with a missing `direction`, its plane's normal: the platform's z."""
         return self if self.direction is not None else replace(self, direction=frame[2])
 
     @property
     def quantities(self) -> tuple[LegQuantity, ...]:
+        """The geometry of the ram's plane; its length is its coordinate."""
         d = self.plane_normal
         return (
             LegQuantity("guide_point", "point", self.guide_point),
@@ -62,13 +64,16 @@ class RPR(RamLeg):
 
     @property
     def plane_normal(self) -> Vector:
+        """The unit normal of the plane in which the ram turns."""
         assert self.direction is not None  # the manipulator has given it
         return self.direction
 
     def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
+        """Return the plane's normal, about which the leg leaves the platform free to turn."""
         return (self.plane_normal,)
 
     def transfers(self, gravity: Vector) -> tuple[LegTransfer, ...]:
+        """Return the transfers of a cylinder on a fixed axis and of two bodies that turn alike."""
         transfer_list = [
             LegTransfer("the cylinder{} turns about a fixed axis", {("m", "u"): (1, ())}),
             LegTransfer(
@@ -140,6 +145,7 @@ class RPREquations(LegEquations):
         return _Ram(w, length, n, rate, turning, ca.dot(n, ddw) + length * swing * swing)
 
     def motion(self, point: PointMotion, rotation: RotationMotion) -> LegMotion:
+        """Return the motion of cylinder, piston and their joints; L' = n . c'."""
         at = self._ram(point)
         n = ca.mtimes(self.plane, at.n)
         row, fixed = point_rows(n.T), (self.r, ca.SX(3, 6), ca.SX(3, 1))
@@ -160,16 +166,19 @@ class RPREquations(LegEquations):
         )
 
     def exported_terms(self, point: PointMotion, rotation: RotationMotion) -> dict[str, Expression]:
+        """Return the named terms w, length, n and theta_rate, the ram's rate about d, rad/s."""
         at = self._ram(point)
         return {"w": at.w, "length": at.length, "n": at.n, "theta_rate": at.turning.rate}
 
     def reach(self, c: Expression) -> Reach:
+        """Return the reach: the ram's length, zero only where c is at the guide point."""
         w = ca.mtimes(self.plane.T, c - self.r)
         square = ca.dot(w, w)
         length = ca.sqrt(square)
         return Reach(length, square, square, length)
 
     def locus(self, q: Expression) -> CircleLocus:
+        """Return the circle of c about the guide point; its radius is the ram's length q, m."""
         return CircleLocus(self.r, q)
 
     def needs(

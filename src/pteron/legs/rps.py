@@ -31,11 +31,13 @@ class RPS(RPR):
     keys: ClassVar = {**RPR.keys, **keys_of("ball")}
 
     def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
+        """Return three axes: the ball joint leaves every rotation of the platform free."""
         return every_axis()
 
     def passive_joints(
         self, motion: LegMotion, zero_axes: Expression, axes: Expression
     ) -> list[Passive]:
+        """Return the ball joint at the platform, if it has a cone."""
         return ball_cone(self.platform_cone, motion, axes, self.limits[1])
 
 

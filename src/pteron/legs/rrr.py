@@ -43,20 +43,24 @@ class RRR(CrankLeg):
     conditions = (FieldCondition(("elbow_limits",), check_elbow),)
 
     def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
+        """Return the revolute axis, about which the leg leaves the platform free to turn."""
         return (self.direction,)
 
     def passive_joints(
         self, motion: LegMotion, zero_axes: Expression, axes: Expression
     ) -> list[Passive]:
+        """Return the elbow if it has limits; its angle between the links is in rad."""
         angle = angle_between(*motion.links)
         return joint_limit("elbow", "rad", angle, self.elbow_limits, self.lower_length)
 
     @property
     def plane_normal(self) -> Vector:
+        """The unit normal of the plane in which the links turn."""
         return self.direction
 
     @property
     def reach_text(self) -> str:
+        """The range of both links' span, as a clause for messages."""
         shortest = abs(self.upper_length - self.lower_length)
         return f"its links span {shortest:.4g} to {self.size:.4g} m"
 
@@ -74,12 +78,15 @@ class RRREquations(CrankEquations):
     kinds: ClassVar = {"u": PlanarInertia.kinds, "l": PlanarInertia.kinds}
 
     def to_link_space(self, v: Expression) -> Expression:
+        """Return the components (2, K) of a vector (3, K) in the crank's plane."""
         return ca.mtimes(self.plane.T, v)
 
     def plane_to_link_space(self, v: Expression) -> Expression:
+        """Return the vector (2, K) itself: the last link moves in the crank's plane."""
         return v
 
     def height(self, w: Expression) -> Expression:
+        """Return 0: c stays in the crank's plane."""
         return ca.SX(0)
 
     def last_link(
@@ -103,6 +110,7 @@ class RRREquations(CrankEquations):
         return body, joints, (lower.rate, lower.acceleration)
 
     def locus(self, q: Expression) -> CircleLocus:
+        """Return the circle of c about the crank's end at q, rad; its radius is the last link."""
         return CircleLocus(self.tip(q), self.ll)
 
 

@@ -31,11 +31,13 @@ class RRS(RRR):
     keys: ClassVar = {**RRR.keys, **keys_of("ball")}
 
     def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
+        """Return three axes: the ball joint leaves every rotation of the platform free."""
         return every_axis()
 
     def passive_joints(
         self, motion: LegMotion, zero_axes: Expression, axes: Expression
     ) -> list[Passive]:
+        """Return the joints that have limits: the elbow, and the ball joint at the platform."""
         inherited = super().passive_joints(motion, zero_axes, axes)
         return [*inherited, *ball_cone(self.platform_cone, motion, axes, self.lower_length)]
 

@@ -30,6 +30,7 @@ from pteron.legs.rods import (
 
 
 def _check_bar(bar: Vector | None, direction: Vector) -> None:
+    """Raise ModelError if the rods' bar is not along the crank's axis."""
     if bar is not None and not parallel(bar, direction):
         raise ModelError(
             f"bar_direction: {list(bar)} is not along direction {list(direction)}, so that the "
@@ -56,14 +57,17 @@ class RSS(RodLeg, CrankLeg):
 
     @property
     def bar(self) -> Vector | None:
+        """The crank's axis, along which parallel rods are apart; None for a single rod."""
         return self.direction if self.rods > 1 else None
 
     def tip_axes(self, motion: LegMotion) -> Expression:
+        """Return the crank's axes x, y and d as columns (3, 3)."""
         crank = motion.bodies["u"]
         return ca.horzcat(crank.x, crank.y, crank.axes)
 
     @property
     def reach_text(self) -> str:
+        """The lengths of rod and crank, as a clause for messages."""
         return (
             f"its rod of {self.lower_length:.4g} m starts from the circle of a crank of "
             f"{self.upper_length:.4g} m"
@@ -89,17 +93,21 @@ class RSSEquations(CrankEquations):
     kinds: ClassVar = {"u": PlanarInertia.kinds, "l": RodInertia.kinds}
 
     def to_link_space(self, v: Expression) -> Expression:
+        """Return the vector (3, K) itself: the rod moves in space."""
         return v
 
     def plane_to_link_space(self, v: Expression) -> Expression:
+        """Return a vector (2, K) of the crank's plane in the base frame (3, K)."""
         return ca.mtimes(self.plane, v)
 
     def height(self, w: Expression) -> Expression:
+        """Return the signed distance of c from the crank's plane, m; w = c - r."""
         return ca.dot(w, self.d)
 
     def last_link(
         self, point: PointMotion, rotation: RotationMotion, at: CrankState, crank: Joint
     ) -> tuple[BodyMotion, list[Joint], None]:
+        """Return the rod's motion and the axes of its universal joints; no turning in a plane."""
         l_u, g = (ca.mtimes(self.plane, v) for v in (at.l_u, at.g))
         rides, square = point_rows(ca.SX.eye(3)), at.rate * at.rate
         swing = (rides - ca.mtimes(g, crank.row)) / self.ll
@@ -111,6 +119,7 @@ class RSSEquations(CrankEquations):
         return rod_body(point, n, ddn, swing), joints, None
 
     def locus(self, q: Expression) -> SphereLocus:
+        """Return the sphere of c about the crank's end at q, rad; its radius is the rod."""
         return SphereLocus(self.tip(q), self.ll)
 
 

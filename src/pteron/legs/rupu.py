@@ -42,11 +42,13 @@ _FAST = 10.0
 
 
 def _check_ratio(ratio: float) -> None:
+    """Raise ModelError if the ratio is 0."""
     if ratio == 0.0:
         raise ModelError("ratio: 0 given; the joint would not turn the platform")
 
 
 def _check_travel(travel: tuple[float, float] | None) -> None:
+    """Raise ModelError if the travel's least length, m, is negative."""
     if travel is not None and travel[0] < 0.0:
         raise ModelError(f"travel: {travel[0]:g} m given, but no length is below 0; give 0 or more")
 
@@ -84,6 +86,7 @@ class RUPU(LegKind):
     )
 
     def with_platform_frame(self, frame: Sequence[Vector]) -> Self:
+        """Return the leg with its `direction` checked, or filled in from the platform's axis."""
         axis = frame[2]
         if self.direction is None:
             return replace(self, direction=axis)
@@ -102,6 +105,7 @@ class RUPU(LegKind):
 
     @property
     def quantities(self) -> tuple[LegQuantity, ...]:
+        """The geometry of the shaft: base point, axis and ratio."""
         d = self.joint_axis
         return (
             LegQuantity("guide_point", "point", self.guide_point),
@@ -112,14 +116,17 @@ class RUPU(LegKind):
         )
 
     def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
+        """Return three axes: the shaft constrains no rotation but through its drive."""
         return (1, 0, 0), (0, 1, 0), (0, 0, 1)
 
     def passive_joints(
         self, motion: LegMotion, zero_axes: Expression, axes: Expression
     ) -> list[Passive]:
+        """Return the telescope, m, if the file limits its travel."""
         return joint_limit("shaft", "m", ca.norm_2(motion.links[1]), self.travel, 1.0)
 
     def unlikely_values(self, axis: Vector | None) -> Iterator[str]:
+        """Yield warnings about a ratio far from 1 and centres of mass beyond the shaft's ends."""
         if not 1.0 / _FAST <= abs(self.ratio) <= _FAST:
             yield (
                 f"ratio: {self.ratio:g} rad of the joint per rad of phi: is that the motor's gear? "
@@ -132,18 +139,22 @@ class RUPU(LegKind):
 
     @property
     def metres(self) -> dict[str, Sequence[float]]:
+        """Its lengths, m, by key: those of every leg, and the telescope's travel."""
         return {**super().metres, **({} if self.travel is None else {"travel": self.travel})}
 
     @property
     def joint_axis(self) -> Vector:
+        """The platform's axis, about which the shaft turns it, a unit vector."""
         assert self.direction is not None  # the manipulator has given it
         return self.direction
 
     @property
     def reach_text(self) -> str:
+        """Why a shaft does not reach a point, as a clause for messages: its ends coincide."""
         return "its shaft has no length"
 
     def transfers(self, gravity: Vector) -> tuple[LegTransfer, ...]:
+        """Return the transfers of a shaft that swings about a fixed point."""
         swing = {("I", "u"): (1, ()), ("I", "l"): (-1, ())}
         transfer_list = [
             LegTransfer("the shaft{} swings about a fixed point", {("m", "u"): (1, ())}),
@@ -180,6 +191,7 @@ class RUPUEquations(LegEquations):
         self.r, self.d, self.hinge, self.ratio = guide_point, direction, plane_axis, ratio
 
     def motion(self, point: PointMotion, rotation: RotationMotion) -> LegMotion:
+        """Return the motion of shaft and joints; its coordinate is ratio times phi."""
         (turn,) = rotation.turns  # the manipulator has asked for one
         w = point.position - self.r
         length = ca.sqrt(ca.dot(w, w))
@@ -251,15 +263,18 @@ class RUPUEquations(LegEquations):
         return Needs(ca.SX(1, swing.shape[1]), force_wrench(force), inertia["l"].m)
 
     def reach(self, c: Expression) -> Reach:
+        """Return the reach: the shaft's length, zero only where c is at the guide point."""
         w = c - self.r
         square = ca.dot(w, w)
         length = ca.sqrt(square)
         return Reach(length, square, square, length)
 
     def lever(self, length: Expression) -> Expression:
+        """Return the platform's characteristic length over |ratio|, m per rad of the joint."""
         return length / ca.fabs(self.ratio)
 
     def locus(self, q: Expression) -> AngleLocus:
+        """Return the platform's angle q / ratio, rad; c may be anywhere."""
         return AngleLocus(q / self.ratio)
 
 

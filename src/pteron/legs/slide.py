@@ -52,25 +52,31 @@ class SlideLeg(LegKind):
 
     @property
     def joint_axis(self) -> Vector:
+        """The unit vector along which the slider moves."""
         return self.slider_direction
 
     def zero_at(self, zero: float) -> dict[str, Any]:
+        """Return the `guide_point` for which the slider's coordinate counts from `zero`, m."""
         return {"guide_point": shift_point(self.guide_point, self.slider_direction, zero)}
 
     @property
     def reach_bound(self) -> ReachBound:
+        """A cylinder about the slider's line, with the link's length as its radius, m."""
         return ReachBound(self.guide_point, self.slider_direction, self.size)
 
     @property
     def reach_text(self) -> str:
+        """The link's length, as a clause for messages."""
         return f"its {self.names['l']} reaches {self.lower_length:.4g} m from the guide"
 
     @property
     def extents(self) -> dict[str, tuple[str, float, float, str]]:
+        """The usual range of x of the link's centre of mass, m."""
         ends = "slider and platform, where its x is zero"
         return {"l": ("lower", -self.lower_length, 0.0, ends)}
 
     def transfers(self, gravity: Vector) -> tuple[LegTransfer, ...]:
+        """Return the transfer of mass between slider and link at their joint."""
         entries = {
             ("m", "p"): (1, ()),
             ("m", "l"): (-1, ()),
@@ -167,6 +173,7 @@ class SlideEquations(LegEquations):
         return SlideState(w, q, b, divisor, rate, (ca.dot(b, ddw) + ca.dot(db, db)) / divisor)
 
     def motion(self, point: PointMotion, rotation: RotationMotion) -> LegMotion:
+        """Return the motion of slider, link and their joints; (b . e) q' = b . c'."""
         at = self.state(point)
         b = self.to_base_frame(at.b)
         full = point_rows(b.T)
@@ -189,10 +196,12 @@ class SlideEquations(LegEquations):
         )
 
     def exported_terms(self, point: PointMotion, rotation: RotationMotion) -> dict[str, Expression]:
+        """Return the closure's named terms w, h, square and root, and the link b."""
         w, h, square = self._closure_terms(point.position)
         return {"w": w, "h": h, "square": square, "root": ca.sqrt(square), "b": self.state(point).b}
 
     def reach(self, c: Expression) -> Reach:
+        """Return the reach by the distance of c from the guide, at most the link's length."""
         _, _, square = self._closure_terms(c)
         far = ca.sqrt(self.ll * self.ll - square)
         return Reach(self.ll - far, square, self.ll * self.ll, self.ll)

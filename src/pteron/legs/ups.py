@@ -62,6 +62,7 @@ class UPS(RamLeg):
     keys: ClassVar = keys_of("ram", "UPS")
 
     def with_platform_frame(self, frame: Sequence[Vector]) -> Self:
+        """Return the leg with a missing `direction`: the platform's x or y across the ram."""
         if self.direction is not None:
             return self
         way = [a - b for a, b in zip(self.platform_point, self.guide_point, strict=True)]
@@ -71,6 +72,7 @@ class UPS(RamLeg):
 
     @property
     def quantities(self) -> tuple[LegQuantity, ...]:
+        """The geometry of the ram's joint with the base; its length is its coordinate."""
         assert self.direction is not None  # the manipulator has given it
         return (
             LegQuantity("guide_point", "point", self.guide_point),
@@ -79,15 +81,18 @@ class UPS(RamLeg):
         )
 
     def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
+        """Return three axes: the ball joint leaves every rotation of the platform free."""
         return (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 
     @property
     def base_axis(self) -> Vector | None:
+        """The first axis of the universal joint on the base, a unit vector."""
         return self.direction
 
     def passive_joints(
         self, motion: LegMotion, zero_axes: Expression, axes: Expression
     ) -> list[Passive]:
+        """Return the joints at the ram's ends that have cones."""
         (_, way), length = motion.links, self.limits[1]
         assert way is not None
         return [
@@ -96,9 +101,11 @@ class UPS(RamLeg):
         ]
 
     def rod_couple(self, motion: LegMotion) -> Expression:
+        """Return a zero couple (3, 1): a ram transmits a force along itself alone."""
         return ca.SX(3, 1)
 
     def transfers(self, gravity: Vector) -> tuple[LegTransfer, ...]:
+        """Return the transfers of a cylinder on a fixed point and of two bodies that turn alike."""
         return (
             LegTransfer("the cylinder{} turns about a fixed point", {("m", "u"): (1, ())}),
             LegTransfer(
@@ -137,6 +144,7 @@ class UPSEquations(LegEquations):
         self.r, self.d = guide_point, direction
 
     def change_frame(self, axes: Expression, origin: Expression) -> UPSEquations:
+        """Return the leg in axes that are the columns of (3, 3), about an origin (3, 1)."""
         guide = ca.mtimes(axes.T, self.r) - ca.mtimes(axes.T, origin)
         return UPSEquations(guide, ca.mtimes(axes.T, self.d), ca.SX(1))
 
@@ -157,6 +165,7 @@ class UPSEquations(LegEquations):
         return _Ram(length, rate, growth, n, dn, ddn, swing)
 
     def motion(self, point: PointMotion, rotation: RotationMotion) -> LegMotion:
+        """Return the motion of cylinder, piston and their joints; L' = n . c'."""
         at = self._ram(point)
         row, unit = point_rows(at.n.T), ca.SX(1)
         turning = ca.mtimes(ca.skew(at.n), at.swing)
@@ -175,16 +184,19 @@ class UPSEquations(LegEquations):
         )
 
     def exported_terms(self, point: PointMotion, rotation: RotationMotion) -> dict[str, Expression]:
+        """Return the named terms w, length, n and dn, the ram's direction and its rate."""
         at = self._ram(point)
         return {"w": point.position - self.r, "length": at.length, "n": at.n, "dn": at.dn}
 
     def reach(self, c: Expression) -> Reach:
+        """Return the reach: the ram's length, zero only where c is at the guide point."""
         w = c - self.r
         square = ca.dot(w, w)
         length = ca.sqrt(square)
         return Reach(length, square, square, length)
 
     def locus(self, q: Expression) -> SphereLocus:
+        """Return the sphere of c about the guide point; its radius is the ram's length q, m."""
         return SphereLocus(self.r, q)
 
     def needs(

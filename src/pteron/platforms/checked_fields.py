@@ -41,6 +41,7 @@ def checked_fields(platform: Any) -> tuple[dict[str, Any], list[str]]:
 
 
 def _axes(platform: Any) -> dict[str, Any]:
+    """Return the platform's `axis` and `x_axis`, unit vectors; ModelError if they are not valid."""
     axis = unit_vector(platform.axis, "axis")
     if platform.x_axis is not None and platform.motion == "2R":
         raise ModelError(
@@ -57,6 +58,7 @@ def _axes(platform: Any) -> dict[str, Any]:
 
 
 def _limits(platform: Any) -> dict[str, Any]:
+    """Return the angles' `limits`, checked, rad: a pair, or a pair per angle where it tilts."""
     if platform.limits is None:
         return {}
     if not platform.angles:
@@ -76,6 +78,7 @@ def _limits(platform: Any) -> dict[str, Any]:
 
 
 def _tool(platform: Any) -> dict[str, Any]:
+    """Return the `tool`, checked as a vector."""
     return {"tool": vector(platform.tool, "tool")}
 
 

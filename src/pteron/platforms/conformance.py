@@ -62,6 +62,7 @@ def faults(platform: Platform, seed: int = 0) -> tuple[str, ...]:
 
 
 def _motion_faults(motion: PlatformMotion, rates: Expression) -> Iterator[str]:
+    """Yield the faults of axes, turns, points and matrices against exact derivatives."""
     omega = sum((turn.rate * turn.axis for turn in motion.rotation.turns), ca.SX(3, 1))
     turned = ca.mtimes(ca.skew(omega), motion.axes)
     pairs = {"axes: do not turn with the angular velocity": (rate_of(motion.axes), turned)}
@@ -99,6 +100,7 @@ def _force_faults(
     gravity: Expression,
     rows: list[Expression],
 ) -> Iterator[str]:
+    """Yield the faults of `needs`, the mass matrix and point masses, by energy and its rate."""
     inertia = equations.moments(rows)
     mass = equations.mass_matrix(motion, inertia)
     energy = 0.5 * ca.bilin(mass, rates, rates)

@@ -114,6 +114,7 @@ class PlatformMotion(NamedTuple):
 
     @property
     def _angular_inverse(self) -> Expression:
+        """The inverse of the angles' matrix E, (3, 3), by its adjugate."""
         a, b, c = ca.horzsplit(self.angular)
         adj = ca.horzcat(ca.cross(b, c), ca.cross(c, a), ca.cross(a, b))
         return adj.T / ca.dot(a, adj[:, 0])
@@ -235,7 +236,7 @@ class PlatformEquations(ABC):
         return wrench
 
     def constraint(self, motion: PlatformMotion) -> Expression | None:
-        """Return the constraint measure of what constrains freedoms outside the pose.
+        """Return the constraint measure of the freedoms outside the pose.
 
         It is 1 at best, 0 where a freedom is unconstrained; None where the legs' couples do it.
         """

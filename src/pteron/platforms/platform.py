@@ -328,6 +328,7 @@ class Platform:
     def _place_tilting(
         self, poses: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return places (..., 3), m, and axes (..., 3, 3) of poses of a platform that tilts."""
         shape = poses.shape[:-1]
         if not poses.size:
             return np.empty((*shape, 3)), np.empty((*shape, 3, 3))
@@ -478,4 +479,5 @@ def _rest_motion(platform: Platform, pose: ca.SX) -> PlatformMotion:
 
 
 def _column(vector: Sequence[float]) -> ca.SX:
+    """Return a vector as a constant column (n, 1)."""
     return ca.SX(ca.DM(list(vector)))

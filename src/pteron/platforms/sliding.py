@@ -36,12 +36,14 @@ class Sliding(PlatformEquations):
     )
 
     def offset(self, s: Expression, t: Expression) -> Offset:
+        """Return the offset of a platform point, whose s slides in m/rad and t is fixed."""
         x0, y0, _ = self.frame
         return Offset(x0 * s[0] + y0 * s[1], ca.SX(3, 1), t)
 
     def motion(
         self, pose: Expression, velocity: Expression, acceleration: Expression
     ) -> PlatformMotion:
+        """Return the motion: points slide by phi along their offsets, the axes do not rotate."""
         p, dp, ddp = (v[:3] for v in (pose, velocity, acceleration))
         phi, rate, growth = pose[3], velocity[3], acceleration[3]
         points, matrices = [], []
@@ -67,11 +69,13 @@ class Sliding(PlatformEquations):
         return ca.mtimes(x0, inertia.hx) + ca.mtimes(y0, inertia.hy)
 
     def needs(self, motion: PlatformMotion, gravity: Expression, inertia: Moments) -> Expression:
+        """Return the wrench (4, K) required at P and along phi."""
         a_g, growth = motion.body.acceleration - gravity, ca.dot(self.frame[0], motion.body.ddx)
         h = self._moment(inertia)
         force = ca.mtimes(a_g, inertia.m) + h * growth
         return ca.vertcat(force, ca.mtimes(a_g.T, h) + growth * inertia.i)
 
     def mass_matrix(self, motion: PlatformMotion, inertia: Moments) -> Expression:
+        """Return the mass matrix (4, 4) of both halves."""
         h = self._moment(inertia)
         return ca.blockcat([[inertia.m * ca.SX.eye(3), h], [h.T, inertia.i]])

@@ -118,6 +118,7 @@ class Tilting(PlatformEquations):
     def motion(
         self, pose: Expression, velocity: Expression, acceleration: Expression
     ) -> PlatformMotion:
+        """Return the motion of a platform whose quasi-velocities are the twist of P."""
         if self.based is not None:
             to_own_axes, turned = self.based.rotation_in_own_axes(pose, velocity, acceleration)
             rates = (ca.mtimes(to_own_axes, v[:3]) for v in (velocity, acceleration))
@@ -130,6 +131,7 @@ class Tilting(PlatformEquations):
     def change_to_platform_axes(
         self, pose: Expression
     ) -> tuple[PlatformEquations, Expression] | None:
+        """Return the equations in the platform's axes, and these; None if P does not translate."""
         if "x" not in self.coordinates:
             return None
         in_own_frame = type(self)(
@@ -191,36 +193,44 @@ class Tilting(PlatformEquations):
         )
 
     def moments(self, rows: Sequence[Expression]) -> SpatialMoments:
+        """Return the spatial inertia from the rows (1, K) of its parameters."""
         return spatial_moments(rows)
 
     def needs(
         self, motion: PlatformMotion, gravity: Expression, inertia: SpatialMoments
     ) -> Expression:
+        """Return the wrench (m, K) required at P along the quasi-velocities."""
         return ca.mtimes(motion.matrix.T, ca.vertcat(*self.needed_wrench(motion, gravity, inertia)))
 
     def needed_wrench(
         self, motion: PlatformMotion, gravity: Expression, inertia: SpatialMoments
     ) -> tuple[Expression, Expression]:
+        """Return the force and the moment about P, each (3, K), from the rotation's rates."""
         assert motion.spatial is not None
         return needed_twist_wrench(motion.spatial, inertia, gravity)
 
     def mass_matrix(self, motion: PlatformMotion, inertia: SpatialMoments) -> Expression:
+        """Return the mass matrix (m, m) in the quasi-velocities."""
         twist_mass = twist_mass_matrix(motion.axes, inertia)
         return ca.mtimes(motion.matrix.T, ca.mtimes(twist_mass, motion.matrix))
 
     def mass_moment(self, motion: PlatformMotion, inertia: SpatialMoments) -> Expression:
+        """Return mass times centre of mass, (3, K), in the base frame."""
         moment = ca.mtimes(motion.axes, inertia.h)
         return ca.mtimes(motion.body.position, inertia.m) + moment
 
     def add_point_masses(
         self, inertia: SpatialMoments, masses: Sequence[Expression]
     ) -> SpatialMoments:
+        """Return the spatial inertia with point masses (1, K) at the legs' points."""
         return inertia.with_points(self.points, masses)
 
     def generalized_forces(self, motion: PlatformMotion, wrench: Expression) -> Expression:
+        """Return the wrench along the quasi-velocities (m, K)."""
         return ca.mtimes(motion.matrix.T, wrench)
 
     def constraint(self, motion: PlatformMotion) -> Expression:
+        """Return 1: there are no freedoms outside the pose to constrain."""
         return ca.SX(1)  # there are none
 
 
@@ -250,6 +260,7 @@ class _Centred(Tilting):
     def motion(
         self, pose: Expression, velocity: Expression, acceleration: Expression
     ) -> PlatformMotion:
+        """Return the motion of a platform whose point P stays at `center`."""
         turned = self.pose_rotation(pose, velocity, acceleration)
         zero = ca.SX(3, 1)
         place = PointMotion(self.quantities["center"], zero, zero)
@@ -282,7 +293,9 @@ class Universal(_Centred):
     order = ("alpha", "beta")
 
     def turn_axes(self) -> list[Expression]:
+        """Return the axes of alpha and beta, in order."""
         return [self.quantities["first_axis"], self.quantities["second_axis"]]
 
     def basis(self, turned: Rotation) -> tuple[Expression, Expression | None]:
+        """Return the twists (6, 2) of unit rates of the angles; they are quasi-velocities."""
         return ca.vertcat(ca.SX(3, 2), turned.axes), None

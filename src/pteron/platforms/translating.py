@@ -26,6 +26,7 @@ class Translating(PlatformEquations):
     def motion(
         self, pose: Expression, velocity: Expression, acceleration: Expression
     ) -> PlatformMotion:
+        """Return the motion: every point moves as P does."""
         p, dp, ddp = (ca.mtimes(self.directions, v) for v in (pose, velocity, acceleration))
         points = tuple(
             PointMotion(p + offset.a + offset.constant, dp, ddp) for offset in self.offsets
@@ -38,15 +39,17 @@ class Translating(PlatformEquations):
         return PlatformMotion(points, (matrix,) * len(points), RotationMotion(), axes, body, matrix)
 
     def needs(self, motion: PlatformMotion, gravity: Expression, inertia: Moments) -> Expression:
+        """Return the force (m, K) required along the pose's lengths."""
         a_g = ca.mtimes(self.directions.T, motion.body.acceleration - gravity)
         return ca.mtimes(a_g, inertia.m)
 
     def mass_matrix(self, motion: PlatformMotion, inertia: Moments) -> Expression:
+        """Return the mass times the identity (m, m)."""
         return inertia.m * ca.SX.eye(len(self.coordinates))
 
 
 class PlanarTranslating(Translating):
-    """The same in the plane across k."""
+    """2T: c = p + s in the plane perpendicular to k."""
 
     coordinates = ("x", "y")
     freedom_text = "moves in a plane and does not turn (2T)"

@@ -60,6 +60,7 @@ class Tripod(Tilting):
     def motion(
         self, pose: Expression, velocity: Expression, acceleration: Expression
     ) -> PlatformMotion:
+        """Return the motion of a platform whose x, y and yaw follow from z, roll and pitch."""
         x0, y0, k = self.frame
         (z, roll, pitch), (_, *rates), (ddz, *growths) = (
             ca.vertsplit(v) for v in (pose, velocity, acceleration)
@@ -106,6 +107,7 @@ class Tripod(Tilting):
         return self.assemble_motion(PointMotion(place, dp, ddp), turned, twist, None)
 
     def plane_wrenches(self, motion: PlatformMotion) -> Expression:
+        """Return the wrenches (3, 6) with which the planes constrain their points, about P."""
         normals = [plane.normal.T for plane in self.planes]
         pairs = zip(normals, motion.point_twists, strict=True)
         return ca.vertcat(*(ca.mtimes(n, shift[:3, :]) for n, shift in pairs))

@@ -32,6 +32,7 @@ class Turning(PlatformEquations):
     def motion(
         self, pose: Expression, velocity: Expression, acceleration: Expression
     ) -> PlatformMotion:
+        """Return the motion: P translates and the points turn about k."""
         p, dp, ddp = (ca.mtimes(self.directions, v[:-1]) for v in (pose, velocity, acceleration))
         x0, y0, k = self.frame
         turn = Turn(k, velocity[-1], acceleration[-1])
@@ -53,6 +54,7 @@ class Turning(PlatformEquations):
         return ca.blockcat([[self.directions, lever], [zero, self.frame[2]]])
 
     def needs(self, motion: PlatformMotion, gravity: Expression, inertia: Moments) -> Expression:
+        """Return the wrench (m, K) required at P: force along the lengths and moment about k."""
         a_g = motion.body.acceleration - gravity
         _, dh, ddh = self._first_moment(motion, inertia)
         force = ca.mtimes(a_g, inertia.m) + ddh
@@ -60,6 +62,7 @@ class Turning(PlatformEquations):
         return ca.vertcat(ca.mtimes(self.directions.T, force), moment)
 
     def mass_matrix(self, motion: PlatformMotion, inertia: Moments) -> Expression:
+        """Return the mass matrix (m, m), coupled by the first moment."""
         coupling = ca.mtimes(self.directions.T, self._first_moment(motion, inertia)[1])
         masses = inertia.m * ca.SX.eye(self.directions.shape[1])
         return ca.blockcat([[masses, coupling], [coupling.T, inertia.i]])
@@ -75,7 +78,7 @@ class Turning(PlatformEquations):
 
 
 class PlanarTurning(Turning):
-    """The same in the plane across k."""
+    """2T1R: c = p + R(phi) s0 + t0 in the plane perpendicular to k."""
 
     coordinates = ("x", "y", "phi")
     freedom_text = "moves and turns in a plane (2T1R)"

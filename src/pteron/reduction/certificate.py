@@ -214,4 +214,5 @@ class ExactCertificate(Certificate):
 
 
 def _sentence_of_list(head: str, items: tuple[str, ...]) -> list[str]:
+    """Return a line of a heading and its items; nothing without items."""
     return [f"{head}: {'; '.join(items)}."] if items else []

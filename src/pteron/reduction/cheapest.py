@@ -63,6 +63,7 @@ def cheapest_parameters(robot: RobotLike) -> BaseParameters:
 
 @lru_cache(maxsize=32)
 def _cheapest_parameters(robot: Manipulator) -> BaseParameters:
+    """Return the base parameters of the cheapest columns, cached in memory and on disk."""
     columns = parameter_data(robot)
     key, packages = ("cheapest", geometry_only(robot)), ("kinematics", "reduction")
     best = cached_result(key, packages, lambda: _cheapest_columns(robot))
@@ -70,6 +71,7 @@ def _cheapest_parameters(robot: Manipulator) -> BaseParameters:
 
 
 def _cheapest_columns(robot: Manipulator) -> tuple[int, ...]:
+    """Return the columns of the base whose inverse dynamics need the fewest operations."""
     columns = parameter_data(robot)
     base = base_parameters(robot)
     grouping = _unitless_grouping(robot, base)
@@ -123,7 +125,7 @@ def _improve_by_exchange(
 
 
 class _Model:
-    """The reduced model of a machine, which costs something for every choice of base parameters."""
+    """The reduced model of a machine, with its cost for each choice of base parameters."""
 
     def __init__(self, robot: Manipulator) -> None:
         self.machine = Machine.numeric(robot)
@@ -133,7 +135,7 @@ class _Model:
         self.known: dict[tuple[int, ...], int] = {}
 
     def cost(self, base_columns: tuple[int, ...]) -> int:
-        """Return the operations of a state before the pass that saves some, which takes longer."""
+        """Return the operations for a state, before the optimisation pass, which is slow."""
         if base_columns not in self.known:
             base = ca.SX.sym("base", len(base_columns))
             values = ca.SX(len(self.machine.parameters), 1)
@@ -146,7 +148,7 @@ class _Model:
         return self.known[base_columns]
 
     def _operations(self, base: Expression, forces: Expression) -> int:
-        """Count what depends on the state; what depends on base parameters alone is done once."""
+        """Count the operations that depend on the state."""
         inputs = [Port("", (symbol.shape[0],)) for symbol in self.motion]
         ports = (*inputs, Port("base", (base.shape[0],), shared=True))
         graph = graph_of(ca.Function("forces", [*self.motion, base], [ca.cse(forces)]), ports)
@@ -154,6 +156,6 @@ class _Model:
 
 
 def _final_cost(robot: Manipulator, base_columns: tuple[int, ...]) -> int:
-    """Return the operations of the kernel: after the pass, base parameters made ready once."""
+    """Return the kernel's operations after the pass, with base parameters preprocessed."""
     built = program(robot, "inverse_dynamics", tuple((column,) for column in base_columns))
     return count_operations(hoist_invariants(built, "base_parameters")[0].function)

@@ -10,7 +10,7 @@ from math import isqrt
 def dependencies(
     rows: Sequence[Sequence[int]], order: Sequence[int], prime: int
 ) -> tuple[list[int], dict[int, dict[int, int]]]:
-    """Return the independent columns of a matrix modulo a prime, and how the others follow.
+    """Return the independent columns of a matrix modulo a prime, and the others' shares.
 
     Parameters
     ----------

@@ -86,7 +86,7 @@ class _ExactRegressor:
         return _shared_rows(rows, self.sharing)
 
     def rational_rows(self) -> list[list[Fraction]]:
-        """Return the rows at random rational configurations; none where there are none."""
+        """Return the rows at random rational configurations; [] if a leg has none."""
         rows = rational_rows(geometry_only(self.robot), self.geometry, _RATIONAL_CHECKS, self.rng)
         return _shared_rows(rows, self.sharing)
 
@@ -239,7 +239,7 @@ def _certificate(
     fresh: int,
     seed: int,
 ) -> ExactCertificate:
-    """Return what was computed and checked, with the probability that a false vector passes."""
+    """Return the certificate: the checks, and the probability that a false vector passes."""
     robot, geometry = regressor.robot, regressor.geometry
     degree = degree_bound(geometry_only(robot))
     # A pose is drawn among the 1 in 2^n whose n radicands are squares, and the 2^n choices of their
@@ -272,6 +272,7 @@ def _certificate(
 
 
 def _no_dynamics_error(robot: Manipulator) -> SingularPose:
+    """Return the error for a machine that is singular at every pose."""
     return SingularPose(
         "singular at every pose (type II), so that it has no inverse dynamics and no base "
         "parameters; change what the Jacobian depends on, a leg's "
@@ -328,7 +329,7 @@ def _shared_rows(rows: Sequence[Sequence[Number]], sharing: Array) -> list[list[
 def _lift_to_fractions(
     eliminations: dict[int, tuple[list[int], Relations]],
 ) -> dict[int, dict[int, Fraction]] | None:
-    """Return the shares as fractions, if all primes but the last give what the last confirms."""
+    """Return the shares as fractions from all primes but the last; None if that disagrees."""
     primes = list(eliminations)
     *earlier, last = primes
     lifted: dict[int, dict[int, Fraction]] = {}
@@ -353,7 +354,7 @@ def _annihilate(
     rows: Sequence[Sequence[int]] | Sequence[Sequence[Fraction]],
     prime: int | None,
 ) -> bool:
-    """Say whether every null vector annihilates the rows.
+    """Return whether every null vector annihilates the rows.
 
     A relation gives a column as shares of the kept columns; under the key -1 stands a null vector
     itself.

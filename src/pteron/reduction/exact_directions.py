@@ -81,11 +81,13 @@ class Notes:
         return self.length(f"{name}.x", x), self.length(f"{name}.y", y)
 
     def _note_recognised(self, name: str, value: float, exact: Surd) -> None:
+        """Note that a value is recognised as an exact number, with its difference."""
         error = abs(float(exact) - value)
         difference = f"off by {error:.0e}" if error else "to the last digit"
         self.recognised.append(f"{name} = {exact} ({difference})")
 
     def _note_approximated(self, name: str, value: float, exact: Surd) -> None:
+        """Note that a value is approximated by an exact number, unless it is equal."""
         error = abs(float(exact) - value)
         if error:
             self.approximated.append(f"{name} (off by {error:.0e})")
@@ -157,7 +159,7 @@ def describe_near_relations(vectors: dict[str, Array]) -> list[str]:
 
 
 def _perpendicular(a: ExactVector, b: ExactVector) -> bool:
-    """Say whether a . b = 0 exactly: for each radicand its terms must sum to zero."""
+    """Return whether a . b = 0 exactly: for each radicand its terms must sum to zero."""
     sums: dict[int, Fraction] = {}
     for x, y in zip(a, b, strict=True):
         term = Surd.root(Fraction(x.s * y.s), 1.0)

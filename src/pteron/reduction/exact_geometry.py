@@ -153,6 +153,7 @@ class ExactGeometry:
 
 @lru_cache(maxsize=6)
 def _plane_axis(i: int, sign: int) -> ca.Function:
+    """Return the CasADi function of a leg's plane axis from its direction, cached."""
     d = ca.SX.sym("d", 3)
     return ca.Function("plane_axis", [d], [ca.densify(plane_axis(d, i, sign))])
 
@@ -197,6 +198,7 @@ def exact_geometry(robot: Manipulator) -> ExactGeometry:
 def _exact_leg(
     robot: Manipulator, i: int, frame: Array, exact: dict[str, ExactVector], notes: Notes
 ) -> ExactLeg:
+    """Return leg i's geometry, from 0, in exact numbers; notes tell of approximations."""
     leg = robot.legs[i]
     # What does not turn only shifts what the leg is fixed to.
     shift = np.array(leg.fixed_offset)
@@ -234,6 +236,7 @@ def _exact_leg(
 
 
 def _fraction(value: float) -> Surd:
+    """Return a number as a surd, its fraction with a denominator of at most 1e9."""
     return Surd(Fraction(value).limit_denominator(10**9))
 
 

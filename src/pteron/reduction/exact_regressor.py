@@ -31,7 +31,7 @@ Element = TypeVar("Element")
 def modular_rows(
     topology: Manipulator, geometry: ExactGeometry, prime: int, states: int, rng: random.Random
 ) -> list[list[int]]:
-    """Return the regressor's rows at random states modulo a prime, for the machine's own guides.
+    """Return the regressor's rows at random states modulo a prime, guide points exact.
 
     A pose can be used if every leg's discriminant Delta is a square, as for one pose in 2^n;
     velocity and acceleration are free.
@@ -116,11 +116,12 @@ def rational_rows(
 
 
 def is_square(value: int, prime: int) -> bool:
-    """Say whether a residue is a square (Euler's criterion)."""
+    """Return whether a residue is a square (Euler's criterion)."""
     return pow(value, (prime - 1) // 2, prime) <= 1
 
 
 def _draw(count: int, prime: int, rng: random.Random) -> list[int]:
+    """Return random residues modulo a prime."""
     return [rng.randrange(prime) for _ in range(count)]
 
 
@@ -161,26 +162,32 @@ class _DegreeField:
         return a.numerator + sum(self.degrees[k] * n for k, n in pairs)
 
     def number(self, value: Fraction | int) -> _Degree:
+        """Return a constant, of degree 0."""
         return self.make_degree(0, {}, value)
 
     def variable(self, name: str) -> _Degree:
+        """Return a variable, of degree 1."""
         return self.make_degree(1, {}, name)
 
     def add(self, a: _Degree, b: _Degree) -> _Degree:
+        """Return a bound for a sum: the greatest degree over the common denominator."""
         powers = common_powers((a, b))
         degree = max(self.degree_over(powers, a), self.degree_over(powers, b))
         return self.make_degree(degree, powers, "add", a.name, b.name)
 
     def subtract(self, a: _Degree, b: _Degree) -> _Degree:
+        """Return the bound for a difference, that of the sum."""
         return self.add(a, b)._replace(
             name=self.make_degree(0, {}, "subtract", a.name, b.name).name
         )
 
     def multiply(self, a: _Degree, b: _Degree) -> _Degree:
+        """Return a bound for a product: the sum of degrees and of powers of divisors."""
         powers = {k: a.powers.get(k, 0) + b.powers.get(k, 0) for k in {**a.powers, **b.powers}}
         return self.make_degree(a.numerator + b.numerator, powers, "multiply", a.name, b.name)
 
     def divide(self, a: _Degree, b: _Degree) -> _Degree:
+        """Return a bound for a quotient; b's numerator becomes a divisor of later values."""
         inverse = self.make_degree(b.numerator, {}, "numerator", b.name).name
         self.degrees += [0] * (inverse + 1 - len(self.degrees))
         self.degrees[inverse] = b.numerator
@@ -194,6 +201,7 @@ class _DegreeField:
         return self.make_degree(numerator, powers, "divide", a.name, b.name)
 
     def square_root(self, a: _Degree) -> _Degree:
+        """Return a bound for a square root: half the degree and powers, rounded up."""
         powers = {k: -(-n // 2) for k, n in a.powers.items()}
         twice = self.degree_over({k: 2 * n for k, n in powers.items()}, a)
         return self.make_degree(-(-twice // 2), powers, "root", a.name)
@@ -220,6 +228,7 @@ def degree_bound(topology: Manipulator) -> int:
 
 
 def _degree_bound(topology: Manipulator) -> int:
+    """Return the degree bound of a topology's regressor, by evaluating it on degrees."""
     program = general_program(topology, "regressor").function
     field = _DegreeField()
     constants = [field.number(Fraction(0))] * program.size1_in(0)

@@ -101,6 +101,7 @@ def _write_terms(share: Share, digits: int, write: Callable[[Any], str]) -> tupl
 
 
 def _is_symbolic(share: Share) -> bool:
+    """Return whether a share contains symbols of SymPy."""
     return bool(getattr(share, "free_symbols", None))
 
 
@@ -121,6 +122,7 @@ def as_sympy(names: Sequence[str], terms: Terms) -> Any:
 
 
 def _latex_name(parameter: Parameter) -> str:
+    """Return a parameter's name in LaTeX, as "I_{z,u1}", or a first moment as m times gamma."""
     letter, body, axis = _parts(parameter)
     if parameter.length_power == 1:
         return rf"m_{{{body}}}\gamma_{{{body},{axis}}}"

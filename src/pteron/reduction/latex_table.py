@@ -95,14 +95,17 @@ def _terms(text: str) -> list[str]:
 
 
 def _number(value: float, digits: int) -> str:
+    """Return a number in LaTeX with `digits` digits, a power of ten where it needs an exponent."""
     mantissa, _, exponent = f"{value:.{digits}g}".partition("e")
     return rf"{mantissa} \times 10^{{{int(exponent)}}}" if exponent else mantissa
 
 
 def _unit(unit: str) -> str:
+    """Return a unit in LaTeX, upright in math mode."""
     spaced = unit.replace(" ", r"\,")
     return rf"$\mathrm{{{spaced}}}$"
 
 
 def _escape_latex(text: str) -> str:
+    """Return a text with LaTeX's special characters escaped."""
     return "".join(_SPECIAL.get(letter, letter) for letter in text)

@@ -98,6 +98,7 @@ def fitted_shares(
 
 
 def _least_squares(scaled: _Scaled, base_columns: list[int], dropped: list[int]) -> Array:
+    """Return the shares (b, d) of dropped columns in the base columns, by least squares."""
     shares = np.linalg.lstsq(scaled.matrix[:, base_columns], scaled.matrix[:, dropped], rcond=None)[
         0
     ]
@@ -142,7 +143,7 @@ def _lengths(matrix: Array, axis: int) -> tuple[Array, float]:
 
 
 def _poses(robot: Manipulator, count: int, rng: np.random.Generator) -> Array:
-    """Return random poses (count, m): the better ones of those in reach, whatever machine it is.
+    """Return random poses (count, m) whose type-I and type-II measures exceed the medians.
 
     They keep the limits where enough poses do; the rank is the same beyond them.
     """
@@ -157,7 +158,7 @@ def _poses(robot: Manipulator, count: int, rng: np.random.Generator) -> Array:
 def independent(
     matrix: Array, order: Sequence[int], most: int | None = None, least: float = _TOLERANCE
 ) -> tuple[list[int], dict[int, float]]:
-    """Return the first columns, `most` at most, that those before do not give, and all remainders.
+    """Return the first independent columns, `most` at most, and each column's remainder.
 
     Gram and Schmidt, twice over, which is as good as Householder: a remainder of more than `least`
     is a column's own.
@@ -204,7 +205,7 @@ def _grouping(
 def _unscaled_shares(
     base_columns: list[int], dropped: list[int], shares: Array, scaled: _Scaled
 ) -> Shares:
-    """Undo the scaling of the columns; shares that are rounding only are left out."""
+    """Return the shares of the unscaled columns, without those that are only rounding."""
     scale = scaled.lengths
     return {
         column: {

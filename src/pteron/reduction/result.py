@@ -91,6 +91,7 @@ class BaseParameters(Result):
         return f"<BaseParameters of {self.robot.name!r}: {self.rank} of {columns}, {method}>"
 
     def _overview(self) -> Overview:
+        """Return the overview table: base parameters, their values and units, and the proof."""
         columns = [Column("", "number"), Column("base parameter", "long")]
         columns += [Column("value", "number"), Column("unit")]
         sums, values = self.expressions("html"), self.values()
@@ -105,7 +106,7 @@ class BaseParameters(Result):
         return Overview(self.robot.name, about, columns, rows, [proof])
 
     def summary(self) -> str:
-        """Return each base parameter with its value, for people, and what proves the rank."""
+        """Return the base parameters with their values and the certificate's summary, as text."""
         units = (self.parameters[column].unit for column in self.kept)
         rows = zip(self.expressions(), self.values(), units, strict=True)
         lines = [f"{text} = {number:.5g} {unit}" for text, number, unit in rows]
@@ -131,7 +132,7 @@ class BaseParameters(Result):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The kept columns, which name the base parameters."""
+        """The names of the base parameters: each is that of its independent column."""
         return tuple(self.columns[column] for column in self.kept)
 
     def values(self, robot: Manipulator | None = None) -> Array:
@@ -152,12 +153,12 @@ class BaseParameters(Result):
 
     @cached_property
     def _symbolic(self) -> Shares:
-        """The shares in symbols of the geometry, those that are equal in one."""
+        """The shares in symbols of the geometry; equal values share a symbol."""
         return self._symbolic_shares(self._symbol_values)
 
     @cached_property
     def _leg_shares(self) -> Shares:
-        """The shares in symbols of the geometry, each leg with its own."""
+        """The shares in symbols of the geometry, with separate symbols for each leg."""
         if not self.shared_symbols:
             return self._symbolic
         from pteron.reduction.symbols import named_values  # SymPy
@@ -165,6 +166,7 @@ class BaseParameters(Result):
         return self._symbolic_shares(named_values(exact_geometry(self.robot), shared=False))
 
     def _symbolic_shares(self, named: dict[str, Any]) -> Shares:
+        """Return the shares with symbols; ModelError if the certificate is not exact."""
         if not isinstance(self.certificate, ExactCertificate):
             raise ModelError(
                 f'symbols: not known to method "{self.certificate.method}"; use method="exact"'

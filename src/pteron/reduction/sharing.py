@@ -59,7 +59,7 @@ def share(
 
 
 def default_order(columns: Sequence[Parameter]) -> list[int]:
-    """Return the numbers of the columns in order of preference: the first are kept first."""
+    """Return the columns' indices in order of preference as base parameters."""
     kinds = {(parameter.kind, parameter.body) for parameter in columns}
     preference = PREFERENCE if kinds <= set(PREFERENCE) else TILTING_PREFERENCE
 

@@ -76,7 +76,7 @@ _LENGTH_DENOMINATOR = 10**6
 
 
 def direction_cosine(value: float) -> Surd | None:
-    """Return the simple number that a component of a unit vector stands for, if there is one.
+    """Return the simple exact number nearest to a unit vector's component; None without.
 
     Simple: itself or its square a fraction with a denominator up to 300, within 1e-9.
     """
@@ -84,7 +84,7 @@ def direction_cosine(value: float) -> Surd | None:
 
 
 def length(value: float) -> Surd | None:
-    """Return the simple number that a length in metres stands for, if there is one.
+    """Return the simple exact number nearest to a length in metres; None without.
 
     Simple: a decimal to the micrometre, or the root of a fraction with a denominator up to 10^6.
     """

@@ -111,4 +111,5 @@ def _rider_entries(
 
 
 def _unit_entry(parameter: Parameter, _: Values) -> dict[Parameter, Any]:
+    """Return the entry of a parameter alone: its share is 1."""
     return {parameter: 1}
