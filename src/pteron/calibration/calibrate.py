@@ -250,6 +250,7 @@ def _select_fitting_rows(
 
 
 def _check_readings(joints: int, measurements: Measurements) -> None:
+    """Raise where readings are not finite numbers of shape (N, n), or nothing was measured."""
     shape = measurements.readings.shape
     expect(len(shape) == 2 and shape[1] == joints, "readings", f"shape {shape}", f"(N, {joints})")
     if not np.isfinite(measurements.readings).all():

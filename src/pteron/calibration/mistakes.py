@@ -245,6 +245,7 @@ def _signed_axes(determinant: float) -> list[Array]:
 
 
 def _described_axes(turn: Array) -> str:
+    """Return the axes of a signed permutation in words: x along -y, for example."""
     return ", ".join(
         f"{'xyz'[k]} along {'-' if row.sum() < 0 else ''}{'xyz'[int(np.abs(row).argmax())]}"
         for k, row in enumerate(turn)
@@ -437,6 +438,7 @@ def _name_readings(guess: Guess, fitted: Guess, freedom: int) -> Iterator[Mistak
 
 
 def _listed_joints(joints: Sequence[int], names: Sequence[str]) -> str:
+    """Return joints by number and name; "all joints" where it is all of them."""
     if len(joints) == len(names):
         return "all joints"
     return f"joint {joints[0] + 1} ({names[joints[0]]})"

@@ -120,6 +120,7 @@ def describe_mistake(
 
 
 def _size_text(error: float, kind: str) -> str:
+    """Return an error as text in mrad, mm or m."""
     if kind == "angle":
         return f"{1e3 * error:.3g} mrad"
     return f"{1e3 * error:.3g} mm" if error < 1.0 else f"{error:.4g} m"
@@ -201,6 +202,7 @@ def _change_by_order(
 
 
 def _sample_rows(measurements: Measurements) -> Measurements:
+    """Return a random sample of the rows, the same in each run."""
     # At random: rows at even steps might all be of one mark.
     return measurements.rows(np.random.default_rng(0).permutation(len(measurements)) < _ROWS)
 

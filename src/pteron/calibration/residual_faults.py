@@ -118,6 +118,7 @@ def _outliers(
     out: NDArray[np.bool_],
     reasons: Mapping[int, str],
 ) -> tuple[CalibrationFinding, ...]:
+    """Return a finding that lists the outliers with the largest residuals; none without them."""
     rows = np.flatnonzero(out)
     if not len(rows):
         return ()
@@ -131,6 +132,7 @@ def _outliers(
 
 
 def _residual_text(fit: CalibrationFit, row: int) -> str:
+    """Return a row's largest residual in words, or that its readings lead to no pose."""
     if fit.distances[row] == BEYOND:
         return "its readings lead to no pose"
     residuals = fit.residuals[row]

@@ -57,6 +57,7 @@ class PlaceTable(TomlTable):
 
     @model_validator(mode="after")
     def _somewhere(self) -> PlaceTable:
+        """Return the place; raise unless it has coordinates or is free."""
         if not self.free and "at" not in self.model_fields_set:
             raise ValueError("neither at nor free = true given; a place is known or found")
         return self

@@ -111,6 +111,7 @@ def blocks_of(
 def _point_unknowns(
     name: str, tolerance: float = _WIDE, group: str = "setup"
 ) -> tuple[Unknown, ...]:
+    """Return the three coordinates of a point as unknowns, m."""
     return tuple(Unknown(f"{name}.{axis}", group, "m", tolerance) for axis in "xyz")
 
 

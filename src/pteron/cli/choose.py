@@ -114,6 +114,7 @@ class _Log:
 
 
 def _show(choice: Choice) -> None:
+    """Print the requirements, a table of the feasible kinds, and why others are infeasible."""
     show("[bold]Asked[/bold]: " + plain("; ".join(choice.job.requirement_lines())))
     serving = [candidate for candidate in choice.candidates if candidate.serves]
     rows = {candidate.kind: candidate.figure_texts for candidate in serving}

@@ -278,6 +278,7 @@ def _held_out_cycles(excitation: Excitation, rate: float) -> RepeatedCycle | Non
 
 
 def _quality(excitation: Excitation) -> Table:
+    """Return a table of condition numbers: optimised motion, best random motion, ratio."""
     headings = ("optimised", f"best of {excitation.draws} random", "ratio")
     best, random = excitation.conditioning, excitation.random
     caption = None
@@ -294,6 +295,7 @@ def _quality(excitation: Excitation) -> Table:
 
 
 def _number(value: float, digits: int) -> str:
+    """Return a number with significant digits, or `-` where it is not finite."""
     return f"{value:.{digits}g}" if math.isfinite(value) else "-"
 
 
@@ -323,6 +325,7 @@ def _clearance_sentence(
 
 
 def _margins(margins_by_motion: dict[str, Margins]) -> Table:
+    """Return a table of each limit's least margin, its leg and time, and those of other motions."""
     headings = ("least margin", "leg", "at (s)")
     others = list(margins_by_motion)[1:]
     margin_table = table("limit", *headings, *others, numbers=(*headings, *others))

@@ -251,6 +251,7 @@ def forces(
 
 
 def _typed_row(typed: list[str | None], motion: list[str], loads: tuple[str, ...]) -> TableRows:
+    """Return a single row of the typed pose, rates, accelerations and wrench; 0 by default."""
     m = len(motion) // 3
     if typed[0] is None:
         raise DataError(f"no pose given; give --pose with {' '.join(motion[:m])}, or --table FILE")

@@ -132,6 +132,7 @@ def _stocks(texts: list[str] | None) -> dict[str, str]:
 
 
 def _machine(robot: Manipulator) -> dict[str, Any]:
+    """Return a machine's name, motion, coordinates, leg types and working mode as JSON data."""
     return {
         "name": robot.name,
         "motion": robot.platform.motion,
@@ -181,6 +182,7 @@ def check(file: str, *, elbows: str | None = None) -> CommandResult:
 
 
 def _findings(robot: Manipulator) -> dict[str, Any]:
+    """Return the results of a machine's examination as JSON data: home, reach, modes, warnings."""
     import numpy as np
 
     from pteron.kinematics import inverse_kinematics, singular_orientations
@@ -221,6 +223,7 @@ def _findings(robot: Manipulator) -> dict[str, Any]:
 
 
 def _leg(leg: LegKind) -> dict[str, Any]:
+    """Return a leg's type, joint, lengths, limits, units and drive as JSON data."""
     return {
         "type": leg.type,
         "joint": leg.joint.noun,
@@ -233,6 +236,7 @@ def _leg(leg: LegKind) -> dict[str, Any]:
 
 
 def _show(robot: Manipulator, findings: dict[str, Any]) -> None:
+    """Print the results of a machine's examination: a table of its legs, and sentences."""
     from pteron.manipulator.commented_file import crank_direction_text
 
     rows = (
@@ -342,4 +346,5 @@ def _passive(joints: list[dict[str, Any]]) -> list[Table]:
 
 
 def _vector(values: Any, places: int = 4) -> str:
+    """Return numbers as text in parentheses, rounded to decimal places."""
     return f"({', '.join(f'{round(value, places) + 0.0:g}' for value in values)})"

@@ -120,6 +120,7 @@ def _open_closed_streams() -> None:
 
 
 def _usage(error: Any) -> str:
+    """Return a usage error's message in a single line that names the command's `--help`."""
     message = " ".join(str(error.format_message()).split()).rstrip(".")
     message = message.replace("Value error, ", "")
     context = getattr(error, "ctx", None)

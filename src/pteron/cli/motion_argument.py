@@ -167,4 +167,5 @@ def _check_rates(robot: Manipulator, rows: Table) -> None:
 
 
 def _vector_text(values: Sequence[float]) -> str:
+    """Return numbers as text in parentheses."""
     return f"({', '.join(f'{value:g}' for value in values)})"

@@ -112,6 +112,7 @@ def parsed_command(
 
 
 def _share_programs() -> AbstractContextManager[None]:
+    """Return a context in which machines of equal structure share their compiled programs."""
     from pteron.kernels import sharing_programs
 
     return sharing_programs()
@@ -123,6 +124,7 @@ def _is_group(hint: Any) -> bool:
 
 
 def _option(name: str, kind: Any, *, default: Any = None) -> Parameter:
+    """Return a keyword-only parameter of a signature, from which Typer makes an option."""
     return Parameter(name, Parameter.KEYWORD_ONLY, default=default, annotation=kind)
 
 

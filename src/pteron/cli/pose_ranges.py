@@ -79,6 +79,7 @@ def span_text(name: str, low: float, high: float) -> str:
 
 
 def _unit(name: str) -> str:
+    """Return the unit of a pose coordinate."""
     from pteron.platforms.coordinates import coordinate
 
     return coordinate(name).unit

@@ -51,6 +51,7 @@ def progress_bar(task: str) -> Iterator[Progress]:
         number = progress.add_task(plain(task), total=1.0)
 
         def tell(share: float) -> None:
+            """Update the bar's share, 0 to 1, its step's text and the time remaining."""
             estimate.tell(share)
             text = plain(getattr(share, "step", "") or task)
             is_new = text != progress.tasks[number].description
@@ -116,12 +117,14 @@ class TimeLeft:
 
 
 def _bar(estimate: TimeLeft) -> rich_progress.Progress:
+    """Return a progress bar on standard error that shows the time remaining."""
     from rich import progress
     from rich.console import Console
     from rich.text import Text
 
     class Left(progress.ProgressColumn):
         def render(self, task: progress.Task) -> Text:
+            """Return the estimate of the time remaining as text."""
             return Text(estimate.words())
 
     return progress.Progress(

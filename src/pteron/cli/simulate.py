@@ -154,6 +154,7 @@ def controller_of(name: Name, motion: Motion, period: float, bandwidth: float | 
 
 
 def _data(simulation: Simulation, controller: str, cycle: str, carried: Carried) -> dict[str, Any]:
+    """Return a simulation as JSON data: tracking errors by coordinate, and loads by leg."""
     import numpy as np
 
     robot, error = simulation.robot, simulation.error
@@ -189,6 +190,7 @@ def _rows(columns: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 
 def _pictures(simulation: Simulation) -> dict[str, str]:
+    """Return SVG texts of the tracking errors and of the drive forces, by file name."""
     from pteron.plots import forces_figure, svg_file, tracking_figure
 
     units = ", ".join(dict.fromkeys(leg.joint.force_unit for leg in simulation.robot.legs))

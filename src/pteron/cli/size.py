@@ -175,6 +175,7 @@ def _unserved_legs(sizing: Sizing, fits: tuple[MotorFit, ...], margin: float) ->
 
 
 def _data(sizing: Sizing, fits: tuple[MotorFit, ...], request: _Asked) -> dict[str, Any]:
+    """Return a sizing as JSON data: loads by drive, totals, margins, overloads and motors."""
     total = sizing.power.sum(axis=-1)
     return {
         "robot": sizing.robot.name,
@@ -305,6 +306,7 @@ def _places(sizing: Sizing) -> list[rich.table.Table]:
 
 
 def _loads(sizing: Sizing) -> rich.table.Table:
+    """Return a table of each drive's peak and RMS force and speed."""
     force = force_word(sizing.robot)
     names = ("leg", f"peak {force}", f"RMS {force}", "peak speed", "RMS speed")
     columns = sizing.peak_forces, sizing.rms_forces, sizing.peak_speeds, sizing.rms_speeds
@@ -317,6 +319,7 @@ def _loads(sizing: Sizing) -> rich.table.Table:
 
 
 def _powers(sizing: Sizing) -> rich.table.Table:
+    """Return a table of each drive's power (W) and energy (J), motoring and braking."""
     names = ("leg", "peak (W)", "mean (W)", "brakes (W)", "gives (J)", "takes back (J)")
     powers = (sizing.peak_power, sizing.mean_power, sizing.peak_braking)
     columns = zip(*powers, sizing.given_energy, sizing.braked_energy, strict=True)

@@ -76,6 +76,7 @@ class TableRows:
     def _chunks(
         self, serve: Callable[[NDArray[Any]], NDArray[Any]], values: NDArray[Any], unlikely: str
     ) -> Iterator[NDArray[Any]]:
+        """Yield results of `serve` by chunks of rows; an error names the row that fails."""
         for start in range(0, len(values), CHUNK):
             try:
                 yield serve(values[start : start + CHUNK])
@@ -196,6 +197,7 @@ def deliver(
 def _show(
     robot: Manipulator, result: Table | TypedRow, shown: Sequence[str], *, single: bool
 ) -> None:
+    """Print the first rows of a result as a table, with units in its headings."""
     known = robot.column_units
     units = [known.get(name, "") for name in shown]
     headings = [f"{n} ({unit})" if unit else n for n, unit in zip(shown, units, strict=True)]
@@ -212,6 +214,7 @@ def _show(
 
 
 def _text(cell: float | int | None, unit: str) -> str:
+    """Return a cell as text: `-` if empty, with the decimals of its unit."""
     if cell is None:
         return "-"
     # Adding zero takes the sign from what was rounded to zero.
@@ -219,4 +222,5 @@ def _text(cell: float | int | None, unit: str) -> str:
 
 
 def _count(rows: int) -> str:
+    """Return a number of rows with its noun."""
     return f"{rows} {'row' if rows == 1 else 'rows'}"

@@ -48,6 +48,7 @@ def is_interactive() -> bool:
 
 
 def _is_watched(stream: TextIO, variable: str) -> bool:
+    """Return what an environment variable (1 or 0) decides, else whether it is a terminal."""
     decision = {"0": False, "1": True}.get(os.environ.get(variable, ""))
     return stream.isatty() if decision is None else decision
 

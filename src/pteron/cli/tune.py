@@ -126,6 +126,7 @@ def tune(
 
 
 def _files(tuning: Tuning, tried: pl.DataFrame) -> dict[str, str]:
+    """Return the texts of the tuning's files, by name: gains in TOML, and the page."""
     from pteron.controllers import gains_text
     from pteron.report.tuning_page import tuning_page
 

@@ -151,6 +151,7 @@ def workspace(
 def _show(
     index_map: Map, volume: ReachVolume | None, data: dict[str, Any], out: str | None
 ) -> None:
+    """Print a map on a terminal, or write its rows as CSV to a pipe; then list the files."""
     if is_terminal():
         show_map(index_map, volume, data)
     else:
@@ -160,6 +161,7 @@ def _show(
 
 
 def _checked_indices(robot: Manipulator, names: list[str]) -> tuple[str, ...]:
+    """Return the indices without duplicates, the margin by default; raise on unknown names."""
     from pteron.indices import INDICES, indices_of
     from pteron.maps.map import MARGIN
 
@@ -200,6 +202,7 @@ def _expect_output(out: str | None) -> str:
 
 
 def _warnings(robot: Manipulator) -> list[str]:
+    """Return the warning that a layout is singular everywhere; empty where it is not."""
     from pteron.kinematics.architecture import is_singular_everywhere, singular_everywhere
 
     return [str(singular_everywhere(robot))] if is_singular_everywhere(robot) else []
@@ -277,6 +280,7 @@ def _unreachable_slice_warnings(grid: Grid, volume: ReachVolume | None) -> list[
 
 
 def _draw(index_map: Map, out: str, ending: str) -> None:
+    """Save a picture of a map, or a film of its first index, by the file's ending."""
     from pteron.plots import map_figure, map_film, save_figure
 
     if ending in _PICTURES:

@@ -133,6 +133,7 @@ def cycles_of(job: Job, robot: Manipulator) -> list[Places]:
 
 
 def _cycle_places(job: Job, robot: Manipulator, cycle: ToolCycleTable, k: int) -> Places:
+    """Return a cycle with the shifts and turns at which it fits; raise where there are none."""
     name = cycle.name or f"cycle {k}"
     points = np.zeros((len(cycle.points), robot.freedom))
     rows = np.array(cycle.points)
@@ -197,6 +198,7 @@ def neighbour_places(job: Job, cycle: Places, chosen: Iterable[int], part: float
 
 
 def _plane(turns: Array) -> Array:
+    """Return the rotation matrices (2, 2, K) of turns (K,) in rad."""
     c, s = np.cos(turns), np.sin(turns)
     return np.moveaxis(np.array([[c, -s], [s, c]]), -1, 0)
 

@@ -113,6 +113,7 @@ class Design(Result):
 
     @property
     def _samples(self) -> int:
+        """The number of sample poses along an edge of the workspace or of the largest cube."""
         return _IN_CUBE if self.workspace is None else self.workspace.samples
 
     def lattice(self, count: int) -> Array:
@@ -283,9 +284,11 @@ class Design(Result):
 
     @cached_property
     def _known_quantities(self) -> dict[str, tuple[float, str]]:
+        """Quantities with the reason where they are missing, by name; filled lazily."""
         return {}
 
     def _quantities(self, name: str) -> tuple[float, str]:
+        """Return a quantity and the reason where it is missing, computed at most once."""
         if name not in self._known_quantities:
             self._known_quantities[name] = self._evaluate_quantity(name)
         return self._known_quantities[name]
@@ -313,6 +316,7 @@ class Design(Result):
         return np.nan, where if out else "it has none at some sampled pose: a singularity"
 
     def _evaluate_machine(self, of_machine: Callable[[Manipulator], float]) -> tuple[float, str]:
+        """Return a function's value for the machine and ''; NaN and the reason on failure."""
         try:
             amount = float(of_machine(self.robot))
         except PteronError as error:
@@ -334,4 +338,5 @@ class Design(Result):
 
 @lru_cache(maxsize=8)
 def _start(task: Task) -> Design:
+    """Return the design of the task's initial machine, cached by task."""
     return Design(task, task.robot)

@@ -115,6 +115,7 @@ def prices(path: str | Path, count: int) -> list[float]:
 
 
 def _price(path: str | Path, motor: Mapping[str, Any]) -> float:
+    """Return a motor's price, NaN where the file states none; raise if it is negative."""
     price = float(motor.get("price", np.nan))
     if price < 0.0:
         raise DataError(

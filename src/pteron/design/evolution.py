@@ -12,6 +12,7 @@ from pteron.kernels import Array
 
 
 def _pymoo(module: str) -> Any:
+    """Import a module of pymoo; raise with the extra to install where it is missing."""
     return import_extra("design", f"pymoo.{module}", "a search needs pymoo")
 
 

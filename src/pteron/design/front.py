@@ -53,6 +53,7 @@ class Front(Result):
         return FormerTable("Front", self.designs, self._headed_designs)
 
     def _headed_designs(self) -> pl.DataFrame:
+        """Return the designs with units in the headings of the columns."""
         return self.designs.select(list(self.headings)).rename(self.headings)
 
     def summary(self) -> str:
@@ -72,6 +73,7 @@ class Front(Result):
         }
 
     def _overview(self) -> Overview:
+        """Return the overview for notebooks: the counts of designs and the table."""
         title, _, about = self.summary().partition(": ")
         return frame_overview(title, about, self.table())
 
@@ -165,6 +167,7 @@ class ProvedRows:
             self._rows |= zip(self._keys(proved), proved.rows(), strict=True)
 
     def _keys(self, designs: pl.DataFrame) -> list[bytes]:
+        """Return the cache keys of designs: the bytes of their variables."""
         return [np.ascontiguousarray(row).tobytes() for row in self._task.points(designs)]
 
 

@@ -130,6 +130,7 @@ def _refine(
         )
 
         def with_choices(units: Array, best: Array = best) -> Array:
+            """Return the best design's unit coordinates with the free ones replaced, in 0 .. 1."""
             trial = best.copy()
             trial[free] = np.clip(units, 0.0, 1.0)
             return trial

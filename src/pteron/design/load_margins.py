@@ -111,6 +111,7 @@ def margins_of(
         speed = max(required.speed, _NOTHING)
 
         def motion_margins(places: Array) -> Array:
+            """Return ratios (N, 2 n) of force and speed limits to the worst loads at places."""
             poses = middle + places
             forces = worst_forces(robot, poses, speed, required.acceleration)
             loads = np.hstack([forces, worst_speeds(robot, poses, speed)])

@@ -50,10 +50,12 @@ _PEAK = 10.0 / sqrt(3.0)
 
 
 def _numbers(numbers: Any) -> Any:
+    """Return a single number as a list; anything else unchanged."""
     return [numbers] if isinstance(numbers, int | float) else numbers
 
 
 def _one_or_six(numbers: Any) -> Any:
+    """Return the numbers of an inertia; raise on a list whose length is not 6."""
     if isinstance(numbers, list | tuple) and len(numbers) != 6:
         raise ValueError(f"{len(numbers)} numbers given, 1 or 6 expected: Ixx Ixy Ixz Iyy Iyz Izz")
     return numbers
@@ -102,6 +104,7 @@ class CycleTable(TomlTable):
 
     @model_validator(mode="after")
     def _one_kind(self) -> Self:
+        """Return the cycle; raise unless it has points or a scale, and times that fit."""
         if (self.points is None) == (self.scale is None):
             raise ValueError("give either points, or the scale of the standard pick-and-place")
         if self.times is not None:
@@ -182,6 +185,7 @@ class SectionTable(TomlTable):
 
     @model_validator(mode="after")
     def _one_shape(self) -> Self:
+        """Return the section; raise unless it has a diameter, or a side and a wall that fit."""
         if (self.diameter is None) == (self.side is None) or (self.side and self.wall is None):
             raise ValueError("give a diameter, or a side and a wall")
         outer = self.diameter or self.side or 0.0
@@ -212,6 +216,7 @@ class ElasticityTable(TomlTable):
 
     @model_validator(mode="after")
     def _expect_some(self) -> Self:
+        """Return the table; raise where no part is elastic."""
         if self.actuators is None and self.upper is None and self.lower is None:
             raise ValueError("nothing gives way; give actuators, upper or lower")
         return self

@@ -67,6 +67,7 @@ class MachineSpace:
     def _extents_of_points(
         self, robot: Manipulator, poses: Array, points: Array, middle: Array
     ) -> Array:
+        """Return low ends, negated high ends (N, 6) and distances outside keep-outs (N, b), m."""
         margin, center = self._job.cell.margin, tool_places(robot, middle[None])[0]
         starts, ends = (part - center for part in _lines(robot, poses, points))
         both = np.stack([starts, ends])
@@ -137,6 +138,7 @@ class MachineSpace:
 
 
 def _parts(beyond: float) -> str:
+    """Return the beginning of a sentence on parts that go beyond a bound by a distance, m."""
     return f"parts {beyond:.3g} m" if beyond > 0.0 else "parts nearly"
 
 

@@ -98,6 +98,7 @@ def geometric_keys(leg: LegKind) -> list[str]:
 def _places_in_leg(
     robot: Manipulator, path: str, i: int, key: str, part: str | None, sign: int
 ) -> Iterator[GeometryNumber]:
+    """Yield the geometric numbers of a leg that a path names; raise where the leg has none."""
     leg = robot.legs[i - 1]
     known = geometric_keys(leg)
     if key not in known:

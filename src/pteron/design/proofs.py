@@ -228,6 +228,7 @@ def workspace_share(design: Design, proof: Proof) -> float:
 
 
 def _proof(design: Design, region: Region) -> Proof:
+    """Return the proof that a design's region meets the task's floors, with shared programs."""
     floors = design.task.floors
     with sharing_programs(design.task.robot):
         return prove(design.robot, region, type_i=floors.type_i, type_ii=floors.type_ii, most=_MOST)

@@ -173,6 +173,7 @@ class KindEvaluator:
             sign = np.sign(np.median(numeric(robot, "type_ii")(poses)[0]))
 
             def measures(places: Array) -> Array:
+                """Return type-I (squared), type-II and passive-joint margins (N, k) at places."""
                 poses = rating.middle + places
                 squares, determinant, room = (
                     numeric(robot, name)(poses)[0]
@@ -201,6 +202,7 @@ class KindEvaluator:
         if self.job.workspace.tilt is not None:
             # Between the tilts of the samples rams are longer and shorter.
             def ends(places: Array) -> Array:
+                """Return lengths and negated lengths (N, 2 n) of joints; infinity out of reach."""
                 at = inverse_kinematics(robot, rating.middle + places, on_failure="nan")
                 return np.asarray(np.nan_to_num(np.hstack([at, -at]), nan=np.inf))
 

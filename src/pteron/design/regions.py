@@ -53,6 +53,7 @@ def workspace_poses(workspace: WorkspaceTable, angles: Array, samples: int | Non
 
 
 def _positions(workspace: WorkspaceTable, count: int) -> Array:
+    """Return a grid of positions (N, k) over a workspace, its boundary included, m."""
     line = np.linspace(-1.0, 1.0, count)
     if workspace.shape != "cylinder":
         low, high = (np.array(end) for end in workspace.ends)

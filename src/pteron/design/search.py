@@ -161,6 +161,7 @@ class DesignRows:
 
 
 def _await_rows(pending: Sequence[Future[pl.DataFrame]]) -> pl.DataFrame:
+    """Return the rows of all pending evaluations in a single table; blocks until they end."""
     import polars as pl
 
     rows: pl.DataFrame = pl.concat(map(result_of, pending), rechunk=True)
@@ -245,4 +246,5 @@ def _designs_to_improve(
 
 
 def _digest(designs: Array) -> str:
+    """Return the digest of designs (N, v), 16 hexadecimal digits."""
     return hashlib.sha256(np.ascontiguousarray(designs).tobytes()).hexdigest()[:16]

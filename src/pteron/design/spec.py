@@ -38,6 +38,7 @@ ROUNDING = 1e-9
 
 
 def _expect_rising(pair: tuple[float, float]) -> tuple[float, float]:
+    """Return the pair [low, high]; raise unless low is below high."""
     low, high = pair
     if not low < high:
         raise ValueError(f"[{low:g}, {high:g}] given, whose range is empty; give [low, high]")
@@ -85,10 +86,12 @@ class ObjectiveTable(TomlTable):
     @field_validator("maximise", "minimise")
     @classmethod
     def _expect_known(cls, name: str | None) -> str | None:
+        """Return the name of a quantity; raise where it is unknown."""
         return name and expect_quantity(name)
 
     @model_validator(mode="after")
     def _one_way(self) -> Self:
+        """Return the objective; raise unless it has exactly either maximise or minimise."""
         if (self.maximise is None) == (self.minimise is None):
             raise ValueError("give either maximise or minimise, and a quantity")
         return self
@@ -114,10 +117,12 @@ class RequirementTable(TomlTable):
     @field_validator("quantity")
     @classmethod
     def _expect_known(cls, name: str) -> str:
+        """Return the name of a quantity; raise where it is unknown."""
         return expect_quantity(name)
 
     @model_validator(mode="after")
     def _expect_bound(self) -> Self:
+        """Return the requirement; raise where it has no bound or bounds that contradict."""
         if self.least is None and self.most is None:
             raise ValueError(f"{self.quantity}: neither least nor most given")
         if None not in (self.least, self.most) and self.least > self.most:  # type: ignore[operator]
@@ -263,6 +268,7 @@ class Spec(TomlTable):
         return self._with_functions(functions, requirements=[*self.requirements, table])
 
     def _with_functions(self, functions: dict[str, DesignQuantity], **update: Any) -> Spec:
+        """Return a copy of the spec with user-defined quantities and updated keys."""
         spec = self.model_copy(update=update)
         spec._user_quantities = functions
         return spec

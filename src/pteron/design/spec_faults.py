@@ -47,6 +47,7 @@ def spec_faults(spec: Spec, robot: Manipulator) -> Iterator[str]:
 
 
 def _workspace_faults(spec: Spec, robot: Manipulator) -> Iterator[str]:
+    """Yield the contradictions between a search's workspace and its machine, in words."""
     lengths, workspace = robot.platform.lengths, spec.workspace
     if workspace is None:
         return

@@ -123,6 +123,7 @@ def _clip_to_radius(points: Array, radius: float) -> Array:
 
 
 def _positions_along(job: Job) -> int:
+    """Return the number of sample positions along an edge, fewer where the platform tilts."""
     return _ALONG_TILTED if job.workspace.tilts else _ALONG
 
 
@@ -140,6 +141,7 @@ def _places(job: Job, robot: Manipulator, count: int) -> Array:
 
 
 def _poses_at(job: Job, robot: Manipulator, places: Array) -> Array:
+    """Return poses (N, m) of places (N, m): the tool's positions and the platform's angles."""
     count = len(robot.platform.lengths)
     angles = places[:, count:]
     if job.workspace.tilt is not None:
@@ -157,6 +159,7 @@ def pad_to_xyz(rows: object) -> Array:
 
 
 def _positions(job: Job, count: int) -> Array:
+    """Return sample positions (N, 3) over the workspace, relative to its middle, m."""
     space, half = job.workspace, job.workspace.half
     if space.poses is not None:
         points = pad_to_xyz(space.poses)
@@ -177,6 +180,7 @@ def orientations(job: Job, robot: Manipulator) -> Array:
 
 
 def _turns(job: Job) -> list[float]:
+    """Return the turns at which a workspace is sampled, rad: its ends, and 0 if between them."""
     turn = job.workspace.turn
     return [0.0] if turn is None else [*([0.0] if turn[0] < 0.0 < turn[1] else []), *turn]
 

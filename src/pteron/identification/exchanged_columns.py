@@ -103,6 +103,7 @@ def _exchanges(order: Sequence[int]) -> int:
 
 
 def _order_clauses(names: Sequence[str], order: Sequence[int]) -> Iterator[str]:
+    """Yield a clause that states which columns are swapped or in another order, if any."""
     moved = [name for k, name in enumerate(names) if order[k] != k]
     if len(moved) == 2:
         yield f"{_join_names(moved)} are swapped"
@@ -114,6 +115,7 @@ def _order_clauses(names: Sequence[str], order: Sequence[int]) -> Iterator[str]:
 def _sign_clauses(
     names: Sequence[str], order: Sequence[int], signs: Sequence[int]
 ) -> Iterator[str]:
+    """Yield a clause that states which columns have the wrong sign, if any."""
     flipped = [names[order[k]] for k, sign in enumerate(signs) if sign < 0]
     if flipped:
         yield f"{_join_names(flipped)} {'has' if len(flipped) == 1 else 'have'} the sign flipped"
@@ -265,4 +267,5 @@ def _unphysical(fault: ColumnFault, observations: Observations, model: Model) ->
 
 
 def _join_names(names: Sequence[str]) -> str:
+    """Return names joined by commas and "and"."""
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

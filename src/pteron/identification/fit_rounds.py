@@ -169,6 +169,7 @@ def _run_round(task: FitTask, equations: FitEquations, *, fits_delay: bool) -> F
 
 
 def _distort(faults: tuple[LogFault, ...]) -> bool:
+    """Return whether a fault of the log may pass for a fault of the machine."""
     return any(fault.distorts for fault in faults)
 
 

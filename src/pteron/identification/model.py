@@ -255,6 +255,7 @@ class Model:
         return coefficients
 
     def _all_columns(self, states: States) -> Array:
+        """Return the regressor (N, n, p) of all terms, before columns are selected."""
         robot, terms = self.robot, self.terms
         n = len(robot.legs)
         motion = states.pose, states.velocity, states.acceleration

@@ -204,6 +204,7 @@ def motion_mask(rates: Array, slow: Array, rows: int, *, wraps: bool = False) ->
 def _filter_block(
     model: LinearModel, block: SampleBlock, preprocessing: Preprocessing
 ) -> Observations:
+    """Return a block's observations: slow rows masked, then filtered and decimated."""
     decimation = preprocessing.decimation
     settling = preprocessing.settling_rows
     inner = slice(settling, len(block.states) - settling)

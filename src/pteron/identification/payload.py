@@ -209,6 +209,7 @@ class Payload(Result):
         return "\n".join(lines)
 
     def _opinion(self) -> str:
+        """Return a sentence that states whether the payload is significant and a real body."""
         if not self.is_significant:
             return "No payload is felt: the values are zero within their certainty."
         if self.real:

@@ -96,6 +96,7 @@ class Identification(Result):
         return f"<Identification of {self.robot.name!r}: {known} values, {grade}>"
 
     def _overview(self) -> Overview:
+        """Return the overview for notebooks: each value with its interval and the drawn value."""
         from pteron.identification.names_in_html import html_expressions
 
         drawn = [*self.model.base.values(self.robot).tolist()]

@@ -80,6 +80,7 @@ class Transmissions(Result):
 
 
 def _clear(values: Array, deviations: Array) -> Array:
+    """Return values that differ from zero significantly, and 0 for the others."""
     return np.where(values > _CLEAR * deviations, values, 0.0)
 
 

@@ -336,6 +336,7 @@ def _square_root(covariance: ArrayLike, rank: int) -> Array:
 
 
 def _prior(robot: Manipulator, cad: RobotLike | ArrayLike | None) -> Array | None:
+    """Return a CAD model's inertial parameters, from a machine, its file or an array; or None."""
     if cad is None:
         return None
     if isinstance(cad, str) and cad == "robot":

@@ -131,6 +131,7 @@ def maximum_likelihood(
 
 
 def _check(log: Log) -> None:
+    """Raise where a log has gaps or its payload changes."""
     advice = "to maximum likelihood, or choose another estimator"
     if len(log.segments) > 1:
         raise log.fault("gap", f"has gaps; give a part without one {advice}")

@@ -129,6 +129,7 @@ def qr_factor(
 def _blocks(
     observations: Observations, weights: Array | None, block: int
 ) -> Iterator[tuple[Array, Array]]:
+    """Yield weighted rows of the regressor and of the forces, flattened, in blocks of samples."""
     for start in range(0, len(observations.forces), block):
         rows = slice(start, start + block)
         matrix, forces = observations.matrix[rows], observations.forces[rows]

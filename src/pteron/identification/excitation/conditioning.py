@@ -149,6 +149,7 @@ def stacked_regressor(motion: FourierMotion, base: BaseParameters, times: Array)
 
 
 def _condition(matrix: Array) -> float:
+    """Return the condition number of a matrix; infinity where its rank is deficient."""
     values = np.linalg.svd(matrix, compute_uv=False)
     if len(matrix) < matrix.shape[1] or values[-1] <= np.finfo(float).eps * values[0]:
         return float("inf")

@@ -159,5 +159,6 @@ def _violations(motion: FourierMotion, setting: Setting) -> tuple[tuple[str, ...
 
 
 def _margins(motion: FourierMotion, setting: Setting) -> tuple[dict[str, Array], Array]:
+    """Return the relative margins to the limits by name, (T, ...), and their instants (T,)."""
     times = motion.uniform_times(_CHECKED * motion.harmonics)
     return relative_margins(motion, setting.limits, times), times

@@ -150,10 +150,12 @@ class MotionLayout:
         return columns + [(name, "") for name in robot.force_names]
 
     def _unit(self, si: str) -> str:
+        """Return the unit in the file of a quantity in an SI unit; derived units are unchanged."""
         units = {"m": self.length_unit, "rad": self.angle_unit, "s": self.time_unit}
         return units.get(si, si)
 
     def _factor(self, si: str) -> float:
+        """Return the factor from an SI unit to the file's unit."""
         return _PER_UNIT.get(self._unit(si), 1.0)
 
 

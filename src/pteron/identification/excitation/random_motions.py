@@ -194,6 +194,7 @@ def _halve(keeps_limits: Callable[[float], bool], low: float, high: float) -> tu
 
 
 def _scale(motion: FourierMotion, scale: float) -> FourierMotion:
+    """Return a motion with its amplitudes about the mean scaled."""
     coefficients = motion.coefficients
     coefficients[1:] *= scale
     return motion.with_coefficients(coefficients)

@@ -134,10 +134,12 @@ class _Kept:
         return self._sides(derivatives, -derivatives)
 
     def _evaluate_rows(self, z: Array) -> list[Array]:
+        """Return q, q' and q'' at the instants, (n, T) each, of the program's variables (v,)."""
         coefficients = z.reshape(-1, len(self._size)) * self._size
         return [(rows @ coefficients).T for rows in self._rows]
 
     def _sides(self, above: Array, below: Array) -> Array:
+        """Return rows at finite lower bounds, then those at finite upper bounds, flattened."""
         parts = above[:, self._above], below[:, self._below]
         return np.concatenate([part.reshape(-1, *part.shape[2:]) for part in parts])
 

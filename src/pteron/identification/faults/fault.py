@@ -247,6 +247,7 @@ class IsolatedFault(Result):
         return float(np.linalg.norm(parts))
 
     def _sentence(self) -> str:
+        """Return a sentence that states the fault with its size and error."""
         first, key = (
             float(self.sizes[0]),
             "sampling" if self.is_half_sample_delay else str(self.fault),

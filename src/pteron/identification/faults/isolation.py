@@ -190,6 +190,7 @@ def _isolate_in_parts(
     known: Mapping[str, float],
     drawn: DrawnValues | None,
 ) -> FaultIsolation:
+    """Return the faults that the residuals of a fit to parts of a log show."""
     columns = parts[0].model
     noise = np.mean([part.how.force_noise for part in parts], axis=0)
 

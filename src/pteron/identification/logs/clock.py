@@ -134,6 +134,7 @@ class Clock:
         return None if cells.has_nulls() or not cells.dtype.is_integer() else cells
 
     def _parse_timestamps(self, table: Table, name: str) -> Values:
+        """Return times (N,), s, of a column of text; raise at the first cell that is not a time."""
         assert self.format is not None
         stamps = _nanoseconds(table.frame[name], self.format)
         if stamps.has_nulls():

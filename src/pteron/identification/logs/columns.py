@@ -158,4 +158,5 @@ def as_read(
 
 
 def _twice(name: str, source: str) -> DataError:
+    """Return the error that two columns have the same name."""
     return DataError(f"{source}: two columns are called {shorten(name)}; rename or remove one")

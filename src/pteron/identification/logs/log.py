@@ -305,6 +305,7 @@ class Log(OfLog):
 
     @property
     def _symbols(self) -> tuple[ActuatedJoint, ...]:
+        """The joints' symbols; sliders where the log names none."""
         return self.symbols or (SLIDER,) * self.joints.shape[1]
 
     def place(self, index: int) -> str:
@@ -334,6 +335,7 @@ class Log(OfLog):
         return replace(self, rows_in_file=rows_of(self))._take_samples(np.flatnonzero(~rows))
 
     def _take_samples(self, rows: slice | NDArray[np.int64]) -> Log:
+        """Return the log's samples at rows, a slice or their numbers."""
         arrays = {name: getattr(self, name) for name in _ARRAYS}
         changed: dict[str, Any] = {
             name: values[rows] for name, values in arrays.items() if values is not None

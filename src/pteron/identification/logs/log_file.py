@@ -213,6 +213,7 @@ class LogFile(OfLog):
             yield np.concatenate(blocks)
 
     def _piece(self, values: Values, first: int) -> Log:
+        """Return a log of rows read from the file, in SI units; raise on impossible numbers."""
         c, source = self._columns, self.source
         edges = np.cumsum([len(group.names) for group in self._groups])[:-1]
         joints, forces, pose, payload = (
@@ -287,6 +288,7 @@ class LogFile(OfLog):
         return clock, step
 
     def _channels(self) -> list[Channel]:
+        """Return a record for each column of joints and forces, which finds channels that stop."""
         spans, source, c = joint_spans(self._robot), self.source, self._columns
         limits = self.description.limits or (None,)
         joints = [

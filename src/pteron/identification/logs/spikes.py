@@ -115,6 +115,7 @@ class _JointMotion:
         return min(travel_before, travel_after) < _RESTS < _MOVES < max(travel_before, travel_after)
 
     def _travel_between(self, start: int, stop: int) -> float:
+        """Return the largest travel of a joint between two rows, in units of its usual travel."""
         return float((np.abs(self._joints[stop] - self._joints[start]) / self._travel).max())
 
 

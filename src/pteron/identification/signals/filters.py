@@ -250,6 +250,7 @@ class Decimation:
         return self._filter_channel(signal, self.taps)
 
     def _filter_channel(self, signal: Array, taps: Array) -> Array:
+        """Return a signal (T, ...) filtered and decimated; empty if it is too short."""
         if self.factor == 1:
             return signal
         count = len(self.centers(len(signal)))
