@@ -49,7 +49,7 @@ _MAP = "RepRapFirmware height map"
 
 
 class _Touch(NamedTuple):
-    """A place where the tool touched, as the controller logs it."""
+    """A touch of the probe, as a controller logs it."""
 
     place: str
     at: dict[str, float]
@@ -301,7 +301,7 @@ def _match_place(text: str, match: re.Match[str], source: str) -> str:
 
 
 def _touched_heights(robot: Manipulator, touched: Sequence[_Touch]) -> Measurements:
-    """Return heights at readings that follow from the machine as drawn."""
+    """Return touched heights as measurements, with readings by the drawn machine's kinematics."""
     platform, axes = robot.platform, linuxcnc_axes(robot)
     poses = np.array(
         [[touch.at.get(axis.letter, 0.0) / axis.scale for axis in axes] for touch in touched]

@@ -49,7 +49,7 @@ _FINE = 10**6
 def exact_rank(
     start: Guess, blocks: Sequence[UnknownBlock], measurements: Measurements, seed: int
 ) -> tuple[int | None, tuple[int, ...], int]:
-    """Return rank, primes and number of rows; None for a rank where something has no exact form.
+    """Return rank, primes and number of rows; rank None if a part has no exact form.
 
     Rows of measurements matter by their kinds: what was measured, of which mark, from where.
     """
@@ -79,7 +79,7 @@ def exact_rank(
 
 
 def _row_kinds(measurements: Measurements) -> dict[int, float | None]:
-    """Return a row of each kind, by its number, with the height at which such rows always are."""
+    """Return a row of each kind, with the height that such rows have, if constant."""
     measured = ~np.isnan(np.column_stack([*measurements.parts.values()]))
     over, origins, planes = measured[:, -2], measurements.origins, np.array(measurements.planes)
     kinds = {

@@ -151,7 +151,7 @@ def _open_table(robot: Manipulator, path: str | Path, dialect: Dialect | None) -
 
 
 def _name_and_unit(column: str) -> tuple[str, str]:
-    """Return the name of a column in small letters, and the unit in it, if any."""
+    """Return the name of a column in lower case, and its unit, if any."""
     match = _WITH_UNIT.fullmatch(column.strip())
     if match is None:
         return column.strip().lower(), ""
@@ -213,7 +213,7 @@ def _read_rows(robot: Manipulator, opened: _Opened, source: str) -> Measurements
 
 
 def _numbers(table: Table, column: str, faults: list[str]) -> Array:
-    """Return a column (N,), NaN where empty; each cell that is no number adds a fault."""
+    """Return a column (N,), NaN where empty; each cell that is not a number adds a fault."""
     try:
         return np.asarray(table.numbers([column], "nan")[:, 0])
     except DataError as error:

@@ -263,7 +263,7 @@ def _cost_together(
 def _quick_misfit(
     rows: Measurements, blocks: Sequence[UnknownBlock], guess: Guess, most: float
 ) -> float:
-    """Return `_misfit`, or inf where the first few rows are already far above the most that counts.
+    """Return `_misfit`, or inf if the first rows are already far above `most`.
 
     Of these no other assembly modes are sought: of readings that lead to no pose that takes long.
     """
@@ -290,7 +290,7 @@ def _misfit(
 
 
 def _trial_poses(guess: Guess, rows: Measurements, *, modes: bool = True) -> Array:
-    """Return poses of readings that may be wrong: all assembly modes where these are quick to find.
+    """Return poses of trial readings: all assembly modes if these are quick to compute.
 
     The right readings lead to the measured pose, or near home, by Newton's steps alone.
     """

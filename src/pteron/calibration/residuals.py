@@ -142,7 +142,7 @@ class MachineSlopes:
         chosen: Numbers,
         measured: NDArray[np.bool_],
     ) -> tuple[Array, Array, Array]:
-        """Return marks (N, 3), how far they are from where distances begin, and slopes.
+        """Return marks (N, 3), their separations from the ends of distances, and slopes.
 
         Slopes (N, K, p + 2 n) are against all unknowns, and behind them against the joint
         coordinates, of two rows.

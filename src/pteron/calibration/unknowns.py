@@ -116,7 +116,7 @@ def _point_unknowns(
 
 
 def _surrounding_blocks(measured: Measurements) -> Iterator[UnknownBlock]:
-    """Yield the blocks of what measurements refer to and nobody knows."""
+    """Yield the blocks of unknown marks, planes, anchors and frame."""
     setup = measured.setup
     for name, mark in setup.marks.items():
         if not mark.known and name in measured.marks:

@@ -65,7 +65,7 @@ class _Reason(NamedTuple):
 
 
 def rows_for_check(measurements: Measurements, blocks: Sequence[UnknownBlock]) -> int:
-    """Return the least number of such rows from which some are held out of the fit."""
+    """Return the least number of rows from which some are reserved for validation."""
     counted = sum(int((~np.isnan(array)).sum()) for array in measurements.parts.values())
     least = (
         _PER_VALUE[set(measurements.kinds) <= set(measurements.setup.noise)] * blocks[-1].where.stop

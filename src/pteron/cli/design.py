@@ -90,7 +90,7 @@ def design(
 
 
 def _tell_resumed(folder: Path) -> None:
-    """Print whether the search goes on from evaluated designs in the folder."""
+    """Print that the search resumes from evaluated designs, if the folder has any."""
     for name, word in ((_GENERATIONS, "generations"), (_SURVEY, "blocks")):
         count = len([*(folder / name).glob("[0-9]*")])
         if count:

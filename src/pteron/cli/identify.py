@@ -201,7 +201,7 @@ def _box(text: str) -> tuple[str, Box]:
 
 
 def _show(result: Identification) -> None:
-    """Print a verdict, the errors, the values, what was found in the logs, and the files."""
+    """Print the verdict, the errors, the values, the findings in the logs, and the files."""
     verdict = result.verdict
     worst = max(float(prediction.nrms.max()) for prediction in result.held_out)
     color = GRADE_COLORS[verdict.grade]
@@ -258,7 +258,7 @@ def _values(result: Identification) -> Table:
 
 
 def _payload(result: Identification) -> list[str]:
-    """Return the lines that give the payload to a controller and to other commands."""
+    """Return lines with the payload as arguments of a controller and of other commands."""
     from pteron.identification.payload import payload_in
 
     payload = payload_in(result)

@@ -123,7 +123,7 @@ def new(
 
 
 def _stocks(texts: list[str] | None) -> dict[str, str]:
-    """Return what links are cut from, by their key; without a key it is for both."""
+    """Return the stock of the links by key; a stock without a key is for "upper" and "lower"."""
     stocks: dict[str, str] = {}
     for text in texts or ():
         key, _, stock = text.rpartition("=")
@@ -309,7 +309,7 @@ def _home_lines(robot: Manipulator, findings: dict[str, Any]) -> list[str]:
 
 
 def _drives(robot: Manipulator) -> list[Table]:
-    """Return the drives of the joints, where the file has them."""
+    """Return a table of the joints' drives; none if the file has none."""
     from pteron.legs.drive_rows import drive_rows
 
     legs = tuple(f"leg {i}" for i in range(1, robot.joint_count + 1))
@@ -319,7 +319,7 @@ def _drives(robot: Manipulator) -> list[Table]:
 
 
 def _modes(modes: list[dict[str, Any]]) -> list[Table]:
-    """Return where the platform is in each working mode."""
+    """Return a table of the working modes: the platform's pose, its least margin, and remarks."""
     rows = []
     for mode in modes:
         said = [*["the file's"] * mode["named"], *["likely"] * mode["likely"]]

@@ -124,7 +124,7 @@ def simulate(
 
 
 def _model(machine: Manipulator, name: str, elbows: str | None) -> Manipulator:
-    """Return the controller's model of a machine: one that moves as it does, in its mode."""
+    """Return the controller's model of a machine; raise unless coordinates and joints agree."""
     model = load_robot(name, elbows)
     for what, names, other in (
         ("pose is", machine.coordinates, model.coordinates),
@@ -185,7 +185,7 @@ def _data(simulation: Simulation, controller: str, cycle: str, carried: Carried)
 
 
 def _rows(columns: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Return the rows of columns that are as long."""
+    """Return columns of equal length as rows."""
     return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
 
@@ -208,7 +208,7 @@ def _tell(simulation: Simulation, data: dict[str, Any], carried: Carried, out: s
 
 
 def _show(simulation: Simulation, data: dict[str, Any], carried: Carried) -> None:
-    """Print for a person: how well it follows, and what its drives do."""
+    """Print tables of the tracking errors and of the drives' loads."""
     robot = simulation.robot
     steps = "DOP853" if data["step"] is None else f"steps of {data['step'] * 1e3:.3g} ms"
     errors = (

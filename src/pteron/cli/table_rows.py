@@ -33,7 +33,7 @@ _DECIMALS = {"m": 6, "rad": 6, "N": 4, "N m": 4}
 
 @dataclass(frozen=True)
 class TableRows:
-    """A table, or a single row that was typed: messages about it speak of no rows."""
+    """A table, or a single typed row, for which messages name no row."""
 
     table: Table | TypedRow
 
@@ -93,7 +93,7 @@ class TableRows:
         row: int,
         unlikely: str,
     ) -> None:
-        """Serve the row that fails alone: its message then speaks of it, and of no batch."""
+        """Evaluate the row that fails alone, so that the message names it."""
         try:
             serve(values[row])
         except PteronError as error:
@@ -114,7 +114,7 @@ def given_rows(
     what: str,
     names: Sequence[str],
 ) -> TableRows:
-    """Return the rows of a table's file, or the one that was typed; `names` are its columns."""
+    """Return the rows of a table's file, or the typed row; `names` are its columns."""
     if not typed:
         return rows_of_table(robot, file, what, names)
     if file is not None:

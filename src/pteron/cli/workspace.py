@@ -181,7 +181,7 @@ def _checked_indices(robot: Manipulator, names: list[str]) -> tuple[str, ...]:
 
 
 def _expect_output(out: str | None) -> str:
-    """Return the ending of a file after a check, before the work begins, that it can be written."""
+    """Return the ending of a file; raise, before the work begins, if it cannot be written."""
     if out is None:
         return ""
     ending = Path(out).suffix.lower()
@@ -209,7 +209,7 @@ def _warnings(robot: Manipulator) -> list[str]:
 
 
 def _grid(robot: Manipulator, text: str | None, points: int | None, ending: str) -> Grid:
-    """Return the poses that are asked for, as many as the file can hold."""
+    """Return the grid of poses of the slice, with the number of axes that the file needs."""
     from pteron.maps import pose_grid
 
     names = robot.coordinates
@@ -251,7 +251,7 @@ def _with_frames(grid: Grid) -> Grid:
 
 
 def _volume(robot: Manipulator, grid: Grid) -> ReachVolume | None:
-    """Return the reach at the grid's orientation; None where that varies, or nothing is in it."""
+    """Return the reach at the grid's orientation; None where that varies or the reach is empty."""
     from pteron.workspace import reach_volume
 
     if any(axis.unit == "rad" for axis in grid.axes) or len(robot.platform.lengths) < 2:
@@ -263,7 +263,7 @@ def _volume(robot: Manipulator, grid: Grid) -> ReachVolume | None:
 
 
 def _unreachable_slice_warnings(grid: Grid, volume: ReachVolume | None) -> list[str]:
-    """Return the held lengths at which nothing is in reach."""
+    """Return warnings of fixed lengths at which nothing is in reach."""
     from pteron.platforms.coordinates import coordinate
 
     if volume is None:

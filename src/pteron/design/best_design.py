@@ -85,7 +85,7 @@ def _exceeded_limit(evaluator: KindEvaluator, candidate: Candidate) -> str:
 
 
 def shown_objectives(objectives: Sequence[str]) -> list[str]:
-    """Return the objectives, of one alone with another that decides between equals."""
+    """Return the objectives; a single objective with a second that decides between equals."""
     other = "moving_mass" if objectives[0] != "moving_mass" else "footprint"
     return list(objectives) if len(objectives) > 1 else [objectives[0], other]
 

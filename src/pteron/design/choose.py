@@ -68,7 +68,7 @@ class Choice(Result):
 
     @property
     def best(self) -> Candidate | None:
-        """The best kind by the first objective; None where none serves."""
+        """The best kind by the first objective; None where none is feasible."""
         return self.candidates[0] if self.candidates and self.candidates[0].serves else None
 
     def summary(self) -> str:
@@ -302,7 +302,7 @@ class _CandidateStore:
             return None
 
     def keep(self, candidate: Candidate) -> None:
-        """Keep a finished kind."""
+        """Write a finished kind to the folder."""
         if self._folder is not None:
             record = json_ready(candidate.as_dict() | {"digest": self._digest(candidate.kind)})
             self._folder.mkdir(parents=True, exist_ok=True)

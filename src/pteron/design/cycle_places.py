@@ -91,7 +91,7 @@ class Places:
         return replace(self, shifts=self.shifts[indices], turns=self.turns[indices])
 
     def both_ways(self) -> Places:
-        """Return the cycle, finer in time, at its places and, turned by pi, at opposite ones."""
+        """Return the cycle, finer in time, at its places and, turned by pi, at opposite places."""
         fine = replace(self, samples=_IN_CYCLE_LAST)
         if not self.anywhere:
             return fine
@@ -102,7 +102,7 @@ class Places:
 
     @cached_property
     def states(self) -> Curve:
-        """Poses from the middle, velocities and accelerations (B, K, m), if it takes 1 s.
+        """Poses from the middle, velocities and accelerations (B, K, m), for a duration of 1 s.
 
         It goes from rest to rest by quintics, all of the same greatest acceleration.
         """
@@ -111,7 +111,7 @@ class Places:
         return self.curves(*timed.curve(np.linspace(0.0, 1.0, self.samples)))
 
     def curves(self, *curve: Array) -> Curve:
-        """Return poses of the tool (K, m) and two derivatives as P's (B, K, m), at all places."""
+        """Return P's poses and two derivatives (B, K, m) for a curve of the tool, at each place."""
         parts: list[Array] = []
         for part in curve:
             every = np.tile(part, (len(self.turns), 1, 1))

@@ -61,12 +61,12 @@ class Design(Result):
     least: float = np.inf
 
     def __repr__(self) -> str:
-        """Return the design in a line, without what it has yet to compute."""
+        """Return the design in a line, without quantities that are not computed yet."""
         return f"<Design of {self.task.robot.name!r}: {self.robot.name}>"
 
     @property
     def quantities(self) -> dict[str, float]:
-        """The quantities of its search, by name; NaN where it has none."""
+        """The quantities of the search, by name; NaN where undefined."""
         return {name: self.quantity(name) for name in self.task.quantity_names}
 
     @cached_property
@@ -84,7 +84,7 @@ class Design(Result):
 
     @cached_property
     def cube(self) -> Fit:
-        """The largest cube, or copy of a floating workspace: found, proved where it is known."""
+        """The largest cube, or copy of a floating workspace, from a local search or a proof."""
         if self.known is not None:
             return self.known
         return self.cube_without(np.empty((0, self.robot.freedom)))
@@ -97,7 +97,7 @@ class Design(Result):
 
     @cached_property
     def workspace(self) -> WorkspaceTable | None:
-        """The required workspace, where it is in this design."""
+        """The required workspace; a floating one at its best place in this design."""
         table = self.task.spec.workspace
         return table.with_center(self.cube.center) if table is not None and table.floats else table
 
@@ -187,7 +187,7 @@ class Design(Result):
 
     @cached_property
     def cycles(self) -> tuple[Motion, ...]:
-        """The motions of the cycles, about the workspace's middle; as they stand without one."""
+        """The motions of the cycles, about the workspace's middle if there is a workspace."""
         spec, middle = self.task.spec, self.task.orientations[0].copy()
         lengths = len(self.robot.platform.lengths)
         ends = None if self.workspace is None else np.array(self.workspace.ends)
@@ -258,7 +258,7 @@ class Design(Result):
     start_strokes = former_attribute("start_strokes", "reference_strokes")
 
     def quantity(self, name: str) -> float:
-        """Return one of its quantities; NaN where it has none, see `missing_reason`."""
+        """Return a quantity; NaN where it is undefined, see `missing_reason`."""
         return self._quantities(name)[0]
 
     def missing_reason(self, name: str) -> str:
@@ -294,7 +294,7 @@ class Design(Result):
         return self._known_quantities[name]
 
     def _evaluate_quantity(self, name: str) -> tuple[float, str]:
-        """Return a quantity and, where there is none, why."""
+        """Return a quantity and, where it is undefined, the reason."""
         quantity = self.task.quantities[name]
         if quantity.of_machine is not None:
             return self._evaluate_machine(quantity.of_machine)

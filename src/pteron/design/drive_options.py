@@ -100,7 +100,7 @@ def read_gearboxes(path: str | Path) -> tuple[Gearbox, ...]:
 
 
 def prices(path: str | Path, count: int) -> list[float]:
-    """Return the prices that a list has, NaN where it has none."""
+    """Return the prices of a list of motors, NaN where not stated."""
     if Path(path).suffix.lower() == ".toml":
         listed = read_toml(path, DataError, "no such file")["motors"]
         return [_price(path, motor) for motor in listed]
@@ -167,7 +167,7 @@ class Options:
         joint: str,
         friction: float,
     ) -> Options:
-        """Return them by price or, where one has none, by rated power."""
+        """Return all options by price or, if not all have a price, by rated power."""
         options = [
             Option(motor, gearbox, price + gearbox.price, friction)
             for motor, price in motors

@@ -57,7 +57,7 @@ class Evolution:
         return np.array(self._asked.get("X"), dtype=float)
 
     def tell(self, designs: Array, costs: Array, misses: Array) -> None:
-        """Take designs with costs (N, M) and violations (N, C); those of `ask` come first."""
+        """Record designs with costs (N, M) and violations (N, C); those of `ask` come first."""
         from pymoo.core.evaluator import Evaluator
         from pymoo.core.population import Population
         from pymoo.problems.static import StaticProblem

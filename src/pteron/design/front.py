@@ -100,7 +100,7 @@ class Front(Result):
         return np.asarray(self.designs.select(names).to_numpy())
 
     def robot(self, index: int) -> Manipulator:
-        """Return the machine of one of its designs."""
+        """Return the machine of a design of the front."""
         return self.task.machine(self.values[index].tolist())
 
     @cached_property
@@ -152,7 +152,7 @@ class ProvedRows:
         return type(designs)(rows, schema=designs.schema, orient="row")
 
     def front(self, parts: Callable[[], Iterable[pl.DataFrame]]) -> Front:
-        """Return the front of designs that come in parts, each design of it proved.
+        """Return the front of designs in parts, after proving every design on it.
 
         Where a proof takes something from one, the front is another, and that is proved.
         """
@@ -196,13 +196,13 @@ def front_of_parts(task: Task, parts: Iterable[pl.DataFrame]) -> Front:
 
 
 def _misses_of(task: Task, designs: pl.DataFrame) -> Array:
-    """Return how much each design misses, all in all; one without an objective misses it."""
+    """Return the sum of each design's violations (N,); an undefined objective adds to it."""
     missed = violations(designs).sum(axis=1)
     return np.asarray(missed + FAILED * (~np.isfinite(task.costs(designs))).sum(axis=1))
 
 
 def _impossible(task: Task, nearest: pl.DataFrame, evaluated: int) -> ModelError:
-    """Return the error of a search without a feasible design; it names the nearest one."""
+    """Return the error of a search without a feasible design; it has the nearest's violations."""
     row = nearest.row(0, named=True)
     design = Design(task, task.machine([row[v.name] for v in task.variables]))
     reasons = []

@@ -125,7 +125,7 @@ class Job(TomlTable):
             yield from self._room_faults()
 
     def _room_faults(self) -> Iterator[str]:
-        """Yield where the cell leaves the workspace itself no room."""
+        """Yield contradictions between the cell and the workspace, in words."""
         cell, space, sides = self.cell, self.workspace, 2.0 * self.workspace.half
         at = np.array(space.center or (0.0, 0.0, 0.0))
         if cell.footprint is not None and (sides[:2] > cell.footprint).any():
@@ -189,11 +189,11 @@ class Job(TomlTable):
 
     @property
     def free(self) -> bool:
-        """Whether a cycle is to be as fast as the motors can."""
+        """Whether a cycle has no duration, and is to be as fast as the motors can."""
         return any(cycle.duration is None for cycle in self.cycles)
 
     def file(self, name: str) -> Path:
-        """Return a file that it names: beside it, or as it stands."""
+        """Return the path of a file that the job names: beside the job's file if it is there."""
         beside = self._folder / name
         return beside if beside.exists() else Path(name)
 

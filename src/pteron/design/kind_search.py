@@ -146,7 +146,7 @@ def _refine(
 
 
 def pareto_ratings(ratings: list[Rating], objectives: list[str]) -> list[Rating]:
-    """Return the designs that keep all requirements and that no other of them dominates."""
+    """Return the feasible designs that no other feasible design dominates."""
     good = [rating for rating in ratings if not rating.misses]
     costs = np.array([[rating.figures[name] for name in objectives] for rating in good])
     return [good[k] for k in pareto_front(costs)]

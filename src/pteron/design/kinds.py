@@ -169,7 +169,7 @@ class Kind:
         return {key: Stock.parse(name) for key, name in self.link_stocks(point).items()}
 
     def with_travel(self, leg: Any, travel: tuple[float, float], point: Array) -> Any:
-        """Return a leg whose joint goes from one end to another, m; a ram's tubes are as long."""
+        """Return a leg with limits of its travel, m; a ram with tubes of that length."""
         limited = replace(leg, limits=travel)
         if slides(leg):
             return limited

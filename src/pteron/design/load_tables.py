@@ -26,7 +26,7 @@ def default_table(table: type[TomlTable]) -> Any:
 
 
 def as_list(names: Any) -> Any:
-    """Return a name as a list of one; a list as it is."""
+    """Return a name as a list with a single item; a list as it is."""
     return [names] if isinstance(names, str) else names
 
 
@@ -77,7 +77,7 @@ class PayloadTable(TomlTable):
     )
 
     def add_to(self, robot: Manipulator) -> Manipulator:
-        """Return a machine that carries it; a number is of a ball where the platform tilts."""
+        """Return a machine with the payload; a scalar inertia counts about all axes if it tilts."""
         inertia = self.inertia
         tensor = (
             inertia if isinstance(inertia, tuple) else (inertia, 0.0, 0.0, inertia, 0.0, inertia)
@@ -170,7 +170,7 @@ class ErrorsTable(TomlTable):
 
     @property
     def tolerances(self) -> Tolerances:
-        """The same for `pose_error`."""
+        """The tolerances for `pose_error`."""
         joints, backlash = (v[0] if len(v) == 1 else v for v in (self.encoder, self.backlash))
         return Tolerances(joints, backlash, self.point, self.length, self.angle)
 
@@ -195,7 +195,7 @@ class SectionTable(TomlTable):
 
     @property
     def section(self) -> Section:
-        """The same as stiffnesses."""
+        """The section with its material, for stiffnesses."""
         material = {"steel": STEEL, "aluminium": ALUMINIUM}[self.material]
         if self.side is not None:
             return Section.square_tube(self.side, self.wall or 0.0, material)
@@ -223,7 +223,7 @@ class ElasticityTable(TomlTable):
 
     @property
     def elasticity(self) -> Elasticity:
-        """The same for `stiffness`."""
+        """The elasticity for `stiffness`."""
         stiffnesses = (inf,) if self.actuators is None else self.actuators
         upper, lower = (None if t is None else t.section for t in (self.upper, self.lower))
         return Elasticity(

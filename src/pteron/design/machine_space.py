@@ -190,7 +190,7 @@ def _guides(robot: Manipulator) -> Iterator[tuple[int, Array, Array]]:
 
 @lru_cache(maxsize=1)
 def _squared_distances() -> ca.Function:
-    """Return the function of the ends of two segments that gives their squared distance."""
+    """Return a CasADi function: squared distance of two segments, from their ends."""
     p, p_end, q, q_end = (ca.SX.sym(name, 3) for name in ("p", "p_end", "q", "q_end"))
     square = squared_distance((p, p_end), (q, q_end))
     return ca.Function("squared_distance", [p, p_end, q, q_end], [square])

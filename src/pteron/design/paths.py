@@ -52,7 +52,7 @@ class GeometryNumber:
         return f"legs[{self.leg}].{self.key}{part}"
 
     def read(self, robot: Manipulator) -> float:
-        """Return the number as it is in a machine."""
+        """Return the number's value in a machine."""
         numbers = getattr(robot.legs[self.leg - 1], self.key)
         return float(numbers if self.part is None else numbers[self.part])
 

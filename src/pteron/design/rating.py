@@ -49,7 +49,7 @@ _BY_STAGE = 100.0
 
 @dataclass
 class Rating:
-    """A machine as far as it was judged.
+    """The figures of a machine and its violated bounds, up to the stage at which it failed.
 
     Attributes
     ----------
@@ -93,7 +93,7 @@ class Rating:
         return self.robot
 
     def miss(self, name: str, share: float, words: str) -> None:
-        """Note that a bound is violated by a share of it."""
+        """Record the violation of a bound, relative to the bound, with its words."""
         if share > self.misses.get(name, 0.0):
             self.misses[name], self.shortfalls[name] = float(share), words
 
@@ -147,7 +147,7 @@ class KindEvaluator:
         return [[i for i, g in enumerate(legs) if (g.type, g.joint.unit) == k] for k in kinds]
 
     def rate(self, point: Array) -> Rating:
-        """Return how the machine of a design does the job; call it within `sharing_programs`."""
+        """Return the rating of a design for the job; call it within `sharing_programs`."""
         rating = Rating(np.asarray(point, dtype=float))
         try:
             robot, rating.middle = self.kind.machine(point)
@@ -226,7 +226,7 @@ class KindEvaluator:
         rating.robot = replace(robot, legs=tuple(legs))
 
     def _judge_room(self, rating: Rating) -> None:
-        """Judge footprint, height, keep-out boxes and clearances."""
+        """Evaluate footprint, height, keep-out boxes and clearances."""
         figures, misses = self.machine_space.evaluate(
             rating.machine, rating.middle + self.visited, rating.middle
         )
@@ -300,7 +300,7 @@ class KindEvaluator:
         samples: int | None = None,
         keep: int = 1,
     ) -> tuple[Array, Array]:
-        """Return least values over workspace and cycles, as `refine_worst_values` has them."""
+        """Return the least values over workspace and cycles (see `refine_worst_values`)."""
         return refine_worst_values(self.job, robot, values_of, samples, keep, self.between)
 
     def shares(self, time: float | None) -> Array:
@@ -378,7 +378,7 @@ class KindEvaluator:
         return loads, work
 
     def states(self, cycle: Places, middle: Array, duration: float) -> tuple[Array, Array, Array]:
-        """Return the states (B, K, m) of a cycle that takes so long."""
+        """Return poses, velocities and accelerations (B, K, m) of a cycle of a duration, s."""
         pose, velocity, acceleration = cycle.states
         return middle + pose, velocity / duration, acceleration / duration**2
 

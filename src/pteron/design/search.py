@@ -134,7 +134,7 @@ class DesignRows:
         plan: dict[str, Any],
         progress: Progress | None = None,
     ) -> pl.DataFrame:
-        """Return the rows that a function gives for jobs; those that the folder has stay."""
+        """Return the rows of `function` for jobs; rows already in the folder are reused."""
         store = TableStore(self.folder / name, {**self.task.plan, **plan})
         chunks = [jobs[k : k + _CHUNK] for k in range(0, len(jobs), _CHUNK)]
         if self.pool is None:
@@ -215,7 +215,7 @@ def first_designs(task: Task, count: int, seed: int) -> Array:
 
 
 def evaluate_designs(task: Task, jobs: Sequence[tuple[list[float], int]]) -> pl.DataFrame:
-    """Return the rows of designs, of which those with an objective are improved in it first."""
+    """Return the rows of designs; those with an objective are improved in it by gradients first."""
     with one_thread():
         designs = [point if k < 0 else improve_design(task, point, k) for point, k in jobs]
     return design_table(task, designs)

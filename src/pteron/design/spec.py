@@ -165,7 +165,7 @@ Quantitative: TypeAlias = str | DesignQuantity | Callable[[Manipulator], float]
 
 
 def _note_quantity(quantity: Quantitative, functions: dict[str, DesignQuantity]) -> str:
-    """Return a quantity's name; add a user's own to those that a search has."""
+    """Return a quantity's name, after adding a user-defined quantity to `functions`."""
     if not isinstance(quantity, str):
         named = named_quantity(quantity)
         if function_of(functions.setdefault(named.name, named)) != function_of(named):
@@ -227,7 +227,7 @@ class Spec(TomlTable):
     def with_objectives(
         self, *, minimise: Sequence[Quantitative] = (), maximise: Sequence[Quantitative] = ()
     ) -> Spec:
-        """Return the same search with other objectives.
+        """Return a copy of the search with other objectives.
 
         Parameters
         ----------
@@ -257,7 +257,7 @@ class Spec(TomlTable):
     def with_requirement(
         self, quantity: Quantitative, *, least: float | None = None, most: float | None = None
     ) -> Spec:
-        """Return the same search with one more requirement, of a quantity as `with_objectives`."""
+        """Return a copy of the search with a further requirement (see `with_objectives`)."""
         functions = dict(self._user_quantities)
         name = _note_quantity(quantity, functions)
         table = RequirementTable.model_construct(quantity=name, least=least, most=most)
@@ -274,7 +274,7 @@ class Spec(TomlTable):
         return spec
 
     def with_seed(self, seed: int) -> Spec:
-        """Return the same search with another seed of the random numbers."""
+        """Return a copy of the search with another seed of the random numbers."""
         return self.model_copy(update={"search": self.search.model_copy(update={"seed": seed})})
 
     def requirement_lines(self) -> list[str]:

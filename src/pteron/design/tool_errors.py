@@ -48,7 +48,7 @@ def joint_errors(accuracy: AccuracyTable, ratios: Array, backlash: Array) -> Arr
 
 
 def unit_errors(accuracy: AccuracyTable, robot: Manipulator, poses: Array) -> tuple[Array, Array]:
-    """Return the tool's errors at poses, (N,) each, m: by joint errors of 1, and by all else."""
+    """Return the tool's errors at poses, (N,) each, m: per unit of joint error, and others."""
     joints = greatest_errors(accuracy, robot, poses, Tolerances(joints=1.0))
     if not accuracy.has_part_errors:
         return joints, np.zeros_like(joints)

@@ -34,7 +34,7 @@ _ROUNDS = 4
 
 
 def platform_curve(robot: Manipulator, *curve: Array) -> Curve:
-    """Return places of the tool from the middle, and two derivatives, as those of P."""
+    """Return poses of P and two derivatives for a curve of the tool, from the middle."""
     pose, first, second = pose_motion(robot.platform, *curve)
     zeros = np.zeros((1, robot.freedom))
     return pose + tool_motion(robot.platform, zeros, zeros, zeros)[0], first, second
@@ -93,7 +93,7 @@ def refine_worst_values(
 
 
 def _neighbour_steps(steps: Array, count: int) -> Array:
-    """Return the neighbours of a place (W, m), in steps: any, but if it tilts in part of it."""
+    """Return steps (W, m) to the neighbours of a place; not in lengths and tilts at once."""
     several = [(-1.0, 0.0, 1.0) if step else (0.0,) for step in steps]
     if not steps[count:-1].any():
         return np.array(list(product(*several)))

@@ -204,7 +204,7 @@ class ToolWorkspaceTable(TomlTable):
         return np.pad(0.5 * sides, (0, 3 - len(sides)))
 
     def meets(self, low: Array, high: Array) -> bool:
-        """Say whether the tool may enter a box, corners (3,) from the workspace's middle, m."""
+        """Return whether the tool may enter a box, corners (3,) from the workspace's middle, m."""
         if self.poses is not None:
             poses = np.pad(self.poses, ((0, 0), (0, 3 - len(self.poses[0]))))
             poses = poses - 0.5 * (poses.min(axis=0) + poses.max(axis=0))

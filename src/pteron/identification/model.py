@@ -158,7 +158,7 @@ class Model:
         return None if speeds is None else np.broadcast_to(speeds, (len(self.robot.legs),))
 
     def with_speeds(self, speeds: Array) -> Model:
-        """Return the model with speeds (n,) that were found."""
+        """Return the model with identified Stribeck speeds (n,)."""
         return _independent(Model(self.base, self.terms, speeds=tuple(speeds.tolist())))
 
     @cached_property
@@ -168,7 +168,7 @@ class Model:
 
     @cached_property
     def joining_terms(self) -> tuple[Term, ...]:
-        """The terms that join others."""
+        """The terms whose values others absorb."""
         return tuple(term for term in self.all_terms if term.name in self.merged_terms)
 
     @cached_property
@@ -221,7 +221,7 @@ class Model:
         return np.asarray(np.sum([np.zeros(len(self.names)), *parts], axis=0))
 
     def joint_values(self, kind: str, values: Array) -> Array | None:
-        """Return a kind of term (n,) of values (p,); 0 where it joins others, None if it is none.
+        """Return the values (n,) of a kind of term; 0 where others absorb it, None without it.
 
         A term that joins others is in their values already.
         """

@@ -219,7 +219,7 @@ class Identification(Result):
         )
 
     def _terms_per_joint(self, kind: str, values: Array, least: float = 0.0) -> Array:
-        """Return a kind of term (n,) of values (p,), 0 where there is none.
+        """Return the values (n,) of a kind of term, at least `least`; 0 without the term.
 
         Friction and inertia below zero are noise: no joint pushes itself.
         """

@@ -327,7 +327,7 @@ def percentages(values: Iterable[float], places: int = 2) -> str:
 
 
 def times(ratio: float) -> str:
-    """Return the ratio of two values as text.
+    """Return the ratio of two values as text, such as "3.1 times".
 
     Examples
     --------

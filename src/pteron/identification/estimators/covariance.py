@@ -91,7 +91,7 @@ def noise_of(
     weights: Array | float = 1.0,
     whitened: Array | None = None,
 ) -> Noise:
-    """Return the noise that has left such residuals after a fit.
+    """Return the noise model that is estimated from the residuals of a fit.
 
     With H the projection on W, residuals of noise of covariance C have (I - H) C (I - H): they are
     smaller than the noise, and less alike. What they miss is computed from the noise found so far.

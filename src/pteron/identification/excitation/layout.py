@@ -160,7 +160,7 @@ class MotionLayout:
 
 
 def check_sampling(period: float, rate: float, periods: int) -> None:
-    """Refuse, before any work, a period and a rate, samples a second, that give no table."""
+    """Raise, before any work, on a period and a rate (samples a second) that give no table."""
     expect(0.0 < period < np.inf, "period", f"{period} s", "a number above 0")
     expect(0.0 < rate < np.inf, "rate", rate, "samples a second above 0")
     expect(periods >= 1, "periods", periods, "1 or more")

@@ -237,7 +237,7 @@ class _Search:
         return _Candidate(motion, conditioning_of(root, self.base.values(motion.robot)), root)
 
     def lengths(self) -> Array:
-        """Return the columns' lengths (p,) in the random motions, as root mean squares."""
+        """Return the columns' root mean square lengths (p,) over the random motions."""
         norms = np.array([np.linalg.norm(candidate.root, axis=0) for candidate in self.drawn])
         reached = norms[np.isfinite(norms).all(axis=1)]
         return np.sqrt((reached**2).mean(axis=0)) if len(reached) else np.zeros(self.base.rank)
@@ -267,7 +267,7 @@ class _Search:
     def improve(
         self, starts: Sequence[_Started], plan: Round, seconds: float, workers: int
     ) -> None:
-        """Do a round on some starts, in so many seconds."""
+        """Improve some starts in parallel, for `seconds` in all."""
         workers = min(workers, len(starts))
         each = seconds / math.ceil(len(starts) / workers)
         if each <= 0.0:

@@ -95,7 +95,7 @@ class Assumption:
     after: float
 
     def as_dict(self) -> dict[str, object]:
-        """Return it as plain data."""
+        """Return the assumption as plain data."""
         return fields_as_json(self, "fault message before after")
 
 
@@ -186,7 +186,7 @@ def hidden_orders(robot: Manipulator, log: Log, how: Preprocessing) -> str:
 
 
 def _symmetries(robot: Manipulator) -> list[tuple[int, ...]]:
-    """Return the orders of the legs in which guide and platform points have the same distances."""
+    """Return the permutations of the legs that preserve distances of guide and platform points."""
     count = len(robot.legs)
     if count > _MOST_LEGS:
         return []
@@ -228,7 +228,7 @@ def _samples(log: Log, how: Preprocessing, rotors: Array) -> _Samples | None:
 def _alternatives(
     robot: Manipulator, s: _Samples
 ) -> Iterator[tuple[Literal["ratio", "gravity", "mode"], tuple[str, str], Manipulator, _Samples]]:
-    """Yield assumptions: gear ratios, gravity along other axes, working modes."""
+    """Yield alternative assumptions: gear ratios, directions of gravity, working modes."""
     at_home = evaluate_unchecked(robot, "joint_coordinates", np.array(s.start))
     for factor in _FACTORS:
         for middle, where in ((at_home, "home"), (np.zeros_like(at_home), "zero")):
@@ -295,7 +295,7 @@ def _other_modes(
 
 
 def _unexplained_share(robot: Manipulator, s: _Samples) -> float:
-    """Return what is left of the forces, over their deviation, with all parameters free.
+    """Return the unexplained share of the forces' variation, with all parameters free.
 
     Infinite where the joints have no poses.
     """

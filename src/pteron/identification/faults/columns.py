@@ -53,7 +53,7 @@ _DRY = ("coulomb", "stribeck")
 
 
 class Tolerance(NamedTuple):
-    """The usual size of a fault, 0 where it is not known, and the size up to which it is none."""
+    """The usual size of a fault, 0 if unknown, and the size up to which it is negligible."""
 
     usual: float = 0.0
     negligible: float = 0.0
@@ -224,7 +224,7 @@ _ROTORS = Family(
 
 
 def families_of(model: Model) -> tuple[Family, ...]:
-    """Return the faults that are told by name; a wrong scale is one actuator's, each is tried.
+    """Return the families of faults that are searched for, one for each actuator where they differ.
 
     Motors' inertia is tried where the model has none and no other value takes it in, as a ram's.
     """
@@ -245,7 +245,7 @@ def families_of(model: Model) -> tuple[Family, ...]:
 
 
 def _ratio(joints: Sequence[int]) -> Family:
-    """Return the fault of joints that move more than the log says, by forces that are less."""
+    """Return the family of wrong ratios: joints move more than logged, forces are smaller."""
     some = list(joints)
 
     def columns(m: FittedMotion) -> Array:
@@ -311,7 +311,7 @@ def _scale(i: int) -> Family:
 
 @dataclass(frozen=True)
 class FaultColumns:
-    """A model with the columns of faults behind its own.
+    """A model with further columns for faults.
 
     `values` (p,) are those of the fit, `begin` and `end` the times of the log, s; `usual` (n,),
     `stride` and `cutoff` are those of `FittedMotion`.
@@ -335,7 +335,7 @@ class FaultColumns:
 
     @property
     def extended_model(self) -> Model:
-        """The model with all columns behind its own."""
+        """The model with the columns of all faults appended."""
         count = self.places[-1].stop - len(self.model.names)
         return extend_model(self.model, count, self.matrix)
 

@@ -115,7 +115,7 @@ class FittedMotion:
         return self._slopes_along(changes)
 
     def give_slopes(self, motion: Sequence[Array]) -> Array:
-        """Return slopes (R, n, n) of forces as each joint is behind what was measured.
+        """Return slopes (R, n, n) of forces with respect to a lag of each joint.
 
         Joints are behind by a `motion`: its coordinates, rates and accelerations, (R, n) each.
         """

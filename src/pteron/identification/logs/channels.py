@@ -105,7 +105,7 @@ class Channel:
         self._rows += len(values)
 
     def finish(self) -> tuple[Finding, ...]:
-        """Return what was found, once all pieces are taken.
+        """Return the findings, after all pieces.
 
         Raises
         ------

@@ -331,7 +331,7 @@ class Log(OfLog):
         return replace(self, forces=forces, description=description, findings=findings)
 
     def drop_samples(self, rows: NDArray[np.bool_]) -> Log:
-        """Return the samples without some, (T,): where they were is a gap."""
+        """Return the log without samples where `rows` (T,) is true; gaps replace them."""
         return replace(self, rows_in_file=rows_of(self))._take_samples(np.flatnonzero(~rows))
 
     def _take_samples(self, rows: slice | NDArray[np.int64]) -> Log:
@@ -346,7 +346,7 @@ class Log(OfLog):
 
 
 def join_logs(pieces: Sequence[Log]) -> Log:
-    """Return pieces that follow each other as one log, with what is said of the first."""
+    """Return consecutive pieces as a single log, with the metadata of the first."""
     if len(pieces) > 1 and any(piece.rows_in_file is not None for piece in pieces):
         pieces = [replace(piece, rows_in_file=rows_of(piece)) for piece in pieces]
     first = pieces[0]
@@ -397,7 +397,7 @@ def gaps(time: NDArray[np.float64], step: float) -> NDArray[np.bool_]:
 
 
 def are_apart(before: NDArray[np.float64], after: NDArray[np.float64], step: float) -> bool:
-    """Say whether samples are missing between times and those that follow."""
+    """Return whether samples are missing between consecutive times."""
     near = before[-_AROUND:]
     return bool(gaps(np.concatenate([near, after[:_AROUND]]), step)[len(near) - 1])
 

@@ -146,7 +146,7 @@ class LogFile(OfLog):
             yield buffer
 
     def _remove_spikes(self, progress: Callable[[int], None] | None) -> Iterator[Log]:
-        """Yield pieces without spikes; whether a row is one, its neighbours' piece may tell."""
+        """Yield pieces without spikes, which are judged with the neighbouring pieces."""
         c = self._columns
         spikes = Spikes((*c.joints.printable_names, *c.forces.printable_names), self.source)
         previous: Log | None = None
@@ -168,7 +168,7 @@ class LogFile(OfLog):
         self.findings += spikes.findings()
 
     def _check_pieces(self) -> Iterator[Log]:
-        """Yield the file in pieces, in SI units; all findings but spikes stand behind the last."""
+        """Yield the file in pieces, in SI units; the last piece has all findings but spikes."""
         stamps = TimeStamps(self._step, self._columns.time.printable_names[0], self.source)
         channels = self._channels()
         n = self._robot.joint_count
@@ -304,7 +304,7 @@ class LogFile(OfLog):
 
 
 def _to_si(values: Values, unit: str) -> Values:
-    """Return lengths in m, angles in rad, anything else as it is."""
+    """Return lengths in m, angles in rad, and other values unchanged."""
     return np.radians(values) if unit == "deg" else values / _PER_METRE.get(unit, 1.0)
 
 

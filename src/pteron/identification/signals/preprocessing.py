@@ -319,7 +319,7 @@ def _checked_series(log: Log, period: float | None) -> FittedSeries:
 
 
 def _is_series(series: FittedSeries, joints: Array) -> bool:
-    """Say whether a Fourier series leaves noise alone: jumps of acceleration take more terms."""
+    """Return whether a series leaves only noise of the positions as residuals."""
     least = LAST_DIGITS * np.ptp(joints, axis=0)
     return bool((series.noise <= np.maximum(_NOISE_ALONE * position_noise(joints), least)).all())
 
