@@ -193,7 +193,7 @@ class _ModularSlopes(MachineSlopes):
         return moved
 
     def _radial(self, point: Array) -> tuple[Residues, Residues]:
-        """Return unit vectors from the platform's axis to a point, and across both.
+        """Return unit vectors radial and tangential to the platform's axis at a point.
 
         They are rational ones near the machine's: no relation to the other numbers is meant.
         """

@@ -90,7 +90,7 @@ def order_mistakes(measurements: Measurements, guess: Guess) -> Iterator[Mistake
 
 
 def leg_orders(guess: Guess) -> Iterator[tuple[int, ...]]:
-    """Yield orders of the readings that differ from that of the legs, of which two are swapped.
+    """Yield the orders of the readings in which two legs are swapped.
 
     Of three legs also those in which they follow each other round.
     """

@@ -320,7 +320,7 @@ def _widen_box(robot: Manipulator, box: Box, sides: Array, floors: tuple[float, 
 
 
 def _upright(robot: Manipulator) -> int:
-    """Return which coordinate moves along z most."""
+    """Return the index of the coordinate that is nearest to vertical."""
     lengths = np.flatnonzero(~robot.platform.angular)
     return int(lengths[np.abs(robot.platform.directions[:, 2]).argmax()])
 

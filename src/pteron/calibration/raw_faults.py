@@ -158,7 +158,7 @@ def hidden_order(
     robot_guess: Guess,
     fit: CalibrationFit,
 ) -> HiddenOrder | None:
-    """Return the legs whose readings could be exchanged and nothing would show; None for none.
+    """Return the legs whose readings could be exchanged unnoticed; None if there are none.
 
     Heights over the bed of a symmetric machine are those of its mirror image.
     """

@@ -61,7 +61,7 @@ def progress_bar(task: str) -> Iterator[Progress]:
 
 
 class TimeLeft:
-    """The time that work still needs, by its recent rate.
+    """The estimated time remaining, from the recent rate of work.
 
     Work that goes on where an earlier run was ended begins with what that had done, at no rate.
     While nothing is done the time grows, since the rate is that up to now.

@@ -225,7 +225,7 @@ def _further_files(sizing: Sizing, fits: tuple[MotorFit, ...]) -> dict[str, str]
 def _show(
     sizing: Sizing, fits: tuple[MotorFit, ...], common: tuple[CommonFit, ...], request: _Asked
 ) -> None:
-    """Print for a person: loads, power, motors, and the choice."""
+    """Print tables of loads, power and motors, and the choice."""
     dwell = f", {sizing.dwell:g} s of it at rest" if sizing.dwell else ""
     places = (
         f"The greatest of {len(sizing.places)} places and turns of the cycle, within "
@@ -268,7 +268,7 @@ def _energy(sizing: Sizing) -> list[str]:
 
 
 def _verdict(sizing: Sizing, fits: tuple[MotorFit, ...], margin: float) -> list[str]:
-    """Return whether drives and motors are enough, and the margin that exists."""
+    """Return lines on whether drives and motors suffice, with the actual margin."""
     lines = []
     if sizing.margins:
         least = min(sizing.margins, key=lambda limit: limit.margin)

@@ -123,7 +123,7 @@ def given_rows(
 
 
 def single_row(columns: Sequence[str], values: Sequence[float]) -> TableRows:
-    """Return the row that was typed."""
+    """Return the typed row."""
     from pteron.cli.typed_row import TypedRow
 
     return TableRows(TypedRow({name: [value] for name, value in zip(columns, values, strict=True)}))

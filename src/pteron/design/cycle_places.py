@@ -204,7 +204,7 @@ def _plane(turns: Array) -> Array:
 
 
 def _turn_path(path: Array, turn: float) -> Array:
-    """Return places (K, 3) turned about the upright."""
+    """Return places (K, 3) turned about the vertical axis."""
     return np.column_stack([path[:, :2] @ _plane(np.array([turn]))[0].T, path[:, 2]])
 
 
@@ -248,7 +248,7 @@ def _angles(job: Job, robot: Manipulator, angles: Array) -> Iterator[Array]:
 
 
 def _share(job: Job, path: Array, shift: Array) -> float | None:
-    """Return how much of a shift a path (K, 3) can go and stay in the workspace; None for nothing.
+    """Return the share of a shift by which a path (K, 3) fits the workspace; None if nothing.
 
     Of a cylinder the corner of its box is outside: it goes as far towards it as can be.
     """

@@ -134,7 +134,7 @@ class Front(Result):
 
 
 class ProvedRows:
-    """The rows of designs that were proved, in place of those that a look at points gave.
+    """Designs' rows after proofs, which replace rows from sample points.
 
     `prove` takes values of designs (N, V), and returns their rows, each as far as it is proved.
     """

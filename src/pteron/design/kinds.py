@@ -131,7 +131,7 @@ class Kind:
 
     @property
     def counts(self) -> Array:
-        """Numbers of things to choose from (V,); 0 of a measure."""
+        """Numbers of choices of discrete variables (V,); 0 for continuous variables."""
         return np.array([len(self._choices.get(name, ())) for name in self.variables])
 
     def numbers(self, point: Array) -> dict[str, float]:

@@ -29,7 +29,7 @@ _NOTHING = 1e-9
 
 @dataclass
 class LoadMargins:
-    """LoadMargins of drives: their limits over their loads.
+    """Margins of drives: their limits over their loads.
 
     Attributes
     ----------

@@ -133,7 +133,7 @@ class MachineSpace:
 
     @cached_property
     def _meetings(self) -> list[tuple[Any, Any]]:
-        """Kinds of bodies that may meet, but for guides."""
+        """Pairs of kinds of bodies that may collide; guides are not among them."""
         return meetings(self._robot)
 
 
@@ -163,7 +163,7 @@ def _lines(robot: Manipulator, poses: Array, points: Array) -> tuple[Array, Arra
 
 
 def _depths(starts: Array, ends: Array, low: Array, high: Array) -> Array:
-    """Return how deep lines (..., 3) go into a box: the least distance to a face, at its most.
+    """Return the greatest depth of lines (..., 3) in a box: the distance to its nearest face.
 
     Along a line it is concave, so that thirds find its most.
     """

@@ -98,7 +98,7 @@ class Rating:
             self.misses[name], self.shortfalls[name] = float(share), words
 
     def expect_least(self, name: str, figure: float, least: float) -> None:
-        """Note a violation of a lower bound."""
+        """Record a violation of a lower bound."""
         if not figure >= least:
             share = least - figure if np.isfinite(figure) else 1.0
             self.miss(name, share, f"{name} {figure:.3g}, at least {least:.3g} asked")
@@ -304,7 +304,7 @@ class KindEvaluator:
         return refine_worst_values(self.job, robot, values_of, samples, keep, self.between)
 
     def shares(self, time: float | None) -> Array:
-        """Return how much of a duty cycle's time each cycle has; none if each counts by itself."""
+        """Return the durations that weight cycles in a duty cycle, s; empty without shares."""
         pairs = [(c.share, (c.duration or time or 1.0) + c.dwell) for c in self.cycles if c.share]
         return np.array([share * duration for share, duration in pairs])
 
@@ -384,7 +384,7 @@ class KindEvaluator:
 
 
 def _expect_share(rating: Rating, name: str, share: float, option: str) -> None:
-    """Note a requirement that the best drive meets only in part."""
+    """Record a requirement that the best drive meets only in part."""
     if share < 1.0:
         much = f"{share:.0%}" if share >= 0.01 else "less than 1%"
         words = f"{name} {much} of what is asked, with {option}"

@@ -201,7 +201,7 @@ def _generations(evaluation: DesignRows, progress: Progress | None) -> Front:
 
 
 def _report(progress: Progress, number: int, settings: SearchTable, share: float) -> None:
-    """Report the share of all generations that is done."""
+    """Report the finished share of all generations."""
     progress((number - 1 + share) / settings.generations)
 
 

@@ -58,9 +58,9 @@ def unit_errors(accuracy: AccuracyTable, robot: Manipulator, poses: Array) -> tu
 def greatest_errors(
     accuracy: AccuracyTable, robot: Manipulator, poses: Array, errors: Tolerances
 ) -> Array:
-    """Return the tool's error at poses, (N,), m: the worst evaluator or the standard deviation.
+    """Return the tool's error at poses, (N,), m: worst case or standard deviation.
 
-    `asked.counted` says which of both.
+    `accuracy.counted` selects which.
     """
     if accuracy.counted == "worst":
         return worst_position_errors(robot, poses, errors)

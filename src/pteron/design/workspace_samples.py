@@ -213,7 +213,7 @@ def _tilted_angles(robot: Manipulator, leans: Array) -> Array:
 
 
 def turn_angles(angles: Array, turn: float) -> Array:
-    """Return angles (A, a) turned further about the upright."""
+    """Return angles (A, a) turned further about the vertical axis."""
     if not angles.shape[1]:
         return angles
     return np.asarray(angles + turn * np.eye(angles.shape[1])[-1])

@@ -44,7 +44,7 @@ class DrawnValues:
 
     @classmethod
     def from_estimate(cls, model: Model, estimate: Estimate, known: Array) -> DrawnValues:
-        """Return those that a fit leaves open; `known` (p,) is the rotors' part of the values."""
+        """Return drawn values for what a fit leaves open; `known` (p,) is the rotors' part."""
         names = unseen_names(model, estimate.deviations)
         places = np.array([model.names.index(name) for name in names], dtype=np.int64)
         drawn = parameters(model.robot)

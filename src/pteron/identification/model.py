@@ -196,7 +196,7 @@ class Model:
     def with_joins(
         self, texts: Sequence[str], names: Mapping[str, str], *, minus: str = "-", gap: str = " "
     ) -> tuple[str, ...]:
-        """Return texts of the values with the terms behind that join them, by their names."""
+        """Return expressions of the values, with the terms that they absorb appended by name."""
         sums = list(texts)
         for name, shares in self.joins.items():
             for joined, share in shares.items():
@@ -206,14 +206,14 @@ class Model:
         return tuple(sums)
 
     def share_of(self, name: str, value: float) -> Array:
-        """Return the part of the values (p,) that a term which joins them adds."""
+        """Return the part of the values (p,) that a term adds to those that absorb it."""
         added = np.zeros(len(self.names))
         for joined, share in self.joins.get(name, {name: 1.0}).items():
             added[self.names.index(joined)] = share * value
         return added
 
     def known_values(self, known: Mapping[str, float]) -> Array:
-        """Return the part of the values (p,) that terms of known size make, by their names.
+        """Return the part of the values (p,) that terms of known values contribute, by name.
 
         A term that joins others adds to those.
         """

@@ -180,7 +180,7 @@ class Payload(Result):
 
     @property
     def has_valid_errors(self) -> bool:
-        """Whether the stated errors of the values hold: no fault shows that lowers the grade."""
+        """Whether the stated errors of the values hold: there is no fault that lowers the grade."""
         return not self.fault_isolation.matters
 
     def summary(self) -> str:

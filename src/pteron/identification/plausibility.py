@@ -179,7 +179,7 @@ class Factor(NamedTuple):
 
     @property
     def is_detectable(self) -> bool:
-        """Whether a factor that matters would be seen."""
+        """Whether a factor of practical size would be significant."""
         return CLEAR * self.deviation < WANTED
 
     def times(self, number: float) -> Factor:
@@ -261,7 +261,7 @@ def unphysical(model: Model, observations: Observations, fit: Estimate) -> int:
 def _values_that_contribute(
     observations: Observations, fit: Estimate, share: float
 ) -> NDArray[np.bool_]:
-    """Return which values (p,) make more than a share of the forces at an actuator."""
+    """Return whether values (p,) contribute more than a share of the forces of an actuator."""
     effect = np.abs(fit.values) * np.sqrt((observations.matrix**2).mean(axis=0))
     size = np.sqrt((observations.forces**2).mean(axis=0))
     return np.asarray((effect > share * size[:, None]).any(axis=0))

@@ -130,7 +130,7 @@ class Identification(Result):
 
     @property
     def has_understated_errors(self) -> bool:
-        """Whether a fault shows for which the values' stated errors do not allow."""
+        """Whether a fault shows that the stated errors of the values do not include."""
         return self.fault_isolation.understates
 
     @cached_property

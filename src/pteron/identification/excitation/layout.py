@@ -1,4 +1,4 @@
-"""MotionLayout of the file of a motion for a controller: columns, units, dialect of CSV."""
+"""Layout of the file of a motion for a controller: columns, units, dialect of CSV."""
 
 from __future__ import annotations
 

@@ -176,7 +176,7 @@ class FittedMotion:
         return self._forces_at(self._geometry)
 
     def _forces_at(self, geometry: Array, *added: Array) -> Array:
-        """Return the forces by another geometry, and with some motion added to the joints'.
+        """Return the forces with another geometry, and with a motion added to the joints'.
 
         Another geometry puts the platform elsewhere, as the joints are what was measured.
         """

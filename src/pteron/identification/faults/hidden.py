@@ -85,7 +85,7 @@ def _usual_sizes(family: Family, motion: FittedMotion) -> Array | None:
 def _largest_error(
     unexplained: Array, error: Array, usual: Array, other: ReferenceCycle, motion: FittedMotion
 ) -> float:
-    """Return the error of another motion's forces, percent, by a usual fault that stays hidden.
+    """Return another motion's error of forces, percent, by a usual fault that is not detectable.
 
     `unexplained` (N, k) are a fault's columns over the noise, without what the model's take in;
     `error` (R, n, k) is that of the other motion's forces per unit of its sizes, and `usual` (k,)

@@ -74,7 +74,7 @@ class Channel:
         self._runs: list[_Run] = []
 
     def take(self, values: Values, joints: Values) -> None:
-        """Look at the next piece: this channel, (rows,), and all joint coordinates, (rows, n)."""
+        """Examine the next piece: this channel, (rows,), and all joint coordinates, (rows, n)."""
         self._least = min(self._least, float(values.min()))
         self._greatest = max(self._greatest, float(values.max()))
         if self._limits is not None:

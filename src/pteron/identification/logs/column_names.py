@@ -44,7 +44,7 @@ class ColumnNames:
     def incomplete(
         self, kind: Wanted, numbers: Sequence[int], families: Sequence[Mapping[int, str]]
     ) -> DataError:
-        """Return the error for columns that a file has not, or has not for all legs.
+        """Return the error for columns that a file lacks, entirely or for some legs.
 
         `families` are columns that are called alike, by number.
         """

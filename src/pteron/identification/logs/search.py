@@ -117,7 +117,7 @@ class ColumnSearch(ColumnNames):
                 yield name, parts
 
     def family(self, kind: Wanted, numbers: Sequence[int]) -> tuple[list[str], bool]:
-        """Return the columns of these numbers, 0 for none, and whether by another name."""
+        """Return the columns with these numbers (0: none), and whether they have another name."""
         families: dict[str, dict[int, str]] = {}
         for name, parts in self.matches(kind):
             if (parts.number is not None) == (numbers[0] > 0):
@@ -171,7 +171,7 @@ class ColumnSearch(ColumnNames):
         return self._group_by_unit(wanted, columns, guessed=guessed)
 
     def lone(self, kind: Wanted) -> list[str]:
-        """Return the column without a number that may be meant, if any."""
+        """Return the column without a number that fits, as a list; empty if there is none."""
         candidates = [name for name, parts in self.matches(kind) if parts.number is None]
         if len(candidates) > 1:
             raise self.ambiguous(kind, [[name] for name in candidates])
