@@ -334,7 +334,7 @@ class KindEvaluator:
     def loads(
         self, robot: Manipulator, rating: Rating, time: float | None
     ) -> tuple[JointLoads, list[tuple[Array, Array]]]:
-        """Return the loads of all cycles at all places, and of each the work and ways of joints."""
+        """Return the loads of all cycles at all places, and each cycle's work and joint travel."""
         n, middle = robot.joint_count, rating.middle
         squares, forces, rises, work = [], [np.zeros((1, n))], [np.zeros((1, n))], []
         speeds = np.zeros(n)
