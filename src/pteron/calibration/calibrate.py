@@ -136,7 +136,7 @@ def _undo_mistakes(
     run_calibration: Callable[..., Calibration],
     held_out: Measurements | None,
 ) -> Calibration:
-    """Return the calibration of a log, of which a mistake that explains it is undone."""
+    """Return the calibration of a log after correction of a mistake that explains it."""
     mistake = raw_mistake(measurements, blocks, start)
     if mistake is None:
         calibration = run_calibration(measurements, blocks, held_out)
@@ -243,13 +243,14 @@ def _exceeds_ordinary_error(fit: CalibrationFit, measurements: Measurements) -> 
 def _select_fitting_rows(
     measurements: Measurements, fit: CalibrationFit, chosen: NDArray[np.bool_]
 ) -> Measurements:
-    """Return chosen rows without outliers of the fit of all rows, where these are few."""
+    """Return the chosen rows, without outliers of the fit of all rows if there are few of these."""
     few = (~fit.kept).sum() <= FEW_LEFT_OUT * len(fit.kept)
     some = chosen & fit.kept if few else chosen
     return measurements.rows(some if some.any() else chosen)
 
 
 def _check_readings(joints: int, measurements: Measurements) -> None:
+    """Raise where readings are not finite numbers of shape (N, n), or nothing was measured."""
     shape = measurements.readings.shape
     expect(len(shape) == 2 and shape[1] == joints, "readings", f"shape {shape}", f"(N, {joints})")
     if not np.isfinite(measurements.readings).all():

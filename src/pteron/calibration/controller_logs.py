@@ -49,7 +49,7 @@ _MAP = "RepRapFirmware height map"
 
 
 class _Touch(NamedTuple):
-    """A place where the tool touched, as the controller logs it."""
+    """A touch of the probe, as a controller logs it."""
 
     place: str
     at: dict[str, float]
@@ -218,6 +218,7 @@ def _read_g30(text: str, source: str) -> Iterator[_Touch]:
 
 
 def _read_klipper_log(text: str, source: str) -> Iterator[_Touch]:
+    """Yield the touches of a probe in a Klipper log, with their heights."""
     offsets = [(m.start(), float(m[1])) for m in _OFFSET.finditer(text)]
     for match in _KLIPPER.finditer(text):
         x, y, word, z = match.groups()
@@ -290,15 +291,17 @@ _READERS = (_read_height_map, _read_g30, _read_klipper_log, _read_marlin)
 
 
 def _xyz(x: float, y: float, z: float) -> dict[str, float]:
+    """Return coordinates by axis letter."""
     return {"X": x, "Y": y, "Z": z}
 
 
 def _match_place(text: str, match: re.Match[str], source: str) -> str:
+    """Return the file and the line of a match, for messages."""
     return f"{source}, line {text.count(chr(10), 0, match.start()) + 1}"
 
 
 def _touched_heights(robot: Manipulator, touched: Sequence[_Touch]) -> Measurements:
-    """Return heights at readings that follow from the machine as drawn."""
+    """Return touched heights as measurements, with readings by the drawn machine's kinematics."""
     platform, axes = robot.platform, linuxcnc_axes(robot)
     poses = np.array(
         [[touch.at.get(axis.letter, 0.0) / axis.scale for axis in axes] for touch in touched]

@@ -49,7 +49,7 @@ _FINE = 10**6
 def exact_rank(
     start: Guess, blocks: Sequence[UnknownBlock], measurements: Measurements, seed: int
 ) -> tuple[int | None, tuple[int, ...], int]:
-    """Return rank, primes and number of rows; None for a rank where something has no exact form.
+    """Return rank, primes and number of rows; rank None if a part has no exact form.
 
     Rows of measurements matter by their kinds: what was measured, of which mark, from where.
     """
@@ -79,7 +79,7 @@ def exact_rank(
 
 
 def _row_kinds(measurements: Measurements) -> dict[int, float | None]:
-    """Return a row of each kind, by its number, with the height at which such rows always are."""
+    """Return a row of each kind, with the height that such rows have, if constant."""
     measured = ~np.isnan(np.column_stack([*measurements.parts.values()]))
     over, origins, planes = measured[:, -2], measurements.origins, np.array(measurements.planes)
     kinds = {
@@ -193,7 +193,7 @@ class _ModularSlopes(MachineSlopes):
         return moved
 
     def _radial(self, point: Array) -> tuple[Residues, Residues]:
-        """Return unit vectors from the platform's axis to a point, and across both.
+        """Return unit vectors radial and tangential to the platform's axis at a point.
 
         They are rational ones near the machine's: no relation to the other numbers is meant.
         """
@@ -209,27 +209,34 @@ class _ModularSlopes(MachineSlopes):
         return u, np.cross(k, u)
 
     def _outputs(self, guess: Guess, poses: Residues) -> list[Residues]:
+        """Return the program's outputs at poses, looked up by pose."""
         columns = zip(*(self.known[tuple(pose)] for pose in poses), strict=True)
         return [np.stack(residues) for residues in columns]
 
     def _matrix(self, guess: Guess) -> Residues:
+        """Return the slopes of the geometry's numbers against its variations."""
         return self.steps
 
     def _readings(self, readings: Array, joints: Residues) -> Residues:
+        """Return random residues for joints that turn, and the coordinates of other joints."""
         random_ = [self.rng.randrange(self.prime) if turns else 0 for turns in self.turning_joints]
         return np.where(self.turning_joints, np.array(random_, dtype=object), joints)
 
     def _base_vectors(self, vectors: Array) -> Residues:
+        """Return vectors (..., 3) of the base frame as residues in the machine's frame."""
         return self._numbers(vectors @ self.own.T)
 
     def _numbers(self, values: Array) -> Residues:
+        """Return numbers as residues modulo the prime, by rational approximations."""
         residues = [self.field.number(Fraction(v).limit_denominator(_FINE)) for v in values.flat]
         return np.array(residues, dtype=object).reshape(values.shape)
 
     def _unit(self, vectors: Residues) -> Residues:
+        """Return the vectors unchanged, as a row's length does not affect the rank."""
         return vectors  # a row's length does not matter to a rank
 
     def _solve_stack(self, matrix: Residues, right: Residues) -> Residues:
+        """Return matrix^-1 right of a stack, modulo the prime."""
         return np.stack([_solve(*pair, self.prime) for pair in zip(matrix, right, strict=True)])
 
 

@@ -364,7 +364,7 @@ class Fitter:
         return white[..., 0], white[..., 1 : 1 + count], white[..., 1 + count :]
 
     def _shared_information(self, fit: CalibrationFit) -> Array | float:
-        """Return a fit's `shared` (p, p), or 0 where no distances share a row's readings."""
+        """Return the information (p, p) shared by distances through a row's readings; else 0."""
         origins = self.measurements.origins
         ends = np.unique(origins[origins >= 0])
         if not self.readings_noise or not len(ends):

@@ -98,7 +98,7 @@ class Guess:
         return np.stack([*self.marks.values()])[[order[name] for name in names]]
 
     def points(self, marks: Sequence[str], poses: Array) -> Array:
-        """Return where each row's mark is (N, 3) at its pose, in the base frame, m."""
+        """Return the positions (N, 3) of the rows' marks at poses, in the base frame, m."""
         place, axes = self.robot.platform.placement(poses)
         return np.asarray(place + np.einsum("nij,ni->nj", axes, self.mark_points(marks)))
 

@@ -84,6 +84,7 @@ def read_measurements(robot: RobotLike, *paths: str | Path) -> Measurements:
 
 
 def _read(robot: Manipulator, path: str | Path) -> Measurements:
+    """Return the measurements of a file, with those of the file beside it; raise on faults."""
     setup_file = read_setup_file(path)
     measurements = read_controller_log(path, robot, setup_file.g33.radius)
     if measurements is None:
@@ -150,7 +151,7 @@ def _open_table(robot: Manipulator, path: str | Path, dialect: Dialect | None) -
 
 
 def _name_and_unit(column: str) -> tuple[str, str]:
-    """Return the name of a column in small letters, and the unit in it, if any."""
+    """Return the name of a column in lower case, and its unit, if any."""
     match = _WITH_UNIT.fullmatch(column.strip())
     if match is None:
         return column.strip().lower(), ""
@@ -158,6 +159,7 @@ def _name_and_unit(column: str) -> tuple[str, str]:
 
 
 def _read_rows(robot: Manipulator, opened: _Opened, source: str) -> Measurements:
+    """Return the measurements of a table's rows; raise with all faults of its cells."""
     table, columns = opened
     faults: list[str] = []
     n = len(table)
@@ -211,7 +213,7 @@ def _read_rows(robot: Manipulator, opened: _Opened, source: str) -> Measurements
 
 
 def _numbers(table: Table, column: str, faults: list[str]) -> Array:
-    """Return a column (N,), NaN where empty; each cell that is no number adds a fault."""
+    """Return a column (N,), NaN where empty; each cell that is not a number adds a fault."""
     try:
         return np.asarray(table.numbers([column], "nan")[:, 0])
     except DataError as error:
@@ -257,6 +259,7 @@ def _missing_descriptions(measurements: Measurements) -> Iterator[str]:
 def _unlikely_readings(
     robot: Manipulator, measurements: Measurements, source: str
 ) -> Iterator[str]:
+    """Yield warnings of readings that are implausible: units, limits, sizes, empty rows."""
     places = measurements.places
     size = 0.1 * unlikely_length(robot)
     measured = np.concatenate([measurements.positions, measurements.angles], axis=-1)
@@ -297,6 +300,7 @@ def _unlikely_readings(
 
 
 def _join_logs(parts: Sequence[Measurements], sources: Sequence[str]) -> Measurements:
+    """Return the measurements of several files as a single log; raise where setups differ."""
     setup: Setup = join_setups([part.setup for part in parts], sources)
     if len(parts) == 1:
         return parts[0]

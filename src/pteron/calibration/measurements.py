@@ -96,7 +96,7 @@ def spread_rows(count: int, most: int) -> NDArray[np.int64]:
 
 
 def length_columns(robot: Manipulator) -> list[int]:
-    """Return which of x, y and z the pose's lengths are."""
+    """Return the indices of the pose's lengths among x, y and z."""
     return ["xyz".index(name) for name in robot.coordinates if name in "xyz"]
 
 

@@ -90,7 +90,7 @@ def order_mistakes(measurements: Measurements, guess: Guess) -> Iterator[Mistake
 
 
 def leg_orders(guess: Guess) -> Iterator[tuple[int, ...]]:
-    """Yield orders of the readings that differ from that of the legs, of which two are swapped.
+    """Yield the orders of the readings in which two legs are swapped.
 
     Of three legs also those in which they follow each other round.
     """
@@ -233,7 +233,7 @@ def _whole_positions(measurements: Measurements) -> bool:
 
 
 def _signed_axes(determinant: float) -> list[Array]:
-    """Return matrices (3, 3) whose rows say along which axis of the base x, y and z point."""
+    """Return the signed permutations (3, 3) of a determinant, without the identity."""
     matrices = [
         np.array(signs)[:, None] * np.eye(3)[list(order)]
         for order in permutations(range(3))
@@ -245,6 +245,7 @@ def _signed_axes(determinant: float) -> list[Array]:
 
 
 def _described_axes(turn: Array) -> str:
+    """Return the axes of a signed permutation in words: x along -y, for example."""
     return ", ".join(
         f"{'xyz'[k]} along {'-' if row.sum() < 0 else ''}{'xyz'[int(np.abs(row).argmax())]}"
         for k, row in enumerate(turn)
@@ -252,7 +253,7 @@ def _described_axes(turn: Array) -> str:
 
 
 def _rotate_positions(turn: Array) -> Callable[[Measurements], Measurements]:
-    """Return the change that takes positions from axes, in rows, to the base's."""
+    """Return the change of positions to the base frame, from a frame whose axes are rows."""
     return lambda measurements: replace(measurements, positions=measurements.positions @ turn)
 
 
@@ -395,7 +396,7 @@ def _far_joints(guess: Guess, fitted: Guess, kind: str) -> tuple[int, ...]:
 
 
 def _common_scale(guess: Guess, fitted: Guess) -> Iterator[Mistake]:
-    """Yield one scale of all readings, where the joints' scales are alike."""
+    """Yield a common scale of all readings, if the joints' scales agree."""
     factors = fitted.scales / guess.scales
     factor = float(np.median(factors))
     count = len(factors)
@@ -409,7 +410,7 @@ def _common_scale(guess: Guess, fitted: Guess) -> Iterator[Mistake]:
 
 
 def _name_readings(guess: Guess, fitted: Guess, freedom: int) -> Iterator[Mistake]:
-    """Yield the zeros and scales of a fit that are beyond their tolerances, as one mistake."""
+    """Yield the zeros and scales of a fit beyond their tolerances, as a single mistake."""
     legs, names = guess.robot.legs, guess.robot.joint_names
     far = {kind: _far_joints(guess, fitted, kind) for kind in ("scales", "zeros")}
     texts = []
@@ -437,6 +438,7 @@ def _name_readings(guess: Guess, fitted: Guess, freedom: int) -> Iterator[Mistak
 
 
 def _listed_joints(joints: Sequence[int], names: Sequence[str]) -> str:
+    """Return joints by number and name; "all joints" where it is all of them."""
     if len(joints) == len(names):
         return "all joints"
     return f"joint {joints[0] + 1} ({names[joints[0]]})"

@@ -67,7 +67,7 @@ class Observability(Result):
         return min(self.rank, self.at_poses)
 
     def summary(self) -> str:
-        """Return the grounds of the rank in a few sentences."""
+        """Return the reasons for the rank in a few sentences."""
         exact = (
             f"Exact rank {self.rank} of {self.columns} values: a minor of that size at "
             f"{self.rows} random rows is not zero modulo "

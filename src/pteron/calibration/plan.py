@@ -265,6 +265,7 @@ def _floors(robot: Manipulator, center: Array) -> tuple[float, float]:
 
 
 def _no_region(robot: Manipulator, center: Array) -> ModelError:
+    """Return the error that no box of poses around a centre is proved to be usable."""
     return ModelError(
         f"no box of poses around {np.round(center, 4).tolist()} is proved to be in reach, "
         "within limits and away from singularities; move the plane, or the machine's limits",
@@ -319,7 +320,7 @@ def _widen_box(robot: Manipulator, box: Box, sides: Array, floors: tuple[float, 
 
 
 def _upright(robot: Manipulator) -> int:
-    """Return which coordinate moves along z most."""
+    """Return the index of the coordinate that is nearest to vertical."""
     lengths = np.flatnonzero(~robot.platform.angular)
     return int(lengths[np.abs(robot.platform.directions[:, 2]).argmax()])
 
@@ -405,6 +406,7 @@ def _choose_poses(
 
 
 def _order_by_distance(poses: Array, home: Array, robot: Manipulator) -> list[int]:
+    """Return the order of poses by nearest neighbours, from the home pose on."""
     remaining, at, order = list(range(len(poses))), home, []
     size = np.where(robot.platform.angular, 1.0 / max(leg.size for leg in robot.legs), 1.0)
     while remaining:

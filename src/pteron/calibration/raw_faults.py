@@ -120,6 +120,7 @@ def describe_mistake(
 
 
 def _size_text(error: float, kind: str) -> str:
+    """Return an error as text in mrad, mm or m."""
     if kind == "angle":
         return f"{1e3 * error:.3g} mrad"
     return f"{1e3 * error:.3g} mm" if error < 1.0 else f"{error:.4g} m"
@@ -157,7 +158,7 @@ def hidden_order(
     robot_guess: Guess,
     fit: CalibrationFit,
 ) -> HiddenOrder | None:
-    """Return the legs whose readings could be exchanged and nothing would show; None for none.
+    """Return the legs whose readings could be exchanged unnoticed; None if there are none.
 
     Heights over the bed of a symmetric machine are those of its mirror image.
     """
@@ -201,6 +202,7 @@ def _change_by_order(
 
 
 def _sample_rows(measurements: Measurements) -> Measurements:
+    """Return a random sample of the rows, the same in each run."""
     # At random: rows at even steps might all be of one mark.
     return measurements.rows(np.random.default_rng(0).permutation(len(measurements)) < _ROWS)
 
@@ -261,7 +263,7 @@ def _cost_together(
 def _quick_misfit(
     rows: Measurements, blocks: Sequence[UnknownBlock], guess: Guess, most: float
 ) -> float:
-    """Return `_misfit`, or inf where the first few rows are already far above the most that counts.
+    """Return `_misfit`, or inf if the first rows are already far above `most`.
 
     Of these no other assembly modes are sought: of readings that lead to no pose that takes long.
     """
@@ -288,7 +290,7 @@ def _misfit(
 
 
 def _trial_poses(guess: Guess, rows: Measurements, *, modes: bool = True) -> Array:
-    """Return poses of readings that may be wrong: all assembly modes where these are quick to find.
+    """Return poses of trial readings: all assembly modes if these are quick to compute.
 
     The right readings lead to the measured pose, or near home, by Newton's steps alone.
     """

@@ -118,6 +118,7 @@ def _outliers(
     out: NDArray[np.bool_],
     reasons: Mapping[int, str],
 ) -> tuple[CalibrationFinding, ...]:
+    """Return a finding that lists the outliers with the largest residuals; none without them."""
     rows = np.flatnonzero(out)
     if not len(rows):
         return ()
@@ -131,6 +132,7 @@ def _outliers(
 
 
 def _residual_text(fit: CalibrationFit, row: int) -> str:
+    """Return a row's largest residual in words, or that its readings lead to no pose."""
     if fit.distances[row] == BEYOND:
         return "its readings lead to no pose"
     residuals = fit.residuals[row]
@@ -140,7 +142,7 @@ def _residual_text(fit: CalibrationFit, row: int) -> str:
 
 
 class _ScoreTest:
-    """Score test: how far a further unknown would lower the rows' squared whitened residuals.
+    """Score test: the fall of the squared whitened residuals with a further unknown.
 
     Attributes
     ----------
@@ -196,7 +198,7 @@ class _ScoreTest:
         self.variance = max(float(np.median(self.squares)) / (0.6 * (1.0 - taken)), self.least)
 
     def refit_residuals(self, moved: Array) -> Array:
-        """Return residuals (N, K) after the fit's unknowns are fitted to them again."""
+        """Return residuals (N, K) after a refit of the fit's unknowns."""
         change = self._covariance @ (self._flat.T @ moved.reshape(-1))
         return np.asarray(moved - self._fitted @ change)
 
@@ -345,7 +347,7 @@ def _scale_trials(test: _ScoreTest) -> Iterator[FaultTrial]:
 
 
 def _scale_text(change: float) -> str:
-    """Return a relative change of scale as words; to first order it has a size below a half."""
+    """Return a relative change of scale in words; first order holds below a half."""
     return f"{1e2 * change:+.3g} % farther" if abs(change) < 0.5 else "by quite another factor"
 
 

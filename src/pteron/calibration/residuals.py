@@ -107,6 +107,7 @@ class MachineSlopes:
         return pose_slopes[..., : self.count], mark_slopes[..., : self.count]
 
     def _wrap_angles(self, missed: Array) -> Array:
+        """Return differences of joint angles that turn endlessly within -pi and pi."""
         turned = (missed + np.pi) % (2.0 * np.pi) - np.pi
         return np.where(self._round, turned, missed)
 
@@ -141,7 +142,7 @@ class MachineSlopes:
         chosen: Numbers,
         measured: NDArray[np.bool_],
     ) -> tuple[Array, Array, Array]:
-        """Return marks (N, 3), how far they are from where distances begin, and slopes.
+        """Return marks (N, 3), their separations from the ends of distances, and slopes.
 
         Slopes (N, K, p + 2 n) are against all unknowns, and behind them against the joint
         coordinates, of two rows.
@@ -278,6 +279,7 @@ class MachineSlopes:
         return slope_matrix(guess.robot, self._changes, self._terms, geometry)
 
     def _readings(self, readings: Array, joints: Array) -> Array:
+        """Return readings (N, n) by which scale errors are multiplied."""
         return readings
 
     def _base_vectors(self, vectors: Array) -> Array:
@@ -285,13 +287,16 @@ class MachineSlopes:
         return vectors
 
     def _numbers(self, values: Array) -> Array:
+        """Return numbers in this class's arithmetic: floating point."""
         return values
 
     def _unit(self, vectors: Array) -> Array:
+        """Return vectors (N, 3) divided by their lengths; zero vectors unchanged."""
         length = np.linalg.norm(vectors, axis=-1)
         return np.asarray(vectors / np.where(length > 0.0, length, 1.0)[:, None])
 
     def _solve_stack(self, matrix: Array, right: Array) -> Array:
+        """Return matrix^-1 right of a stack; NaN where a matrix is singular."""
         return _solve_stack(matrix, right)
 
 
@@ -303,6 +308,7 @@ def _solve_stack(matrix: Array, right: Array) -> Array:
 
 
 def _skew(v: Array) -> Array:
+    """Return the matrices (N, 3, 3) of the cross product with vectors (N, 3)."""
     zero = np.zeros(len(v), dtype=v.dtype)
     x, y, z = v.T
     return np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1).reshape(-1, 3, 3)

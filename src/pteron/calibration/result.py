@@ -314,6 +314,7 @@ def values_of(
 
 
 def _origin(share: float, unknown: Unknown) -> Origin:
+    """Return whether a value comes from the data, its tolerance, or both."""
     if share <= _BY_DATA or unknown.group == "setup":
         return "data"
     return "tolerance" if share >= _BY_TOLERANCE else "both"

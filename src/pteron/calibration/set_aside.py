@@ -90,7 +90,7 @@ def rows_set_aside(
 
 
 def _depths_under_planes(start: Guess, measurements: Measurements, poses: Array) -> Array:
-    """Return how deep rows without a height lie under a known plane that other rows touch (N,)."""
+    """Return the depths (N,) of rows without a height under a known plane that others touch."""
     depths = np.zeros(len(measurements))
     names = np.array(measurements.planes, dtype=object)
     heights = np.abs(measurements.heights)
@@ -160,7 +160,7 @@ class _Factors:
         return f"; {words}, factor {factor:.3g}, would put it {where}"
 
     def _error_at(self, row: int, joints: Array, pose: Array) -> tuple[float, str] | None:
-        """Return a row's error at other joint coordinates, and words for it; None where large."""
+        """Return a row's error at other joint coordinates, with its words; None if large."""
         is_row = np.arange(len(self.measurements)) == row
         poses = self.poses.copy()
         poses[is_row] = pose
@@ -189,7 +189,7 @@ class _Factors:
 def _heights_over_planes(
     start: Guess, measurements: Measurements, row: int, pose: Array
 ) -> float | None:
-    """Return a row's height over its known plane at a pose (1, m), m; None where there is none."""
+    """Return a row's height over its known plane at a pose (1, m), m; None without a plane."""
     name = measurements.planes[row]
     plane = measurements.setup.planes.get(name)
     if (plane is not None and not plane.known) or name not in start.planes:

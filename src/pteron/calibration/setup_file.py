@@ -57,6 +57,7 @@ class PlaceTable(TomlTable):
 
     @model_validator(mode="after")
     def _somewhere(self) -> PlaceTable:
+        """Return the place; raise unless it has coordinates or is free."""
         if not self.free and "at" not in self.model_fields_set:
             raise ValueError("neither at nor free = true given; a place is known or found")
         return self
@@ -100,7 +101,7 @@ class MeasuredLog(TomlTable):
     g33: G33Table = Field(default_factory=G33Table)
 
     def setup(self) -> Setup:
-        """Return what the measurements refer to."""
+        """Return the setup of the measurements: noise, marks, planes, anchors, frame."""
 
         def places(tables: dict[str, PlaceTable]) -> dict[str, Place]:
             return {name: Place(table.at, not table.free) for name, table in tables.items()}
@@ -115,7 +116,7 @@ class MeasuredLog(TomlTable):
 
 
 def read_setup_file(log: str | Path) -> MeasuredLog:
-    """Return the TOML file beside a log, of the same stem; an empty one where there is none.
+    """Return the TOML file beside a log, of the same stem; empty if there is none.
 
     Raises
     ------
@@ -132,7 +133,7 @@ def read_setup_file(log: str | Path) -> MeasuredLog:
 
 
 def join_setups(setups: Sequence[Setup], sources: Sequence[str]) -> Setup:
-    """Return what the measurements of several logs refer to.
+    """Return the merged setup of several logs; raise where they contradict each other.
 
     Raises
     ------

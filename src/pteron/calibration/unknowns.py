@@ -111,11 +111,12 @@ def blocks_of(
 def _point_unknowns(
     name: str, tolerance: float = _WIDE, group: str = "setup"
 ) -> tuple[Unknown, ...]:
+    """Return the three coordinates of a point as unknowns, m."""
     return tuple(Unknown(f"{name}.{axis}", group, "m", tolerance) for axis in "xyz")
 
 
 def _surrounding_blocks(measured: Measurements) -> Iterator[UnknownBlock]:
-    """Yield the blocks of what measurements refer to and nobody knows."""
+    """Yield the blocks of unknown marks, planes, anchors and frame."""
     setup = measured.setup
     for name, mark in setup.marks.items():
         if not mark.known and name in measured.marks:

@@ -146,6 +146,7 @@ def _named_combinations(
 
 
 def _is_on_platform(name: str) -> bool:
+    """Return whether an unknown is a coordinate of a point on the platform."""
     return name.startswith(("tool.", "marks."))
 
 

@@ -65,7 +65,7 @@ class _Reason(NamedTuple):
 
 
 def rows_for_check(measurements: Measurements, blocks: Sequence[UnknownBlock]) -> int:
-    """Return the least number of such rows from which some are held out of the fit."""
+    """Return the least number of rows from which some are reserved for validation."""
     counted = sum(int((~np.isnan(array)).sum()) for array in measurements.parts.values())
     least = (
         _PER_VALUE[set(measurements.kinds) <= set(measurements.setup.noise)] * blocks[-1].where.stop
@@ -210,6 +210,7 @@ def _hides_rod_tilt(evidence: Evidence) -> bool:
 
 
 def _tilt_text(evidence: Evidence) -> str:
+    """Return a clause on the hidden tilt of the platform, with its size where it is small."""
     tilt = evidence.hidden_tilt or 0.0
     size = f" by up to {_size_text(tilt, 'angle')}" if tilt < _GREAT_TILT else ""
     return f"tilt the platform{size}"
@@ -226,6 +227,7 @@ def _hidden_rod_reasons(evidence: Evidence) -> Iterator[_Reason]:
 
 
 def _far_value_reasons(evidence: Evidence) -> Iterator[_Reason]:
+    """Yield a reason if values of the geometry are far from the drawing."""
     unknowns = [u for block in evidence.blocks for u in block.unknowns]
     far = [
         u.name
@@ -242,6 +244,7 @@ def _far_value_reasons(evidence: Evidence) -> Iterator[_Reason]:
 
 
 def _outlier_reasons(fit: CalibrationFit) -> Iterator[_Reason]:
+    """Yield a reason if many rows do not fit."""
     out, count = int((~fit.kept).sum()), len(fit.kept)
     if out > thresholds.FEW_LEFT_OUT * count:
         many = out > thresholds.MANY_LEFT_OUT * count
@@ -253,6 +256,7 @@ def _outlier_reasons(fit: CalibrationFit) -> Iterator[_Reason]:
 
 
 def _unseen_reasons(shown: Observability) -> Iterator[_Reason]:
+    """Yield a reason if measurements do not show all combinations of unknowns."""
     open_values = shown.columns - shown.determined_count
     if open_values:
         potential = (
@@ -265,12 +269,15 @@ def _unseen_reasons(shown: Observability) -> Iterator[_Reason]:
 
 
 def _unit(kind: str) -> str:
+    """Return the unit of residuals of a kind: mrad or mm."""
     return "mrad" if kind == "angle" else "mm"
 
 
 def _size_text(error: float, kind: str) -> str:
+    """Return an error as text in mrad or mm."""
     return f"{1e3 * error:.3g} {_unit(kind)}"
 
 
 def _join(names: Sequence[str]) -> str:
+    """Return names joined by commas and "and"."""
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

@@ -55,7 +55,7 @@ class NumbersCommand(Command):
     """A command whose arguments may be negative numbers, and whose options may take several."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Parse the arguments, put in an order that Typer understands."""
+        """Parse the arguments, reordered for Typer."""
         valued = [
             name
             for parameter in self.params
@@ -108,7 +108,7 @@ def _meant_for_vector(words: Sequence[str]) -> int:
 
 
 def _numeric(word: str) -> bool:
-    """Say whether a word is meant as a number, even if it is not one, such as -0.1.2."""
+    """Return whether a word is meant as a number, even if malformed, such as -0.1.2."""
     if word[:1] == "-" and word[1:2] and word[1] in ".0123456789":
         return True
     try:
@@ -150,7 +150,7 @@ def parsed_list(text: str | None, what: str) -> list[float] | None:
 def split_numbers(
     option: str, text: str, between: str, count: int | None, expected: str
 ) -> tuple[float, ...]:
-    """Return the numbers in an option's text, `count` of them if that is given.
+    """Return the numbers in an option's text; raise unless they are `count`, where it is stated.
 
     Raises
     ------

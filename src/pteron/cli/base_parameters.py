@@ -74,6 +74,7 @@ def base(
 def _write(
     parameters: BaseParameters, symbols: Symbols, form: Literal["sympy", "latex", "booktabs"]
 ) -> None:
+    """Write the base parameters to standard output in a form, closing lines as comments."""
     if form == "booktabs":
         echo(parameters.to_latex(symbols=symbols))
     else:
@@ -83,6 +84,7 @@ def _write(
 
 
 def _show(parameters: BaseParameters, symbols: Symbols) -> None:
+    """Print the base parameters: a table with values and units on a terminal, else plain lines."""
     expressions = parameters.expressions(symbols=symbols)
     closing = [plain(line) for line in _closing_lines(parameters, symbols)]
     if not is_terminal():
@@ -100,6 +102,7 @@ def _show(parameters: BaseParameters, symbols: Symbols) -> None:
 
 
 def _geometry(parameters: BaseParameters, symbols: Symbols) -> dict[str, float]:
+    """Return the geometry's values by the names of the symbols that the expressions use."""
     return parameters.leg_geometry_values if symbols == "leg" else parameters.geometry_values
 
 

@@ -105,6 +105,7 @@ def calibrate(
 
 
 def _prior(path: str) -> dict[str, float]:
+    """Return standard deviations (m or rad) by the name of the geometry's value, from a file."""
     from pteron.toml import read_toml
 
     tolerances: dict[str, float] = {}
@@ -219,6 +220,7 @@ def _show(result: Calibration, firmware: FirmwareFit | None, left_out: str) -> N
 
 
 def _values(result: Calibration) -> Table:
+    """Return the table of the values that changed most, with a caption that counts the others."""
     from pteron.report.calibration import value_rows
 
     rows = value_rows(result)
@@ -230,6 +232,7 @@ def _values(result: Calibration) -> Table:
 
 
 def _table(rows: Sequence[CalibrationRow], caption: str | None = None) -> Table:
+    """Return a table of fitted values: drawn, change, 95 % half-width, unit and origin."""
     numbers = ("drawn", "change", "+- 95 %")
     return table(
         *("value", *numbers, "unit", "made by"),
@@ -249,6 +252,7 @@ def _table(rows: Sequence[CalibrationRow], caption: str | None = None) -> Table:
 
 
 def _errors(result: Calibration) -> list[Table]:
+    """Return a table of errors (mm, mrad) of rows outside the fit, before and after; else none."""
     held_out = result.held_out
     if held_out is None:
         return []

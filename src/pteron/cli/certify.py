@@ -102,9 +102,11 @@ class RequestedProofs:
 
     @property
     def _unsure(self) -> list[str]:
+        """The warning that type-II singularities are not excluded; empty where they are."""
         return [] if self.type_ii else [_MAY_BE_SINGULAR]
 
     def _certify_tilt(self, robot: Manipulator, pose: Array, warnings: list[str]) -> CommandResult:
+        """Prove the largest tilt to every side at a pose, and return it as data and lines."""
         from pteron.workspace import conditions, largest_tilt
 
         warn(warnings)
@@ -119,6 +121,7 @@ class RequestedProofs:
         return CommandResult(data | {"proved": True, "warnings": warnings}, lines + self._unsure)
 
     def _certify(self, robot: Manipulator, pose: Array, warnings: list[str]) -> CommandResult:
+        """Prove bounds of the workspace's volume at a pose's angles, and its largest cube."""
         from pteron.workspace import conditions, largest_cube, paving
 
         warn(warnings)
@@ -164,6 +167,7 @@ def _orientation(robot: Manipulator, slice_: str | None) -> Array:
 
 
 def _region(robot: Manipulator, text: str) -> Box:
+    """Return the box that a text of pose ranges states; raise where a coordinate has no range."""
     spans = pose_spans(robot, text, "--prove", "; a proof is of all poses between")
     every = ", ".join(robot.coordinates)
     missing = [name for name in robot.coordinates if name not in spans]
@@ -175,6 +179,7 @@ def _region(robot: Manipulator, text: str) -> Box:
 def _paving_data(
     paved: Paving, pose: Array, floors: dict[str, float], cube: Inscribed | None
 ) -> dict[str, Any]:
+    """Return a paving's volumes, box counts, boundary shares and largest cube as JSON data."""
     return {
         "robot": paved.robot.name,
         "held": _angles(paved.robot, pose),
@@ -189,6 +194,7 @@ def _paving_data(
 
 
 def _proof(proof: Proof, floors: dict[str, float]) -> dict[str, Any]:
+    """Return a proof as JSON data: region, verdict, counterexample or undecided pose, causes."""
     pose, undecided = proof.counterexample, proof.undecided
     low, high = proof.region.box.tolist()
     return {
@@ -206,6 +212,7 @@ def _proof(proof: Proof, floors: dict[str, float]) -> dict[str, Any]:
 
 
 def _show(paved: Paving, pose: Array, floors: dict[str, float], cube: Inscribed | None) -> None:
+    """Print the proved volumes, the largest cube, and the share of the boundary by cause."""
     robot, shares, (noun, shape) = paved.robot, paved.boundary_shares, _SHAPES[len(paved.axes)]
     show(_heading(robot, _angles(robot, pose), floors))
     if not paved.outer_volume:
@@ -234,6 +241,7 @@ def _show(paved: Paving, pose: Array, floors: dict[str, float], cube: Inscribed 
 
 
 def _heading(robot: Manipulator, angles: Mapping[str, float], floors: dict[str, float]) -> str:
+    """Return the first line of a printout: the machine, the fixed angles, the nonzero floors."""
     where = ", ".join(pose_text(name, angle) for name, angle in angles.items())
     minimums = ", ".join(f"{name} {value:g}" for name, value in floors.items() if value)
     text = f"[bold]{plain(robot.name)}[/bold]{f' at {where}' if where else ''}"
@@ -241,11 +249,13 @@ def _heading(robot: Manipulator, angles: Mapping[str, float], floors: dict[str, 
 
 
 def _angles(robot: Manipulator, pose: Array) -> dict[str, float]:
+    """Return the angles (rad) of a pose by coordinate."""
     pairs = zip(robot.coordinates, pose.tolist(), strict=True)
     return {name: value for name, value in pairs if name in robot.platform.angles}
 
 
 def _spans(robot: Manipulator, region: Box) -> str:
+    """Return a box of poses as text: each coordinate's value, or its range."""
     spans = zip(robot.coordinates, region.low, region.high, strict=True)
     return ", ".join(
         pose_text(name, low) if low == high else span_text(name, low + 0.0, high + 0.0)

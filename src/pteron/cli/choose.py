@@ -86,14 +86,14 @@ def choose(
 
 
 class _Log:
-    """A line on what is tried, and one for each kind that is finished."""
+    """Notes on standard error: the kinds to search, and the result of each."""
 
     def __init__(self, evaluations: int, out: str | None) -> None:
         self._evaluations, self._out = evaluations, out
         self._count = self._done = 0
 
     def begin(self, kinds: Sequence[str], resumed: Sequence[str]) -> None:
-        """Tell what will be tried, before it takes its time."""
+        """Print the kinds to search, and those that are already finished in the folder."""
         self._count = len(kinds)
         if resumed:
             note(f"Gone on in {self._out}: {', '.join(resumed)} finished before")
@@ -106,7 +106,7 @@ class _Log:
             )
 
     def finish(self, candidate: Candidate) -> None:
-        """Tell what became of a kind."""
+        """Print how many of a kind's designs are feasible."""
         self._done += 1
         feasible = f"{candidate.kept} of {candidate.evaluated} designs keep all that is asked"
         verdict = feasible if candidate.serves else f"falls out; {feasible}"
@@ -114,6 +114,7 @@ class _Log:
 
 
 def _show(choice: Choice) -> None:
+    """Print the requirements, a table of the feasible kinds, and why others are infeasible."""
     show("[bold]Asked[/bold]: " + plain("; ".join(choice.job.requirement_lines())))
     serving = [candidate for candidate in choice.candidates if candidate.serves]
     rows = {candidate.kind: candidate.figure_texts for candidate in serving}

@@ -11,7 +11,7 @@ from pteron.errors import PteronError
 
 
 def machines(incomplete: str) -> list[str]:
-    """Return the names of the catalog and the TOML files that begin so.
+    """Return the names of the catalog and the TOML files that begin with the typed text.
 
     Where there is none the shell goes on with the names of all files and folders.
     """
@@ -28,12 +28,12 @@ def machines(incomplete: str) -> list[str]:
 
 
 def functions(incomplete: str) -> list[str]:
-    """Return the functions that can be exported, those whose names begin so."""
+    """Return the functions that can be exported whose names begin with the typed text."""
     return [name for name in FUNCTIONS if name.startswith(incomplete)]
 
 
 def indices(ctx: Context, incomplete: str) -> list[str]:
-    """Return the performance indices of the machine named before, those whose names begin so."""
+    """Return the machine's performance indices whose names begin with the typed text."""
     from pteron.indices import INDICES, indices_of
     from pteron.manipulator import load
 

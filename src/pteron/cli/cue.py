@@ -110,7 +110,7 @@ def cue(
 
 
 def _write(machine: Manipulator, cued: Cue, out: str | None, page: str | None) -> list[str]:
-    """Write the motion's table and page where they are asked for; return their names."""
+    """Write the motion's table and page if requested; return their names."""
     files = []
     if out is not None:
         from pteron.tables import write_table

@@ -176,6 +176,7 @@ def _result(
     carried: Carried,
     out: str | None,
 ) -> CommandResult:
+    """Write the motion's table if a file is named, and return its summary with the peak loads."""
     import numpy as np
 
     from pteron.manipulator.template_masses import template_masses
@@ -219,6 +220,7 @@ def _result(
 
 
 def _show(lines: list[str | Table], out: str | None) -> None:
+    """Print the lines and tables, and a hint to `--out` where no file was written."""
     show(*lines)
     if out is None:
         note("Note: no file is written; to have the motion, add --out FILE.csv")

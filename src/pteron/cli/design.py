@@ -90,7 +90,7 @@ def design(
 
 
 def _tell_resumed(folder: Path) -> None:
-    """Print whether the search goes on from evaluated designs in the folder."""
+    """Print that the search resumes from evaluated designs, if the folder has any."""
     for name, word in ((_GENERATIONS, "generations"), (_SURVEY, "blocks")):
         count = len([*(folder / name).glob("[0-9]*")])
         if count:
@@ -100,6 +100,7 @@ def _tell_resumed(folder: Path) -> None:
 def _search_front(
     spec: Spec, out: str | None, count: int | None, workers: int | None, scheduler: str | None
 ) -> Front:
+    """Run a survey of `count` designs, or a search if `count` is None, and return its front."""
     from pteron.design import search, survey
     from pteron.maps.sweep import cores
 
@@ -116,6 +117,7 @@ def _search_front(
 
 
 def _show(summary: FrontReport) -> None:
+    """Print the requirements, the proofs at the start, and a table for each selected design."""
     front = summary.front
     name, _, counts = front.summary().partition(": ")
     show(f"[bold]{plain(name)}[/bold]: {counts}")

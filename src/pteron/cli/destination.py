@@ -37,7 +37,7 @@ class Destination:
         return self.out is not None and Path(self.out).suffix.lower() in _TABLES
 
     def check(self) -> None:
-        """Refuse, before the work begins, a place where nothing can be written."""
+        """Raise, before the work begins, if the files cannot be written."""
         if self.is_table:
             from pteron.tables import check_output
 
@@ -55,7 +55,7 @@ class Destination:
         person: Callable[[], None],
         code: int = 0,
     ) -> CommandResult:
-        """Write files if they are asked for, and return the command's result.
+        """Write the files if requested, and return the command's result.
 
         `data` are the figures, `more` makes the other files of a folder, by name, and `person`
         prints what a person reads.

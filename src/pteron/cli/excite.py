@@ -62,7 +62,7 @@ class _LimitOptions:
     passive_clearance: float = 0.02
 
     def limits(self, machine: Manipulator) -> Limits:
-        """Return the limits of a machine, its drives' where none are given."""
+        """Return the limits of a machine; those of its drives where no option states them."""
         from pteron.identification.excitation import Limits
 
         return Limits.of(
@@ -221,7 +221,7 @@ def _result(
     file: _FileOptions,
     out: str | None,
 ) -> CommandResult:
-    """Check the motions between samples, write them, and return what is said of them."""
+    """Check the motions between samples, write them, and return the command's result."""
     import numpy as np
 
     from pteron.motion.overloads import overloads_of
@@ -269,7 +269,7 @@ def _result(
 
 
 def _held_out_cycles(excitation: Excitation, rate: float) -> RepeatedCycle | None:
-    """Return the motion to be held out; None, with a note, where there is none."""
+    """Return the motion for validation; None, with a note, where there is none."""
     try:
         return excitation.held_out(rate)
     except ModelError as error:
@@ -278,6 +278,7 @@ def _held_out_cycles(excitation: Excitation, rate: float) -> RepeatedCycle | Non
 
 
 def _quality(excitation: Excitation) -> Table:
+    """Return a table of condition numbers: optimised motion, best random motion, ratio."""
     headings = ("optimised", f"best of {excitation.draws} random", "ratio")
     best, random = excitation.conditioning, excitation.random
     caption = None
@@ -294,13 +295,14 @@ def _quality(excitation: Excitation) -> Table:
 
 
 def _number(value: float, digits: int) -> str:
+    """Return a number with significant digits, or `-` where it is not finite."""
     return f"{value:.{digits}g}" if math.isfinite(value) else "-"
 
 
 def _clearance_sentence(
     machine: Manipulator, limits: Limits, margins_by_motion: dict[str, Margins]
 ) -> list[str]:
-    """Return the distance that the joints keep from their limits, in a sentence, if they have any.
+    """Return a sentence on the joints' least distance from their limits; none without limits.
 
     A least margin is what is left beyond what was asked for, which is not what a person looks for.
     """
@@ -323,6 +325,7 @@ def _clearance_sentence(
 
 
 def _margins(margins_by_motion: dict[str, Margins]) -> Table:
+    """Return a table of each limit's least margin, its leg and time, and those of other motions."""
     headings = ("least margin", "leg", "at (s)")
     others = list(margins_by_motion)[1:]
     margin_table = table("limit", *headings, *others, numbers=(*headings, *others))

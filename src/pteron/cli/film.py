@@ -78,6 +78,7 @@ def film(
 
 
 def _expect_ffmpeg(options: dict[str, Any]) -> None:
+    """Raise where an MP4 film is requested and the extra with FFmpeg is not installed."""
     if options["out"].lower().endswith(".mp4"):
         expect_extra("film", "imageio_ffmpeg", "MP4 films need FFmpeg (a .gif does not)")
 
@@ -86,6 +87,7 @@ vars(film)["before"] = _expect_ffmpeg
 
 
 def _sides(text: str) -> tuple[int, int]:
+    """Return width and height in pixels of a text such as `960x720`."""
     parts = text.lower().replace("\u00d7", "x").split("x")
     try:
         width, height = (int(part) for part in parts)

@@ -142,6 +142,7 @@ def identify(
 
 
 def _speeds(text: str | None) -> tuple[float, ...] | Literal["auto"] | None:
+    """Return the Stribeck speeds (m/s or rad/s) that a text states, `auto`, or None."""
     if text in (None, "auto"):
         return "auto" if text else None
     each = "a speed in m/s or rad/s expected, or one for each joint, such as 0.02,0.03, or auto"
@@ -149,6 +150,7 @@ def _speeds(text: str | None) -> tuple[float, ...] | Literal["auto"] | None:
 
 
 def _delay(text: str | None) -> float | Literal["auto"] | None:
+    """Return the delay (s) that a text states, `auto`, or None without text."""
     if text in (None, "auto"):
         return "auto" if text else None
     expected = "seconds expected, such as 0.003, or auto"
@@ -163,6 +165,7 @@ def _terms(
     payload: bool,
     stribeck: tuple[float, ...] | Literal["auto"] | None,
 ) -> Terms:
+    """Return the model's terms from the options; raise where `--without` has an unknown name."""
     from pteron.identification import Terms
 
     left_out = [] if without is None else [name.strip() for name in without.split(",")]
@@ -185,6 +188,7 @@ def _bounds(boxes: list[str] | None, machine: Manipulator) -> Bounds | None:
 
 
 def _box(text: str) -> tuple[str, Box]:
+    """Return a body and the bounds (m) of its centre of mass, from a text such as `u1=0,1,0,1`."""
     body, _, numbers = text.partition("=")
     try:
         x0, x1, y0, y1 = (float(number) for number in numbers.split(","))
@@ -197,7 +201,7 @@ def _box(text: str) -> tuple[str, Box]:
 
 
 def _show(result: Identification) -> None:
-    """Print a verdict, the errors, the values, what was found in the logs, and the files."""
+    """Print the verdict, the errors, the values, the findings in the logs, and the files."""
     verdict = result.verdict
     worst = max(float(prediction.nrms.max()) for prediction in result.held_out)
     color = GRADE_COLORS[verdict.grade]
@@ -213,6 +217,7 @@ def _show(result: Identification) -> None:
 
 
 def _errors(result: Identification) -> Table:
+    """Return a table of each actuator's NRMS of prediction (%), its noise, and no friction."""
     from pteron.report.typeset import significant
 
     headings = ("held-out NRMS (%)", "noise", "no friction")[: 2 if _narrow() else 3]
@@ -226,6 +231,7 @@ def _errors(result: Identification) -> Table:
 
 
 def _values(result: Identification) -> Table:
+    """Return a table of base parameters with 95 % half-widths (absolute, and relative in %)."""
     from pteron.report.identification import parameter_rows, value_with_uncertainty
     from pteron.report.typeset import significant
 
@@ -252,7 +258,7 @@ def _values(result: Identification) -> Table:
 
 
 def _payload(result: Identification) -> list[str]:
-    """Return the lines that give the payload to a controller and to other commands."""
+    """Return lines with the payload as arguments of a controller and of other commands."""
     from pteron.identification.payload import payload_in
 
     payload = payload_in(result)
@@ -264,10 +270,12 @@ def _payload(result: Identification) -> list[str]:
 
 
 def _narrow() -> bool:
+    """Return whether the terminal has fewer columns than the full tables need."""
     return get_terminal_size().columns < _NARROW
 
 
 def _bodies(result: Identification) -> tuple[str, ...]:
+    """Return sentences: whether real bodies have these parameters, the CAD model, and notes."""
     consistency = result.consistency
     if consistency is None:
         return result.notes

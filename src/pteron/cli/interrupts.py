@@ -110,7 +110,7 @@ def _end(number: int, _: FrameType | None) -> None:
 
 
 def _interrupt() -> None:
-    """Interrupt the main thread, and where the system can the wait that it may be in."""
+    """Interrupt the main thread, and on POSIX the system call in which it waits."""
     main = threading.main_thread().ident
     if os.name == "posix" and main is not None:
         signal.pthread_kill(main, signal.SIGINT)
@@ -119,7 +119,7 @@ def _interrupt() -> None:
 
 
 def _is_in_casadi(frame: FrameType | None) -> bool:
-    """Say whether a function of CasADi is among those that are running."""
+    """Return whether a CasADi function is running."""
     while frame is not None:
         if frame.f_globals.get("__name__") == "casadi.casadi":
             return True

@@ -123,7 +123,7 @@ def direct(
 
 
 def _note_limits(machine: Manipulator, joints: NDArray[Any]) -> None:
-    """Say which joint coordinates (B, n) are beyond limits: the numbers stand."""
+    """Print a note on joint coordinates (B, n) beyond limits; the results are unchanged."""
     import numpy as np
 
     violations = []
@@ -145,7 +145,7 @@ def _note_limits(machine: Manipulator, joints: NDArray[Any]) -> None:
 def _modes(
     table: Table | TypedRow, poses: NDArray[Any], coordinates: tuple[str, ...]
 ) -> Table | TypedRow:
-    """Return one row for each real pose, and one without a pose where there is none."""
+    """Return a row for each real pose, and a row without a pose where there is none."""
     from dataclasses import replace
 
     import numpy as np
@@ -251,6 +251,7 @@ def forces(
 
 
 def _typed_row(typed: list[str | None], motion: list[str], loads: tuple[str, ...]) -> TableRows:
+    """Return a single row of the typed pose, rates, accelerations and wrench; 0 by default."""
     m = len(motion) // 3
     if typed[0] is None:
         raise DataError(f"no pose given; give --pose with {' '.join(motion[:m])}, or --table FILE")

@@ -12,7 +12,7 @@ _READING = ("arguments", "errors", "toml")
 
 
 def kept_machine(name_or_path: str) -> tuple[Manipulator, tuple[str, ...]]:
-    """Return a machine, and what is unlikely in its file, as `pteron.load` warns of it.
+    """Return a machine, cached, and the warnings that `pteron.load` gives of its file.
 
     What is kept is that of the very bytes of the file, and of the sources and the Pydantic that
     read them. A machine with a leg from outside this package is read again each time.

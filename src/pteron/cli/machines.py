@@ -123,7 +123,7 @@ def new(
 
 
 def _stocks(texts: list[str] | None) -> dict[str, str]:
-    """Return what links are cut from, by their key; without a key it is for both."""
+    """Return the stock of the links by key; a stock without a key is for "upper" and "lower"."""
     stocks: dict[str, str] = {}
     for text in texts or ():
         key, _, stock = text.rpartition("=")
@@ -132,6 +132,7 @@ def _stocks(texts: list[str] | None) -> dict[str, str]:
 
 
 def _machine(robot: Manipulator) -> dict[str, Any]:
+    """Return a machine's name, motion, coordinates, leg types and working mode as JSON data."""
     return {
         "name": robot.name,
         "motion": robot.platform.motion,
@@ -181,6 +182,7 @@ def check(file: str, *, elbows: str | None = None) -> CommandResult:
 
 
 def _findings(robot: Manipulator) -> dict[str, Any]:
+    """Return the results of a machine's examination as JSON data: home, reach, modes, warnings."""
     import numpy as np
 
     from pteron.kinematics import inverse_kinematics, singular_orientations
@@ -221,6 +223,7 @@ def _findings(robot: Manipulator) -> dict[str, Any]:
 
 
 def _leg(leg: LegKind) -> dict[str, Any]:
+    """Return a leg's type, joint, lengths, limits, units and drive as JSON data."""
     return {
         "type": leg.type,
         "joint": leg.joint.noun,
@@ -233,6 +236,7 @@ def _leg(leg: LegKind) -> dict[str, Any]:
 
 
 def _show(robot: Manipulator, findings: dict[str, Any]) -> None:
+    """Print the results of a machine's examination: a table of its legs, and sentences."""
     from pteron.manipulator.commented_file import crank_direction_text
 
     rows = (
@@ -305,7 +309,7 @@ def _home_lines(robot: Manipulator, findings: dict[str, Any]) -> list[str]:
 
 
 def _drives(robot: Manipulator) -> list[Table]:
-    """Return the drives of the joints, where the file has them."""
+    """Return a table of the joints' drives; none if the file has none."""
     from pteron.legs.drive_rows import drive_rows
 
     legs = tuple(f"leg {i}" for i in range(1, robot.joint_count + 1))
@@ -315,7 +319,7 @@ def _drives(robot: Manipulator) -> list[Table]:
 
 
 def _modes(modes: list[dict[str, Any]]) -> list[Table]:
-    """Return where the platform is in each working mode."""
+    """Return a table of the working modes: the platform's pose, its least margin, and remarks."""
     rows = []
     for mode in modes:
         said = [*["the file's"] * mode["named"], *["likely"] * mode["likely"]]
@@ -342,4 +346,5 @@ def _passive(joints: list[dict[str, Any]]) -> list[Table]:
 
 
 def _vector(values: Any, places: int = 4) -> str:
+    """Return numbers as text in parentheses, rounded to decimal places."""
     return f"({', '.join(f'{round(value, places) + 0.0:g}' for value in values)})"

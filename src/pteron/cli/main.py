@@ -99,7 +99,7 @@ class CommandGroup(TyperGroup):
 
 
 def _note_warnings(message: Warning | str, category: type[Warning], *place: Any, **_: Any) -> None:
-    """Show a warning of unlikely values as a note; others are a programmer's."""
+    """Print a warning of unlikely values as a note, any other in Python's format."""
     if issubclass(category, UnlikelyValue):
         note(f"Note: {message}")
     else:
@@ -120,6 +120,7 @@ def _open_closed_streams() -> None:
 
 
 def _usage(error: Any) -> str:
+    """Return a usage error's message in a single line that names the command's `--help`."""
     message = " ".join(str(error.format_message()).split()).rstrip(".")
     message = message.replace("Value error, ", "")
     context = getattr(error, "ctx", None)
@@ -130,7 +131,7 @@ def _usage(error: Any) -> str:
 
 
 def _close_standard_output() -> None:
-    """Discard Python's last flush: the reader of the output has left, or its disk is full."""
+    """Redirect standard output to the null device, so that Python's last flush cannot fail."""
     with suppress(OSError, ValueError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
@@ -158,7 +159,7 @@ _GENERAL = (check, report, workspace, base, table1, export)
 
 
 class Commands(Mapping[str, Any]):
-    """The subcommands by their names, each made when it is asked for: most often one is."""
+    """The subcommands by name, each created on first use."""
 
     def __init__(self) -> None:
         self._panels = {f.__name__: (panel, f) for panel, fs in _COMMANDS.items() for f in fs}

@@ -44,6 +44,7 @@ def map_data(
 
 
 def _index_data(index_map: Map, name: str) -> dict[str, Any]:
+    """Return an index's statistics over a map as JSON data; null where it is finite at no pose."""
     index = index_map.index(name)
     about = fields_as_json(index, "index=name title unit better")
     try:

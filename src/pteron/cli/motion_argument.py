@@ -45,7 +45,7 @@ def read_motion(robot: Manipulator, file: str, start: PoseLike | None = None) ->
 
 
 def read_playback(robot: Manipulator, file: str) -> Playback:
-    """Return a motion from a table, or a log, as it is shown."""
+    """Return the playback of a motion from a table or a log."""
     from pteron.playback import playback, read_motion
     from pteron.tables import Table
 
@@ -56,7 +56,7 @@ def read_playback(robot: Manipulator, file: str) -> Playback:
 
 
 def _playback_of_table(robot: Manipulator, rows: Table, start: PoseLike | None = None) -> Playback:
-    """Return the motion of a table; what it cannot do may be in another unit."""
+    """Return the playback of a table; an error names values that may be in another unit."""
     from pteron.kinematics.unlikely_values import unlikely_values
     from pteron.playback import playback_of_table
 
@@ -115,14 +115,14 @@ class Carried:
         return cls(carried, center, parts[1] if len(parts) > 1 else (), tool)
 
     def __str__(self) -> str:
-        """Return it in words behind a machine's name, empty if there is nothing."""
+        """Return the load in words that follow a machine's name; empty without a load."""
         tool = [] if self.tool is None else [f"tool {self.tool}"]
         at = "" if self.payload_center is None else f" at {_vector_text(self.payload_center)} m"
         words = [*tool, *([f"{self.payload:g} kg{at}"] if self.payload else [])]
         return f" with {' and '.join(words)}" if words else ""
 
     def load_machine(self, robot: Manipulator) -> Manipulator:
-        """Return the machine with it."""
+        """Return the machine with the tool and the payload."""
         from pteron.motion import with_payload
 
         robot = self.mount_tool(robot)
@@ -130,7 +130,7 @@ class Carried:
         return with_payload(robot, *body)
 
     def mount_tool(self, robot: Manipulator) -> Manipulator:
-        """Return the machine with the tool alone."""
+        """Return the machine with the tool, without the payload."""
         from pteron.motion import with_tool
 
         return robot if self.tool is None else with_tool(robot, self.tool)
@@ -167,4 +167,5 @@ def _check_rates(robot: Manipulator, rows: Table) -> None:
 
 
 def _vector_text(values: Sequence[float]) -> str:
+    """Return numbers as text in parentheses."""
     return f"({', '.join(f'{value:g}' for value in values)})"

@@ -34,13 +34,13 @@ def peaks_table(largest: Sequence[Peak]) -> Table:
 
 
 def _word(peak: Peak) -> str:
-    """Return the quantity of a peak: what a crank gives is a torque."""
+    """Return the name of a peak's quantity; the force of a revolute joint is a torque."""
     word = peak.name.replace("_", " ")
     return word.replace("force", "torque") if peak.unit == "N m" else word
 
 
 def force_word(robot: Manipulator) -> str:
-    """Return what the drives give: "force", "torque", or "force or torque"."""
+    """Return the noun for the drives' output: "force", "torque", or "force or torque"."""
     return " or ".join(sorted({leg.joint.force for leg in robot.legs}))
 
 

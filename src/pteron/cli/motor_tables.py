@@ -59,12 +59,14 @@ def common_table(robot: Manipulator, fits: Sequence[CommonFit]) -> list[rich.tab
 
 
 def _alone(fit: MotorFit) -> CommonFit:
+    """Return a leg's fit of a motor as the common fit of this leg alone."""
     from pteron.motion import CommonFit
 
     return CommonFit((fit.leg,), fit.motor, fit.span, fit.ratio, (fit,))
 
 
 def _data(robot: Manipulator, fit: CommonFit) -> dict[str, Any]:
+    """Return a common fit as JSON data: motor, gear ratio, its feasible range, and margins."""
     least, greatest = fit.span if fit.span else (None, None)
     return {
         "motor": fit.motor.name,
@@ -78,6 +80,7 @@ def _data(robot: Manipulator, fit: CommonFit) -> dict[str, Any]:
 
 
 def _table(robot: Manipulator, heading: str, fits: Iterable[CommonFit]) -> list[rich.table.Table]:
+    """Return a table of the best motors by leg or group of legs; an empty list without fits."""
     rows = []
     for legs, group in groupby(fits, key=lambda fit: fit.legs):
         for i, fit in enumerate(islice(group, _BEST)):
@@ -97,4 +100,5 @@ def _margins(common: CommonFit) -> tuple[float, ...]:
 
 
 def _ratio_unit(robot: Manipulator, fit: CommonFit) -> str:
+    """Return the unit of the gear ratio of a fit: rad of the motor per m or rad of the joint."""
     return f"rad/{robot.legs[fit.legs[0] - 1].joint.unit}"

@@ -62,7 +62,7 @@ _COMPLETION = {
 def parsed_command(
     command: Callable[..., CommandResult | None], *, general: bool = False
 ) -> Callable[..., None]:
-    """Return a command as it is typed.
+    """Return the function from which Typer makes a subcommand.
 
     Its `machine` is loaded from ROBOT in the working mode of --elbows, what it carries is read from
     --payload and --tool, and its result is printed for a person or, with --json, for a program.
@@ -112,22 +112,24 @@ def parsed_command(
 
 
 def _share_programs() -> AbstractContextManager[None]:
+    """Return a context in which machines of equal structure share their compiled programs."""
     from pteron.kernels import sharing_programs
 
     return sharing_programs()
 
 
 def _is_group(hint: Any) -> bool:
-    """Say whether a parameter's type is a group of options."""
+    """Return whether a parameter's type is a group of options."""
     return isinstance(hint, type) and is_dataclass(hint) and hint not in (MachineArgument, Carried)
 
 
 def _option(name: str, kind: Any, *, default: Any = None) -> Parameter:
+    """Return a keyword-only parameter of a signature, from which Typer makes an option."""
     return Parameter(name, Parameter.KEYWORD_ONLY, default=default, annotation=kind)
 
 
 def help_of(command: Callable[..., None]) -> dict[str, Any]:
-    """Give a command's parameters their options; return its help and what stands at its end."""
+    """Set the Typer options of a command's parameters; return its help and its epilog."""
     text, *sections = _SECTION.split(cleandoc(command.__doc__ or ""))
     parts = dict(zip(sections[::2], sections[1::2], strict=True))
     examples = parts.pop("Examples", "")
@@ -152,7 +154,7 @@ def help_of(command: Callable[..., None]) -> dict[str, Any]:
 
 
 def _read(line: str) -> tuple[str, dict[str, Any]]:
-    """Return the name of an argument or option, and what Typer is told of it."""
+    """Return the name of an argument or option, and the settings for Typer."""
     match = _LINE.match(line)
     assert match is not None, line
     name, short, metavar, text, default = match.groups()

@@ -72,6 +72,7 @@ def play(
 
 
 def _playback(machine: Manipulator, motion: str) -> Playback:
+    """Return a table's motion as a playback, or the standard cycle if no file has its name."""
     from pteron.motion import pick_and_place
     from pteron.playback import Playback
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 def pose_ranges(
     text: str | None, option: str
 ) -> tuple[dict[str, float], dict[str, tuple[float, ...]]]:
-    """Return the coordinates that an option holds, and the ranges of others.
+    """Return the constant coordinates in an option's text, and the ranges of the others.
 
     Examples
     --------
@@ -79,6 +79,7 @@ def span_text(name: str, low: float, high: float) -> str:
 
 
 def _unit(name: str) -> str:
+    """Return the unit of a pose coordinate."""
     from pteron.platforms.coordinates import coordinate
 
     return coordinate(name).unit

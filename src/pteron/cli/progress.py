@@ -51,6 +51,7 @@ def progress_bar(task: str) -> Iterator[Progress]:
         number = progress.add_task(plain(task), total=1.0)
 
         def tell(share: float) -> None:
+            """Update the bar's share, 0 to 1, its step's text and the time remaining."""
             estimate.tell(share)
             text = plain(getattr(share, "step", "") or task)
             is_new = text != progress.tasks[number].description
@@ -60,7 +61,7 @@ def progress_bar(task: str) -> Iterator[Progress]:
 
 
 class TimeLeft:
-    """The time that work still needs, by its recent rate.
+    """The estimated time remaining, from the recent rate of work.
 
     Work that goes on where an earlier run was ended begins with what that had done, at no rate.
     While nothing is done the time grows, since the rate is that up to now.
@@ -78,7 +79,7 @@ class TimeLeft:
         self._share = 0.0
 
     def tell(self, share: float) -> None:
-        """Take the share that is done, from 0 to 1."""
+        """Record the share of the work that is done, from 0 to 1."""
         now = self._clock()
         self._share = share
         if self._first is None:
@@ -91,7 +92,7 @@ class TimeLeft:
             self._told.popleft()
 
     def seconds(self) -> float | None:
-        """Return what time is left, s; None as long as that is not known."""
+        """Return the estimated time remaining, s; None while it is unknown."""
         if self._first is None:
             return None
         now, (began, base) = self._clock(), self._first
@@ -105,7 +106,7 @@ class TimeLeft:
         return (now - start) * max(1.0 - share, 0.0) / (share - earlier_share)
 
     def words(self) -> str:
-        """Return what time is left in words, of two digits; empty as long as it is not known."""
+        """Return the time remaining in words, with two digits; empty while it is unknown."""
         seconds = self.seconds()
         if seconds is None:
             return ""
@@ -116,12 +117,14 @@ class TimeLeft:
 
 
 def _bar(estimate: TimeLeft) -> rich_progress.Progress:
+    """Return a progress bar on standard error that shows the time remaining."""
     from rich import progress
     from rich.console import Console
     from rich.text import Text
 
     class Left(progress.ProgressColumn):
         def render(self, task: progress.Task) -> Text:
+            """Return the estimate of the time remaining as text."""
             return Text(estimate.words())
 
     return progress.Progress(
@@ -136,7 +139,7 @@ def _bar(estimate: TimeLeft) -> rich_progress.Progress:
 
 
 class Times:
-    """The times of the steps of long work; it is called as a bar's callable is."""
+    """The time of each step of long work, measured by a progress callable."""
 
     def __init__(self, tell: Progress) -> None:
         self._tell = tell
@@ -144,7 +147,7 @@ class Times:
         self._step, self._since = "", perf_counter()
 
     def __call__(self, share: float) -> None:
-        """Take the share of the work that is done, with the name of its step."""
+        """Record the share of the work that is done, with the name of its step."""
         self.begin(getattr(share, "step", ""))
         self._tell(share)
 

@@ -61,6 +61,7 @@ vars(report)["warns"] = True
 
 
 def _machine(contents: dict[str, Any]) -> Table:
+    """Return a table of a machine's figures: home, margin, reach, tilt, cycle, base parameters."""
     from pteron.platforms.coordinates import coordinate
 
     home, reach, base = contents["home"], contents["reach"], contents["base_parameters"]
@@ -88,6 +89,7 @@ def _machine(contents: dict[str, Any]) -> Table:
 
 
 def _legs(cycle: dict[str, Any], joints: list[dict[str, str]]) -> Table:
+    """Return a table of each leg's peak and RMS force and peak speed over the cycle."""
     force = " or ".join(sorted({joint["force"] for joint in joints}))
     headings = ("leg", f"peak {force}", f"RMS {force}", "peak speed")
     of = "Of the drives, with friction." if cycle["with_drives"] else "Of the bodies, no friction."

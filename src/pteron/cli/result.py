@@ -33,7 +33,7 @@ class CommandResult:
     code: int = 0
 
     def tell(self, *, as_json: bool) -> None:
-        """Print it for a program or for a person, and end with its exit code."""
+        """Print the result for a program or for a person, and exit with its exit code."""
         if as_json:
             show_json(self.data)
         elif callable(self.told):

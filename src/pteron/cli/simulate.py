@@ -124,7 +124,7 @@ def simulate(
 
 
 def _model(machine: Manipulator, name: str, elbows: str | None) -> Manipulator:
-    """Return the controller's model of a machine: one that moves as it does, in its mode."""
+    """Return the controller's model of a machine; raise unless coordinates and joints agree."""
     model = load_robot(name, elbows)
     for what, names, other in (
         ("pose is", machine.coordinates, model.coordinates),
@@ -154,6 +154,7 @@ def controller_of(name: Name, motion: Motion, period: float, bandwidth: float | 
 
 
 def _data(simulation: Simulation, controller: str, cycle: str, carried: Carried) -> dict[str, Any]:
+    """Return a simulation as JSON data: tracking errors by coordinate, and loads by leg."""
     import numpy as np
 
     robot, error = simulation.robot, simulation.error
@@ -184,11 +185,12 @@ def _data(simulation: Simulation, controller: str, cycle: str, carried: Carried)
 
 
 def _rows(columns: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Return the rows of columns that are as long."""
+    """Return columns of equal length as rows."""
     return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
 
 def _pictures(simulation: Simulation) -> dict[str, str]:
+    """Return SVG texts of the tracking errors and of the drive forces, by file name."""
     from pteron.plots import forces_figure, svg_file, tracking_figure
 
     units = ", ".join(dict.fromkeys(leg.joint.force_unit for leg in simulation.robot.legs))
@@ -206,7 +208,7 @@ def _tell(simulation: Simulation, data: dict[str, Any], carried: Carried, out: s
 
 
 def _show(simulation: Simulation, data: dict[str, Any], carried: Carried) -> None:
-    """Print for a person: how well it follows, and what its drives do."""
+    """Print tables of the tracking errors and of the drives' loads."""
     robot = simulation.robot
     steps = "DOP853" if data["step"] is None else f"steps of {data['step'] * 1e3:.3g} ms"
     errors = (

@@ -134,7 +134,7 @@ class _Asked:
 def _box(
     machine: Manipulator, spans: dict[str, tuple[float, ...]], motions: Sequence[Motion]
 ) -> Box:
-    """Return a box of poses, with room for a cycle at every turn along what has no span."""
+    """Return a box of poses with room for a cycle at every turn; `spans` override its sides."""
     import numpy as np
 
     from pteron.workspace import Box
@@ -148,7 +148,7 @@ def _box(
 
 
 def _weak(sizing: Sizing, margin: float) -> list[str]:
-    """Return what the drives of the machine's file have too little of, a line each."""
+    """Return a line for each limit that a drive of the file does not meet by the margin."""
     beyond = [
         f"leg {drive.leg}: not enough: {drive.limit} allow {drive.most:.4g} {drive.unit}, "
         f"{drive.margin:.3g} times the {drive.needed:.4g} {drive.unit} that the cycle takes"
@@ -160,7 +160,7 @@ def _weak(sizing: Sizing, margin: float) -> list[str]:
 
 
 def _unserved_legs(sizing: Sizing, fits: tuple[MotorFit, ...], margin: float) -> list[str]:
-    """Return the joints for which no motor of the list is enough, and what the best one lacks."""
+    """Return a line for each leg that no motor serves: the nearest motor and its shortfall."""
     lines = []
     for leg in range(1, sizing.robot.joint_count + 1):
         leg_fits = [fit for fit in fits if fit.leg == leg]
@@ -175,6 +175,7 @@ def _unserved_legs(sizing: Sizing, fits: tuple[MotorFit, ...], margin: float) ->
 
 
 def _data(sizing: Sizing, fits: tuple[MotorFit, ...], request: _Asked) -> dict[str, Any]:
+    """Return a sizing as JSON data: loads by drive, totals, margins, overloads and motors."""
     total = sizing.power.sum(axis=-1)
     return {
         "robot": sizing.robot.name,
@@ -201,7 +202,7 @@ def _data(sizing: Sizing, fits: tuple[MotorFit, ...], request: _Asked) -> dict[s
 
 
 def _worst(sizing: Sizing) -> list[dict[str, Any]]:
-    """Return the worst places of each leg; none where the cycle is done as it stands."""
+    """Return the worst places of each leg; none where the cycle has a fixed place."""
     rows = []
     for leg in range(sizing.robot.joint_count) if sizing.places else ():
         for quantity in _NAMED:
@@ -224,7 +225,7 @@ def _further_files(sizing: Sizing, fits: tuple[MotorFit, ...]) -> dict[str, str]
 def _show(
     sizing: Sizing, fits: tuple[MotorFit, ...], common: tuple[CommonFit, ...], request: _Asked
 ) -> None:
-    """Print for a person: loads, power, motors, and the choice."""
+    """Print tables of loads, power and motors, and the choice."""
     dwell = f", {sizing.dwell:g} s of it at rest" if sizing.dwell else ""
     places = (
         f"The greatest of {len(sizing.places)} places and turns of the cycle, within "
@@ -247,7 +248,7 @@ def _show(
 
 
 def _energy(sizing: Sizing) -> list[str]:
-    """Return what all drives take, and from where their friction is."""
+    """Return lines on the energy of all drives over a cycle, and on assumed friction."""
     total = sizing.power.sum(axis=-1)
     net = sizing.net_energy
     exchanged = f"{sizing.given_energy.sum():.4g} J given and taken back: there is no friction"
@@ -267,7 +268,7 @@ def _energy(sizing: Sizing) -> list[str]:
 
 
 def _verdict(sizing: Sizing, fits: tuple[MotorFit, ...], margin: float) -> list[str]:
-    """Return whether drives and motors are enough, and the margin that exists."""
+    """Return lines on whether drives and motors suffice, with the actual margin."""
     lines = []
     if sizing.margins:
         least = min(sizing.margins, key=lambda limit: limit.margin)
@@ -291,7 +292,7 @@ def _verdict(sizing: Sizing, fits: tuple[MotorFit, ...], margin: float) -> list[
 
 
 def _places(sizing: Sizing) -> list[rich.table.Table]:
-    """Return where each leg's force and speed are greatest."""
+    """Return a table of the places where each leg's force and speed are greatest."""
     rows = []
     for worst in _worst(sizing):
         pose = " ".join(f"{round(value, 6) + 0.0:.4g}" for value in worst["pose"])
@@ -305,6 +306,7 @@ def _places(sizing: Sizing) -> list[rich.table.Table]:
 
 
 def _loads(sizing: Sizing) -> rich.table.Table:
+    """Return a table of each drive's peak and RMS force and speed."""
     force = force_word(sizing.robot)
     names = ("leg", f"peak {force}", f"RMS {force}", "peak speed", "RMS speed")
     columns = sizing.peak_forces, sizing.rms_forces, sizing.peak_speeds, sizing.rms_speeds
@@ -317,6 +319,7 @@ def _loads(sizing: Sizing) -> rich.table.Table:
 
 
 def _powers(sizing: Sizing) -> rich.table.Table:
+    """Return a table of each drive's power (W) and energy (J), motoring and braking."""
     names = ("leg", "peak (W)", "mean (W)", "brakes (W)", "gives (J)", "takes back (J)")
     powers = (sizing.peak_power, sizing.mean_power, sizing.peak_braking)
     columns = zip(*powers, sizing.given_energy, sizing.braked_energy, strict=True)
@@ -325,7 +328,7 @@ def _powers(sizing: Sizing) -> rich.table.Table:
 
 
 def _rotors(sizing: Sizing) -> list[rich.table.Table]:
-    """Return the loads of the motors of the machine's file, where it says enough."""
+    """Return a table of the motors' loads and inertia ratios; none without rotor or ratio."""
     if not any(drive.ratio or drive.rotor_inertia for drive in sizing.drives):
         return []
     names = ("leg", "load", "rotor", "load/rotor", "ratio", "best ratio", "RMS at motor")

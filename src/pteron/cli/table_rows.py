@@ -33,7 +33,7 @@ _DECIMALS = {"m": 6, "rad": 6, "N": 4, "N m": 4}
 
 @dataclass(frozen=True)
 class TableRows:
-    """A table, or a single row that was typed: messages about it speak of no rows."""
+    """A table, or a single typed row, for which messages name no row."""
 
     table: Table | TypedRow
 
@@ -76,6 +76,7 @@ class TableRows:
     def _chunks(
         self, serve: Callable[[NDArray[Any]], NDArray[Any]], values: NDArray[Any], unlikely: str
     ) -> Iterator[NDArray[Any]]:
+        """Yield results of `serve` by chunks of rows; an error names the row that fails."""
         for start in range(0, len(values), CHUNK):
             try:
                 yield serve(values[start : start + CHUNK])
@@ -92,7 +93,7 @@ class TableRows:
         row: int,
         unlikely: str,
     ) -> None:
-        """Serve the row that fails alone: its message then speaks of it, and of no batch."""
+        """Evaluate the row that fails alone, so that the message names it."""
         try:
             serve(values[row])
         except PteronError as error:
@@ -113,7 +114,7 @@ def given_rows(
     what: str,
     names: Sequence[str],
 ) -> TableRows:
-    """Return the rows of a table's file, or the one that was typed; `names` are its columns."""
+    """Return the rows of a table's file, or the typed row; `names` are its columns."""
     if not typed:
         return rows_of_table(robot, file, what, names)
     if file is not None:
@@ -122,7 +123,7 @@ def given_rows(
 
 
 def single_row(columns: Sequence[str], values: Sequence[float]) -> TableRows:
-    """Return the row that was typed."""
+    """Return the typed row."""
     from pteron.cli.typed_row import TypedRow
 
     return TableRows(TypedRow({name: [value] for name, value in zip(columns, values, strict=True)}))
@@ -196,6 +197,7 @@ def deliver(
 def _show(
     robot: Manipulator, result: Table | TypedRow, shown: Sequence[str], *, single: bool
 ) -> None:
+    """Print the first rows of a result as a table, with units in its headings."""
     known = robot.column_units
     units = [known.get(name, "") for name in shown]
     headings = [f"{n} ({unit})" if unit else n for n, unit in zip(shown, units, strict=True)]
@@ -212,6 +214,7 @@ def _show(
 
 
 def _text(cell: float | int | None, unit: str) -> str:
+    """Return a cell as text: `-` if empty, with the decimals of its unit."""
     if cell is None:
         return "-"
     # Adding zero takes the sign from what was rounded to zero.
@@ -219,4 +222,5 @@ def _text(cell: float | int | None, unit: str) -> str:
 
 
 def _count(rows: int) -> str:
+    """Return a number of rows with its noun."""
     return f"{rows} {'row' if rows == 1 else 'rows'}"

@@ -48,6 +48,7 @@ def is_interactive() -> bool:
 
 
 def _is_watched(stream: TextIO, variable: str) -> bool:
+    """Return what an environment variable (1 or 0) decides, else whether it is a terminal."""
     decision = {"0": False, "1": True}.get(os.environ.get(variable, ""))
     return stream.isatty() if decision is None else decision
 
@@ -106,7 +107,7 @@ def write(text: str) -> None:
 
 
 def show_json(data: Any) -> None:
-    """Print data on standard output as JSON, null for the numbers that it does not have."""
+    """Print data on standard output as JSON, with null for NaN and infinity."""
     write(json.dumps(json_ready(data), indent=2, allow_nan=False) + "\n")
 
 
@@ -157,13 +158,13 @@ def note(message: str) -> None:
 
 
 def warn(messages: Iterable[str], source: str = "") -> None:
-    """Print a line on standard error for each warning; `source` goes before what it says."""
+    """Print a line on standard error for each warning; `source` is its beginning."""
     for message in messages:
         note(f"Warning: {source}{message}")
 
 
 def complain(message: str) -> None:
-    """Print an error as one line on standard error; lines to paste into a file stay lines."""
+    """Print an error on standard error; lines to paste into a file are not wrapped."""
     from rich.console import Console
 
     console = Console(stderr=True, highlight=False, emoji=False, soft_wrap=True)

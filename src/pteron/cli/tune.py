@@ -126,6 +126,7 @@ def tune(
 
 
 def _files(tuning: Tuning, tried: pl.DataFrame) -> dict[str, str]:
+    """Return the texts of the tuning's files, by name: gains in TOML, and the page."""
     from pteron.controllers import gains_text
     from pteron.report.tuning_page import tuning_page
 
@@ -136,7 +137,7 @@ def _files(tuning: Tuning, tried: pl.DataFrame) -> dict[str, str]:
 
 
 def _show(tuning: Tuning, controller: str, tried: pl.DataFrame) -> None:
-    """Print for a person: the gains, the least margins, and the trials."""
+    """Print the gains, the least margins, and the trials."""
     import numpy as np
 
     least, gains = tuning.least, tuning.gains()

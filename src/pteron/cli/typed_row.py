@@ -91,10 +91,12 @@ class TypedRow:
             yield ",".join(map(_text, row)) + "\n"
 
     def _drop_columns(self, names: Collection[str]) -> dict[str, Sequence[Cell]]:
+        """Return the columns except those named."""
         return {name: values for name, values in self.cells.items() if name not in names}
 
 
 def _column(values: ArrayLike) -> list[Cell]:
+    """Return values as a list of cells, with None for NaN."""
     return [None if value != value else value for value in np.asarray(values).tolist()]
 
 

@@ -97,7 +97,7 @@ def view(
 
 
 def _has_screen() -> bool:
-    """Say whether a person may see a browser that is opened here."""
+    """Return whether a person may see a browser that is opened here."""
     if sys.platform in ("win32", "darwin"):
         return True
     return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))

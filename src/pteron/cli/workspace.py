@@ -151,6 +151,7 @@ def workspace(
 def _show(
     index_map: Map, volume: ReachVolume | None, data: dict[str, Any], out: str | None
 ) -> None:
+    """Print a map on a terminal, or write its rows as CSV to a pipe; then list the files."""
     if is_terminal():
         show_map(index_map, volume, data)
     else:
@@ -160,6 +161,7 @@ def _show(
 
 
 def _checked_indices(robot: Manipulator, names: list[str]) -> tuple[str, ...]:
+    """Return the indices without duplicates, the margin by default; raise on unknown names."""
     from pteron.indices import INDICES, indices_of
     from pteron.maps.map import MARGIN
 
@@ -179,7 +181,7 @@ def _checked_indices(robot: Manipulator, names: list[str]) -> tuple[str, ...]:
 
 
 def _expect_output(out: str | None) -> str:
-    """Return the ending of a file after a check, before the work begins, that it can be written."""
+    """Return the ending of a file; raise, before the work begins, if it cannot be written."""
     if out is None:
         return ""
     ending = Path(out).suffix.lower()
@@ -200,13 +202,14 @@ def _expect_output(out: str | None) -> str:
 
 
 def _warnings(robot: Manipulator) -> list[str]:
+    """Return the warning that a layout is singular everywhere; empty where it is not."""
     from pteron.kinematics.architecture import is_singular_everywhere, singular_everywhere
 
     return [str(singular_everywhere(robot))] if is_singular_everywhere(robot) else []
 
 
 def _grid(robot: Manipulator, text: str | None, points: int | None, ending: str) -> Grid:
-    """Return the poses that are asked for, as many as the file can hold."""
+    """Return the grid of poses of the slice, with the number of axes that the file needs."""
     from pteron.maps import pose_grid
 
     names = robot.coordinates
@@ -248,7 +251,7 @@ def _with_frames(grid: Grid) -> Grid:
 
 
 def _volume(robot: Manipulator, grid: Grid) -> ReachVolume | None:
-    """Return the reach at the grid's orientation; None where that varies, or nothing is in it."""
+    """Return the reach at the grid's orientation; None where that varies or the reach is empty."""
     from pteron.workspace import reach_volume
 
     if any(axis.unit == "rad" for axis in grid.axes) or len(robot.platform.lengths) < 2:
@@ -260,7 +263,7 @@ def _volume(robot: Manipulator, grid: Grid) -> ReachVolume | None:
 
 
 def _unreachable_slice_warnings(grid: Grid, volume: ReachVolume | None) -> list[str]:
-    """Return the held lengths at which nothing is in reach."""
+    """Return warnings of fixed lengths at which nothing is in reach."""
     from pteron.platforms.coordinates import coordinate
 
     if volume is None:
@@ -277,6 +280,7 @@ def _unreachable_slice_warnings(grid: Grid, volume: ReachVolume | None) -> list[
 
 
 def _draw(index_map: Map, out: str, ending: str) -> None:
+    """Save a picture of a map, or a film of its first index, by the file's ending."""
     from pteron.plots import map_figure, map_film, save_figure
 
     if ending in _PICTURES:

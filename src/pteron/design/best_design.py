@@ -85,7 +85,7 @@ def _exceeded_limit(evaluator: KindEvaluator, candidate: Candidate) -> str:
 
 
 def shown_objectives(objectives: Sequence[str]) -> list[str]:
-    """Return the objectives, of one alone with another that decides between equals."""
+    """Return the objectives; a single objective with a second that decides between equals."""
     other = "moving_mass" if objectives[0] != "moving_mass" else "footprint"
     return list(objectives) if len(objectives) > 1 else [objectives[0], other]
 
@@ -97,6 +97,7 @@ def _candidate(
     counts: tuple[int, int],
     best: list[Rating],
 ) -> Candidate:
+    """Return a proved design with its worst figures and margins, refined between sample poses."""
     robot = rating.machine
     loaded_robot = evaluator.add_payload(robot)
     figures = dict(rating.figures)
@@ -139,6 +140,7 @@ def _candidate(
 
 
 def _clear_words(evaluator: KindEvaluator, robot: Manipulator, middle: Array) -> str:
+    """Return a sentence on the clearance between parts: proved, or evaluated at sample poses."""
     least, samples = evaluator.job.floors.clearance, sample_poses(evaluator.job, robot, DENSE)
     count = len(samples) + len(evaluator.between)
     distance_words = f"come nearer than {1e3 * least:g} mm" if least else "touch"
@@ -202,15 +204,19 @@ class _ShiftedPath(Path):
 
     @property
     def length(self) -> float:
+        """The length of the path."""
         return self._path.length
 
     @property
     def rests(self) -> tuple[float, ...]:
+        """The path parameters at which the motion stops."""
         return self._path.rests
 
     def at(self, s: Array) -> tuple[Array, Array, Array]:
+        """Return poses (N, m) and their first and second derivatives by the path parameter (N,)."""
         pose, first, second = (part[0] for part in self._place.curves(*self._path.at(s)))
         return self._middle + pose, first, second
 
     def place(self, s: float) -> str:
+        """Return the name of the place on the path at a parameter."""
         return self._path.place(s)

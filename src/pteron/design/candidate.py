@@ -86,7 +86,7 @@ class Candidate(Result):
         return min(self.figures.get(f"{name}_margin", np.inf) for name in MARGINS)
 
     def summary(self) -> str:
-        """Return in a line how many designs keep all that is asked, or what the nearest misses."""
+        """Return in a line how many designs are feasible, or the nearest design's violations."""
         if not self.serves:
             return f"{self.kind} falls out: the nearest design has {'; '.join(self.why)}"
         return f"{self.kind}: {self.kept} of {self.evaluated} designs keep all that is asked"

@@ -68,7 +68,7 @@ class Choice(Result):
 
     @property
     def best(self) -> Candidate | None:
-        """The best kind by the first objective; None where none serves."""
+        """The best kind by the first objective; None where none is feasible."""
         return self.candidates[0] if self.candidates and self.candidates[0].serves else None
 
     def summary(self) -> str:
@@ -83,6 +83,7 @@ class Choice(Result):
         return pl.DataFrame(rows, infer_schema_length=None)
 
     def _overview(self) -> Overview:
+        """Return the overview for notebooks: the best kind, the table and the summary's lines."""
         best = "no kind does what is asked" if self.best is None else f"{self.best.kind} is best"
         return frame_overview("Kinds of machines", best, self.table(), self.summary().splitlines())
 
@@ -245,6 +246,7 @@ def _has_drives(name: str, options: Mapping[str, Options], job: Job) -> bool:
 
 
 def _candidate(evaluator: KindEvaluator, progress: Progress) -> Candidate:
+    """Return the best provable design of a kind, searched with a single BLAS thread."""
     search = evaluator.job.search
     with one_thread():
         return prove_best_design(
@@ -278,6 +280,7 @@ class _CandidateStore:
         self._folder, self._job, self._cases = folder, job, evaluators
 
     def _digest(self, name: str) -> str:
+        """Return the digest of all that a kind's result depends on: job, drives, machine, code."""
         job = self._job.model_dump(mode="json", exclude={"kinds"})
         options = {unit: repr(some.all) for unit, some in self._cases[name].options.items()}
         text = json.dumps(
@@ -299,7 +302,7 @@ class _CandidateStore:
             return None
 
     def keep(self, candidate: Candidate) -> None:
-        """Keep a finished kind."""
+        """Write a finished kind to the folder."""
         if self._folder is not None:
             record = json_ready(candidate.as_dict() | {"digest": self._digest(candidate.kind)})
             self._folder.mkdir(parents=True, exist_ok=True)

@@ -63,6 +63,7 @@ def shortest_time(robot: Manipulator, motion: Motion) -> float:
 
 
 def _remove_stribeck(drive: Drive | None) -> Drive | None:
+    """Return a drive with its Stribeck force added to Coulomb friction; a bound at every speed."""
     if drive is None or drive.stribeck is None:
         return drive
     return replace(drive, coulomb=drive.coulomb + drive.stribeck.force, stribeck=None)

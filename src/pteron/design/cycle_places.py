@@ -91,7 +91,7 @@ class Places:
         return replace(self, shifts=self.shifts[indices], turns=self.turns[indices])
 
     def both_ways(self) -> Places:
-        """Return the cycle, finer in time, at its places and, turned by pi, at opposite ones."""
+        """Return the cycle, finer in time, at its places and, turned by pi, at opposite places."""
         fine = replace(self, samples=_IN_CYCLE_LAST)
         if not self.anywhere:
             return fine
@@ -102,7 +102,7 @@ class Places:
 
     @cached_property
     def states(self) -> Curve:
-        """Poses from the middle, velocities and accelerations (B, K, m), if it takes 1 s.
+        """Poses from the middle, velocities and accelerations (B, K, m), for a duration of 1 s.
 
         It goes from rest to rest by quintics, all of the same greatest acceleration.
         """
@@ -111,7 +111,7 @@ class Places:
         return self.curves(*timed.curve(np.linspace(0.0, 1.0, self.samples)))
 
     def curves(self, *curve: Array) -> Curve:
-        """Return poses of the tool (K, m) and two derivatives as P's (B, K, m), at all places."""
+        """Return P's poses and two derivatives (B, K, m) for a curve of the tool, at each place."""
         parts: list[Array] = []
         for part in curve:
             every = np.tile(part, (len(self.turns), 1, 1))
@@ -133,6 +133,7 @@ def cycles_of(job: Job, robot: Manipulator) -> list[Places]:
 
 
 def _cycle_places(job: Job, robot: Manipulator, cycle: ToolCycleTable, k: int) -> Places:
+    """Return a cycle with the shifts and turns at which it fits; raise where there are none."""
     name = cycle.name or f"cycle {k}"
     points = np.zeros((len(cycle.points), robot.freedom))
     rows = np.array(cycle.points)
@@ -197,12 +198,13 @@ def neighbour_places(job: Job, cycle: Places, chosen: Iterable[int], part: float
 
 
 def _plane(turns: Array) -> Array:
+    """Return the rotation matrices (2, 2, K) of turns (K,) in rad."""
     c, s = np.cos(turns), np.sin(turns)
     return np.moveaxis(np.array([[c, -s], [s, c]]), -1, 0)
 
 
 def _turn_path(path: Array, turn: float) -> Array:
-    """Return places (K, 3) turned about the upright."""
+    """Return places (K, 3) turned about the vertical axis."""
     return np.column_stack([path[:, :2] @ _plane(np.array([turn]))[0].T, path[:, 2]])
 
 
@@ -246,7 +248,7 @@ def _angles(job: Job, robot: Manipulator, angles: Array) -> Iterator[Array]:
 
 
 def _share(job: Job, path: Array, shift: Array) -> float | None:
-    """Return how much of a shift a path (K, 3) can go and stay in the workspace; None for nothing.
+    """Return the share of a shift by which a path (K, 3) fits the workspace; None if nothing.
 
     Of a cylinder the corner of its box is outside: it goes as far towards it as can be.
     """

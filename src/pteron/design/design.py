@@ -61,12 +61,12 @@ class Design(Result):
     least: float = np.inf
 
     def __repr__(self) -> str:
-        """Return the design in a line, without what it has yet to compute."""
+        """Return the design in a line, without quantities that are not computed yet."""
         return f"<Design of {self.task.robot.name!r}: {self.robot.name}>"
 
     @property
     def quantities(self) -> dict[str, float]:
-        """The quantities of its search, by name; NaN where it has none."""
+        """The quantities of the search, by name; NaN where undefined."""
         return {name: self.quantity(name) for name in self.task.quantity_names}
 
     @cached_property
@@ -84,7 +84,7 @@ class Design(Result):
 
     @cached_property
     def cube(self) -> Fit:
-        """The largest cube, or copy of a floating workspace: found, proved where it is known."""
+        """The largest cube, or copy of a floating workspace, from a local search or a proof."""
         if self.known is not None:
             return self.known
         return self.cube_without(np.empty((0, self.robot.freedom)))
@@ -97,7 +97,7 @@ class Design(Result):
 
     @cached_property
     def workspace(self) -> WorkspaceTable | None:
-        """The required workspace, where it is in this design."""
+        """The required workspace; a floating one at its best place in this design."""
         table = self.task.spec.workspace
         return table.with_center(self.cube.center) if table is not None and table.floats else table
 
@@ -113,6 +113,7 @@ class Design(Result):
 
     @property
     def _samples(self) -> int:
+        """The number of sample poses along an edge of the workspace or of the largest cube."""
         return _IN_CUBE if self.workspace is None else self.workspace.samples
 
     def lattice(self, count: int) -> Array:
@@ -186,7 +187,7 @@ class Design(Result):
 
     @cached_property
     def cycles(self) -> tuple[Motion, ...]:
-        """The motions of the cycles, about the workspace's middle; as they stand without one."""
+        """The motions of the cycles, about the workspace's middle if there is a workspace."""
         spec, middle = self.task.spec, self.task.orientations[0].copy()
         lengths = len(self.robot.platform.lengths)
         ends = None if self.workspace is None else np.array(self.workspace.ends)
@@ -257,7 +258,7 @@ class Design(Result):
     start_strokes = former_attribute("start_strokes", "reference_strokes")
 
     def quantity(self, name: str) -> float:
-        """Return one of its quantities; NaN where it has none, see `missing_reason`."""
+        """Return a quantity; NaN where it is undefined, see `missing_reason`."""
         return self._quantities(name)[0]
 
     def missing_reason(self, name: str) -> str:
@@ -283,15 +284,17 @@ class Design(Result):
 
     @cached_property
     def _known_quantities(self) -> dict[str, tuple[float, str]]:
+        """Quantities with the reason where they are missing, by name; filled lazily."""
         return {}
 
     def _quantities(self, name: str) -> tuple[float, str]:
+        """Return a quantity and the reason where it is missing, computed at most once."""
         if name not in self._known_quantities:
             self._known_quantities[name] = self._evaluate_quantity(name)
         return self._known_quantities[name]
 
     def _evaluate_quantity(self, name: str) -> tuple[float, str]:
-        """Return a quantity and, where there is none, why."""
+        """Return a quantity and, where it is undefined, the reason."""
         quantity = self.task.quantities[name]
         if quantity.of_machine is not None:
             return self._evaluate_machine(quantity.of_machine)
@@ -313,6 +316,7 @@ class Design(Result):
         return np.nan, where if out else "it has none at some sampled pose: a singularity"
 
     def _evaluate_machine(self, of_machine: Callable[[Manipulator], float]) -> tuple[float, str]:
+        """Return a function's value for the machine and ''; NaN and the reason on failure."""
         try:
             amount = float(of_machine(self.robot))
         except PteronError as error:
@@ -334,4 +338,5 @@ class Design(Result):
 
 @lru_cache(maxsize=8)
 def _start(task: Task) -> Design:
+    """Return the design of the task's initial machine, cached by task."""
     return Design(task, task.robot)

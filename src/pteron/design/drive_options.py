@@ -100,7 +100,7 @@ def read_gearboxes(path: str | Path) -> tuple[Gearbox, ...]:
 
 
 def prices(path: str | Path, count: int) -> list[float]:
-    """Return the prices that a list has, NaN where it has none."""
+    """Return the prices of a list of motors, NaN where not stated."""
     if Path(path).suffix.lower() == ".toml":
         listed = read_toml(path, DataError, "no such file")["motors"]
         return [_price(path, motor) for motor in listed]
@@ -115,6 +115,7 @@ def prices(path: str | Path, count: int) -> list[float]:
 
 
 def _price(path: str | Path, motor: Mapping[str, Any]) -> float:
+    """Return a motor's price, NaN where the file states none; raise if it is negative."""
     price = float(motor.get("price", np.nan))
     if price < 0.0:
         raise DataError(
@@ -166,7 +167,7 @@ class Options:
         joint: str,
         friction: float,
     ) -> Options:
-        """Return them by price or, where one has none, by rated power."""
+        """Return all options by price or, if not all have a price, by rated power."""
         options = [
             Option(motor, gearbox, price + gearbox.price, friction)
             for motor, price in motors

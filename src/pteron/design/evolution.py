@@ -12,6 +12,7 @@ from pteron.kernels import Array
 
 
 def _pymoo(module: str) -> Any:
+    """Import a module of pymoo; raise with the extra to install where it is missing."""
     return import_extra("design", f"pymoo.{module}", "a search needs pymoo")
 
 
@@ -56,7 +57,7 @@ class Evolution:
         return np.array(self._asked.get("X"), dtype=float)
 
     def tell(self, designs: Array, costs: Array, misses: Array) -> None:
-        """Take designs with costs (N, M) and violations (N, C); those of `ask` come first."""
+        """Record designs with costs (N, M) and violations (N, C); those of `ask` come first."""
         from pymoo.core.evaluator import Evaluator
         from pymoo.core.population import Population
         from pymoo.problems.static import StaticProblem

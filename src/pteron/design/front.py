@@ -53,6 +53,7 @@ class Front(Result):
         return FormerTable("Front", self.designs, self._headed_designs)
 
     def _headed_designs(self) -> pl.DataFrame:
+        """Return the designs with units in the headings of the columns."""
         return self.designs.select(list(self.headings)).rename(self.headings)
 
     def summary(self) -> str:
@@ -72,6 +73,7 @@ class Front(Result):
         }
 
     def _overview(self) -> Overview:
+        """Return the overview for notebooks: the counts of designs and the table."""
         title, _, about = self.summary().partition(": ")
         return frame_overview(title, about, self.table())
 
@@ -98,7 +100,7 @@ class Front(Result):
         return np.asarray(self.designs.select(names).to_numpy())
 
     def robot(self, index: int) -> Manipulator:
-        """Return the machine of one of its designs."""
+        """Return the machine of a design of the front."""
         return self.task.machine(self.values[index].tolist())
 
     @cached_property
@@ -132,7 +134,7 @@ class Front(Result):
 
 
 class ProvedRows:
-    """The rows of designs that were proved, in place of those that a look at points gave.
+    """Designs' rows after proofs, which replace rows from sample points.
 
     `prove` takes values of designs (N, V), and returns their rows, each as far as it is proved.
     """
@@ -150,7 +152,7 @@ class ProvedRows:
         return type(designs)(rows, schema=designs.schema, orient="row")
 
     def front(self, parts: Callable[[], Iterable[pl.DataFrame]]) -> Front:
-        """Return the front of designs that come in parts, each design of it proved.
+        """Return the front of designs in parts, after proving every design on it.
 
         Where a proof takes something from one, the front is another, and that is proved.
         """
@@ -165,6 +167,7 @@ class ProvedRows:
             self._rows |= zip(self._keys(proved), proved.rows(), strict=True)
 
     def _keys(self, designs: pl.DataFrame) -> list[bytes]:
+        """Return the cache keys of designs: the bytes of their variables."""
         return [np.ascontiguousarray(row).tobytes() for row in self._task.points(designs)]
 
 
@@ -193,13 +196,13 @@ def front_of_parts(task: Task, parts: Iterable[pl.DataFrame]) -> Front:
 
 
 def _misses_of(task: Task, designs: pl.DataFrame) -> Array:
-    """Return how much each design misses, all in all; one without an objective misses it."""
+    """Return the sum of each design's violations (N,); an undefined objective adds to it."""
     missed = violations(designs).sum(axis=1)
     return np.asarray(missed + FAILED * (~np.isfinite(task.costs(designs))).sum(axis=1))
 
 
 def _impossible(task: Task, nearest: pl.DataFrame, evaluated: int) -> ModelError:
-    """Return the error of a search without a feasible design; it names the nearest one."""
+    """Return the error of a search without a feasible design; it has the nearest's violations."""
     row = nearest.row(0, named=True)
     design = Design(task, task.machine([row[v.name] for v in task.variables]))
     reasons = []

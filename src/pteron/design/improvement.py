@@ -82,7 +82,7 @@ def improve_design(task: Task, point: Sequence[float], objective: int) -> list[f
 
 
 def _condition_samples(design: Design, lengths: int, count: int) -> Samples:
-    """Return poses of the workspace, of the cube, or of both, as the search asks for them."""
+    """Return sample poses at which the conditions hold: of the workspace, the cube, or both."""
     task = design.task
     moving = shape_samples(task.shape[0], task.orientations, count)
     if task.spec.workspace is None or task.floats:
@@ -93,14 +93,14 @@ def _condition_samples(design: Design, lengths: int, count: int) -> Samples:
 
 @dataclass(frozen=True)
 class _Slopes:
-    """Slopes of quantities by the unknowns about one design."""
+    """Derivatives of quantities with respect to the unknowns, at a design."""
 
     task: Task
     design: Design
     start: Array
 
     def slopes_of_quantity(self, name: str) -> Array | None:
-        """Return a quantity's slopes (V + k + 1,), or None where it has none."""
+        """Return a quantity's derivatives (V + k + 1,); None if it is not of geometry alone."""
         task, tail = self.task, len(self.task.robot.platform.lengths) + 1
         if name in ("cube", "scale"):
             edge = task.shape[1] if name == "scale" else 1.0
@@ -114,7 +114,7 @@ class _Slopes:
         return np.append(slopes, np.zeros(tail))
 
     def bounds(self, objective: int, z0: Array) -> list[tuple[Array, float]]:
-        """Return linear bounds that hold other objectives and requirements with known slopes."""
+        """Return linear bounds on other objectives and requirements with known derivatives."""
         bounds = []
         for k, target in enumerate(self.task.spec.objectives):
             row = self.slopes_of_quantity(target.quantity)

@@ -45,6 +45,7 @@ OBJECTIVES = {
 
 
 def _expect_names_once(names: list[str], known: Collection[str]) -> list[str]:
+    """Return the names; raise where a name is unknown or occurs twice."""
     for k, name in enumerate(names):
         if name not in known:
             raise ValueError(f"{shorten(name)} is none of {', '.join(known)}")
@@ -79,21 +80,25 @@ class Job(TomlTable):
     @field_validator("objectives")
     @classmethod
     def _known_objectives(cls, names: list[str]) -> list[str]:
+        """Return the objectives; raise where a name is unknown or occurs twice."""
         return _expect_names_once(names, OBJECTIVES)
 
     @field_validator("kinds")
     @classmethod
     def _known_kinds(cls, names: list[str] | None) -> list[str] | None:
+        """Return the kinds; raise where a name is unknown or occurs twice."""
         return names and _expect_names_once(names, KINDS)
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
+        """Return the job; raise with every contradiction between its tables."""
         faults = list(self._faults())
         if faults:
             raise ValueError("; ".join(faults))
         return self
 
     def _faults(self) -> Iterator[str]:
+        """Yield the contradictions between the job's tables, in words."""
         if not self.cycles and not self.motion.acceleration:
             yield "no [[cycles]] and no [motion] acceleration: nothing says what the motors must do"
         if self.free and "cycle_time" not in self.objectives and self.most.cycle_time is None:
@@ -120,7 +125,7 @@ class Job(TomlTable):
             yield from self._room_faults()
 
     def _room_faults(self) -> Iterator[str]:
-        """Yield where the cell leaves the workspace itself no room."""
+        """Yield contradictions between the cell and the workspace, in words."""
         cell, space, sides = self.cell, self.workspace, 2.0 * self.workspace.half
         at = np.array(space.center or (0.0, 0.0, 0.0))
         if cell.footprint is not None and (sides[:2] > cell.footprint).any():
@@ -146,6 +151,7 @@ class Job(TomlTable):
                 yield f"keep_out[{k}]: it is in the workspace, where the tool must be"
 
     def _cycle_faults(self, cycle: ToolCycleTable) -> Iterator[str]:
+        """Yield the contradictions of a cycle with the workspace, in words."""
         space, k = self.workspace, self.lengths
         sizes = {len(point) for point in cycle.points}
         known = {2: "x y", 3: "x y z"}[k]
@@ -183,11 +189,11 @@ class Job(TomlTable):
 
     @property
     def free(self) -> bool:
-        """Whether a cycle is to be as fast as the motors can."""
+        """Whether a cycle has no duration, and is to be as fast as the motors can."""
         return any(cycle.duration is None for cycle in self.cycles)
 
     def file(self, name: str) -> Path:
-        """Return a file that it names: beside it, or as it stands."""
+        """Return the path of a file that the job names: beside the job's file if it is there."""
         beside = self._folder / name
         return beside if beside.exists() else Path(name)
 
@@ -253,4 +259,5 @@ def read_job(path: str | Path) -> Job:
 
 
 def _box(low: Sequence[float], high: Sequence[float]) -> str:
+    """Return the ranges of a box as text."""
     return " x ".join(f"{a:g}..{b:g}" for a, b in zip(low, high, strict=True))

@@ -130,6 +130,7 @@ def _refine(
         )
 
         def with_choices(units: Array, best: Array = best) -> Array:
+            """Return the best design's unit coordinates with the free ones replaced, in 0 .. 1."""
             trial = best.copy()
             trial[free] = np.clip(units, 0.0, 1.0)
             return trial
@@ -145,7 +146,7 @@ def _refine(
 
 
 def pareto_ratings(ratings: list[Rating], objectives: list[str]) -> list[Rating]:
-    """Return the designs that keep all requirements and that no other of them dominates."""
+    """Return the feasible designs that no other feasible design dominates."""
     good = [rating for rating in ratings if not rating.misses]
     costs = np.array([[rating.figures[name] for name in objectives] for rating in good])
     return [good[k] for k in pareto_front(costs)]

@@ -120,6 +120,7 @@ class Kind:
 
     @cached_property
     def _choices(self) -> dict[str, Sequence[str]]:
+        """The stock by link, for links of this kind that have a choice of stock."""
         keys = {part_key for leg in self.robot.legs for part_key, *_ in leg.extents.values()}
         return {key: stock for key, stock in self.stocks.items() if key in keys and len(stock) > 1}
 
@@ -130,7 +131,7 @@ class Kind:
 
     @property
     def counts(self) -> Array:
-        """Numbers of things to choose from (V,); 0 of a measure."""
+        """Numbers of choices of discrete variables (V,); 0 for continuous variables."""
         return np.array([len(self._choices.get(name, ())) for name in self.variables])
 
     def numbers(self, point: Array) -> dict[str, float]:
@@ -164,10 +165,11 @@ class Kind:
         return {key: names[int(numbers.get(key, 0.0))] for key, names in self.stocks.items()}
 
     def _stock(self, point: Array) -> dict[str, Stock]:
+        """Return the stock of each link in a design, parsed."""
         return {key: Stock.parse(name) for key, name in self.link_stocks(point).items()}
 
     def with_travel(self, leg: Any, travel: tuple[float, float], point: Array) -> Any:
-        """Return a leg whose joint goes from one end to another, m; a ram's tubes are as long."""
+        """Return a leg with limits of its travel, m; a ram with tubes of that length."""
         limited = replace(leg, limits=travel)
         if slides(leg):
             return limited
@@ -180,6 +182,7 @@ def slides(leg: Any) -> bool:
 
 
 def _lengths(leg: Any) -> set[str]:
+    """Return the names of a leg's lengths that have a value."""
     keys = leg.every_key().items()
     return {name for name, key in keys if key.role == "length" and getattr(leg, name) is not None}
 

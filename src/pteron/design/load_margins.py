@@ -29,7 +29,7 @@ _NOTHING = 1e-9
 
 @dataclass
 class LoadMargins:
-    """LoadMargins of drives: their limits over their loads.
+    """Margins of drives: their limits over their loads.
 
     Attributes
     ----------
@@ -49,19 +49,19 @@ class LoadMargins:
     place: tuple[Places, int] | None = None
 
     def take(self, name: str, limits: Array, loads: Array) -> Array:
-        """Return the margins (B,), limits (n,) over loads (B, n), and keep the least."""
+        """Return the least margins (B,) of limits (n,) to loads (B, n), and record the least."""
         margins = np.asarray((limits / np.maximum(loads, _NOTHING)).min(axis=-1))
         self.note(name, float(margins.min()))
         return margins
 
     def note(self, name: str, margin: float) -> None:
-        """Keep a margin if it is the least of its name."""
+        """Record a margin if it is the least of its name."""
         self.figures[name] = min(self.figures.get(name, np.inf), margin)
 
     def note_place(
         self, margin: float, words: str, place: tuple[Places, int] | None = None
     ) -> None:
-        """Keep motion and place of a margin if it is the least of all."""
+        """Record the motion and the place of a margin if it is the least of all."""
         if margin < self.least:
             self.least, self.worst, self.place = margin, words, place or self.place
 
@@ -111,6 +111,7 @@ def margins_of(
         speed = max(required.speed, _NOTHING)
 
         def motion_margins(places: Array) -> Array:
+            """Return ratios (N, 2 n) of force and speed limits to the worst loads at places."""
             poses = middle + places
             forces = worst_forces(robot, poses, speed, required.acceleration)
             loads = np.hstack([forces, worst_speeds(robot, poses, speed)])

@@ -67,6 +67,7 @@ class MachineSpace:
     def _extents_of_points(
         self, robot: Manipulator, poses: Array, points: Array, middle: Array
     ) -> Array:
+        """Return low ends, negated high ends (N, 6) and distances outside keep-outs (N, b), m."""
         margin, center = self._job.cell.margin, tool_places(robot, middle[None])[0]
         starts, ends = (part - center for part in _lines(robot, poses, points))
         both = np.stack([starts, ends])
@@ -132,11 +133,12 @@ class MachineSpace:
 
     @cached_property
     def _meetings(self) -> list[tuple[Any, Any]]:
-        """Kinds of bodies that may meet, but for guides."""
+        """Pairs of kinds of bodies that may collide; guides are not among them."""
         return meetings(self._robot)
 
 
 def _parts(beyond: float) -> str:
+    """Return the beginning of a sentence on parts that go beyond a bound by a distance, m."""
     return f"parts {beyond:.3g} m" if beyond > 0.0 else "parts nearly"
 
 
@@ -161,7 +163,7 @@ def _lines(robot: Manipulator, poses: Array, points: Array) -> tuple[Array, Arra
 
 
 def _depths(starts: Array, ends: Array, low: Array, high: Array) -> Array:
-    """Return how deep lines (..., 3) go into a box: the least distance to a face, at its most.
+    """Return the greatest depth of lines (..., 3) in a box: the distance to its nearest face.
 
     Along a line it is concave, so that thirds find its most.
     """
@@ -188,7 +190,7 @@ def _guides(robot: Manipulator) -> Iterator[tuple[int, Array, Array]]:
 
 @lru_cache(maxsize=1)
 def _squared_distances() -> ca.Function:
-    """Return the function of the ends of two segments that gives their squared distance."""
+    """Return a CasADi function: squared distance of two segments, from their ends."""
     p, p_end, q, q_end = (ca.SX.sym(name, 3) for name in ("p", "p_end", "q", "q_end"))
     square = squared_distance((p, p_end), (q, q_end))
     return ca.Function("squared_distance", [p, p_end, q, q_end], [square])

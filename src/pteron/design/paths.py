@@ -52,7 +52,7 @@ class GeometryNumber:
         return f"legs[{self.leg}].{self.key}{part}"
 
     def read(self, robot: Manipulator) -> float:
-        """Return the number as it is in a machine."""
+        """Return the number's value in a machine."""
         numbers = getattr(robot.legs[self.leg - 1], self.key)
         return float(numbers if self.part is None else numbers[self.part])
 
@@ -98,6 +98,7 @@ def geometric_keys(leg: LegKind) -> list[str]:
 def _places_in_leg(
     robot: Manipulator, path: str, i: int, key: str, part: str | None, sign: int
 ) -> Iterator[GeometryNumber]:
+    """Yield the geometric numbers of a leg that a path names; raise where the leg has none."""
     leg = robot.legs[i - 1]
     known = geometric_keys(leg)
     if key not in known:

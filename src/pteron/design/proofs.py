@@ -107,7 +107,7 @@ class Proved(Result):
 
 
 def prove_design(design: Design) -> Proved:
-    """Return a design with its proofs, and with the cube that they leave it."""
+    """Return a design with its proofs, and its largest cube reduced to what is proved."""
     task, cube = design.task, None
     workspace: tuple[Proof, ...] = ()
     if task.seeks_place:
@@ -129,7 +129,7 @@ def prove_design(design: Design) -> Proved:
 
 @lru_cache(maxsize=8)
 def start_design(task: Task) -> Design:
-    """Return the machine that a search begins with, as it is, as far as it is proved."""
+    """Return the machine that a search begins with, with its proofs."""
     return prove_design(Design(task, task.robot)).design
 
 
@@ -228,13 +228,14 @@ def workspace_share(design: Design, proof: Proof) -> float:
 
 
 def _proof(design: Design, region: Region) -> Proof:
+    """Return the proof that a design's region meets the task's floors, with shared programs."""
     floors = design.task.floors
     with sharing_programs(design.task.robot):
         return prove(design.robot, region, type_i=floors.type_i, type_ii=floors.type_ii, most=_MOST)
 
 
 def _least(design: Design, proof: Proof) -> float:
-    """Return the least row, below 0, of a region whose proof does not hold."""
+    """Return the least condition, below 0, at the counterexample of a proof."""
     if proof.counterexample is None:
         return UNKNOWN
     rows = design.task.conditions.rows(design.geometry, proof.counterexample, design.side)

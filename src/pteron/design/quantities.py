@@ -96,6 +96,7 @@ def machine_quantity(
 
 
 def _evaluate_machine(of_machine: Callable[[Manipulator], float], design: Any) -> float:
+    """Return a machine's function evaluated for a design."""
     return of_machine(design.robot)
 
 
@@ -109,6 +110,7 @@ def quantity_of(
 
 
 def _links(robot: Manipulator) -> float:
+    """Return the sum of the legs' lengths, m."""
     return float(
         sum(q.value[0] for leg in robot.legs for q in leg.quantities if q.role == "length")
     )
@@ -122,6 +124,7 @@ def moving_mass(robot: Manipulator) -> float:
 
 
 def _size(design: Any) -> float:
+    """Return the diagonal of the box around all joint points over the workspace, m."""
     points = design.values("joint_points")
     points = points.reshape(-1, 3)
     points = points[np.isfinite(points).all(axis=-1)]
@@ -131,15 +134,18 @@ def _size(design: Any) -> float:
 
 
 def _type_i(design: Any, poses: Array) -> Array:
+    """Return the least type-I index of the legs at poses (N, m): (N,), NaN out of reach."""
     squares = design.values("squared_type_i", poses).min(axis=-1)
     return np.asarray(np.where(squares >= 0.0, np.sqrt(np.abs(squares)), np.nan))
 
 
 def _type_ii(design: Any, poses: Array) -> Array:
+    """Return the type-II index at poses (N, m): (N,), 0 beyond the singularity."""
     return np.asarray(np.maximum(design.side * design.values("type_ii", poses), 0.0))
 
 
 def _stroke(design: Any) -> float:
+    """Return the largest stroke of a drive, relative to that of the initial machine."""
     return float((design.strokes / design.reference_strokes).max())
 
 
@@ -151,15 +157,18 @@ def _drive_load(design: Any, poses: Array) -> Array:
 
 
 def _stiffness(design: Any, poses: Array) -> Array:
+    """Return the least stiffness at the tool over directions at poses (N, m): (N,), N/m."""
     elastic = design.task.spec.elasticity.elasticity
     return np.asarray(stiffness(design.robot, poses, elastic, on_failure="nan").least)
 
 
 def _accuracy(design: Any, poses: Array) -> Array:
+    """Return the largest position errors of the tool at poses (N, m): (N,), m."""
     return worst_position_errors(design.robot, poses, design.task.spec.errors.tolerances)
 
 
 def _cycle_time(design: Any) -> float:
+    """Return the shortest time of all cycles within the drives' limits, with dwells, s."""
     robot, rests = design.loaded_robot, sum(cycle.dwell for cycle in design.task.spec.cycles)
     return float(rests) + sum(shortest_time(robot, motion) for motion in design.cycles)
 

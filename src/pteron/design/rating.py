@@ -49,7 +49,7 @@ _BY_STAGE = 100.0
 
 @dataclass
 class Rating:
-    """A machine as far as it was judged.
+    """The figures of a machine and its violated bounds, up to the stage at which it failed.
 
     Attributes
     ----------
@@ -93,12 +93,12 @@ class Rating:
         return self.robot
 
     def miss(self, name: str, share: float, words: str) -> None:
-        """Note that a bound is violated by a share of it."""
+        """Record the violation of a bound, relative to the bound, with its words."""
         if share > self.misses.get(name, 0.0):
             self.misses[name], self.shortfalls[name] = float(share), words
 
     def expect_least(self, name: str, figure: float, least: float) -> None:
-        """Note a violation of a lower bound."""
+        """Record a violation of a lower bound."""
         if not figure >= least:
             share = least - figure if np.isfinite(figure) else 1.0
             self.miss(name, share, f"{name} {figure:.3g}, at least {least:.3g} asked")
@@ -147,7 +147,7 @@ class KindEvaluator:
         return [[i for i, g in enumerate(legs) if (g.type, g.joint.unit) == k] for k in kinds]
 
     def rate(self, point: Array) -> Rating:
-        """Return how the machine of a design does the job; call it within `sharing_programs`."""
+        """Return the rating of a design for the job; call it within `sharing_programs`."""
         rating = Rating(np.asarray(point, dtype=float))
         try:
             robot, rating.middle = self.kind.machine(point)
@@ -173,6 +173,7 @@ class KindEvaluator:
             sign = np.sign(np.median(numeric(robot, "type_ii")(poses)[0]))
 
             def measures(places: Array) -> Array:
+                """Return type-I (squared), type-II and passive-joint margins (N, k) at places."""
                 poses = rating.middle + places
                 squares, determinant, room = (
                     numeric(robot, name)(poses)[0]
@@ -201,6 +202,7 @@ class KindEvaluator:
         if self.job.workspace.tilt is not None:
             # Between the tilts of the samples rams are longer and shorter.
             def ends(places: Array) -> Array:
+                """Return lengths and negated lengths (N, 2 n) of joints; infinity out of reach."""
                 at = inverse_kinematics(robot, rating.middle + places, on_failure="nan")
                 return np.asarray(np.nan_to_num(np.hstack([at, -at]), nan=np.inf))
 
@@ -224,7 +226,7 @@ class KindEvaluator:
         rating.robot = replace(robot, legs=tuple(legs))
 
     def _judge_room(self, rating: Rating) -> None:
-        """Judge footprint, height, keep-out boxes and clearances."""
+        """Evaluate footprint, height, keep-out boxes and clearances."""
         figures, misses = self.machine_space.evaluate(
             rating.machine, rating.middle + self.visited, rating.middle
         )
@@ -298,11 +300,11 @@ class KindEvaluator:
         samples: int | None = None,
         keep: int = 1,
     ) -> tuple[Array, Array]:
-        """Return least values over workspace and cycles, as `refine_worst_values` has them."""
+        """Return the least values over workspace and cycles (see `refine_worst_values`)."""
         return refine_worst_values(self.job, robot, values_of, samples, keep, self.between)
 
     def shares(self, time: float | None) -> Array:
-        """Return how much of a duty cycle's time each cycle has; none if each counts by itself."""
+        """Return the durations that weight cycles in a duty cycle, s; empty without shares."""
         pairs = [(c.share, (c.duration or time or 1.0) + c.dwell) for c in self.cycles if c.share]
         return np.array([share * duration for share, duration in pairs])
 
@@ -332,7 +334,7 @@ class KindEvaluator:
     def loads(
         self, robot: Manipulator, rating: Rating, time: float | None
     ) -> tuple[JointLoads, list[tuple[Array, Array]]]:
-        """Return the loads of all cycles at all places, and of each the work and ways of joints."""
+        """Return the loads of all cycles at all places, and each cycle's work and joint travel."""
         n, middle = robot.joint_count, rating.middle
         squares, forces, rises, work = [], [np.zeros((1, n))], [np.zeros((1, n))], []
         speeds = np.zeros(n)
@@ -376,13 +378,13 @@ class KindEvaluator:
         return loads, work
 
     def states(self, cycle: Places, middle: Array, duration: float) -> tuple[Array, Array, Array]:
-        """Return the states (B, K, m) of a cycle that takes so long."""
+        """Return poses, velocities and accelerations (B, K, m) of a cycle of a duration, s."""
         pose, velocity, acceleration = cycle.states
         return middle + pose, velocity / duration, acceleration / duration**2
 
 
 def _expect_share(rating: Rating, name: str, share: float, option: str) -> None:
-    """Note a requirement that the best drive meets only in part."""
+    """Record a requirement that the best drive meets only in part."""
     if share < 1.0:
         much = f"{share:.0%}" if share >= 0.01 else "less than 1%"
         words = f"{name} {much} of what is asked, with {option}"

@@ -53,6 +53,7 @@ def workspace_poses(workspace: WorkspaceTable, angles: Array, samples: int | Non
 
 
 def _positions(workspace: WorkspaceTable, count: int) -> Array:
+    """Return a grid of positions (N, k) over a workspace, its boundary included, m."""
     line = np.linspace(-1.0, 1.0, count)
     if workspace.shape != "cylinder":
         low, high = (np.array(end) for end in workspace.ends)
@@ -77,7 +78,7 @@ def _positions(workspace: WorkspaceTable, count: int) -> Array:
 
 
 def workspace_region(table: WorkspaceTable, pose: Array, share: float = 1.0) -> Region:
-    """Return a workspace that has its place, at the orientation of a pose, or a share of it."""
+    """Return a workspace, scaled by `share`, as a region at a pose's orientation."""
     if table.shape == "cylinder":
         assert table.radius is not None  # the shape says so
         assert table.height is not None
@@ -117,7 +118,7 @@ class TurnedTool:
         return np.array([low - at[0] - away[0], high - at[0] + away[0]])
 
     def holds(self, poses: Array) -> NDArray[np.bool_]:
-        """Return which poses (..., m) lie in it."""
+        """Return whether poses (..., m) lie in the region."""
         zeros = np.zeros_like(poses)
         return self.of_tool.holds(tool_motion(self.platform, poses, zeros, zeros)[0])
 

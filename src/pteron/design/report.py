@@ -134,6 +134,7 @@ class ReportedDesign(Proved):
 
 
 def _motor_words(fit: MotorFit) -> str:
+    """Return a sentence on a motor's margin for a leg's loads."""
     return (
         f"drive of leg {fit.leg}: {fit.motor.name} at a ratio of {fit.ratio:.4g} can do "
         f"{fit.margin:.3g} times what it must, least in {fit.scarcest}"
@@ -233,9 +234,11 @@ class FrontReport(Result):
 
 
 def _design(task: Task, robot: Manipulator, name: str) -> Design:
+    """Return the design of a machine whose name ends in the selection's name."""
     ending = f"-{name.split(', ')[0]}"
     return Design(task, replace(robot, name=robot.name[: LONGEST_NAME - len(ending)] + ending))
 
 
 def _report_design(name: str, design: Design) -> ReportedDesign:
+    """Return a design with its proofs under a name of the report."""
     return ReportedDesign(**vars(prove_design(design)), name=name)

@@ -103,6 +103,7 @@ class LinksTable(TomlTable):
     @field_validator("upper", "lower")
     @classmethod
     def _expect_known(cls, names: list[str]) -> list[str]:
+        """Return the names of stock; raise where a name cannot be parsed as a stock."""
         for name in names:
             try:
                 Stock.parse(name)

@@ -134,7 +134,7 @@ class DesignRows:
         plan: dict[str, Any],
         progress: Progress | None = None,
     ) -> pl.DataFrame:
-        """Return the rows that a function gives for jobs; those that the folder has stay."""
+        """Return the rows of `function` for jobs; rows already in the folder are reused."""
         store = TableStore(self.folder / name, {**self.task.plan, **plan})
         chunks = [jobs[k : k + _CHUNK] for k in range(0, len(jobs), _CHUNK)]
         if self.pool is None:
@@ -161,6 +161,7 @@ class DesignRows:
 
 
 def _await_rows(pending: Sequence[Future[pl.DataFrame]]) -> pl.DataFrame:
+    """Return the rows of all pending evaluations in a single table; blocks until they end."""
     import polars as pl
 
     rows: pl.DataFrame = pl.concat(map(result_of, pending), rechunk=True)
@@ -200,7 +201,7 @@ def _generations(evaluation: DesignRows, progress: Progress | None) -> Front:
 
 
 def _report(progress: Progress, number: int, settings: SearchTable, share: float) -> None:
-    """Report the share of all generations that is done."""
+    """Report the finished share of all generations."""
     progress((number - 1 + share) / settings.generations)
 
 
@@ -214,7 +215,7 @@ def first_designs(task: Task, count: int, seed: int) -> Array:
 
 
 def evaluate_designs(task: Task, jobs: Sequence[tuple[list[float], int]]) -> pl.DataFrame:
-    """Return the rows of designs, of which those with an objective are improved in it first."""
+    """Return the rows of designs; those with an objective are improved in it by gradients first."""
     with one_thread():
         designs = [point if k < 0 else improve_design(task, point, k) for point, k in jobs]
     return design_table(task, designs)
@@ -245,4 +246,5 @@ def _designs_to_improve(
 
 
 def _digest(designs: Array) -> str:
+    """Return the digest of designs (N, v), 16 hexadecimal digits."""
     return hashlib.sha256(np.ascontiguousarray(designs).tobytes()).hexdigest()[:16]

@@ -38,6 +38,7 @@ ROUNDING = 1e-9
 
 
 def _expect_rising(pair: tuple[float, float]) -> tuple[float, float]:
+    """Return the pair [low, high]; raise unless low is below high."""
     low, high = pair
     if not low < high:
         raise ValueError(f"[{low:g}, {high:g}] given, whose range is empty; give [low, high]")
@@ -85,10 +86,12 @@ class ObjectiveTable(TomlTable):
     @field_validator("maximise", "minimise")
     @classmethod
     def _expect_known(cls, name: str | None) -> str | None:
+        """Return the name of a quantity; raise where it is unknown."""
         return name and expect_quantity(name)
 
     @model_validator(mode="after")
     def _one_way(self) -> Self:
+        """Return the objective; raise unless it has exactly either maximise or minimise."""
         if (self.maximise is None) == (self.minimise is None):
             raise ValueError("give either maximise or minimise, and a quantity")
         return self
@@ -114,10 +117,12 @@ class RequirementTable(TomlTable):
     @field_validator("quantity")
     @classmethod
     def _expect_known(cls, name: str) -> str:
+        """Return the name of a quantity; raise where it is unknown."""
         return expect_quantity(name)
 
     @model_validator(mode="after")
     def _expect_bound(self) -> Self:
+        """Return the requirement; raise where it has no bound or bounds that contradict."""
         if self.least is None and self.most is None:
             raise ValueError(f"{self.quantity}: neither least nor most given")
         if None not in (self.least, self.most) and self.least > self.most:  # type: ignore[operator]
@@ -160,7 +165,7 @@ Quantitative: TypeAlias = str | DesignQuantity | Callable[[Manipulator], float]
 
 
 def _note_quantity(quantity: Quantitative, functions: dict[str, DesignQuantity]) -> str:
-    """Return a quantity's name; add a user's own to those that a search has."""
+    """Return a quantity's name, after adding a user-defined quantity to `functions`."""
     if not isinstance(quantity, str):
         named = named_quantity(quantity)
         if function_of(functions.setdefault(named.name, named)) != function_of(named):
@@ -222,7 +227,7 @@ class Spec(TomlTable):
     def with_objectives(
         self, *, minimise: Sequence[Quantitative] = (), maximise: Sequence[Quantitative] = ()
     ) -> Spec:
-        """Return the same search with other objectives.
+        """Return a copy of the search with other objectives.
 
         Parameters
         ----------
@@ -252,7 +257,7 @@ class Spec(TomlTable):
     def with_requirement(
         self, quantity: Quantitative, *, least: float | None = None, most: float | None = None
     ) -> Spec:
-        """Return the same search with one more requirement, of a quantity as `with_objectives`."""
+        """Return a copy of the search with a further requirement (see `with_objectives`)."""
         functions = dict(self._user_quantities)
         name = _note_quantity(quantity, functions)
         table = RequirementTable.model_construct(quantity=name, least=least, most=most)
@@ -263,12 +268,13 @@ class Spec(TomlTable):
         return self._with_functions(functions, requirements=[*self.requirements, table])
 
     def _with_functions(self, functions: dict[str, DesignQuantity], **update: Any) -> Spec:
+        """Return a copy of the spec with user-defined quantities and updated keys."""
         spec = self.model_copy(update=update)
         spec._user_quantities = functions
         return spec
 
     def with_seed(self, seed: int) -> Spec:
-        """Return the same search with another seed of the random numbers."""
+        """Return a copy of the search with another seed of the random numbers."""
         return self.model_copy(update={"search": self.search.model_copy(update={"seed": seed})})
 
     def requirement_lines(self) -> list[str]:

@@ -47,6 +47,7 @@ def spec_faults(spec: Spec, robot: Manipulator) -> Iterator[str]:
 
 
 def _workspace_faults(spec: Spec, robot: Manipulator) -> Iterator[str]:
+    """Yield the contradictions between a search's workspace and its machine, in words."""
     lengths, workspace = robot.platform.lengths, spec.workspace
     if workspace is None:
         return
@@ -74,7 +75,7 @@ _NEEDS = {
 
 
 def _has_drive_limits(robot: Manipulator) -> bool:
-    """Say whether a drive of a machine has limits."""
+    """Return whether a drive of a machine has limits."""
     limits = limits_of(robot)
     return bool(np.isfinite([limits.force, limits.speed]).any())
 
@@ -102,7 +103,7 @@ def _missing_tables(spec: Spec, robot: Manipulator, names: set[str]) -> Iterator
 
 
 def _loads(spec: Spec, robot: Manipulator) -> Iterator[str]:
-    """Yield the faults of payload, cycles and numbers that are one a leg."""
+    """Yield contradictions of payload, cycles and per-leg numbers with the machine, in words."""
     if spec.payload is not None:
         try:
             spec.payload.add_to(robot)

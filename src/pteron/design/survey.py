@@ -104,5 +104,6 @@ def survey_designs(task: Task, first: int, count: int) -> Array:
 
 
 def _parts(store: TableStore, chunks: range) -> Iterable[pl.DataFrame]:
+    """Return the store's rows in tables of a chunk each, read lazily."""
     table = store.scan()
     return (table.slice(first, _CHUNK).collect() for first in chunks)

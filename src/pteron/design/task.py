@@ -161,7 +161,7 @@ class Task:
 
     @cached_property
     def orientations(self) -> Array:
-        """Poses (A, m) whose angles are those that the search asks for."""
+        """Poses (A, m) with the angles of the search."""
         spec, angular = self.spec, self.robot.platform.angular
         pose = np.zeros(len(angular)) if spec.pose is None else np.array(spec.pose)
         if spec.angles is None:
@@ -214,7 +214,7 @@ class Task:
         return units.get(name, self.quantities[name].unit)
 
     def function(self, what: str) -> Kernel:
-        """Return a function of the machines' topology, whose geometry a call gives."""
+        """Return a function for the machines' topology, with geometry as an input."""
         return compile(self.robot, what, grade="general")
 
     def machine(self, point: Sequence[float]) -> Manipulator:

@@ -48,7 +48,7 @@ def joint_errors(accuracy: AccuracyTable, ratios: Array, backlash: Array) -> Arr
 
 
 def unit_errors(accuracy: AccuracyTable, robot: Manipulator, poses: Array) -> tuple[Array, Array]:
-    """Return the tool's errors at poses, (N,) each, m: by joint errors of 1, and by all else."""
+    """Return the tool's errors at poses, (N,) each, m: per unit of joint error, and others."""
     joints = greatest_errors(accuracy, robot, poses, Tolerances(joints=1.0))
     if not accuracy.has_part_errors:
         return joints, np.zeros_like(joints)
@@ -58,9 +58,9 @@ def unit_errors(accuracy: AccuracyTable, robot: Manipulator, poses: Array) -> tu
 def greatest_errors(
     accuracy: AccuracyTable, robot: Manipulator, poses: Array, errors: Tolerances
 ) -> Array:
-    """Return the tool's error at poses, (N,), m: the worst evaluator or the standard deviation.
+    """Return the tool's error at poses, (N,), m: worst case or standard deviation.
 
-    `asked.counted` says which of both.
+    `accuracy.counted` selects which.
     """
     if accuracy.counted == "worst":
         return worst_position_errors(robot, poses, errors)

@@ -13,7 +13,7 @@ from pteron.manipulator import Manipulator
 
 
 def named_quantity(quantity: DesignQuantity | Callable[[Manipulator], float]) -> DesignQuantity:
-    """Return the quantity that a user's function of the machine gives, named after it.
+    """Return a function of the machine as a quantity with the function's name.
 
     Raises
     ------
@@ -32,7 +32,7 @@ def named_quantity(quantity: DesignQuantity | Callable[[Manipulator], float]) ->
 
 
 def function_of(quantity: DesignQuantity) -> Any:
-    """Return the function that gives a quantity."""
+    """Return the function that computes a quantity."""
     return quantity.of_machine or quantity.of
 
 

@@ -82,6 +82,7 @@ def variables_of(robot: Manipulator, tables: Sequence[VariableTable]) -> tuple[V
 
 
 def _variables(robot: Manipulator, table: VariableTable) -> list[Variable]:
+    """Return the variables that a table states: a single variable, or a variable for each leg."""
     named = [place for path in table.moves for place in named_numbers(robot, path)]
     legs = sorted({place.leg for place in named})
     groups = [[p for p in named if p.leg == leg] for leg in legs] if table.each else [named]

@@ -34,7 +34,7 @@ _ROUNDS = 4
 
 
 def platform_curve(robot: Manipulator, *curve: Array) -> Curve:
-    """Return places of the tool from the middle, and two derivatives, as those of P."""
+    """Return poses of P and two derivatives for a curve of the tool, from the middle."""
     pose, first, second = pose_motion(robot.platform, *curve)
     zeros = np.zeros((1, robot.freedom))
     return pose + tool_motion(robot.platform, zeros, zeros, zeros)[0], first, second
@@ -93,7 +93,7 @@ def refine_worst_values(
 
 
 def _neighbour_steps(steps: Array, count: int) -> Array:
-    """Return the neighbours of a place (W, m), in steps: any, but if it tilts in part of it."""
+    """Return steps (W, m) to the neighbours of a place; not in lengths and tilts at once."""
     several = [(-1.0, 0.0, 1.0) if step else (0.0,) for step in steps]
     if not steps[count:-1].any():
         return np.array(list(product(*several)))
@@ -123,6 +123,7 @@ def _clip_to_radius(points: Array, radius: float) -> Array:
 
 
 def _positions_along(job: Job) -> int:
+    """Return the number of sample positions along an edge, fewer where the platform tilts."""
     return _ALONG_TILTED if job.workspace.tilts else _ALONG
 
 
@@ -140,6 +141,7 @@ def _places(job: Job, robot: Manipulator, count: int) -> Array:
 
 
 def _poses_at(job: Job, robot: Manipulator, places: Array) -> Array:
+    """Return poses (N, m) of places (N, m): the tool's positions and the platform's angles."""
     count = len(robot.platform.lengths)
     angles = places[:, count:]
     if job.workspace.tilt is not None:
@@ -157,6 +159,7 @@ def pad_to_xyz(rows: object) -> Array:
 
 
 def _positions(job: Job, count: int) -> Array:
+    """Return sample positions (N, 3) over the workspace, relative to its middle, m."""
     space, half = job.workspace, job.workspace.half
     if space.poses is not None:
         points = pad_to_xyz(space.poses)
@@ -177,6 +180,7 @@ def orientations(job: Job, robot: Manipulator) -> Array:
 
 
 def _turns(job: Job) -> list[float]:
+    """Return the turns at which a workspace is sampled, rad: its ends, and 0 if between them."""
     turn = job.workspace.turn
     return [0.0] if turn is None else [*([0.0] if turn[0] < 0.0 < turn[1] else []), *turn]
 
@@ -209,7 +213,7 @@ def _tilted_angles(robot: Manipulator, leans: Array) -> Array:
 
 
 def turn_angles(angles: Array, turn: float) -> Array:
-    """Return angles (A, a) turned further about the upright."""
+    """Return angles (A, a) turned further about the vertical axis."""
     if not angles.shape[1]:
         return angles
     return np.asarray(angles + turn * np.eye(angles.shape[1])[-1])

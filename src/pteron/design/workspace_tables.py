@@ -41,6 +41,7 @@ def _fine(error: float) -> float:
 
 
 def _expect_tilt(angle: float) -> float:
+    """Return a tilt in rad; raise if it is too large, as an angle in degrees is."""
     if angle >= _LEANS:
         raise ValueError(f"{angle:g} rad given, below {_LEANS:g} expected: is this in degrees?")
     return angle
@@ -85,6 +86,7 @@ class WorkspaceTable(TomlTable):
 
     @model_validator(mode="after")
     def _one_shape(self) -> Self:
+        """Return the workspace; raise unless its keys state exactly a box, a cube or a cylinder."""
         keys = ("low", "high", "sides", "center", "edge", "radius", "height")
         keys_present = {key for key in keys if getattr(self, key) is not None}
         valid_sets = ({"low", "high"}, {"sides"}, {"edge"}, {"radius", "height"})
@@ -171,6 +173,7 @@ class ToolWorkspaceTable(TomlTable):
 
     @model_validator(mode="after")
     def _one_shape(self) -> Self:
+        """Return the workspace; raise unless it has one shape and valid turns and directions."""
         keys = ("size", "radius", "height", "poses")
         keys_present = [key for key in keys if getattr(self, key) is not None]
         if keys_present not in (["size"], ["radius", "height"], ["poses"]):
@@ -201,7 +204,7 @@ class ToolWorkspaceTable(TomlTable):
         return np.pad(0.5 * sides, (0, 3 - len(sides)))
 
     def meets(self, low: Array, high: Array) -> bool:
-        """Say whether the tool may enter a box, corners (3,) from the workspace's middle, m."""
+        """Return whether the tool may enter a box, corners (3,) from the workspace's middle, m."""
         if self.poses is not None:
             poses = np.pad(self.poses, ((0, 0), (0, 3 - len(self.poses[0]))))
             poses = poses - 0.5 * (poses.min(axis=0) + poses.max(axis=0))
@@ -235,6 +238,7 @@ class KeepOutTable(TomlTable):
 
     @model_validator(mode="after")
     def _rises(self) -> Self:
+        """Return the box; raise unless each low end is below the high end."""
         if not all(a < b for a, b in zip(self.low, self.high, strict=True)):
             raise ValueError(f"low {list(self.low)} is not below high {list(self.high)}")
         return self

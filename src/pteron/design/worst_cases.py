@@ -68,6 +68,7 @@ def worst_forces(robot: Manipulator, poses: Array, speed: float, acceleration: f
 
 
 def _frictionless(drive: Drive | None) -> Drive | None:
+    """Return a drive with its rotor's inertia and ratio alone; None without a drive."""
     return drive and Drive(rotor_inertia=drive.rotor_inertia, ratio=drive.ratio)
 
 

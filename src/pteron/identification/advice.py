@@ -47,7 +47,7 @@ def advice_on_hidden_values(
 
 
 def _has_equal_legs(robot: Manipulator) -> bool:
-    """Say whether all legs have the same kind and the same inertial parameters as drawn."""
+    """Return whether all legs have the same kind and the same inertial parameters as drawn."""
     groups: dict[tuple[str, str], list[float]] = {}
     for parameter, value in zip(parameter_data(robot), parameters(robot).tolist(), strict=True):
         if parameter.legs:
@@ -77,7 +77,7 @@ def advice_on_weak_values(model: Model, weak: Sequence[str]) -> list[str]:
 
 
 def notes_on_fit(model: Model, estimate: Estimate, rotors: dict[str, float]) -> list[str]:
-    """Return notes on convergence, rotors and terms that join others."""
+    """Return notes on convergence, known rotors, and terms that others absorb."""
     notes, units = [], {term.name: term.unit for term in model.all_terms}
     if not estimate.converged:
         notes.append(

@@ -82,6 +82,7 @@ def finite(array: ArrayLike, place: str) -> Array:
 
 
 def _texts(labels: Sequence[str] | None, count: int, place: str) -> tuple[str, ...]:
+    """Return the labels of columns; raise where their number differs from that of the columns."""
     texts = () if labels is None else tuple(labels)
     if labels is not None and (isinstance(labels, str) or len(texts) != count):
         raise DataError(f"{place}: {len(texts)} given, {count} expected, one for each column")

@@ -14,7 +14,7 @@ _ROUNDS = 5
 
 
 def conditional_shift(covariance: Array, places: Sequence[int], shift: Array) -> Array:
-    """Return the shift of all values (p,) of least cost by which some move by `shift`.
+    """Return the most probable shift of all values (p,) if some are shifted by `shift`.
 
     By a fit's covariance C (p, p) the others move by their regression on those: C_ab C_bb^-1 shift.
     """

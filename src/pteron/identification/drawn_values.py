@@ -25,7 +25,7 @@ _LITTLE = 0.5
 
 @dataclass(frozen=True)
 class DrawnValues:
-    """Values of a drawing that stand for those that a motion does not show.
+    """Drawn values that replace those that a motion does not determine.
 
     Attributes
     ----------
@@ -44,7 +44,7 @@ class DrawnValues:
 
     @classmethod
     def from_estimate(cls, model: Model, estimate: Estimate, known: Array) -> DrawnValues:
-        """Return those that a fit leaves open; `known` (p,) is the rotors' part of the values."""
+        """Return drawn values for what a fit leaves open; `known` (p,) is the rotors' part."""
         names = unseen_names(model, estimate.deviations)
         places = np.array([model.names.index(name) for name in names], dtype=np.int64)
         drawn = parameters(model.robot)
@@ -63,13 +63,13 @@ class DrawnValues:
         return cls(model.base.names, places, values, usual_sizes(model.base, drawn))
 
     def name_undetermined(self, estimate: Estimate) -> DrawnValues:
-        """Return it with the names of those only that are little better known after a fit."""
+        """Return it with the names of those only that the fit hardly determines."""
         share = estimate.deviations[self.places] / self.deviations
         names = zip(self.names, share.tolist(), strict=True)
         return replace(self, names=tuple(name for name, s in names if s > _LITTLE))
 
     def update_estimate(self, estimate: Estimate, observations: Observations) -> Estimate:
-        """Return the estimate with the drawn values as further measurements."""
+        """Return the estimate updated with the drawn values as further measurements."""
         if not len(self.places):
             return estimate
         size = np.maximum(estimate.deviations, np.finfo(float).tiny)

@@ -190,6 +190,7 @@ def identify_drive_gains(
 
 
 def _unit(logs: list[Log]) -> str:
+    """Return the unit of the currents of all logs; raise where they differ or are newtons."""
     for log in logs:
         if log.description.force_unit == "N":
             raise log.fault(

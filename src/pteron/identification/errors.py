@@ -52,12 +52,12 @@ class OfLog:
     source: str
 
     def fault(self, reason: Reason, message: str) -> LogError:
-        """Return the error that it does not show what is asked of it."""
+        """Return the error that the log lacks what the evaluation needs."""
         return LogError(reason, self.source, message)
 
 
 def name_cause(error: DataError | ModelError, causes: Sequence[str]) -> None:
-    """Put the first of causes at the beginning of an error's message, if there is one."""
+    """Put the first cause at the beginning of an error's message, if there is a cause."""
     for cause in causes[:1]:
         place = f"{error.place}: " if isinstance(error, LogError) else ""
         error.args = (f"{place}{cause.rstrip('.')} ({str(error).removeprefix(place)})",)

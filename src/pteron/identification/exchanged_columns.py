@@ -103,6 +103,7 @@ def _exchanges(order: Sequence[int]) -> int:
 
 
 def _order_clauses(names: Sequence[str], order: Sequence[int]) -> Iterator[str]:
+    """Yield a clause that states which columns are swapped or in another order, if any."""
     moved = [name for k, name in enumerate(names) if order[k] != k]
     if len(moved) == 2:
         yield f"{_join_names(moved)} are swapped"
@@ -114,6 +115,7 @@ def _order_clauses(names: Sequence[str], order: Sequence[int]) -> Iterator[str]:
 def _sign_clauses(
     names: Sequence[str], order: Sequence[int], signs: Sequence[int]
 ) -> Iterator[str]:
+    """Yield a clause that states which columns have the wrong sign, if any."""
     flipped = [names[order[k]] for k, sign in enumerate(signs) if sign < 0]
     if flipped:
         yield f"{_join_names(flipped)} {'has' if len(flipped) == 1 else 'have'} the sign flipped"
@@ -159,7 +161,7 @@ def column_fault(model: Model, log: Log, preprocessing: Preprocessing) -> Column
 def exchanged_joints(
     model: LinearModel, log: Log, preprocessing: Preprocessing, error: float
 ) -> ColumnFault | None:
-    """Return the order of the joints, or the sign of one, that makes the error of the fit small."""
+    """Return the exchange or the sign of joints with which the error of the fit is small."""
     none = _fault(model, log.joints.shape[1])
     best: ColumnFault | None = None
     for fault, observations in _moved_joints(none, model, log, preprocessing):
@@ -170,14 +172,14 @@ def exchanged_joints(
 
 
 def _fault(model: LinearModel, n: int) -> ColumnFault:
-    """Return the faultless columns, each as its name says, from which faults are made."""
+    """Return the columns as named: no exchange and no sign flipped."""
     usual, upright = tuple(range(n)), (1,) * n
     names = model.robot.force_names, model.robot.joint_names
     return ColumnFault(*names, usual, upright, usual, upright, np.inf, np.inf)
 
 
 def _with_signs(fault: ColumnFault, orders: Iterable[tuple[int, ...]]) -> list[ColumnFault]:
-    """Return a fault with orders of the forces, each with all signs; the usual ones first."""
+    """Return faults with all orders and signs of the forces; unflipped signs first."""
     signs = list(product((1, -1), repeat=len(fault.order)))
     return [replace(fault, order=o, signs=s) for o in orders for s in signs]
 
@@ -206,7 +208,7 @@ def _other_faults(
 def _moved_joints(
     none: ColumnFault, model: LinearModel, log: Log, how: Preprocessing
 ) -> Iterator[tuple[ColumnFault, Observations]]:
-    """Yield faults of joints, one sign or another order, with which all rows have poses."""
+    """Yield flipped signs and orders of joints with which all rows have poses."""
     n = len(none.order)
     faults = [
         replace(none, joint_signs=tuple(-1 if k == i else 1 for k in range(n))) for i in range(n)
@@ -265,4 +267,5 @@ def _unphysical(fault: ColumnFault, observations: Observations, model: Model) ->
 
 
 def _join_names(names: Sequence[str]) -> str:
+    """Return names joined by commas and "and"."""
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

@@ -144,7 +144,7 @@ def _stack_equations(task: FitTask) -> FitEquations:
 
 
 def _run_round(task: FitTask, equations: FitEquations, *, fits_delay: bool) -> FitRound:
-    """Return a fit and all that is judged by it."""
+    """Return a fit with its predictions, verdict and faults."""
     motions = task.motions
     known = equations.model.known_values(task.known_rotors)
     with append_findings(motions.recordings):
@@ -169,11 +169,12 @@ def _run_round(task: FitTask, equations: FitEquations, *, fits_delay: bool) -> F
 
 
 def _distort(faults: tuple[LogFault, ...]) -> bool:
+    """Return whether a fault of the log may pass for a fault of the machine."""
     return any(fault.distorts for fault in faults)
 
 
 def _fit_unknowns(task: FitTask, equations: FitEquations, *, fits_delay: bool) -> FitEquations:
-    """Return the equations with the speeds, and the delay where it is fitted, that suit best."""
+    """Return the equations with the best Stribeck speeds, and the best delay where it is fitted."""
     model, preprocessing = equations.model, equations.preprocessing
     first = weighted_least_squares(equations.observations)
     if fits_delay:
@@ -225,7 +226,7 @@ def _estimate_with_drawing(
     observations: Observations,
     error: LogError,
 ) -> Estimate:
-    """Return a fit of a log that does not determine all values by itself, or raise its error."""
+    """Return the fit of a log, with drawn values where it determines too little; or raise."""
     if error.reason != "too little motion":
         raise error
     try:

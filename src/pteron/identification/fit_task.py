@@ -135,7 +135,7 @@ def read_task(
     processing: Processing,
     steps: Steps,
 ) -> FitTask:
-    """Return what is to be fitted, with recordings that are read and checked; see `identify`."""
+    """Return the task of a fit, with recordings that are read and checked; see `identify`."""
     motions = _read_motions(robot, logs, held_out, processing, steps)
     base = base_parameters(robot, shared=shared)
     rotors = _motor_data(robot, motions.fit)
@@ -166,7 +166,7 @@ def _read_motions(
 
 
 def logs_in_newtons(logs: Logs, robot: Manipulator) -> list[Log | LogFile]:
-    """Return the logs, with the names of the machine's joints where they have none, in newtons."""
+    """Return the logs in newtons, with the machine's joint names where they have none."""
     symbols = tuple(leg.joint for leg in robot.legs)
     named = [
         replace(log, symbols=symbols) if isinstance(log, Log) and log.symbols is None else log
@@ -176,7 +176,7 @@ def logs_in_newtons(logs: Logs, robot: Manipulator) -> list[Log | LogFile]:
 
 
 def _originals(logs: Logs) -> list[Log]:
-    """Return the logs that are in memory, or the beginning of their files, as they were given."""
+    """Return the original logs in memory, or the beginning of their files."""
     several = [logs] if isinstance(logs, Log | LogFile) else logs
     return [log if isinstance(log, Log) else next(iter(log.pieces())) for log in several]
 
@@ -197,7 +197,7 @@ def _row_counter(steps: Steps, step: str, total: int) -> Callable[[int], None]:
 def _motor_data(
     robot: Manipulator, fit: Sequence[Recording]
 ) -> tuple[tuple[float, float], ...] | None:
-    """Return inertia and ratio of each joint's motor, by the log or else by the machine's file."""
+    """Return inertia and ratio of each joint's motor, from the log or else the machine's file."""
     description = fit[0].head().description
     if description.rotor_inertia is not None and description.ratio is not None:
         return tuple(zip(description.rotor_inertia, description.ratio, strict=True))

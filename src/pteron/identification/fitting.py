@@ -170,7 +170,7 @@ def fit_observations(
 
 
 def stack_balanced(parts: Sequence[Observations]) -> Observations:
-    """Return the observations of recordings as one, with the rows of each by its own noise.
+    """Return the observations of recordings stacked, each weighted by its noise.
 
     A motion of small forces is recorded with less noise than one of large ones: unscaled, the noise
     of both would be taken for one, and the values' intervals would hold for neither.
@@ -225,7 +225,7 @@ def estimate_values(
 
 @contextmanager
 def append_findings(recordings: Sequence[Recording]) -> Iterator[None]:
-    """Put the findings of logs behind an error that is raised within, which they may explain."""
+    """Append the findings of logs to an error that is raised within, as possible explanations."""
     try:
         yield
     except PteronError as error:

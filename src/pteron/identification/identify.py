@@ -135,7 +135,7 @@ def identify(
 def _refusal_cause(
     robot: Manipulator, logs: Logs, processing: Processing, error: DataError | ModelError
 ) -> str:
-    """Return the assumption of a machine's file that makes a log impossible; empty if none does."""
+    """Return the wrong assumption of the machine's file that makes a log impossible; else ""."""
     of_log = isinstance(error, LogError) and error.reason in _OF_ASSUMPTIONS
     of_poses = isinstance(error, ModelError) and "poses" in str(error)
     if not (of_log or of_poses):
@@ -207,7 +207,7 @@ def _predict_fitted(task: FitTask, fit: FittedValues) -> tuple[Prediction, ...]:
 
 
 def _fit_essential(task: FitTask, fit: FittedValues) -> Essential:
-    """Return the values that the data show, fitted alone; weighted where no such fit is known."""
+    """Return the essential values, fitted without the others; weighted for unknown estimators."""
     estimator = task.estimator
     if isinstance(estimator, str):
         estimator = ESTIMATORS.get(estimator, weighted_least_squares)
@@ -244,7 +244,7 @@ def _advice(
     drawn: Manipulator | None,
     factor: float,
 ) -> list[str]:
-    """Return advice on hidden values, weak ones, and those that are not plausible."""
+    """Return advice on hidden, weak and implausible values."""
     fit, model = last.fit, last.fit.equations.model
     advice = plausibility_warnings(
         model, fit.estimate, fit.known, bodies.consistency, drawn, factor

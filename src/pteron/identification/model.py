@@ -158,7 +158,7 @@ class Model:
         return None if speeds is None else np.broadcast_to(speeds, (len(self.robot.legs),))
 
     def with_speeds(self, speeds: Array) -> Model:
-        """Return the model with speeds (n,) that were found."""
+        """Return the model with identified Stribeck speeds (n,)."""
         return _independent(Model(self.base, self.terms, speeds=tuple(speeds.tolist())))
 
     @cached_property
@@ -168,7 +168,7 @@ class Model:
 
     @cached_property
     def joining_terms(self) -> tuple[Term, ...]:
-        """The terms that join others."""
+        """The terms whose values others absorb."""
         return tuple(term for term in self.all_terms if term.name in self.merged_terms)
 
     @cached_property
@@ -196,7 +196,7 @@ class Model:
     def with_joins(
         self, texts: Sequence[str], names: Mapping[str, str], *, minus: str = "-", gap: str = " "
     ) -> tuple[str, ...]:
-        """Return texts of the values with the terms behind that join them, by their names."""
+        """Return expressions of the values, with the terms that they absorb appended by name."""
         sums = list(texts)
         for name, shares in self.joins.items():
             for joined, share in shares.items():
@@ -206,14 +206,14 @@ class Model:
         return tuple(sums)
 
     def share_of(self, name: str, value: float) -> Array:
-        """Return the part of the values (p,) that a term which joins them adds."""
+        """Return the part of the values (p,) that a term adds to those that absorb it."""
         added = np.zeros(len(self.names))
         for joined, share in self.joins.get(name, {name: 1.0}).items():
             added[self.names.index(joined)] = share * value
         return added
 
     def known_values(self, known: Mapping[str, float]) -> Array:
-        """Return the part of the values (p,) that terms of known size make, by their names.
+        """Return the part of the values (p,) that terms of known values contribute, by name.
 
         A term that joins others adds to those.
         """
@@ -221,7 +221,7 @@ class Model:
         return np.asarray(np.sum([np.zeros(len(self.names)), *parts], axis=0))
 
     def joint_values(self, kind: str, values: Array) -> Array | None:
-        """Return a kind of term (n,) of values (p,); 0 where it joins others, None if it is none.
+        """Return the values (n,) of a kind of term; 0 where others absorb it, None without it.
 
         A term that joins others is in their values already.
         """
@@ -255,6 +255,7 @@ class Model:
         return coefficients
 
     def _all_columns(self, states: States) -> Array:
+        """Return the regressor (N, n, p) of all terms, before columns are selected."""
         robot, terms = self.robot, self.terms
         n = len(robot.legs)
         motion = states.pose, states.velocity, states.acceleration

@@ -43,7 +43,7 @@ class LinearModel(Protocol):
 
     @property
     def kinds(self) -> tuple[str, ...]:
-        """Their kinds, as `Model.kinds`."""
+        """The kinds of the values, as `Model.kinds`."""
 
     def matrix(self, states: States) -> Array:
         """Return their columns (R, n, p) at states."""
@@ -204,6 +204,7 @@ def motion_mask(rates: Array, slow: Array, rows: int, *, wraps: bool = False) ->
 def _filter_block(
     model: LinearModel, block: SampleBlock, preprocessing: Preprocessing
 ) -> Observations:
+    """Return a block's observations: slow rows masked, then filtered and decimated."""
     decimation = preprocessing.decimation
     settling = preprocessing.settling_rows
     inner = slice(settling, len(block.states) - settling)
@@ -251,7 +252,7 @@ def assemble_observations(
 
 
 def _phases(log: Log, rate: float, fit: FourierFit) -> list[Log]:
-    """Return the stretches of a periodic log with one payload that last a period or more."""
+    """Return the stretches of a periodic log with a constant payload and at least a period."""
     parts = [log.part(start, stop) for start, stop in log.phases]
     long_enough = [
         part for part in parts if part.duration + 1.0 / rate >= fit.period * (1.0 - 1e-3)
@@ -268,7 +269,7 @@ def _phases(log: Log, rate: float, fit: FourierFit) -> list[Log]:
 def _periodic(
     model: LinearModel, log: Log, preprocessing: Preprocessing, fit: FourierFit
 ) -> Observations:
-    """Return the observations of one period, with noise averaged over all that were recorded."""
+    """Return the observations of a period, with noise averaged over all recorded periods."""
     # The parallel filter is a projection of both sides onto the harmonics up to the band, with as
     # many rows as coefficients, so that white noise stays white.
     period, rate = fit.period, preprocessing.rate

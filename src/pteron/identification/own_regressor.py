@@ -179,7 +179,7 @@ def _hold_out(
     held_out: tuple[ArrayLike, ...] | None,
     kinds: Sequence[str] | None,
 ) -> tuple[Observations, Observations]:
-    """Return the observations to fit, and those held out: another motion's, or the last samples."""
+    """Return the observations to fit, and those for validation: another motion's or the last."""
     count = len(observations.time)
     if held_out is None:
         rows = round(FITTED * count)

@@ -148,7 +148,7 @@ class Payload(Result):
         return mass, center, self.central_inertia or (0.0,) * count
 
     def call(self, robot: RobotLike) -> str:
-        """Return as text the call of exported C that sets the payload, and the commands' option."""
+        """Return the call of exported C that sets the payload, and the command-line option."""
         mass, center, inertia = (
             ", ".join(f"{value:.9g}" for value in np.ravel(part)) for part in self.arguments(robot)
         )
@@ -180,7 +180,7 @@ class Payload(Result):
 
     @property
     def has_valid_errors(self) -> bool:
-        """Whether the stated errors of the values hold: no fault shows that lowers the grade."""
+        """Whether the stated errors of the values hold: there is no fault that lowers the grade."""
         return not self.fault_isolation.matters
 
     def summary(self) -> str:
@@ -209,6 +209,7 @@ class Payload(Result):
         return "\n".join(lines)
 
     def _opinion(self) -> str:
+        """Return a sentence that states whether the payload is significant and a real body."""
         if not self.is_significant:
             return "No payload is felt: the values are zero within their certainty."
         if self.real:
@@ -351,7 +352,7 @@ def observations_with_payload(
 def _phases(
     without: Log, with_payload: Log | None, processing: Processing | None
 ) -> list[Recording]:
-    """Return a log with both phases, or two logs, as recordings."""
+    """Return recordings with and without payload, of a log with both phases or of two logs."""
     if with_payload is None:
         logs = [without]
         _check_phases(without)
@@ -393,7 +394,7 @@ def _check_phases(log: Log) -> None:
 
 
 def _set_phase(log: Log, phase: int) -> Log:
-    """Return a log as one phase throughout."""
+    """Return a log in which all rows have a phase; raise if its column contradicts it."""
     if log.payload is not None and ((log.payload != 0) != phase).any():
         row = int(np.argmax((log.payload != 0) != phase))
         raise LogError(

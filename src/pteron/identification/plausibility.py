@@ -126,7 +126,7 @@ def plausibility_warnings(
 
 
 def friction_below_zero(model: Model, observations: Observations, fit: Estimate) -> tuple[str, ...]:
-    """Return a sentence on friction that is below zero by more than its interval; none else."""
+    """Return a sentence on friction significantly below zero; empty if there is none."""
     high = fit.intervals()[1]
     felt = (high < 0.0) & _values_that_contribute(observations, fit, _FELT)
     chosen = np.flatnonzero(np.isin(model.kinds, _FRICTION) & felt)
@@ -150,7 +150,7 @@ def common_factor(
     drawn: Manipulator | None,
     observations: Observations,
 ) -> float:
-    """Return the factor of the bodies' forces beside those of the drawing; 1 where none is clear.
+    """Return the factor between the identified and the drawn bodies' forces; 1 if unclear.
 
     It is that of least squares. Forces that differ by more than drawings do have no factor; `known`
     (p,) is the rotors' part of the values.
@@ -179,21 +179,21 @@ class Factor(NamedTuple):
 
     @property
     def is_detectable(self) -> bool:
-        """Whether a factor that matters would be seen."""
+        """Whether a factor of practical size would be significant."""
         return CLEAR * self.deviation < WANTED
 
     def times(self, number: float) -> Factor:
-        """Return the factor of forces that are so many times as large."""
+        """Return the factor of the forces multiplied by a number."""
         return Factor(number * self.value, abs(number) * self.deviation)
 
     @property
     def wrong(self) -> bool:
-        """Whether it is not one, by more than what is known may be off."""
+        """Whether the factor differs from 1 significantly, by more than known values may err."""
         return abs(self.value - 1.0) > max(CLEAR * self.deviation, _USUAL_ERROR)
 
     @property
     def chance(self) -> float:
-        """Probability that it seems so far from one where it is one."""
+        """p-value of the estimated factor if the true factor is 1."""
         return float(2.0 * scipy.stats.norm.sf(abs(self.value - 1.0) / max(self.deviation, 1e-300)))
 
 
@@ -218,7 +218,7 @@ def known_values(
 
 
 def factor_of_forces(model: Model, fit: Estimate, known: Mapping[str, float]) -> Factor | None:
-    """Return the factor that all forces have, by what is known of the values; None without that."""
+    """Return the common factor of all forces from known values; None without these."""
     if not known:
         return None
     places = [model.names.index(name) for name in known]
@@ -248,7 +248,7 @@ def has_negative_inertia(model: Model, values: Array, covariance: Array) -> bool
 
 
 def unphysical(model: Model, observations: Observations, fit: Estimate) -> int:
-    """Return how many properties of a fit's values are certainly no machine's.
+    """Return the number of physically impossible properties of a fit's values.
 
     Directions of motion in which kinetic energy is negative, and joints that friction pushes, with
     more than 5 % of the forces.
@@ -261,14 +261,14 @@ def unphysical(model: Model, observations: Observations, fit: Estimate) -> int:
 def _values_that_contribute(
     observations: Observations, fit: Estimate, share: float
 ) -> NDArray[np.bool_]:
-    """Return which values (p,) make more than a share of the forces at an actuator."""
+    """Return whether values (p,) contribute more than a share of the forces of an actuator."""
     effect = np.abs(fit.values) * np.sqrt((observations.matrix**2).mean(axis=0))
     size = np.sqrt((observations.forces**2).mean(axis=0))
     return np.asarray((effect > share * size[:, None]).any(axis=0))
 
 
 def _negative_directions(model: Model, values: Array, covariance: Array) -> int:
-    """Return along how many coordinates, and all at once, energy is negative in most poses."""
+    """Return the number of directions in which kinetic energy is negative in most poses."""
     # x''^T M x'' is positive for every real machine, whatever its CAD says.
     robot, rng = model.robot, np.random.default_rng(0)
     drawn = model.base.grouping @ parameters(robot)

@@ -113,7 +113,7 @@ def read_recording(
 
 
 def _stamp_findings(log: Log) -> tuple[Finding, ...]:
-    """Return a log's findings; of one that comes from no file, those of its time stamps."""
+    """Return a log's findings, or those of its time stamps if it has none."""
     if log.findings or log.rows < 2:
         return log.findings
     stamps = TimeStamps(1.0 / log.rate, "t", log.source)
@@ -157,7 +157,7 @@ def periodic_part(log: Log, period: float | None = None) -> Log:
 
 
 def hold_same_samples(first: Recording, other: Recording) -> bool:
-    """Say whether two recordings hold the same samples."""
+    """Return whether two recordings have the same samples."""
     a, b = first.head(), other.head()
     return np.array_equal(a.forces, b.forces) and np.array_equal(a.joints, b.joints)
 

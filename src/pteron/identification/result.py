@@ -96,6 +96,7 @@ class Identification(Result):
         return f"<Identification of {self.robot.name!r}: {known} values, {grade}>"
 
     def _overview(self) -> Overview:
+        """Return the overview for notebooks: each value with its interval and the drawn value."""
         from pteron.identification.names_in_html import html_expressions
 
         drawn = [*self.model.base.values(self.robot).tolist()]
@@ -129,7 +130,7 @@ class Identification(Result):
 
     @property
     def has_understated_errors(self) -> bool:
-        """Whether a fault shows for which the values' stated errors do not allow."""
+        """Whether a fault shows that the stated errors of the values do not include."""
         return self.fault_isolation.understates
 
     @cached_property
@@ -218,7 +219,7 @@ class Identification(Result):
         )
 
     def _terms_per_joint(self, kind: str, values: Array, least: float = 0.0) -> Array:
-        """Return a kind of term (n,) of values (p,), 0 where there is none.
+        """Return the values (n,) of a kind of term, at least `least`; 0 without the term.
 
         Friction and inertia below zero are noise: no joint pushes itself.
         """

@@ -62,7 +62,7 @@ class Transmissions(Result):
     backlash_deviations: PerJoint
 
     def add_to(self, robot: RobotLike) -> Manipulator:
-        """Return a machine whose drives bend so; damping and play that are not clear are 0."""
+        """Return a machine with elastic drives; insignificant damping and play are 0."""
         robot = as_manipulator(robot)
         damping = _clear(self.damping, self.damping_deviations)
         play = _clear(self.backlash, self.backlash_deviations)
@@ -80,6 +80,7 @@ class Transmissions(Result):
 
 
 def _clear(values: Array, deviations: Array) -> Array:
+    """Return values that differ from zero significantly, and 0 for the others."""
     return np.where(values > _CLEAR * deviations, values, 0.0)
 
 
@@ -154,7 +155,7 @@ def identify_transmissions(
 
 
 def _interpolate(known: Array, values: Array, time: Array) -> Array:
-    """Return signals (T, n), known at some times, at other times between these."""
+    """Return signals (T, n), interpolated at other times."""
     return np.column_stack([np.interp(time, known, column) for column in values.T])
 
 

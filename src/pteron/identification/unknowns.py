@@ -161,7 +161,7 @@ def fit_nonlinear_terms(
 
 
 def search_speeds(model: Model, observe: Observe, usual: Array) -> Array:
-    """Return the speeds (n,) of least squares, about; infinite where friction is not seen to fall.
+    """Return approximate least-squares speeds (n,); infinite where friction does not fall.
 
     `model` has none of that friction yet, and `usual` (n,) are the root mean squares of the joints'
     rates.
@@ -202,7 +202,7 @@ def search_speeds(model: Model, observe: Observe, usual: Array) -> Array:
 
 
 def _coordinatewise(spline: Array, gram: Array, image: Array) -> NDArray[np.int64]:
-    """Return which of the speeds tried suits each joint (n,); -1 where none is clear."""
+    """Return the index of the best speed for each joint (n,); -1 where none is significant."""
     n = len(image)
     chosen = np.full(n, -1)
 

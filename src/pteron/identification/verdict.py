@@ -230,12 +230,14 @@ def predict_held_out(
 
 
 def _grade_error(percent: float, small: float) -> Grade:
+    """Return the grade of an error in percent; up to `small` it is trustworthy."""
     if percent <= small:
         return "trustworthy"
     return "usable with care" if percent <= LARGE else "not trustworthy"
 
 
 def _judge_prediction(prediction: Prediction) -> Opinion:
+    """Return the opinion on a prediction of forces: its error beyond the noise."""
     ratio = prediction.robust_nrms / np.maximum(prediction.floor, 1e-12)
     missed = prediction.unexplained_error
     # The worst actuator is the one farthest beyond both limits.
@@ -279,6 +281,7 @@ def _judge_prediction(prediction: Prediction) -> Opinion:
 
 
 def _judge_faults(shown: FaultIsolation) -> Opinion:
+    """Return the opinion on the isolated faults, and on the errors expected in a fast cycle."""
     opinion = Opinion(reasons=list(shown.causes))
     if shown.matters:
         opinion.grade = "usable with care"
@@ -324,7 +327,7 @@ def percentages(values: Iterable[float], places: int = 2) -> str:
 
 
 def times(ratio: float) -> str:
-    """Return the ratio of two values as text.
+    """Return the ratio of two values as text, such as "3.1 times".
 
     Examples
     --------

@@ -57,7 +57,7 @@ class Bodies:
 
     @cached_property
     def moments(self) -> tuple[Array, ...]:
-        """The matrix of each body as a function of the columns, linear: (d, d, k).
+        """The pseudo-inertia of each body as a linear function of the columns: (d, d, k).
 
         It is positive semidefinite where the body is real; see `_moments`.
         """
@@ -77,7 +77,7 @@ class Bodies:
         return units
 
     def mean(self, values: Array) -> Array:
-        """Return the free parameters of given parameters (N,): their mean where legs share."""
+        """Return the free parameters for parameters (N,); the mean of those that legs share."""
         return np.asarray((self.sharing / self.sharing.sum(axis=0)).T @ values)
 
     def least(self, scaled: Array) -> Array:
@@ -134,7 +134,7 @@ def parameters_of(robot: Manipulator, values: ArrayLike, what: str) -> Array:
 
 
 def real_bodies(robot: Manipulator, values: ArrayLike | None = None) -> tuple[str, ...]:
-    """Return what keeps parameters from belonging to real bodies; nothing where they do.
+    """Return the conditions that parameters violate as real bodies; empty if they are feasible.
 
     A real body has m > 0, and in planar motion I > 0 and I m >= (m gamma)^2, since the moment of
     inertia about its centre of mass, I - (m gamma)^2 / m, is not negative. Of one that turns about

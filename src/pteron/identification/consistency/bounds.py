@@ -136,7 +136,7 @@ class Bounds:
 
 
 def _rods(robot: Manipulator) -> dict[str, tuple[float, float]]:
-    """Return where each rod of known ends begins and ends along its x, m."""
+    """Return the ends of each rod along its x axis, m; rods without extents are left out."""
     ends = {}
     for p in parameter_data(robot):
         if p.kind == "I" and p.legs:
@@ -147,7 +147,7 @@ def _rods(robot: Manipulator) -> dict[str, tuple[float, float]]:
 
 
 def _names_of_key(key: str, known: Mapping[str, str], what: str) -> list[str]:
-    """Return the name itself, or those of all legs that go by the same name without a number."""
+    """Return the name itself, or the names of all legs whose stem it is."""
     names = [name for name, stem in known.items() if key in (name, stem)]
     if not names:
         raise ModelError(f"bounds: {key!r} is no {what} of this machine: {', '.join(known)}")
@@ -155,7 +155,7 @@ def _names_of_key(key: str, known: Mapping[str, str], what: str) -> list[str]:
 
 
 def _box(place: Mapping[str, Array], box: Box) -> Iterator[tuple[Array, str]]:
-    """Yield rows that are at most 0 for a body inside a box, and what each one says."""
+    """Yield rows that are at most 0 for a body inside a box, with the name of each."""
     solid = SpatialInertia.second_moments(place) if "Izz" in place else None
     inertia, least = place.get("I"), 0.0
     for k, (axis, (low, high)) in enumerate(zip("xyz", box, strict=False)):

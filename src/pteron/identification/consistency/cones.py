@@ -45,7 +45,7 @@ class RealBodies:
 
     @cached_property
     def rows(self) -> tuple[Array, Array, Array]:
-        """Factors of z and of the depth, and constants, of the rows that hold z in the set.
+        """Factors of z and of the depth, and constants, of the constraints' rows.
 
         Limits come first and are not negative; the matrix of each body follows as the solver has
         it: the columns of its upper triangle, entries off the diagonal times sqrt(2).
@@ -63,7 +63,7 @@ class RealBodies:
 
 
 def widest(real: RealBodies, start: Array, free: Array, most: float) -> tuple[float, Array]:
-    """Return how deep in the set z = start + free @ y can be, at most `most`, and there z.
+    """Return the greatest depth in the set for z = start + free @ y, at most `most`, and that z.
 
     The depth is minus infinity where there is no such z.
     """

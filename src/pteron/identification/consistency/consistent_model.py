@@ -240,7 +240,7 @@ def _scale_problem(
 
 
 def _choose_aim(problem: _Problem) -> _Aim:
-    """Return the identified values where real bodies have them, else the closest that some have."""
+    """Return the identified values if they are feasible, else the nearest feasible values."""
     real, target, values, free = problem.real, problem.target, problem.values, problem.free
     depth, deepest = widest(real, problem.inverse @ (values / problem.sizes), free, _DEEPEST)
     if depth >= _SHALLOW:
@@ -293,7 +293,7 @@ def _checked_parameters(problem: _Problem, aim: _Aim, z: Array) -> tuple[Array, 
 
 
 def _names_at_border(problem: _Problem, aim: _Aim, z: Array) -> tuple[str, ...]:
-    """Return the names of bodies z next to their cones' border, or of what holds the fit back."""
+    """Return the bodies and limits that are active at the solution, by name."""
     real, target = problem.real, problem.target
     if aim.multipliers is None:
         close = problem.bodies.least(z) < 1.01 * target.margins
@@ -336,6 +336,7 @@ def _square_root(covariance: ArrayLike, rank: int) -> Array:
 
 
 def _prior(robot: Manipulator, cad: RobotLike | ArrayLike | None) -> Array | None:
+    """Return a CAD model's inertial parameters, from a machine, its file or an array; or None."""
     if cad is None:
         return None
     if isinstance(cad, str) and cad == "robot":
@@ -351,7 +352,7 @@ def _prior(robot: Manipulator, cad: RobotLike | ArrayLike | None) -> Array | Non
 
 
 def _move_inside(bodies: Bodies, point: Array, inside: Array, margins: Array) -> Array:
-    """Return a point, moved towards one inside as little as its bodies need to be real."""
+    """Return a point moved towards an interior point by the least step that makes bodies real."""
     # Values that are thousands of deviations off leave the solver little accuracy at the border.
     for part in (0.0, *np.logspace(-12, 0, 37)):
         candidate = (1.0 - part) * point + part * inside

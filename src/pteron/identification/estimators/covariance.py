@@ -76,6 +76,7 @@ class Noise:
         return self._apply_whitening(np.einsum("ij,rjp->rip", self.root @ self.root.T, backwards))
 
     def _apply_whitening(self, matrix: Array) -> Array:
+        """Return columns (R, n, p) filtered by 1 / A_i along the rows of each actuator."""
         columns = [
             scipy.signal.lfilter([1.0], polynomial, matrix[:, i], axis=0)
             for i, polynomial in enumerate(self.polynomials)
@@ -90,7 +91,7 @@ def noise_of(
     weights: Array | float = 1.0,
     whitened: Array | None = None,
 ) -> Noise:
-    """Return the noise that has left such residuals after a fit.
+    """Return the noise model that is estimated from the residuals of a fit.
 
     With H the projection on W, residuals of noise of covariance C have (I - H) C (I - H): they are
     smaller than the noise, and less alike. What they miss is computed from the noise found so far.
@@ -180,6 +181,7 @@ def _levinson(autocovariances: Array) -> tuple[Array, float]:
 
 
 def _parzen_window(share: Array) -> Array:
+    """Return the Parzen window at lags as shares of its width."""
     near = 1.0 - 6.0 * share**2 * (1.0 - share)
     return np.asarray(np.where(share < 0.5, near, 2.0 * (1.0 - share) ** 3))
 

@@ -134,7 +134,7 @@ class Estimate(Result):
         return float(np.sqrt(self.wald(self.values - np.asarray(truth, dtype=float))))
 
     def p_value(self, truth: ArrayLike) -> float:
-        """Return the chance of an estimate farther away, were these the true values (p,).
+        """Return the p-value of true values (p,): the probability of an estimate farther away.
 
         The joint region at 95 % is where it is at least 0.05.
         """
@@ -190,7 +190,7 @@ class SearchRecord:
     converged: bool = True
 
     def steps(self, most: int) -> Iterator[None]:
-        """Count iterations, `most` of them or until one says that the search has converged."""
+        """Yield for each iteration, up to `most` or until `converged` is set."""
         for self.iterations in range(1, most + 1):
             yield
             if self.converged:
@@ -209,7 +209,7 @@ def estimate_of(
     instruments: Array | None = None,
     beside: Array | float = 0.0,
 ) -> Estimate:
-    """Return the estimate that an estimator found.
+    """Return the estimate of an estimator's values.
 
     The values are B Z^T V F, `factor` is that of the rows times `weights` (R, n) or (n,), whose
     squares are V, and the covariance B (Z^T V cov(F) V Z + `beside`) B, (p, p). By default B is
@@ -255,7 +255,7 @@ def whiteness(residuals: Array, used: NDArray[np.bool_] | None = None) -> Whiten
 def autocorrelations(
     residuals: Array, used: NDArray[np.bool_], most: int
 ) -> tuple[Array, NDArray[np.int64]]:
-    """Return the autocorrelations (L, n) at lags from 1 to `most`, and of how many pairs each is.
+    """Return the autocorrelations (L, n) at lags from 1 to `most`, and their numbers of pairs.
 
     Residuals (R, n) that are not used take no part; a lag leaves at least four fifths of the rows.
     """

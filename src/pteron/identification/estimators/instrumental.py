@@ -93,7 +93,7 @@ def instrumental(
 def halves(
     model: Model, log: Log, preprocessing: Preprocessing
 ) -> tuple[Observations, Observations]:
-    """Return the observations of a log by every other sample of the positions, and by the others.
+    """Return two sets of observations of a log: from even and from odd samples of the positions.
 
     A spline through one half of the samples gives the positions at all instants. Encoders' noise is
     not the same in two samples, as long as a joint passes a step or more between them, so that
@@ -108,7 +108,7 @@ def halves(
 def _together(
     observations: Observations, instruments: Observations, *, mutual: bool
 ) -> tuple[Observations, Array, Array | None]:
-    """Return observations and instruments where there are both, and what they err by if mutual.
+    """Return observations and instruments at common rows, and half their difference if mutual.
 
     With M and D mean and half the difference of two regressors, (W1^T W2 + W2^T W1) / 2 is
     M^T M - D^T D.
@@ -149,7 +149,7 @@ def _normal_equations(
 
 
 def _every_other(log: Log, start: int) -> Log:
-    """Return a log with the positions that every other sample from `start` on has."""
+    """Return a log with positions interpolated from every other sample, `start` the first."""
     joints = log.joints.copy()
     for rows in log.segments:
         time, every_other = log.time[rows], slice(start, None, 2)

@@ -131,6 +131,7 @@ def maximum_likelihood(
 
 
 def _check(log: Log) -> None:
+    """Raise where a log has gaps or its payload changes."""
     advice = "to maximum likelihood, or choose another estimator"
     if len(log.segments) > 1:
         raise log.fault("gap", f"has gaps; give a part without one {advice}")
@@ -152,7 +153,7 @@ def _expect_small(log: Log, coefficients: int) -> None:
 def _sample_observations(
     model: Model, log: Log, curve: Curve, preprocessing: Preprocessing
 ) -> Observations:
-    """Return the observations of a motion at the log's own samples, which no filter has touched."""
+    """Return unfiltered observations of a motion at the log's samples."""
     states = States.from_log(model.robot, log, curve.motion, preprocessing.start)
     used = motion_mask(states.joint_rates, preprocessing.slow, preprocessing.settling_rows)
     used[: curve.ends] = used[len(used) - curve.ends :] = 0.0

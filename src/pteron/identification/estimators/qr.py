@@ -63,14 +63,14 @@ class QrFactor(OfLog):
         return np.asarray((inverse @ inverse.T) / np.outer(self.scale, self.scale))
 
     def inverse_triangle(self) -> Array | None:
-        """Return what makes orthonormal columns of W (p, p); None where it would lose digits."""
+        """Return the inverse (p, p) that orthonormalises W's columns; None if ill-conditioned."""
         if not self.condition < _PLAIN:
             return None
         inverse = scipy.linalg.solve_triangular(self.factor, np.eye(len(self.names)))
         return np.asarray(inverse / self.scale[:, None])
 
     def check_seen(self) -> QrFactor:
-        """Return it, or raise a LogError that names the values that observations leave open."""
+        """Return the factor; raise a LogError with the names of the undetermined values."""
         if self.degrees <= 0:
             raise self.fault(
                 "too short",
@@ -92,7 +92,7 @@ class QrFactor(OfLog):
 
 
 def actuator_factors(observations: Observations) -> Observations:
-    """Return observations that stand for others: the triangle of each actuator's [W F].
+    """Return equivalent observations with fewer rows: the triangle of each actuator's [W F].
 
     Whatever weights (n,) actuators have, they have the same `qr_factor`, from p + 1 rows each.
     """
@@ -129,6 +129,7 @@ def qr_factor(
 def _blocks(
     observations: Observations, weights: Array | None, block: int
 ) -> Iterator[tuple[Array, Array]]:
+    """Yield weighted rows of the regressor and of the forces, flattened, in blocks of samples."""
     for start in range(0, len(observations.forces), block):
         rows = slice(start, start + block)
         matrix, forces = observations.matrix[rows], observations.forces[rows]

@@ -57,7 +57,7 @@ class Reduced(Result):
         return tuple(texts)
 
     def values(self, parameters: Array) -> Array:
-        """Return the values (kept,) that parameters of all columns have."""
+        """Return the values (kept,) of the independent columns for parameters of all columns."""
         independent, joined = parameters[list(self.kept)], parameters[list(self.dependent)]
         return np.asarray(independent + self.shares @ joined)
 

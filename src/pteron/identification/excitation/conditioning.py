@@ -141,7 +141,7 @@ def condition_of_long(root: Array, short: Array) -> float:
 
 
 def stacked_regressor(motion: FourierMotion, base: BaseParameters, times: Array) -> Array:
-    """Return the base regressors at times (T,) below one another, (T n, rank)."""
+    """Return the base regressors at times (T,), stacked: (T n, rank)."""
     state = motion.states(times)
     path = state.pose, state.velocity, state.acceleration
     regressors: Array = evaluate_unchecked(motion.robot, "base_regressor", *path, base=base)
@@ -149,6 +149,7 @@ def stacked_regressor(motion: FourierMotion, base: BaseParameters, times: Array)
 
 
 def _condition(matrix: Array) -> float:
+    """Return the condition number of a matrix; infinity where its rank is deficient."""
     values = np.linalg.svd(matrix, compute_uv=False)
     if len(matrix) < matrix.shape[1] or values[-1] <= np.finfo(float).eps * values[0]:
         return float("inf")

@@ -231,6 +231,7 @@ class Excitation(Result):
         return write_description(self._description(periods, layout or MotionLayout()), path)
 
     def _description(self, periods: int, layout: MotionLayout) -> Description:
+        """Return the description of a log of so many periods: its columns and periodic part."""
         led = self.with_leads(periods)
         described = _describe(led, layout)
         return replace(described, period=self.motion.period, start=led.start, end=led.end)

@@ -172,6 +172,7 @@ class FourierMotion(Result):
 
 
 def _times(time: ArrayLike) -> Array:
+    """Return times (T,) as an array; raise unless they are finite numbers in one dimension."""
     times = as_array(time, "time", ())
     fits = times.ndim == 1 and np.isfinite(times).all()
     expect(fits, "time", f"shape {times.shape}", "finite numbers of shape (T,)")

@@ -146,7 +146,7 @@ def held_out_cycle(
 
 
 def _standard(robot: Manipulator, least: float) -> RepeatedCycle:
-    """Return the standard cycle, as large as it fits, across where it moves every joint most.
+    """Return the largest standard cycle that fits, in the direction that moves every joint most.
 
     A joint that rests says nothing of its forces.
     """

@@ -75,7 +75,7 @@ class Improvement:
     seconds: float
 
     def stages(self) -> Iterator[Stage]:
-        """Yield the result of each stage; the last one has ended."""
+        """Yield the result of each stage; that of the last has `ended`."""
         plan, setting, remaining = self.plan, self.setting, self.seconds
         safe = current = self.start
         # The limits that the program keeps, by name, and instants (E,) beside its own samples, s
@@ -109,7 +109,7 @@ class Improvement:
 
 
 def improve_starts(starts: Sequence[Improvement], workers: int) -> Generator[Stage, None, None]:
-    """Yield every stage of all starts, done by so many processes; by this one if one.
+    """Yield every stage of all starts, computed by `workers` processes; without others by this.
 
     A start whose process fails is improved here; where the iteration is given up, all are ended.
     """
@@ -133,7 +133,7 @@ def _improve_in_processes(
 
 
 def _send_stages(start: Improvement, send: Callable[[Stage], None]) -> Stage:
-    """Send the result of each stage but the last one, which is returned."""
+    """Send the result of each stage but the last, and return the last."""
     for stage in start.stages():
         if not stage.ended:
             send(stage)
@@ -159,5 +159,6 @@ def _violations(motion: FourierMotion, setting: Setting) -> tuple[tuple[str, ...
 
 
 def _margins(motion: FourierMotion, setting: Setting) -> tuple[dict[str, Array], Array]:
+    """Return the relative margins to the limits by name, (T, ...), and their instants (T,)."""
     times = motion.uniform_times(_CHECKED * motion.harmonics)
     return relative_margins(motion, setting.limits, times), times

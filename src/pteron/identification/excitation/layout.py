@@ -1,4 +1,4 @@
-"""MotionLayout of the file of a motion for a controller: columns, units, dialect of CSV."""
+"""Layout of the file of a motion for a controller: columns, units, dialect of CSV."""
 
 from __future__ import annotations
 
@@ -150,15 +150,17 @@ class MotionLayout:
         return columns + [(name, "") for name in robot.force_names]
 
     def _unit(self, si: str) -> str:
+        """Return the unit in the file of a quantity in an SI unit; derived units are unchanged."""
         units = {"m": self.length_unit, "rad": self.angle_unit, "s": self.time_unit}
         return units.get(si, si)
 
     def _factor(self, si: str) -> float:
+        """Return the factor from an SI unit to the file's unit."""
         return _PER_UNIT.get(self._unit(si), 1.0)
 
 
 def check_sampling(period: float, rate: float, periods: int) -> None:
-    """Refuse, before any work, a period and a rate, samples a second, that give no table."""
+    """Raise, before any work, on a period and a rate (samples a second) that give no table."""
     expect(0.0 < period < np.inf, "period", f"{period} s", "a number above 0")
     expect(0.0 < rate < np.inf, "rate", rate, "samples a second above 0")
     expect(periods >= 1, "periods", periods, "1 or more")

@@ -177,7 +177,7 @@ def _room(led: LedMotion, limits: Limits, samples: int) -> float:
 
 
 def _set_off(times: Array, span: float) -> tuple[Array, Array, Array]:
-    """Return the phase less that at the lead's end, s, its rate and its gain, 1/s, (T,) each."""
+    """Return the phase relative to the lead's end, s, its rate and acceleration, 1/s, (T,) each."""
     u = np.clip(times / span, 0.0, 1.0)
     rate, gain, _ = quintic(u, 0.0, 1.0)
     return span * (u**4 * (2.5 - 3.0 * u + u**2) - 0.5), rate, gain / span

@@ -167,6 +167,7 @@ def unit_of(robot: Manipulator, name: str, leg: int) -> str:
 
 
 def _number(name: str, value: object) -> float:
+    """Return a limit as a number; raise unless it is finite, or an infinite force."""
     try:
         number = float(value)  # type: ignore[arg-type]
     except (TypeError, ValueError):

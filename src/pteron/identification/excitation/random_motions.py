@@ -142,7 +142,7 @@ def sizes(robot: Manipulator, space: Space) -> Array:
 
 
 def is_clear(motion: Movement, limits: Limits, samples: int, clear: float = _CLEAR) -> bool:
-    """Return whether all limits are kept at so many samples, by a share of their sizes."""
+    """Return whether samples keep all limits by a relative margin."""
     margins = relative_margins(motion, limits, np.linspace(0.0, motion.duration, samples))
     return all(float(values.min()) >= clear for values in margins.values())
 
@@ -169,7 +169,7 @@ def shrink_into_limits(motion: FourierMotion, limits: Limits) -> FourierMotion |
 
 
 def _largest(center_motion: FourierMotion, shape: Array, limits: Limits) -> FourierMotion | None:
-    """Return the motion of that shape about a center, as large as it can be; None without room."""
+    """Return the largest motion of a shape about a center within limits; None without room."""
 
     def resize(scale: float) -> FourierMotion:
         return center_motion.with_coefficients(np.vstack([center_motion.center, scale * shape]))
@@ -188,12 +188,13 @@ def _largest(center_motion: FourierMotion, shape: Array, limits: Limits) -> Four
 
 
 def _halve(keeps_limits: Callable[[float], bool], low: float, high: float) -> tuple[float, float]:
-    """Return the half of an interval of scales in which the largest one that is kept lies."""
+    """Return the half of a bisection interval that contains the largest feasible scale."""
     middle = 0.5 * (low + high)
     return (middle, high) if keeps_limits(middle) else (low, middle)
 
 
 def _scale(motion: FourierMotion, scale: float) -> FourierMotion:
+    """Return a motion with its amplitudes about the mean scaled."""
     coefficients = motion.coefficients
     coefficients[1:] *= scale
     return motion.with_coefficients(coefficients)

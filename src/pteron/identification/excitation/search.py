@@ -232,16 +232,18 @@ class _Search:
     """The share of the work that is done."""
 
     def judge_motion(self, motion: FourierMotion) -> _Candidate:
+        """Return a motion with its conditioning and the root of its information matrix."""
         root = information_root(motion, self.base)
         return _Candidate(motion, conditioning_of(root, self.base.values(motion.robot)), root)
 
     def lengths(self) -> Array:
-        """Return the columns' lengths (p,) in the random motions, as root mean squares."""
+        """Return the columns' root mean square lengths (p,) over the random motions."""
         norms = np.array([np.linalg.norm(candidate.root, axis=0) for candidate in self.drawn])
         reached = norms[np.isfinite(norms).all(axis=1)]
         return np.sqrt((reached**2).mean(axis=0)) if len(reached) else np.zeros(self.base.rank)
 
     def cost(self, candidate: _Candidate) -> float:
+        """Return a candidate's cost: -log det, or the condition number of columns long enough."""
         if self.criterion == "logdet":
             return -candidate.conditioning.logdet
         return condition_of_long(candidate.root, self.short)
@@ -265,7 +267,7 @@ class _Search:
     def improve(
         self, starts: Sequence[_Started], plan: Round, seconds: float, workers: int
     ) -> None:
-        """Do a round on some starts, in so many seconds."""
+        """Improve some starts in parallel, for `seconds` in all."""
         workers = min(workers, len(starts))
         each = seconds / math.ceil(len(starts) / workers)
         if each <= 0.0:
@@ -284,10 +286,12 @@ class _Search:
                 self.report(seen + weight * sum(share) / len(share))
 
     def report(self, share: float) -> None:
+        """Record the share of the work that is done, and report it."""
         self.seen = share
         self.progress(share)
 
     def result(self, limits: Limits, seed: int, seconds: float, interrupted: bool) -> Excitation:
+        """Return the best motion of all starts and random motions, with its margins."""
         random = min(self.drawn, key=self.cost)
         best = min([*(start.best for start in self.starts), random], key=self.cost)
         starts = tuple(

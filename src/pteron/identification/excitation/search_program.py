@@ -110,7 +110,7 @@ def _numbers(matrix: ca.DM) -> Array:
 
 
 class _Kept:
-    """The limits at instants (T,), as values of the program's variables that are 0 or more."""
+    """Inequality constraints at instants (T,), at least 0 where the limits are kept."""
 
     def __init__(self, setting: Setting, watched: tuple[str, ...], times: Array) -> None:
         path, slopes, low, high = _path(setting, watched)
@@ -134,16 +134,18 @@ class _Kept:
         return self._sides(derivatives, -derivatives)
 
     def _evaluate_rows(self, z: Array) -> list[Array]:
+        """Return q, q' and q'' at the instants, (n, T) each, of the program's variables (v,)."""
         coefficients = z.reshape(-1, len(self._size)) * self._size
         return [(rows @ coefficients).T for rows in self._rows]
 
     def _sides(self, above: Array, below: Array) -> Array:
+        """Return rows at finite lower bounds, then those at finite upper bounds, flattened."""
         parts = above[:, self._above], below[:, self._below]
         return np.concatenate([part.reshape(-1, *part.shape[2:]) for part in parts])
 
 
 def _bases(setting: Setting, times: Array) -> Array:
-    """Return what takes coefficients to q, q' and q'' at instants (T,): (3, T, 2 H + 1)."""
+    """Return the Fourier bases (3, T, 2 H + 1): coefficients to q, q' and q'' at instants (T,)."""
     return np.array(list(fourier_bases(times, setting.harmonics, setting.period)))
 
 
@@ -155,7 +157,7 @@ def _instants(setting: Setting) -> Array:
 
 @lru_cache(maxsize=16)
 def _cost(setting: Setting, doublings: int) -> ca.Function:
-    """Return the measure and its gradient as a function of the coefficients over their sizes."""
+    """Return a CasADi function: the cost and its gradient, of scaled coefficients."""
     times = _instants(setting)
     n = setting.robot.freedom
     z = ca.MX.sym("z", 2 * setting.harmonics + 1, n)
@@ -169,7 +171,7 @@ def _cost(setting: Setting, doublings: int) -> ca.Function:
 
 @lru_cache(maxsize=16)
 def _regressor(setting: Setting) -> ca.Function:
-    """Return the base regressor's transpose (rank, n) as a function of q, q' and q''."""
+    """Return a CasADi function: the base regressor's transpose (rank, n), of q, q' and q''."""
     q, state = _state(setting)
     built = program(setting.robot, "base_regressor", setting.columns)
     return ca.Function("regressor", q, [built.function(*state)], {"cse": True})
@@ -179,7 +181,7 @@ def _regressor(setting: Setting) -> ca.Function:
 def _path(
     setting: Setting, watched: tuple[str, ...]
 ) -> tuple[ca.Function, ca.Function, Array, Array]:
-    """Return limits (g,) as a function of q, q' and q'', its slopes, and its least and greatest.
+    """Return CasADi functions of limited quantities (g,) and of their slopes, and their bounds.
 
     The slopes are a column (3 n g,): the derivatives of all by q1, then those by q2, and so on.
     Squared sines stay finite and smooth out of reach.
@@ -247,7 +249,7 @@ def _state(setting: Setting) -> tuple[list[Expression], list[Expression]]:
 def measure(
     information: Expression, criterion: Criterion, doublings: int, short: Sequence[float]
 ) -> Expression:
-    """Return what an optimiser makes small, of the information matrix M = W^T W / T (p, p).
+    """Return the criterion to minimise, from the information matrix M = W^T W / T (p, p).
 
     R is M with rows and columns divided by the roots of its diagonal, so that the condition number
     of R is the square of the scaled condition number of W.

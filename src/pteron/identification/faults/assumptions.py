@@ -95,7 +95,7 @@ class Assumption:
     after: float
 
     def as_dict(self) -> dict[str, object]:
-        """Return it as plain data."""
+        """Return the assumption as plain data."""
         return fields_as_json(self, "fault message before after")
 
 
@@ -186,7 +186,7 @@ def hidden_orders(robot: Manipulator, log: Log, how: Preprocessing) -> str:
 
 
 def _symmetries(robot: Manipulator) -> list[tuple[int, ...]]:
-    """Return the orders of the legs in which guide and platform points have the same distances."""
+    """Return the permutations of the legs that preserve distances of guide and platform points."""
     count = len(robot.legs)
     if count > _MOST_LEGS:
         return []
@@ -203,6 +203,7 @@ def _symmetries(robot: Manipulator) -> list[tuple[int, ...]]:
 
 
 def _sentence(message: tuple[str, str], error_before: float, error_after: float) -> str:
+    """Return the sentence on a fault with the errors of the forces before and after."""
     fault, remedy = message
     was = f"{100.0 * error_before:.2g} % of the forces is left"
     if not np.isfinite(error_before):
@@ -211,6 +212,7 @@ def _sentence(message: tuple[str, str], error_before: float, error_after: float)
 
 
 def _samples(log: Log, how: Preprocessing, rotors: Array) -> _Samples | None:
+    """Return samples of the longest stretch's first part; None where it is too short."""
     longest = max(log.segments, key=lambda part: part.stop - part.start)
     part = log.part(longest.start, min(longest.stop, longest.start + _LOOK))
     edge = how.differentiator.edge
@@ -226,7 +228,7 @@ def _samples(log: Log, how: Preprocessing, rotors: Array) -> _Samples | None:
 def _alternatives(
     robot: Manipulator, s: _Samples
 ) -> Iterator[tuple[Literal["ratio", "gravity", "mode"], tuple[str, str], Manipulator, _Samples]]:
-    """Yield assumptions: gear ratios, gravity along other axes, working modes."""
+    """Yield alternative assumptions: gear ratios, directions of gravity, working modes."""
     at_home = evaluate_unchecked(robot, "joint_coordinates", np.array(s.start))
     for factor in _FACTORS:
         for middle, where in ((at_home, "home"), (np.zeros_like(at_home), "zero")):
@@ -249,6 +251,7 @@ def _alternatives(
 def _turned_gravity(
     robot: Manipulator, s: _Samples
 ) -> Iterator[tuple[Literal["gravity"], tuple[str, str], Manipulator, _Samples]]:
+    """Yield the machine with gravity along each axis and sense, with the message for each."""
     g = np.array(robot.gravity)
     size = float(np.linalg.norm(g)) or 9.81
     for axis in range(3):
@@ -269,6 +272,7 @@ def _turned_gravity(
 def _other_modes(
     robot: Manipulator, s: _Samples
 ) -> Iterator[tuple[Literal["mode"], tuple[str, str], Manipulator, _Samples]]:
+    """Yield the machine in its other working modes, with the message for each."""
     count = len(robot.legs)
     modes: list[tuple[list[int], Manipulator]] = []
     for mode in working_modes(robot):
@@ -291,7 +295,7 @@ def _other_modes(
 
 
 def _unexplained_share(robot: Manipulator, s: _Samples) -> float:
-    """Return what is left of the forces, over their deviation, with all parameters free.
+    """Return the unexplained share of the forces' variation, with all parameters free.
 
     Infinite where the joints have no poses.
     """
@@ -320,6 +324,7 @@ def _paths(robot: Manipulator, s: _Samples) -> Iterator[Array]:
 
 
 def _residual(robot: Manipulator, pose: Array, s: _Samples) -> float:
+    """Return the share of the forces' variation that a machine's model leaves unexplained."""
     good = np.isfinite(pose).all(axis=1)
     if good.mean() < 1.0 - _MOST_LOST:
         return np.inf

@@ -53,7 +53,7 @@ _DRY = ("coulomb", "stribeck")
 
 
 class Tolerance(NamedTuple):
-    """The usual size of a fault, 0 where it is not known, and the size up to which it is none."""
+    """The usual size of a fault, 0 if unknown, and the size up to which it is negligible."""
 
     usual: float = 0.0
     negligible: float = 0.0
@@ -119,18 +119,22 @@ class Family:
 
 
 def _forces(model: Model) -> Sequence[str]:
+    """Return the names of the machine's drive forces."""
     return model.robot.force_names
 
 
 def _load(m: FittedMotion) -> Array:
+    """Return the forces (R, n) of the rigid bodies, without friction and payload."""
     return m.forces(of=["base"])
 
 
 def _stribeck(share: float, m: FittedMotion) -> Array:
+    """Return columns (R, n, n) of Stribeck friction, at a share of the usual speed."""
     return diagonal(m.direction * np.exp(-((m.states.joint_rates / (share * m.usual)) ** 2)))
 
 
 def _elasticity(m: FittedMotion) -> Array:
+    """Return columns (R, n, n) by which elastic drives let joints lag behind their motors."""
     # The motor, where friction mostly is, is ahead of its joint by what the load deflects: the
     # joint is that much behind what was measured.
     load = _load(m)
@@ -143,6 +147,7 @@ def _elasticity(m: FittedMotion) -> Array:
 
 
 def _drift(m: FittedMotion) -> Array:
+    """Return columns (R, n, 2 n) of Coulomb friction and offset that grow with time."""
     later = m.along[:, None]
     return np.concatenate([diagonal(later * d) for d in (m.direction, m.direction**0)], axis=-1)
 
@@ -158,6 +163,7 @@ def _payload(m: FittedMotion) -> Array:
 
 
 def _weight(m: FittedMotion) -> Array:
+    """Return the forces' column (R, n, 1) of the bodies' and payload's weight."""
     standstill = {
         name: np.zeros_like(getattr(m.states, name))
         for name in ("joint_rates", "joint_accelerations", "velocity", "acceleration")
@@ -167,12 +173,14 @@ def _weight(m: FittedMotion) -> Array:
 
 
 def _passive_legs(model: Model) -> Sequence[str]:
+    """Return the part of the machine to which each passive joint belongs."""
     return [
         "the platform" if j.leg is None else f"leg {j.leg}" for j in passive_joints(model.robot)
     ]
 
 
 def _passive(m: FittedMotion) -> Array:
+    """Return columns (R, n, k) of friction in the passive joints."""
     s = m.states
     return np.asarray(evaluate_unchecked(m.model.robot, "passive_friction", s.pose, s.velocity))
 
@@ -216,7 +224,7 @@ _ROTORS = Family(
 
 
 def families_of(model: Model) -> tuple[Family, ...]:
-    """Return the faults that are told by name; a wrong scale is one actuator's, each is tried.
+    """Return the families of faults that are searched for, one for each actuator where they differ.
 
     Motors' inertia is tried where the model has none and no other value takes it in, as a ram's.
     """
@@ -237,7 +245,7 @@ def families_of(model: Model) -> tuple[Family, ...]:
 
 
 def _ratio(joints: Sequence[int]) -> Family:
-    """Return the fault of joints that move more than the log says, by forces that are less."""
+    """Return the family of wrong ratios: joints move more than logged, forces are smaller."""
     some = list(joints)
 
     def columns(m: FittedMotion) -> Array:
@@ -259,6 +267,7 @@ def length_tolerance(robot: Manipulator) -> Tolerance:
 
 
 def _zero(robot: Manipulator, i: int) -> Family:
+    """Return the family of faults of a joint's zero position."""
     joint, leg = slice(i, i + 1), robot.legs[i]
     slides = leg.joint.unit == "m"
     usual = _ZERO_OF_SLIDE * leg.size if slides else _ZERO_OF_CRANK
@@ -274,6 +283,7 @@ def _zero(robot: Manipulator, i: int) -> Family:
 
 
 def _geometry(robot: Manipulator, legs: Sequence[int]) -> Family:
+    """Return the family of faults of legs' lengths, m."""
     lengths = lengths_of(robot)
     places = [k for k, (leg, _) in enumerate(lengths) if leg in legs]
     labels = [f"leg {lengths[k][0] + 1}" for k in places]
@@ -287,6 +297,7 @@ def _geometry(robot: Manipulator, legs: Sequence[int]) -> Family:
 
 
 def _scale(i: int) -> Family:
+    """Return the family of faults of a force channel's scale."""
     actuator = slice(i, i + 1)
     return Family(
         "scale",
@@ -300,7 +311,7 @@ def _scale(i: int) -> Family:
 
 @dataclass(frozen=True)
 class FaultColumns:
-    """A model with the columns of faults behind its own.
+    """A model with further columns for faults.
 
     `values` (p,) are those of the fit, `begin` and `end` the times of the log, s; `usual` (n,),
     `stride` and `cutoff` are those of `FittedMotion`.
@@ -324,7 +335,7 @@ class FaultColumns:
 
     @property
     def extended_model(self) -> Model:
-        """The model with all columns behind its own."""
+        """The model with the columns of all faults appended."""
         count = self.places[-1].stop - len(self.model.names)
         return extend_model(self.model, count, self.matrix)
 

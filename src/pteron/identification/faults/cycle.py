@@ -112,4 +112,5 @@ class ReferenceCycle:
 
 
 def _complete_motion(robot: Manipulator, motion: Motion) -> FullMotion:
+    """Return a planned motion with its joint coordinates, rates and accelerations."""
     return FullMotion.from_platform(robot, motion.pose, motion.velocity, motion.acceleration)

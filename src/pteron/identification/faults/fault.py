@@ -140,7 +140,7 @@ def _format_size(size: float, angle: bool = False) -> str:
 
 
 def is_half(delay: float, deviation: float, step: float) -> bool:
-    """Say whether a delay of forces, or of positions (below 0), is half a step of the log; all s.
+    """Return whether a delay of forces, or of positions (below 0), is half a step; all in s.
 
     It may be off by two standard deviations, but not so far that none or a whole step is nearer.
     """
@@ -149,7 +149,7 @@ def is_half(delay: float, deviation: float, step: float) -> bool:
 
 
 def describe_held_forces(delay: float) -> str:
-    """Return the words, without a full stop, for a delay, s, of forces that are held."""
+    """Return the clause on a delay, s, by zero-order hold of the forces."""
     late, early = ("forces", "positions")[:: 1 if delay > 0.0 else -1]
     return _SAMPLING.format(late=late, early=early, size_ms=1e3 * abs(delay))
 
@@ -197,7 +197,7 @@ class IsolatedFault(Result):
 
     @property
     def is_half_sample_delay(self) -> bool:
-        """Whether it is the half step by which forces that are held differ from positions."""
+        """Whether the delay is the half step by which a zero-order hold shifts forces."""
         return self.fault == "delay" and abs(self.sizes[0]) <= _HALF_STEP[1] * self.step
 
     @property
@@ -220,13 +220,13 @@ class IsolatedFault(Result):
 
     @property
     def text_without_remedy(self) -> str:
-        """The fault without a remedy: another one, which is mended first, may be all there is."""
+        """The sentence without a remedy: the fault may be an effect of the fault before it."""
         return (
             f"{self._sentence()}{self._equivalents()}, or what is named before looks so: mend that."
         )
 
     def as_dict(self) -> dict[str, Any]:
-        """Return it as plain data."""
+        """Return the fault as plain data."""
         return {
             **fields_as_json(self, "fault message labels sizes"),
             "standard_deviations": [None if np.isnan(v) else float(v) for v in self.deviations],
@@ -236,17 +236,18 @@ class IsolatedFault(Result):
         }
 
     def _equivalents(self) -> str:
-        """Return, in brackets, the other faults that explain the residuals as well."""
+        """Return, in parentheses, the other faults that explain the residuals equally well."""
         if not self.as_well:
             return ""
         return f" (as well explained by: {', '.join(_IN_WORDS[name] for name in self.as_well)})"
 
     def _leg_size(self, label: str) -> float:
-        """Return the size of all errors of one label together."""
+        """Return the Euclidean norm of all sizes with a label."""
         parts = [size for size, name in zip(self.sizes, self.labels, strict=False) if name == label]
         return float(np.linalg.norm(parts))
 
     def _sentence(self) -> str:
+        """Return a sentence that states the fault with its size and error."""
         first, key = (
             float(self.sizes[0]),
             "sampling" if self.is_half_sample_delay else str(self.fault),

@@ -115,7 +115,7 @@ class FittedMotion:
         return self._slopes_along(changes)
 
     def give_slopes(self, motion: Sequence[Array]) -> Array:
-        """Return slopes (R, n, n) of forces as each joint is behind what was measured.
+        """Return slopes (R, n, n) of forces with respect to a lag of each joint.
 
         Joints are behind by a `motion`: its coordinates, rates and accelerations, (R, n) each.
         """
@@ -129,6 +129,7 @@ class FittedMotion:
         return self._interpolate_rows(np.stack(columns, axis=-1))
 
     def _slopes_along(self, changes: Array) -> Array:
+        """Return slopes (R, n, k) of forces along changes (k, g) of the geometry's numbers."""
         columns = [
             (self._forces_at(self._geometry + _STEP * change) - self._reference_forces) / _STEP
             for change in changes
@@ -136,6 +137,7 @@ class FittedMotion:
         return self._interpolate_rows(np.stack(columns, axis=-1))
 
     def _interpolate_rows(self, columns: Array) -> Array:
+        """Return columns at all rows (R, ...), by splines between the sampled rows."""
         rows = len(self.states)
         if len(self._sampled_rows) == rows:
             return columns
@@ -152,6 +154,7 @@ class FittedMotion:
 
     @cached_property
     def _geometry(self) -> Array:
+        """The numbers (g,) of the machine's geometry, as in its file."""
         return np.array(numbers(self.model.robot))
 
     @cached_property
@@ -163,15 +166,17 @@ class FittedMotion:
 
     @cached_property
     def _kernels(self) -> tuple[Kernel, ...]:
+        """The kernels of a Newton step, the platform's motion and inverse dynamics."""
         outputs = "newton_step", "platform_motion", "inverse_dynamics"
         return tuple(compile(self.model.robot, what, "vm", grade="general") for what in outputs)
 
     @cached_property
     def _reference_forces(self) -> Array:
+        """The forces at the sampled rows, with the geometry of the machine's file."""
         return self._forces_at(self._geometry)
 
     def _forces_at(self, geometry: Array, *added: Array) -> Array:
-        """Return the forces by another geometry, and with some motion added to the joints'.
+        """Return the forces with another geometry, and with a motion added to the joints'.
 
         Another geometry puts the platform elsewhere, as the joints are what was measured.
         """

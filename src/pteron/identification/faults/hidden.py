@@ -35,7 +35,7 @@ def hidden_faults(
     noise: Array,
     other: ReferenceCycle,
 ) -> list[FaultName]:
-    """Return the faults that the equations leave open, beside the noise (n,) of the forces.
+    """Return the faults that the equations cannot show beyond the noise (n,) of the forces.
 
     `other` is another motion than that of the logs. The clock and the scale of one force are left
     open if their column depends on the model's columns, but for a part below the noise. Zeros,
@@ -69,7 +69,7 @@ def hidden_faults(
 
 
 def _usual_sizes(family: Family, motion: FittedMotion) -> Array | None:
-    """Return the usual sizes of a fault (k,); None where such a fault is not sought."""
+    """Return the usual sizes of a fault (k,); None if it has none."""
     load = motion.forces(of=["base"]).std(axis=0)
     if family.name == "elasticity":
         compliance = motion.states.joint_accelerations.std(axis=0) / np.maximum(load, 1e-300)
@@ -85,7 +85,7 @@ def _usual_sizes(family: Family, motion: FittedMotion) -> Array | None:
 def _largest_error(
     unexplained: Array, error: Array, usual: Array, other: ReferenceCycle, motion: FittedMotion
 ) -> float:
-    """Return the error of another motion's forces, percent, by a usual fault that stays hidden.
+    """Return another motion's error of forces, percent, by a usual fault that is not detectable.
 
     `unexplained` (N, k) are a fault's columns over the noise, without what the model's take in;
     `error` (R, n, k) is that of the other motion's forces per unit of its sizes, and `usual` (k,)

@@ -101,7 +101,7 @@ class FaultIsolation(Result):
 
     @property
     def causes(self) -> tuple[str, ...]:
-        """All that shows in a sentence each: log, scale, then machine, as to be mended."""
+        """A sentence for each fault, in the order of repair: log, scale, machine."""
         distorted = any(fault.distorts for fault in self.log)
         of_file = [] if self.factor == 1.0 else [_OF_FACTOR.format(factor=self.factor)]
         ranked = sorted(self.faults, key=lambda fault: ORDER.index(fault.fault))
@@ -114,7 +114,7 @@ class FaultIsolation(Result):
 
     @property
     def expected_error(self) -> Array:
-        """Expected error of such a cycle's forces, in percent (n,)."""
+        """Expected error of the forces of the reference cycle, in percent (n,)."""
         return np.asarray(np.hypot(self.uncertain, self.spoiled))
 
     @property
@@ -128,7 +128,7 @@ class FaultIsolation(Result):
         return any(fault.understates for fault in self.faults)
 
     def as_dict(self) -> dict[str, Any]:
-        """Return it as plain data."""
+        """Return the isolation as plain data."""
         shares = {"uncertain": self.uncertain, "spoiled": self.spoiled, "off": self.expected_error}
         return fields_as_json(self, "tried why_not cannot_be_told=hidden faults") | {
             "log": [fault.as_dict() for fault in self.log],
@@ -190,6 +190,7 @@ def _isolate_in_parts(
     known: Mapping[str, float],
     drawn: DrawnValues | None,
 ) -> FaultIsolation:
+    """Return the faults that the residuals of a fit to parts of a log show."""
     columns = parts[0].model
     noise = np.mean([part.how.force_noise for part in parts], axis=0)
 
@@ -246,7 +247,7 @@ def _found_faults(
     estimate: Estimate,
     noise: Array,
 ) -> tuple[Estimate, list[FoundFault]]:
-    """Return the fit without faults, and the faults that residuals show beside each other."""
+    """Return the fit without faults, and the faults that residuals show together."""
     columns = parts[0].model
     largest = max(float(np.abs(part.log.forces).max()) for part in parts)
     exact = np.abs(estimate.residuals).max() < ROOT_OF_ROUNDING * largest
@@ -290,7 +291,7 @@ def _named_faults(
 def _wrong_gain(
     factor: Factor, known: tuple[str, ...], faults: Sequence[IsolatedFault], count: int
 ) -> IsolatedFault | None:
-    """Return the fault of a factor of all forces, by known values; None if it is one."""
+    """Return the fault of a common factor of all forces; None if the factor may be 1."""
     # A slow clock makes all inertia too small, that of known rotors too.
     slow = [1.0 + float(fault.sizes[0]) for fault in faults if fault.fault == "clock"]
     if not (factor.wrong and all(factor.times(s).wrong for s in slow)):
@@ -362,7 +363,7 @@ def _search_families(
 def _delay(
     parts: Sequence[SearchedPart], observe: Callable[[Sequence[SearchedPart]], Observations]
 ) -> tuple[FoundFault | None, list[SearchedPart]]:
-    """Return the whole delay of the logs' forces, None if none shows, and the parts without it."""
+    """Return the total delay of the logs' forces, None if insignificant, and parts without it."""
     late, shifted = None, list(parts)
     for _ in range(_ROUNDS):
         _, found_faults = _search_families((DELAY,), shifted, observe)

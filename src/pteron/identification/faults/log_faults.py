@@ -83,7 +83,7 @@ class LogFault:
     distorts: bool
 
     def as_dict(self) -> dict[str, object]:
-        """Return it as plain data."""
+        """Return the fault as plain data."""
         return fields_as_json(self, "fault message size distorts")
 
 
@@ -139,7 +139,7 @@ def log_faults(
 
 
 def _merge_limit_sentences(sentences: Sequence[str]) -> str:
-    """Return the first of sentences on forces at a limit, with the names of the other forces."""
+    """Return the first sentence on a force at its limit, with the names of the other forces."""
     first = sentences[0].rstrip(".")
     names = dict.fromkeys(sentence.partition(" ")[0] for sentence in sentences[1:])
     others = ", ".join(name for name in names if not first.startswith(f"{name} "))
@@ -172,7 +172,7 @@ def _plateaus(log: Log, noise: Array) -> tuple[str, ...]:
 
 
 def delay_fault(delay: float, deviation: float) -> LogFault:
-    """Return the fault of forces that are so late, s; it is taken out."""
+    """Return the fault of delayed forces (s), which is corrected."""
     late, early = ("forces", "positions")[:: 1 if delay > 0.0 else -1]
     said = (
         f"The {late} are {1e3 * abs(delay):.3g} ms (+- {2e3 * deviation:.1g}) late for the {early}"
@@ -197,7 +197,7 @@ _PAUSE = 0.02
 
 
 def sampling_jitter(log: Log, how: Preprocessing) -> tuple[float, float, float]:
-    """Return the deviation of sampling times, s, how clear it is, and its share of the noise.
+    """Return the jitter of sampling times (s), its significance, and its share of the noise.
 
     Where samples are taken dt off, positions are v dt off: joints that move have it in common.
     Eighth differences e of positions keep that and nothing of a smooth motion. The mean of

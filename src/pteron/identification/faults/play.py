@@ -44,7 +44,7 @@ class PlayRecord(NamedTuple):
 
 
 class Knocks(NamedTuple):
-    """How much larger the residuals of joints are where their loads change direction."""
+    """The ratio by which joints' residuals are larger where their loads change direction."""
 
     looked: NDArray[np.bool_]
     """(n,); False where the load changes direction too seldom to tell."""
@@ -56,7 +56,7 @@ class Knocks(NamedTuple):
 
 
 def backlash_signature(records: Sequence[PlayRecord], band: float) -> Knocks:
-    """Return what shows play in joints' drives, and of which of them enough is seen to tell.
+    """Return the signature of backlash in joints' drives, and the joints with enough data.
 
     Windows' mean squares are ranked (Mann and Whitney's test, over all joints, each in units of its
     usual one), and medians compared, so that single outliers, or a few of these changes that
@@ -84,7 +84,7 @@ def backlash_signature(records: Sequence[PlayRecord], band: float) -> Knocks:
 
 
 def _windows(records: Sequence[PlayRecord], band: float, joint: int) -> tuple[Array, Array, float]:
-    """Return mean squares of windows as a load changes direction, of others, and the first's share.
+    """Return mean squares of windows at load reversals and elsewhere, and the share of the former.
 
     A joint moves all through a window.
     """

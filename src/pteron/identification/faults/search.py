@@ -248,7 +248,7 @@ def _usual_error_share(size: Array, covariance: Array, mix: Array, model: FaultC
 
 
 def _is_possible(fault: FoundFault, model: FaultColumns, fit_noise: Array, floor: Array) -> bool:
-    """Say whether the sizes are possible: friction must brake, errors of lengths be small.
+    """Return whether the sizes are possible: friction brakes, errors of lengths are small.
 
     A fault that varies freely with time must leave noise alone, `floor` (n,), or a small part of
     the residuals `fit_noise` (n,) without it.

@@ -32,7 +32,7 @@ class Recorded(Protocol):
         """The description of the log: units, gains, what its columns hold."""
 
     def with_gains(self, description: Description, finding: Finding) -> Self:
-        """Return the log with the gains of a description; `finding` tells a person of them."""
+        """Return the log with the gains of a description, and a finding that states it."""
 
 
 AnyLog = TypeVar("AnyLog", bound=Recorded)
@@ -45,7 +45,7 @@ _RATED = ("ratio", "rated_torque")
 
 
 def joint_factors(joints: Group, robot: Manipulator, source: str) -> NDArray[np.float64]:
-    """Return factors (n,) from the motors' turns or counts to joint coordinates; else 1.
+    """Return factors (n,) from motor angles or counts to joint coordinates; else 1.
 
     `joints` are the log's position columns with their units.
 

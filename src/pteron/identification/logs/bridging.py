@@ -69,7 +69,7 @@ def fill_gaps(log: Log) -> Log:
 
 
 def _insert_samples(log: Log, missing: NDArray[np.int64]) -> Log:
-    """Return a stretch with `missing` (T - 1,) samples put in between its rows."""
+    """Return a stretch with `missing` (T - 1,) samples inserted between its rows."""
     places = np.repeat(np.arange(log.rows - 1), missing)
     nth = np.concatenate([np.arange(1, k + 1) for k in missing[missing > 0]] or [np.zeros(0)])
     share = nth / (missing[places] + 1.0)
@@ -113,7 +113,7 @@ def _interpolate_locally(
 
 
 def _side(ticks: Array, values: Array, degree: int) -> int:
-    """Return how many rows on each side predict a row best, by polynomials of a degree.
+    """Return the number of rows on each side with which polynomials predict a row best.
 
     Many rows make less of the noise, few follow a motion that is fast for its sampling.
     """

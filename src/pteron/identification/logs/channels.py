@@ -45,6 +45,7 @@ class _Run:
 
     @property
     def rows(self) -> int:
+        """The number of rows in the stretch."""
         return self.stop - self.start
 
 
@@ -73,7 +74,7 @@ class Channel:
         self._runs: list[_Run] = []
 
     def take(self, values: Values, joints: Values) -> None:
-        """Look at the next piece: this channel, (rows,), and all joint coordinates, (rows, n)."""
+        """Examine the next piece: this channel, (rows,), and all joint coordinates, (rows, n)."""
         self._least = min(self._least, float(values.min()))
         self._greatest = max(self._greatest, float(values.max()))
         if self._limits is not None:
@@ -104,7 +105,7 @@ class Channel:
         self._rows += len(values)
 
     def finish(self) -> tuple[Finding, ...]:
-        """Return what was found, once all pieces are taken.
+        """Return the findings, after all pieces.
 
         Raises
         ------
@@ -146,9 +147,11 @@ class Channel:
         return tuple(findings)
 
     def _is_frozen(self, run: _Run) -> bool:
+        """Return whether other joints move too far in a stretch for the channel to be at rest."""
         at_the_end = run.start == 0 or run.stop == self._rows
         moved = self._moved * (_RESTED if at_the_end else 1.0)
         return bool((run.greatest - run.least > moved).any())
 
     def _make_finding(self, kind: Kind, message: str, start: int, count: int) -> Finding:
+        """Return a finding about this channel; `start` counts rows from 0."""
         return Finding(kind, f"{self._source}: {message}", start + 1, self._column, count)

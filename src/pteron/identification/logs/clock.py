@@ -84,7 +84,7 @@ class Clock:
     _days: int = field(default=0, repr=False)
 
     def fresh(self) -> Clock:
-        """Return the clock as before the first row."""
+        """Return the clock reset to before the first row."""
         return replace(self, _origin=None, _last=0, _days=0)
 
     def seconds(self, table: Table) -> Values:
@@ -134,6 +134,7 @@ class Clock:
         return None if cells.has_nulls() or not cells.dtype.is_integer() else cells
 
     def _parse_timestamps(self, table: Table, name: str) -> Values:
+        """Return times (N,), s, of a column of text; raise at the first cell that is not a time."""
         assert self.format is not None
         stamps = _nanoseconds(table.frame[name], self.format)
         if stamps.has_nulls():

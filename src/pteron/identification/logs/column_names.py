@@ -44,7 +44,7 @@ class ColumnNames:
     def incomplete(
         self, kind: Wanted, numbers: Sequence[int], families: Sequence[Mapping[int, str]]
     ) -> DataError:
-        """Return the error for columns that a file has not, or has not for all legs.
+        """Return the error for columns that a file lacks, entirely or for some legs.
 
         `families` are columns that are called alike, by number.
         """
@@ -68,7 +68,7 @@ class ColumnNames:
         )
 
     def ambiguous(self, kind: Wanted, choices: Sequence[Sequence[str]]) -> DataError:
-        """Return the error for columns that are as good as others; the first are shown declared."""
+        """Return the error for ambiguous columns, with a declaration of the first as an example."""
         names = [columns[0] for columns in choices] if len(choices) > 1 else choices[0]
         single = kind.table in ("time", "payload")
         entry = {"column": choices[0][0]} if single else {"columns": list(choices[0])}
@@ -82,7 +82,7 @@ class ColumnNames:
         )
 
     def _example(self, kind: Wanted) -> str:
-        """Return a declaration with columns that are called like nothing else."""
+        """Return an example of a declaration, with columns whose names have no other meaning."""
         others = [stem for stem in _STEMS if stem != kind.stem]
         free = [
             name

@@ -96,7 +96,7 @@ def check_names(repeated: Mapping[str, str], source: str) -> None:
 
 
 def repeated_times(repeated: Mapping[str, str], columns: Columns, source: str) -> tuple[str, ...]:
-    """Return the columns of times beside the first, of its name, where each channel has its own.
+    """Return the further columns of times with the first's name, where each channel has its own.
 
     `repeated` are the names that a file has more than once, as they are told apart.
 
@@ -134,7 +134,7 @@ def as_read(
     clock: Clock,
     again: Sequence[str],
 ) -> tuple[Finding, ...]:
-    """Return how a file was read, in one finding, where that is neither documented nor declared.
+    """Return a finding that states how a file was read, if not documented or declared.
 
     `found` is what is unlike a plain CSV file, `again` are the `repeated_times`.
     """
@@ -158,4 +158,5 @@ def as_read(
 
 
 def _twice(name: str, source: str) -> DataError:
+    """Return the error that two columns have the same name."""
     return DataError(f"{source}: two columns are called {shorten(name)}; rename or remove one")

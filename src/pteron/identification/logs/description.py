@@ -60,12 +60,14 @@ _Class = TypeVar("_Class", bound=type)
 
 
 def _not_zero(value: float) -> float:
+    """Return the value; raise where it is zero."""
     if value == 0.0:
         raise ValueError("0 given: its motor would not move the joint")
     return value
 
 
 def _check_rising(pair: tuple[float, float]) -> tuple[float, float]:
+    """Return the pair [low, high]; raise unless low is below high."""
     low, high = pair
     if not low < high:
         raise ValueError(f"{low:g} is not below {high:g}; give [low, high]")
@@ -149,6 +151,7 @@ class KnownPayload:
 
     @model_validator(mode="after")
     def _real(self) -> KnownPayload:
+        """Return the payload with its first moment; raise unless it can be a real body's."""
         if self.center_of_mass is not None:
             moment = tuple(self.mass * x for x in self.center_of_mass)
             object.__setattr__(self, "first_moment", moment)
@@ -258,6 +261,7 @@ class Description:
     @field_validator("payload", mode="before")
     @classmethod
     def _whole_payload(cls, payload: Any) -> Any:
+        """Return the payload; raise where only part of its inertia is stated."""
         if not isinstance(payload, dict) or "mass" not in payload:
             return payload
         center, moment = "center_of_mass" in payload, "first_moment" in payload
@@ -270,6 +274,7 @@ class Description:
 
     @model_validator(mode="after")
     def _agrees(self) -> Description:
+        """Return the description; raise where its columns, times or units contradict each other."""
         named = [self.time_column, self.payload_column]
         for several in (self.joint_columns, self.force_columns, self.pose_columns):
             named += several or ()

@@ -45,7 +45,7 @@ def find_description(log_path: str | Path) -> Path | None:
 
 
 def _describes_log(path: Path) -> bool:
-    """Say whether a file is there, and describes no manipulator."""
+    """Return whether a file exists and does not describe a manipulator."""
     if not path.is_file():
         return False
     try:
@@ -160,7 +160,7 @@ def collect_undeclared(
 
 
 def _tables(lines: str) -> dict[str, Any]:
-    """Return the tables that a refusal ends in; none if it ends otherwise."""
+    """Return the TOML tables of an error message's last lines; empty if they are not TOML."""
     try:
         return tomllib.loads(lines)
     except tomllib.TOMLDecodeError:
@@ -168,7 +168,7 @@ def _tables(lines: str) -> dict[str, Any]:
 
 
 def _add_tables(about: Description, added: dict[str, Any]) -> Description:
-    """Return a description with more tables, as its file has them."""
+    """Return a description with further tables."""
     tables = _plain(about)
     for table, entries in added.items():
         if table == "csv":
@@ -179,7 +179,7 @@ def _add_tables(about: Description, added: dict[str, Any]) -> Description:
 
 
 def _plain(about: Description) -> dict[str, Any]:
-    """Return a description as plain data, by the keys of its file."""
+    """Return a description as plain data, with the keys of its file."""
     return dict(
         TypeAdapter(Description).dump_python(about, mode="json", by_alias=True, exclude_none=True)
     )

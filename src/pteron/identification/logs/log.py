@@ -305,6 +305,7 @@ class Log(OfLog):
 
     @property
     def _symbols(self) -> tuple[ActuatedJoint, ...]:
+        """The joints' symbols; sliders where the log names none."""
         return self.symbols or (SLIDER,) * self.joints.shape[1]
 
     def place(self, index: int) -> str:
@@ -330,10 +331,11 @@ class Log(OfLog):
         return replace(self, forces=forces, description=description, findings=findings)
 
     def drop_samples(self, rows: NDArray[np.bool_]) -> Log:
-        """Return the samples without some, (T,): where they were is a gap."""
+        """Return the log without samples where `rows` (T,) is true; gaps replace them."""
         return replace(self, rows_in_file=rows_of(self))._take_samples(np.flatnonzero(~rows))
 
     def _take_samples(self, rows: slice | NDArray[np.int64]) -> Log:
+        """Return the log's samples at rows, a slice or their numbers."""
         arrays = {name: getattr(self, name) for name in _ARRAYS}
         changed: dict[str, Any] = {
             name: values[rows] for name, values in arrays.items() if values is not None
@@ -344,7 +346,7 @@ class Log(OfLog):
 
 
 def join_logs(pieces: Sequence[Log]) -> Log:
-    """Return pieces that follow each other as one log, with what is said of the first."""
+    """Return consecutive pieces as a single log, with the metadata of the first."""
     if len(pieces) > 1 and any(piece.rows_in_file is not None for piece in pieces):
         pieces = [replace(piece, rows_in_file=rows_of(piece)) for piece in pieces]
     first = pieces[0]
@@ -395,7 +397,7 @@ def gaps(time: NDArray[np.float64], step: float) -> NDArray[np.bool_]:
 
 
 def are_apart(before: NDArray[np.float64], after: NDArray[np.float64], step: float) -> bool:
-    """Say whether samples are missing between times and those that follow."""
+    """Return whether samples are missing between consecutive times."""
     near = before[-_AROUND:]
     return bool(gaps(np.concatenate([near, after[:_AROUND]]), step)[len(near) - 1])
 

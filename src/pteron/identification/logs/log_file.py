@@ -146,7 +146,7 @@ class LogFile(OfLog):
             yield buffer
 
     def _remove_spikes(self, progress: Callable[[int], None] | None) -> Iterator[Log]:
-        """Yield pieces without spikes; whether a row is one, its neighbours' piece may tell."""
+        """Yield pieces without spikes, which are judged with the neighbouring pieces."""
         c = self._columns
         spikes = Spikes((*c.joints.printable_names, *c.forces.printable_names), self.source)
         previous: Log | None = None
@@ -168,7 +168,7 @@ class LogFile(OfLog):
         self.findings += spikes.findings()
 
     def _check_pieces(self) -> Iterator[Log]:
-        """Yield the file in pieces, in SI units; all findings but spikes stand behind the last."""
+        """Yield the file in pieces, in SI units; the last piece has all findings but spikes."""
         stamps = TimeStamps(self._step, self._columns.time.printable_names[0], self.source)
         channels = self._channels()
         n = self._robot.joint_count
@@ -213,6 +213,7 @@ class LogFile(OfLog):
             yield np.concatenate(blocks)
 
     def _piece(self, values: Values, first: int) -> Log:
+        """Return a log of rows read from the file, in SI units; raise on impossible numbers."""
         c, source = self._columns, self.source
         edges = np.cumsum([len(group.names) for group in self._groups])[:-1]
         joints, forces, pose, payload = (
@@ -287,6 +288,7 @@ class LogFile(OfLog):
         return clock, step
 
     def _channels(self) -> list[Channel]:
+        """Return a record for each column of joints and forces, which finds channels that stop."""
         spans, source, c = joint_spans(self._robot), self.source, self._columns
         limits = self.description.limits or (None,)
         joints = [
@@ -302,7 +304,7 @@ class LogFile(OfLog):
 
 
 def _to_si(values: Values, unit: str) -> Values:
-    """Return lengths in m, angles in rad, anything else as it is."""
+    """Return lengths in m, angles in rad, and other values unchanged."""
     return np.radians(values) if unit == "deg" else values / _PER_METRE.get(unit, 1.0)
 
 

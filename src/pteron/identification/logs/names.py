@@ -114,17 +114,17 @@ def parse_column_name(name: str) -> Called | None:
 
 
 def means(word: str, stem: str) -> bool:
-    """Say whether a word may stand for the documented one."""
+    """Return whether a word is a synonym of the documented word."""
     return word in _WORDS.get(stem, (stem,))
 
 
 def unit_called(text: str, si: str) -> str | None:
-    """Return the unit that is spelled like this, if it is one of what is measured in `si`."""
+    """Return the unit with this spelling for quantities in `si`; None if unknown."""
     return UNITS[si].get(text.strip().lower())
 
 
 def stamp_columns(names: tuple[str, ...]) -> list[tuple[str, ...]]:
-    """Return the columns of the time of measurement in a message of ROS: one, or s and ns.
+    """Return the columns of the stamps in a ROS message: a single column, or s and ns.
 
     Examples
     --------

@@ -125,4 +125,5 @@ def _jump(log: Log, joint: NDArray[np.float64], turns: bool) -> list[tuple[float
 
 
 def _is_turn(size: float) -> bool:
+    """Return whether the size of a jump is a full turn, rad."""
     return abs(size - 2.0 * np.pi) <= _ALIKE * size

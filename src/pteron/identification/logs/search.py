@@ -74,7 +74,7 @@ class ColumnSearch(ColumnNames):
         declared: Sequence[str] | None,
         numbers: Sequence[int],
     ) -> Group:
-        """Return the columns wanted, one for each number, that are declared or called alike."""
+        """Return the columns of quantities, one for each number, by declaration or by name."""
         if declared is not None:
             columns = self.declared_columns(wanted[0].table, declared)
             return self._group_by_unit(wanted, columns, guessed=False)
@@ -93,7 +93,7 @@ class ColumnSearch(ColumnNames):
     def _group_by_unit(
         self, wanted: Sequence[Wanted], columns: Sequence[str], *, guessed: bool
     ) -> Group:
-        """Return columns of what is wanted with their units; lengths have one, and angles."""
+        """Return columns with their units; all lengths share a unit, and so do all angles."""
         units, said, is_stated = dict[str, str](), True, guessed
         for kind in {member.unit: member for member in wanted}.values():
             alike = zip(columns, wanted, strict=True)
@@ -106,7 +106,7 @@ class ColumnSearch(ColumnNames):
         return Group(tuple(columns), each, said, is_stated, guessed)
 
     def matches(self, kind: Wanted) -> Iterator[tuple[str, Called]]:
-        """Yield the columns that are called by a word for it, in a unit of it if in any."""
+        """Yield the columns whose names are a synonym of a quantity, with a fitting unit if any."""
         for name in self.names:
             parts = parse_column_name(name)
             if (
@@ -117,7 +117,7 @@ class ColumnSearch(ColumnNames):
                 yield name, parts
 
     def family(self, kind: Wanted, numbers: Sequence[int]) -> tuple[list[str], bool]:
-        """Return the columns of these numbers, 0 for none, and whether by another name."""
+        """Return the columns with these numbers (0: none), and whether they have another name."""
         families: dict[str, dict[int, str]] = {}
         for name, parts in self.matches(kind):
             if (parts.number is not None) == (numbers[0] > 0):
@@ -171,14 +171,14 @@ class ColumnSearch(ColumnNames):
         return self._group_by_unit(wanted, columns, guessed=guessed)
 
     def lone(self, kind: Wanted) -> list[str]:
-        """Return the column without a number that may be meant, if any."""
+        """Return the column without a number that fits, as a list; empty if there is none."""
         candidates = [name for name, parts in self.matches(kind) if parts.number is None]
         if len(candidates) > 1:
             raise self.ambiguous(kind, [[name] for name in candidates])
         return candidates
 
     def payload(self, declared: str | None) -> Group:
-        """Return the column that says when a payload is carried, if any."""
+        """Return the column that states when a payload is carried, if any."""
         candidates = [name for name in self.names if name.lower() == "payload"]
         if declared is not None:
             candidates = self.declared_columns("payload", [declared])
@@ -188,7 +188,7 @@ class ColumnSearch(ColumnNames):
         return Group(tuple(candidates), ("",) * len(candidates))
 
     def unit_of(self, name: str, kind: Wanted) -> str | None:
-        """Return the unit that a line of units says, or else the column's name; None for none.
+        """Return the unit from the line of units, else from the column's name; None without.
 
         A word such as current says another unit than the documented one; rho and force do not.
         """
@@ -236,7 +236,7 @@ class ColumnSearch(ColumnNames):
         return next(iter(units))
 
     def unit(self, kind: Wanted, named: str | None) -> str:
-        """Return the unit declared, else the one the file says, else the documented one."""
+        """Return the declared unit, else that in the file, else the documented unit."""
         if kind.declared and named and kind.declared != named:
             # Currents called F1 are the file's business; that the two differ must be said.
             message = (

@@ -163,6 +163,7 @@ def _size_of(robot: Manipulator) -> float:
 
 
 def _travel_of(leg: LegKind, robot: Manipulator) -> float | None:
+    """Return a bound on a slider's coordinate, m; infinity for a crank, None if it is endless."""
     if leg.joint.unit == "rad":
         return None if leg.goes_round else math.inf
     if leg.limits is not None or leg.reach_bound is None:
@@ -172,10 +173,12 @@ def _travel_of(leg: LegKind, robot: Manipulator) -> float | None:
 
 
 def _farthest(limits: tuple[float, float] | None) -> float:
+    """Return the larger absolute limit; 0 without limits."""
     return 0.0 if limits is None else max(abs(limit) for limit in limits)
 
 
 def _declare(contents: str, key: str, unit: str) -> str:
+    """Return advice to declare a unit in a TOML file, with the lines to write."""
     table, _, entry = key.partition("] ")
     said = declaration(table.removeprefix("["), **{entry: unit})
     return f"if the file holds {contents}, say so in a TOML file beside it:{said}"

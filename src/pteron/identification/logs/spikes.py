@@ -96,7 +96,7 @@ class _JointMotion:
         self._travel = np.maximum(travel, np.finfo(float).tiny)
 
     def is_pushed(self, start: int, stop: int) -> bool:
-        """Say whether joints are accelerated in some samples as they are not before and after.
+        """Return whether joints accelerate in some samples unlike before and after.
 
         They may stop in them, or start.
         """
@@ -115,17 +115,18 @@ class _JointMotion:
         return min(travel_before, travel_after) < _RESTS < _MOVES < max(travel_before, travel_after)
 
     def _travel_between(self, start: int, stop: int) -> float:
+        """Return the largest travel of a joint between two rows, in units of its usual travel."""
         return float((np.abs(self._joints[stop] - self._joints[start]) / self._travel).max())
 
 
 def _pushes(steps: Values, length: int) -> Values:
-    """Return how much more speed is gained in so many steps than in those before and after."""
+    """Return the gain of speed over `length` steps beyond that before and after."""
     gain = steps[length:] - steps[:-length]
     return np.abs(gain[length:-length] - (gain[: -2 * length] + gain[2 * length :]) / 2.0)
 
 
 def _groups(values: Values, share: float, least: Values | float) -> Mask:
-    """Return the samples between a jump and the jump back; none of so few that none is usual."""
+    """Return the mask of samples between a jump and the jump back; empty for short signals."""
     is_spike = np.zeros(len(values), dtype=bool)
     if len(values) < 2 * _WINDOW:
         return is_spike
@@ -171,7 +172,7 @@ class Spikes:
         self._too_many = False
 
     def find(self, joints: Values, forces: Values, inner: slice, first_row: int) -> Mask:
-        """Return which rows of a piece to leave out: none where they are too many.
+        """Return the mask of a piece's rows to drop; none if there are too many.
 
         `joints` and `forces` (T, n) have up to `MARGIN` rows more at each end; `inner` are the
         piece's own, of which the first is row `first_row` of the file, from 0.

@@ -173,7 +173,7 @@ class FourierFit:
     edge: ClassVar[int] = 0
 
     def series(self, log: Log) -> FittedSeries:
-        """Return the series of the log's positions, as the forces are late for them."""
+        """Return the Fourier series of the log's positions, delayed as its forces are."""
         series = fitted_series(log.time, log.joints, self.period, highest=self.cutoff)
         return series.later(self.delay)
 
@@ -191,7 +191,7 @@ class FourierFit:
         return Curve(series.coefficients, (q, dq, ddq), 0)
 
     def fastest(self, band: float) -> float | None:
-        """Return the cut-off or the band: a series ends where noise begins, and mixes nothing."""
+        """Return the highest frequency that passes, Hz: cut-off or band; None without a cut-off."""
         return None if self.cutoff is None else max(self.cutoff, band)
 
 
@@ -268,7 +268,7 @@ def _design(
 
 
 def _smooth_sections(time: Array, joints: Array) -> NDArray[np.bool_]:
-    """Return where a spline through samples without noise agrees with central differences."""
+    """Return the samples (T,) at which a spline and central differences agree."""
     spline = fitted_spline(time, joints, None)
     even = np.linspace(time[0], time[-1], len(time))
     rate = (len(even) - 1) / float(even[-1] - even[0])

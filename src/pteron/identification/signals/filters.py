@@ -107,7 +107,7 @@ def _spectrum(signal: Array) -> Array:
 
 
 def _grid(signal: Array) -> Array:
-    """Return the step (k,) of the grid that values stand on; 0 where there is none."""
+    """Return the quantisation step (k,) of signals; 0 where there is none."""
     steps = np.zeros(signal.shape[1])
     for k, values in enumerate(signal[:_GRID_LOOK].T):
         levels = np.unique(values)
@@ -122,7 +122,7 @@ def _grid(signal: Array) -> Array:
 
 
 def force_steps(forces: Array) -> Array:
-    """Return the step (n,) of the grid that forces' values stand on; 0 where there is none."""
+    """Return the quantisation step (n,) of the forces; 0 where there is none."""
     return _grid(forces)
 
 
@@ -201,7 +201,7 @@ def _least_risk(relative: Array, gains: Array, weights: Array) -> int:
 
 
 def bins_below(power: Array, share: float) -> int:
-    """Return how many frequencies of a spectrum (F, k) hold that share of every signal's power."""
+    """Return the number of frequencies of a spectrum (F, k) with a share of each signal's power."""
     total = np.maximum(power.sum(axis=0), np.finfo(float).tiny)
     return int((np.cumsum(power, axis=0) / total < share).sum(axis=0).max())
 
@@ -229,7 +229,7 @@ class Decimation:
         return 0 if self.factor == 1 else _HALF * self.factor
 
     def centers(self, rows: int) -> NDArray[np.int64]:
-        """Return the indices of the samples kept, of so many."""
+        """Return the indices of the samples after decimation, of so many rows."""
         return np.arange(self.margin, rows - self.margin, self.factor, dtype=np.int64)
 
     @cached_property
@@ -242,7 +242,7 @@ class Decimation:
         )
 
     def noise(self, used: Array) -> Array:
-        """Return the noise left of unit white noise on the samples (T, n) that are 1, not 0."""
+        """Return the deviation of filtered unit white noise on the samples (T, n) that are 1."""
         return np.asarray(np.sqrt(np.maximum(self._filter_channel(used, self.taps**2), 0.0)))
 
     def __call__(self, signal: Array) -> Array:
@@ -250,6 +250,7 @@ class Decimation:
         return self._filter_channel(signal, self.taps)
 
     def _filter_channel(self, signal: Array, taps: Array) -> Array:
+        """Return a signal (T, ...) filtered and decimated; empty if it is too short."""
         if self.factor == 1:
             return signal
         count = len(self.centers(len(signal)))

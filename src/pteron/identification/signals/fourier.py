@@ -44,6 +44,7 @@ class Projection:
 
     @cached_property
     def _normal(self) -> tuple[Array, bool]:
+        """The Cholesky factor of the normal equations of the fit."""
         bases = (self.basis(rows) for rows in row_blocks(len(self.time)))
         size = 2 * self.harmonics + 1
         normal = sum((basis.T @ basis for basis in bases), np.zeros((size, size)))

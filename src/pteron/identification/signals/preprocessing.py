@@ -195,6 +195,7 @@ class Preprocessing(Result):
         return self._rows(_UNSURE)
 
     def _rows(self, periods: float) -> int:
+        """Return the number of rows in so many periods of the fastest frequency that passes."""
         fastest = self.differentiator.fastest(self.band)
         if fastest is None:
             return 0
@@ -318,7 +319,7 @@ def _checked_series(log: Log, period: float | None) -> FittedSeries:
 
 
 def _is_series(series: FittedSeries, joints: Array) -> bool:
-    """Say whether a Fourier series leaves noise alone: jumps of acceleration take more terms."""
+    """Return whether a series leaves only noise of the positions as residuals."""
     least = LAST_DIGITS * np.ptp(joints, axis=0)
     return bool((series.noise <= np.maximum(_NOISE_ALONE * position_noise(joints), least)).all())
 
@@ -335,6 +336,7 @@ def _rate_spectrum(rates: Array, rate: float, series: FittedSeries | None) -> tu
 
 
 def _check_frequencies(settings: Processing, rate: float) -> None:
+    """Raise where a frequency in the settings is not below half the sampling rate."""
     for name in ("cutoff", "band"):
         value = getattr(settings, name)
         if value is not None and value >= rate / 2.0:

@@ -114,6 +114,7 @@ def blocks(pieces: Iterable[Log], margin: int, size: int, rate: float) -> Iterat
 
 
 def _flush_buffer(buffer: Log | None, margin: int) -> Iterator[Log]:
+    """Yield the buffer if it exceeds the margins at both ends."""
     if buffer is not None and buffer.rows > 2 * margin:
         yield buffer
 
@@ -129,6 +130,7 @@ def _stretches(piece: Log, rate: float) -> Iterator[Log]:
 
 
 def _continues(buffer: Log, following: Log, rate: float) -> bool:
+    """Return whether samples follow the buffer without a gap or a change of payload."""
     same = buffer.payload is None or (
         following.payload is not None and buffer.payload[-1] == following.payload[0]
     )

@@ -219,6 +219,7 @@ def home_mode(robot: Manipulator) -> int:
 def _no_pose(
     robot: Manipulator, joints: Array, lost: NDArray[np.bool_], source: str, first: int
 ) -> LogError:
+    """Return the error for the first sample without a pose, with a hint at its cause."""
     row = int(np.argmax(lost))
     values = ", ".join(f"{value:.4f}" for value in joints[row])
     followed = not closure_of(robot).closed_form
@@ -240,6 +241,7 @@ def _no_pose(
 
 
 def _check_regular(robot: Manipulator, pose: Array, source: str, first_row: int) -> None:
+    """Raise at the first pose that is singular or has a leg stretched or folded."""
     measures = {
         "a leg is all but stretched or folded": evaluate_unchecked(robot, "reach", pose)[1].min(-1)
     }
