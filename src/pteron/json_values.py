@@ -33,6 +33,11 @@ def fields_as_json(owner: object, *names: str) -> dict[str, Any]:
     return {key or name: _data(getattr(owner, name)) for key, _, name in pairs}
 
 
+def json_fields(**fields: object) -> dict[str, Any]:
+    """Return values as plain data, by their keys; see `fields_as_json` for what becomes of them."""
+    return {key: _data(value) for key, value in fields.items()}
+
+
 def _data(value: Any) -> Any:
     if hasattr(value, "tolist") or hasattr(value, "as_dict"):
         return value.tolist() if hasattr(value, "tolist") else value.as_dict()

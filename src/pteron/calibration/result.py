@@ -22,7 +22,7 @@ from pteron.calibration.measurements import (
 from pteron.calibration.observability import Observability
 from pteron.calibration.residuals import MachineSlopes
 from pteron.calibration.thresholds import OFF_TOLERANCES
-from pteron.json_values import fields_as_json
+from pteron.json_values import json_fields
 from pteron.legs import Reading
 from pteron.manipulator import Manipulator
 from pteron.manipulator.machine_record import machine_record
@@ -245,12 +245,22 @@ class Calibration(Result):
             "machine": machine_record(self.drawn),
             "calibrated_geometry": machine_record(self.robot)["geometry"],
             "values": value_records,
-            **fields_as_json(self.fit.guess, "zeros scales"),
+            **json_fields(zeros=self.fit.guess.zeros, scales=self.fit.guess.scales),
             "noise": self.noise,
-            **fields_as_json(self.observability, "rank shown=determined_count columns"),
+            **json_fields(
+                rank=self.observability.rank,
+                shown=self.observability.determined_count,
+                columns=self.observability.columns,
+            ),
             "certificate": self.observability.summary(),
-            **fields_as_json(self.observability, "unseen weak"),
-            **fields_as_json(self, "held_out findings verdict open_errors hidden_order"),
+            **json_fields(unseen=self.observability.unseen, weak=self.observability.weak),
+            **json_fields(
+                held_out=self.held_out,
+                findings=self.findings,
+                verdict=self.verdict,
+                open_errors=self.open_errors,
+                hidden_order=self.hidden_order,
+            ),
             "outliers": outliers,
         }
 

@@ -11,7 +11,7 @@ from pteron.cli.arguments import MachineArgument
 from pteron.cli.progress import spinner
 from pteron.cli.result import CommandResult
 from pteron.cli.terminal import is_terminal, plain, show, show_json, table
-from pteron.json_values import fields_as_json
+from pteron.json_values import json_fields
 
 if TYPE_CHECKING:
     from pteron.reduction import BaseParameters
@@ -141,7 +141,15 @@ def table1() -> CommandResult:
         computed_rows = computed()
     wrong = sum(not row.agrees for row in computed_rows)
     data = [
-        fields_as_json(r, "parameter kept printed computed agrees restored") for r in computed_rows
+        json_fields(
+            parameter=r.parameter,
+            kept=r.kept,
+            printed=r.printed,
+            computed=r.computed,
+            agrees=r.agrees,
+            restored=r.restored,
+        )
+        for r in computed_rows
     ]
     verdicts = {True: "yes", False: "[bold red]NO[/bold red]"}
     rows = (

@@ -13,7 +13,7 @@ from pteron.cli.progress import progress_bar, spinner
 from pteron.cli.result import CommandResult
 from pteron.cli.terminal import note, percent, plain, show, table, warn
 from pteron.errors import DataError, ModelError
-from pteron.json_values import fields_as_json
+from pteron.json_values import json_fields
 
 if TYPE_CHECKING:
     from pteron.kernels import Array
@@ -184,12 +184,12 @@ def _paving_data(
         "robot": paved.robot.name,
         "held": _angles(paved.robot, pose),
         "floors": floors,
-        **fields_as_json(paved, "inner=inner_volume outer=outer_volume unit"),
+        **json_fields(inner=paved.inner_volume, outer=paved.outer_volume, unit=paved.unit),
         "gap": paved.gap if paved.inner_volume else None,
         "complete": paved.complete,
         "boxes": {"inner": len(paved.inner), "undecided": len(paved.boundary)},
         "boundary": paved.boundary_shares,
-        "cube": cube and {**fields_as_json(cube, "edge center"), "proved": True},
+        "cube": cube and {**json_fields(edge=cube.edge, center=cube.center), "proved": True},
     }
 
 

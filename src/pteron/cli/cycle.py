@@ -15,7 +15,7 @@ from pteron.cli.progress import spinner
 from pteron.cli.result import CommandResult
 from pteron.cli.terminal import note, show
 from pteron.errors import DataError
-from pteron.json_values import fields_as_json
+from pteron.json_values import json_fields
 from pteron.tolerances import SAME
 
 if TYPE_CHECKING:
@@ -206,7 +206,10 @@ def _result(
         "quintic_duration": bound,
         "scale": getattr(motion, "scale", None),
         "peaks": [
-            fields_as_json(p, "quantity=name leg size unit limit share") | {"leg": p.leg or None}
+            json_fields(
+                quantity=p.name, leg=p.leg, size=p.size, unit=p.unit, limit=p.limit, share=p.share
+            )
+            | {"leg": p.leg or None}
             for p in largest
         ],
         "file": out,

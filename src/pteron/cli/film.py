@@ -11,7 +11,7 @@ from pteron.cli.result import CommandResult
 from pteron.cli.terminal import plain
 from pteron.errors import DataError
 from pteron.extras import expect_extra
-from pteron.json_values import fields_as_json
+from pteron.json_values import json_fields
 
 
 def film(
@@ -66,7 +66,13 @@ def film(
     data = {
         "robot": machine.name,
         "cycle": cycle,
-        **fields_as_json(written, "duration speed frames fps size"),
+        **json_fields(
+            duration=written.duration,
+            speed=written.speed,
+            frames=written.frames,
+            fps=written.fps,
+            size=written.size,
+        ),
         "file": str(written.path),
     }
     pace = "in real time" if written.speed == 1.0 else f"at {written.speed:.3g} times its speed"

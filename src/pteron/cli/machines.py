@@ -15,7 +15,7 @@ from pteron.cli.progress import spinner
 from pteron.cli.result import CommandResult
 from pteron.cli.terminal import complain, plain, show, table, warn, write
 from pteron.errors import ModelError, OutputError, PteronError
-from pteron.json_values import fields_as_json
+from pteron.json_values import json_fields
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -211,7 +211,15 @@ def _findings(robot: Manipulator) -> dict[str, Any]:
         "mirror_pose": None if both.mirror is None else list(both.mirror),
         "holding": asdict(examination.holding),
         "working_modes": [
-            fields_as_json(mode, "elbows=signs place depth pose margin named likely")
+            json_fields(
+                elbows=mode.signs,
+                place=mode.place,
+                depth=mode.depth,
+                pose=mode.pose,
+                margin=mode.margin,
+                named=mode.named,
+                likely=mode.likely,
+            )
             for mode in examination.modes
         ],
         "limited_joints": [asdict(joint) for joint in limited_joints(robot, home)],
@@ -227,11 +235,11 @@ def _leg(leg: LegKind) -> dict[str, Any]:
     return {
         "type": leg.type,
         "joint": leg.joint.noun,
-        **fields_as_json(leg, "axis=joint_axis"),
+        **json_fields(axis=leg.joint_axis),
         "lengths": {q.name: q.value[0] for q in leg.quantities if q.role == "length"},
-        **fields_as_json(leg, "elbow limits"),
-        **fields_as_json(leg.joint, "unit force_unit"),
-        **fields_as_json(leg, "drive reading"),
+        **json_fields(elbow=leg.elbow, limits=leg.limits),
+        **json_fields(unit=leg.joint.unit, force_unit=leg.joint.force_unit),
+        **json_fields(drive=leg.drive, reading=leg.reading),
     }
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from pteron.cli.pose_ranges import pose_text, span_text
 from pteron.cli.terminal import percent, plain, show, table
 from pteron.errors import DataError
-from pteron.json_values import fields_as_json
+from pteron.json_values import fields_as_json, json_fields
 from pteron.tolerances import ROUNDING
 
 if TYPE_CHECKING:
@@ -36,7 +36,13 @@ def map_data(
         "poses": grid.size,
         "in_reach": index_map.share,
         "causes": index_map.causes,
-        "reach": volume and fields_as_json(volume, "box volume standard_error unit"),
+        "reach": volume
+        and json_fields(
+            box=volume.box,
+            volume=volume.volume,
+            standard_error=volume.standard_error,
+            unit=volume.unit,
+        ),
         "indices": [_index_data(index_map, index.name) for index in index_map.indices],
         "warnings": warnings,
         **({"files": [out]} if out is not None else {}),
@@ -46,7 +52,7 @@ def map_data(
 def _index_data(index_map: Map, name: str) -> dict[str, Any]:
     """Return an index's statistics over a map as JSON data; null where it is finite at no pose."""
     index = index_map.index(name)
-    about = fields_as_json(index, "index=name title unit better")
+    about = json_fields(index=index.name, title=index.title, unit=index.unit, better=index.better)
     try:
         summary = index_map.statistics(name)
     except DataError:

@@ -18,7 +18,7 @@ from pteron.identification.model import Model, Terms, identification_model
 from pteron.identification.observation import Observations
 from pteron.identification.payload import observations_with_payload
 from pteron.identification.signals import Processing
-from pteron.json_values import fields_as_json
+from pteron.json_values import json_fields
 from pteron.kernels import Array
 from pteron.manipulator import RobotLike, as_manipulator
 from pteron.reduction import BaseParameters
@@ -98,9 +98,18 @@ class DriveGains(Result):
     def as_dict(self) -> dict[str, Any]:
         """Return everything but the residuals as plain data."""
         units = {"units": list(self.estimate.units[: len(self.gains)])}
-        return fields_as_json(self, "gains standard_deviations=deviations total_least_squares") | {
+        return json_fields(
+            gains=self.gains,
+            standard_deviations=self.deviations,
+            total_least_squares=self.total_least_squares,
+        ) | {
             **units,
-            **fields_as_json(self, "residual condition_number=condition gap estimate"),
+            **json_fields(
+                residual=self.residual,
+                condition_number=self.condition,
+                gap=self.gap,
+                estimate=self.estimate,
+            ),
         }
 
 

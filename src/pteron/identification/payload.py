@@ -36,7 +36,7 @@ from pteron.identification.plausibility import (
 )
 from pteron.identification.recordings import Recording, read_recording
 from pteron.identification.signals import Preprocessing, Processing, preprocessing_for_log
-from pteron.json_values import fields_as_json
+from pteron.json_values import json_fields
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.payload import with_payload
@@ -220,11 +220,20 @@ class Payload(Result):
 
     def as_dict(self) -> dict[str, Any]:
         """Return the payload as plain data, without the other values of the fit."""
-        return fields_as_json(
-            self,
-            "mass first_moment inertia center_of_mass central_inertia names",
-            "standard_deviations=deviations covariance felt=is_significant real residual",
-            "trial=fault_isolation findings",
+        return json_fields(
+            mass=self.mass,
+            first_moment=self.first_moment,
+            inertia=self.inertia,
+            center_of_mass=self.center_of_mass,
+            central_inertia=self.central_inertia,
+            names=self.names,
+            standard_deviations=self.deviations,
+            covariance=self.covariance,
+            felt=self.is_significant,
+            real=self.real,
+            residual=self.residual,
+            trial=self.fault_isolation,
+            findings=self.findings,
         )
 
     carried_by = former_attribute("carried_by", "add_to")

@@ -13,7 +13,7 @@ from pteron.identification.model import Model
 from pteron.identification.observation import motion_mask
 from pteron.identification.recordings import Recording
 from pteron.identification.signals import Preprocessing, samples
-from pteron.json_values import fields_as_json
+from pteron.json_values import json_fields
 from pteron.kernels import Array
 from pteron.renamed import former_attribute
 from pteron.result import Result
@@ -122,13 +122,19 @@ class Prediction(Result):
 
     def as_dict(self) -> dict[str, Any]:
         """Return everything but the samples as plain data."""
-        return fields_as_json(
-            self,
-            "source samples left_out force_standard_deviation=size rms_error=error",
-            "rms_error_of_all_samples=error_of_all nrms_percent=nrms",
-            "robust_nrms_percent=robust_nrms outliers",
-            "nrms_percent_without_friction=nrms_without_friction",
-            "noise_floor_percent=floor unexplained_percent=unexplained_error",
+        return json_fields(
+            source=self.source,
+            samples=self.samples,
+            left_out=self.left_out,
+            force_standard_deviation=self.size,
+            rms_error=self.error,
+            rms_error_of_all_samples=self.error_of_all,
+            nrms_percent=self.nrms,
+            robust_nrms_percent=self.robust_nrms,
+            outliers=self.outliers,
+            nrms_percent_without_friction=self.nrms_without_friction,
+            noise_floor_percent=self.floor,
+            unexplained_percent=self.unexplained_error,
         )
 
     unexplained = former_attribute("unexplained", "unexplained_error")

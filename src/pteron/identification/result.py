@@ -19,7 +19,7 @@ from pteron.identification.model import Model
 from pteron.identification.prediction import Prediction
 from pteron.identification.signals import Preprocessing
 from pteron.identification.unknowns import Unknowns
-from pteron.json_values import fields_as_json
+from pteron.json_values import fields_as_json, json_fields
 from pteron.kernels import Array
 from pteron.legs import Drive, Stribeck
 from pteron.manipulator import Manipulator
@@ -251,18 +251,24 @@ class Identification(Result):
         consistency, base = self.consistency, self.model.base
         exported, inertia, expressions = self._export_values
         bodies = consistency and {
-            **fields_as_json(consistency, "feasible distance p_value at_border cad_feasible"),
-            **fields_as_json(consistency, "cad_violations"),
+            **json_fields(
+                feasible=consistency.feasible,
+                distance=consistency.distance,
+                p_value=consistency.p_value,
+                at_border=consistency.at_border,
+                cad_feasible=consistency.cad_feasible,
+            ),
+            **json_fields(cad_violations=consistency.cad_violations),
             "share_of_residual": self.consistency_share,
-            **fields_as_json(consistency, "parameters"),
+            **json_fields(parameters=consistency.parameters),
             "summary": consistency.summary().splitlines(),
         }
         return {
             "robot": self.robot.name,
             "machine": machine_record(self.robot),
-            **fields_as_json(self, "verdict"),
+            **json_fields(verdict=self.verdict),
             "expressions": [*expressions],
-            **fields_as_json(self.model, "kinds left_out=merged_terms"),
+            **json_fields(kinds=self.model.kinds, left_out=self.model.merged_terms),
             "base_parameters": {
                 "names": list(base.names),
                 "expressions": list(base.expressions(digits=12)),
@@ -278,17 +284,31 @@ class Identification(Result):
                 }
                 for friction, inertia in zip(self._friction(exported), inertia, strict=True)
             ],
-            **fields_as_json(self, "estimate unknowns"),
-            "essential": fields_as_json(self.essential, "names dropped p_value level")
-            | fields_as_json(self.essential.estimate, "values standard_deviations=deviations"),
-            **fields_as_json(self, "unseen"),
+            **json_fields(estimate=self.estimate, unknowns=self.unknowns),
+            "essential": json_fields(
+                names=self.essential.names,
+                dropped=self.essential.dropped,
+                p_value=self.essential.p_value,
+                level=self.essential.level,
+            )
+            | json_fields(
+                values=self.essential.estimate.values,
+                standard_deviations=self.essential.estimate.deviations,
+            ),
+            **json_fields(unseen=self.unseen),
             "real_bodies": bodies,
-            **fields_as_json(self, "trial=fault_isolation fitted held_out"),
+            **json_fields(trial=self.fault_isolation, fitted=self.fitted, held_out=self.held_out),
             "preprocessing": [fields_as_json(how, *vars(how)) for how in self.preprocessing],
             "findings": [
-                fields_as_json(finding, "kind row column message") for finding in self.findings
+                json_fields(
+                    kind=finding.kind,
+                    row=finding.row,
+                    column=finding.column,
+                    message=finding.message,
+                )
+                for finding in self.findings
             ],
-            **fields_as_json(self, "notes"),
+            **json_fields(notes=self.notes),
         }
 
     understated = former_attribute("understated", "has_understated_errors")

@@ -15,7 +15,7 @@ from pteron.arguments import expect_one_of
 from pteron.bodies.parameters import Parameter
 from pteron.errors import ModelError
 from pteron.html_table import Column, Overview
-from pteron.json_values import fields_as_json
+from pteron.json_values import json_fields
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator, parameters as values_of
 from pteron.reduction.certificate import Certificate, ExactCertificate
@@ -283,7 +283,7 @@ class BaseParameters(Result):
         """Return everything as plain data, fractions as text."""
         return {
             "robot": self.robot.name,
-            **fields_as_json(self, "rank names columns"),
+            **json_fields(rank=self.rank, names=self.names, columns=self.columns),
             "expressions": list(self.expressions(digits=12)),
             "grouping": self.grouping.tolist(),
             "shares": {

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from pteron.atomic import checked_file, write_text, write_texts
 from pteron.errors import OutputError, shorten
-from pteron.json_values import fields_as_json, json_text
+from pteron.json_values import fields_as_json, json_fields, json_text
 from pteron.manipulator import RobotLike, as_manipulator
 
 if TYPE_CHECKING:
@@ -187,22 +187,36 @@ def numbers(report: Report) -> dict[str, Any]:
     return {
         "robot": robot.name,
         "motion": robot.platform.motion,
-        **fields_as_json(robot, "coordinates"),
+        **json_fields(coordinates=robot.coordinates),
         "joints": [vars(leg.joint) for leg in robot.legs],
         "drives": [asdict(leg.drive) if leg.drive else None for leg in robot.legs],
         "elbows": [leg.elbow for leg in robot.legs],
-        **fields_as_json(robot, "gravity"),
-        **fields_as_json(robot.platform, "tool"),
-        **fields_as_json(report, "doubts"),
+        **json_fields(gravity=robot.gravity),
+        **json_fields(tool=robot.platform.tool),
+        **json_fields(doubts=report.doubts),
         "home": {
             "pose": report.home.tolist(),
-            **fields_as_json(report.margins, "type_i type_ii clearances=joints reserve=least"),
+            **json_fields(
+                type_i=report.margins.type_i,
+                type_ii=report.margins.type_ii,
+                clearances=report.margins.joints,
+                reserve=report.margins.least,
+            ),
             "passive_joints": [vars(joint) for joint in report.passive],
-            **fields_as_json(report.jacobian, "jacobian=matrix condition_number=condition"),
+            **json_fields(
+                jacobian=report.jacobian.matrix, condition_number=report.jacobian.condition
+            ),
             "condition_radius": report.jacobian.radius,
         },
         "singular_orientations": None if orientations is None else orientations.singular.tolist(),
-        "reach": volume and fields_as_json(volume, "volume standard_error unit samples=count box"),
+        "reach": volume
+        and json_fields(
+            volume=volume.volume,
+            standard_error=volume.standard_error,
+            unit=volume.unit,
+            samples=volume.count,
+            box=volume.box,
+        ),
         "largest_tilt": report.tilt,
         "cycle": {
             "standard": standard is not None,
@@ -210,10 +224,25 @@ def numbers(report: Report) -> dict[str, Any]:
             "scale": None if standard is None else standard.scale,
             "duration": cycle.duration,
             **(fields_as_json(standard, _WAY) if standard else dict.fromkeys(_WAY.split())),
-            **fields_as_json(cycle, "time pose velocity acceleration"),
-            **fields_as_json(report, "forces with_drives=has_drives"),
-            **fields_as_json(sizing, "overloads peak_forces rms_forces peak_speeds"),
-            "joints": fields_as_json(report.joints, "least greatest limits within"),
+            **json_fields(
+                time=cycle.time,
+                pose=cycle.pose,
+                velocity=cycle.velocity,
+                acceleration=cycle.acceleration,
+            ),
+            **json_fields(forces=report.forces, with_drives=report.has_drives),
+            **json_fields(
+                overloads=sizing.overloads,
+                peak_forces=sizing.peak_forces,
+                rms_forces=sizing.rms_forces,
+                peak_speeds=sizing.peak_speeds,
+            ),
+            "joints": json_fields(
+                least=report.joints.least,
+                greatest=report.joints.greatest,
+                limits=report.joints.limits,
+                within=report.joints.within,
+            ),
         },
         "motors": sizing.table().to_dicts(),
         "base_parameters": {

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from pteron.identification.estimators.covariance import noise_of
 from pteron.identification.estimators.qr import QrFactor
 from pteron.identification.observation import Observations
-from pteron.json_values import fields_as_json
+from pteron.json_values import json_fields
 from pteron.kernels import Array
 from pteron.renamed import former_attribute
 from pteron.result import Result
@@ -153,14 +153,27 @@ class Estimate(Result):
     def as_dict(self) -> dict[str, Any]:
         """Return everything but the residuals as plain data."""
         return {
-            **fields_as_json(self, "method names units values standard_deviations=deviations"),
-            **fields_as_json(self, "relative_deviations"),
+            **json_fields(
+                method=self.method,
+                names=self.names,
+                units=self.units,
+                values=self.values,
+                standard_deviations=self.deviations,
+            ),
+            **json_fields(relative_deviations=self.relative_deviations),
             "intervals_95": [end.tolist() for end in self.intervals()],
-            **fields_as_json(self, "correlation noise"),
-            "residuals": fields_as_json(self.whiteness, "white autocorrelation p_values")
+            **json_fields(correlation=self.correlation, noise=self.noise),
+            "residuals": json_fields(
+                white=self.whiteness.white,
+                autocorrelation=self.whiteness.autocorrelation,
+                p_values=self.whiteness.p_values,
+            )
             | {"correlated": self.has_correlated_residuals},
-            **fields_as_json(
-                self, "condition_number=condition equations=rows iterations converged"
+            **json_fields(
+                condition_number=self.condition,
+                equations=self.rows,
+                iterations=self.iterations,
+                converged=self.converged,
             ),
         }
 

@@ -21,7 +21,7 @@ from pteron.identification.excitation.motion_files import motion_paths, write_mo
 from pteron.identification.excitation.movement import Movement
 from pteron.identification.excitation.search_program import Criterion
 from pteron.identification.logs import Description, write_description
-from pteron.json_values import fields_as_json
+from pteron.json_values import json_fields
 from pteron.kinematics import assembly_mode
 from pteron.manipulator.machine_record import machine_record
 from pteron.result import Result
@@ -242,17 +242,24 @@ class Excitation(Result):
         return {
             "robot": motion.robot.name,
             "machine": machine_record(motion.robot),
-            **fields_as_json(
-                self, "criterion seed seconds interrupted conditioning random draws gain"
+            **json_fields(
+                criterion=self.criterion,
+                seed=self.seed,
+                seconds=self.seconds,
+                interrupted=self.interrupted,
+                conditioning=self.conditioning,
+                random=self.random,
+                draws=self.draws,
+                gain=self.gain,
             ),
-            **fields_as_json(self, "limits"),
-            **fields_as_json(self.margins, "margins=each"),
-            **fields_as_json(self, "starts"),
+            **json_fields(limits=self.limits),
+            **json_fields(margins=self.margins.each),
+            **json_fields(starts=self.starts),
             "motion": {
-                **fields_as_json(motion, "space period"),
+                **json_fields(space=motion.space, period=motion.period),
                 "lead": self.lead._asdict(),
                 "assembly_mode": _mode_of(motion),
-                **fields_as_json(motion, "center cosines sines"),
+                **json_fields(center=motion.center, cosines=motion.cosines, sines=motion.sines),
             },
         }
 

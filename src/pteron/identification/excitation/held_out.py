@@ -13,7 +13,7 @@ from pteron.identification.excitation.limits import Limits
 from pteron.identification.excitation.margins import Margins, margins
 from pteron.identification.excitation.random_motions import is_clear, sizes
 from pteron.identification.signals.states import FullMotion, home
-from pteron.json_values import fields_as_json
+from pteron.json_values import json_fields
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
 from pteron.motion import pick_and_place
@@ -88,10 +88,10 @@ class RepeatedCycle(Result):
     def as_dict(self) -> dict[str, Any]:
         """Return everything but the machine as plain data."""
         cycle = self.cycle
-        cycle_data = fields_as_json(cycle, "scale around across up") | {
-            "turn": cycle.scale * cycle.turn
-        }
-        return fields_as_json(self, "count length") | cycle_data
+        cycle_data = json_fields(
+            scale=cycle.scale, around=cycle.around, across=cycle.across, up=cycle.up
+        ) | {"turn": cycle.scale * cycle.turn}
+        return json_fields(count=self.count, length=self.length) | cycle_data
 
 
 def held_out_cycle(

@@ -20,7 +20,7 @@ from pteron.errors import PteronError, UnlikelyValue
 from pteron.identification.logs import Log
 from pteron.identification.observation import scale_columns
 from pteron.identification.signals import Preprocessing
-from pteron.json_values import fields_as_json
+from pteron.json_values import json_fields
 from pteron.kernels import Array
 from pteron.kinematics import assembly_modes, direct_kinematics, follow
 from pteron.kinematics.evaluate import evaluate_unchecked
@@ -96,7 +96,9 @@ class Assumption:
 
     def as_dict(self) -> dict[str, object]:
         """Return the assumption as plain data."""
-        return fields_as_json(self, "fault message before after")
+        return json_fields(
+            fault=self.fault, message=self.message, before=self.before, after=self.after
+        )
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from pteron.json_values import fields_as_json
+from pteron.json_values import json_fields
 from pteron.kernels import Array
 from pteron.renamed import former_attribute
 from pteron.result import Result
@@ -228,11 +228,15 @@ class IsolatedFault(Result):
     def as_dict(self) -> dict[str, Any]:
         """Return the fault as plain data."""
         return {
-            **fields_as_json(self, "fault message labels sizes"),
+            **json_fields(
+                fault=self.fault, message=self.message, labels=self.labels, sizes=self.sizes
+            ),
             "standard_deviations": [None if np.isnan(v) else float(v) for v in self.deviations],
-            **fields_as_json(self, "chance shift matters as_well"),
+            **json_fields(
+                chance=self.chance, shift=self.shift, matters=self.matters, as_well=self.as_well
+            ),
             "cycle_percent": [None if np.isnan(v) else float(v) for v in self.cycle],
-            **fields_as_json(self, "speeds"),
+            **json_fields(speeds=self.speeds),
         }
 
     def _equivalents(self) -> str:

@@ -27,7 +27,7 @@ from pteron.identification.plausibility import Factor, factor_of_forces, known_v
 from pteron.identification.recordings import Recording
 from pteron.identification.signals import Preprocessing, samples
 from pteron.identification.signals.preprocessing import LATEST
-from pteron.json_values import fields_as_json
+from pteron.json_values import json_fields
 from pteron.kernels import Array
 from pteron.renamed import former_attribute
 from pteron.result import Result
@@ -130,7 +130,9 @@ class FaultIsolation(Result):
     def as_dict(self) -> dict[str, Any]:
         """Return the isolation as plain data."""
         shares = {"uncertain": self.uncertain, "spoiled": self.spoiled, "off": self.expected_error}
-        return fields_as_json(self, "tried why_not cannot_be_told=hidden faults") | {
+        return json_fields(
+            tried=self.tried, why_not=self.why_not, cannot_be_told=self.hidden, faults=self.faults
+        ) | {
             "log": [fault.as_dict() for fault in self.log],
             "cycle_percent": {
                 name: None if np.isnan(values).any() else values.tolist()

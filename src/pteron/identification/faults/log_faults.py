@@ -18,7 +18,7 @@ from pteron.identification.logs.recorded import saturation_sentences
 from pteron.identification.signals import Preprocessing
 from pteron.identification.signals.derivatives import uniform
 from pteron.identification.signals.filters import DIFFERENCE, force_steps, lowpass
-from pteron.json_values import fields_as_json
+from pteron.json_values import json_fields
 from pteron.kernels import Array
 
 _LOST = 0.01
@@ -84,7 +84,9 @@ class LogFault:
 
     def as_dict(self) -> dict[str, object]:
         """Return the fault as plain data."""
-        return fields_as_json(self, "fault message size distorts")
+        return json_fields(
+            fault=self.fault, message=self.message, size=self.size, distorts=self.distorts
+        )
 
 
 def log_faults(

@@ -14,7 +14,7 @@ import numpy as np
 import scipy  # type: ignore[import-untyped]
 
 from pteron.html_table import Column, Overview
-from pteron.json_values import fields_as_json
+from pteron.json_values import json_fields
 from pteron.kernels import Array
 from pteron.legs import Drive
 from pteron.legs.motor_limits import motor_peak
@@ -302,11 +302,17 @@ class Sizing(Result):
         turning = np.array([drive.ratio is not None for drive in self.drives])
         rms, peak = self.motor_torques
         numbers = {
-            **fields_as_json(
-                self,
-                "peak_force=peak_forces rms_force=rms_forces peak_speed=peak_speeds",
-                "rms_speed=rms_speeds peak_power mean_power peak_braking mean_braking",
-                "given_energy braked_energy",
+            **json_fields(
+                peak_force=self.peak_forces,
+                rms_force=self.rms_forces,
+                peak_speed=self.peak_speeds,
+                rms_speed=self.rms_speeds,
+                peak_power=self.peak_power,
+                mean_power=self.mean_power,
+                peak_braking=self.peak_braking,
+                mean_braking=self.mean_braking,
+                given_energy=self.given_energy,
+                braked_energy=self.braked_energy,
             ),
             "least_load_inertia": self.load_inertia[0],
             "greatest_load_inertia": self.load_inertia[1],
