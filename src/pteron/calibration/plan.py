@@ -256,7 +256,7 @@ def proved_box(robot: Manipulator, center: Array, flat: bool = False) -> Box:
 
 
 def _floors(robot: Manipulator, center: Array) -> tuple[float, float]:
-    """Return the least type-I and type-II measures of a region around a pose."""
+    """Return the least type-I and type-II measures that a region about a pose must keep."""
     type_i, type_ii = numeric(robot, "reach")(center)[1], numeric(robot, "type_ii")(center)[0]
     floors = _SHARE * float(type_i.min()), _SHARE * abs(float(type_ii))
     if not np.isfinite(floors).all():

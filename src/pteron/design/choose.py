@@ -302,7 +302,7 @@ class _CandidateStore:
             return None
 
     def keep(self, candidate: Candidate) -> None:
-        """Write a finished kind to the folder."""
+        """Write the candidate of a kind whose search has ended to the folder."""
         if self._folder is not None:
             record = json_ready(candidate.as_dict() | {"digest": self._digest(candidate.kind)})
             self._folder.mkdir(parents=True, exist_ok=True)

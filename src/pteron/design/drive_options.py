@@ -135,7 +135,7 @@ class Option:
 
     @property
     def drive(self) -> Drive:
-        """The drive, as a machine's file has it; its dry friction is assumed."""
+        """The motor and gearbox as a `Drive` of a leg; its dry friction is assumed."""
         motor, ratio = self.motor, self.gearbox.ratio
         return Drive(
             coulomb=self.friction * motor.rated_torque * ratio,

@@ -37,7 +37,7 @@ def function_of(quantity: DesignQuantity) -> Any:
 
 
 def code_digest(quantity: DesignQuantity) -> str:
-    """Return a digest of a user's quantity and its code; results of other code are refused."""
+    """Return a digest of a user's quantity and its code, by which kept results are recognised."""
     code = getattr(function_of(quantity), "__code__", None)
     parts = () if code is None else (code.co_code, code.co_consts, code.co_names)
     text = repr([quantity.name, quantity.unit, parts])

@@ -92,7 +92,10 @@ class DrawnValues:
         )
 
     def rows_beside(self, observations: Observations, noise: Array) -> Observations:
-        """Return observations with a row for each drawn value, weighted by forces' `noise` (n,)."""
+        """Return observations with a row for each value known from the drawing.
+
+        Rows are scaled by the forces' `noise` (n,), so that all rows have the same weight.
+        """
         count = len(self.places)
         if not count:
             return observations

@@ -132,7 +132,7 @@ def fit_in_rounds(task: FitTask) -> FitRound:
 
 
 def _stack_equations(task: FitTask) -> FitEquations:
-    """Return the equations of the rows to fit, with speeds of Stribeck's friction from a grid."""
+    """Return the equations of the rows to fit; Stribeck speeds are the best of a coarse grid."""
     robot, model, processing = task.robot, task.model, task.processing
     preprocessing = tuple(choose_preprocessing(robot, log, processing) for log in task.motions.fit)
     observe, unknowns = partial(task.observe, preprocessing), Unknowns()

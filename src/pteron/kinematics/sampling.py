@@ -341,7 +341,7 @@ def _least_margins(robot: Manipulator, poses: Array) -> Array:
 def _too_few(
     robot: Manipulator, count: int, sample: _Sample, conditions: _Conditions
 ) -> ModelError:
-    """Return the error for a sample with too few usable poses, with the condition that fails."""
+    """Return the error of a search with fewer than `count` poses: it names the condition."""
     total = len(sample.poses)
     if sample.regular >= count:
         text = (

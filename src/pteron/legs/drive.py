@@ -284,7 +284,7 @@ class Drive:
 
     @property
     def gear(self) -> float:
-        """The ratio, 1 by default."""
+        """Motor turns per turn of a crank, or rad of the motor per m of a slider; 1 by default."""
         return 1.0 if self.ratio is None else self.ratio
 
     @property

@@ -287,7 +287,7 @@ def _no_dynamics_error(robot: Manipulator) -> SingularPose:
 def _modular(
     transfer: MassTransfer, geometry: ExactGeometry, columns: Sequence[Parameter], prime: int
 ) -> dict[int, int]:
-    """Return a transfer's null vector modulo a prime, by column."""
+    """Return a transfer's null vector modulo a prime: its nonzero entries by the column's index."""
     field = PrimeField(prime)
     symbols = {name: value.field_element(field) for name, value in geometry.symbols().items()}
     entries = {columns.index(c): v % prime for c, v in transfer.evaluate(symbols).items()}

@@ -196,7 +196,7 @@ class Excitation(Result):
     def frame(
         self, rate: float = 1000.0, periods: int = 1, layout: MotionLayout | None = None
     ) -> pl.DataFrame:
-        """Return the trajectory from rest to rest, sampled for a controller (see `write_csv`)."""
+        """Return the trajectory from rest to rest, `rate` rows a second; see `write_csv`."""
         check_sampling(self.motion.period, rate, periods)
         return (layout or MotionLayout()).frame(self.with_leads(periods), rate)
 

@@ -122,11 +122,11 @@ def collect_undeclared(
     opened: Callable[[Description], object],
     joint: ActuatedJoint,
 ) -> DataError:
-    """Return one error for all that is undeclared about a log.
+    """Return one error that names all facts about a log that its description lacks.
 
-    A refusal ends in the lines that would help. They are taken for granted, and the log is `opened`
-    with them once more, until nothing is refused or a refusal has no such lines. Columns that are
-    called as nobody else calls them get the unit of a `joint`, for the user to check.
+    An error ends with the lines to add to the description. These are added, and the log is opened
+    again by `opened`, until there is no error or one without such lines. Columns with unusual names
+    get the unit of a `joint`, for the user to check.
     """
     source, reasons, error = "", [], first
     for _ in range(_MOST):
