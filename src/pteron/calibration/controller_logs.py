@@ -128,6 +128,7 @@ def _read_stable_positions(robot: Manipulator, text: str, source: str) -> Measur
         downwards.append((-1.0 if up else 1.0) * (1e-3 if leg.joint.unit == "m" else 1.0))
     away = np.array(downwards) * np.array([step or 0.0 for step in steps])
     faults: list[str] = []
+    rows: list[tuple[str, list[float], float, float, int]] = []
 
     def position(key: str) -> list[float]:
         words = config.get("delta_calibrate", key, fallback=None)
@@ -141,7 +142,6 @@ def _read_stable_positions(robot: Manipulator, text: str, source: str) -> Measur
             return [0.0] * 3
         return counts
 
-    rows: list[tuple[str, list[float], float, float, int]] = []
     for kind in ("height", "manual_height", "distance"):
         k = 0
         while (setting_value := setting(config, "delta_calibrate", f"{kind}{k}")) is not None:

@@ -248,21 +248,8 @@ class Identification(Result):
 
     def as_dict(self) -> dict[str, Any]:
         """Return everything but samples and residuals as plain data."""
-        consistency, base = self.consistency, self.model.base
+        base = self.model.base
         exported, inertia, expressions = self._export_values
-        bodies = consistency and {
-            **json_fields(
-                feasible=consistency.feasible,
-                distance=consistency.distance,
-                p_value=consistency.p_value,
-                at_border=consistency.at_border,
-                cad_feasible=consistency.cad_feasible,
-            ),
-            **json_fields(cad_violations=consistency.cad_violations),
-            "share_of_residual": self.consistency_share,
-            **json_fields(parameters=consistency.parameters),
-            "summary": consistency.summary().splitlines(),
-        }
         return {
             "robot": self.robot.name,
             "machine": machine_record(self.robot),
@@ -296,7 +283,7 @@ class Identification(Result):
                 standard_deviations=self.essential.estimate.deviations,
             ),
             **json_fields(unseen=self.unseen),
-            "real_bodies": bodies,
+            "real_bodies": self._consistency_data(),
             **json_fields(trial=self.fault_isolation, fitted=self.fitted, held_out=self.held_out),
             "preprocessing": [fields_as_json(how, *vars(how)) for how in self.preprocessing],
             "findings": [
@@ -310,6 +297,27 @@ class Identification(Result):
             ],
             **json_fields(notes=self.notes),
         }
+
+    def _consistency_data(self) -> dict[str, Any] | None:
+        """Return what is known of the real bodies as plain data, None without them."""
+        consistency = self.consistency
+        return (
+            None
+            if consistency is None
+            else {
+                **json_fields(
+                    feasible=consistency.feasible,
+                    distance=consistency.distance,
+                    p_value=consistency.p_value,
+                    at_border=consistency.at_border,
+                    cad_feasible=consistency.cad_feasible,
+                ),
+                **json_fields(cad_violations=consistency.cad_violations),
+                "share_of_residual": self.consistency_share,
+                **json_fields(parameters=consistency.parameters),
+                "summary": consistency.summary().splitlines(),
+            }
+        )
 
     understated = former_attribute("understated", "has_understated_errors")
 

@@ -186,11 +186,8 @@ def _bad_pose(
     if np.isnan(type_i).any():
         i = int(np.isnan(type_i).argmax())
         leg, shortfall = robot.legs[i], max(-float(margin[i]), 0.0)
-        doubt = (
-            "is it in millimetres? lengths are in metres"
-            if far
-            else "move the pose towards the legs' reach"
-        )
+        units = "is it in millimetres? lengths are in metres"
+        doubt = units if far else "move the pose towards the legs' reach"
         return UnreachablePose(
             f"{where}: leg {i + 1} misses it by {shortfall:.3g} m: {leg.reach_text}; {doubt}{many}",
             leg=i + 1,

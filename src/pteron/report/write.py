@@ -181,9 +181,7 @@ def comment_lines(lines: Iterable[str]) -> str:
 
 def numbers(report: Report) -> dict[str, Any]:
     """Return the numbers of a report as plain data in SI units and radians."""
-    robot, cycle, sizing = report.robot, report.cycle, report.sizing
-    standard, volume = report.standard, report.volume
-    orientations = report.orientations
+    robot, volume, orientations = report.robot, report.volume, report.orientations
     return {
         "robot": robot.name,
         "motion": robot.platform.motion,
@@ -194,20 +192,7 @@ def numbers(report: Report) -> dict[str, Any]:
         **json_fields(gravity=robot.gravity),
         **json_fields(tool=robot.platform.tool),
         **json_fields(doubts=report.doubts),
-        "home": {
-            "pose": report.home.tolist(),
-            **json_fields(
-                type_i=report.margins.type_i,
-                type_ii=report.margins.type_ii,
-                clearances=report.margins.joints,
-                reserve=report.margins.least,
-            ),
-            "passive_joints": [vars(joint) for joint in report.passive],
-            **json_fields(
-                jacobian=report.jacobian.matrix, condition_number=report.jacobian.condition
-            ),
-            "condition_radius": report.jacobian.radius,
-        },
+        "home": _home_numbers(report),
         "singular_orientations": None if orientations is None else orientations.singular.tolist(),
         "reach": volume
         and json_fields(
@@ -218,33 +203,8 @@ def numbers(report: Report) -> dict[str, Any]:
             box=volume.box,
         ),
         "largest_tilt": report.tilt,
-        "cycle": {
-            "standard": standard is not None,
-            "source": report.source or None,
-            "scale": None if standard is None else standard.scale,
-            "duration": cycle.duration,
-            **(fields_as_json(standard, _WAY) if standard else dict.fromkeys(_WAY.split())),
-            **json_fields(
-                time=cycle.time,
-                pose=cycle.pose,
-                velocity=cycle.velocity,
-                acceleration=cycle.acceleration,
-            ),
-            **json_fields(forces=report.forces, with_drives=report.has_drives),
-            **json_fields(
-                overloads=sizing.overloads,
-                peak_forces=sizing.peak_forces,
-                rms_forces=sizing.rms_forces,
-                peak_speeds=sizing.peak_speeds,
-            ),
-            "joints": json_fields(
-                least=report.joints.least,
-                greatest=report.joints.greatest,
-                limits=report.joints.limits,
-                within=report.joints.within,
-            ),
-        },
-        "motors": sizing.table().to_dicts(),
+        "cycle": _cycle_numbers(report),
+        "motors": report.sizing.table().to_dicts(),
         "base_parameters": {
             "rank": report.base.rank,
             "of": len(report.base.columns),
@@ -253,4 +213,51 @@ def numbers(report: Report) -> dict[str, Any]:
             "values": report.base.values().tolist(),
         },
         "costs": [vars(cost) for cost in report.costs],
+    }
+
+
+def _home_numbers(report: Report) -> dict[str, Any]:
+    """Return the numbers at the home pose: margins, passive joints and the Jacobian."""
+    return {
+        "pose": report.home.tolist(),
+        **json_fields(
+            type_i=report.margins.type_i,
+            type_ii=report.margins.type_ii,
+            clearances=report.margins.joints,
+            reserve=report.margins.least,
+        ),
+        "passive_joints": [vars(joint) for joint in report.passive],
+        **json_fields(jacobian=report.jacobian.matrix, condition_number=report.jacobian.condition),
+        "condition_radius": report.jacobian.radius,
+    }
+
+
+def _cycle_numbers(report: Report) -> dict[str, Any]:
+    """Return the numbers of the cycle: its motion, forces, overloads and joints."""
+    cycle, sizing, standard = report.cycle, report.sizing, report.standard
+    return {
+        "standard": standard is not None,
+        "source": report.source or None,
+        "scale": None if standard is None else standard.scale,
+        "duration": cycle.duration,
+        **(fields_as_json(standard, _WAY) if standard else dict.fromkeys(_WAY.split())),
+        **json_fields(
+            time=cycle.time,
+            pose=cycle.pose,
+            velocity=cycle.velocity,
+            acceleration=cycle.acceleration,
+        ),
+        **json_fields(forces=report.forces, with_drives=report.has_drives),
+        **json_fields(
+            overloads=sizing.overloads,
+            peak_forces=sizing.peak_forces,
+            rms_forces=sizing.rms_forces,
+            peak_speeds=sizing.peak_speeds,
+        ),
+        "joints": json_fields(
+            least=report.joints.least,
+            greatest=report.joints.greatest,
+            limits=report.joints.limits,
+            within=report.joints.within,
+        ),
     }
