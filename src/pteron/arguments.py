@@ -185,6 +185,7 @@ def _memory() -> float:
 
 
 def _add_check(function: types.FunctionType) -> types.FunctionType:
+    """Return a function that checks its arguments against the type hints before it runs."""
     expect = expect_kinds
 
     def call(*args: Any, **named: Any) -> Any:
@@ -289,6 +290,7 @@ def _alternative(hint: Any) -> _Kind | None:
 
 
 def _either(kinds: list[_Kind | None]) -> _Kind | None:
+    """Return the union of argument kinds; None, which accepts anything, if any of them is None."""
     known = [kind for kind in kinds if kind is not None]
     if len(known) < len(kinds):
         return None
@@ -297,10 +299,12 @@ def _either(kinds: list[_Kind | None]) -> _Kind | None:
 
 
 def _join_words(words: list[str]) -> str:
+    """Return words joined by commas, and by "or" before the last."""
     return " or ".join([", ".join(words[:-1]), words[-1]] if words[:-1] else words)
 
 
 def _with_bounds(kind: _Kind | None, bounds: Between) -> _Kind | None:
+    """Return a kind of number restricted to bounds, which its words state; None for None."""
     if kind is None:
         return None
     least, most = bounds
@@ -311,6 +315,8 @@ def _with_bounds(kind: _Kind | None, bounds: Between) -> _Kind | None:
 
 
 def _sequence(every: _Kind | None, *, lazy: bool = False, count: int | None = None) -> _Kind:
+    """Return the kind of a sequence with elements of a kind; `lazy` accepts iterators too."""
+
     def holds(argument: Any) -> bool:
         if isinstance(argument, str | bytes | Mapping) or not hasattr(argument, "__iter__"):
             return False
@@ -325,6 +331,7 @@ def _sequence(every: _Kind | None, *, lazy: bool = False, count: int | None = No
 
 
 def _is_number(argument: Any) -> bool:
+    """Return whether an argument is a real scalar: no bool, no text, no array with axes."""
     if isinstance(argument, bool | np.bool_ | str | bytes) or not hasattr(argument, "__float__"):
         return False
     try:
@@ -334,10 +341,12 @@ def _is_number(argument: Any) -> bool:
 
 
 def _is_array(argument: Any) -> bool:
+    """Return whether an argument is an array or nested sequence of real numbers."""
     return _are_numbers(argument) and np.ndim(argument) > 0
 
 
 def _is_whole(argument: Any) -> bool:
+    """Return whether an argument is an integer of less than 64 bits; a bool is none."""
     if isinstance(argument, bool | np.bool_):
         return False
     try:
@@ -347,6 +356,7 @@ def _is_whole(argument: Any) -> bool:
 
 
 def _are_numbers(argument: Any) -> bool:
+    """Return whether NumPy converts an argument to real numbers or booleans; text is refused."""
     if isinstance(argument, str | bytes) or argument is None:
         return False
     try:
@@ -359,6 +369,7 @@ def _are_numbers(argument: Any) -> bool:
 
 
 def _has_text(array: np.ndarray[Any, Any]) -> bool:
+    """Return whether an array of objects has elements of text."""
     return any(isinstance(element, str | bytes) for element in array.flat)
 
 

@@ -148,6 +148,7 @@ def make_folder(path: str | Path) -> Path:
 
 
 def _encode(path: str | Path, text: str) -> bytes:
+    """Return a text in UTF-8; a surrogate that UTF-8 cannot represent raises an `OutputError`."""
     try:
         return text.encode("utf-8")
     except UnicodeEncodeError as error:
@@ -155,6 +156,7 @@ def _encode(path: str | Path, text: str) -> bytes:
 
 
 def _umask() -> int:
+    """Return the process's umask, which the system shows only while it is set."""
     mask = os.umask(0)
     os.umask(mask)
     return mask

@@ -40,6 +40,7 @@ class PteronError(ValueError):
 def _restore_error(
     kind: type[PteronError], args: tuple[Any, ...], state: dict[str, Any]
 ) -> PteronError:
+    """Return an unpickled error with its attributes, without a call of its constructor."""
     error = kind.__new__(kind, *args)
     error.__dict__.update(state)
     return error

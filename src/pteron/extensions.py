@@ -50,10 +50,12 @@ def extension_value(group: str, name: str) -> str:
 
 
 def _entry_point(group: str, name: str) -> EntryPoint | None:
+    """Return the entry point of a name in a group; None if no package has it."""
     return next((point for point in _entry_points(group) if point.name == name), None)
 
 
 def _entry_points(group: str) -> tuple[EntryPoint, ...]:
+    """Return the entry points of a group that installed packages declare."""
     from importlib.metadata import entry_points
 
     return tuple(entry_points(group=group))

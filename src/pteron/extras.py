@@ -55,6 +55,7 @@ def install_command(extra: str) -> str:
 
 
 def _requirement(extra: str) -> str:
+    """Return pip's requirement for an extra, from the origin that Pteron was installed from."""
     # Only where something is missing: these are slow to import.
     import json
     from importlib.metadata import PackageNotFoundError, distribution
@@ -79,4 +80,5 @@ def _requirement(extra: str) -> str:
 
 
 def _quote_path(path: str) -> str:
+    """Return a path in quotation marks if it has blanks."""
     return f'"{path}"' if " " in path else path

@@ -108,10 +108,12 @@ def frame_overview(
 
 
 def _kind(kind: str) -> Markup:
+    """Return the class attribute of a column's kind, with a leading blank; empty if it has none."""
     return Markup(f' class="{kind}"') if kind else Markup("")
 
 
 def _cell(cell: Cell) -> str:
+    """Return a cell's text: numbers rounded, with a true minus sign; None and NaN empty."""
     if cell is None or isinstance(cell, str):
         return cell or ""
     text = f"{cell:.{_DIGITS}g}" if isinstance(cell, float) else str(cell)

@@ -34,6 +34,7 @@ def fields_as_json(owner: object, *names: str) -> dict[str, Any]:
 
 
 def _data(value: Any) -> Any:
+    """Return a value as JSON can hold it: arrays as lists, objects by their fields."""
     if hasattr(value, "tolist") or hasattr(value, "as_dict"):
         return value.tolist() if hasattr(value, "tolist") else value.as_dict()
     if isinstance(value, list | tuple):

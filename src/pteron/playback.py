@@ -218,5 +218,6 @@ def playback_of_log(robot: Manipulator, log: Log) -> Playback:
 
 
 def _check_motion_of(robot: Manipulator, motion: Motion) -> Motion:
+    """Return a motion after a check that it fits the machine."""
     check_motion(robot, motion)
     return motion

@@ -117,6 +117,7 @@ def result_of(future: Future[Any]) -> Any:
 
 
 def _lost_worker() -> LostWorkerError:
+    """Return the error that a worker process was ended from outside."""
     return LostWorkerError(
         "a process that did a part of the work was ended: is there enough memory? what is "
         "finished is kept in the folder, if one is given: run it again"
@@ -128,6 +129,7 @@ _queue: Any = None
 
 
 def _import_error(error: Exception) -> PteronError:
+    """Return the error that a worker process cannot import the function of its job."""
     return PteronError(
         f"other processes cannot take part: {type(error).__name__}: {error}; define functions and "
         "classes at the top of a module that can be imported, or do the work without workers"
@@ -155,12 +157,14 @@ def _exit_with_parent() -> None:
 
 
 def _call_with_shared(function: Callable[..., Any], *arguments: Any) -> Any:
+    """Return a function's result with the worker's shared object as its first argument."""
     if isinstance(_shared, PteronError):
         raise _shared
     return function(_shared, *arguments)
 
 
 def _call(function: Callable[[Any, Callable[[Any], None]], Any], k: int, job: Any) -> Any:
+    """Return a function's result on a job, with a callback that sends messages of job `k`."""
     return function(job, lambda message: _queue.put((k, message)))
 
 

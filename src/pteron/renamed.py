@@ -235,6 +235,7 @@ class FormerTable:
         return self._table()
 
     def _former(self) -> Any:
+        """Return the table that the former property gave, with a deprecation warning."""
         warnings.warn(
             f"{self._owner}.table is a method from version {UNTIL} on; write .designs",
             DeprecationWarning,

@@ -96,6 +96,7 @@ class Result:
         return pl.DataFrame(columns).with_columns(pl.selectors.float().fill_nan(None))
 
     def _repr_html_(self) -> str:
+        """Return the result's table as HTML, for notebooks."""
         from pteron.html_table import html_table  # Jinja
 
         return html_table(*self._overview())
@@ -136,12 +137,14 @@ def _shown_parts(result: Result) -> Iterator[tuple[str, Any]]:
 
 
 def _compared_fields(result: object) -> Iterator[tuple[str, Any]]:
+    """Yield name and value of each field that equality compares."""
     for field in fields(result):  # type: ignore[arg-type]
         if field.compare:
             yield field.name, getattr(result, field.name)
 
 
 def _equal_fields(first: object, second: object) -> bool:
+    """Return whether two results have equal values in all compared fields."""
     return all(_equal(part, getattr(second, name)) for name, part in _compared_fields(first))
 
 

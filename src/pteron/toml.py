@@ -299,6 +299,7 @@ def table_keys(model: Any) -> tuple[str, ...]:
 
 
 def _key(location: tuple[int | str, ...]) -> str:
+    """Return the location of a value as text: keys with dots, items by their numbers from 1."""
     key, link = "", ""
     for part in location:
         if isinstance(part, int):
@@ -326,6 +327,10 @@ def _nearest_key(location: tuple[int | str, ...], schema: _Node) -> tuple[int | 
 def _fault(
     fault: Any, schema: _Node, location: tuple[int | str, ...], listed: set[tuple[str, ...]]
 ) -> str:
+    """Return the text of pydantic's fault at a location: the value, and what is expected.
+
+    `listed` has the lists of valid keys that an earlier fault of the file named.
+    """
     kind, shown_input, context = fault["type"], shorten(fault["input"]), fault.get("ctx", {})
     if kind == "value_error":
         return str(context["error"])

@@ -274,4 +274,5 @@ class CPrinter:
 
 
 def _join_conditions(tests: Iterable[str]) -> str:
+    """Return the conjunction of C conditions, joined by line breaks."""
     return "\n        && ".join(tests)

@@ -143,6 +143,7 @@ def _drive_functions(robot: Manipulator) -> Iterator[ca.Function]:
 def _function(
     name: str, symbols: dict[str, Expression], middle: Sequence[str], **results: Expression
 ) -> ca.Function:
+    """Return a CasADi function of pose, velocity, `middle` and wrench, densified and simplified."""
     inputs = ["pose", "velocity", *middle, "wrench"]
     outputs = [ca.cse(ca.densify(result)) for result in results.values()]
     return ca.Function(name, [symbols[k] for k in inputs], outputs, inputs, list(results))

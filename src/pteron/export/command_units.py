@@ -123,4 +123,5 @@ def command_meaning(robot: Manipulator, output: Output) -> str:
 
 
 def _join_values(values: list[float]) -> str:
+    """Return values as text: a single value if all are equal, else a list with commas."""
     return f"{values[0]:g}" if len(set(values)) == 1 else ", ".join(f"{v:g}" for v in values)

@@ -175,6 +175,7 @@ class ExportRequest:
         return function
 
     def _library_program(self) -> Program:
+        """Return the program of the request: a control law, or a function of the library."""
         loaded, base = self.wrench and self.function_name in LOADED, self.base
         if isinstance(self.controller, Custom):
             return self.controller.law(self.robot).program
@@ -321,6 +322,7 @@ def _states(
 
 
 def _example_at(function: Program, graph: Graph, inputs: list[Array]) -> Example:
+    """Return a test vector: inputs, results, status (0 valid, 1 invalid), and gains of errors."""
     values = function.function.call([np.reshape(value, (-1, 1)) for value in inputs])
     results = tuple(np.array(value).ravel("F") for value in values)
     if function.name == "direct_kinematics":  # of several poses one will do

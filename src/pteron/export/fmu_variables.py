@@ -177,6 +177,7 @@ def _words(robot: Manipulator, pose: Array, forces: Array) -> dict[str, list[_Wo
 
 
 def _fmi_unit(unit: str) -> str:
+    """Return a unit as FMI writes it, with points between its factors."""
     return unit.replace(" ", ".")
 
 

@@ -55,6 +55,7 @@ that is false there."""
 
 
 def _sum_bound(sizes: Sequence[float]) -> float:
+    """Return log10 of the largest possible sum, from log10 of the magnitudes of its terms."""
     most = max(sizes)
     if most == -math.inf:
         return most
@@ -162,6 +163,7 @@ class Statements:
         return name
 
     def _name(self, k: int) -> str:
+        """Return the variable that node `k` is assigned to: its label, or a new temporary."""
         name = self._labels.get(k)
         if name is None:
             return self._temporary("t")
@@ -213,16 +215,19 @@ class Statements:
         return self._divisors[k]
 
     def _temporary(self, stem: str) -> str:
+        """Return a new temporary variable whose name begins with a stem, and declare it."""
         self.temporaries.append(self._spare.new(stem))
         return self.temporaries[-1]
 
     def _guard(self, test: str, name: str, value: str, otherwise: str, flag: str) -> None:
+        """Add an assignment guarded by a test; where that fails, a substitute and a cleared flag."""
         self.flags.add(flag)
         self._choose(
             test, [f"{name} := {value};"], [f"{name} := {otherwise};", f"{flag} := FALSE;"]
         )
 
     def _choose(self, test: str, then: Sequence[str], otherwise: Sequence[str] = ()) -> None:
+        """Add an IF statement with the lines of both branches."""
         self.lines += [f"IF {test} THEN", *(f"    {line}" for line in then)]
         if otherwise:
             self.lines += ["ELSE", *(f"    {line}" for line in otherwise)]

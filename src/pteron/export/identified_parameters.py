@@ -106,6 +106,7 @@ def read_identified(robot: Manipulator, path: str | Path) -> Identified:
 
 
 def _object(path: str | Path) -> dict[str, Any]:
+    """Return the object in a JSON file; empty if the file holds another kind of value."""
     try:
         expect_regular(Path(path))
         data = json.loads(Path(path).read_text(encoding="utf-8"))

@@ -70,6 +70,7 @@ def measures_of(robot: Manipulator, poses: Array) -> Array:
 
 
 def _measures(robot: Manipulator, poses: Array) -> Array:
+    """Return min(type-I measure, twice the type-II measure) at poses (..., m) in reach."""
     bent = np.sqrt(evaluate_unchecked(robot, "squared_type_i", poses).min(axis=-1))
     type_ii = 2.0 * np.abs(evaluate_unchecked(robot, "type_ii", poses))
     return np.asarray(np.minimum(bent, type_ii))

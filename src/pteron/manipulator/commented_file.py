@@ -130,6 +130,7 @@ def crank_direction_text(robot: Manipulator) -> str:
 
 
 def _dimension_text(dimension: Any) -> str:
+    """Return a variant's dimension as text: a number, a range, or the stock of each link."""
     if isinstance(dimension, Mapping):
         return ", ".join(f"{stock} ({key})" for key, stock in dimension.items())
     return (

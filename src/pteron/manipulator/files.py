@@ -38,6 +38,7 @@ def catalog() -> tuple[str, ...]:
 
 @lru_cache(maxsize=1)
 def _names() -> tuple[str, ...]:
+    """Return the names of the catalog's machines, sorted."""
     folder = files("pteron.manipulator") / "catalog"
     return tuple(sorted(f.name[:-5] for f in folder.iterdir() if f.name.endswith(".toml")))
 
@@ -229,6 +230,7 @@ def _similar_machines(name: str) -> list[str]:
 
 
 def _machine(document: dict[str, Any], source: str) -> Manipulator:
+    """Return the machine of a TOML document; a `ModelError` lists all its faults."""
     from pteron.manipulator.tables import MachineTable, TiltingMachineTable, platform_table
 
     raw_platform = document.get("platform")

@@ -22,6 +22,7 @@ from pteron.toml import raise_faults
 
 
 def _no_truth(sign: Any) -> Any:
+    """Return a sign; a bool, which Python counts as an integer, is refused."""
     if isinstance(sign, bool):  # Python counts it as 1 or 0
         raise ValueError(f"{sign} given, 1 or -1 expected")
     return sign

@@ -81,6 +81,7 @@ class Manipulator:
 
     @cached_property
     def _hash(self) -> int:
+        """The hash of the fields that equality compares."""
         compared = (part.name for part in fields(self) if part.compare)
         return hash(tuple(getattr(self, name) for name in compared))
 
@@ -108,6 +109,7 @@ class Manipulator:
         return f"<Manipulator {self.name!r}: {kinds} under a {self.platform.motion} platform>"
 
     def _repr_html_(self) -> str:
+        """Return the table of the legs as HTML, for notebooks."""
         from pteron.manipulator.notebook import machine_table
 
         return machine_table(self)

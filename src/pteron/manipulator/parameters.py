@@ -53,6 +53,7 @@ def _cached_parameter_list(
     platform: tuple[str, ...],
     groups: tuple[tuple[int, ...], ...] | None,
 ) -> tuple[Parameter, ...]:
+    """Return the inertial parameters of legs' bodies and the platform, cached by their kinds."""
     return parameter_list([dict(bodies) for bodies in kinds], platform, groups)
 
 

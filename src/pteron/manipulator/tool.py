@@ -104,4 +104,5 @@ def tool_faults(platform: Platform, tools: Sequence[Tool]) -> Iterator[str]:
 
 
 def _inertia(raw: Any, key: str) -> float | tuple[float, ...]:
+    """Return a tool's inertia from a file: a number, or the numbers of a spatial inertia."""
     return numbers(raw, key, _SPATIAL) if isinstance(raw, Sequence) else number(raw, key)

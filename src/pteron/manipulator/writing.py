@@ -76,6 +76,7 @@ def _kind_of(name: str) -> type[LegKind]:
 
 
 def _bodies() -> str:
+    """Return a comment that lists the keys of a planar body with their descriptions."""
     fields = PlanarBody.model_fields.items()
     return f"A body's keys: {'; '.join(f'{key}, {field.description}' for key, field in fields)}."
 
@@ -133,6 +134,7 @@ def _comment_lines(entries: list[tuple[str, FieldInfo | None]]) -> list[str]:
 
 
 def _toml(content: Any) -> str:
+    """Return a value in TOML on a single line: mappings as inline tables, sequences as arrays."""
     if isinstance(content, Mapping):
         return "{ " + ", ".join(f"{key} = {_toml(part)}" for key, part in content.items()) + " }"
     if isinstance(content, Sequence) and not isinstance(content, str):

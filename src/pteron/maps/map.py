@@ -181,6 +181,7 @@ class Map(Result):
         )
 
     def _pose(self, place: int) -> Array:
+        """Return the pose (m,) at a flat index of the grid."""
         region = tuple(
             slice(int(i), int(i) + 1) for i in np.unravel_index(place, self.status.shape)
         )
@@ -220,6 +221,7 @@ class Map(Result):
     at = former_attribute("at", "slice_at")
 
     def _overview(self) -> Overview:
+        """Return the share of poses in reach and the table of the indices, for notebooks."""
         about = f"{self.share:.1%} of {self.status.size} poses in reach"
         return frame_overview(self.robot, about, self.table())
 

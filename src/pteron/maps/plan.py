@@ -68,12 +68,14 @@ def _machine(text: Any) -> Mapping[str, Any]:
 
 
 def _is_table_list(part: Any) -> bool:
+    """Return whether a part of a plan is a list with tables."""
     return isinstance(part, list) and any(
         isinstance(entry_of_list, Mapping) for entry_of_list in part
     )
 
 
 def _difference_text(name: str, stored: Any, plan: Any) -> str:
+    """Return the text of a difference between the store's plan and the run's."""
     texts = ["none" if plan_value is None else shorten(plan_value) for plan_value in (stored, plan)]
     name = shorten(name, bare=True, longest=2 * _LONG)
     if any(len(text) > _LONG for text in texts):

@@ -146,6 +146,7 @@ class MapStore:
 
     @property
     def _arrays(self) -> tuple[str, ...]:
+        """Names of the arrays in the store: the indices and the status."""
         return (*self.names, _STATUS)
 
     def _read(self, number: int) -> dict[str, NDArray[Any]] | None:
@@ -263,6 +264,7 @@ def _checked_seal(path: Path, attributes: Mapping[str, Any]) -> str:
 
 
 def _dtype(name: str) -> str:
+    """Return the NumPy type of an array in the store: int8 for the status, float64 for indices."""
     return "int8" if name == _STATUS else "float64"
 
 
@@ -306,4 +308,5 @@ def _attributes(path: Path) -> dict[str, Any]:
 
 
 def _zarr() -> Any:
+    """Return the module zarr, or raise an error with the pip command of its extra."""
     return import_extra("cluster", "zarr", "a .zarr store needs Zarr")

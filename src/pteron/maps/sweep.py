@@ -134,6 +134,7 @@ def sweep(
 def _compute_chunk(
     function: Callable[[_Chunk], _Result], store: Store[_Result], number: int, chunk: _Chunk
 ) -> None:
+    """Compute a chunk's result and write it to the store."""
     store.write(number, function(chunk))
 
 
@@ -223,6 +224,7 @@ def _told_if_lost(where: str) -> Iterator[None]:
 
 
 def _lost_workers_error(where: str) -> PteronError:
+    """Return the error that a Dask cluster has ended or is no longer connected."""
     return PteronError(f"{where}: has ended, or its connection has; {_AGAIN}")
 
 

@@ -102,6 +102,7 @@ class TableStore:
                 yield int(name), file
 
     def _is_whole(self, file: Path) -> bool:
+        """Return whether a chunk's file is complete: its contents have the checksum in its name."""
         number, _, given_sum = file.stem.partition("-")
         try:
             return number.isdecimal() and given_sum == self._checksum(
@@ -111,4 +112,5 @@ class TableStore:
             return False
 
     def _checksum(self, number: int, contents: bytes) -> str:
+        """Return a checksum, hexadecimal digits, of a chunk's contents, its number and the plan."""
         return hashlib.sha256(f"{self._plan} {number} ".encode() + contents).hexdigest()[:16]

@@ -56,6 +56,7 @@ def greatest_difference(points: JointPoints, other: JointPoints) -> float:
 
 
 def _shift_points(points: Array, others: Array, times: float) -> Array:
+    """Return points (K, 3) shifted by `times` their difference from another machine's."""
     # Joints that coincide in one machine may be two in the other: the nearest is the same one.
     if len(points) == len(others):
         nearest = others

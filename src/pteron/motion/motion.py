@@ -64,6 +64,7 @@ class Motion(Result):
         return self._overview().text
 
     def _overview(self) -> Overview:
+        """Return the range, speed and acceleration of each coordinate as a table, for notebooks."""
         columns = [Column("coordinate", "number"), Column("from", "number")]
         columns += [Column(name, "number") for name in ("to", "speed", "acceleration")]
         extremes = (

@@ -103,6 +103,7 @@ class Picture(Figure):
 
     @property
     def _is_flat(self) -> bool:
+        """Whether all axes are two-dimensional and Cartesian."""
         return all(axes.name == "rectilinear" for axes in self.axes)
 
     def savefig(self, fname: Any, **options: Any) -> None:
@@ -115,6 +116,7 @@ class Picture(Figure):
             warn_of_absent(absent)
 
     def _ipython_display_(self) -> None:
+        """Show the figure in a notebook as a PNG at a fixed resolution."""
         # The way that goes before pyplot's, which notebooks know only once it is imported.
         from IPython.display import display
 
@@ -304,6 +306,7 @@ def log_scale(axes: Axes, low: float, high: float) -> None:
 
 
 def _decade(value: float, as_power: bool) -> str:
+    """Return a tick label: a power of ten where that is exact and `as_power`, else digits."""
     power = round(float(np.log10(value)))
     return power_of_ten(power) if as_power and np.isclose(value, 10.0**power) else f"{value:g}"
 

@@ -90,6 +90,7 @@ class Gif:
 
 
 def _rate_in_hundredths(fps: float) -> float:
+    """Return the nearest frame rate, Hz, whose frame time is a multiple of 10 ms."""
     return 100.0 / max(round(100.0 / fps), _SHORTEST)
 
 
@@ -107,6 +108,7 @@ def checked_encoder(path: Path) -> None:
 
 
 def _ffmpeg() -> Any:
+    """Return the module imageio_ffmpeg, or raise an error that says how to install FFmpeg."""
     try:
         import imageio_ffmpeg  # type: ignore[import-untyped]
 

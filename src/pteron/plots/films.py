@@ -218,14 +218,17 @@ def checked_film(path: str | Path) -> Path:
 
 
 def _speed_text(speed: float) -> str:
+    """Return the text of a film's speed in multiples of real time."""
     return "real time" if speed == 1.0 else f"{speed:.3g} \u00d7 real time"
 
 
 def _expect_number(name: str, value: float, low: float, high: float) -> None:
+    """Raise a `DataError` if a number is outside an interval, whose ends are allowed."""
     expect(low <= value <= high, name, f"{value:g}", f"a number from {low:g} to {high:g}")
 
 
 def _checked_forces(forces: ArrayLike, motion: Motion, robot: Manipulator) -> Array:
+    """Return a motion's forces as an array (T, n), checked for its shape."""
     array = as_array(forces, "forces", ())
     expected = len(motion.time), robot.joint_count
     if array.shape != expected:

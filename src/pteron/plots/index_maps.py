@@ -289,6 +289,7 @@ def _mark_best(axes: Axes, plane: Map, name: str, handles: list[Any]) -> None:
 
 
 def _is_constant(summary: Summary) -> bool:
+    """Return whether an index is constant over the map, up to rounding."""
     return abs(summary.best - summary.worst) <= SAME * abs(summary.best)
 
 
@@ -321,10 +322,12 @@ def _light(color: str) -> str:
 
 
 def _axis_values(axis: Axis) -> Array:
+    """Return the coordinates of a map's axis in the units shown."""
     return coordinate(axis.name).shown_factor * axis.values
 
 
 def _index_label(index_map: Map, name: str) -> str:
+    """Return the label of a map's index: its title, with its unit if it has a unit."""
     unit = _unit(index_map, name)
     return f"{index_map.index(name).title} ({unit})" if unit else index_map.index(name).title
 

@@ -98,6 +98,7 @@ class MachineAxes(ABC):
         self._add_line(p, zorder=self._order(p) + raised, **look)
 
     def _add_line(self, p: Array, **look: Any) -> None:
+        """Draw a polyline through points (K, d), without a rescaling of the axes."""
         # `plot` would scale the axes, each time, which `fill` does once.
         self.things.append(self.axes.add_artist(self._line(*p.T, **look)))
 

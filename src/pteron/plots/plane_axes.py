@@ -65,14 +65,17 @@ class PlaneAxes(MachineAxes):
         self._small, self._step, self.plane = small, step, plane
 
     def _to_axes(self, points: Array, *, extends: bool = True) -> Array:
+        """Return points (..., 3) projected on the plane (..., 2), mm; the axes' limits hold them."""
         flat = np.asarray(1e3 * points @ self.plane.T)
         self._drawn.append(flat)
         return flat
 
     def _order(self, points: Array) -> float:
+        """Return a constant drawing order: things in a plane have no depth."""
         return 10.0
 
     def _polygons(self, faces: list[Array], **look: Any) -> Artist:
+        """Add filled polygons to the axes."""
         polygons: Artist = self.axes.add_collection(PolyCollection(faces, **look))
         return polygons
 

@@ -247,6 +247,7 @@ def svg_file(figure: Figure) -> str:
 
 
 def _render_svg(figure: Figure, **look: Any) -> str:
+    """Return a figure as SVG whose text is text, without metadata."""
     buffer = StringIO()
     with mpl.rc_context(TEXT):
         figure.savefig(buffer, format="svg", metadata=NO_METADATA, **look)

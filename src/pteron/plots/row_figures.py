@@ -165,6 +165,7 @@ def row_axes(figure: Figure, names: Sequence[str], xlabel: str, place: Any = Non
 
 
 def _checked_values(names: Sequence[str], values: ArrayLike, what: str) -> Array:
+    """Return values of named rows as an array (N,), checked for its shape."""
     array = np.asarray(values, dtype=float)
     expect(array.shape == (len(names),), what, f"shape {array.shape}", f"({len(names)},)")
     return array

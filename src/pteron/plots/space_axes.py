@@ -77,15 +77,18 @@ class SpaceAxes(MachineAxes):
         )
 
     def _to_axes(self, points: Array, *, extends: bool = True) -> Array:
+        """Return points (..., 3) in the viewing frame; with `extends` the axes' limits hold them."""
         placed = np.asarray(points @ self.rotation.T)
         if extends:
             self._drawn.append(placed)
         return placed
 
     def _order(self, points: Array) -> float:
+        """Return the drawing order of points (K, 3): the nearer to the eye, the later."""
         return 10.0 + float(points.mean(axis=0) @ self._towards_eye)
 
     def _polygons(self, faces: list[Array], **look: Any) -> Artist:
+        """Add filled polygons in space to the axes."""
         polygons: Artist = Poly3DCollection(faces, **look)
         self.axes.add_collection3d(polygons)
         return polygons

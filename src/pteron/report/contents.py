@@ -165,6 +165,7 @@ class Report:
 
 
 def _volume(robot: Manipulator, home: Array) -> ReachVolume:
+    """Return the volume of reach at the orientation of a pose, cached between runs."""
     key = "reach_volume", geometry_only(robot), tuple(home.tolist()), version("scipy")
     return cached_result(
         key, ("dynamics", "kinematics", "workspace"), lambda: reach_volume(robot, home)
@@ -222,6 +223,8 @@ def _slices(robot: Manipulator, home: Array, volume: ReachVolume | None) -> tupl
 
 
 def _tilt(robot: Manipulator, home: Array) -> float | None:
+    """Return the largest tilt, rad, at a pose, cached between runs; None if there is none."""
+
     def tilt() -> float | None:
         with suppress(ModelError):  # it does not tilt, or not from the level
             return largest_tilt(robot, home).tilt

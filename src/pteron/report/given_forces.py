@@ -43,4 +43,5 @@ def force_doubts(robot: Manipulator, playback: Playback) -> tuple[str, ...]:
 
 
 def _rms(forces: Array) -> Array:
+    """Return the root mean square over time of forces (T, n): (n,)."""
     return np.asarray(np.sqrt(np.mean(forces**2, axis=0)))

@@ -127,6 +127,7 @@ def line_samples(count: int) -> slice:
 
 
 def _interpolate(time: Array, values: Array, at: Array) -> Array:
+    """Return columns (T, k) interpolated linearly at times (F,): (F, k)."""
     return np.column_stack([np.interp(at, time, column) for column in values.T])
 
 
@@ -214,4 +215,5 @@ def view_frame(robot: Manipulator) -> Array:
 
 
 def _plain(array: Array) -> Any:
+    """Return an array as nested lists of numbers, rounded for the page."""
     return (np.round(array, _DECIMALS) + 0.0).tolist()

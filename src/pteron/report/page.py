@@ -281,6 +281,7 @@ def symbolic_sums(base: BaseParameters) -> dict[str, list[Any]] | None:
 
 
 def _symbolic_texts(base: BaseParameters) -> tuple[list[str], list[tuple[str, float]]] | None:
+    """Return base parameters as HTML formulas with the lengths in them; None if too long."""
     try:
         lines = base.expressions(symbols=True)
     except ModelError:

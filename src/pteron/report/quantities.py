@@ -98,4 +98,5 @@ def angles_text(robot: Manipulator, pose: Array) -> str:
 
 
 def _distinct(words: Iterable[str]) -> list[str]:
+    """Return words in their order, without repetition."""
     return list(dict.fromkeys(words))

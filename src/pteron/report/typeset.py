@@ -110,6 +110,7 @@ def value_with_uncertainty(value: float, half: float) -> tuple[str, str]:
 
 
 def _millimetres(metres: float, places: int = 1) -> str:
+    """Return a length in m as millimetres, to a number of decimals."""
     return format_fixed(1e3 * float(metres), places)
 
 

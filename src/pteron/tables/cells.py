@@ -92,6 +92,7 @@ def best_cut(text: Sequence[str], declared: Dialect) -> Cut | None:
 
 
 def _split_cells(text: Sequence[str], separator: Separator, decimal: Decimal) -> Cut:
+    """Return a text's records, cut by a separator, with the columns that mostly hold numbers."""
     records = list(_records(text, separator))
     width = Counter(len(record.cells) for record in records).most_common(1)[0][0] if records else 0
     full_rows = [record.cells for record in records if len(record.cells) == width]
@@ -102,6 +103,7 @@ def _split_cells(text: Sequence[str], separator: Separator, decimal: Decimal) ->
 
 
 def _records(text: Sequence[str], separator: Separator) -> Iterator[Record]:
+    """Yield the records that are not empty, with their lines, up to a fault of CSV."""
     if separator == " ":
         text = [single_blanks(line.encode()).decode() for line in text]
     reader, last_line = csv.reader(text, delimiter=separator), 0

@@ -137,6 +137,7 @@ class CsvFile:
             line += block.count(b"\n")
 
     def _read_head(self) -> bytes:
+        """Return the bytes at the beginning of the file, from which its layout is detected."""
         if isinstance(self._data, bytes):
             return self._data[:_HEAD]
         with self._data.open("rb") as file:
@@ -221,6 +222,7 @@ class CsvFile:
         return frame.rename({str(j): self.columns[j] for j in indices})
 
     def _read_by_record(self, block: bytes, row: int, line: int) -> pl.DataFrame:
+        """Return a block's rows as text, read by `csv`; errors name the line of the row."""
         names, rows = self.columns, list[list[str | None]]()
         try:
             for begins, cells in self._records(block, line):
@@ -249,12 +251,14 @@ class CsvFile:
             begins = line + reader.line_num
 
     def _line_of(self, block: bytes, line: int, index: int) -> int:
+        """Return the line of the file at which the row of an index in a block begins."""
         try:
             return next(islice(self._records(block, line), index, None))[0]
         except csv.Error:  # a cell longer than `csv` reads, which Polars did: each row is a line
             return line + index
 
     def _not_text(self) -> DataError:
+        """Return the error that the file is not text in its encoding."""
         message = f"{self.source}: not {self._encoding.upper()} text; save it as CSV in UTF-8"
         if self._found:
             message += ", or say what it is in a TOML file beside it, such as"

@@ -126,6 +126,7 @@ def whole_table(file: CsvFile | ParquetFile) -> Table:
 
 
 def _join_tables(tables: list[Table]) -> Table:
+    """Return the tables of a file as a single table that gives each row's line in the file."""
     if len(tables) == 1:
         return tables[0]
 
@@ -140,6 +141,7 @@ def _join_tables(tables: list[Table]) -> Table:
 
 @contextmanager
 def _name_in_errors(source: str) -> Iterator[None]:
+    """Raise errors of the file system in a block as a `DataError` that names the source."""
     try:
         yield
     except FileNotFoundError:
@@ -209,5 +211,6 @@ ENDINGS: dict[str, Callable[[pl.DataFrame, io.BytesIO, Dialect], None]] = {
 
 
 def _ending_fault(file: Path, noun: str) -> str:
+    """Return the text of the fault of a file's ending, with the valid endings."""
     fault = f"unknown ending {shorten(file.suffix)}" if file.suffix else "no ending"
     return f"{fault}; a {noun}'s file ends in {' or '.join(ENDINGS)}"

@@ -187,6 +187,7 @@ def _names(
 
 
 def _are_units(record: Record) -> bool:
+    """Return whether all cells of a record are units, and at least two are not empty."""
     cells = [cell for cell in record.cells if cell]
     return len(cells) > 1 and all(map(_UNIT.fullmatch, cells))
 
@@ -212,6 +213,7 @@ def _scope_names(
 
 
 def _nameless(rows: Cut, above: Sequence[Record], source: str) -> DataError:
+    """Return the error that no line above the rows names their columns."""
     if not above:
         return DataError(f"{source}: no line names the columns; the first line must name them")
     last = above[-1]

@@ -140,9 +140,11 @@ class Table:
                 raise self._unfit("CSV", str(error).splitlines()[0]) from None
 
     def _unfit(self, kind: str, reason: str) -> DataError:
+        """Return the error that the table cannot be written as a kind of file, and why."""
         return DataError(f"{self.source}: cannot be written as {kind} ({reason}); drop the column")
 
     def _require(self, columns: Sequence[str]) -> None:
+        """Raise a `DataError` that names the missing columns, if there are any."""
         missing = [name for name in columns if name not in self.columns]
         if not missing:
             return
@@ -171,6 +173,7 @@ class Table:
         return cells, signs.cast(pl.Float64, strict=False)
 
     def _fault(self, row: int, column: str, *, is_text: bool, choice: bool) -> str:
+        """Return the text of a cell's fault, an empty cell or no finite number, with its place."""
         cell = self.frame[column][row]
         name = shorten(column, bare=True)
         fault = f"the cell is empty; {name} needs a number"
@@ -197,6 +200,7 @@ def parse_numeric_columns(frame: pl.DataFrame) -> pl.DataFrame:
 
 
 def _number_column(column: pl.Series) -> pl.Series:
+    """Return a text column as integers or floats if all its cells are numbers, else unchanged."""
     if column.dtype != pl.String or column.null_count() == len(column):
         return column
     text = column.str.strip_chars()

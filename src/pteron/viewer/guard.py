@@ -50,6 +50,7 @@ def _name(header: str) -> str:
 
 
 def _is_loopback(name: str) -> bool:
+    """Return whether a name is an address of the loopback interface."""
     try:
         return ipaddress.ip_address(name.partition("%")[0]).is_loopback
     except ValueError:

@@ -53,6 +53,7 @@ def controls(session: Session) -> dict[str, Any]:
 
 
 def _sliders(names: Sequence[str], units: Sequence[str], ranges: Array) -> list[dict[str, Any]]:
+    """Return sliders for ranges (2, k) of quantities, in display units."""
     sliders = []
     for name, unit, (low, high) in zip(names, units, ranges.T, strict=True):
         word, factor = SHOWN[unit]
@@ -203,16 +204,19 @@ class _Request:
         return np.array([x, y, z]) @ view_frame(self.robot)
 
     def coordinate(self) -> _Action:
+        """Return the action that sets a coordinate of the pose."""
         i = self.index(self.robot.freedom)
         amount = self.number("value") / float(pose_factors(self.robot)[i])
         return f"pose{i}", lambda: self.session.set_coordinate(i, amount)
 
     def joint(self) -> _Action:
+        """Return the action that sets a joint's coordinate."""
         i = self.index(self.robot.joint_count)
         amount = self.number("value") / float(_joint_factors(self.robot)[i])
         return f"joint{i}", lambda: self.session.set_joint(i, amount)
 
     def drag(self) -> _Action:
+        """Return the action that drags the platform to a point, along an axis or freely."""
         axis = None if self.fields["axis"] is None else int(self.fields["axis"])
         to = self.point("to")
         if axis not in (None, 0, 1, 2):
@@ -220,6 +224,7 @@ class _Request:
         return "drag", lambda: self.session.drag(axis, to)
 
     def pull(self) -> _Action:
+        """Return the action that pulls the platform by a spring from a grip to a point."""
         grip, to, stiffness = self.point("grip"), self.point("to"), self.number("stiffness")
 
         def act() -> None:
@@ -231,6 +236,8 @@ class _Request:
         return "pull", act
 
     def release(self) -> _Action:
+        """Return the action that releases the spring."""
+
         def act() -> None:
             if self.session.push is not None:
                 self.session.push.release()
@@ -238,6 +245,7 @@ class _Request:
         return "pull", act
 
     def assembly(self) -> _Action:
+        """Return the action that goes to an assembly of the legs, by its number."""
         k = int(self.fields["i"])
 
         def act() -> None:
@@ -248,18 +256,22 @@ class _Request:
         return "assembly", act
 
     def mode(self) -> _Action:
+        """Return the action that sets the working mode."""
         elbows = {signs(mode): mode for mode in self.session.modes()}[self.fields["mode"]]
         return "mode", lambda: self.session.set_working_mode(elbows)
 
     def speed(self) -> _Action:
+        """Return the action that sets the speed of playback."""
         factor = SPEEDS[self.fields["speed"]]
         return "speed", lambda: setattr(self.session, "speed", factor)
 
     def plane(self) -> _Action:
+        """Return the action that chooses the plane of the slice or map."""
         choices(self.robot)[name := self.fields["plane"]]
         return "plane", lambda: setattr(self.session, "plane", name)
 
     def seek(self) -> _Action:
+        """Return the action that stops playback and seeks a time, s."""
         time = self.number("time")
 
         def act() -> None:
@@ -294,10 +306,12 @@ _ACTIONS: dict[str, Callable[[_Request], _Action]] = {
 
 
 def _joint_factors(robot: Manipulator) -> Array:
+    """Return the factors (n,) from joint coordinates, m or rad, to display units."""
     return np.array([SHOWN[leg.joint.unit][1] for leg in robot.legs])
 
 
 def _tenths(array: Array) -> list[float]:
+    """Return an array as a list, rounded to tenths."""
     rounded: list[float] = (np.round(array, 1) + 0.0).tolist()
     return rounded
 

@@ -104,6 +104,7 @@ class ViewerPicture:
         return f"arrows: what each drive gives{bent}; {', '.join(scales)}"
 
     def _arrow(self, points: Array, color: str | int, radius: float) -> Arrow:
+        """Return an arrow through points (2, 3), in the picture's frame."""
         return picture_points(self._robot, points), color, radius
 
     def _screws(self, state: ViewerState, points: JointPoints) -> list[Arrow]:

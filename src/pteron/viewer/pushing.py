@@ -153,6 +153,7 @@ class Push:
         return float(bodies + 0.5 * rotors @ rates**2 + 0.5 * self.stiffness * stretch**2)
 
     def _control(self) -> None:
+        """Update the drives' forces by the control law at the present state."""
         if self._law is None:
             return
         joints = inverse_kinematics(self._robot, self.pose)

@@ -68,6 +68,7 @@ def readout(state: ViewerState, numbers: Readings) -> str:
 
 @cache
 def _template() -> Template:
+    """Return the template of the panel's numbers, loaded once."""
     return template("readout.html.j2", "viewer")
 
 

@@ -84,6 +84,7 @@ class Tab:
             self._wake.notify()
 
     def _run(self) -> None:
+        """Run the thread: send queued messages until the tab is closed."""
         from websockets.exceptions import ConnectionClosed
 
         while True:
@@ -139,6 +140,7 @@ class Server:
         self._thread.join()
 
     def _answer(self, connection: ServerConnection, request: Request) -> Response | None:
+        """Return the HTTP response to a request; None for a web socket, whose handshake goes on."""
         hosts, origins = (request.headers.get_all(name) for name in ("Host", "Origin"))
         reason = refusal(self._host, self._here, hosts, origins)
         if reason is not None:
@@ -165,6 +167,7 @@ class Server:
         return response
 
     def _handle(self, connection: ServerConnection) -> None:
+        """Handle a web socket: open a tab, pass its messages on, and close it at the end."""
         from websockets.exceptions import ConnectionClosed
 
         assert connection.request is not None
@@ -209,6 +212,7 @@ def free_port(host: str, port: int) -> int:
 
 
 def _is_free(family: int, address: Any, port: int) -> bool:
+    """Return whether a port is free; an address of another machine raises a `DataError`."""
     with socket.socket(family, socket.SOCK_STREAM) as tried:
         if os.name == "posix":  # elsewhere it would take a port that is in use
             tried.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

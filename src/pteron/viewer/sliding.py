@@ -73,6 +73,7 @@ def nearest_reachable_pose(
 
 
 def _weights(robot: Manipulator) -> Array:
+    """Return weights (m,) that turn coordinates into lengths: m for each rad, 1 for lengths."""
     arm = max(float(np.linalg.norm(leg.platform_point)) for leg in robot.legs)
     size = max(leg.size for leg in robot.legs)
     return np.where(robot.platform.angular, max(arm, 0.1 * size), 1.0)

@@ -205,6 +205,7 @@ def pose_units(robot: Manipulator) -> str:
 
 
 def _number(text: str, name: str, expected: str) -> float:
+    """Return a text as a finite number; a `DataError` says what is expected."""
     try:
         value = float(text)
     except ValueError:
@@ -227,5 +228,6 @@ def stop_motion(state: ViewerState, message: str = "") -> ViewerState:
 
 
 def _stop_at(state: ViewerState, pose: Array, message: str = "") -> ViewerState:
+    """Return the state at rest at a pose, with a message."""
     zeros = np.zeros_like(pose)
     return replace(state, pose=pose, velocity=zeros, acceleration=zeros, message=message)

@@ -123,6 +123,7 @@ class Viewer:
 
 
 def _render_side_by_side(names: Sequence[str]) -> str:
+    """Return the HTML page that shows viewers of several names side by side."""
     return template("beside.html.j2", "viewer").render(names=names)
 
 
@@ -199,6 +200,7 @@ def view(
 def _session(
     robot: RobotLike, payload: float, motion: Motion | Simulation | str | Path | None
 ) -> Session:
+    """Return the session of a machine with its payload and motion."""
     session = Session(as_manipulator(robot), payload)
     if isinstance(motion, Motion | Simulation):
         session.take(motion.motion if isinstance(motion, Simulation) else motion, "motion")
@@ -212,6 +214,7 @@ def _session(
 def _comparison(
     session: Session, compare: RobotLike | None, enlarge: float | None
 ) -> tuple[Manipulator, float] | None:
+    """Return the machine to compare with and the factor that enlarges differences; None if none."""
     if compare is None:
         return None
     robot, other = session.state.robot, as_manipulator(compare)

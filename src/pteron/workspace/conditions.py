@@ -74,6 +74,7 @@ EDGES = ("stretched", "folded", _CAUSES["reach"])
 
 
 def _clause(edge: Edge) -> str:
+    """Return the phrase for the edge of a condition, such as "at the edge of its reach"."""
     return _CAUSES.get(edge.cause, edge.cause).format(edge.noun)
 
 

@@ -110,6 +110,7 @@ def _poses_near_home(robot: Manipulator, home: Array) -> Array:
 
 
 def _weight(robot: Manipulator) -> float:
+    """Return the weight, N, of the platform and all bodies of the legs."""
     masses = [getattr(body, "mass", 0.0) for leg in robot.legs for body in leg.bodies.values()]
     mass = robot.platform.total_inertia.mass + sum(masses)
     return float(mass * np.linalg.norm(robot.gravity))

@@ -184,6 +184,7 @@ def _largest_shape(
     proved: bool,
     own_conditions: tuple[Condition, ...] | None,
 ) -> Inscribed:
+    """Return the largest shape of a kind at the orientation of a pose; `proved` proves it."""
     expect_places(robot, "it only turns; ask for its `largest_tilt`")
     expect_share("tolerance", tolerance)
     required = conditions(robot) if own_conditions is None else own_conditions

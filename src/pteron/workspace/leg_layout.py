@@ -59,6 +59,7 @@ def _swap_warnings(robot: Manipulator) -> Iterator[str]:
 
 
 def _pairings(count: int) -> Iterator[tuple[int, ...]]:
+    """Yield pairings of guide points with platform points: all, or swaps if legs are many."""
     if count <= _ALL:
         yield from permutations(range(count))
         return
@@ -94,6 +95,7 @@ def _symmetries(base: Array, top: Array, order: Sequence[int], *, reflections: b
 
 
 def _turns(count: int) -> list[Array]:
+    """Return the rotation matrices (2, 2) of the multiples of a turn over `count`."""
     angles = 2.0 * np.pi * np.arange(count) / count
     return [np.array([[np.cos(a), -np.sin(a)], [np.sin(a), np.cos(a)]]) for a in angles]
 
@@ -149,6 +151,7 @@ def _crossing_warnings(robot: Manipulator, home: Array) -> Iterator[str]:
 
 
 def _segments(points: Array) -> list[tuple[Array, Array]]:
+    """Return a leg's links as pairs of points (3,), without very short links and NaN points."""
     points = points[np.isfinite(points).all(axis=-1)]
     lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
     least = CROSSING * lengths.max(initial=0.0)

@@ -108,6 +108,7 @@ def _first_least(margins: Array) -> int:
 
 @lru_cache(maxsize=64)
 def _leg_sizes(robot: Manipulator) -> Array:
+    """Return the size of each leg, m, (n,)."""
     return np.array([leg.size for leg in robot.legs])
 
 

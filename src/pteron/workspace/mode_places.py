@@ -134,4 +134,5 @@ def mode_warnings(modes: Sequence[ModePlace]) -> tuple[str, ...]:
 
 
 def _pose_text(pose: Array) -> str:
+    """Return a pose as text, to three digits."""
     return f"({', '.join(f'{coordinate:.3g}' for coordinate in pose)})"

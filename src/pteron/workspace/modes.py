@@ -110,6 +110,7 @@ def mode_contacts(pavings: dict[tuple[int, ...], Paving]) -> tuple[Contact, ...]
 def _contact(
     first: Paving, second: Paving, elbows: tuple[tuple[int, ...], tuple[int, ...]], leg: int
 ) -> Contact:
+    """Return the contact of two working modes at a leg, by bisection of both pavings' boxes."""
     first_test, second_test = (
         interval_test(side.robot, side.conditions) for side in (first, second)
     )

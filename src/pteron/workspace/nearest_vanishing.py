@@ -169,10 +169,12 @@ class Search:
         return length, np.sqrt(np.where(most > 0.0, most, 1.0))
 
     def _pose(self, state: Array) -> Array:
+        """Return poses (..., m) of states (..., k + R)."""
         ways = self._sizes[0] * state[..., : len(self.moving)]
         return vary_coordinates(self.at, self.at[self.moving] + ways, self.moving)
 
     def _length(self, state: Array) -> float:
+        """Return the distance, m or rad, of a state's pose from the reference pose."""
         return self._sizes[0] * float(np.linalg.norm(state[: len(self.moving)]))
 
     def _values(self, states: Array) -> tuple[Array, Array, Array]:

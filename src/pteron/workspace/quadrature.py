@@ -102,6 +102,7 @@ def quadrature_volume(
 def _integral(
     robot: Manipulator, required: tuple[Condition, ...], reference: Array, box: Array, lines: int
 ) -> float:
+    """Return the volume of the workspace in a box (2, d), by the midpoint rule over lines."""
     steps = (box[1] - box[0])[1:] / lines
     sides = [
         low + step * (np.arange(lines) + 0.5) for low, step in zip(box[0, 1:], steps, strict=True)

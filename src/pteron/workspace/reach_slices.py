@@ -169,6 +169,7 @@ def reach_slice(
 
 
 def _grid(center: Array, places: tuple[int, int], first: Array, second: Array) -> Array:
+    """Return poses (S, F, m) about a centre, with two coordinates varied over (F,) and (S,)."""
     return vary_coordinates(center, np.stack(np.meshgrid(first, second), axis=-1), list(places))
 
 

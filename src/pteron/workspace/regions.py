@@ -155,6 +155,7 @@ class Cylinder:
 
 
 def _checked_numbers(numbers: object, name: str) -> tuple[float, ...]:
+    """Return numbers of a sensible size as a tuple of floats; others raise a `DataError`."""
     try:
         array = np.asarray(numbers, dtype=float)
     except (TypeError, ValueError, OverflowError):

@@ -64,6 +64,7 @@ class SmoothConditions:
         }
 
     def _output(self, robot: Manipulator, what: str, name: str) -> ca.SX:
+        """Return an output of a machine's function, by name, as a symbolic column."""
         program = general_program(robot, what)
         inputs = {"geometry": self._symbols[2], "pose": self._symbols[0]}
         inputs["stored"] = ca.SX(ca.DM(FIXED["stored"](robot)))
@@ -89,17 +90,21 @@ class SmoothConditions:
 
     @cached_property
     def _values(self) -> Kernel:
+        """The compiled rows."""
         return self._kernel("vm" if compiler() is None else "c", "condition_rows", 0)
 
     @cached_property
     def _pose_slopes(self) -> Kernel:
+        """The compiled rows with their Jacobian by the pose."""
         return self._kernel("vm" if compiler() is None else "c", "condition_pose_slopes", 1)
 
     @cached_property
     def _all_slopes(self) -> Kernel:
+        """The compiled rows with their Jacobians by the pose and by the geometry."""
         return self._kernel("vm", "condition_slopes", 2)
 
     def _kernel(self, target: str, name: str, slopes: int) -> Kernel:
+        """Return the rows compiled for a target, with 0 to 2 Jacobians: by pose and by geometry."""
         pose, _, geometry = self._symbols
         variables = (pose, geometry)[:slopes]
         outputs = [self._rows, *(ca.jacobian(self._rows, symbol) for symbol in variables)]

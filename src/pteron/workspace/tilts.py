@@ -249,6 +249,7 @@ def largest_ball(
 
 
 def _expect_tilting(robot: RobotLike, pose: PoseLike) -> tuple[Manipulator, Array]:
+    """Return a machine and a pose (m,); a platform that does not tilt to every side is refused."""
     machine = as_manipulator(robot)
     platform = machine.platform
     upright = not platform.second_axis or (
@@ -275,6 +276,7 @@ def _largest_region(
     sizes: Callable[[float], tuple[float, float]],
     report: Callable[[float], None],
 ) -> LargestTilt:
+    """Return the largest proved region of positions and tilts, of sizes up to `most`."""
     expect_share("tolerance", tolerance)
     required = conditions(robot) if own_conditions is None else own_conditions
     angular = np.flatnonzero(robot.platform.angular)

@@ -116,6 +116,7 @@ def _numbers_before_the_cut(robot: Manipulator, i: int, motion: LegMotion) -> tu
 
 @lru_cache(maxsize=64)
 def _states(robot: Manipulator) -> tuple[Any, State]:
+    """Return the symbolic pose (m,) of a machine and its kinematic state there."""
     pose = ca.SX.sym("pose", robot.freedom)
     return pose, Machine.numeric(robot).state(pose)
 

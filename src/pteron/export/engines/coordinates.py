@@ -95,6 +95,7 @@ def _leg(home: LegStance, away: LegStance) -> list[Array]:
 
 
 def _next_point(leg: LegStance, k: int) -> Array:
+    """Return the points (K, 3) of the joint after joint `k` of a leg, or of the leg's end."""
     return leg.points[k + 1] if k + 1 < len(leg.points) else leg.end
 
 

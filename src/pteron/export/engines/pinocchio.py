@@ -178,8 +178,10 @@ def _with_gear(body: TreeBody, gear: TreeBody, ratio: float) -> TreeBody:
 
 
 def _bound(value: float | None, infinite: str) -> str:
+    """Return a joint limit as a literal; the text for infinity if there is no limit."""
     return infinite if value is None else number(value)
 
 
 def _list(values: Any) -> str:
+    """Return an array's values, flattened, as literals with commas."""
     return ", ".join(map(number, np.ravel(values)))

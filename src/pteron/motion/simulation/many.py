@@ -260,6 +260,7 @@ def _start_arrays(
 
 
 def _make_empty_folder(out: str | Path) -> Path:
+    """Return the output folder, created on demand; refuse a folder with results of another run."""
     folder = make_folder(out)
     there = sorted(folder.glob("machines-*.parquet"))
     if there:

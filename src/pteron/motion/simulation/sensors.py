@@ -173,6 +173,7 @@ def expect_encoders(robot: Manipulator, law: Program) -> None:
 
 
 def _joint_array(setting: float | tuple[float, ...], name: str, count: int) -> Array:
+    """Return a sensor setting for each joint (n,); a scalar is broadcast."""
     array = np.asarray(setting, dtype=float)
     if array.shape not in ((), (count,)):
         raise DataError(

@@ -252,6 +252,7 @@ def check_delay(delay: float) -> None:
 
 
 def _is_number(number: object) -> bool:
+    """Return whether a value is a finite real number."""
     return isinstance(number, int | float | np.number) and bool(np.isfinite(number))
 
 

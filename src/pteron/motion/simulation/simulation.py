@@ -83,6 +83,7 @@ class Simulation(Result):
         return self._overview().text
 
     def _overview(self) -> Overview:
+        """Return errors, speeds, forces and saturation as a table, for notebooks."""
         headings = ("error, rms", "error, largest", "peak speed", "peak force", "at its limit")
         columns = [Column("coordinate"), *(Column(name, "number") for name in headings[:2])]
         columns += [Column("joint"), *(Column(name, "number") for name in headings[2:])]

@@ -83,6 +83,7 @@ class Sizing(Result):
         return self._overview().text
 
     def _overview(self) -> Overview:
+        """Return the loads on each drive as a table, for notebooks."""
         headings = ("peak force", "rms force", "peak speed", "peak power", "mean power")
         columns = [Column("joint"), *(Column(name, "number") for name in headings)]
         columns_of_numbers = (
@@ -146,6 +147,7 @@ class Sizing(Result):
         }
 
     def _greatest(self, quantity: str) -> PerJoint:
+        """Return the greatest value of a quantity over all places, for each joint (n,)."""
         return np.asarray(self._quantities_at_places[quantity].max(axis=0))
 
     def integral(self, samples: Array) -> Array:
@@ -265,6 +267,7 @@ class Sizing(Result):
 
     @cached_property
     def _squares(self) -> tuple[Array, Array, Array]:
+        """Means over the cycle of force^2, force times acceleration, and acceleration^2."""
         f, a = self.loads, self.accelerations
         return self.mean(f * f), self.mean(f * a), self.mean(a * a)
 

@@ -159,6 +159,7 @@ def _sample_curve(time: Array, curve: Curve, middles: Array) -> Curve:
 
 
 def _interleave(samples: Array, middles: Array) -> Array:
+    """Return samples (T, ...) with the middles (T - 1, ...) between them: (2 T - 1, ...)."""
     interleaved = np.empty((2 * len(samples) - 1, *samples.shape[1:]))
     interleaved[::2], interleaved[1::2] = samples, middles
     return interleaved

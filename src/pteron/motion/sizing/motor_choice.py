@@ -66,6 +66,7 @@ class MotorFit(Result):
 
     @property
     def _margins(self) -> dict[str, float]:
+        """The margins of the motor, limit over need, by what they are margins of."""
         return {
             "rated torque": self.rated_margin,
             "peak torque": self.peak_margin,
@@ -164,11 +165,13 @@ def rank_motors(
 
 
 def _order(fit: CommonFit) -> tuple[bool, float]:
+    """Return a sort key: feasible motors first, by size; then infeasible ones, by margin."""
     size = fit.motor.rated_torque * fit.motor.max_speed
     return not fit.span, size if fit.span else -fit.worst.margin
 
 
 def _fit(sizing: Sizing, legs: tuple[int, ...], motor: Motor, margin: float) -> CommonFit:
+    """Return a motor's fit to legs with a common ratio, within the ratios feasible at each leg."""
     span = fast = Span(0.0, math.inf)
     for leg in legs:
         fast = fast.intersect(speed_span(sizing, leg, motor.max_speed / margin))
@@ -231,4 +234,5 @@ def fit_at(sizing: Sizing, leg: int, motor: Motor, span: Span, ratio: float) -> 
 
 
 def _margin(limit: float, needed: float) -> float:
+    """Return limit / needed; infinity where nothing is needed."""
     return limit / needed if needed > 0.0 else np.inf

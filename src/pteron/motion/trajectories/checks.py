@@ -140,6 +140,8 @@ class _Failure(NamedTuple):
 
 
 def _reach_failure(curve: _Curve, marks: Array) -> _Failure | None:
+    """Return the first place where a leg does not reach or is singular (type I), else None."""
+
     def squares(at: Array) -> Array:
         return np.nan_to_num(curve.value("squared_type_i", at), nan=-1.0)
 
@@ -176,6 +178,8 @@ def _reach_failure(curve: _Curve, marks: Array) -> _Failure | None:
 
 
 def _joint_failure(curve: _Curve, marks: Array) -> _Failure | None:
+    """Return the first place where an actuated joint passes its limits, else None."""
+
     def margin(at: Array) -> Array:
         return joint_distances(curve.robot, curve.value("joint_coordinates", at))
 
@@ -194,6 +198,8 @@ def _joint_failure(curve: _Curve, marks: Array) -> _Failure | None:
 
 
 def _passive_failure(curve: _Curve, marks: Array) -> _Failure | None:
+    """Return the first place where a passive joint passes its limits, else None."""
+
     def margin(at: Array) -> Array:
         return curve.value("passive_room", at, 1)
 
@@ -215,11 +221,13 @@ def _passive_failure(curve: _Curve, marks: Array) -> _Failure | None:
 
 
 def _limit_failure(curve: _Curve, at: float, leg: int, fault: str, metres: float) -> _Failure:
+    """Return the failure of a leg's limit at a place on a curve, passed by a length, m."""
     text = f"{curve.place_text(at)}: {fault}; take another path"
     return _Failure(at, UnreachablePose(text, leg=leg, shortfall=metres, index=()))
 
 
 def _type_ii_failure(curve: _Curve, marks: Array) -> _Failure | None:
+    """Return the first place where the type-II measure changes its sign, else None."""
     if closure_of(curve.robot).vanishes() is False and not curve.robot.platform.angles:
         return None
     # Its sign is that of the beginning, as far as the actuators hold the platform.

@@ -134,6 +134,7 @@ def _wrap_half_turn(angles: Array) -> Array:
 
 
 def _end_joints(robot: Manipulator, name: str, pose: Array) -> Array:
+    """Return the joint coordinates (n,) at a pose, which errors call by a name."""
     try:
         return inverse_kinematics(robot, pose)
     except UnreachablePose as error:
@@ -160,6 +161,7 @@ def _expect_modes(robot: Manipulator, motion: Motion, planned: Any, end: Array) 
 
 
 def _lost_error(text: str) -> UnreachablePose:
+    """Return an error for a motion that leaves reach, without a leg or a distance."""
     return UnreachablePose(text, leg=0, shortfall=float("nan"), index=())
 
 

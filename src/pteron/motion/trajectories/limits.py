@@ -138,6 +138,7 @@ def limit_array(
 
 
 def _positive_number(name: str, setting: object) -> float:
+    """Return a setting as a float; it must be a number above 0."""
     number = number_or_nan(setting)
     if not number > 0.0:
         text = setting if isinstance(setting, float) else shorten(setting)

@@ -90,6 +90,7 @@ def time_curve(
 
 
 def _no_limit_error() -> DataError:
+    """Return the error that neither a duration nor a limit determines the motion's time."""
     return DataError(
         "neither a duration nor a limit that the motion meets is given, and the machine's drives "
         "have none; give a duration, or limits such as speed and acceleration of the joints"
@@ -241,5 +242,6 @@ def sample_curve(states: Callable[[Array], Curve], duration: float, step: float 
 
 
 def _expect_time(name: str, seconds: float) -> float:
+    """Return a time, s; it must be finite and above 0."""
     expect(np.isfinite(seconds) and seconds > 0.0, name, seconds, "a time above 0 s")
     return seconds

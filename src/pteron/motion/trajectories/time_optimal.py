@@ -202,6 +202,7 @@ def _fastest_law(
         # Limits are tightened by what the spread motion exceeds them.
 
         def evaluate_law(tau: Array, progress: Progress = progress) -> Curve:
+            """Return states at shares of the duration."""
             return states(progress(tau)[0])
 
         tau, needs, _ = demand_between(robot, evaluate_law, np.linspace(0.0, 1.0, _LOOK))

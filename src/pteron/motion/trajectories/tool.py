@@ -39,6 +39,7 @@ def tool_path(platform: Platform, pose: Array, first: Array, second: Array) -> C
 
 
 def _shift_curve(platform: Platform, curve: Curve, side: float) -> Curve:
+    """Return a curve shifted by the tool's arm: to the tool with `side` 1, back to P with -1."""
     turning = [
         part for axis, part in zip("xyz", platform.tool, strict=True) if axis in platform.arm_axes
     ]
@@ -77,6 +78,7 @@ def arm_motion(platform: Platform, angles: Array, rates: Array, growths: Array) 
 
 
 def _pose_of_angles(platform: Platform, angles: Array) -> Array:
+    """Return poses (..., m) with the platform's angles (..., a) and zeros for lengths."""
     pose = np.zeros((*angles.shape[:-1], len(platform.coordinates)))
     pose[..., platform.angular] = angles
     return pose

@@ -136,14 +136,17 @@ class LoopMargins(Result):
 
     @cached_property
     def _stable(self) -> float:
+        """Stability of the closed loop: 1.0 if it is stable, else 0.0."""
         return float(self.slowest > 0.0)
 
     @cached_property
     def _response(self) -> Array:
+        """Frequency response of the loop at `frequencies`, (W, n, n)."""
         return self.loop.response(self.frequencies)
 
     @cached_property
     def _single_margins(self) -> Array:
+        """Margins of gain, phase (rad), delay (s), and crossover (rad/s), of each drive (4, n)."""
         n = self.loop.plant.inputs.shape[1]
         if not self._stable:
             return np.array([0.0, 0.0, 0.0, np.nan])[:, None] * np.ones(n)

@@ -208,6 +208,7 @@ def _stiffer(robot: Manipulator, factor: float) -> Manipulator:
 
 
 def _tool_places(robot: Manipulator, poses: Array) -> Array:
+    """Return the tool's positions (..., k) at poses (..., m); the poses if it has none."""
     zero_rates = np.zeros_like(poses)
     place = tool_path(robot.platform, poses, zero_rates, zero_rates)[0]
     return place if place.shape[-1] else poses

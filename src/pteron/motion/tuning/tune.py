@@ -84,6 +84,7 @@ class Required:
         return float(min(*each, self._share(found.common_gain, delay)))
 
     def _share(self, gain: float, delay: float) -> float:
+        """Return the least ratio of margin to requirement, of the gains' logarithms and of delays."""
         factor = np.log(max(gain, 1.0)) / np.log(self.gain)
         return float(min(factor, delay / self.delay if self.delay else np.inf))
 
@@ -278,6 +279,7 @@ class _Search:
     steps: Steps
 
     def loop(self, controller: Controller, i: int) -> SampledLoop:
+        """Return the sampled loop of a controller at state `i`."""
         law = linearised_law(controller.law(self.model), *self.states[i])
         return SampledLoop(self.plants[i], law, controller.period, **self.how)
 
@@ -356,6 +358,7 @@ class _Search:
             high = low
 
     def _margins_text(self, controller: Controller, i: int) -> str:
+        """Return the text of a controller's margins at state `i` beside the required margins."""
         least, required = LoopMargins(self.loop(controller, i)).least, self.required
         delay_text = f", {1e3 * required.delay:.3g} ms" if required.delay else ""
         rate = controller.bandwidth

@@ -69,6 +69,7 @@ def firmware_fit(result: Calibration) -> FirmwareFit | None:
 
 
 def _row(name: str, drawn: float, estimated: float, unit: str, deviation: float) -> CalibrationRow:
+    """Return the row of a firmware value: drawn, estimated, their change, and its 95 % interval."""
     half = _QUANTILE * deviation
     change = estimated - drawn
     if unit == "°":
@@ -89,6 +90,7 @@ def _row(name: str, drawn: float, estimated: float, unit: str, deviation: float)
 
 
 def _sentence(fitted: Calibration) -> str:
+    """Return a sentence on the errors in rows that were not fitted, with and without the fit."""
     held_out = fitted.held_out
     if held_out is None:
         return "With these six values alone no rows were left for a check."

@@ -72,6 +72,7 @@ def error_text(value: float, kind: str) -> str:
 
 
 def _unit(kind: str) -> str:
+    """Return the unit that a kind of residual is shown in."""
     return "mrad" if kind == "angle" else "mm"
 
 
@@ -113,6 +114,7 @@ def levels(values: Array) -> list[float]:
 
 
 def _figures(result: Calibration) -> dict[str, Any]:
+    """Return the figures of the page by name; None for those that the machine does not allow."""
     fit, robot = result.fit, result.drawn
     kinds = [*["position"] * 3, *["angle"] * int(robot.platform.angular.sum())]
     rows = [*kinds, "height", "distance"]

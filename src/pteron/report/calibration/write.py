@@ -83,6 +83,7 @@ def numbers(result: Calibration, firmware: FirmwareFit | None = None) -> dict[st
 
 
 def _header(result: Calibration) -> list[str]:
+    """Return the comments at the head of the machine's file: origin, verdict, reasons, notes."""
     return [
         f"{result.drawn.name}, calibrated from {len(result.measurements)} rows of measurements.",
         f"Verdict: {result.verdict.grade}.",

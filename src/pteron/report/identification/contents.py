@@ -151,6 +151,7 @@ def contents(result: Identification) -> Contents:
 
 
 def _page_recording(prediction: Prediction, names: dict[str, str]) -> PageRecording:
+    """Return a recording with the stretch of greatest error, which is drawn."""
     time = prediction.time
     step = float(time[-1] - time[0]) / max(len(time) - 1, 1)
     length = min(max(int(_STRETCH / max(step, 1e-9)), _FEWEST), len(time))

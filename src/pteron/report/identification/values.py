@@ -129,5 +129,6 @@ def body_rows(result: Identification) -> tuple[ReportedBody, ...]:
 
 
 def _values(inertia: Inertia) -> tuple[float | None, ...]:
+    """Return m, mgx, mgy and I of an inertia with a moment of inertia, else its mass alone."""
     values = with_center(inertia)
     return tuple(map(values.get, ("m", "mgx", "mgy", "I"))) if "I" in values else (values["m"],)

@@ -63,6 +63,7 @@ def model_path(folder: str | Path, name: str, sources: Iterable[str | Path] = ()
 
 
 def _header(result: Identification) -> list[str]:
+    """Return the comments at the head of the model file: origin, verdict, and what is uncertain."""
     consistency = result.consistency
     assert consistency is not None
     names = short_sources(result)
