@@ -220,7 +220,7 @@ class Statements:
         return self.temporaries[-1]
 
     def _guard(self, test: str, name: str, value: str, otherwise: str, flag: str) -> None:
-        """Add an assignment guarded by a test; where that fails, a substitute and a cleared flag."""
+        """Add an assignment guarded by a test; if that fails, a substitute and a cleared flag."""
         self.flags.add(flag)
         self._choose(
             test, [f"{name} := {value};"], [f"{name} := {otherwise};", f"{flag} := FALSE;"]

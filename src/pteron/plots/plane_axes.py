@@ -65,7 +65,7 @@ class PlaneAxes(MachineAxes):
         self._small, self._step, self.plane = small, step, plane
 
     def _to_axes(self, points: Array, *, extends: bool = True) -> Array:
-        """Return points (..., 3) projected on the plane (..., 2), mm; the axes' limits hold them."""
+        """Return points (..., 3) projected on the plane (..., 2), mm; `fill` includes them."""
         flat = np.asarray(1e3 * points @ self.plane.T)
         self._drawn.append(flat)
         return flat

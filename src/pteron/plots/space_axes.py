@@ -77,7 +77,7 @@ class SpaceAxes(MachineAxes):
         )
 
     def _to_axes(self, points: Array, *, extends: bool = True) -> Array:
-        """Return points (..., 3) in the viewing frame; with `extends` the axes' limits hold them."""
+        """Return points (..., 3) in the upright frame; with `extends`, `fill` includes them."""
         placed = np.asarray(points @ self.rotation.T)
         if extends:
             self._drawn.append(placed)

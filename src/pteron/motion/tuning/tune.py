@@ -84,7 +84,7 @@ class Required:
         return float(min(*each, self._share(found.common_gain, delay)))
 
     def _share(self, gain: float, delay: float) -> float:
-        """Return the least ratio of margin to requirement, of the gains' logarithms and of delays."""
+        """Return min(log gain / log required gain, delay / required delay)."""
         factor = np.log(max(gain, 1.0)) / np.log(self.gain)
         return float(min(factor, delay / self.delay if self.delay else np.inf))
 
