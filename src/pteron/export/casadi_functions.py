@@ -91,7 +91,7 @@ def casadi_functions(robot: RobotLike) -> dict[str, ca.Function]:
 
 
 def _plain(robot: Manipulator, name: str, what: str) -> ca.Function:
-    """Return a function of the library's table, its matrices with their rows as rows."""
+    """Return a library function with the machine's parameters, its matrices by rows."""
     library = specialise_program(
         program(robot, what, wrench=what in _LOADED), {"parameters": parameters(robot)}
     )
@@ -217,7 +217,7 @@ def export_casadi(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
 
 
 def _ends(robot: Manipulator) -> tuple[list[float], list[float]]:
-    """Return two poses between which the example moves: a short straight way within all limits.
+    """Return the start and end poses of the example: a short straight path within all limits.
 
     Raises
     ------

@@ -85,7 +85,7 @@ _PER_READING = {
 
 
 def convert_joints(function: Program, robot: Manipulator) -> Program:
-    """Return a program whose joints, rates and forces are as the drives count them."""
+    """Return a program whose joints, rates and forces are those of the drives' readings."""
     if not has_readings(robot):
         return function
     zeros, scales = ca.DM(reading_zeros(robot)), ca.DM(reading_scales(robot))

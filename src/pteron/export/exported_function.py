@@ -94,7 +94,7 @@ class ExportedFunction:
 
     @property
     def several(self) -> bool:
-        """Whether it returns several poses, one a row, of which some may not exist."""
+        """Whether it returns several poses, as rows, some of which may not exist."""
         return self.name == "direct_kinematics"
 
     @property
@@ -136,7 +136,7 @@ class ExportRequest:
 
     @property
     def is_custom(self) -> bool:
-        """Whether it is the law of a controller of one's own."""
+        """Whether it is the law of a custom controller."""
         return isinstance(self.controller, Custom)
 
     @property
@@ -266,7 +266,7 @@ def _meanings(
 
 
 def _drop_status(law: Program) -> Program:
-    """Return a program without its last output, all others the same to the bit."""
+    """Return a program without its last output; other results are bitwise equal."""
     symbols = law.function.sx_in()
     results = law.function.call(symbols)[:-1]
     return Program.from_expressions(law.name, symbols, law.inputs, results, law.outputs[:-1])
@@ -299,7 +299,7 @@ def _states(
     fixed: dict[str, Array],
     controller: Controller | Custom | None,
 ) -> list[list[Array]]:
-    """Return inputs at three random poses in reach, and far out of it."""
+    """Return inputs at three random poses in reach and at a pose far out of reach."""
     rng = np.random.default_rng(1)
     states = []
     law = controller.law(robot) if controller else None

@@ -109,7 +109,7 @@ def exported_functions(
 def _usual_names(
     robot: Manipulator, usual: Sequence[str], identified: Identified | None, specialised: bool
 ) -> list[str]:
-    """Return the names of functions that are exported where none are named."""
+    """Return the names of the functions exported by default."""
     closed = closure_of(robot).closed_form
     step = {"direct_kinematics": "direct_step"}
     names = [name if closed else step.get(name, name) for name in usual]
@@ -127,7 +127,7 @@ def _usual_names(
 
 
 def _expect_exportable(names: Sequence[str], custom: set[str], specialised: bool) -> None:
-    """Refuse unknown names, those of custom controllers that are taken, and none at all."""
+    """Refuse unknown names, custom names that Pteron uses, and an empty choice."""
     based = {name + BASE for name in (*REDUCIBLE, PAYLOAD)}
     allowed = sorted({*COMPILED, *based} - {"base_regressor"})
     valid = f"choose from {', '.join(allowed)}"

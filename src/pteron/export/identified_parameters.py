@@ -50,7 +50,7 @@ class Identified:
 
     @classmethod
     def from_robot(cls, robot: Manipulator) -> Identified:
-        """Return a machine's own base parameters, with the values of its file."""
+        """Return a machine's base parameters, with the values of its file."""
         base = base_parameters(robot)
         return cls(robot, base, base.values(), _comments(base, base.expressions()))
 

@@ -101,12 +101,12 @@ class _Arm:
 
     @property
     def turns(self) -> bool:
-        """Whether it hangs on phi."""
+        """Whether the arm depends on phi."""
         return bool(self.cosine.any())
 
     @property
     def rows(self) -> list[list[float]]:
-        """The three numbers of each length."""
+        """The coefficients (still, cos phi, sin phi) of each length."""
         parts = (part.tolist() for part in (self.still, self.cosine, self.sine))
         return [list(row) for row in zip(*parts, strict=True)]
 
@@ -250,7 +250,7 @@ def _linear(robot: Manipulator) -> bool:
 
 
 def linuxcnc_axes(robot: Manipulator) -> tuple[LinuxCncAxis, ...]:
-    """Return the axes of LinuxCNC that the pose's coordinates are."""
+    """Return the LinuxCNC axes of the pose's coordinates."""
     axes = []
     for name, unit in zip(robot.coordinates, robot.units, strict=True):
         if name in _LETTERS:

@@ -22,7 +22,7 @@ _SHARE = 0.5
 
 
 def start_pose(robot: Manipulator) -> Array:
-    """Return a pose (m,) to start from: zero if it is a good one, else amid the good ones.
+    """Return a start pose (m,): zero if it is far from singularities, else amid such poses.
 
     Of a platform that tilts it is the home pose, which is level where that can be; so it is where
     the machine's file names its home.

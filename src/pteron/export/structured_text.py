@@ -160,7 +160,7 @@ def function_block(
     *,
     largest: float = _LREAL,
 ) -> str:
-    """Return a FUNCTION_BLOCK that computes a graph, in ASCII if what is given is.
+    """Return a FUNCTION_BLOCK that computes a graph, in ASCII if all texts passed in are.
 
     `comments` are lines for its head, `descriptions` say what ports mean, `labels` what nodes are
     called (the others are t1, t2 and so on); `largest` is the power of ten of the largest LREAL.

@@ -60,7 +60,7 @@ def _differences(name: str, stored: Any, plan: Any) -> Iterator[str]:
 
 
 def _machine(text: Any) -> Mapping[str, Any]:
-    """Return what a machine's file says; of anything else, its name."""
+    """Return the tables of a machine's file; for another text, a table with its name."""
     try:
         return tomllib.loads(text)
     except (TypeError, AttributeError, ValueError, RecursionError):

@@ -60,7 +60,7 @@ class Motion(Result):
         return f"<{type(self).__name__}: {self.duration:.6g} s, {rows}>"
 
     def summary(self) -> str:
-        """Return what the motion reaches, for people, as lines of text."""
+        """Return the range and rates of the motion as lines of text."""
         return self._overview().text
 
     def _overview(self) -> Overview:

@@ -66,7 +66,7 @@ def coordinates(opened: Tree, poses: PoseLike) -> Array:
 
 
 def _leg(home: LegStance, away: LegStance) -> list[Array]:
-    """Return how far each joint of a leg has moved from the home pose, (K,) each."""
+    """Return the displacement of each joint of a leg from the home pose, (K,) each."""
     count = len(away.end)
     turn, shift = np.broadcast_to(np.eye(3), (count, 3, 3)), np.zeros((count, 3))
     motions: list[Array] = []

@@ -107,7 +107,7 @@ def omission_notes(opened: Tree, written: Sequence[str]) -> list[str]:
 
 
 def head(opened: Tree, language: str) -> list[str]:
-    """Return the first lines of every file: its machine, and the numbers that are made up."""
+    """Return the head comment of every file: machine, home pose, and assumed numbers."""
     robot = opened.robot
     name = re.sub(r"[^\w ,.+-]|--+", "?", " ".join(robot.name.split()))
     pairs = zip(robot.coordinates, opened.home, strict=True)

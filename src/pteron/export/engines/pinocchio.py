@@ -73,7 +73,7 @@ def export_pinocchio(
 
 
 def pinocchio_model(robot: RobotLike, *, home: PoseLike | None = None) -> Any:
-    """Return what `build()` of the exported file returns: a Pinocchio model with its constraints.
+    """Return the Pinocchio model and its constraints, as the exported file's `build()` does.
 
     Parameters
     ----------

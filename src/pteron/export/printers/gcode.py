@@ -65,7 +65,7 @@ def _lines(
     of_ends: Callable[[Sequence[float]], Any],
     sign: float,
 ) -> list[str]:
-    """Return M665 and M666; `of_ends` gives the height, from which ends are told with a sign."""
+    """Return M665 and M666; `of_ends` gives the height that end stops are measured from."""
     height, end_lines = "", []
     if numbers.ends is not None:
         level = float(of_ends(numbers.ends))

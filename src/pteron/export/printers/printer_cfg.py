@@ -88,7 +88,7 @@ def printer_cfg(text: str, source: str = "printer.cfg") -> configparser.RawConfi
 
 
 def setting(config: configparser.RawConfigParser, section: str, key: str) -> float | None:
-    """Return a number of a printer.cfg; None where it is not given.
+    """Return a number of a printer.cfg; None if it is absent.
 
     Raises
     ------
@@ -107,7 +107,7 @@ def setting(config: configparser.RawConfigParser, section: str, key: str) -> flo
 
 
 def _way_a_turn(config: configparser.RawConfigParser, tower: str) -> float | None:
-    """Return a joint's way a turn of its motor, mm or rad; None where the file does not say."""
+    """Return a joint's travel per motor turn, mm or rad; None if the file does not define it."""
     section = f"stepper_{tower}"
     turn = setting(config, section, "rotation_distance")
     text = config.get(section, "gear_ratio", fallback="")
@@ -123,7 +123,7 @@ def _way_a_turn(config: configparser.RawConfigParser, tower: str) -> float | Non
 
 
 def way_a_step(config: configparser.RawConfigParser, tower: str) -> float | None:
-    """Return a joint's way a step of its motor, mm or rad; None where the file does not say."""
+    """Return a joint's travel per motor step, mm or rad; None if the file does not define it."""
     section = f"stepper_{tower}"
     turn, micro = _way_a_turn(config, tower), setting(config, section, "microsteps")
     if turn is None or micro is None:

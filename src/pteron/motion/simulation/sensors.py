@@ -109,7 +109,7 @@ def encoder_arrays(
 
 
 def encoder_memory(joints: Array, rates: Array, steps: Array, period: float) -> Array:
-    """Return the memory (..., 4 E) of encoders that begin with joints and rates (..., E).
+    """Return the initial memory (..., 4 E) of encoders at joints and rates (..., E).
 
     `steps` (E,) are theirs, `period` is from one sample to the next.
     """
@@ -132,7 +132,7 @@ def encoder_noise(
 
 
 def encoder_of(drive: Drive | None) -> str:
-    """Return where a drive's encoder is: "motor", "joint" or "both"; a rigid one has both."""
+    """Return the place of a drive's encoder: "motor", "joint" or "both"; rigid drives have both."""
     return drive.elastic.encoder if drive and drive.elastic else "rigid"
 
 

@@ -79,7 +79,7 @@ class Simulation(Result):
         return f"<Simulation of {self.robot.name!r}: {rows}{end}>"
 
     def summary(self) -> str:
-        """Return errors and drives' loads, for people, as lines of text."""
+        """Return errors and drives' loads as lines of text."""
         return self._overview().text
 
     def _overview(self) -> Overview:
@@ -124,7 +124,7 @@ class Simulation(Result):
 
     @property
     def saturated_share(self) -> Array:
-        """Share of the samples, (n,), in which a drive could not give what was asked for."""
+        """Share of the samples, (n,), in which a drive's commanded force exceeded its limits."""
         beyond = np.abs(self.asked) > limits_of(self.robot).force
         beyond |= (
             np.abs(limit_to_motors(self.robot, self.asked, self.motor_rates) - self.asked) > 0.0

@@ -50,7 +50,7 @@ class MotorFit(Result):
 
     @property
     def fits(self) -> bool:
-        """Whether there is a ratio at which it serves."""
+        """Whether the motor is feasible at some ratio."""
         return bool(self.span)
 
     @property
@@ -108,7 +108,7 @@ class CommonFit(Result):
 
 
 def choose(sizing: Sizing, motors: Sequence[Motor], *, margin: float = 1.0) -> tuple[MotorFit, ...]:
-    """Return how each motor suits each joint: first what serves, the smallest motor before others.
+    """Return how each motor suits each joint: feasible motors first, by size, then others.
 
     A motor serves at a ratio if, times the margin, its root mean square torque over the cycle, the
     rest included, is no more than its rated torque, its greatest torque no more than its peak
@@ -185,7 +185,7 @@ def _fit(sizing: Sizing, legs: tuple[int, ...], motor: Motor, margin: float) -> 
 
 
 def serving_span(sizing: Sizing, leg: int, motor: Motor, margin: float) -> Span:
-    """Return the ratios at which a motor keeps its speed and its torques."""
+    """Return the ratios at which a motor keeps its speed and torque limits."""
     rotor = motor.rotor_inertia
     span = speed_span(sizing, leg, motor.max_speed / margin)
     span = span.intersect(rated_span(sizing, leg, rotor, motor.rated_torque / margin))
@@ -193,7 +193,7 @@ def serving_span(sizing: Sizing, leg: int, motor: Motor, margin: float) -> Span:
 
 
 def _best_ratio(sizing: Sizing, legs: tuple[int, ...], rotor_inertia: float) -> float:
-    """Return the ratio at which the largest root mean square torque of all legs is least."""
+    """Return the ratio that minimises the largest root mean square torque of all legs."""
     optimal_ratios = [best_ratio(sizing, leg, rotor_inertia) for leg in legs]
     moving = [ratio for ratio in optimal_ratios if math.isfinite(ratio)]
     if not moving:

@@ -57,7 +57,7 @@ def check_path(robot: RobotLike, path: Path) -> None:
 def check_motion(
     robot: RobotLike, motion: Motion, place: Callable[[float], str] | None = None
 ) -> None:
-    """Refuse a motion that the machine cannot do, as `check_path` does; it says at what time.
+    """Refuse a motion that the machine cannot do, like `check_path`; the error names the time.
 
     Parameters
     ----------
@@ -117,7 +117,7 @@ def check_curve(
 
 
 class _Curve(NamedTuple):
-    """A curve of poses (K, m) over a parameter (K,), and words for a place on it."""
+    """A curve of poses (K, m) over a parameter (K,), with a text for a place on it."""
 
     robot: Manipulator
     poses: Callable[[Array], Array]
@@ -128,12 +128,12 @@ class _Curve(NamedTuple):
         return np.asarray(numeric(self.robot, what)(self.poses(at))[index])
 
     def place_text(self, at: float) -> str:
-        """Return where that is, and the pose."""
+        """Return the text of a parameter's place on the curve and of the pose there."""
         return f"{self.place(at)}, pose {pose_text(self.poses(np.array([at]))[0])}"
 
 
 class _Failure(NamedTuple):
-    """The place where a curve fails, and the error that says so."""
+    """The place where a curve fails, and the error to raise."""
 
     at: float
     error: PteronError

@@ -79,5 +79,5 @@ class CyclePath:
         return tau
 
     def place(self, s: float) -> str:
-        """Return the place of s on the path in words."""
+        """Return the text of a place on the path, by its s."""
         return f"{s:.4g} m along its path of {self.length:.4g} m"

@@ -78,7 +78,7 @@ _SLOWEST = 1e-4
 
 @dataclass(frozen=True, eq=False, repr=False)
 class TimeOptimal(Motion):
-    """A motion along a path in next to the shortest time.
+    """A motion along a path in nearly the shortest time.
 
     Attributes
     ----------
@@ -261,7 +261,7 @@ def _largest_in_ranges(ranges: Array, quantities: Array) -> Array:
 def _solve_pass(
     toppra: Any, rows: LimitRows, grid: Array, last_squares: Array, ahead: float
 ) -> Array:
-    """Return x = s'^2 on the grid, by TOPP-RA, from that of the pass before.
+    """Return x = s'^2 on the grid, by TOPP-RA, from the solution of the previous pass.
 
     With viscous friction it is at most `ahead` times as large: there the chord ends.
     """

@@ -15,7 +15,7 @@ from pteron.motion.trajectories.tool import Curve
 
 @dataclass(frozen=True)
 class Timed:
-    """A curve of poses over one unit of time, traversed in a given duration.
+    """A curve of poses over a unit of time, traversed in a duration.
 
     Attributes
     ----------

@@ -54,12 +54,12 @@ def _shift_curve(platform: Platform, curve: Curve, side: float) -> Curve:
 
 
 def carries(platform: Platform) -> bool:
-    """Say whether the pose's lengths can hold the tool in place while its angles change."""
+    """Return whether the pose's lengths can compensate the tool's displacement by its angles."""
     return bool(platform.angles) and set(platform.arm_axes) <= set(platform.lengths)
 
 
 def arm_motion(platform: Platform, angles: Array, rates: Array, growths: Array) -> Curve:
-    """Return the part of the arm from P to the tool that turns, and two derivatives, (..., k).
+    """Return the rotating part of the arm from P to the tool, and two derivatives, (..., k).
 
     The k components are along the pose's lengths; angles, rates and growths, their second
     derivatives, are (..., j). The platform is one that `carries` its tool.
