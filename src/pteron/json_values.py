@@ -9,7 +9,7 @@ from typing import Any
 
 
 def json_ready(data: Any) -> Any:
-    """Return data for JSON: NumPy's numbers as Python's, None (null) for what is not finite."""
+    """Return data for JSON: NumPy's numbers as Python's, None (null) for non-finite ones."""
     if isinstance(data, dict):
         return {key: json_ready(value) for key, value in data.items()}
     if isinstance(data, list | tuple):

@@ -62,7 +62,7 @@ class Stock:
         return cls(_DENSITIES[match[1]], outer / 1e3, round(outer - 2.0 * wall, 9) / 1e3)
 
     def link(self, kind: Any, low: float, high: float, count: int = 1) -> Any:
-        """Return the inertia of a link, or several alike, from x = low to high of its frame."""
+        """Return the inertia of a link, or of several identical ones, from x = low to high."""
         length, squares = high - low, self.outer**2 + self.inner**2
         area = math.pi / 4.0 * (self.outer**2 - self.inner**2)
         mass, middle = count * self.density * area * length, (low + high) / 2.0
@@ -81,7 +81,7 @@ def with_dimensions(
     stock: Mapping[str, str | Stock] | None = None,
     platform_mass: float | None = None,
 ) -> Manipulator:
-    """Return a machine of the same kind with other dimensions, which hold for all of its legs.
+    """Return a machine of the same kind with other dimensions, equal for all legs.
 
     Links of another length keep their section unless `stock` is given; so do a ram's cylinder and
     piston, which are as long as its shortest length. Limits of joints, and the platform's mass and

@@ -32,7 +32,7 @@ DEFAULT_KIND = "PRRR"
 
 
 def catalog() -> tuple[str, ...]:
-    """Return the names of the machines that come with Pteron."""
+    """Return the names of the machines in the catalog that is part of Pteron."""
     return _names()
 
 
@@ -165,7 +165,7 @@ def from_dict(tables: Mapping[str, Any]) -> Manipulator:
 
 
 def _warned(robot: Manipulator, unlikely: Sequence[str], source: str) -> Manipulator:
-    """Return a machine, and warn of its unlikely values."""
+    """Return a machine after issuing warnings of its unlikely values."""
     for text in unlikely:
         warn_unlikely(f"{source}: {text}")
     return robot
@@ -210,7 +210,7 @@ def contents(name_or_path: str | Path) -> tuple[bytes, str]:
 
 
 def _similar_files(path: Path) -> list[str]:
-    """Return the file in a missing file's folder with the most similar name, if one is similar."""
+    """Return the file in the same folder whose name is most similar to a missing file's, if any."""
     with suppress(OSError, ValueError):  # no such folder, one that may not be read, or no path
         if not path.exists():
             names = [file.name for file in path.parent.iterdir() if file.suffix == ".toml"]

@@ -121,7 +121,7 @@ class Manipulator:
 
     @property
     def joint_count(self) -> int:
-        """Number of actuated joints n, one a leg."""
+        """Number of actuated joints n, equal to that of legs."""
         return len(self.legs)
 
     @property
@@ -131,7 +131,7 @@ class Manipulator:
 
     @property
     def wraps(self) -> NDArray[np.bool_]:
-        """Coordinates (m,) of which a whole turn leads back to the same joint coordinates.
+        """Coordinates (m,) of which a full turn gives the same joint coordinates.
 
         A platform's angle does, unless it slides the platform's halves or a joint follows it.
         """
@@ -317,7 +317,7 @@ def _tilting_leg_faults(platform: Platform, leg: LegKind) -> Iterator[str]:
 
 
 def _unheld_tilting(platform: Platform, legs: Sequence[LegKind]) -> list[str]:
-    """Return the fault of legs that leave a tilting platform a freedom at every pose."""
+    """Return the fault of legs that leave a tilting platform a free motion at every pose."""
     normals = [leg.plane_normal for leg in legs if leg.plane_normal is not None]
     if normals and all(parallel(normals[0], normal) for normal in normals[1:]):
         return [
@@ -328,7 +328,7 @@ def _unheld_tilting(platform: Platform, legs: Sequence[LegKind]) -> list[str]:
 
 
 def _with_held_points(platform: Platform, legs: Sequence[LegKind]) -> Platform:
-    """Return a platform with the planes in which its legs keep its points, if it is a tripod's."""
+    """Return a tripod's platform with the planes that its legs confine its points to."""
     if not platform.keeps_points_in_planes:
         return platform
     planes = [
@@ -340,7 +340,7 @@ def _with_held_points(platform: Platform, legs: Sequence[LegKind]) -> Platform:
 
 
 def unheld_axes(platform: Platform, legs: Sequence[LegKind]) -> NDArray[np.float64]:
-    """Return axes (k, 3) about which no leg keeps a platform that does not tilt from turning.
+    """Return axes (k, 3) about which no leg prevents a non-tilting platform from rotating.
 
     Only the points where both legs meet may carry anything there, as of a five-bar.
     """
@@ -351,7 +351,7 @@ def unheld_axes(platform: Platform, legs: Sequence[LegKind]) -> NDArray[np.float
 
 
 def _unheld_freedoms(platform: Platform, legs: list[LegKind]) -> list[str]:
-    """Return the fault of legs that leave the platform a freedom outside its motion."""
+    """Return the fault of legs that leave the platform a free motion other than its own."""
     turning = [i for i, leg in enumerate(legs, start=1) if leg.follows_angle]
     if len(turning) > 1:
         return [f"{legs_text(turning)}: all turn the platform, which takes one such leg"]

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def machine_table(robot: Any) -> str:
-    """Return the legs of a machine as a table in HTML, and its platform above it."""
+    """Return the platform and the table of the legs of a machine, as HTML."""
     driven = any(leg.drive for leg in robot.legs)
     columns = [
         *(Column("leg", "number"), Column("kind"), Column("joint"), Column("limits")),

@@ -112,7 +112,7 @@ def parameters(robot: RobotLike) -> NDArray[np.float64]:
 
 
 def with_parameters(robot: RobotLike, values: ArrayLike) -> Manipulator:
-    """Return the same machine with other inertial parameters.
+    """Return a machine with other inertial parameters, otherwise equal.
 
     Parameters
     ----------

@@ -69,7 +69,7 @@ class Tool:
         return self.point if self.center_of_mass is None else self.center_of_mass
 
     def turned(self, turn: Callable[[Vector], Vector]) -> Tool:
-        """Return the tool in a frame of the platform that turns: every vector v becomes turn(v)."""
+        """Return the tool in a rotated frame of the platform: every vector v becomes turn(v)."""
         center, inertia = self.center_of_mass, self.central_inertia
         if isinstance(inertia, tuple):
             rotation = np.array(

@@ -18,7 +18,7 @@ _NO_LETTERS = ("Last Resort", "STIXNonUnicode", "STIXSize", "cm")
 
 
 def take_fonts(figure: Figure) -> str:
-    """Give every text of a figure the fonts that its letters need; return what no font has."""
+    """Set fonts that have the letters of each text of a figure; return letters without a font."""
     absent: set[str] = set()
     for text in figure.findobj(Text):
         assert isinstance(text, Text)
@@ -69,7 +69,7 @@ def _fallback_families(letters: frozenset[str]) -> tuple[list[str], frozenset[st
 
 @lru_cache(maxsize=1)
 def _font_files() -> dict[str, str]:
-    """Return one file of each family, upright where there is one, of those that have letters."""
+    """Return a font file of each family, upright if available; symbol fonts are excluded."""
     listed = sorted(font_manager.fontManager.ttflist, key=lambda font: font.style == "normal")
     files = {font.name: font.fname for font in listed if not font.name.startswith(_NO_LETTERS)}
     return dict(sorted(files.items()))

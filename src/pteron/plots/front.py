@@ -121,7 +121,7 @@ def fronts_figure(
     *,
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return the picture of several fronts of two objectives, the first over the second.
+    """Return the picture of several fronts of two objectives.
 
     Parameters
     ----------

@@ -184,7 +184,7 @@ def base_outline(points: JointPoints, guides: Sequence[Guide]) -> Array:
 
 
 def rods(line: Array, bar: Array | None, size: float) -> list[Array]:
-    """Return the lines of a leg's last link: one (2, 3), or two and the bars between them."""
+    """Return the line (2, 3) of a leg's last link, or both lines and the bars between them."""
     if bar is None:
         return [line[-2:]]
     first_rod, second_rod = (line[-2:] + side * APART * size * bar for side in (1.0, -1.0))

@@ -174,7 +174,7 @@ def poses_figure(
     along: PoseLike | None = None,
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return a machine in several poses beside each other, all seen from one place.
+    """Return a machine in several poses beside each other, from the same viewpoint.
 
     They may be instants of a motion, or assembly modes of one machine; its working modes are robots
     of their own.

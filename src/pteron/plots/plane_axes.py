@@ -86,7 +86,7 @@ class PlaneAxes(MachineAxes):
         return np.asarray(np.copysign(1.0, normal @ self.plane @ away) * normal @ self.plane)
 
     def fill(self, angles: Sequence[float] = (0.0,)) -> None:
-        """Let the scales end a rim beyond what was drawn."""
+        """Set the scales to end a margin beyond everything drawn."""
         drawn = self.drawn_points
         low, high = drawn.min(axis=0), drawn.max(axis=0)
         rim = _RIM * float((high - low).max())

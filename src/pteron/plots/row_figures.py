@@ -46,7 +46,7 @@ def parameters_figure(
     reference: ArrayLike | None = None,
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return the values of parameters with their intervals, each unit on a scale of its own.
+    """Return the values of parameters with their intervals, with a scale for each unit.
 
     Parameters
     ----------

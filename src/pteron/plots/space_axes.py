@@ -30,7 +30,7 @@ _MARGIN = 0.04
 
 
 def upright_rotation(vertical: Array) -> Array:
-    """Return a rotation (3, 3) that takes a direction to z and keeps x, or y, near its place."""
+    """Return a rotation (3, 3) that takes a direction to z, with x, or y, nearly unchanged."""
     z = vertical / np.linalg.norm(vertical)
     near = np.eye(3)[0] if abs(z[0]) < 0.9 else np.eye(3)[1]
     y = np.cross(z, near)
@@ -39,7 +39,7 @@ def upright_rotation(vertical: Array) -> Array:
 
 
 class SpaceAxes(MachineAxes):
-    """Matplotlib's three-dimensional axes, with a vertical, which draw by distance.
+    """Matplotlib's three-dimensional axes, with a vertical, that draw in order of distance.
 
     They take a `box` of the figure: left, bottom, width and height, as shares of it.
     """
@@ -64,7 +64,7 @@ class SpaceAxes(MachineAxes):
         self.turn(0.0)
 
     def turn(self, angle: float) -> None:
-        """Look from another side: the eye goes round the vertical by an angle from the first, rad.
+        """Set the viewpoint: turned about the vertical by an angle from the first, rad.
 
         From then on things are drawn in the order of their distance from there.
         """
@@ -107,7 +107,7 @@ class SpaceAxes(MachineAxes):
         return np.asarray(self.rotation.T @ (point + moved))
 
     def fill(self, angles: Sequence[float] = (0.0,)) -> None:
-        """Place the axes so that all things fill the box, seen from any of the angles, rad.
+        """Place the axes so that all things fit into the box, seen from any of the angles, rad.
 
         Later things leave them where they are.
         """
@@ -139,7 +139,7 @@ class SpaceAxes(MachineAxes):
         return seen.min(axis=0), seen.max(axis=0)
 
     def ground(self, low: Array, high: Array, step: float) -> None:
-        """Draw squares of a side under everything, one rim wider than it."""
+        """Draw a grid of squares of a side below everything, a margin wider than it."""
         first, last = np.floor(low / step) - 0.5, np.ceil(high / step) + 0.5
         x, y = (np.arange(first[i] + 0.5, last[i], 1.0) * step for i in (0, 1))
         z = low[2]

@@ -92,7 +92,7 @@ def joints_figure(
     robot: RobotLike | None = None,
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return the joints' coordinates over time, and below their speeds, accelerations and jerks.
+    """Return the joints' coordinates over time, above their speeds, accelerations and jerks.
 
     Parameters
     ----------

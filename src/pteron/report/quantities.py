@@ -48,7 +48,7 @@ class JointQuantity:
 
 
 def coordinate(joints: Sequence[ActuatedJoint]) -> JointQuantity:
-    """Return the joint coordinates, as people read them."""
+    """Return the joint coordinates, in display units."""
     names = _distinct(joint.coordinate for joint in joints)
     name = ", ".join(SYMBOLS.get(letter, letter) for letter in names)
     shown = [SHOWN[joint.unit] for joint in joints]
@@ -76,7 +76,7 @@ def nouns(joints: Sequence[ActuatedJoint]) -> str:
 
 
 def readable(value: float, unit: str, places: int = 1) -> str:
-    """Return a coordinate of a joint or a pose as people read it.
+    """Return the text of a coordinate, in display units.
 
     Examples
     --------
@@ -88,7 +88,7 @@ def readable(value: float, unit: str, places: int = 1) -> str:
 
 
 def angles_text(robot: Manipulator, pose: Array) -> str:
-    """Return the angles of a pose (m,) with their symbols; empty where the platform has none."""
+    """Return the angles of a pose (m,) with their symbols; empty without angles."""
     pairs = zip(robot.coordinates, pose, strict=True)
     return ", ".join(
         f"{pose_coordinate(name).symbol} = {readable(value, 'rad', 0)}"

@@ -72,7 +72,7 @@ def open_table(
 
 
 def read_table(path: str | Path) -> Table:
-    """Read a table from a CSV or Parquet file, or as CSV from standard input (``-``).
+    """Return the table in a CSV or Parquet file, or in CSV from standard input (``-``).
 
     Parameters
     ----------
@@ -153,7 +153,7 @@ def _name_in_errors(source: str) -> Iterator[None]:
 
 
 def check_output(path: str | Path, dialect: Dialect | None = None) -> Path:
-    """Return `path` after a check, before the work begins, that a table can be written there.
+    """Return `path`, checked beforehand for whether a table can be written there.
 
     Raises
     ------
@@ -170,7 +170,7 @@ def check_output(path: str | Path, dialect: Dialect | None = None) -> Path:
 
 
 def write_table(frame: pl.DataFrame, path: str | Path, dialect: Dialect | None = None) -> Path:
-    """Write a table to a CSV or Parquet file, whole or not at all.
+    """Write a table to a CSV or Parquet file, atomically.
 
     Parameters
     ----------

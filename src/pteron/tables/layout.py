@@ -145,7 +145,7 @@ def _check_commas(rows: Cut, source: str) -> None:
 
 
 def _first_row(rows: Cut, header_lines: int | None) -> int:
-    """Return the line of the first row, from 0."""
+    """Return the line of the first row of data, from 0."""
     if header_lines is not None:
         below = [record for record in rows.records if record.line >= header_lines]
         return below[0].after if below and _are_units(below[0]) else header_lines

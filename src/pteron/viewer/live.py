@@ -43,7 +43,7 @@ _UNDONE = ("pose", "joint", "drag", "type", "payload", "home", "mode", "assembly
 
 
 class Live:
-    """A session with the tabs that show it, and a queue of actions for it.
+    """A session with the tabs that show it, and a queue of its actions.
 
     Attributes
     ----------
@@ -87,7 +87,7 @@ class Live:
         self._thread.join()
 
     def queue_action(self, name: str, act: Callable[[], object]) -> None:
-        """Queue an action; of waiting actions with one name only the last is done."""
+        """Queue an action; it replaces a waiting action with the same name."""
         with self._wake:
             self._actions.pop(name, None)
             self._actions[name] = act
@@ -118,7 +118,7 @@ class Live:
             self._files.pop(tab, None)
 
     def handle_message(self, tab: Tab, message: str | bytes) -> None:
-        """Handle a message of a tab; a file comes after its name."""
+        """Handle a tab's message; the contents of a file follow its name."""
         session = self.session
         if isinstance(message, bytes):
             name = self._files.pop(tab, "")
@@ -140,7 +140,7 @@ class Live:
         self.queue_action(name, act)
 
     def _push(self, drives: str) -> None:
-        """Compile the equations of motion in a thread of its own, then begin the push."""
+        """Compile the equations of motion in a thread, then begin the push."""
         session = self.session
 
         def prepare() -> None:

@@ -89,7 +89,7 @@ def values(session: Session, joints: Array) -> dict[str, Any]:
 
 
 def _pose_text(robot: Manipulator, pose: Array) -> str:
-    """Return a pose (m,) in a line, each unit once."""
+    """Return the text of a pose (m,), each unit named once."""
     values, units = pose_factors(robot) * pose, (SHOWN[unit][0] for unit in robot.units)
     named = zip(robot.coordinates, values, units, strict=True)
     groups = groupby(
@@ -100,7 +100,7 @@ def _pose_text(robot: Manipulator, pose: Array) -> str:
 
 
 def _label(robot: Manipulator, pose: Array) -> str:
-    """Return a pose (m,) as the list of assembly modes has it."""
+    """Return the label of a pose (m,) in the list of assembly modes."""
     parts = zip(pose_factors(robot) * pose, robot.platform.angular, strict=True)
     return " ".join(format_fixed(x) + "°" * bool(angle) for x, angle in parts)
 
@@ -112,7 +112,7 @@ def joints_in_display_units(robot: Manipulator, joints: Array) -> list[float]:
 
 
 def settled_values(session: Session, busy: Callable[[], bool]) -> dict[str, Any] | None:
-    """Return the slow values: assembly modes, and the span of each slider from this pose.
+    """Return values that are slow to compute: assembly modes, and sliders' spans at this pose.
 
     None if somebody acts meanwhile.
     """
@@ -133,7 +133,7 @@ def settled_values(session: Session, busy: Callable[[], bool]) -> dict[str, Any]
 
 
 def activity_text(session: Session) -> str:
-    """Return what the machine does as a sentence."""
+    """Return a sentence on what the machine does."""
     name, state = session.state.robot.name, session.state
     if words := _push_text(session):
         return words
@@ -144,7 +144,7 @@ def activity_text(session: Session) -> str:
 
 
 def _push_text(session: Session) -> str:
-    """Return what the machine does by itself, or is about to; empty where it does nothing."""
+    """Return the text of a push or of its preparation; empty without one."""
     if session.push is not None:
         return f"{session.push.does}. Pull at its platform."
     if session.preparing:
@@ -153,7 +153,7 @@ def _push_text(session: Session) -> str:
 
 
 def action(session: Session, text: str) -> _Action:
-    """Return the action that a page's request, JSON, asks for, with its name.
+    """Return name and action that a page's JSON request stands for.
 
     Raises
     ------
@@ -169,7 +169,7 @@ def action(session: Session, text: str) -> _Action:
 
 @dataclass(frozen=True)
 class _Request:
-    """A request of a page: its fields, as JSON has them, and the session that it is made to.
+    """A request of a page: its JSON fields, and the session it applies to.
 
     Methods return the name of an action, which undoing goes by, and the action.
     """
@@ -317,5 +317,5 @@ def _tenths(array: Array) -> list[float]:
 
 
 def signs(mode: Any) -> str:
-    """Return the sides of a working mode's elbows as signs."""
+    """Return the signs of a working mode's elbows as text."""
     return "".join("+" if side > 0 else "-" for side in mode)

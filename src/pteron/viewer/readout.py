@@ -73,7 +73,7 @@ def _template() -> Template:
 
 
 def _share(share: float) -> dict[str, Any] | None:
-    """Return a drive's share of its limit, with its level and words for that."""
+    """Return a drive's share of its limit, with its level and a text."""
     if np.isnan(share):
         return None
     how: Level = "far" if share <= 0.8 else "near" if share <= 1.0 else "close"

@@ -189,7 +189,7 @@ class Server:
 
 
 def free_port(host: str, port: int) -> int:
-    """Return the first free port of a host from a given one on; 0 means any."""
+    """Return the first free port of a host, from a port on; 0 means any."""
     if not 0 <= port <= _LAST_PORT:
         raise DataError(
             f"port: {shorten(port)} given, a whole number from 0 to {_LAST_PORT} expected"
@@ -231,5 +231,5 @@ def _is_free(family: int, address: Any, port: int) -> bool:
 
 
 def _is_significant(record: logging.LogRecord) -> bool:
-    """Say whether a record of the log matters: browsers open connections that they do not use."""
+    """Return whether a log record matters: browsers open connections they do not use."""
     return record.levelno >= logging.ERROR and record.getMessage() != "opening handshake failed"

@@ -80,7 +80,7 @@ def _weights(robot: Manipulator) -> Array:
 
 
 def _step(robot: Manipulator, pose: Array, wish: Array, weights: Array) -> Array:
-    """Return the step (m,) nearest to a wished one that keeps the margins, taken as linear.
+    """Return the step (m,) nearest to a desired one that keeps the linearised margins.
 
     Least distance programming by non-negative least squares (Lawson and Hanson, chapter 23).
     """

@@ -33,7 +33,7 @@ _SHARES = 40
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Inscribed(Result):
-    """The largest shape that was found in the workspace.
+    """The largest shape in the workspace, by a search, with its proof.
 
     Attributes
     ----------

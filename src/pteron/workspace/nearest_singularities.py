@@ -182,14 +182,14 @@ def _singularity_of(
 
 
 def _varying_coordinates(robot: Manipulator, by: By) -> NDArray[np.intp]:
-    """Return the coordinates that vary."""
+    """Return the indices of the coordinates that a translation or rotation varies."""
     return np.flatnonzero(robot.platform.angular == (by == "rotation"))
 
 
 def _search(
     vanishing: Vanishing, reference: Array, by: By, most: int, report: Callable[[float], None]
 ) -> Nearest:
-    """Return the nearest pose at which a function vanishes, moved or turned alone."""
+    """Return the nearest pose at which a function vanishes, by translation or rotation only."""
     robot, moving = vanishing.robot, _varying_coordinates(vanishing.robot, by)
     if by == "translation":
         try:

@@ -49,11 +49,11 @@ class Vanishing:
 
     @property
     def smooth(self) -> Smooth:
-        """The function, of pose and roots."""
+        """The function in terms of pose and roots."""
         return _smooth(self.robot, self.kind, self.leg)
 
     def proves_absence(self, boxes: Array) -> NDArray[np.bool_]:
-        """Return for which boxes (B, 2, m) intervals prove that it vanishes at no pose in reach."""
+        """Return which boxes (B, 2, m) are proved, by intervals, to have no zero in reach."""
         squares = bounds(self.robot, "squared_type_i", boxes)["squares"]
         is_absent = np.asarray((squares.high < 0.0).any(axis=-1))
         if self.leg:

@@ -171,7 +171,7 @@ def path_weights(platform: Platform) -> Array:
 def _round_corners(
     platform: Platform, places: Array, directions: Array, sizes: Array, corner: float
 ) -> LinePath:
-    """Return the path through places (K, m) with rounded corners, from line directions and lengths."""
+    """Return the path through places (K, m), with rounded corners between its lines."""
     controls: list[Array] = []
     knots, rests, corners = [0.0], [0.0], [0.0]
     here = places[0]

@@ -46,8 +46,8 @@ class SampledLoop:
     def open_loop(self, more: float = 0.0) -> tuple[Array, Array, Array]:
         """Return (F, G, H) of s' = F s + G u, commands = H s: the loop opened at all drives.
 
-        s are the changes of the plant's state, last readings of joints and rates, memory, and commanded
-        forces not yet applied; u are commanded forces, `more` is a delay, s, added to the loop's.
+        s are the changes of the plant's state, last readings of joints and rates, memory, and
+        commanded forces not yet applied; u are commanded forces, `more` is an extra delay, s.
         """
         period, law, n = self.period, self.law, self.plant.inputs.shape[1]
         late, delay_samples = split_delay(self.delay + more, period)

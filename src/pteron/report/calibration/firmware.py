@@ -22,7 +22,7 @@ _QUANTILE = 1.96
 
 @dataclass(frozen=True)
 class FirmwareFit:
-    """A calibration of the firmware's six values, in its own units, and what it leaves."""
+    """A calibration of the firmware's six values, in its own units, and its residuals."""
 
     rows: tuple[CalibrationRow, ...]
     sentence: str
@@ -30,7 +30,7 @@ class FirmwareFit:
     result: Calibration
 
     def as_dict(self) -> dict[str, Any]:
-        """Return it as plain data: values in mm and degrees, as texts with their digits."""
+        """Return it as plain data: values in mm and degrees, as texts with significant digits."""
         values = [
             {"name": row.name, "drawn": row.drawn, "found": row.found, "unit": row.unit}
             for row in self.rows
@@ -39,7 +39,7 @@ class FirmwareFit:
 
 
 def firmware_fit(result: Calibration) -> FirmwareFit | None:
-    """Return the firmware's values fitted to a calibration's measurements; None for no printer."""
+    """Return the firmware's values fitted to a calibration's data; None if that is impossible."""
     try:
         drawn = LinearDelta.from_robot(result.drawn)
         loose = dict.fromkeys(("radius", "angles", "zeros"), float("inf"))

@@ -49,7 +49,7 @@ class ErrorMap(NamedTuple):
 
 
 def page(result: Calibration, *, written: bool = True, firmware: FirmwareFit | None = None) -> str:
-    """Return the page as HTML without reference to another file; robot.toml may not be written."""
+    """Return the page as self-contained HTML; `written` says whether robot.toml is written."""
     document = template("calibration/page.html.j2", error_text=error_text)
     return document.render(
         result=result,
@@ -67,7 +67,7 @@ def page(result: Calibration, *, written: bool = True, firmware: FirmwareFit | N
 
 
 def error_text(value: float, kind: str) -> str:
-    """Return an error of a kind of measurement with its unit, the same all over the page."""
+    """Return an error of a kind of measurement with its unit, in the page's format."""
     return f"{significant(1e3 * value)} {_unit(kind)}"
 
 
@@ -106,7 +106,7 @@ def error_maps(result: Calibration) -> list[ErrorMap]:
 
 
 def levels(values: Array) -> list[float]:
-    """Return round levels of a map, of which the first is below all of its values."""
+    """Return round contour levels of a map, the first below all values."""
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
     step = nice_step(max((high - low) / _LEVELS, 1e-3 * high, 1e-12))
     first, last = int(np.floor(low / step)), int(np.ceil(high / step))

@@ -88,12 +88,12 @@ class Contents:
 
     @property
     def essential(self) -> int:
-        """Number of values that the data show."""
+        """Number of values that the data determine."""
         return sum(not row.weak for row in self.parameters)
 
 
 def short_sources(result: Identification) -> dict[str, str]:
-    """Return the names of recordings on a page: without folders, unless two would be alike."""
+    """Return display names of recordings: without folders, unless names coincide."""
     every = list(
         dict.fromkeys(prediction.source for prediction in (*result.fitted, *result.held_out))
     )
@@ -162,7 +162,7 @@ def _page_recording(prediction: Prediction, names: dict[str, str]) -> PageRecord
 
 
 def _residuals(result: Identification) -> Array:
-    """Return the residuals of the equations; an equation that is not used has none."""
+    """Return the residuals of the equations; NaN for unused equations."""
     residuals = result.estimate.residuals
     if not residuals.size:
         return np.full((0, len(result.robot.legs)), np.nan)
