@@ -137,7 +137,7 @@ def _import_error(error: Exception) -> PteronError:
 
 
 def _initialise_worker(pickled: bytes, messages: Any) -> None:
-    """Ignore SIGINT, exit when the parent does, and keep what the calls share."""
+    """Ignore SIGINT, exit when the parent does, and store the object that calls share."""
     global _shared, _queue
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     Thread(target=_exit_with_parent, daemon=True).start()

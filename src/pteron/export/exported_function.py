@@ -50,7 +50,7 @@ Far above rounding, far below the shares at which results bend."""
 
 @dataclass(frozen=True)
 class NumberTable:
-    """The machine's own values for an argument: code has them as a constant array to pass."""
+    """The machine's values for an argument: in code a constant array to pass."""
 
     name: str
     comment: str
@@ -60,7 +60,7 @@ class NumberTable:
 
 @dataclass(frozen=True)
 class Example:
-    """A test vector: a state, what a function returns for it, and its status.
+    """A test vector: a state, the function's results for it, and its status.
 
     The status is that of exported code: 0 where all is well, 1 where there is no result, as out of
     reach. (That of `pteron.kernels.programs` is the other way round.)
@@ -275,7 +275,7 @@ def _drop_status(law: Program) -> Program:
 def _table(
     robot: Manipulator, name: str, base: Identified | None, controller: Controller | Custom | None
 ) -> NumberTable:
-    """Return the machine's own numbers for a shared input, or a controller's parameters."""
+    """Return the machine's values for a shared input, or a controller's parameters."""
     if isinstance(controller, Custom):
         values = controller.law(robot).numbers[f"law_{name}"].ravel()
         names = tuple(f"{name}_{k}" for k in range(1, len(values) + 1))

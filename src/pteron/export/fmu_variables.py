@@ -78,7 +78,7 @@ class FmuVariables:
 
     @property
     def units(self) -> dict[str, dict[str, int]]:
-        """The units that occur, and what they are made of."""
+        """The units in use, with their exponents of SI base units."""
         used = [variable.unit for block in self.blocks for variable in block.variables]
         return {unit: _TABLE["units"][unit] for unit in dict.fromkeys(used)}
 

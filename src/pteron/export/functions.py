@@ -45,7 +45,7 @@ PLACES = ("pose", "joints", "motors")
 
 
 def has_drives(robot: Manipulator) -> bool:
-    """Return whether the machine's file says what drives its joints."""
+    """Return whether the machine's file has drives of its joints."""
     return any(leg.drive is not None for leg in robot.legs)
 
 
@@ -66,7 +66,7 @@ def exported_functions(
     base: str | Path | None = None,
     tables: bool = True,
 ) -> tuple[ExportedFunction, ...]:
-    """Return the functions to export: the `usual` unless a choice is given.
+    """Return the functions to export: by default the `usual` ones.
 
     `tables` says whether the code can have tables of the machine's own values. Where not, they are
     folded in, all but the inertial parameters that `set_payload` returns.

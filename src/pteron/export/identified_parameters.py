@@ -56,7 +56,7 @@ class Identified:
 
 
 def read_identified(robot: Manipulator, path: str | Path) -> Identified:
-    """Read the base parameters, friction and offsets that `pteron identify` found for a machine.
+    """Return base parameters, friction and offsets that `pteron identify` wrote for a machine.
 
     What a drive's file says of the motor and its limits stays; a rotor's inertia is in the base
     parameters that it joins, or among the values.
@@ -169,7 +169,7 @@ def base_program(what: str, identified: Identified, *, wrench: bool, folded: boo
 
 
 def _payload_program(robot: Manipulator, base: BaseParameters) -> Program:
-    """Return `set_payload` of base parameters, which a payload's own parameters are added to."""
+    """Return `set_payload` for base parameters, to which it adds those of a payload."""
     load = program(robot, "set_payload")
     mass, center, inertia, parameters = load.function.sx_in()
     load_parameters = load.function(mass, center, inertia, ca.SX.zeros(parameters.shape))
@@ -186,7 +186,7 @@ def _payload_program(robot: Manipulator, base: BaseParameters) -> Program:
 
 
 def _substitute_parameters(function: Program, matrix: Array) -> Program:
-    """Return a program of base parameters b from one of matrix @ b, by substitution."""
+    """Return a program with input b from a program with input matrix @ b."""
     place = next(k for k, port in enumerate(function.inputs) if port.name == _NAME)
     symbols, ports = function.function.sx_in(), list(function.inputs)
     symbols[place] = ca.SX.sym(_NAME, matrix.shape[1])

@@ -279,7 +279,7 @@ class _FileReader:
     """The lists of valid keys that messages have named."""
 
     def table(self, model: Any, raw_table: object, prefix: str) -> Any:
-        """Return a table as its model; one with faults, which are collected, as `valid_part`."""
+        """Return a table as its model; if it has faults, collect them and return `valid_part`."""
         from pydantic import ValidationError
 
         try:

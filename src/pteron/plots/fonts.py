@@ -36,7 +36,7 @@ def take_fonts(figure: Figure) -> str:
 
 
 def warn_of_absent(letters: str) -> None:
-    """Issue one warning of letters that are drawn as boxes, if there are any."""
+    """Issue a warning of letters that are drawn as boxes, if there are any."""
     if letters:
         some = shorten(letters, bare=True, longest=8)
         warnings.warn(
@@ -48,7 +48,7 @@ def warn_of_absent(letters: str) -> None:
 
 @contextmanager
 def silence_glyph_warnings() -> Iterator[None]:
-    """Silence matplotlib's own warnings of missing letters, several for each letter."""
+    """Silence matplotlib's warnings of missing letters in a block."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", r"(?s)(Glyph|Matplotlib currently does not).*")
         yield

@@ -64,7 +64,7 @@ def map_figure(
     *names: str,
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return the picture of a map: a panel for each index, one below the other.
+    """Return the picture of a map: a panel for each index, in a column.
 
     Over one coordinate it is a curve, over two a plane. Over three it is the three planes through
     the pose that is deepest among those that serve, one below the other, and the indices stand side

@@ -267,7 +267,7 @@ def poses_figure(
 
 
 def _share_size(scenes: list[Scene]) -> list[Scene]:
-    """Return the scenes, each extended to the size of the largest one."""
+    """Return the scenes, each enlarged to the size of the largest one."""
     low = np.min([scene.low for scene in scenes], axis=0)
     high = np.max([scene.high for scene in scenes], axis=0)
     step = max(scene.step for scene in scenes)

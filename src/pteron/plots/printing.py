@@ -71,7 +71,7 @@ _METADATA: dict[str, dict[str, Any]] = {
 
 
 def resize(figure: Figure, width: Width | float) -> Figure:
-    """Return the same figure for print, with letters of 8 points.
+    """Return the figure resized for print, with letters of 8 points.
 
     Maps and machines keep their shape; curves keep more of their height.
 
@@ -207,7 +207,7 @@ def save_figure(
 
 
 def svg(figure: Figure, *, name: str, title: str, widest: float = _ON_PAGE) -> Markup:
-    """Return a figure as one `<svg>` element for an HTML page, without a background.
+    """Return a figure as an `<svg>` element for an HTML page, without a background.
 
     It holds no date, no random identifier and no address, and its colours are CSS variables with
     the printed colours as defaults. Text stays text, in the page's font. The name, of letters and

@@ -114,7 +114,7 @@ def operations_figure(
     *,
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return bars of counts, such as operations, each with its number.
+    """Return bars of counts, such as operations, labelled with their values.
 
     Parameters
     ----------

@@ -36,7 +36,7 @@ _LITTLE = 1e-3
 
 @dataclass(frozen=True)
 class Frames:
-    """F moments of a motion, to be drawn.
+    """F moments of a motion for animation.
 
     Attributes
     ----------

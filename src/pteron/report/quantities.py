@@ -28,12 +28,12 @@ class JointQuantity:
 
     @property
     def common_unit(self) -> str:
-        """The unit, if all have the same."""
+        """The unit, if it is the same for all joints."""
         return self.units[0] if len(set(self.units)) == 1 else ""
 
     @property
     def heading(self) -> str:
-        """The name, with the unit if all have the same."""
+        """The name, with the unit if it is the same for all joints."""
         unit = self.common_unit.replace(" ", _NARROW)
         return f"{self.name} ({unit})" if unit else self.name
 
@@ -43,7 +43,7 @@ class JointQuantity:
         return f"{self.name} ({', '.join(dict.fromkeys(self.units))})"
 
     def unit_suffix(self, i: int) -> str:
-        """Return the unit of leg i, from 0, if the heading does not have it."""
+        """Return the unit of leg i, from 0, unless the heading has it."""
         return "" if self.common_unit else f" {self.units[i]}"
 
 

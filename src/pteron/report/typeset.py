@@ -125,7 +125,7 @@ def triple(values: Iterable[float], factor: float = 1.0, digits: int = 4) -> str
 
 
 def prose(text: str) -> Markup:
-    """Return a message with true signs; commands and options are code, in one piece."""
+    """Return a message as HTML, with true signs, and commands and options as code."""
     signed = re.sub(r"(?<![\w.-])-(?=\d)", "\u2212", str(escape(text)))
     signed = re.sub(r"(?<=\d) x (?=\w)", " \u00d7 ", signed).replace("^2", "²")
     commands = re.sub(_COMMAND, lambda command: re.sub(r"\S+", _CODE, command[0]), signed)

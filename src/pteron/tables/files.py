@@ -111,7 +111,7 @@ def read_table(path: str | Path) -> Table:
 
 
 def whole_table(file: CsvFile | ParquetFile) -> Table:
-    """Return all rows of an open file as one table.
+    """Return all rows of an open file as a single table.
 
     Raises
     ------

@@ -72,7 +72,7 @@ class Layout:
 
 
 def find_encoding(head: bytes, declared: str | None, source: str) -> str:
-    """Return the encoding: the declared one, that of a byte order mark, UTF-8, or else cp1252."""
+    """Return the encoding: declared, by byte order mark, UTF-8, or else cp1252."""
     if declared is not None:
         return declared
     if head.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
@@ -162,7 +162,7 @@ def _first_row(rows: Cut, header_lines: int | None) -> int:
 def _names(
     rows: Cut, above: Sequence[Record], header_lines: int | None, source: str
 ) -> tuple[tuple[str, ...], tuple[str, ...], bool]:
-    """Return names and units of the columns, and whether the units have a line of their own."""
+    """Return names and units of the columns, and whether units are on a separate line."""
     width = rows.width
     # Rows may end in a separator where the line of names does not.
     fitting = [record for record in above if len(record.cells) in (width, width - 1)]

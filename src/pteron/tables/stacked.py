@@ -35,7 +35,7 @@ _Columns = dict[str, list[tuple[str, str]]]
 
 
 def side_by_side(file: Path, encoding: str | None, source: str) -> bytes | None:
-    """Return a file whose variables stand one below another as plain CSV, with the time in t.
+    """Return a log with variables one below another as plain CSV with columns, time in t.
 
     `encoding` is what was declared. None for any other file.
     """

@@ -242,7 +242,7 @@ class Live:
     # What the page shows.
 
     def _show(self, *, settled: bool = False) -> None:
-        """Send the state to the tabs; `settled` also sends what takes long to compute."""
+        """Send the state to the tabs; `settled` also sends values that are slow to compute."""
         session = self.session
         state, push = session.state, session.push
         if state.robot != self._robot:

@@ -173,7 +173,7 @@ class Session:
         self.state = move_platform(self.state, target)
 
     def drag(self, axis: int | None, point: Array) -> None:
-        """Move P to a point (3,), m, or turn the platform so that one of its axes leads there."""
+        """Move P to a point (3,), m, or turn the platform to point an axis at it."""
         platform, target = self.state.robot.platform, self.state.pose.copy()
         if axis is None:
             target[~platform.angular] = platform.directions @ point

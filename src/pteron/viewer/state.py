@@ -119,7 +119,7 @@ def current_assembly(state: ViewerState, poses: Array) -> int | None:
 
 
 def switch_assembly(state: ViewerState, pose: Array) -> ViewerState:
-    """Return the machine in another assembly mode, that of a pose with the same joints."""
+    """Return the machine in another assembly mode, at a pose with the same joints."""
     if not is_allowed(state.robot, pose):
         why = stop_reason(state.robot, pose)
         return replace(state, message=f"This assembly mode is not possible. {why}.")

@@ -156,7 +156,7 @@ def _reachable_measures(robot: Manipulator, poses: Array) -> Array:
 
 
 def _singular_between_samples(robot: Manipulator, region: Array) -> Array | None:
-    """Return a singular pose between random poses of opposite sign; None without such."""
+    """Return a singular pose between random poses of opposite sign, or None."""
     rng = np.random.default_rng(0)
     poses = rng.uniform(region[0], region[1], (_SAMPLES, robot.freedom))
     measures = _reachable_measures(robot, poses)

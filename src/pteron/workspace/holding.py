@@ -153,7 +153,7 @@ def expect_regular(robot: Manipulator, home: Array) -> None:
 
 
 def holding_warnings(of: Holding) -> tuple[str, ...]:
-    """Return warnings of a platform that is held badly at home, or nearly singular there."""
+    """Return warnings of a platform that drives hold badly at home, or nearly singular there."""
     warnings = []
     if of.everywhere <= INACCURATE * of.rounding:
         warnings.append(

@@ -63,7 +63,7 @@ class ModePlace:
 
     @property
     def signs(self) -> str:
-        """Its elbows as --elbows takes them, such as ++-."""
+        """Its elbows as text for the option --elbows, such as ++-."""
         return "".join("+" if sign > 0 else "-" for sign in self.elbows)
 
 

@@ -94,7 +94,7 @@ def shaft_ratio(robot: Manipulator, i: int) -> float:
 
 
 def _numbers_before_the_cut(robot: Manipulator, i: int, motion: LegMotion) -> tuple[int, ...]:
-    """Return the indices, in a leg's chain, of its joints up to the one of its last body."""
+    """Return the indices, in a leg's chain, of its joints up to its last body."""
     leg = robot.legs[i]
     carried = [joint.body for joint in motion.chain if joint.body]
     if sorted(carried) != sorted(motion.bodies):

@@ -164,7 +164,7 @@ def _merge_gears(bodies: Sequence[TreeBody]) -> list[TreeBody]:
 
 
 def _with_gear(body: TreeBody, gear: TreeBody, ratio: float) -> TreeBody:
-    """Return a body joined with a balanced one at its origin that turns `ratio` times faster.
+    """Return a body merged with a balanced one at its origin that turns `ratio` times as fast.
 
     Only the moment about z acts, and it is exact.
     """

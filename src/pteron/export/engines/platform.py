@@ -221,7 +221,7 @@ def _gears(platform: Platform, pose: Array, masses: Array, against: float) -> li
 
 
 def _share_axis(first: Array, second: Array) -> bool:
-    """Return whether two places of the platform are on one axis of it."""
+    """Return whether two places are on a common axis of the platform."""
     return bool(np.abs(first - second)[:2].max() <= ROUNDING)
 
 

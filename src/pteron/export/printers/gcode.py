@@ -148,7 +148,7 @@ def _numbers(robot: Manipulator) -> tuple[LinearDelta, list[int]]:
 
 
 def _turns(numbers: LinearDelta, order: Sequence[int]) -> list[float]:
-    """Return each tower's angle less the one that it has in the firmware, degrees."""
+    """Return each tower's angle less the firmware's, degrees."""
     return [
         float(_wrap_degrees(numbers.angles[i] - firmware_angle))
         for i, firmware_angle in zip(order, _TOWERS, strict=True)

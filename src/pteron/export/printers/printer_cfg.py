@@ -255,7 +255,7 @@ def _crank(leg: LegKind, turn: float, base: list[float], lengths: list[float]) -
 def _place_leg(
     leg: LegKind, turn: float, radius: float, height: float, lengths: dict[str, float]
 ) -> LegKind:
-    """Return a leg turned about z, at a radius and height, with links of given lengths, m."""
+    """Return a leg turned about z, at a radius and height, m, with new link lengths, m."""
     cos, sin = math.cos(turn), math.sin(turn)
 
     def turn_vector(v: Vector) -> Vector:

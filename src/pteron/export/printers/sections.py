@@ -13,7 +13,7 @@ INSTEAD = "use --linuxcnc, or --c for a controller of your own"
 
 
 def differs(robot: Manipulator, leg: int, reason: str, taker: str) -> ModelError:
-    """Return the error that refuses a machine because of one of its legs."""
+    """Return the error that the firmware does not fit a machine because of a leg."""
     return ModelError(f"{robot.name}: {taker} does not fit leg {leg}: {reason}; {INSTEAD}")
 
 

@@ -91,7 +91,7 @@ class Loads:
 
 @dataclass(frozen=True)
 class Timing:
-    """The delays of forces and of readings, and how steps between samples are made."""
+    """The delays of forces and of readings, and the integration steps between samples."""
 
     delay: float
     method: Method

@@ -92,7 +92,7 @@ def simulate_many(
     out: str | Path | None = None,
     threads: Workers = 1,
 ) -> Batch:
-    """Simulate many machines that follow a motion under one controller.
+    """Return statistics of many simulated machines that follow a motion under a controller.
 
     Each is what `simulate` makes of it, to the same bits but for the noise, whose seed is that of
     the sensors with the machine's number; where machines have a geometry of their own, to rounding.

@@ -81,7 +81,7 @@ def simulate(
     error: float | None = None,
     progress: Progress | None = None,
 ) -> Simulation:
-    """Simulate a machine with its drives under a controller, or under given forces, or free.
+    """Return the simulation of a machine with drives under a controller, under forces, or free.
 
     The rigid bodies and the motors' inertia move under the drives' forces and friction. Dry
     friction sticks: a joint at rest does not move until it is pulled by more than its friction

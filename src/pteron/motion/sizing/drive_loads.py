@@ -167,7 +167,7 @@ class Sizing(Result):
 
     @property
     def rms_forces(self) -> PerJoint:
-        """Root mean square of each force over the cycle, N or N m: what heats a motor."""
+        """Root mean square of each force over the cycle, N or N m, which heats the motor."""
         return self._greatest("rms_force")
 
     @property

@@ -19,7 +19,7 @@ from pteron.tolerances import ROUNDING
 
 @dataclass(frozen=True, eq=False, repr=False)
 class MotorFit(Result):
-    """A motor at a joint over a cycle: the ratios at which it serves, and its margins.
+    """A motor at a joint over a cycle: its feasible ratios, and its margins.
 
     Attributes
     ----------
@@ -66,7 +66,7 @@ class MotorFit(Result):
 
     @property
     def _margins(self) -> dict[str, float]:
-        """The margins of the motor, limit over need, by what they are margins of."""
+        """The margins of the motor, limit over load, by the limit's name."""
         return {
             "rated torque": self.rated_margin,
             "peak torque": self.peak_margin,
@@ -76,7 +76,7 @@ class MotorFit(Result):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CommonFit(Result):
-    """A motor at several legs over a cycle, behind the same ratio at each.
+    """A motor at several legs over a cycle, with an equal ratio at each.
 
     Attributes
     ----------
@@ -153,7 +153,7 @@ def choose(sizing: Sizing, motors: Sequence[Motor], *, margin: float = 1.0) -> t
 def rank_motors(
     sizing: Sizing, groups: Sequence[tuple[int, ...]], motors: Sequence[Motor], margin: float
 ) -> list[CommonFit]:
-    """Return how each motor suits each group of legs, with one ratio for all of a group.
+    """Return how each motor suits each group of legs, with a common ratio per group.
 
     What serves comes first in a group, the smallest motor before others; then what comes nearest.
     """

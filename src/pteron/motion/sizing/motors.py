@@ -32,7 +32,7 @@ _NUMBERS = ("rotor_inertia", "rated_torque", "peak_torque", "max_speed")
 @checked_arguments
 @dataclass(frozen=True)
 class Motor:
-    """A rotary motor; everything is at its own shaft.
+    """A rotary motor; all values are at its shaft.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ class Motor:
 
 
 def read_motors(path: str | Path) -> tuple[Motor, ...]:
-    """Return the motors that a file lists.
+    """Return the motors listed in a file.
 
     Parameters
     ----------

@@ -271,7 +271,7 @@ def _is_in_box(region: Region, poses: Array) -> NDArray[np.bool_]:
 
 
 def expect_places_of(robot: Manipulator, places: Sequence[CyclePlace]) -> tuple[CyclePlace, ...]:
-    """Return the places after a check: at least one, each with the machine's coordinates."""
+    """Return places after a check: at least one, each with the machine's coordinates."""
     expect(places, "places", "none", "at least one")
     for i, place in enumerate(places):
         if len(place.pose) != robot.freedom:

@@ -246,7 +246,7 @@ class Peak(Result):
 def peaks(
     robot: RobotLike, pose: Array, velocity: Array, acceleration: Array, limits: MotionLimits
 ) -> tuple[Peak, ...]:
-    """Return the largest sizes in a motion (T, m), one for each leg and quantity, then the tool's.
+    """Return the largest sizes in a motion (T, m): for each leg and quantity, then the tool.
 
     Parameters
     ----------

@@ -29,7 +29,7 @@ class Timed:
     duration: float
 
     def slow_down(self, factor: float) -> Timed:
-        """Return the same curve with its duration multiplied by a factor."""
+        """Return the curve with its duration multiplied by a factor."""
         return Timed(self.curve, factor * self.duration)
 
     def at(self, time: Array) -> Curve:

@@ -78,7 +78,7 @@ def reasons(choice: Choice, serving: list[Candidate]) -> list[str]:
 
 
 def next_steps(choice: Choice, serving: list[Candidate]) -> list[str]:
-    """Return what to do after a choice, a sentence each."""
+    """Return the next steps after a choice, a sentence each."""
     if not serving:
         return [
             "See below what each kind misses by how much: ask for less of that, or give stronger "

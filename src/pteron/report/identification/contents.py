@@ -37,7 +37,7 @@ _LAGS = 40
 
 @dataclass(frozen=True)
 class PageRecording:
-    """A recording: its name on the page, its forces as predicted, and the stretch to draw.
+    """A recording: its displayed name, its predicted forces, and the stretch to draw.
 
     The stretch is where the predictions miss the measured forces most.
     """
@@ -82,7 +82,7 @@ class Contents:
 
     @property
     def worst_floor(self) -> float:
-        """The part of the largest held-out error that noise alone makes, percent."""
+        """The part of the largest held-out error due to noise alone, percent."""
         shown = max(self.held_out, key=lambda recording: float(recording.prediction.nrms.max()))
         return float(shown.prediction.floor[int(np.argmax(shown.prediction.nrms))])
 
