@@ -167,7 +167,7 @@ def _map(
     names: tuple[str, str],
     ax: Axes | SubFigure | None,
 ) -> tuple[Figure, Axes, Array, Array, Array]:
-    """Return a figure, its axes, and both coordinates, in mm and degrees."""
+    """Return a figure, its axes, both coordinates in mm and degrees, and the values (B, A)."""
     scaled, labels = [], []
     for axis_values, name in zip((first, second), names, strict=True):
         numbers = as_array(axis_values, name, ())

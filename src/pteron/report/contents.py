@@ -64,7 +64,7 @@ _FINE = 121
 
 @dataclass(frozen=True)
 class Orientations:
-    """The type-II measure (A,) over the platform's angle over its best; NaN out of reach.
+    """The type-II measure (A,) over the platform's angle, relative to its best; NaN out of reach.
 
     `coordinate` is the place of the angle in a pose, `singular` has the type-II singular
     orientations; angles are in rad. The measure is the same at every position if `everywhere`, else
@@ -267,7 +267,7 @@ def _measures(robot: Manipulator, home: Array, volume: ReachVolume | None) -> Me
 
 
 def _orientations(robot: Manipulator, home: Array) -> Orientations | None:
-    """Return the type-II measure over a single angle at home; None if it depends on more."""
+    """Return the type-II measure over the platform's only angle at home; None if constant."""
     if robot.platform.axis_angle is None:
         return None
     (turn,) = np.flatnonzero(robot.platform.angular).tolist()

@@ -75,7 +75,7 @@ def _middle(robot: Manipulator) -> tuple[float, ...]:
 
 
 def _best(worth: Array) -> int:
-    """Return the index of the first maximum, up to rounding: mirrored poses do not alternate."""
+    """Return the first index of the maximum up to rounding, which mirrored poses may share."""
     return int((worth >= worth.max() - ROUNDING).argmax())
 
 

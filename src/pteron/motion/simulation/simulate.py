@@ -324,7 +324,7 @@ def _sample_source(
     name: str,
     time: Array,
 ) -> Array:
-    """Return forces or a wrench at each time, or a single row if they are constant."""
+    """Return a machine's forces or a wrench at each time (T, k); constant rows are repeated."""
     columns = robot.column_names[name]
     size = len(columns)
 
