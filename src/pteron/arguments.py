@@ -41,27 +41,27 @@ _Class = TypeVar("_Class")
 
 
 class Between(NamedTuple):
-    """The bounds of a number, both of them allowed, as an annotation of its type hint."""
+    """The bounds of a number, both included, as an annotation of its type hint."""
 
     least: float
     most: float = math.inf
 
 
 class _Kind(NamedTuple):
-    """A kind of argument: its words in messages, and its test."""
+    """A kind of argument: its name in messages, and its test."""
 
     words: str
     holds: Callable[[Any], bool]
 
 
 def with_checked_arguments(function: types.FunctionType) -> types.FunctionType:
-    """Return a function that first refuses arguments of another kind than its type hints say."""
+    """Return a function that first refuses arguments that do not match its type hints."""
     hints = {hint for key, hint in function.__annotations__.items() if key != "return"}
     return _add_check(function) if hints - _CHECKED_LATER - {"bool"} else function
 
 
 def checked_arguments(decorated: type[_Class]) -> type[_Class]:
-    """Let a class refuse arguments of another kind than its type hints say, as a decorator.
+    """Return a class, as a decorator, that refuses arguments that do not match its type hints.
 
     It is for classes that are made from what a user gives, and have no check of their own.
     """
@@ -73,7 +73,7 @@ def checked_arguments(decorated: type[_Class]) -> type[_Class]:
 def expect_kinds(
     function: Callable[..., Any], args: tuple[Any, ...], named: Mapping[str, Any]
 ) -> None:
-    """Refuse arguments of another kind than the type hints say, all in one line.
+    """Refuse arguments that do not match the type hints, all in a single message.
 
     Raises
     ------
@@ -93,7 +93,7 @@ def expect_kinds(
 
 
 def expect(holds: object, name: str, actual: object, expected: object) -> None:
-    """Refuse an argument of which a condition does not hold, in the words of all such messages.
+    """Raise a `DataError` in the common format if an argument's condition does not hold.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ def expect(holds: object, name: str, actual: object, expected: object) -> None:
 
 
 def expect_share(name: str, share: float) -> None:
-    """Refuse a number that is no share of a whole: it must be above 0 and below 1.
+    """Refuse a number that is no fraction: it must be above 0 and below 1.
 
     Raises
     ------
@@ -130,7 +130,7 @@ def expect_share(name: str, share: float) -> None:
 
 
 def number_or_nan(argument: object) -> float:
-    """Return what `float` makes of a value, NaN of what is no number.
+    """Return `float` of a value; NaN if it is no number.
 
     Examples
     --------
@@ -147,14 +147,14 @@ def number_or_nan(argument: object) -> float:
 def expect_one_of(
     choices: Sequence[str], error: type[PteronError] = DataError, **arguments: object
 ) -> None:
-    """Refuse values, by the names of their arguments, that are none of the choices."""
+    """Refuse values, by the names of their arguments, that are not among the choices."""
     for name, argument in arguments.items():
         if argument not in choices:
             raise error(f"{name}: {argument!r} is not one of {', '.join(choices)}")
 
 
 def expect_to_fit(name: str, count: object, numbers: float) -> None:
-    """Refuse a size whose arrays do not fit into this computer's memory, before they are made.
+    """Refuse a size whose arrays exceed this computer's memory, before their allocation.
 
     Parameters
     ----------
@@ -177,7 +177,7 @@ def expect_to_fit(name: str, count: object, numbers: float) -> None:
 
 @cache
 def _memory() -> float:
-    """Return the bytes of this computer's memory."""
+    """Return the size of this computer's memory, bytes."""
     try:
         return float(os.sysconf("SC_PAGE_SIZE")) * os.sysconf("SC_PHYS_PAGES")
     except (AttributeError, ValueError, OSError):  # Windows does not tell it this way
@@ -185,6 +185,7 @@ def _memory() -> float:
 
 
 def _add_check(function: types.FunctionType) -> types.FunctionType:
+    """Return a function that checks its arguments against the type hints before it runs."""
     expect = expect_kinds
 
     def call(*args: Any, **named: Any) -> Any:
@@ -202,7 +203,7 @@ def _add_check(function: types.FunctionType) -> types.FunctionType:
 def _kinds_of(
     function: Callable[..., Any],
 ) -> tuple[dict[str, tuple[_Kind | None, Any]], list[str], str]:
-    """Return kind and default of each argument, the names in order, and the name of the rest."""
+    """Return kind and default of each argument, positional names, and the name of *args."""
     kinds, order, others = {}, [], ""
     for name, argument in inspect.signature(function).parameters.items():
         if argument.kind is argument.VAR_POSITIONAL:
@@ -216,7 +217,7 @@ def _kinds_of(
 
 
 def _hint(function: Callable[..., Any], annotation: Any) -> Any:
-    """Return the value of a type hint; `Any` where its names exist for type checkers only."""
+    """Return the value of a type hint; `Any` if its names exist for type checkers only."""
     try:
         return eval(annotation, function.__globals__) if isinstance(annotation, str) else annotation
     except NameError:
@@ -224,7 +225,7 @@ def _hint(function: Callable[..., Any], annotation: Any) -> Any:
 
 
 def _kind(hint: Any) -> _Kind | None:
-    """Return the kind that a type hint asks for; None where it allows any value."""
+    """Return the kind of argument of a type hint; None if it allows any value."""
     if hint in _PLAIN:
         return _PLAIN[hint]
     origin, inner = typing.get_origin(hint), typing.get_args(hint)
@@ -267,7 +268,7 @@ def _kind(hint: Any) -> _Kind | None:
 
 
 def _has_shape(hint: Any) -> bool:
-    """Say whether a type hint is an array of jaxtyping, which then is imported."""
+    """Return whether a type hint is an array of jaxtyping, which is then imported."""
     jaxtyping = sys.modules.get("jaxtyping")
     return (
         jaxtyping is not None
@@ -277,7 +278,7 @@ def _has_shape(hint: Any) -> bool:
 
 
 def _alternative(hint: Any) -> _Kind | None:
-    """Return the kind of one of several type hints; a literal is compared with its choices."""
+    """Return the kind of a member of a union; a literal is compared with its choices."""
     kind = _kind(hint)
     if kind is None or typing.get_origin(hint) is not typing.Literal:
         return kind
@@ -289,6 +290,7 @@ def _alternative(hint: Any) -> _Kind | None:
 
 
 def _either(kinds: list[_Kind | None]) -> _Kind | None:
+    """Return the union of argument kinds; None, which accepts anything, if any of them is None."""
     known = [kind for kind in kinds if kind is not None]
     if len(known) < len(kinds):
         return None
@@ -297,10 +299,12 @@ def _either(kinds: list[_Kind | None]) -> _Kind | None:
 
 
 def _join_words(words: list[str]) -> str:
+    """Return words joined by commas, and by "or" before the last."""
     return " or ".join([", ".join(words[:-1]), words[-1]] if words[:-1] else words)
 
 
 def _with_bounds(kind: _Kind | None, bounds: Between) -> _Kind | None:
+    """Return a kind of number restricted to bounds, which its words state; None for None."""
     if kind is None:
         return None
     least, most = bounds
@@ -311,6 +315,8 @@ def _with_bounds(kind: _Kind | None, bounds: Between) -> _Kind | None:
 
 
 def _sequence(every: _Kind | None, *, lazy: bool = False, count: int | None = None) -> _Kind:
+    """Return the kind of a sequence with elements of a kind; `lazy` accepts iterators too."""
+
     def holds(argument: Any) -> bool:
         if isinstance(argument, str | bytes | Mapping) or not hasattr(argument, "__iter__"):
             return False
@@ -325,6 +331,7 @@ def _sequence(every: _Kind | None, *, lazy: bool = False, count: int | None = No
 
 
 def _is_number(argument: Any) -> bool:
+    """Return whether an argument is a real scalar: no bool, no text, no array with axes."""
     if isinstance(argument, bool | np.bool_ | str | bytes) or not hasattr(argument, "__float__"):
         return False
     try:
@@ -334,10 +341,12 @@ def _is_number(argument: Any) -> bool:
 
 
 def _is_array(argument: Any) -> bool:
+    """Return whether an argument is an array or nested sequence of real numbers."""
     return _are_numbers(argument) and np.ndim(argument) > 0
 
 
 def _is_whole(argument: Any) -> bool:
+    """Return whether an argument is an integer of less than 64 bits; a bool is none."""
     if isinstance(argument, bool | np.bool_):
         return False
     try:
@@ -347,6 +356,7 @@ def _is_whole(argument: Any) -> bool:
 
 
 def _are_numbers(argument: Any) -> bool:
+    """Return whether NumPy converts an argument to real numbers or booleans; text is refused."""
     if isinstance(argument, str | bytes) or argument is None:
         return False
     try:
@@ -359,6 +369,7 @@ def _are_numbers(argument: Any) -> bool:
 
 
 def _has_text(array: np.ndarray[Any, Any]) -> bool:
+    """Return whether an array of objects has elements of text."""
     return any(isinstance(element, str | bytes) for element in array.flat)
 
 

@@ -78,7 +78,7 @@ def write_files(files: Mapping[Path, bytes]) -> list[Path]:
 
 
 def _mode_of(target: Path) -> int:
-    """Return the permissions of a file that is there, or the usual ones of a new file."""
+    """Return the permissions of an existing file, or the default ones of a new file."""
     try:
         return stat.S_IMODE(target.stat().st_mode)
     except FileNotFoundError:
@@ -86,7 +86,7 @@ def _mode_of(target: Path) -> int:
 
 
 def _replace_all(written: Mapping[Path, Path]) -> None:
-    """Rename temporary files to their targets; where one fails, former files come back."""
+    """Rename temporary files to their targets; if that fails, restore former files."""
     former = {target: _copy_beside(target) for target in written if target.exists()}
     renamed: list[Path] = []
     try:
@@ -106,7 +106,7 @@ def _replace_all(written: Mapping[Path, Path]) -> None:
 
 
 def _copy_beside(target: Path) -> Path:
-    """Copy a file that is there, and return the path of the copy."""
+    """Copy an existing file, and return the path of the copy."""
     handle, name = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
     os.close(handle)
     shutil.copy2(target, name)
@@ -114,7 +114,7 @@ def _copy_beside(target: Path) -> Path:
 
 
 def checked_file(path: str | Path, example: str = "") -> Path:
-    """Return a path after a check, before the work begins, that a file may be there.
+    """Return a path, checked beforehand for whether a file can be there.
 
     Raises
     ------
@@ -130,7 +130,7 @@ def checked_file(path: str | Path, example: str = "") -> Path:
 
 
 def make_folder(path: str | Path) -> Path:
-    """Return the folder `path`, made if it is missing, after a check that it can be written.
+    """Return the folder `path`, created if missing, after a check that it is writable.
 
     Raises
     ------
@@ -148,6 +148,7 @@ def make_folder(path: str | Path) -> Path:
 
 
 def _encode(path: str | Path, text: str) -> bytes:
+    """Return a text in UTF-8; a surrogate that UTF-8 cannot represent raises an `OutputError`."""
     try:
         return text.encode("utf-8")
     except UnicodeEncodeError as error:
@@ -155,6 +156,7 @@ def _encode(path: str | Path, text: str) -> bytes:
 
 
 def _umask() -> int:
+    """Return the process's umask, which the system shows only while it is set."""
     mask = os.umask(0)
     os.umask(mask)
     return mask

@@ -17,7 +17,7 @@ _brief.maxlevel = 3
 
 
 class PteronError(ValueError):
-    """Root of every error that Pteron raises for something the user can mend.
+    """Root of every error that Pteron raises for something the user can correct.
 
     Attributes
     ----------
@@ -40,6 +40,7 @@ class PteronError(ValueError):
 def _restore_error(
     kind: type[PteronError], args: tuple[Any, ...], state: dict[str, Any]
 ) -> PteronError:
+    """Return an unpickled error with its attributes, without a call of its constructor."""
     error = kind.__new__(kind, *args)
     error.__dict__.update(state)
     return error
@@ -60,11 +61,11 @@ class ModelError(PteronError):
 
 
 class DataError(PteronError):
-    """An array, a table or a log does not hold what it should."""
+    """An array, a table or a log has invalid contents."""
 
 
 class OutputError(PteronError):
-    """A result cannot be written where it was asked for."""
+    """A result cannot be written to its destination."""
 
 
 class UnlikelyValue(UserWarning):
@@ -72,7 +73,7 @@ class UnlikelyValue(UserWarning):
 
 
 def warn_unlikely(text: str) -> None:
-    """Issue a warning, `UnlikelyValue`, at the line outside of Pteron that gave the value."""
+    """Issue an `UnlikelyValue` warning at the calling line outside of Pteron."""
     frame, level = sys._getframe(), 1
     while frame.f_back and frame.f_globals.get("__name__", "").startswith("pteron."):
         frame, level = frame.f_back, level + 1
@@ -111,7 +112,7 @@ class UnreachablePose(PteronError):
 
 
 class SingularPose(PteronError):
-    """The pose is singular, so that what was asked for is not determined there.
+    """The pose is singular, so that the result is not determined there.
 
     Attributes
     ----------
@@ -146,7 +147,7 @@ class SingularPose(PteronError):
 
 
 def shorten(value: object, *, bare: bool = False, longest: int = _LONGEST) -> str:
-    r"""Return a value as messages show it: short, on one line, without control characters.
+    r"""Return a value's text for messages: short, on a single line, without control characters.
 
     Parameters
     ----------

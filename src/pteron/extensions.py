@@ -22,12 +22,12 @@ EXTENSION_GROUPS = {
 
 
 def extension_names(group: str) -> tuple[str, ...]:
-    """Return the names of a group that installed packages have, sorted."""
+    """Return the names that installed packages have in a group, sorted."""
     return tuple(sorted({entry_point.name for entry_point in _entry_points(group)}))
 
 
 def load_extension(group: str, name: str) -> Any:
-    """Return what an installed package has under a name of a group; None if no package has it.
+    """Return the object of a name in a group from an installed package; None without one.
 
     Raises
     ------
@@ -44,16 +44,18 @@ def load_extension(group: str, name: str) -> Any:
 
 
 def extension_value(group: str, name: str) -> str:
-    """Return where an entry point says that its object is, such as "my_legs:SliderRod"."""
+    """Return the location of an entry point's object, such as "my_legs:SliderRod"."""
     entry_point = _entry_point(group, name)
     return "" if entry_point is None else entry_point.value
 
 
 def _entry_point(group: str, name: str) -> EntryPoint | None:
+    """Return the entry point of a name in a group; None if no package has it."""
     return next((point for point in _entry_points(group) if point.name == name), None)
 
 
 def _entry_points(group: str) -> tuple[EntryPoint, ...]:
+    """Return the entry points of a group that installed packages declare."""
     from importlib.metadata import entry_points
 
     return tuple(entry_points(group=group))

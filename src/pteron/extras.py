@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def import_extra(extra: str, module: str, need: str, error: type[PteronError] | None = None) -> Any:
-    """Return a module that an extra brings, or say how to install it.
+    """Return a module of an extra, or raise an error that says how to install it.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ def import_extra(extra: str, module: str, need: str, error: type[PteronError] | 
 
 
 def expect_extra(extra: str, module: str, need: str) -> None:
-    """Refuse, before anything slow is imported, to go on without a module that an extra brings.
+    """Raise an error, before slow imports, if a module of an extra is missing.
 
     The parameters are those of `import_extra`; the module's name has no dots.
     """
@@ -55,6 +55,7 @@ def install_command(extra: str) -> str:
 
 
 def _requirement(extra: str) -> str:
+    """Return pip's requirement for an extra, from the origin that Pteron was installed from."""
     # Only where something is missing: these are slow to import.
     import json
     from importlib.metadata import PackageNotFoundError, distribution
@@ -79,4 +80,5 @@ def _requirement(extra: str) -> str:
 
 
 def _quote_path(path: str) -> str:
+    """Return a path in quotation marks if it has blanks."""
     return f'"{path}"' if " " in path else path

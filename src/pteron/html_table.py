@@ -24,7 +24,7 @@ _ROWS = 12
 
 
 class Column(NamedTuple):
-    """A column: its heading, and its kind: numbers go to the right, long texts wrap."""
+    """A column: its heading, and its kind: numbers are right-aligned, long texts wrap."""
 
     heading: str
     kind: Literal["", "number", "long"] = ""
@@ -34,7 +34,7 @@ Cell = str | float | int | None
 
 
 class Overview(NamedTuple):
-    """What `html_table` shows of a result."""
+    """The contents of an `html_table` of a result."""
 
     title: str
     about: str
@@ -44,7 +44,7 @@ class Overview(NamedTuple):
 
     @property
     def text(self) -> str:
-        """The same as lines of text: one for each row, and one for each note.
+        """The overview as lines of text: a line for each row and each note.
 
         Examples
         --------
@@ -67,7 +67,7 @@ def html_table(
     rows: Iterable[Sequence[Cell]],
     notes: Iterable[str] = (),
 ) -> str:
-    """Return a table with a title and what is said about it, as HTML that needs nothing else.
+    """Return a table with a title and a subtitle as self-contained HTML.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ def html_table(
 def frame_overview(
     title: str, about: str, frame: pl.DataFrame, notes: Iterable[str] = ()
 ) -> Overview:
-    """Return the first rows of a table for `html_table`, with a note on those left out."""
+    """Return the first rows of a table for `html_table`, with a note on omitted rows."""
     columns = [Column(c.name, "number" if c.dtype.is_numeric() else "") for c in frame]
     hidden = len(frame) - _ROWS
     hint = [f"{hidden} more rows: see table()"] if hidden > 0 else []
@@ -108,10 +108,12 @@ def frame_overview(
 
 
 def _kind(kind: str) -> Markup:
+    """Return the class attribute of a column's kind, with a leading blank; empty if it has none."""
     return Markup(f' class="{kind}"') if kind else Markup("")
 
 
 def _cell(cell: Cell) -> str:
+    """Return a cell's text: numbers rounded, with a true minus sign; None and NaN empty."""
     if cell is None or isinstance(cell, str):
         return cell or ""
     text = f"{cell:.{_DIGITS}g}" if isinstance(cell, float) else str(cell)

@@ -9,7 +9,7 @@ from typing import Any
 
 
 def json_ready(data: Any) -> Any:
-    """Return data for JSON: NumPy's numbers as Python's, None (null) for what is not finite."""
+    """Return data for JSON: NumPy's numbers as Python's, None (null) for non-finite ones."""
     if isinstance(data, dict):
         return {key: json_ready(value) for key, value in data.items()}
     if isinstance(data, list | tuple):
@@ -39,6 +39,7 @@ def json_fields(**fields: object) -> dict[str, Any]:
 
 
 def _data(value: Any) -> Any:
+    """Return a value as JSON can hold it: arrays as lists, objects by their fields."""
     if hasattr(value, "tolist") or hasattr(value, "as_dict"):
         return value.tolist() if hasattr(value, "tolist") else value.as_dict()
     if isinstance(value, list | tuple):

@@ -40,7 +40,7 @@ _SLOW = 0.5
 
 @dataclass(frozen=True)
 class Playback:
-    """A motion with T samples, and the forces of the drives that came with it.
+    """A motion with T samples, and the forces of the drives recorded with it.
 
     Attributes
     ----------
@@ -67,7 +67,7 @@ Given = Motion | Simulation | Playback | Table | Log | str | Path
 
 
 def playback(robot: Manipulator, motion: Given, start: PoseLike | None = None) -> Playback:
-    """Return a motion as it is to be shown, after a check that the machine can do it.
+    """Return a motion for display, after a check that the machine can do it.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ def playback(robot: Manipulator, motion: Given, start: PoseLike | None = None) -
 
 
 def read_motion(robot: Manipulator, path: str | Path) -> Table | Log:
-    """Return the table or the log that is in a file; ``-`` is a table on standard input."""
+    """Return the table or log in a file; ``-`` is a table on standard input."""
     if find_description(path) is not None:
         return read_log(path, robot)
     if not Path(path).is_file():
@@ -138,7 +138,7 @@ def read_motion(robot: Manipulator, path: str | Path) -> Table | Log:
 
 
 def read_content(robot: Manipulator, data: bytes, source: str) -> Table | Log:
-    """Return the table or the log that is in the content of a file of that name."""
+    """Return the table or log in the content of a file with a name."""
     if Path(source).suffix.lower() == ".csv":
         plain = CsvFile(data, source)
         if is_table(robot, plain.columns):
@@ -157,7 +157,7 @@ def read_content(robot: Manipulator, data: bytes, source: str) -> Table | Log:
 
 
 def is_table(robot: Manipulator, columns: Sequence[str]) -> bool:
-    """Say whether columns are those of a table of a motion, rather than of a log.
+    """Return whether columns are those of a motion's table, rather than of a log.
 
     A log has joints and forces, but no rates of the pose; or it calls everything by other names.
     """
@@ -171,7 +171,7 @@ def is_table(robot: Manipulator, columns: Sequence[str]) -> bool:
 
 
 def playback_of_table(robot: Manipulator, rows: Table, start: PoseLike | None = None) -> Playback:
-    """Return the motion of a table, with its forces where it has them all."""
+    """Return the motion of a table, with its forces if all are there."""
     rows = convert_to_si(rows, {**robot.column_units, "t": "s"})
     if start is None and not set(rows.columns) >= set(robot.coordinates):
         start = home_pose(robot)
@@ -188,7 +188,7 @@ def playback_of_table(robot: Manipulator, rows: Table, start: PoseLike | None = 
 
 
 def playback_of_log(robot: Manipulator, log: Log) -> Playback:
-    """Return the motion of a log's joints, smoothed, with its forces where they are N or N m."""
+    """Return the motion of a log's joints, smoothed, with its forces if in N or N m."""
     # All of it is to be seen, and not the part alone that repeats.
     whole_log = replace(
         log, description=replace(log.description, period=None, start=None, end=None)
@@ -218,5 +218,6 @@ def playback_of_log(robot: Manipulator, log: Log) -> Playback:
 
 
 def _check_motion_of(robot: Manipulator, motion: Motion) -> Motion:
+    """Return a motion after a check that it fits the machine."""
     check_motion(robot, motion)
     return motion

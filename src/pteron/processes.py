@@ -27,11 +27,11 @@ _ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 
 
 class LostWorkerError(PteronError):
-    """A process that did a part of the work was ended from outside, or could not start."""
+    """A worker process was ended from outside, or could not start."""
 
 
 class WorkerPool(ProcessPoolExecutor):
-    """Processes that leave Ctrl-C to this one, and end with it or where the work is broken off.
+    """Worker processes that ignore Ctrl-C, and end with this process or on cancellation.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ class WorkerPool(ProcessPoolExecutor):
         self._others = set(active_children())
 
     def submit(self, function: Any, /, *arguments: Any, **options: Any) -> Future[Any]:
-        """Give the processes a call, and start one where none is free."""
+        """Submit a call to the processes; start another process if none is free."""
         main = sys.modules["__main__"]
         with held_interrupts(), _environment(_ONE_THREAD):
             try:
@@ -73,7 +73,7 @@ class WorkerPool(ProcessPoolExecutor):
                 sys.modules["__main__"] = main
 
     def start(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
-        """Call a function in one of the processes, with what they share as its first argument."""
+        """Call a function in a worker, with the shared object as its first argument."""
         return self.submit(_call_with_shared, function, *arguments)
 
     def messages(
@@ -100,7 +100,7 @@ class WorkerPool(ProcessPoolExecutor):
 
 
 def result_of(future: Future[Any]) -> Any:
-    """Return the result of a call once it is there; raise what the call raised.
+    """Return the result of a call when it is done, or raise its error.
 
     Raises
     ------
@@ -117,6 +117,7 @@ def result_of(future: Future[Any]) -> Any:
 
 
 def _lost_worker() -> LostWorkerError:
+    """Return the error that a worker process was ended from outside."""
     return LostWorkerError(
         "a process that did a part of the work was ended: is there enough memory? what is "
         "finished is kept in the folder, if one is given: run it again"
@@ -128,6 +129,7 @@ _queue: Any = None
 
 
 def _import_error(error: Exception) -> PteronError:
+    """Return the error that a worker process cannot import the function of its job."""
     return PteronError(
         f"other processes cannot take part: {type(error).__name__}: {error}; define functions and "
         "classes at the top of a module that can be imported, or do the work without workers"
@@ -135,7 +137,7 @@ def _import_error(error: Exception) -> PteronError:
 
 
 def _initialise_worker(pickled: bytes, messages: Any) -> None:
-    """Ignore SIGINT, exit when the parent does, and keep what the calls share."""
+    """Ignore SIGINT, exit when the parent does, and store the object that calls share."""
     global _shared, _queue
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     Thread(target=_exit_with_parent, daemon=True).start()
@@ -147,7 +149,7 @@ def _initialise_worker(pickled: bytes, messages: Any) -> None:
 
 
 def _exit_with_parent() -> None:
-    """End this process when its parent has ended, even if that was killed."""
+    """Exit this process when its parent has ended, even if that was killed."""
     parent = parent_process()
     assert parent is not None  # this one was spawned
     parent.join()
@@ -155,18 +157,20 @@ def _exit_with_parent() -> None:
 
 
 def _call_with_shared(function: Callable[..., Any], *arguments: Any) -> Any:
+    """Return a function's result with the worker's shared object as its first argument."""
     if isinstance(_shared, PteronError):
         raise _shared
     return function(_shared, *arguments)
 
 
 def _call(function: Callable[[Any, Callable[[Any], None]], Any], k: int, job: Any) -> Any:
+    """Return a function's result on a job, with a callback that sends messages of job `k`."""
     return function(job, lambda message: _queue.put((k, message)))
 
 
 @contextmanager
 def _environment(variables: Mapping[str, str]) -> Iterator[None]:
-    """Set variables of the environment for the processes that are started meanwhile."""
+    """Set environment variables for processes started in a block."""
     before = {name: os.environ.get(name) for name in variables}
     os.environ.update(variables)
     try:
@@ -181,7 +185,7 @@ def _environment(variables: Mapping[str, str]) -> Iterator[None]:
 
 @contextmanager
 def held_interrupts() -> Iterator[None]:
-    """Hold Ctrl-C back: here for so long, in processes that are started meanwhile for good.
+    """Defer SIGINT in a block; processes started meanwhile ignore it for good.
 
     A process imports for seconds before it can be told to ignore it, and one that is broken off
     while it is started complains. Python's tracker of resources unblocks signals as it starts: it

@@ -22,7 +22,7 @@ _OTHERS = {"annotations"}
 
 
 class _Package(ModuleType):
-    """A package in which a module does not hide the public function that it is named after."""
+    """A package in which a module does not shadow the public function of the same name."""
 
     def __setattr__(self, name: str, value: Any) -> None:
         if not (isinstance(value, ModuleType) and name in vars(self)["__all__"]):
@@ -96,7 +96,7 @@ def publish(
 
 
 def _places(names: Mapping[str, Any]) -> dict[str, tuple[str, str]]:
-    """Return the module of each name that a package's stub imports, and its name there."""
+    """Return module and original name of each name that a package's stub imports."""
     stub = PurePath(names["__file__"]).with_suffix(".pyi")
     try:
         text = names["__loader__"].get_data(str(stub))

@@ -131,7 +131,7 @@ UNTIL = "0.4"
 
 
 def former_name(package: str, name: str) -> Any:
-    """Return what a package's former name is called now, for the package's ``__getattr__``.
+    """Return the object of a package's former name, for the package's ``__getattr__``.
 
     A `DeprecationWarning` has the line to write instead; any other name is an AttributeError.
 
@@ -169,7 +169,7 @@ def former_name(package: str, name: str) -> Any:
 
 
 def warn_former(former: str, present: str, *, depth: int = 3) -> None:
-    """Warn that a former way goes, with what to write instead; `depth` calls below the user's."""
+    """Warn that a former usage is deprecated, with the line to write; `depth` calls up."""
     text = f"{former} goes with version {UNTIL}; write {present}"
     warnings.warn(text, DeprecationWarning, stacklevel=depth)
 
@@ -206,7 +206,7 @@ def former_attribute(former: str, present: str) -> property:
 
 
 def adopt_former_methods(owner: type, **former: str) -> None:
-    """Take over methods that a subclass of a user defines under former names, with a warning.
+    """Adopt methods that a user's subclass defines under former names, with a warning.
 
     Parameters
     ----------
@@ -225,7 +225,7 @@ def adopt_former_methods(owner: type, **former: str) -> None:
 
 
 class FormerTable:
-    """A method `table` that was a property until version 0.1: what is read of it is the table."""
+    """A method `table` that was a property until version 0.1: it also acts as the former table."""
 
     def __init__(self, owner: str, frame: Any, table: Callable[[], Any]) -> None:
         self._owner, self._frame, self._table = owner, frame, table
@@ -235,6 +235,7 @@ class FormerTable:
         return self._table()
 
     def _former(self) -> Any:
+        """Return the table that the former property gave, with a deprecation warning."""
         warnings.warn(
             f"{self._owner}.table is a method from version {UNTIL} on; write .designs",
             DeprecationWarning,

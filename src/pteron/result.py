@@ -28,15 +28,15 @@ _POSES = ("center", "counterexample", "poses", "best_pose")
 
 
 class NamedColumns(Protocol):
-    """A machine, as far as tables need it: the names of its columns."""
+    """A machine as tables need it: the names of its columns."""
 
     @property
     def column_names(self) -> dict[str, tuple[str, ...]]:
-        """Names of columns that hold a pose, joints and so on."""
+        """Names of the columns of poses, joints and so on."""
 
 
 class Result:
-    """What a function returns, with its figures as fields: a frozen dataclass.
+    """The result of a function, with its figures as fields: a frozen dataclass.
 
     Results are equal if they are of one class and all fields are, arrays element by element, NaN
     as NaN; equal results have equal hashes. Their classes are dataclasses with ``frozen=True,
@@ -52,16 +52,16 @@ class Result:
     one's table is this one's."""
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the result as plain data, SI units; of a machine its name."""
+        """Return the result as plain data in SI units; a machine becomes its name."""
         return {name: _plain(part) for name, part in _shown_parts(self)}
 
     def summary(self) -> str:
-        """Return the result, for people, as lines of text."""
+        """Return the result as lines of text."""
         parts = [(name.replace("_", " "), part) for name, part in _shown_parts(self)]
         return "\n".join(line for name, part in parts for line in _lines(name, part))
 
     def table(self) -> pl.DataFrame:
-        """Return the result as a table whose columns functions take in place of arrays.
+        """Return the result as a table whose columns functions accept instead of arrays.
 
         Columns of poses and joints are called as `Manipulator.column_names` has them, SI units and
         radians; those of a result without a machine are numbered, see `table_for`.
@@ -70,7 +70,7 @@ class Result:
         return self.table_for(getattr(self, "robot", None) or getattr(proof, "robot", None))
 
     def table_for(self, robot: NamedColumns | None) -> pl.DataFrame:
-        """Return the table with the names of columns that a machine has.
+        """Return the table with a machine's column names.
 
         Parameters
         ----------
@@ -96,12 +96,13 @@ class Result:
         return pl.DataFrame(columns).with_columns(pl.selectors.float().fill_nan(None))
 
     def _repr_html_(self) -> str:
+        """Return the result's table as HTML, for notebooks."""
         from pteron.html_table import html_table  # Jinja
 
         return html_table(*self._overview())
 
     def _overview(self) -> Overview:
-        """Return what a notebook shows of the result."""
+        """Return the table of the result for notebooks."""
         from pteron.html_table import frame_overview
 
         title, _, about = repr(self)[1:-1].partition(": ")
@@ -130,18 +131,20 @@ class Result:
 
 
 def _shown_parts(result: Result) -> Iterator[tuple[str, Any]]:
-    """Yield the attributes of a result that are shown, with their names."""
+    """Yield names and values of the attributes that a result shows."""
     names = result.SHOWN.split() or [field.name for field in fields(result)]  # type: ignore[arg-type]
     return ((name, getattr(result, name)) for name in names)
 
 
 def _compared_fields(result: object) -> Iterator[tuple[str, Any]]:
+    """Yield name and value of each field that equality compares."""
     for field in fields(result):  # type: ignore[arg-type]
         if field.compare:
             yield field.name, getattr(result, field.name)
 
 
 def _equal_fields(first: object, second: object) -> bool:
+    """Return whether two results have equal values in all compared fields."""
     return all(_equal(part, getattr(second, name)) for name, part in _compared_fields(first))
 
 
@@ -165,7 +168,7 @@ def _equal(first: Any, second: Any) -> bool:
 
 
 def _hashable(part: Any) -> Any:
-    """Return what equal parts of results share, of arrays the shape and the first number."""
+    """Return a hashable key, equal for equal parts; of arrays shape and first number."""
     if isinstance(part, np.ndarray):
         return part.shape, _hashable(part.flat[0].item()) if part.size else None
     if isinstance(part, list | tuple):
@@ -201,7 +204,7 @@ def _plain(part: Any) -> Any:
 
 
 def _short(part: Any) -> str:
-    """Return a part of a result in a few characters; nothing where it has none."""
+    """Return a short text of a part of a result; empty if it has none."""
     if isinstance(part, bool | np.bool_ | str | int | np.integer):
         return str(part)
     if isinstance(part, float | np.floating) or (isinstance(part, np.ndarray) and part.ndim == 0):
@@ -215,7 +218,7 @@ def _short(part: Any) -> str:
 
 
 def _lines(name: str, part: Any) -> list[str]:
-    """Return the lines of a summary on a part of a result; none where there is nothing to say."""
+    """Return a summary's lines on a part of a result; empty if there is nothing to report."""
     if isinstance(part, Mapping):
         return [line for key, each in part.items() for line in _lines(f"{name}, {key}", each)]
     if isinstance(part, tuple) and part and all(isinstance(text, str) for text in part):
@@ -225,7 +228,7 @@ def _lines(name: str, part: Any) -> list[str]:
 
 
 def _row(result: Result, names: Mapping[str, Sequence[str]]) -> Iterator[tuple[str, Any]]:
-    """Yield the columns of a result in a row: numbers, texts, and the numbers of short arrays."""
+    """Yield a result's columns as a row: numbers, texts, and numbers of short arrays."""
     for name, part in _shown_parts(result):
         heading = _HEADINGS.get(name, name)
         if part is None or isinstance(part, bool | str | int | float):
@@ -245,7 +248,7 @@ def _row(result: Result, names: Mapping[str, Sequence[str]]) -> Iterator[tuple[s
 def _columns(
     name: str, part: NDArray[Any], axes: int, names: Mapping[str, Sequence[str]]
 ) -> dict[str, Any]:
-    """Return the columns of an array whose last axes, as many as `axes`, are in one row."""
+    """Return the columns of an array, with its last `axes` axes flattened."""
     if axes == 0:
         return {_HEADINGS.get(name, name): part.ravel()}
     width = int(np.prod(part.shape[part.ndim - axes :]))

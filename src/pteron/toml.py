@@ -92,7 +92,7 @@ def read_toml(path: str | Path, error: type[PteronError], absent: str) -> dict[s
 
 
 def toml_bytes(path: str | Path, error: type[PteronError], absent: str) -> tuple[bytes, str]:
-    """Return the bytes of a TOML file, cut off past the most it may have, and its name in messages.
+    """Return the bytes of a TOML file, up to its maximum size, and its name in messages.
 
     Raises
     ------
@@ -111,7 +111,7 @@ def toml_bytes(path: str | Path, error: type[PteronError], absent: str) -> tuple
 
 
 def expect_regular(path: Path) -> None:
-    """Refuse a FIFO or a device, which may never end, before it is opened.
+    """Refuse a FIFO or device, whose reading may never end, before opening it.
 
     Raises
     ------
@@ -123,7 +123,7 @@ def expect_regular(path: Path) -> None:
 
 
 def language_of(text: str) -> str:
-    """Return the name of another language of robot descriptions or data, or nothing.
+    """Return the name of another language of robot descriptions or data, or "".
 
     Examples
     --------
@@ -141,7 +141,7 @@ def language_of(text: str) -> str:
 
 
 def _integers(node: Any) -> Iterator[int]:
-    """Yield the whole numbers of a document."""
+    """Yield the integers of a document."""
     if isinstance(node, bool):
         return
     if isinstance(node, int):
@@ -216,7 +216,7 @@ def to_model(
 
 
 def joined_faults(lines: Sequence[str]) -> str:
-    """Return the faults of a file as the reason of one error: a line each, `_MANY` at most."""
+    """Return a file's faults as text for an error: a line each, `_MANY` at most."""
     if len(lines) == 1:
         return lines[0]
     remainder = [f"and {len(lines) - _MANY} more"] if len(lines) > _MANY else []
@@ -224,7 +224,7 @@ def joined_faults(lines: Sequence[str]) -> str:
 
 
 def raise_faults(faults: Sequence[str]) -> None:
-    """Raise one `ModelError` of all faults, if there are any."""
+    """Raise a single `ModelError` of all faults, if there are any."""
     if faults:
         raise ModelError(joined_faults(faults), faults=faults)
 
@@ -232,7 +232,7 @@ def raise_faults(faults: Sequence[str]) -> None:
 def keep_checked(
     part: object, checks: Mapping[str, Callable[[Any, str], object]], faults: Iterable[str] = ()
 ) -> None:
-    """Check the fields of a frozen dataclass, and keep them as the checks return them.
+    """Replace fields of a frozen dataclass by the results of their checks.
 
     A check takes a field's value and name. `faults` are told with those that the checks find.
 
@@ -253,7 +253,7 @@ def keep_checked(
 def fault_lines(
     error: ValidationError, model: Any, listed: set[tuple[str, ...]] | None = None
 ) -> list[str]:
-    r"""Return a line for every fault that pydantic found: the key, what was given and expected.
+    r"""Return a line for every pydantic fault: the key, the value, and what is expected.
 
     `model` is the pydantic model or dataclass that refused a file's content. Aliases with a dot,
     such as ``"time.unit"``, are understood as keys of tables. A key that is missing is not told
@@ -294,11 +294,12 @@ def fault_lines(
 
 
 def table_keys(model: Any) -> tuple[str, ...]:
-    """Return the top-level keys that a model's file may have: an alias `time.unit` gives `time`."""
+    """Return the top-level keys of a model's file: an alias `time.unit` gives `time`."""
     return _keys(_schema(model), "")
 
 
 def _key(location: tuple[int | str, ...]) -> str:
+    """Return the location of a value as text: keys with dots, items by their numbers from 1."""
     key, link = "", ""
     for part in location:
         if isinstance(part, int):
@@ -311,13 +312,13 @@ def _key(location: tuple[int | str, ...]) -> str:
 
 
 def _valid(location: tuple[int | str, ...], schema: _Node) -> tuple[str, tuple[str, ...]]:
-    """Return what aliases of an unknown key's table begin with, and the keys that it may have."""
+    """Return the prefix of aliases in an unknown key's table, and the table's valid keys."""
     table, dot, _ = str(location[-1]).rpartition(".")
     return table + dot, _keys(_subschema(schema, location[:-1]), table + dot)
 
 
 def _nearest_key(location: tuple[int | str, ...], schema: _Node) -> tuple[int | str, ...]:
-    """Return the location of the valid key that is nearest to an unknown one; empty if none is."""
+    """Return the location of the valid key most similar to an unknown one; empty without."""
     table, valid = _valid(location, schema)
     close = get_close_matches(str(location[-1]).removeprefix(table), valid, n=1)
     return (*location[:-1], table + close[0]) if close else ()
@@ -326,6 +327,10 @@ def _nearest_key(location: tuple[int | str, ...], schema: _Node) -> tuple[int | 
 def _fault(
     fault: Any, schema: _Node, location: tuple[int | str, ...], listed: set[tuple[str, ...]]
 ) -> str:
+    """Return the text of pydantic's fault at a location: the value, and what is expected.
+
+    `listed` has the lists of valid keys that an earlier fault of the file named.
+    """
     kind, shown_input, context = fault["type"], shorten(fault["input"]), fault.get("ctx", {})
     if kind == "value_error":
         return str(context["error"])
@@ -368,7 +373,7 @@ def _fault(
 
 
 def _schema(model: Any) -> _Node:
-    """Return the JSON schema of a model, in which nothing stands for another part of it."""
+    """Return the JSON schema of a model, with all references resolved."""
     from pydantic import TypeAdapter
 
     schema = TypeAdapter(model).json_schema(by_alias=True)
@@ -403,13 +408,13 @@ def _subschema(node: _Node, location: tuple[int | str, ...]) -> _Node:
 
 
 def _keys(node: _Node, table: str) -> tuple[str, ...]:
-    """Return the keys that are valid in a table; `table` is what aliases begin with."""
+    """Return the valid keys of a table; `table` is the prefix of aliases."""
     inner = (k.removeprefix(table) for k in node.get("properties", {}) if k.startswith(table))
     return tuple(dict.fromkeys(name.partition(".")[0] for name in inner))
 
 
 def _words(node: _Node) -> str:
-    """Return the words for a schema; empty where there are none."""
+    """Return the description of a schema's values for messages; empty without one."""
     if node.get("type") != "array":
         return _WORDS.get(node.get("type", ""), "")
     several = node.get("prefixItems", [])

@@ -154,7 +154,7 @@ def c_texts(
 
 
 def _tolerance_of(rounding: float) -> Callable[[float], float]:
-    """Return what gives the tolerance of a result's columns, relative, from its gain.
+    """Return the function from a result's gain to its relative tolerance.
 
     Of a hexapod's thousand operations rounding sums up to some tens of units in the last place, and
     the gain magnifies it; the least is 1000 units.
@@ -274,4 +274,5 @@ class CPrinter:
 
 
 def _join_conditions(tests: Iterable[str]) -> str:
+    """Return the conjunction of C conditions, joined by line breaks."""
     return "\n        && ".join(tests)

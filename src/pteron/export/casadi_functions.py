@@ -91,7 +91,7 @@ def casadi_functions(robot: RobotLike) -> dict[str, ca.Function]:
 
 
 def _plain(robot: Manipulator, name: str, what: str) -> ca.Function:
-    """Return a function of the library's table, its matrices with their rows as rows."""
+    """Return a library function with the machine's parameters, its matrices by rows."""
     library = specialise_program(
         program(robot, what, wrench=what in _LOADED), {"parameters": parameters(robot)}
     )
@@ -143,6 +143,7 @@ def _drive_functions(robot: Manipulator) -> Iterator[ca.Function]:
 def _function(
     name: str, symbols: dict[str, Expression], middle: Sequence[str], **results: Expression
 ) -> ca.Function:
+    """Return a CasADi function of pose, velocity, `middle` and wrench, densified and simplified."""
     inputs = ["pose", "velocity", *middle, "wrench"]
     outputs = [ca.cse(ca.densify(result)) for result in results.values()]
     return ca.Function(name, [symbols[k] for k in inputs], outputs, inputs, list(results))
@@ -216,7 +217,7 @@ def export_casadi(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
 
 
 def _ends(robot: Manipulator) -> tuple[list[float], list[float]]:
-    """Return two poses between which the example moves: a short straight way within all limits.
+    """Return the start and end poses of the example: a short straight path within all limits.
 
     Raises
     ------

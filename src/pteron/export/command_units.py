@@ -85,7 +85,7 @@ _PER_READING = {
 
 
 def convert_joints(function: Program, robot: Manipulator) -> Program:
-    """Return a program whose joints, rates and forces are as the drives count them."""
+    """Return a program whose joints, rates and forces are those of the drives' readings."""
     if not has_readings(robot):
         return function
     zeros, scales = ca.DM(reading_zeros(robot)), ca.DM(reading_scales(robot))
@@ -123,4 +123,5 @@ def command_meaning(robot: Manipulator, output: Output) -> str:
 
 
 def _join_values(values: list[float]) -> str:
+    """Return values as text: a single value if all are equal, else a list with commas."""
     return f"{values[0]:g}" if len(set(values)) == 1 else ", ".join(f"{v:g}" for v in values)

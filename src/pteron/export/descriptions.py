@@ -85,4 +85,5 @@ def law_meanings(what: str, meanings: Mapping[str, str]) -> dict[str, str]:
 
 
 def _join_units(units: Sequence[str]) -> str:
+    """Return the units of a vector as text: a single unit if all are equal, else leg by leg."""
     return units[0] if len(set(units)) == 1 else f"{', '.join(units)} (leg by leg)"

@@ -50,7 +50,7 @@ Far above rounding, far below the shares at which results bend."""
 
 @dataclass(frozen=True)
 class NumberTable:
-    """The machine's own values for an argument: code has them as a constant array to pass."""
+    """The machine's values for an argument: in code a constant array to pass."""
 
     name: str
     comment: str
@@ -60,7 +60,7 @@ class NumberTable:
 
 @dataclass(frozen=True)
 class Example:
-    """A test vector: a state, what a function returns for it, and its status.
+    """A test vector: a state, the function's results for it, and its status.
 
     The status is that of exported code: 0 where all is well, 1 where there is no result, as out of
     reach. (That of `pteron.kernels.programs` is the other way round.)
@@ -94,7 +94,7 @@ class ExportedFunction:
 
     @property
     def several(self) -> bool:
-        """Whether it returns several poses, one a row, of which some may not exist."""
+        """Whether it returns several poses, as rows, some of which may not exist."""
         return self.name == "direct_kinematics"
 
     @property
@@ -136,7 +136,7 @@ class ExportRequest:
 
     @property
     def is_custom(self) -> bool:
-        """Whether it is the law of a controller of one's own."""
+        """Whether it is the law of a custom controller."""
         return isinstance(self.controller, Custom)
 
     @property
@@ -175,6 +175,7 @@ class ExportRequest:
         return function
 
     def _library_program(self) -> Program:
+        """Return the program of the request: a control law, or a function of the library."""
         loaded, base = self.wrench and self.function_name in LOADED, self.base
         if isinstance(self.controller, Custom):
             return self.controller.law(self.robot).program
@@ -265,7 +266,7 @@ def _meanings(
 
 
 def _drop_status(law: Program) -> Program:
-    """Return a program without its last output, all others the same to the bit."""
+    """Return a program without its last output; other results are bitwise equal."""
     symbols = law.function.sx_in()
     results = law.function.call(symbols)[:-1]
     return Program.from_expressions(law.name, symbols, law.inputs, results, law.outputs[:-1])
@@ -274,7 +275,7 @@ def _drop_status(law: Program) -> Program:
 def _table(
     robot: Manipulator, name: str, base: Identified | None, controller: Controller | Custom | None
 ) -> NumberTable:
-    """Return the machine's own numbers for a shared input, or a controller's parameters."""
+    """Return the machine's values for a shared input, or a controller's parameters."""
     if isinstance(controller, Custom):
         values = controller.law(robot).numbers[f"law_{name}"].ravel()
         names = tuple(f"{name}_{k}" for k in range(1, len(values) + 1))
@@ -298,7 +299,7 @@ def _states(
     fixed: dict[str, Array],
     controller: Controller | Custom | None,
 ) -> list[list[Array]]:
-    """Return inputs at three random poses in reach, and far out of it."""
+    """Return inputs at three random poses in reach and at a pose far out of reach."""
     rng = np.random.default_rng(1)
     states = []
     law = controller.law(robot) if controller else None
@@ -321,6 +322,7 @@ def _states(
 
 
 def _example_at(function: Program, graph: Graph, inputs: list[Array]) -> Example:
+    """Return a test vector: inputs, results, status (0 valid, 1 invalid), and gains of errors."""
     values = function.function.call([np.reshape(value, (-1, 1)) for value in inputs])
     results = tuple(np.array(value).ravel("F") for value in values)
     if function.name == "direct_kinematics":  # of several poses one will do

@@ -203,6 +203,7 @@ def _platform() -> tuple[str, str]:
 
 
 def _zip_files(members: Mapping[str, bytes]) -> bytes:
+    """Return a zip archive of members, names to contents, with fixed dates: reproducible."""
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, data in members.items():

@@ -78,7 +78,7 @@ class FmuVariables:
 
     @property
     def units(self) -> dict[str, dict[str, int]]:
-        """The units that occur, and what they are made of."""
+        """The units in use, with their exponents of SI base units."""
         used = [variable.unit for block in self.blocks for variable in block.variables]
         return {unit: _TABLE["units"][unit] for unit in dict.fromkeys(used)}
 
@@ -103,7 +103,7 @@ class FmuVariables:
 
     @property
     def dependencies(self) -> dict[int, tuple[int, ...]]:
-        """Value references that each computed variable or state depends on, by its own."""
+        """Value references that each computed variable or state depends on, by its reference."""
         dependencies = {}
         for block in self.blocks:
             every = sum((self[name] for name in block.depends), ())
@@ -144,7 +144,7 @@ def fmu_variables(robot: Manipulator, pose: Array, forces: Array) -> FmuVariable
 
 
 def _variable(row: dict[str, str], words: _Words) -> FmuVariable:
-    """Return the variable of a row of the table with these words."""
+    """Return the variable of a template row, with its placeholders filled in."""
     name, unit, description = (
         row[key].format(**words) for key in ("variable", "unit", "description")
     )
@@ -153,7 +153,7 @@ def _variable(row: dict[str, str], words: _Words) -> FmuVariable:
 
 
 def _words(robot: Manipulator, pose: Array, forces: Array) -> dict[str, list[_Words]]:
-    """Return the words of each variable, by what a block has variables for."""
+    """Return the placeholder values of each variable, by what a block has variables for."""
     platform = robot.platform
     coordinates = zip(platform.coordinates, robot.units, pose.tolist(), strict=True)
     legs = enumerate(zip(robot.legs, forces.tolist(), strict=True), start=1)
@@ -177,11 +177,12 @@ def _words(robot: Manipulator, pose: Array, forces: Array) -> dict[str, list[_Wo
 
 
 def _fmi_unit(unit: str) -> str:
+    """Return a unit as FMI writes it, with points between its factors."""
     return unit.replace(" ", ".")
 
 
 def _wrench(platform: Platform) -> Iterator[_Words]:
-    """Yield each part of a wrench: its name, its unit and along what it does work."""
+    """Yield name, unit and direction of each component of the wrench."""
     if not platform.wrench_in_base_axes:
         for name, unit in zip(platform.coordinates, platform.units, strict=True):
             yield {"name": name, "unit": "N.m" if unit == "rad" else "N", "along": name}
@@ -204,7 +205,7 @@ def _inertia(platform: Platform) -> Iterator[_Words]:
 
 
 def _drives(robot: Manipulator) -> Iterator[_Words]:
-    """Yield the numbers of the drives, in the order of the table that the C code has."""
+    """Yield the drives' numbers, in the order of the C code's table."""
     values = iter(drive_numbers(robot).tolist())
     for name in Drives._fields:
         for i, leg in enumerate(robot.legs, start=1):

@@ -45,7 +45,7 @@ PLACES = ("pose", "joints", "motors")
 
 
 def has_drives(robot: Manipulator) -> bool:
-    """Return whether the machine's file says what drives its joints."""
+    """Return whether the machine's file has drives of its joints."""
     return any(leg.drive is not None for leg in robot.legs)
 
 
@@ -66,7 +66,7 @@ def exported_functions(
     base: str | Path | None = None,
     tables: bool = True,
 ) -> tuple[ExportedFunction, ...]:
-    """Return the functions to export: the `usual` unless a choice is given.
+    """Return the functions to export: by default the `usual` ones.
 
     `tables` says whether the code can have tables of the machine's own values. Where not, they are
     folded in, all but the inertial parameters that `set_payload` returns.
@@ -109,7 +109,7 @@ def exported_functions(
 def _usual_names(
     robot: Manipulator, usual: Sequence[str], identified: Identified | None, specialised: bool
 ) -> list[str]:
-    """Return the names of functions that are exported where none are named."""
+    """Return the names of the functions exported by default."""
     closed = closure_of(robot).closed_form
     step = {"direct_kinematics": "direct_step"}
     names = [name if closed else step.get(name, name) for name in usual]
@@ -127,7 +127,7 @@ def _usual_names(
 
 
 def _expect_exportable(names: Sequence[str], custom: set[str], specialised: bool) -> None:
-    """Refuse unknown names, those of custom controllers that are taken, and none at all."""
+    """Refuse unknown names, custom names that Pteron uses, and an empty choice."""
     based = {name + BASE for name in (*REDUCIBLE, PAYLOAD)}
     allowed = sorted({*COMPILED, *based} - {"base_regressor"})
     valid = f"choose from {', '.join(allowed)}"

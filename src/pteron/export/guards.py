@@ -55,6 +55,7 @@ that is false there."""
 
 
 def _sum_bound(sizes: Sequence[float]) -> float:
+    """Return log10 of the largest possible sum, from log10 of the magnitudes of its terms."""
     most = max(sizes)
     if most == -math.inf:
         return most
@@ -80,7 +81,7 @@ class Names:
         self._taken = {name.lower() for name in names}
 
     def new(self, text: str) -> str:
-        """Return a text as an identifier, with a number behind it where that is taken."""
+        """Return an unused identifier made of a text, with a number appended if it is taken."""
         name = re.sub(r"[^A-Za-z0-9]+", "_", text).strip("_")
         numbered = (f"{name}_{number}" for number in count(2))
         identifier = next(n for n in chain([name], numbered) if n.lower() not in self._taken)
@@ -126,7 +127,7 @@ class Statements:
         return self.names[k]
 
     def _state(self, k: int) -> str:
-        """Add the statement of a node, and return the text that stands for it from then on."""
+        """Add the statement of a node, and return the expression for its value."""
         node = self.graph.nodes[k]
         if node.operation == "select":
             return self._select(k)
@@ -147,7 +148,7 @@ class Statements:
         return name
 
     def _select(self, k: int) -> str:
-        """Add a selection: of NaN, which says that a leg does not reach, or of a number."""
+        """Add the statement of a selection: between NaN, for a leg out of reach, and a number."""
         test, value = self.graph.nodes[k].arguments
         if self.graph.nodes[test].operation != "less":
             raise ValueError("a selection without a comparison")
@@ -162,6 +163,7 @@ class Statements:
         return name
 
     def _name(self, k: int) -> str:
+        """Return the variable that node `k` is assigned to: its label, or a new temporary."""
         name = self._labels.get(k)
         if name is None:
             return self._temporary("t")
@@ -169,7 +171,7 @@ class Statements:
         return name
 
     def _size(self, k: int) -> float:
-        """Return the power of ten that a node cannot exceed, after the guards that this takes."""
+        """Return the power of ten that bounds a node, after adding the guards it needs."""
         size = self._bound(k)
         while size > self._largest:
             arguments = [
@@ -213,16 +215,19 @@ class Statements:
         return self._divisors[k]
 
     def _temporary(self, stem: str) -> str:
+        """Return a new temporary variable whose name begins with a stem, and declare it."""
         self.temporaries.append(self._spare.new(stem))
         return self.temporaries[-1]
 
     def _guard(self, test: str, name: str, value: str, otherwise: str, flag: str) -> None:
+        """Add an assignment guarded by a test; if that fails, a substitute and a cleared flag."""
         self.flags.add(flag)
         self._choose(
             test, [f"{name} := {value};"], [f"{name} := {otherwise};", f"{flag} := FALSE;"]
         )
 
     def _choose(self, test: str, then: Sequence[str], otherwise: Sequence[str] = ()) -> None:
+        """Add an IF statement with the lines of both branches."""
         self.lines += [f"IF {test} THEN", *(f"    {line}" for line in then)]
         if otherwise:
             self.lines += ["ELSE", *(f"    {line}" for line in otherwise)]

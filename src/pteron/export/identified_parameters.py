@@ -50,13 +50,13 @@ class Identified:
 
     @classmethod
     def from_robot(cls, robot: Manipulator) -> Identified:
-        """Return a machine's own base parameters, with the values of its file."""
+        """Return a machine's base parameters, with the values of its file."""
         base = base_parameters(robot)
         return cls(robot, base, base.values(), _comments(base, base.expressions()))
 
 
 def read_identified(robot: Manipulator, path: str | Path) -> Identified:
-    """Read the base parameters, friction and offsets that `pteron identify` found for a machine.
+    """Return base parameters, friction and offsets that `pteron identify` wrote for a machine.
 
     What a drive's file says of the motor and its limits stays; a rotor's inertia is in the base
     parameters that it joins, or among the values.
@@ -106,6 +106,7 @@ def read_identified(robot: Manipulator, path: str | Path) -> Identified:
 
 
 def _object(path: str | Path) -> dict[str, Any]:
+    """Return the object in a JSON file; empty if the file holds another kind of value."""
     try:
         expect_regular(Path(path))
         data = json.loads(Path(path).read_text(encoding="utf-8"))
@@ -168,7 +169,7 @@ def base_program(what: str, identified: Identified, *, wrench: bool, folded: boo
 
 
 def _payload_program(robot: Manipulator, base: BaseParameters) -> Program:
-    """Return `set_payload` of base parameters, which a payload's own parameters are added to."""
+    """Return `set_payload` for base parameters, to which it adds those of a payload."""
     load = program(robot, "set_payload")
     mass, center, inertia, parameters = load.function.sx_in()
     load_parameters = load.function(mass, center, inertia, ca.SX.zeros(parameters.shape))
@@ -185,7 +186,7 @@ def _payload_program(robot: Manipulator, base: BaseParameters) -> Program:
 
 
 def _substitute_parameters(function: Program, matrix: Array) -> Program:
-    """Return a program of base parameters b from one of matrix @ b, by substitution."""
+    """Return a program with input b from a program with input matrix @ b."""
     place = next(k for k, port in enumerate(function.inputs) if port.name == _NAME)
     symbols, ports = function.function.sx_in(), list(function.inputs)
     symbols[place] = ca.SX.sym(_NAME, matrix.shape[1])

@@ -89,6 +89,7 @@ class _Arm:
 
     @classmethod
     def from_platform(cls, platform: Platform) -> _Arm:
+        """Return the arm of a platform that does not tilt."""
         x, y, z = (platform.directions @ axis for axis in platform.frame)
         a, b, c = platform.tool
         if not platform.angles:
@@ -100,12 +101,12 @@ class _Arm:
 
     @property
     def turns(self) -> bool:
-        """Whether it hangs on phi."""
+        """Whether the arm depends on phi."""
         return bool(self.cosine.any())
 
     @property
     def rows(self) -> list[list[float]]:
-        """The three numbers of each length."""
+        """The coefficients (still, cos phi, sin phi) of each length."""
         parts = (part.tolist() for part in (self.still, self.cosine, self.sine))
         return [list(row) for row in zip(*parts, strict=True)]
 
@@ -124,6 +125,7 @@ class _TurnedArm:
 
     @classmethod
     def from_platform(cls, platform: Platform, pose: Array) -> _TurnedArm:
+        """Return the arm of a platform that tilts, with the axes it turns about at a pose."""
         places = {name: k for k, name in enumerate(platform.coordinates)}
         # A tripod's yaw, which is none of the pose, does not move the tool along its z.
         chain = platform_joints(platform, pose)
@@ -248,7 +250,7 @@ def _linear(robot: Manipulator) -> bool:
 
 
 def linuxcnc_axes(robot: Manipulator) -> tuple[LinuxCncAxis, ...]:
-    """Return the axes of LinuxCNC that the pose's coordinates are."""
+    """Return the LinuxCNC axes of the pose's coordinates."""
     axes = []
     for name, unit in zip(robot.coordinates, robot.units, strict=True):
         if name in _LETTERS:
@@ -266,6 +268,7 @@ def linuxcnc_axes(robot: Manipulator) -> tuple[LinuxCncAxis, ...]:
 
 
 def _joints(robot: Manipulator, home: Array) -> Iterator[_Joint]:
+    """Yield the legs' joints with scales, home position and limits, in mm and degrees."""
     coordinates = inverse_kinematics(robot, home)
     for i, (leg, at) in enumerate(zip(robot.legs, coordinates, strict=True), start=1):
         angular = leg.joint.unit == "rad"

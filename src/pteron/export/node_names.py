@@ -76,7 +76,7 @@ def _quantities(machine: Machine, inputs: dict[str, Expression]) -> Iterator[Nam
 
 
 def _motion(machine: Machine, pose: Expression, *rates: Expression) -> Iterator[NamedQuantity]:
-    """Yield the motion of the platform's points, and that of the legs."""
+    """Yield the named quantities of the motion of platform points and legs."""
     state = machine.state(pose, *rates)
     platform = state.platform
     for name, coordinate in zip(machine.platform.coordinates, ca.vertsplit(pose), strict=True):
@@ -104,7 +104,7 @@ def _motion(machine: Machine, pose: Expression, *rates: Expression) -> Iterator[
 
 
 def _matches(values: Array, quantities: Array) -> dict[int, int]:
-    """Return the places of the wanted quantities, by the first node that equals each of them."""
+    """Return, by the first node with an equal value, the index of each wanted quantity."""
     places: dict[int, int] = {}
     for place, row in enumerate(quantities):
         if np.isfinite(row).all() and np.ptp(row) > 0.0:  # constants may be equal by chance
@@ -118,7 +118,7 @@ def _matches(values: Array, quantities: Array) -> dict[int, int]:
 def _name_nodes(
     graph: Graph, known: dict[int, int], names: list[str], legs: list[int]
 ) -> dict[int, str]:
-    """Return a name for every node: known ones, those of one leg, and the rest."""
+    """Return a name for every node: known names, numbered ones of a leg, and numbered others."""
     of_leg: list[frozenset[int]] = []
     node_names: dict[int, str] = {}
     counts: dict[str, int] = {}

@@ -22,7 +22,7 @@ _SHARE = 0.5
 
 
 def start_pose(robot: Manipulator) -> Array:
-    """Return a pose (m,) to start from: zero if it is a good one, else amid the good ones.
+    """Return a start pose (m,): zero if it is far from singularities, else amid such poses.
 
     Of a platform that tilts it is the home pose, which is level where that can be; so it is where
     the machine's file names its home.
@@ -70,6 +70,7 @@ def measures_of(robot: Manipulator, poses: Array) -> Array:
 
 
 def _measures(robot: Manipulator, poses: Array) -> Array:
+    """Return min(type-I measure, twice the type-II measure) at poses (..., m) in reach."""
     bent = np.sqrt(evaluate_unchecked(robot, "squared_type_i", poses).min(axis=-1))
     type_ii = 2.0 * np.abs(evaluate_unchecked(robot, "type_ii", poses))
     return np.asarray(np.minimum(bent, type_ii))

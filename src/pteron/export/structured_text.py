@@ -132,6 +132,7 @@ def export_st(
 
 
 def _block(robot: Manipulator, name: str, item: ExportedFunction) -> str:
+    """Return the Structured Text of a function block, with its comments."""
     comments = [*banner(robot, "Structured Text"), "", item.summary]
     comments.append(f"{item.operations} arithmetic operations.")
     if item.name.startswith("set_payload"):
@@ -144,6 +145,7 @@ def _block(robot: Manipulator, name: str, item: ExportedFunction) -> str:
 
 
 def _camel(name: str) -> str:
+    """Return a snake_case name in PascalCase."""
     return "".join(part.capitalize() for part in name.split("_"))
 
 
@@ -158,7 +160,7 @@ def function_block(
     *,
     largest: float = _LREAL,
 ) -> str:
-    """Return a FUNCTION_BLOCK that computes a graph, in ASCII if what is given is.
+    """Return a FUNCTION_BLOCK that computes a graph, in ASCII if all texts passed in are.
 
     `comments` are lines for its head, `descriptions` say what ports mean, `labels` what nodes are
     called (the others are t1, t2 and so on); `largest` is the power of ten of the largest LREAL.
@@ -220,6 +222,7 @@ def _harmless(text: str) -> str:
 
 
 def _declare_ports(ports: Sequence[Port], descriptions: Mapping[str, str]) -> list[str]:
+    """Return the declarations of ports as LREAL or arrays of it, with descriptions as comments."""
     lines = []
     for port in ports:
         ranges = ", ".join(f"0..{count - 1}" for count in port.shape)

@@ -44,6 +44,7 @@ def tool_lines(robot: Manipulator) -> list[str]:
 
 
 def _arguments(robot: Manipulator, tool: Tool) -> dict[str, Array]:
+    """Return a tool's mass, centre and inertia as arrays, as `set_payload` takes them."""
     count = inertia_count(robot.platform.inertia.kinds)
     inertia = np.zeros(count) + np.array(tool.central_inertia)
     return {"mass": np.array([tool.mass]), "center": np.array(tool.center), "inertia": inertia}

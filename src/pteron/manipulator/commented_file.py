@@ -32,7 +32,7 @@ LEVEL = "horizontal"
 
 
 def commented_text(name_or_path: str | Path, dimensions: Mapping[str, Any] | None = None) -> str:
-    """Return the text of a robot file made from another, with a comment on each key.
+    """Return the text of a robot file based on another, with a comment on each key.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ def kept_numbers_sentence(robot: Manipulator, dimensions: Mapping[str, Any]) -> 
 
 
 def _masses(robot: Manipulator, stock: Mapping[str, Any]) -> str:
-    """Return in words the masses of the first leg's links for which no stock is given."""
+    """Return the text of the masses of the first leg's links without a stock."""
     leg: Any = robot.legs[0]
     links = {key: leg.bodies[letter].mass for letter, (key, *_) in leg.extents.items()}
     return " and ".join(f"{mass:.4g} kg ({key})" for key, mass in links.items() if key not in stock)
@@ -130,6 +130,7 @@ def crank_direction_text(robot: Manipulator) -> str:
 
 
 def _dimension_text(dimension: Any) -> str:
+    """Return a variant's dimension as text: a number, a range, or the stock of each link."""
     if isinstance(dimension, Mapping):
         return ", ".join(f"{stock} ({key})" for key, stock in dimension.items())
     return (

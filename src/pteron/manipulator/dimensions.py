@@ -62,7 +62,7 @@ class Stock:
         return cls(_DENSITIES[match[1]], outer / 1e3, round(outer - 2.0 * wall, 9) / 1e3)
 
     def link(self, kind: Any, low: float, high: float, count: int = 1) -> Any:
-        """Return the inertia of a link, or several alike, from x = low to high of its frame."""
+        """Return the inertia of a link, or of several identical ones, from x = low to high."""
         length, squares = high - low, self.outer**2 + self.inner**2
         area = math.pi / 4.0 * (self.outer**2 - self.inner**2)
         mass, middle = count * self.density * area * length, (low + high) / 2.0
@@ -81,7 +81,7 @@ def with_dimensions(
     stock: Mapping[str, str | Stock] | None = None,
     platform_mass: float | None = None,
 ) -> Manipulator:
-    """Return a machine of the same kind with other dimensions, which hold for all of its legs.
+    """Return a machine of the same kind with other dimensions, equal for all legs.
 
     Links of another length keep their section unless `stock` is given; so do a ram's cylinder and
     piston, which are as long as its shortest length. Limits of joints, and the platform's mass and
@@ -154,6 +154,7 @@ def _with_limits(leg: LegKind, limits: tuple[float, float]) -> LegKind:
 
 
 def _with_mass(robot: Manipulator, mass: float) -> Manipulator:
+    """Return a machine whose platform has a mass, kg; its inertia and bars are scaled alike."""
     platform_inertia, bars = robot.platform.inertia, robot.platform.bars
     factor = mass / (platform_inertia.mass + sum(bar.mass for bar in bars))
     inertia = type(platform_inertia).of_values(
@@ -164,10 +165,12 @@ def _with_mass(robot: Manipulator, mass: float) -> Manipulator:
 
 
 def _with_legs(robot: Manipulator, legs: Iterable[LegKind]) -> Manipulator:
+    """Return a machine with other legs."""
     return replace(robot, legs=tuple(legs))
 
 
 def _with_base(robot: Manipulator, radius: float) -> Manipulator:
+    """Return a machine whose guide points have a radius, m, about the platform's axis."""
     points = np.array([leg.guide_point for leg in robot.legs])
     axis = np.array(robot.platform.axis)
     radial = (points - points.mean(axis=0)) @ (np.eye(3) - np.outer(axis, axis))
@@ -178,6 +181,7 @@ def _with_base(robot: Manipulator, radius: float) -> Manipulator:
 
 
 def _with_platform(robot: Manipulator, radius: float) -> Manipulator:
+    """Return a machine whose platform points have a radius, m, about the platform's axis."""
     platform = robot.platform
     axis, frame = np.array(platform.axis), np.array(platform.frame)
     fixed = np.array([leg.fixed_offset for leg in robot.legs])
@@ -200,6 +204,7 @@ def _with_platform(robot: Manipulator, radius: float) -> Manipulator:
 
 
 def _factor(name: str, radial: Any, radius: float) -> float:
+    """Return the factor that scales radial vectors (n, 3) to a greatest length, m."""
     greatest = float(np.linalg.norm(radial, axis=1).max())
     if greatest < 1e-9:
         raise ModelError(f"{name}: the points are on one line along the axis, and have no radius")
@@ -207,10 +212,12 @@ def _factor(name: str, radial: Any, radius: float) -> float:
 
 
 def _vector(components: Any) -> Vector:
+    """Return a point's coordinates, m, rounded to 12 decimals."""
     return vector([round(float(x), 12) + 0.0 for x in components], "point")
 
 
 def _with_length(robot: Manipulator, name: str, body: str, length: float) -> Manipulator:
+    """Return a machine with a length, m, of a leg's body in all legs that have this body."""
     changed = [leg.with_length(body, length) for leg in robot.legs]
     if not any(changed):
         raise ModelError(f"{name}: the legs of {robot.name} have no such length")
@@ -221,6 +228,7 @@ def _with_length(robot: Manipulator, name: str, body: str, length: float) -> Man
 
 
 def _with_stock(robot: Manipulator, key: str, stock: Stock) -> Manipulator:
+    """Return a machine whose links of a key, upper or lower, are cut from a stock."""
     bodies_by_leg = [cut_links(leg, {key: stock}) for leg in robot.legs]
     if not any(bodies_by_leg):
         raise ModelError(f"{key}: no link of {robot.name}; upper or lower, which its legs have")

@@ -32,12 +32,13 @@ DEFAULT_KIND = "PRRR"
 
 
 def catalog() -> tuple[str, ...]:
-    """Return the names of the machines that come with Pteron."""
+    """Return the names of the machines in the catalog that is part of Pteron."""
     return _names()
 
 
 @lru_cache(maxsize=1)
 def _names() -> tuple[str, ...]:
+    """Return the names of the catalog's machines, sorted."""
     folder = files("pteron.manipulator") / "catalog"
     return tuple(sorted(f.name[:-5] for f in folder.iterdir() if f.name.endswith(".toml")))
 
@@ -164,7 +165,7 @@ def from_dict(tables: Mapping[str, Any]) -> Manipulator:
 
 
 def _warned(robot: Manipulator, unlikely: Sequence[str], source: str) -> Manipulator:
-    """Return a machine, and warn of its unlikely values."""
+    """Return a machine after issuing warnings of its unlikely values."""
     for text in unlikely:
         warn_unlikely(f"{source}: {text}")
     return robot
@@ -209,7 +210,7 @@ def contents(name_or_path: str | Path) -> tuple[bytes, str]:
 
 
 def _similar_files(path: Path) -> list[str]:
-    """Return the file in a missing file's folder with the most similar name, if one is similar."""
+    """Return the file in the same folder whose name is most similar to a missing file's, if any."""
     with suppress(OSError, ValueError):  # no such folder, one that may not be read, or no path
         if not path.exists():
             names = [file.name for file in path.parent.iterdir() if file.suffix == ".toml"]
@@ -229,6 +230,7 @@ def _similar_machines(name: str) -> list[str]:
 
 
 def _machine(document: dict[str, Any], source: str) -> Manipulator:
+    """Return the machine of a TOML document; a `ModelError` lists all its faults."""
     from pteron.manipulator.tables import MachineTable, TiltingMachineTable, platform_table
 
     raw_platform = document.get("platform")
@@ -277,7 +279,7 @@ class _FileReader:
     """The lists of valid keys that messages have named."""
 
     def table(self, model: Any, raw_table: object, prefix: str) -> Any:
-        """Return a table as its model; one with faults, which are collected, as `valid_part`."""
+        """Return a table as its model; if it has faults, collect them and return `valid_part`."""
         from pydantic import ValidationError
 
         try:

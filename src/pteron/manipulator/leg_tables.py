@@ -22,6 +22,7 @@ from pteron.toml import raise_faults
 
 
 def _no_truth(sign: Any) -> Any:
+    """Return a sign; a bool, which Python counts as an integer, is refused."""
     if isinstance(sign, bool):  # Python counts it as 1 or 0
         raise ValueError(f"{sign} given, 1 or -1 expected")
     return sign
@@ -68,7 +69,7 @@ def leg_table(kind: type[LegKind]) -> type[TomlTable]:
 
 @lru_cache(maxsize=16)
 def part_of(model: type[TomlTable]) -> type[TomlTable]:
-    """Return the model with all keys optional, None where missing."""
+    """Return the model with all keys optional, None if missing."""
     required: dict[str, Any] = {
         key: (field.rebuild_annotation() | None, None)
         for key, field in model.model_fields.items()
@@ -78,7 +79,7 @@ def part_of(model: type[TomlTable]) -> type[TomlTable]:
 
 
 def toml_key(name: str, key: Key) -> str:
-    """Return a leg's field's key in a file; a slider's mass is in the table `slider`."""
+    """Return the TOML key of a leg's field; a slider's mass is in the table `slider`."""
     return "slider" if key.role == "slider" else name
 
 
@@ -181,7 +182,7 @@ def _end_fault(leg: LegKind, letter: str, body: Any) -> str | None:
 
 
 def leg_items(leg: LegKind) -> Mapping[str, Any]:
-    """Return a leg's fields by their keys in a file; bodies stay objects."""
+    """Return a leg's fields by their TOML keys; bodies remain objects."""
     items: dict[str, Any] = {"type": leg.type}
     for name, key in leg.every_key().items():
         items[toml_key(name, key)] = leg.bodies[key.body] if key.body else getattr(leg, name)

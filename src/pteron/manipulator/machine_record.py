@@ -164,8 +164,10 @@ def _dimensions(robot: Manipulator) -> Iterator[_Dimension]:
 
 
 def _digest(content: object) -> str:
+    """Return a digest of a value that JSON can hold, as hexadecimal digits."""
     return sha256(json.dumps(content).encode()).hexdigest()[:_DIGITS]
 
 
 def _numbers(components: Any) -> str:
+    """Return components as text, to six digits, with commas."""
     return ", ".join(f"{component:.6g}" for component in components)

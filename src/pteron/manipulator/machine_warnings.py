@@ -87,7 +87,7 @@ def machine_warnings(robot: Manipulator, *, bodies: bool = True) -> tuple[str, .
 
 
 def _beside_the_pin(robot: Manipulator) -> Iterator[str]:
-    """Yield what stands beside the pin where both legs of a five-bar meet."""
+    """Yield warnings of points beside the pin where both legs of a five-bar meet."""
     platform = robot.platform
     if platform.plane_normal is None:
         return
@@ -148,7 +148,7 @@ def _mass_warnings(platform: Platform, legs: Sequence[LegKind]) -> Iterator[str]
 
 
 def _long_lengths(robot: Manipulator) -> dict[int, dict[str, Sequence[float]]]:
-    """Return the lengths beyond `_LARGE`, m, by leg (from 1; 0: the platform) and by key."""
+    """Return lengths beyond `_LARGE`, m, by leg (from 1; 0 for the platform) and key."""
     platform = robot.platform
     lengths: dict[int, dict[str, Sequence[float]]] = {
         0: {

@@ -81,6 +81,7 @@ class Manipulator:
 
     @cached_property
     def _hash(self) -> int:
+        """The hash of the fields that equality compares."""
         compared = (part.name for part in fields(self) if part.compare)
         return hash(tuple(getattr(self, name) for name in compared))
 
@@ -108,6 +109,7 @@ class Manipulator:
         return f"<Manipulator {self.name!r}: {kinds} under a {self.platform.motion} platform>"
 
     def _repr_html_(self) -> str:
+        """Return the table of the legs as HTML, for notebooks."""
         from pteron.manipulator.notebook import machine_table
 
         return machine_table(self)
@@ -119,7 +121,7 @@ class Manipulator:
 
     @property
     def joint_count(self) -> int:
-        """Number of actuated joints n, one a leg."""
+        """Number of actuated joints n, equal to that of legs."""
         return len(self.legs)
 
     @property
@@ -129,7 +131,7 @@ class Manipulator:
 
     @property
     def wraps(self) -> NDArray[np.bool_]:
-        """Coordinates (m,) of which a whole turn leads back to the same joint coordinates.
+        """Coordinates (m,) of which a full turn gives the same joint coordinates.
 
         A platform's angle does, unless it slides the platform's halves or a joint follows it.
         """
@@ -315,7 +317,7 @@ def _tilting_leg_faults(platform: Platform, leg: LegKind) -> Iterator[str]:
 
 
 def _unheld_tilting(platform: Platform, legs: Sequence[LegKind]) -> list[str]:
-    """Return the fault of legs that leave a tilting platform a freedom at every pose."""
+    """Return the fault of legs that leave a tilting platform a free motion at every pose."""
     normals = [leg.plane_normal for leg in legs if leg.plane_normal is not None]
     if normals and all(parallel(normals[0], normal) for normal in normals[1:]):
         return [
@@ -326,7 +328,7 @@ def _unheld_tilting(platform: Platform, legs: Sequence[LegKind]) -> list[str]:
 
 
 def _with_held_points(platform: Platform, legs: Sequence[LegKind]) -> Platform:
-    """Return a platform with the planes in which its legs keep its points, if it is a tripod's."""
+    """Return a tripod's platform with the planes that its legs confine its points to."""
     if not platform.keeps_points_in_planes:
         return platform
     planes = [
@@ -338,7 +340,7 @@ def _with_held_points(platform: Platform, legs: Sequence[LegKind]) -> Platform:
 
 
 def unheld_axes(platform: Platform, legs: Sequence[LegKind]) -> NDArray[np.float64]:
-    """Return axes (k, 3) about which no leg keeps a platform that does not tilt from turning.
+    """Return axes (k, 3) about which no leg prevents a non-tilting platform from rotating.
 
     Only the points where both legs meet may carry anything there, as of a five-bar.
     """
@@ -349,7 +351,7 @@ def unheld_axes(platform: Platform, legs: Sequence[LegKind]) -> NDArray[np.float
 
 
 def _unheld_freedoms(platform: Platform, legs: list[LegKind]) -> list[str]:
-    """Return the fault of legs that leave the platform a freedom outside its motion."""
+    """Return the fault of legs that leave the platform a free motion other than its own."""
     turning = [i for i, leg in enumerate(legs, start=1) if leg.follows_angle]
     if len(turning) > 1:
         return [f"{legs_text(turning)}: all turn the platform, which takes one such leg"]

@@ -29,7 +29,7 @@ def name_faults(name: object) -> Iterator[str]:
 
 
 def _is_invisible(c: str) -> bool:
-    """Return whether a character is a control character or no character at all."""
+    """Return whether a character is a control or format character, or a noncharacter."""
     if unicodedata.category(c) in ("Cc", "Cf", "Cs", "Zl", "Zp"):
         return c not in _JOINERS
     return ord(c) & 0xFFFE == 0xFFFE or 0xFDD0 <= ord(c) <= 0xFDEF

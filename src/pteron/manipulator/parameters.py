@@ -53,6 +53,7 @@ def _cached_parameter_list(
     platform: tuple[str, ...],
     groups: tuple[tuple[int, ...], ...] | None,
 ) -> tuple[Parameter, ...]:
+    """Return the inertial parameters of legs' bodies and the platform, cached by their kinds."""
     return parameter_list([dict(bodies) for bodies in kinds], platform, groups)
 
 
@@ -111,7 +112,7 @@ def parameters(robot: RobotLike) -> NDArray[np.float64]:
 
 
 def with_parameters(robot: RobotLike, values: ArrayLike) -> Manipulator:
-    """Return the same machine with other inertial parameters.
+    """Return a machine with other inertial parameters, otherwise equal.
 
     Parameters
     ----------

@@ -41,5 +41,5 @@ class Radii:
 
     @property
     def leg(self) -> float:
-        """The radius of a leg whose upper and lower part slide on one line, m: the greater one."""
+        """The radius of a leg with upper and lower part on a common line, m: the greater one."""
         return max(self.upper, self.lower)

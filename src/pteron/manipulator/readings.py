@@ -51,7 +51,7 @@ def remove_readings(robot: Manipulator) -> Manipulator:
 
 
 def refuse_readings(robot: Manipulator, writer: str) -> None:
-    """Raise for a machine with readings where `writer` supports joint coordinates only."""
+    """Refuse a machine with readings where `writer` supports joint coordinates only."""
     if has_readings(robot):
         legs = [str(i) for i, leg in enumerate(robot.legs, start=1) if leg.reading is not None]
         raise ModelError(

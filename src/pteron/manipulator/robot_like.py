@@ -13,7 +13,7 @@ RobotLike = Manipulator | str | Path
 
 
 def as_manipulator(robot: RobotLike) -> Manipulator:
-    """Return the machine itself, or the one that `load` reads by its name or path.
+    """Return a machine itself, or the machine that `load` reads by name or path.
 
     Parameters
     ----------

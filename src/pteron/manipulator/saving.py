@@ -57,7 +57,7 @@ def dumps(robot: RobotLike) -> str:
 
 
 def to_dict(robot: RobotLike) -> dict[str, Any]:
-    """Return the tables of a manipulator's file: what `from_dict` and `json` take.
+    """Return the tables of a manipulator's file, as `from_dict` and `json` take them.
 
     Parameters
     ----------

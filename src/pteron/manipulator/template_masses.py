@@ -12,7 +12,7 @@ from pteron.tolerances import SAME
 
 
 def template_masses(robot: Manipulator) -> str:
-    """Return a sentence on masses that equal those of a machine of the catalog; "" if none do.
+    """Return a sentence on masses equal to those of a catalog machine; "" without any.
 
     All links of the first leg have its masses or its sections (kg/m), and perhaps the platform.
     Machines with a name of the catalog count as the catalog's; `pteron new` gives other names.

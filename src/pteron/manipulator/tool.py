@@ -69,7 +69,7 @@ class Tool:
         return self.point if self.center_of_mass is None else self.center_of_mass
 
     def turned(self, turn: Callable[[Vector], Vector]) -> Tool:
-        """Return the tool in a frame of the platform that turns: every vector v becomes turn(v)."""
+        """Return the tool in a rotated frame of the platform: every vector v becomes turn(v)."""
         center, inertia = self.center_of_mass, self.central_inertia
         if isinstance(inertia, tuple):
             rotation = np.array(
@@ -104,4 +104,5 @@ def tool_faults(platform: Platform, tools: Sequence[Tool]) -> Iterator[str]:
 
 
 def _inertia(raw: Any, key: str) -> float | tuple[float, ...]:
+    """Return a tool's inertia from a file: a number, or the numbers of a spatial inertia."""
     return numbers(raw, key, _SPATIAL) if isinstance(raw, Sequence) else number(raw, key)

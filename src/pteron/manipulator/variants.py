@@ -42,7 +42,7 @@ def working_modes(robot: RobotLike) -> tuple[Manipulator, ...]:
 
 
 def with_elbows(robot: Manipulator, signs: Sequence[int]) -> Manipulator:
-    """Return the machine in the working mode that has these elbows, +1 or -1 for each leg.
+    """Return the machine in the working mode with these elbows, +1 or -1 for each leg.
 
     The home that its file names is that of the file's working mode alone.
     """
@@ -51,7 +51,7 @@ def with_elbows(robot: Manipulator, signs: Sequence[int]) -> Manipulator:
 
 
 def turned(robot: RobotLike, rotation: ArrayLike, *, gravity: bool = True) -> Manipulator:
-    """Return the machine turned as a whole about the base frame's origin.
+    """Return the machine rotated rigidly about the base frame's origin.
 
     Parameters
     ----------

@@ -65,7 +65,7 @@ def robot_text(
 
 
 def _kind_of(name: str) -> type[LegKind]:
-    """Return a kind of leg by its name, from an installed package too."""
+    """Return a kind of leg by its name, also from an installed package."""
     kind = kind_named(name)
     if kind is None:
         raise ModelError(
@@ -76,6 +76,7 @@ def _kind_of(name: str) -> type[LegKind]:
 
 
 def _bodies() -> str:
+    """Return a comment that lists the keys of a planar body with their descriptions."""
     fields = PlanarBody.model_fields.items()
     return f"A body's keys: {'; '.join(f'{key}, {field.description}' for key, field in fields)}."
 
@@ -116,7 +117,7 @@ def _example(field: FieldInfo, table: Mapping[str, Any]) -> Any:
 
 
 def _comment_lines(entries: list[tuple[str, FieldInfo | None]]) -> list[str]:
-    """Return lines with comments on their keys: after short lines, above long ones."""
+    """Return lines with comments on their keys: behind short lines, above long ones."""
     lines = []
     column = max((len(text) for text, _ in entries if len(text) <= _COLUMN), default=0)
     for text, field in entries:
@@ -133,6 +134,7 @@ def _comment_lines(entries: list[tuple[str, FieldInfo | None]]) -> list[str]:
 
 
 def _toml(content: Any) -> str:
+    """Return a value in TOML on a single line: mappings as inline tables, sequences as arrays."""
     if isinstance(content, Mapping):
         return "{ " + ", ".join(f"{key} = {_toml(part)}" for key, part in content.items()) + " }"
     if isinstance(content, Sequence) and not isinstance(content, str):

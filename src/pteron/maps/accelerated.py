@@ -44,7 +44,7 @@ def indices_by_jax(
 def _function(
     robot: Manipulator, names: tuple[str, ...], places: tuple[int, ...], shape: tuple[int, ...]
 ) -> Callable[..., dict[str, Any]]:
-    """Return what takes a pose and the values along each axis, and returns the indices."""
+    """Return a JAX function from a pose and the axes' values to the indices."""
     jax = import_extra("jax", "jax", 'engine: "jax" needs JAX')
     jnp = jax.numpy
     jax.config.update("jax_enable_x64", True)

@@ -99,7 +99,7 @@ class Axis:
 @checked_arguments
 @dataclass(frozen=True)
 class Grid:
-    """Poses of which some coordinates vary and the others are held.
+    """Poses with some coordinates varied on a grid and the others fixed.
 
     Attributes
     ----------

@@ -107,7 +107,7 @@ class Map(Result):
         return tuple(map(self.index, self.values))
 
     def index(self, name: str) -> Index:
-        """Return the index of a name, one's own or one of Pteron."""
+        """Return the index of a name, a custom one or one of Pteron."""
         return {**ALL, **{index.name: index for index in self.own_indices}}[name]
 
     @property
@@ -117,17 +117,17 @@ class Map(Result):
 
     @property
     def reachable(self) -> NDArray[np.bool_]:
-        """Whether each pose serves, shape grid.shape."""
+        """Whether each pose is usable, shape grid.shape."""
         return np.asarray(self.status == REACHABLE)
 
     @property
     def share(self) -> float:
-        """The share of the poses that serve."""
+        """The share of usable poses."""
         return float(self.reachable.mean())
 
     @property
     def causes(self) -> dict[str, float]:
-        """Why poses do not serve, and the share of all for which each is the cause."""
+        """Why poses are not usable, and the share of all poses for each cause."""
         codes, counts = np.unique(self.status, return_counts=True)
         shares = zip(codes.tolist(), (counts / self.status.size).tolist(), strict=True)
         return {cause(code): share for code, share in shares if code != REACHABLE}
@@ -149,7 +149,7 @@ class Map(Result):
         return "\n".join(lines)
 
     def statistics(self, name: str) -> Summary:
-        """Return the best, the worst and the mean of an index over the poses that serve.
+        """Return the best, the worst and the mean of an index over the usable poses.
 
         Raises
         ------
@@ -181,13 +181,14 @@ class Map(Result):
         )
 
     def _pose(self, place: int) -> Array:
+        """Return the pose (m,) at a flat index of the grid."""
         region = tuple(
             slice(int(i), int(i) + 1) for i in np.unravel_index(place, self.status.shape)
         )
         return self.grid.poses(region).reshape(-1)
 
     def table(self) -> pl.DataFrame:
-        """Return one row a pose: its coordinates, the indices, and `status`.
+        """Return a table with a row per pose: its coordinates, the indices, and `status`.
 
         The names of columns have units in brackets, as tables are read here.
         """
@@ -205,7 +206,7 @@ class Map(Result):
         return frame.with_columns(pl.col(pl.Float64).fill_nan(None))
 
     def slice_at(self, name: str, coordinate: float) -> Map:
-        """Return the map at the value of a coordinate that is nearest to one, m or rad."""
+        """Return the map at the grid value of a coordinate nearest to a number, m or rad."""
         k = [axis.name for axis in self.grid.axes].index(name)
         axes = list(self.grid.axes)
         steps = axes.pop(k).values
@@ -220,17 +221,18 @@ class Map(Result):
     at = former_attribute("at", "slice_at")
 
     def _overview(self) -> Overview:
+        """Return the share of poses in reach and the table of the indices, for notebooks."""
         about = f"{self.share:.1%} of {self.status.size} poses in reach"
         return frame_overview(self.robot, about, self.table())
 
 
 def own_attributes(index: Index) -> dict[str, str]:
-    """Return what a file says of an index that is not Pteron's, for `own_indices_of`."""
+    """Return the attributes in which a file stores a custom index, for `own_indices_of`."""
     return {"units": index.unit, "long_name": index.title, "better": index.better}
 
 
 def own_indices_of(attributes: Mapping[str, Mapping[str, Any]]) -> tuple[Index, ...]:
-    """Return the indices, without functions, of what a file says of each by its name."""
+    """Return custom indices, without functions, from the attributes in a file, by name."""
     return tuple(
         Index(name, str(said["long_name"]), unit=str(said["units"]), better=said["better"])
         for name, said in attributes.items()
@@ -243,5 +245,5 @@ def column_heading(index: Index) -> str:
 
 
 def cause(status: int) -> str:
-    """Return what a status that is not `REACHABLE` says."""
+    """Return the text of a status other than `REACHABLE`."""
     return "beyond a joint's limit" if status == BEYOND_LIMITS else f"out of reach of leg {status}"

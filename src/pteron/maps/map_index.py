@@ -52,7 +52,7 @@ def map_index(
     workers: Workers | None = None,
     progress: Progress | None = None,
 ) -> Map:
-    """Return what indices of performance are over a grid of poses, and which of the poses serve.
+    """Return indices of performance over a grid of poses, and which of the poses are usable.
 
     Parameters
     ----------
@@ -195,6 +195,6 @@ def _compute_region(
 
 @lru_cache(maxsize=64)
 def prepare(robot: Manipulator, names: tuple[str, ...], poses: int) -> None:
-    """Have the kernels ready: compiled where so many poses are worth it."""
+    """Load the kernels, compiled if the number of poses justifies it."""
     for name in ("standing", *names):
         numeric(robot, name).tier.fetch(at_any_cost=poses >= _MANY)

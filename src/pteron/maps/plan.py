@@ -60,7 +60,7 @@ def _differences(name: str, stored: Any, plan: Any) -> Iterator[str]:
 
 
 def _machine(text: Any) -> Mapping[str, Any]:
-    """Return what a machine's file says; of anything else, its name."""
+    """Return the tables of a machine's file; for another text, a table with its name."""
     try:
         return tomllib.loads(text)
     except (TypeError, AttributeError, ValueError, RecursionError):
@@ -68,12 +68,14 @@ def _machine(text: Any) -> Mapping[str, Any]:
 
 
 def _is_table_list(part: Any) -> bool:
+    """Return whether a part of a plan is a list with tables."""
     return isinstance(part, list) and any(
         isinstance(entry_of_list, Mapping) for entry_of_list in part
     )
 
 
 def _difference_text(name: str, stored: Any, plan: Any) -> str:
+    """Return the text of a difference between the store's plan and the run's."""
     texts = ["none" if plan_value is None else shorten(plan_value) for plan_value in (stored, plan)]
     name = shorten(name, bare=True, longest=2 * _LONG)
     if any(len(text) > _LONG for text in texts):

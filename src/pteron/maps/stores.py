@@ -49,7 +49,7 @@ class MemoryStore:
         self._status = np.empty(grid.shape, dtype=np.int8)
 
     def finished_chunks(self) -> tuple[int, ...]:
-        """Return the numbers of no chunks: nothing is there before the sweep begins."""
+        """Return no numbers: a new store in memory is empty."""
         return ()
 
     def write(self, number: int, chunk: Mapping[str, NDArray[Any]]) -> None:
@@ -60,7 +60,7 @@ class MemoryStore:
         self._status[region] = chunk[_STATUS]
 
     def map(self, robot: str, machine: str) -> Map:
-        """Return the map of a machine of that name and that file's text."""
+        """Return the map, in memory, of a machine of this name and file text."""
         return Map(robot, self._grid, self._values, self._status, machine)
 
 
@@ -93,7 +93,7 @@ class MapStore:
         plan: Mapping[str, Any],
         own_indices: tuple[Index, ...] = (),
     ) -> MapStore:
-        """Return the store of a map at a path; it is made if there is none.
+        """Return the store of a map at a path; it is created if missing.
 
         A store of the same map is continued. `robot` is the machine's name, `names` are those of
         the indices, and `plan` is all else that the numbers depend on; but for the functions of
@@ -114,7 +114,7 @@ class MapStore:
             raise OutputError(f"{error}; remove it, or name another place") from None
 
     def finished_chunks(self) -> frozenset[int]:
-        """Return the numbers of the chunks that are there as they were written."""
+        """Return the numbers of the chunks that are complete."""
         count = len(self.grid.regions())
         return frozenset(k for k in range(count) if self._read(k) is not None)
 
@@ -127,7 +127,7 @@ class MapStore:
         group[_CHECKSUM][number] = self._checksum(number, arrays)
 
     def map(self, robot: str, machine: str) -> Map:
-        """Return the map, read into memory."""
+        """Return the map, in memory, of a machine of this name and file text."""
         regions = self.grid.regions()
         arrays_by_name = {name: np.empty(self.grid.shape, _dtype(name)) for name in self._arrays}
         missing = 0
@@ -146,10 +146,11 @@ class MapStore:
 
     @property
     def _arrays(self) -> tuple[str, ...]:
+        """Names of the arrays in the store: the indices and the status."""
         return (*self.names, _STATUS)
 
     def _read(self, number: int) -> dict[str, NDArray[Any]] | None:
-        """Return a chunk as it was written; None where it is not there, lost or damaged."""
+        """Return a chunk; None if it is missing or damaged."""
         region, group = self.grid.regions()[number], _group(self.path)
         try:
             recorded = int(group[_CHECKSUM][number])
@@ -181,7 +182,7 @@ def read_store(path: Path) -> Map:
 
 
 def save_store(index_map: Map, path: Path) -> Path:
-    """Write a map to a Zarr store, whole or not at all."""
+    """Write a map to a Zarr store, atomically."""
     plan = {"robot": index_map.machine or index_map.robot, "saved": True}
     names, own = tuple(index_map.values), index_map.own_indices
     if path.exists():
@@ -263,6 +264,7 @@ def _checked_seal(path: Path, attributes: Mapping[str, Any]) -> str:
 
 
 def _dtype(name: str) -> str:
+    """Return the NumPy type of an array in the store: int8 for the status, float64 for indices."""
     return "int8" if name == _STATUS else "float64"
 
 
@@ -296,7 +298,7 @@ def _group(path: Path) -> Any:
 
 
 def _attributes(path: Path) -> dict[str, Any]:
-    """Return a store's attributes as its file has them, or none where the path is no store."""
+    """Return the attributes in a store's file; empty if the path is no store."""
     _zarr()
     try:
         attributes = json.loads((path / "zarr.json").read_bytes())["attributes"]
@@ -306,4 +308,5 @@ def _attributes(path: Path) -> dict[str, Any]:
 
 
 def _zarr() -> Any:
+    """Return the module zarr, or raise an error with the pip command of its extra."""
     return import_extra("cluster", "zarr", "a .zarr store needs Zarr")

@@ -62,7 +62,7 @@ class Surface(Result):
 def surfaces(
     index_map: Map, name: str, levels: Sequence[float] | None = None
 ) -> tuple[Surface, ...]:
-    """Return the surface of the reach, if the map has its margin, and those of equal value.
+    """Return the surface of the reach, if the map has its margin, and isosurfaces of an index.
 
     Parameters
     ----------

@@ -52,7 +52,7 @@ class Store(Protocol[_Written]):
         """Return the numbers of the chunks that are written."""
 
     def write(self, number: int, rows: _Written) -> None:
-        """Write what a chunk gave: when it returns the chunk is finished, before it is not."""
+        """Write a chunk's result; the chunk counts as finished only once this returns."""
 
 
 def sweep(
@@ -65,7 +65,7 @@ def sweep(
     threads: Workers = 1,
     progress: Progress | None = None,
 ) -> int:
-    """Compute the chunks that a store has not yet, and write what each gives to the store.
+    """Compute the chunks missing in a store, and write each result to the store.
 
     A sweep that was ended, by whatever, is resumed by the same call.
 
@@ -134,6 +134,7 @@ def sweep(
 def _compute_chunk(
     function: Callable[[_Chunk], _Result], store: Store[_Result], number: int, chunk: _Chunk
 ) -> None:
+    """Compute a chunk's result and write it to the store."""
     store.write(number, function(chunk))
 
 
@@ -201,7 +202,7 @@ def _run_elsewhere(
 
 
 def _settle(future: Future[None], where: str) -> None:
-    """Raise what ended a task, if anything did."""
+    """Raise the error that ended a task, if any."""
     try:
         future.result()
     except _import_distributed().KilledWorker as error:
@@ -215,7 +216,7 @@ def _settle(future: Future[None], where: str) -> None:
 
 @contextmanager
 def _told_if_lost(where: str) -> Iterator[None]:
-    """Say what has ended if a scheduler does not answer any more."""
+    """Raise errors of a scheduler that no longer answers as a `PteronError`, in a block."""
     try:
         yield
     except (CancelledError, OSError, RuntimeError):
@@ -223,12 +224,13 @@ def _told_if_lost(where: str) -> Iterator[None]:
 
 
 def _lost_workers_error(where: str) -> PteronError:
+    """Return the error that a Dask cluster has ended or is no longer connected."""
     return PteronError(f"{where}: has ended, or its connection has; {_AGAIN}")
 
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Silence Dask's logs: errors are reported in one line here."""
+    """Silence Dask's logs in a block: Pteron reports errors itself."""
     loggers = [logging.getLogger(name) for name in ("distributed", "distributed.client")]
     levels = [logger.level for logger in loggers]
     for logger in loggers:
@@ -257,7 +259,7 @@ def local_workers(count: int | None) -> Any:
 
 @contextmanager
 def _client(where: str, scheduler: str | None, workers: int | None) -> Iterator[Any]:
-    """Yield a client of a cluster that answers and has Pteron as it is here."""
+    """Yield a client of a cluster that answers and has this version of Pteron."""
     distributed = _import_distributed()
     with ExitStack() as opened:
         address = scheduler or opened.enter_context(local_workers(workers))

@@ -68,7 +68,7 @@ def read_map_table(source: Path) -> Map:
 
 
 def _column(table: Table, name: str, heading: str) -> str:
-    """Return the column of a coordinate or an index; empty where there is none."""
+    """Return the column of a coordinate or an index; empty if it is missing."""
     columns = [column for column in table.columns if column.partition(" [")[0] == name]
     if len(columns) > 1:
         raise DataError(f"{table.source}: columns {join_names(columns)} are all {name}; keep one")
@@ -144,7 +144,7 @@ def _axis(table: Table, name: str, coordinates: Array) -> Axis:
 
 
 def _checksum(index_map: Map) -> str:
-    """Return the checksum of what a table holds of a map."""
+    """Return the checksum of a map's columns in a table."""
     indices: dict[str, Any] = {
         name: np.where(np.isfinite(array), array, np.nan)
         for name, array in index_map.values.items()
@@ -153,7 +153,7 @@ def _checksum(index_map: Map) -> str:
 
 
 def _expect_whole(source: Path, index_map: Map) -> None:
-    """Refuse a Parquet file whose checksum, if it has one, is not that of what it holds."""
+    """Refuse a Parquet file whose checksum, if it has one, does not match its contents."""
     import polars as pl
 
     metadata = pl.read_parquet_metadata(source)

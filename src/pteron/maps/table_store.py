@@ -66,7 +66,7 @@ class TableStore:
             write_text(file, json.dumps(plan_as_json, indent=1) + "\n")
 
     def finished_chunks(self) -> frozenset[int]:
-        """Return the numbers of the chunks that are there as they were written."""
+        """Return the numbers of the chunks that are complete."""
         return frozenset(number for number, _ in self._is_complete())
 
     finished = former_attribute("finished", "finished_chunks")
@@ -78,7 +78,7 @@ class TableStore:
         write_bytes(self.folder / name, contents)
 
     def scan(self) -> pl.LazyFrame:
-        """Return all rows that are written, in the plan's order, read only as far as asked for.
+        """Return all rows written, in the plan's order, as a lazy frame.
 
         Raises
         ------
@@ -93,7 +93,7 @@ class TableStore:
         return pl.scan_parquet(files, glob=False)
 
     def _is_complete(self) -> Iterator[tuple[int, Path]]:
-        """Yield the number and the file of each chunk that is as it was written."""
+        """Yield the number and the file of each complete chunk."""
         seen = set()
         for file in sorted(self.folder.glob(f"[0-9]*{_ENDING}")):
             name = file.name.partition("-")[0]
@@ -102,6 +102,7 @@ class TableStore:
                 yield int(name), file
 
     def _is_whole(self, file: Path) -> bool:
+        """Return whether a chunk's file is complete: its contents have the checksum in its name."""
         number, _, given_sum = file.stem.partition("-")
         try:
             return number.isdecimal() and given_sum == self._checksum(
@@ -111,4 +112,5 @@ class TableStore:
             return False
 
     def _checksum(self, number: int, contents: bytes) -> str:
+        """Return a checksum, hexadecimal digits, of a chunk's contents, its number and the plan."""
         return hashlib.sha256(f"{self._plan} {number} ".encode() + contents).hexdigest()[:16]

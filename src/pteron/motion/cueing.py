@@ -101,7 +101,7 @@ class Washout:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Cue(Motion):
-    """A motion of the platform that shows a vehicle's, within a proved box of poses.
+    """A motion of the platform that reproduces a vehicle's, within a proved box of poses.
 
     Attributes
     ----------
@@ -126,7 +126,7 @@ def cue(
     pose: PoseLike | None = None,
     type_ii: float = 0.0,
 ) -> Cue:
-    """Return the motion of a simulator's platform that shows the motion of a vehicle.
+    """Return the motion of a simulator's platform that reproduces a vehicle's, within its box.
 
     Parameters
     ----------
@@ -197,7 +197,7 @@ def cue(
 
 
 def _even_times(time: Array, source: str) -> Array:
-    """Return times with even steps, at most `_STEP`, from 0 to the last of those given, s."""
+    """Return equidistant times, at most `_STEP` apart, from 0 to the last sample's time, s."""
     steps = np.diff(time)
     count = len(time)
     if np.ptp(steps) > SAME * steps.mean() or steps.mean() > _STEP:
@@ -208,7 +208,7 @@ def _even_times(time: Array, source: str) -> Array:
 
 
 def _interpolate_columns(even: Array, time: Array, columns: Array) -> Array:
-    """Return columns (T, 6) at even times, linear between the times given."""
+    """Return columns (T, 6) interpolated linearly at equidistant times."""
     return np.stack([np.interp(even, time, column) for column in columns.T], axis=-1)
 
 

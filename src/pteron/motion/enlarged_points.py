@@ -12,7 +12,7 @@ from pteron.motion.joint_points import Guide, JointPoints, Part
 
 
 def enlarged_points(points: JointPoints, other: JointPoints, times: float) -> JointPoints:
-    """Return a machine's points in a pose, moved by `times` the way to another machine's points.
+    """Return a machine's points at a pose, moved `times` the way to another machine's points.
 
     With 1 they are the other machine's.
     """
@@ -47,7 +47,7 @@ def enlarged_guides(
 
 
 def greatest_difference(points: JointPoints, other: JointPoints) -> float:
-    """Return the greatest distance, m, of a joint of one machine from the same of another."""
+    """Return the greatest distance, m, between corresponding joints of two machines."""
     moved = enlarged_points(points, other, 1.0)
     return max(
         float(np.linalg.norm(there - line, axis=-1).max())
@@ -56,6 +56,7 @@ def greatest_difference(points: JointPoints, other: JointPoints) -> float:
 
 
 def _shift_points(points: Array, others: Array, times: float) -> Array:
+    """Return points (K, 3) shifted by `times` their difference from another machine's."""
     # Joints that coincide in one machine may be two in the other: the nearest is the same one.
     if len(points) == len(others):
         nearest = others

@@ -96,7 +96,7 @@ class JointPoints:
     rams: tuple[bool, ...]
 
     def at(self, index: int) -> JointPoints:
-        """Return the points of one of several poses, by its place among them."""
+        """Return the points of a pose, by its index."""
         return replace(
             self,
             chain=self.chain[index],
@@ -207,7 +207,7 @@ def _links(leg: LegKind, chain: Array, coordinate: Array, end: Array) -> Array:
 
 
 def _parts(robot: Manipulator, poses: Array, p: Array) -> tuple[Part, ...]:
-    """Return the platform's parts in poses (..., m), P being at (..., 3)."""
+    """Return the platform's parts in poses (..., m), with P at points (..., 3)."""
     platform = robot.platform
     frame = np.array(platform.frame)
     arms = np.array([leg.platform_point for leg in robot.legs])
@@ -231,7 +231,7 @@ def _corners(arms: Array) -> Array:
 
 
 def _distinct(points: Array) -> Array:
-    """Return the distinct points (k, 3), each at its first place."""
+    """Return the distinct points (k, 3), in order of their first occurrence."""
     differs = np.abs(points[:, None] - points).max(axis=-1) > ROUNDING
     return points[[bool(differs[i, :i].all()) for i in range(len(points))]]
 

@@ -60,10 +60,11 @@ class Motion(Result):
         return f"<{type(self).__name__}: {self.duration:.6g} s, {rows}>"
 
     def summary(self) -> str:
-        """Return what the motion reaches, for people, as lines of text."""
+        """Return the range and rates of the motion as lines of text."""
         return self._overview().text
 
     def _overview(self) -> Overview:
+        """Return the range, speed and acceleration of each coordinate as a table, for notebooks."""
         columns = [Column("coordinate", "number"), Column("from", "number")]
         columns += [Column(name, "number") for name in ("to", "speed", "acceleration")]
         extremes = (

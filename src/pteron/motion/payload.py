@@ -85,7 +85,7 @@ def with_payload(
     center: Sequence[float] | None = None,
     inertia: float | Sequence[float] = 0.0,
 ) -> Manipulator:
-    """Return the machine with a body that its platform carries: a point mass at the tool, usually.
+    """Return the machine with a body on its platform: a point mass at the tool by default.
 
     It is the same machine whose platform is heavier: m + m_L, m gamma + m_L s and I + I_L + m_L
     |s|^2, s being `center` across the platform's axis; as a whole, where the platform tilts, and
@@ -141,7 +141,7 @@ def add_payload(
     center: Sequence[float] | None = None,
     inertia: float | Sequence[float] = 0.0,
 ) -> Manipulator:
-    """Return the machine with a body as `with_payload`, without a warning of its mass."""
+    """Return the machine with a body, like `with_payload`, without a warning about its mass."""
     payload = number_or_nan(mass)
     if not (math.isfinite(payload) and payload >= 0.0):
         raise DataError(f"payload: {mass!r} given, a mass of 0 kg or more expected")

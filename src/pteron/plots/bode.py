@@ -30,7 +30,7 @@ def bode_figure(
     *,
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return gain and phase of each drive's loop (W, n), complex, over the frequency (W,), rad/s.
+    """Return a picture of gain and phase of drive loops (W, n) over frequency (W,), rad/s.
 
     Lines mark the gain 1 and the phase -180 degrees.
     """
@@ -61,7 +61,7 @@ def poles_figure(
     *,
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return a picture of a sampled loop's poles, complex, and the unit circle round the stable."""
+    """Return a picture of a sampled loop's poles, complex, with the unit circle."""
     try:
         roots = np.asarray(poles, dtype=complex).ravel()
     except (TypeError, ValueError):

@@ -57,7 +57,7 @@ def differences_figure(
     enlarge: float | None = None,
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return a machine in colours over another in grey, its differences from that one enlarged.
+    """Return a machine in colours over another in grey, with their difference enlarged.
 
     Both bring the platform to the same pose.
 
@@ -164,7 +164,7 @@ def row_residuals_figure(
     *,
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return the residuals of measurements by row, each kind in a panel of its own.
+    """Return the residuals of measurements by row, with a panel for each kind.
 
     Parameters
     ----------
@@ -208,12 +208,12 @@ def row_residuals_figure(
 
 
 def enlargement(difference: float, size: float) -> float:
-    """Return the round number of times that makes a difference well seen beside a size, m."""
+    """Return a round factor that makes a difference, m, visible in a picture of a size, m."""
     return nice_step(_SHOWN * size / difference) if difference > 1e-9 * size else 1.0
 
 
 def expect_alike(robot: Manipulator, other: Manipulator) -> None:
-    """Check that two machines differ in numbers only."""
+    """Refuse two machines that differ in more than numbers."""
     if [leg.type for leg in robot.legs] != [leg.type for leg in other.legs] or (
         robot.coordinates != other.coordinates
     ):

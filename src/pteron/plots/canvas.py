@@ -103,10 +103,11 @@ class Picture(Figure):
 
     @property
     def _is_flat(self) -> bool:
+        """Whether all axes are two-dimensional and Cartesian."""
         return all(axes.name == "rectilinear" for axes in self.axes)
 
     def savefig(self, fname: Any, **options: Any) -> None:
-        """Write the figure, with one warning of all letters that no font here has."""
+        """Write the figure, with a single warning of all letters that no font here has."""
         absent = take_fonts(self)
         with silence_glyph_warnings():
             super().savefig(fname, **options)
@@ -115,6 +116,7 @@ class Picture(Figure):
             warn_of_absent(absent)
 
     def _ipython_display_(self) -> None:
+        """Show the figure in a notebook as a PNG at a fixed resolution."""
         # The way that goes before pyplot's, which notebooks know only once it is imported.
         from IPython.display import display
 
@@ -127,7 +129,7 @@ class Picture(Figure):
 
 
 class AxesPlace:
-    """Stands for a figure where a picture is drawn at the place of axes of another figure.
+    """A stand-in for a figure that draws a picture at the place of axes of another figure.
 
     A picture of one panel is drawn on these axes themselves; of several, a subfigure takes their
     place.
@@ -143,7 +145,7 @@ class AxesPlace:
         return self._subfigure or (self._axes and self._axes.figure)
 
     def add_subplot(self, place: Any = None, **options: Any) -> Axes:
-        """Return the axes themselves for the whole place, else axes of a subfigure there."""
+        """Return the stand-in's axes for a picture with single axes, else axes of a subfigure."""
         if self._axes is not None and place is None:
             if (options.get("projection") == "3d") != (self._axes.name == "3d"):
                 former, self._axes = self._axes, self._add_there("add_subplot", **options)
@@ -153,7 +155,7 @@ class AxesPlace:
         return cast(Axes, self.subfigure().add_subplot(*places, **options))
 
     def add_gridspec(self, rows: int, columns: int, **options: Any) -> Any:
-        """Return the grid of a subfigure, or for one panel one whose place is None."""
+        """Return the grid of a subfigure; for a single panel, a grid whose place is None."""
         if rows == columns == 1:
             return dict.fromkeys((0, (0, 0)))
         return self.subfigure().add_gridspec(rows, columns, **options)
@@ -172,13 +174,13 @@ class AxesPlace:
         return np.array([box.width, box.height]) / float(self.figure.get_figure(root=True).dpi)
 
     def set_layout_engine(self, _: str) -> None:
-        """Leave the other figure's layout as it is."""
+        """Leave the layout of the other figure unchanged."""
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self.figure if self._axes is not None else self.subfigure(), name)
 
     def subfigure(self) -> Any:
-        """Return the subfigure, which takes the place of the axes the first time."""
+        """Return the subfigure, which replaces the axes at the first call."""
         if self._subfigure is None:
             self._subfigure = self._add_there("add_subfigure")
             assert self._axes is not None
@@ -187,7 +189,7 @@ class AxesPlace:
         return self._subfigure
 
     def _add_there(self, method: str, **options: Any) -> Any:
-        """Add axes or a subfigure at the place of the axes in their figure's grid."""
+        """Return axes or a subfigure, added at the place of the axes in their figure's grid."""
         assert self._axes is not None
         place = self._axes.get_subplotspec()
         if place is None:
@@ -196,7 +198,7 @@ class AxesPlace:
 
 
 def real_figure(figure: Figure | SubFigure) -> Figure:
-    """Return the figure, or subfigure, for which an `AxesPlace` stands; any other itself."""
+    """Return the figure or subfigure that an `AxesPlace` stands for; another figure itself."""
     place: Any = figure
     return cast(Figure, place.figure if isinstance(place, AxesPlace) else place)
 
@@ -208,7 +210,7 @@ def whole_figure(figure: Figure) -> Figure:
 
 
 def blank(width: float, height: float, ax: Axes | SubFigure | None = None) -> Figure:
-    """Return a figure of so many inches, on white, with its own canvas; or the place of `ax`."""
+    """Return a figure of a size in inches, on white, with its own canvas; or the place of `ax`."""
     if ax is not None:
         return cast(Figure, AxesPlace(ax))
     figure = Picture(figsize=(width, height), layout="constrained", facecolor="white")
@@ -242,10 +244,10 @@ def plain_axes(figure: Figure, xlabel: str, ylabel: str, place: Any = None) -> A
 
 
 class _Ticks(AutoLocator):
-    """Ticks of a scale that no rounding of constant values stretches."""
+    """Ticks of a scale that does not magnify the rounding of constant values."""
 
     def nonsingular(self, v0: float, v1: float) -> tuple[float, float]:
-        """Return limits whose distance is seen beside their size."""
+        """Return limits whose difference is not negligible beside their size."""
         size = max(abs(v0), abs(v1))
         room = 0.05 * size if abs(v1 - v0) < 1e-6 * size else 0.0
         low, high = super().nonsingular(min(v0, v1) - room, max(v0, v1) + room)
@@ -253,7 +255,7 @@ class _Ticks(AutoLocator):
 
 
 class _Numbers(ScalarFormatter):
-    """Short numbers of a scale: a power of ten that they share stands in the scale's label."""
+    """Short tick labels: their common power of ten stands in the scale's label."""
 
     def __init__(self) -> None:
         super().__init__(useOffset=False)
@@ -261,7 +263,7 @@ class _Numbers(ScalarFormatter):
         self._plain = self._written = ""
 
     def set_locs(self, locs: Any) -> None:
-        """Take the ticks' places, and write their power of ten into the label."""
+        """Set the ticks, and write their power of ten into the label."""
         super().set_locs(locs)
         axis: Any = self.axis
         label = axis.label
@@ -272,7 +274,7 @@ class _Numbers(ScalarFormatter):
         label.set_text(self._written)
 
     def get_offset(self) -> str:
-        """Return nothing: the label has it."""
+        """Return an empty text: the label has the power of ten."""
         return ""
 
 
@@ -286,7 +288,7 @@ def _label_with_power(label: str, power: int) -> str:
 
 
 def log_scale(axes: Axes, low: float, high: float) -> None:
-    """Make the scale along x logarithmic, with seven numbers at most, none on another."""
+    """Make the scale along x logarithmic, with up to seven labelled ticks."""
     axes.set_xscale("log")
     axes.set_xlim(low, high)
     first, last = np.ceil(np.log10(low) - 1e-9), np.floor(np.log10(high) + 1e-9)
@@ -305,6 +307,7 @@ def log_scale(axes: Axes, low: float, high: float) -> None:
 
 
 def _decade(value: float, as_power: bool) -> str:
+    """Return a tick label: a power of ten where that is exact and `as_power`, else digits."""
     power = round(float(np.log10(value)))
     return power_of_ten(power) if as_power and np.isclose(value, 10.0**power) else f"{value:g}"
 
@@ -312,14 +315,14 @@ def _decade(value: float, as_power: bool) -> str:
 def stack(
     figure: Figure, xlabel: str, ylabels: list[str], ratios: list[float] | None = None
 ) -> list[Axes]:
-    """Return axes one above the other, which share the lowest one's scale along x."""
+    """Return axes one above the other, with a common scale along x."""
     return [row[0] for row in panels(figure, xlabel, [[label] for label in ylabels], ratios)]
 
 
 def panels(
     figure: Figure, xlabel: str, ylabels: list[list[str]], ratios: list[float] | None = None
 ) -> list[list[Axes]]:
-    """Return rows of axes beside each other, all over one scale along x, named below the last."""
+    """Return rows of axes with a common scale along x, labelled below the last row."""
     rows, columns = len(ylabels), len(ylabels[0])
     grid = figure.add_gridspec(rows, columns, height_ratios=ratios)
     axes_rows = [
@@ -376,7 +379,7 @@ def leg_curves(
     names: Sequence[str] = (),
     noun: str = "",
 ) -> None:
-    """Draw columns of values (T, n), each in its leg's style, over all of the time (T,).
+    """Draw columns of values (T, n) over time (T,), each in its leg's style.
 
     A curve's label is its noun and name. Curves that coincide are dashes of one line in turn; the
     last one's label says so.
@@ -403,7 +406,7 @@ def leg_curves(
 
 
 def fit_time_scale(axes: Axes, time: Array) -> None:
-    """Make the scale along x that of all of the time (T,); one instant has a second about it."""
+    """Set the scale along x to the range of times (T,); for a single time, a second about it."""
     first, last = float(time[0]), float(time[-1])
     room = 0.0 if last > first else 0.5
     axes.set_xlim(first - room, last + room)
@@ -420,7 +423,7 @@ def zero_line(axes: Axes) -> None:
 
 
 def groups_of(kinds: Sequence[Kind]) -> dict[Kind, list[int]]:
-    """Return the columns of each kind, such as a unit, in the order of the kinds.
+    """Return the columns of each kind, such as a unit, by kind.
 
     Examples
     --------
@@ -439,13 +442,13 @@ def nice_step(least: float) -> float:
 
 
 def spot(axes: Axes, x: float, y: float, face: str, edge: str, size: float, **options: Any) -> None:
-    """Draw one round mark."""
+    """Draw a round mark."""
     style = {"marker": "o", "linestyle": "none", "markersize": size, **options}
     axes.plot([x], [y], markerfacecolor=face, markeredgecolor=edge, **style)
 
 
 def remark(axes: Axes, text: str, x: float, y: float, color: str, rise: float = 0.0) -> None:
-    """Write at a point, or so many points of type above it; y = inf is the top of the axes."""
+    """Write a text at a point, or points of type above it; y = inf is the top of the axes."""
     top = y == float("inf")
     axes.annotate(
         text,

@@ -54,7 +54,7 @@ def histogram_figure(
     *,
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return the distribution of residuals, each in its standard deviation, and the normal one.
+    """Return a histogram of residuals in standard deviations, with the normal distribution.
 
     Residuals have shape (R, n), NaN where there is none.
     """
@@ -86,7 +86,7 @@ def autocorrelation_figure(
     *,
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return the autocorrelation of residuals, and the band in which white noise stays.
+    """Return the autocorrelation of residuals, with the band of white noise.
 
     Correlations (L, n) are those at lags 1 to L; white noise keeps below the bound (n,) nineteen
     times in twenty.
@@ -117,7 +117,7 @@ def certainty_figure(
     *,
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return each value over its standard deviation, on a logarithmic scale.
+    """Return the ratio of each value to its standard deviation, on a logarithmic scale.
 
     The p values have names, ratios (p,) of size to standard deviation, and are `weak` (p,) where
     the data hardly show them. The first `inertial` of them are inertial parameters.
@@ -148,7 +148,7 @@ def correlation_figure(
     *,
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return a matrix (p, p) of correlations: blue goes together, orange one for the other."""
+    """Return a correlation matrix (p, p): blue is positive, orange negative."""
     p = len(names)
     side = max(1.0 + 0.165 * p, 3.0)
     figure = blank(side, side, ax)

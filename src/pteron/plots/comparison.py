@@ -126,7 +126,7 @@ def residual_time_figure(
     *,
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return the residuals of all actuators over a whole recording, one above the other.
+    """Return the residuals of all actuators over a recording, one above the other.
 
     Time (T,) is in s, residuals (T, n) in N or N m, as the joints have them. Samples that are not
     `used` (T, n) do not count: they are grey, and may lie outside.
@@ -160,7 +160,7 @@ def residual_speed_figure(
     joint: ActuatedJoint = SLIDER,
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return an actuator's residuals over its joint's speed: friction that is missing shows here.
+    """Return an actuator's residuals over its joint's speed: unmodelled friction shows here.
 
     Speeds (T,) are in m/s or rad/s, residuals (T,) in N or N m. Samples that are not `used` (T,) do
     not count: they are grey, and may lie outside. `leg`, from 0, gives the colour, `joint` the
@@ -187,7 +187,7 @@ def residual_speed_figure(
 
 
 def _dots(axes: Axes, x: Array, y: Array, color: str) -> None:
-    """Draw dots as one path of short strokes: a tenth of the size of markers in an SVG."""
+    """Draw dots as a single path of short strokes: a tenth of the size of markers in an SVG."""
     if not len(x):
         return
     path = Path(

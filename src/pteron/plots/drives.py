@@ -40,7 +40,7 @@ _FAR = 3.0
 
 
 class Ability(NamedTuple):
-    """The limits of a drive, None where one is not known; N and m/s, or N m and rad/s."""
+    """The limits of a drive, None if unknown; N and m/s, or N m and rad/s."""
 
     speed: float | None
     force: float | None

@@ -32,7 +32,7 @@ _GIF_PIXELS = 6e8
 
 
 class Encoder(NamedTuple):
-    """The encoder of one kind of file."""
+    """A film encoder for a kind of file."""
 
     writer: type[Mp4 | Gif]
     """Takes its path, width and height in pixels, and frames a second."""
@@ -43,7 +43,7 @@ class Encoder(NamedTuple):
 
 
 class Mp4:
-    """H.264 with the pixels (yuv420p) and the layout (moov first) that browsers want."""
+    """H.264 with the pixel format (yuv420p) and layout (moov first) that browsers need."""
 
     def __init__(self, path: Path, size: tuple[int, int], fps: float) -> None:
         self._pipe: Any = _ffmpeg().write_frames(
@@ -58,7 +58,7 @@ class Mp4:
         self._pipe.send(None)
 
     def add(self, picture: Pixels) -> None:
-        """Write one more frame."""
+        """Write a frame."""
         self._pipe.send(np.ascontiguousarray(picture))
 
     def close(self) -> None:
@@ -67,14 +67,14 @@ class Mp4:
 
 
 class Gif:
-    """Frames in the first one's colours, in a file that starts again at its end."""
+    """Frames in the palette of the first frame, in a file that repeats without end."""
 
     def __init__(self, path: Path, size: tuple[int, int], fps: float) -> None:
         self._path, self._delay = path, round(1000.0 / fps)
         self._frames: list[Image.Image] = []
 
     def add(self, picture: Pixels) -> None:
-        """Write one more frame."""
+        """Write a frame."""
         image = Image.fromarray(picture)
         # The colours that cover the first frame's best: its white stays white.
         first = self._frames or [image.quantize(_PALETTE, Image.Quantize.MAXCOVERAGE)]
@@ -90,6 +90,7 @@ class Gif:
 
 
 def _rate_in_hundredths(fps: float) -> float:
+    """Return the nearest frame rate, Hz, whose frame time is a multiple of 10 ms."""
     return 100.0 / max(round(100.0 / fps), _SHORTEST)
 
 
@@ -101,12 +102,13 @@ ENCODERS = {
 
 
 def checked_encoder(path: Path) -> None:
-    """Refuse a file whose encoder is not there."""
+    """Refuse a file whose encoder is not installed."""
     if path.suffix.lower() == ".mp4":
         _ffmpeg()
 
 
 def _ffmpeg() -> Any:
+    """Return the module imageio_ffmpeg, or raise an error that says how to install FFmpeg."""
     try:
         import imageio_ffmpeg  # type: ignore[import-untyped]
 

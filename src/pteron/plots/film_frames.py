@@ -115,6 +115,7 @@ def frames(
 
 
 def _draw_still(sheet: MachineAxes, scene: Scene, path: Array) -> None:
+    """Draw the parts that are equal in all frames: surroundings, directions, the tool's path."""
     draw_surroundings(sheet, scene)
     draw_directions(sheet, scene)
     draw_path(sheet, path)

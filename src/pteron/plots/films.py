@@ -70,7 +70,7 @@ class Film(Result):
         return self.frames / self.fps
 
     def _repr_html_(self) -> str:
-        """Return the film itself, for a notebook; where its file is gone, its name."""
+        """Return the film as HTML, for notebooks; the name of its file if that is gone."""
         if not self.path.is_file():
             return f"<code>{escape(str(self.path))}</code>"
         data = b64encode(self.path.read_bytes()).decode()
@@ -196,7 +196,7 @@ def write_film(
     rate: float,
     progress: Progress | None,
 ) -> None:
-    """Write so many pictures of a size as a film, whole or not at all."""
+    """Write pictures of a size as a film, atomically."""
     # Made elsewhere: a film that is not finished leaves nothing behind.
     with TemporaryDirectory(prefix="pteron-film-") as folder:
         file = Path(folder) / f"film{target.suffix.lower()}"
@@ -209,7 +209,7 @@ def write_film(
 
 
 def checked_film(path: str | Path) -> Path:
-    """Return a path after a check, before the work begins, that a film can be written there."""
+    """Return a path, checked beforehand for whether a film can be written there."""
     target = checked_file(path, ", such as cycle.mp4")
     if target.suffix.lower() not in ENCODERS:
         raise OutputError(f"{path}: {target.suffix or 'no'} ending, .mp4 or .gif expected")
@@ -218,14 +218,17 @@ def checked_film(path: str | Path) -> Path:
 
 
 def _speed_text(speed: float) -> str:
+    """Return the text of a film's speed in multiples of real time."""
     return "real time" if speed == 1.0 else f"{speed:.3g} \u00d7 real time"
 
 
 def _expect_number(name: str, value: float, low: float, high: float) -> None:
+    """Raise a `DataError` if a number is outside an interval, whose ends are allowed."""
     expect(low <= value <= high, name, f"{value:g}", f"a number from {low:g} to {high:g}")
 
 
 def _checked_forces(forces: ArrayLike, motion: Motion, robot: Manipulator) -> Array:
+    """Return a motion's forces as an array (T, n), checked for its shape."""
     array = as_array(forces, "forces", ())
     expected = len(motion.time), robot.joint_count
     if array.shape != expected:

@@ -18,7 +18,7 @@ _NO_LETTERS = ("Last Resort", "STIXNonUnicode", "STIXSize", "cm")
 
 
 def take_fonts(figure: Figure) -> str:
-    """Give every text of a figure the fonts that its letters need; return what no font has."""
+    """Set fonts that have the letters of each text of a figure; return letters without a font."""
     absent: set[str] = set()
     for text in figure.findobj(Text):
         assert isinstance(text, Text)
@@ -36,7 +36,7 @@ def take_fonts(figure: Figure) -> str:
 
 
 def warn_of_absent(letters: str) -> None:
-    """Issue one warning of letters that are drawn as boxes, if there are any."""
+    """Issue a warning of letters that are drawn as boxes, if there are any."""
     if letters:
         some = shorten(letters, bare=True, longest=8)
         warnings.warn(
@@ -48,7 +48,7 @@ def warn_of_absent(letters: str) -> None:
 
 @contextmanager
 def silence_glyph_warnings() -> Iterator[None]:
-    """Silence matplotlib's own warnings of missing letters, several for each letter."""
+    """Silence matplotlib's warnings of missing letters in a block."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", r"(?s)(Glyph|Matplotlib currently does not).*")
         yield
@@ -69,7 +69,7 @@ def _fallback_families(letters: frozenset[str]) -> tuple[list[str], frozenset[st
 
 @lru_cache(maxsize=1)
 def _font_files() -> dict[str, str]:
-    """Return one file of each family, upright where there is one, of those that have letters."""
+    """Return a font file of each family, upright if available; symbol fonts are excluded."""
     listed = sorted(font_manager.fontManager.ttflist, key=lambda font: font.style == "normal")
     files = {font.name: font.fname for font in listed if not font.name.startswith(_NO_LETTERS)}
     return dict(sorted(files.items()))

@@ -121,7 +121,7 @@ def fronts_figure(
     *,
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return the picture of several fronts of two objectives, the first over the second.
+    """Return the picture of several fronts of two objectives.
 
     Parameters
     ----------
@@ -152,6 +152,7 @@ def fronts_figure(
 
 
 def _label(name: str, unit: str) -> str:
+    """Return an axis label: the objective's name and unit, with mm for m."""
     unit = "mm" if unit == "m" else unit
     said = name.replace("_", " ")
     return f"{said} ({unit})" if unit else said

@@ -64,7 +64,7 @@ def map_figure(
     *names: str,
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return the picture of a map: a panel for each index, one below the other.
+    """Return the picture of a map: a panel for each index, in a column.
 
     Over one coordinate it is a curve, over two a plane. Over three it is the three planes through
     the pose that is deepest among those that serve, one below the other, and the indices stand side
@@ -107,7 +107,7 @@ def map_figure(
 
 
 def _planes(volume: Map) -> list[Map]:
-    """Return the map itself, or of one over three coordinates the planes through its middle."""
+    """Return a map of up to two coordinates, or the planes through the middle of three."""
     axes = volume.grid.axes
     if len(axes) < 3:
         return [volume]
@@ -126,7 +126,7 @@ def _planes(volume: Map) -> list[Map]:
 
 
 def color_scale(shown_map: Map, name: str) -> Normalize:
-    """Return the scale of colours for the values of an index."""
+    """Return the colour scale of an index's values."""
     factor = shown_unit(shown_map.index(name).unit)[0]
     known = (
         factor * shown_map.values[name][shown_map.reachable & np.isfinite(shown_map.values[name])]
@@ -151,7 +151,7 @@ def map_panels(
     columns: int = 1,
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return a figure of panels, whose legends have these causes too, there or not."""
+    """Return a figure of panels whose legends all list these causes."""
     heights = [_height(plane) for plane, _ in panels[::columns]]
     figure = blank(columns * _WIDTH, sum(heights), ax)
     grid = figure.add_gridspec(len(heights), columns, height_ratios=heights)
@@ -168,7 +168,7 @@ def map_panels(
 
 
 def _height(plane: Map) -> float:
-    """Return the inches of a panel with its titles, scale and legend."""
+    """Return the height of a panel with its titles, scale and legend, inches."""
     if len(plane.grid.axes) < 2:
         return 3.2
     first, second = plane.grid.axes
@@ -232,7 +232,7 @@ def _plane(
 
 
 def _colorbar_extension(drawn: Any, scale: Normalize) -> str:
-    """Return the ends of a scale that a picture's values exceed, as matplotlib names them."""
+    """Return matplotlib's name for the ends of the colour scale that values exceed."""
     low, high = float(scale.vmin or 0.0), float(scale.vmax or 0.0)
     slack = SAME * (high - low)
     under = drawn.count() > 0 and float(drawn.min()) < low - slack
@@ -241,7 +241,7 @@ def _colorbar_extension(drawn: Any, scale: Normalize) -> str:
 
 
 def _hatch_unreachable(axes: Axes, plane: Map, name: str, causes: Mapping[str, Any]) -> list[Any]:
-    """Hatch the poses that do not serve, and return the entries of the legend."""
+    """Hatch the unusable poses, and return the entries of the legend."""
     first, second = (_axis_values(axis) for axis in plane.grid.axes)
     status, by_cause = plane.status.T, name == MARGIN.name
     handles: dict[str, Any] = {}
@@ -289,6 +289,7 @@ def _mark_best(axes: Axes, plane: Map, name: str, handles: list[Any]) -> None:
 
 
 def _is_constant(summary: Summary) -> bool:
+    """Return whether an index is constant over the map, up to rounding."""
     return abs(summary.best - summary.worst) <= SAME * abs(summary.best)
 
 
@@ -321,10 +322,12 @@ def _light(color: str) -> str:
 
 
 def _axis_values(axis: Axis) -> Array:
+    """Return the coordinates of a map's axis in the units shown."""
     return coordinate(axis.name).shown_factor * axis.values
 
 
 def _index_label(index_map: Map, name: str) -> str:
+    """Return the label of a map's index: its title, with its unit if it has a unit."""
     unit = _unit(index_map, name)
     return f"{index_map.index(name).title} ({unit})" if unit else index_map.index(name).title
 
@@ -335,7 +338,7 @@ def _unit(index_map: Map, name: str) -> str:
 
 
 def _title(shown_map: Map) -> str:
-    """Return the machine's name, and the coordinates that are held."""
+    """Return the machine's name and the fixed coordinates."""
     pairs = ((coordinate(name), value) for name, value in shown_map.grid.fixed_coordinates.items())
     constants = (
         f"{c.symbol} = {c.shown_factor * value + 0.0:.4g}{' ' * (c.unit == 'm')}{c.shown_unit}"

@@ -154,7 +154,7 @@ def singularities_figure(
 
 
 def _middle(region: NDArray[np.bool_]) -> tuple[int, int]:
-    """Return the row and column in a region (B, A) that is farthest from its rim."""
+    """Return the row and column in a region (B, A) that are farthest from its boundary."""
     depth = scipy.ndimage.distance_transform_edt(np.pad(region, 1))[1:-1, 1:-1]
     row, column = np.unravel_index(int(depth.argmax()), region.shape)
     return int(row), int(column)
@@ -167,7 +167,7 @@ def _map(
     names: tuple[str, str],
     ax: Axes | SubFigure | None,
 ) -> tuple[Figure, Axes, Array, Array, Array]:
-    """Return a figure, its axes, and what they show, in mm and degrees."""
+    """Return a figure, its axes, both coordinates in mm and degrees, and the values (B, A)."""
     scaled, labels = [], []
     for axis_values, name in zip((first, second), names, strict=True):
         numbers = as_array(axis_values, name, ())
@@ -191,7 +191,7 @@ def _map(
 
 
 def _rim(axes: Axes, x: Array, y: Array, values: Array) -> None:
-    """Draw where values end."""
+    """Draw the boundary of the region with values."""
     known = np.isfinite(values).astype(float)
     if known.min() < known.max():
         axes.contour(x, y, known, levels=[0.5], colors=[MUTED], linewidths=1.0)

@@ -32,7 +32,7 @@ def pick_machine_columns(robot: RobotLike | None, values: ArrayLike, what: str) 
 def rows(
     time: ArrayLike, values: ArrayLike, what: str, columns: int | None = None
 ) -> tuple[Array, Array]:
-    """Return times (T,) and a row of values (T, n) for each, as arrays."""
+    """Return times (T,) and values (T, n) as arrays, checked for their shapes."""
     t, array = as_array(time, "time", ()), as_array(values, what, ())
     expected = "n" if columns is None else columns
     if t.ndim != 1 or not len(t):

@@ -42,15 +42,15 @@ class MachineAxes(ABC):
 
     @abstractmethod
     def _to_axes(self, points: Array, *, extends: bool = True) -> Array:
-        """Return points (..., 3) in the base frame as the axes have them; `fill` holds them."""
+        """Return points (..., 3) of the base frame in axes coordinates; `fill` includes them."""
 
     @abstractmethod
     def _order(self, points: Array) -> float:
-        """Return the drawing order of what is at points (K, d) of the axes."""
+        """Return the drawing order of points (K, d) of the axes."""
 
     @abstractmethod
     def _polygons(self, faces: list[Array], **look: Any) -> Artist:
-        """Add polygons with corners as the axes have them."""
+        """Add polygons with corners in the axes' coordinates."""
 
     @abstractmethod
     def side_direction(self, away: Array, line_direction: Array) -> Array:
@@ -58,10 +58,10 @@ class MachineAxes(ABC):
 
     @abstractmethod
     def fill(self, angles: Sequence[float] = (0.0,)) -> None:
-        """Place the axes so that all things fill them, seen from any of the angles, rad."""
+        """Place the axes so that all things fit into them, seen from any of the angles, rad."""
 
     def clear(self, count: int) -> None:
-        """Remove all but the first things."""
+        """Remove all but the first `count` things."""
         for thing in self.things[count:]:
             thing.remove()
         del self.things[count:]
@@ -69,7 +69,7 @@ class MachineAxes(ABC):
 
     @property
     def drawn_points(self) -> Array:
-        """The points (K, 2) or (K, 3) of all things, as the axes have them."""
+        """The points (K, 2) or (K, 3) of all things, in the axes' coordinates."""
         return np.vstack(self._drawn)
 
     def reserve_space(self, drawn: Array) -> None:
@@ -98,11 +98,12 @@ class MachineAxes(ABC):
         self._add_line(p, zorder=self._order(p) + raised, **look)
 
     def _add_line(self, p: Array, **look: Any) -> None:
+        """Draw a polyline through points (K, d), without a rescaling of the axes."""
         # `plot` would scale the axes, each time, which `fill` does once.
         self.things.append(self.axes.add_artist(self._line(*p.T, **look)))
 
     def faces(self, faces: list[Array], color: str, alpha: float, raised: float = 0.0) -> None:
-        """Draw polygons, all in one place of the order."""
+        """Draw polygons with a common drawing order."""
         placed = [self._to_axes(face, extends=False) for face in faces]
         if self.measures:
             return
@@ -111,7 +112,7 @@ class MachineAxes(ABC):
         self.things.append(self._polygons(placed, alpha=alpha, zorder=order, **look))
 
     def text(self, point: Array, text: str, color: str, *, bold: bool = False) -> None:
-        """Write beside a point, over everything."""
+        """Write a text beside a point, above everything."""
         look: dict[str, Any] = {"fontsize": self._font, "fontweight": "bold" if bold else "normal"}
         look |= {"ha": "center", "va": "center", "zorder": 30.0}
         p = self._to_axes(point[None])[0]

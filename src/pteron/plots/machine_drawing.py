@@ -184,7 +184,7 @@ def base_outline(points: JointPoints, guides: Sequence[Guide]) -> Array:
 
 
 def rods(line: Array, bar: Array | None, size: float) -> list[Array]:
-    """Return the lines of a leg's last link: one (2, 3), or two and the bars between them."""
+    """Return the line (2, 3) of a leg's last link, or both lines and the bars between them."""
     if bar is None:
         return [line[-2:]]
     first_rod, second_rod = (line[-2:] + side * APART * size * bar for side in (1.0, -1.0))
@@ -192,6 +192,7 @@ def rods(line: Array, bar: Array | None, size: float) -> list[Array]:
 
 
 def _draw_guide(sheet: MachineAxes, guide: Guide) -> None:
+    """Draw the guide of a joint: a rail with its ends, or the dashed circle of a crank."""
     if not guide.is_prismatic:
         sheet.line(guide.path, MUTED, 0.9, raised=-0.01, style=(0, (2.0, 2.0)))
         return
@@ -201,6 +202,7 @@ def _draw_guide(sheet: MachineAxes, guide: Guide) -> None:
 
 
 def _draw_leg(sheet: MachineAxes, points: JointPoints, guide: Guide, i: int, size: float) -> None:
+    """Draw leg `i` from its actuated joint to the platform, with its number."""
     color, line = LEG_COLORS[i], points.links[i]
     if guide.is_prismatic:
         sheet.faces(_block(line[0], guide.axis, size), color, 0.95)
@@ -230,6 +232,7 @@ def _block(center: Array, direction: Array, size: float) -> list[Array]:
 
 
 def _draw_part(sheet: MachineAxes, part: Part) -> None:
+    """Draw a part of the platform: its faces, its arms from the hub, and the hub."""
     if len(part.corners) > 2:
         solid = part.triangles
         faces = [part.corners] if solid is None else list(part.corners[solid])
@@ -255,6 +258,7 @@ def _draw_frame(sheet: MachineAxes, points: JointPoints, size: float, angle: str
 
 
 def _draw_gravity(sheet: MachineAxes, start: Array, gravity: Array, size: float) -> None:
+    """Draw an arrow in the direction of gravity, from a point, labelled g."""
     down = gravity / np.linalg.norm(gravity)
     tip = start + 0.2 * size * down
     sheet.line(np.array([start, tip]), MUTED, 1.6, raised=1.0)

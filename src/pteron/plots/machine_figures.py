@@ -174,7 +174,7 @@ def poses_figure(
     along: PoseLike | None = None,
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return a machine in several poses beside each other, all seen from one place.
+    """Return a machine in several poses beside each other, from the same viewpoint.
 
     They may be instants of a motion, or assembly modes of one machine; its working modes are robots
     of their own.
@@ -267,7 +267,7 @@ def poses_figure(
 
 
 def _share_size(scenes: list[Scene]) -> list[Scene]:
-    """Return the scenes, each extended to the size of the largest one."""
+    """Return the scenes, each enlarged to the size of the largest one."""
     low = np.min([scene.low for scene in scenes], axis=0)
     high = np.max([scene.high for scene in scenes], axis=0)
     step = max(scene.step for scene in scenes)

@@ -89,7 +89,7 @@ def _make_even(figure: Figure) -> tuple[int, int]:
 
 
 def _pixels(figure: Figure, size: tuple[int, int], places: Sequence[Bbox]) -> Pixels:
-    """Return the pixels of a figure whose axes are put at places."""
+    """Return the pixels of a figure whose axes are moved to places."""
     figure.set_layout_engine("none")
     figure.set_dpi(_DPI)
     figure.set_size_inches(size[0] / _DPI, size[1] / _DPI)

@@ -65,14 +65,17 @@ class PlaneAxes(MachineAxes):
         self._small, self._step, self.plane = small, step, plane
 
     def _to_axes(self, points: Array, *, extends: bool = True) -> Array:
+        """Return points (..., 3) projected on the plane (..., 2), mm; `fill` includes them."""
         flat = np.asarray(1e3 * points @ self.plane.T)
         self._drawn.append(flat)
         return flat
 
     def _order(self, points: Array) -> float:
+        """Return a constant drawing order: things in a plane have no depth."""
         return 10.0
 
     def _polygons(self, faces: list[Array], **look: Any) -> Artist:
+        """Add filled polygons to the axes."""
         polygons: Artist = self.axes.add_collection(PolyCollection(faces, **look))
         return polygons
 
@@ -83,7 +86,7 @@ class PlaneAxes(MachineAxes):
         return np.asarray(np.copysign(1.0, normal @ self.plane @ away) * normal @ self.plane)
 
     def fill(self, angles: Sequence[float] = (0.0,)) -> None:
-        """Let the scales end a rim beyond what was drawn."""
+        """Set the scales to end a margin beyond everything drawn."""
         drawn = self.drawn_points
         low, high = drawn.min(axis=0), drawn.max(axis=0)
         rim = _RIM * float((high - low).max())

@@ -71,7 +71,7 @@ _METADATA: dict[str, dict[str, Any]] = {
 
 
 def resize(figure: Figure, width: Width | float) -> Figure:
-    """Return the same figure for print, with letters of 8 points.
+    """Return the figure resized for print, with letters of 8 points.
 
     Maps and machines keep their shape; curves keep more of their height.
 
@@ -116,7 +116,7 @@ def resize(figure: Figure, width: Width | float) -> Figure:
 
 
 def _set_width(figure: Figure, inches: float) -> Figure:
-    """Change a figure's width; its legend and the numbers along x find room."""
+    """Change a figure's width, and fit its legend and the tick labels along x."""
     wide, tall = (float(side) for side in figure.get_size_inches())
     shaped = any(axes.name == "3d" or axes.get_aspect() != "auto" for axes in figure.axes)
     ratio = inches / wide
@@ -131,7 +131,7 @@ def _set_width(figure: Figure, inches: float) -> Figure:
 
 
 def _thin_ticks(axes: Axes) -> None:
-    """Take out every second number of even scales while those along x run into each other."""
+    """Remove every second label of linear scales while those along x overlap."""
     while isinstance(axes.xaxis.get_major_locator(), MultipleLocator):
         numbers = [text.get_window_extent() for text in axes.get_xticklabels() if text.get_text()]
         places = sorted((box.x0, box.x1) for box in numbers)
@@ -161,7 +161,7 @@ def _fit_legend(figure: Figure, inches: float) -> None:
 def save_figure(
     figure: Figure, path: str | Path, *, width: Width | float | None = None, dpi: float = 300.0
 ) -> Path:
-    """Write a figure to a file, whole or not at all; text in it stays text.
+    """Write a figure to a file, atomically; text in it stays text.
 
     The same figure makes the same file on every run.
 
@@ -207,7 +207,7 @@ def save_figure(
 
 
 def svg(figure: Figure, *, name: str, title: str, widest: float = _ON_PAGE) -> Markup:
-    """Return a figure as one `<svg>` element for an HTML page, without a background.
+    """Return a figure as an `<svg>` element for an HTML page, without a background.
 
     It holds no date, no random identifier and no address, and its colours are CSS variables with
     the printed colours as defaults. Text stays text, in the page's font. The name, of letters and
@@ -242,11 +242,12 @@ def svg(figure: Figure, *, name: str, title: str, widest: float = _ON_PAGE) -> M
 
 
 def svg_file(figure: Figure) -> str:
-    """Return a figure as the text of an SVG file that stands alone, on white, without a date."""
+    """Return a figure as the text of a standalone SVG file, on white, without a date."""
     return _render_svg(figure)
 
 
 def _render_svg(figure: Figure, **look: Any) -> str:
+    """Return a figure as SVG whose text is text, without metadata."""
     buffer = StringIO()
     with mpl.rc_context(TEXT):
         figure.savefig(buffer, format="svg", metadata=NO_METADATA, **look)

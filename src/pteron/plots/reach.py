@@ -48,7 +48,7 @@ def reach_figure(
     path: Array | None = None,
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return the map of a slice, with the poses (T, m), or their lengths, of a motion on it.
+    """Return the map of a slice, with a motion's poses (T, m), or their lengths, on it.
 
     In reach, the shade deepens with the margin. Outside, the colour is that of the leg that misses
     the pose by most; a line in a leg's colour is the end of its reach (type I).
@@ -123,7 +123,7 @@ def measure_figure(
 def _sheet(
     cut: ReachSlice, ax: Axes | SubFigure | None, lowest: float = 1.8
 ) -> tuple[Figure, Axes, Array, Array]:
-    """Return a figure, its axes with their scales, and both coordinates as people read them."""
+    """Return a figure, its axes with their scales, and both coordinates in display units."""
     names = [coordinate(name) for name in cut.plane]
     first, second = names[0].shown_factor * cut.first, names[1].shown_factor * cut.second
     spans, same = np.array([np.ptp(first), np.ptp(second)]), names[0].unit == names[1].unit
@@ -141,7 +141,7 @@ def _sheet(
 
 
 def _finish(axes: Axes, cut: ReachSlice, path: Array | None) -> None:
-    """Draw a motion's path and the slice's centre."""
+    """Draw a motion's path and the slice's centre over a map."""
     (i, j), (a, b) = cut.places, (coordinate(name).shown_factor for name in cut.plane)
     if path is not None:
         for color, width in ((PAPER, 3.2), (INK, 1.4)):
@@ -151,7 +151,7 @@ def _finish(axes: Axes, cut: ReachSlice, path: Array | None) -> None:
 
 
 def _territories(legs: Array) -> Iterator[tuple[Array, str]]:
-    """Yield fields (B, A) above 0 where a pose is missed, and colours, to be painted in this order.
+    """Yield fields (B, A), positive where a pose is infeasible, with colours, in painting order.
 
     In the end a pose has the colour of the leg that misses it by most: the last leg's is painted
     wherever one does, then the others' over it where none after them does worse. Of legs that miss

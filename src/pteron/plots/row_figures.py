@@ -46,7 +46,7 @@ def parameters_figure(
     reference: ArrayLike | None = None,
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return the values of parameters with their intervals, each unit on a scale of its own.
+    """Return the values of parameters with their intervals, with a scale for each unit.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ def operations_figure(
     *,
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return bars of counts, such as operations, each with its number.
+    """Return bars of counts, such as operations, labelled with their values.
 
     Parameters
     ----------
@@ -165,6 +165,7 @@ def row_axes(figure: Figure, names: Sequence[str], xlabel: str, place: Any = Non
 
 
 def _checked_values(names: Sequence[str], values: ArrayLike, what: str) -> Array:
+    """Return values of named rows as an array (N,), checked for its shape."""
     array = np.asarray(values, dtype=float)
     expect(array.shape == (len(names),), what, f"shape {array.shape}", f"({len(names)},)")
     return array

@@ -30,7 +30,7 @@ _MARGIN = 0.04
 
 
 def upright_rotation(vertical: Array) -> Array:
-    """Return a rotation (3, 3) that takes a direction to z and keeps x, or y, near its place."""
+    """Return a rotation (3, 3) that takes a direction to z, with x, or y, nearly unchanged."""
     z = vertical / np.linalg.norm(vertical)
     near = np.eye(3)[0] if abs(z[0]) < 0.9 else np.eye(3)[1]
     y = np.cross(z, near)
@@ -39,7 +39,7 @@ def upright_rotation(vertical: Array) -> Array:
 
 
 class SpaceAxes(MachineAxes):
-    """Matplotlib's three-dimensional axes, with a vertical, which draw by distance.
+    """Matplotlib's three-dimensional axes, with a vertical, that draw in order of distance.
 
     They take a `box` of the figure: left, bottom, width and height, as shares of it.
     """
@@ -64,7 +64,7 @@ class SpaceAxes(MachineAxes):
         self.turn(0.0)
 
     def turn(self, angle: float) -> None:
-        """Look from another side: the eye goes round the vertical by an angle from the first, rad.
+        """Set the viewpoint: turned about the vertical by an angle from the first, rad.
 
         From then on things are drawn in the order of their distance from there.
         """
@@ -77,15 +77,18 @@ class SpaceAxes(MachineAxes):
         )
 
     def _to_axes(self, points: Array, *, extends: bool = True) -> Array:
+        """Return points (..., 3) in the upright frame; with `extends`, `fill` includes them."""
         placed = np.asarray(points @ self.rotation.T)
         if extends:
             self._drawn.append(placed)
         return placed
 
     def _order(self, points: Array) -> float:
+        """Return the drawing order of points (K, 3): the nearer to the eye, the later."""
         return 10.0 + float(points.mean(axis=0) @ self._towards_eye)
 
     def _polygons(self, faces: list[Array], **look: Any) -> Artist:
+        """Add filled polygons in space to the axes."""
         polygons: Artist = Poly3DCollection(faces, **look)
         self.axes.add_collection3d(polygons)
         return polygons
@@ -104,7 +107,7 @@ class SpaceAxes(MachineAxes):
         return np.asarray(self.rotation.T @ (point + moved))
 
     def fill(self, angles: Sequence[float] = (0.0,)) -> None:
-        """Place the axes so that all things fill the box, seen from any of the angles, rad.
+        """Place the axes so that all things fit into the box, seen from any of the angles, rad.
 
         Later things leave them where they are.
         """
@@ -136,7 +139,7 @@ class SpaceAxes(MachineAxes):
         return seen.min(axis=0), seen.max(axis=0)
 
     def ground(self, low: Array, high: Array, step: float) -> None:
-        """Draw squares of a side under everything, one rim wider than it."""
+        """Draw a grid of squares of a side below everything, a margin wider than it."""
         first, last = np.floor(low / step) - 0.5, np.ceil(high / step) + 0.5
         x, y = (np.arange(first[i] + 0.5, last[i], 1.0) * step for i in (0, 1))
         z = low[2]

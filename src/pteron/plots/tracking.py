@@ -43,6 +43,6 @@ def tracking_figure(
 
 
 def _scale(values: Array) -> tuple[float, str]:
-    """Return the factor and the prefix with which the largest value is a number above one."""
+    """Return the factor and the SI prefix that make the largest value a number above 1."""
     largest = float(np.abs(values).max(initial=0.0))
     return next((pair for pair in _SCALES if largest * pair[0] >= 1.0), _SCALES[-1])

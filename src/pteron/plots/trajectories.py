@@ -92,7 +92,7 @@ def joints_figure(
     robot: RobotLike | None = None,
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return the joints' coordinates over time, and below their speeds, accelerations and jerks.
+    """Return the joints' coordinates over time, above their speeds, accelerations and jerks.
 
     Parameters
     ----------
@@ -140,6 +140,7 @@ def _courses_figure(
     *,
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
+    """Return a figure of courses (T, k) over time: a row a derivative, a column a unit."""
     t = as_array(time, "time", ())
     values = [as_array(course, words[min(k, 4)], ()) for k, course in enumerate(courses)]
     _expect_fitting(t, values, len(names), words)
@@ -160,6 +161,7 @@ def _courses_figure(
 
 
 def _expect_fitting(time: Array, values: list[Array], width: int, words: Sequence[str]) -> None:
+    """Raise a `DataError` if times or courses have unfit shapes, or there are too many courses."""
     if time.ndim != 1 or len(time) < 2:
         raise DataError(f"time: shape {time.shape} given, (T,) expected, T above 1")
     if not 1 <= len(values) <= len(_ORDERS):

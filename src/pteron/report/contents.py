@@ -64,7 +64,7 @@ _FINE = 121
 
 @dataclass(frozen=True)
 class Orientations:
-    """The type-II measure (A,) over the platform's angle, as a share of its best; NaN out of reach.
+    """The type-II measure (A,) over the platform's angle, relative to its best; NaN out of reach.
 
     `coordinate` is the place of the angle in a pose, `singular` has the type-II singular
     orientations; angles are in rad. The measure is the same at every position if `everywhere`, else
@@ -134,7 +134,7 @@ class Report:
 
     @property
     def standard(self) -> PickAndPlace | None:
-        """The cycle, if it is the standard one."""
+        """The cycle, if it is the standard pick-and-place cycle."""
         return self.cycle if isinstance(self.cycle, PickAndPlace) else None
 
     @property
@@ -144,7 +144,7 @@ class Report:
 
     @property
     def shows_joint_limits(self) -> bool:
-        """Whether a slice shows poses that only the joints' limits forbid."""
+        """Whether a slice shows poses that only joint limits exclude."""
         return any(bool((cut.status == BEYOND_LIMITS).any()) for cut in self.slices)
 
     @property
@@ -165,6 +165,7 @@ class Report:
 
 
 def _volume(robot: Manipulator, home: Array) -> ReachVolume:
+    """Return the volume of reach at the orientation of a pose, cached between runs."""
     key = "reach_volume", geometry_only(robot), tuple(home.tolist()), version("scipy")
     return cached_result(
         key, ("dynamics", "kinematics", "workspace"), lambda: reach_volume(robot, home)
@@ -210,7 +211,7 @@ def contents(robot: Manipulator, motion: Playback | None = None) -> Report:
 
 
 def _slices(robot: Manipulator, home: Array, volume: ReachVolume | None) -> tuple[ReachSlice, ...]:
-    """Return the slices through home; those over two lengths are of one width, to be compared."""
+    """Return the slices through home; those over two lengths have a common width."""
     slices = []
     for plane in slice_planes(robot):
         extent = None
@@ -222,6 +223,8 @@ def _slices(robot: Manipulator, home: Array, volume: ReachVolume | None) -> tupl
 
 
 def _tilt(robot: Manipulator, home: Array) -> float | None:
+    """Return the largest tilt, rad, at a pose, cached between runs; None if there is none."""
+
     def tilt() -> float | None:
         with suppress(ModelError):  # it does not tilt, or not from the level
             return largest_tilt(robot, home).tilt
@@ -264,7 +267,7 @@ def _measures(robot: Manipulator, home: Array, volume: ReachVolume | None) -> Me
 
 
 def _orientations(robot: Manipulator, home: Array) -> Orientations | None:
-    """Return the type-II measure over a single angle at home, where it depends on that."""
+    """Return the type-II measure over the platform's only angle at home; None if constant."""
     if robot.platform.axis_angle is None:
         return None
     (turn,) = np.flatnonzero(robot.platform.angular).tolist()
@@ -279,6 +282,6 @@ def _orientations(robot: Manipulator, home: Array) -> Orientations | None:
 
 
 def _type_ii(robot: Manipulator, poses: Array) -> Array:
-    """Return the size of the type-II measure as a share of its best, NaN where it has none."""
+    """Return the type-II measure's size as a share of its best, NaN where undefined."""
     share = np.abs(numeric(robot, "type_ii")(poses)[0]) / best_type_ii(robot)
     return np.asarray(np.minimum(share, 1.0))

@@ -40,7 +40,7 @@ _NAMES = {
 
 @dataclass(frozen=True)
 class Cost:
-    """One form of the model: its name, operations for one state, and a note on its reduction."""
+    """A form of the model: its name, operations per state, and a note on its reduction."""
 
     form: str
     operations: int
@@ -74,13 +74,13 @@ def costs(base: BaseParameters) -> tuple[Cost, ...]:
 
 
 def fewer(value: float, reference: float, less: str = "fewer") -> str:
-    """Return in words the percentage by which a value is below, or above, a reference."""
+    """Return the text of the percentage by which a value is below, or above, a reference."""
     percent = 100.0 * (1.0 - value / reference)
     return f"{abs(percent):.0f} % {less if percent >= 0.0 else 'more'}"
 
 
 def dense_operations(base: BaseParameters, base_columns: Sequence[int]) -> int:
-    """Return the operations of Eq. (15) for some of its columns, every matrix taken as full.
+    """Return the operations of Eq. (15) for some of its columns, with dense matrices.
 
     A product (a, b) (b, c) counts a c (2 b - 1), an elimination with c right sides about
     2 m^3 / 3 + 2 m^2 c. A leg's body that is a mass alone has a Jacobian of one row, other bodies

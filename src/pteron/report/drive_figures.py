@@ -10,7 +10,7 @@ from pteron.report.motion_frames import line_samples
 
 
 def force_speed(sizing: Sizing) -> Figure:
-    """Return force over speed of each drive, within what the machine's file says that it can do."""
+    """Return force over speed of each drive, within the limits in the machine's file."""
     joints = [leg.joint for leg in sizing.robot.legs]
     some = line_samples(len(sizing.time))
     return force_speed_figure(

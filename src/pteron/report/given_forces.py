@@ -15,7 +15,7 @@ of a good drive and no smoothing of a log is as large, while a payload is."""
 
 
 def force_doubts(robot: Manipulator, playback: Playback) -> tuple[str, ...]:
-    """Return a warning where the forces in a motion's file are clearly those of another load.
+    """Return a warning if the forces in a motion's file belong to another load.
 
     A report shows the forces that the machine needs. The reader of a file that was made with a
     payload would otherwise take them for the file's.
@@ -43,4 +43,5 @@ def force_doubts(robot: Manipulator, playback: Playback) -> tuple[str, ...]:
 
 
 def _rms(forces: Array) -> Array:
+    """Return the root mean square over time of forces (T, n): (n,)."""
     return np.asarray(np.sqrt(np.mean(forces**2, axis=0)))

@@ -36,7 +36,7 @@ _LITTLE = 1e-3
 
 @dataclass(frozen=True)
 class Frames:
-    """F moments of a motion, to be drawn.
+    """F moments of a motion for animation.
 
     Attributes
     ----------
@@ -71,7 +71,7 @@ class Frames:
 def frames(
     robot: Manipulator, motion: Motion, forces: Array | None = None, still_pose: Array | None = None
 ) -> Frames:
-    """Return the animation frames of a motion: about sixty a second, 240 to 2400 in all.
+    """Return the animation frames of a motion: about 60 a second, 240 to 2400 in all.
 
     Parameters
     ----------
@@ -112,7 +112,7 @@ def frames(
 
 
 def is_closed(motion: Motion) -> bool:
-    """Say whether a motion ends in the pose, and with the velocity, of its beginning."""
+    """Return whether a motion ends with the pose and the velocity of its beginning."""
     parts = motion.pose, motion.velocity
     sizes = [max(float(np.ptp(part, axis=0).max()), _LITTLE) for part in parts]
     return all(
@@ -122,11 +122,12 @@ def is_closed(motion: Motion) -> bool:
 
 
 def line_samples(count: int) -> slice:
-    """Return the slice of so many samples that a line in a picture needs."""
+    """Return the slice that thins samples out to the number a drawn line needs."""
     return slice(None, None, max(1, count // _DRAWN))
 
 
 def _interpolate(time: Array, values: Array, at: Array) -> Array:
+    """Return columns (T, k) interpolated linearly at times (F,): (F, k)."""
     return np.column_stack([np.interp(at, time, column) for column in values.T])
 
 
@@ -179,7 +180,7 @@ def still_parts(robot: Manipulator, guides: Sequence[Guide], home: JointPoints) 
 
 
 def moving_parts(robot: Manipulator, points: JointPoints) -> dict[str, Any]:
-    """Return the moving parts of pictures of a machine in F poses, or one, as plain lists.
+    """Return the moving parts of a machine's pictures in F poses, or one, as plain lists.
 
     A leg's `chains` in a frame are the points of its line.
     """
@@ -203,15 +204,16 @@ def moving_parts(robot: Manipulator, points: JointPoints) -> dict[str, Any]:
 
 
 def picture_points(robot: Manipulator, points: Array) -> Any:
-    """Return points (..., 3) of the base frame as pictures have them, as plain lists."""
+    """Return points (..., 3) of the base frame in the pictures' frame, as plain lists."""
     flat = 1.0 if robot.platform.plane_normal is None else [1.0, 1.0, 0.0]
     return _plain(points @ view_frame(robot).T * flat)
 
 
 def view_frame(robot: Manipulator) -> Array:
-    """Return the axes (3, 3), one a row, along which pictures of a machine count points."""
+    """Return the axes (3, 3), as rows, of the frame of a machine's pictures."""
     return np.eye(3) if robot.platform.plane_normal is None else np.array(robot.platform.frame)
 
 
 def _plain(array: Array) -> Any:
+    """Return an array as nested lists of numbers, rounded for the page."""
     return (np.round(array, _DECIMALS) + 0.0).tolist()

@@ -53,7 +53,7 @@ class ShownMotion:
 
 
 def motion_contents(robot: Manipulator, recorded: Playback) -> ShownMotion:
-    """Return the contents of the page of a motion that the machine can do."""
+    """Return the contents of the page of a motion, checked to be feasible for the machine."""
     motion = recorded.motion
     forces = recorded.forces
     if forces is None:
@@ -74,7 +74,7 @@ def motion_contents(robot: Manipulator, recorded: Playback) -> ShownMotion:
 
 
 def motion_page(robot: Manipulator, recorded: Playback) -> str:
-    """Return the page of a motion, as HTML without any reference to another file or address."""
+    """Return the page of a motion, as self-contained HTML."""
     motion_shown = motion_contents(robot, recorded)
     joints = [leg.joint for leg in robot.legs]
     whose, origin = _force_origin(motion_shown)
@@ -112,7 +112,7 @@ def motion_page(robot: Manipulator, recorded: Playback) -> str:
 
 
 def _force_origin(motion_shown: ShownMotion) -> tuple[str, str]:
-    """Return the origin of the forces on the page: in a word, and in a clause."""
+    """Return the origin of the forces on the page: as a word, and as a clause."""
     if motion_shown.has_given_forces and motion_shown.playback.log:
         return "Measured", "as they were measured."
     if motion_shown.has_given_forces:
@@ -144,4 +144,5 @@ def _figures(motion_shown: ShownMotion) -> dict[str, Figure]:
 
 
 def _joint_figure(time: Array, values: Array, quantity: JointQuantity) -> Figure:
+    """Return the figure of a joint quantity (T, n) over time, in its display units."""
     return forces_figure(time, values * np.array(quantity.factors), ylabel=quantity.axis)

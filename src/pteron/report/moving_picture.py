@@ -26,7 +26,7 @@ _PACES = (
 
 
 def stage(robot: Manipulator, shown: Frames, **words: str) -> dict[str, Any]:
-    """Return the variables of `moving_picture.html.j2`, but for its pictures.
+    """Return the variables of `moving_picture.html.j2`, without its pictures.
 
     The words are what the machine is `doing`, what the `still` picture shows, and the
     `force_title` over the forces of the moment.
@@ -50,7 +50,7 @@ def stage(robot: Manipulator, shown: Frames, **words: str) -> dict[str, Any]:
 
 
 def gravity_words(robot: Manipulator) -> str:
-    """Return the direction of gravity in the picture of a planar machine, as a clause."""
+    """Return a clause on the direction of gravity in the picture of a planar machine."""
     gravity, frame = np.array(robot.gravity), np.array(robot.platform.frame)
     if not gravity.any():
         return "there is no gravity"

@@ -44,7 +44,7 @@ _LONGEST = 200
 
 
 def page(report: Report) -> str:
-    """Return the page of a report, as HTML without any reference to another file or address."""
+    """Return the page of a report, as self-contained HTML."""
     robot = report.robot
     joints, standard = [leg.joint for leg in robot.legs], report.standard
     document = template(
@@ -110,7 +110,7 @@ def typeset_account(text: str) -> Markup:
 
 
 def kinds(robot: Manipulator) -> list[tuple[LegKind, list[int]]]:
-    """Return one leg of each kind, and the legs of that kind, from 1."""
+    """Return a leg of each kind, and the legs of that kind, from 1."""
     legs_of_kinds: dict[str, list[int]] = {}
     for i, leg in enumerate(robot.legs, start=1):
         legs_of_kinds.setdefault(leg.type, []).append(i)
@@ -118,7 +118,7 @@ def kinds(robot: Manipulator) -> list[tuple[LegKind, list[int]]]:
 
 
 def geometry(robot: Manipulator) -> list[tuple[str, list[str]]]:
-    """Return the rows of the legs' geometry, mm: what it is, and a text a leg."""
+    """Return the rows of the legs' geometry, mm: a name, and a text per leg."""
     roles = {"guide_point": "point"}
     # A leg with more lengths has those of the others among them, in its order.
     counts = [sum(q.role == "length" for q in leg.quantities) for leg in robot.legs]
@@ -174,7 +174,7 @@ def bodies(robot: Manipulator) -> list[tuple[str, int | None, dict[str, float]]]
 
 
 def _letters(robot: Manipulator) -> list[tuple[str, str]]:
-    """Return the letters of the legs' bodies, with the names that they stand for."""
+    """Return the letters of the legs' bodies with the bodies' names."""
     names_of_letters: dict[str, list[str]] = {}
     for leg in robot.legs:
         for letter in leg.bodies:
@@ -185,7 +185,7 @@ def _letters(robot: Manipulator) -> list[tuple[str, str]]:
 
 
 def _reasons(robot: Manipulator) -> list[str]:
-    """Return why parameters group, as the legs and the platform have it."""
+    """Return why parameters form groups, from the legs and the platform."""
     transfers = [transfer.reason for leg in robot.legs for transfer in leg.transfers(robot.gravity)]
     rides = [
         f"{leg.names[letter]} and platform carry the platform point"
@@ -197,7 +197,7 @@ def _reasons(robot: Manipulator) -> list[str]:
 
 
 def _angle_measures(report: Report) -> list[str]:
-    """Return how angles are scaled to lengths in the condition number of the Jacobian."""
+    """Return phrases on how angles are scaled to lengths in the Jacobian's condition number."""
     legs, radius = report.robot.legs, report.jacobian.radius
     followers = [legs[i].joint.noun for i in _followers(report.robot)]
     measures = []
@@ -215,7 +215,7 @@ def _angle_measures(report: Report) -> list[str]:
 
 
 def _followers(robot: Manipulator) -> list[int]:
-    """Return the legs, from 0, whose joint follows the platform's angle: they reach everywhere."""
+    """Return the legs, from 0, whose joint follows the platform's angle without a reach limit."""
     return [i for i, leg in enumerate(robot.legs) if leg.joint.unit == "rad" and not leg.goes_round]
 
 
@@ -267,7 +267,7 @@ def _zero_rounding(base: BaseParameters) -> Array:
 
 
 def symbolic_sums(base: BaseParameters) -> dict[str, list[Any]] | None:
-    """Return the sums in symbols and the symbols' values in m; None if none, or too long."""
+    """Return sums in symbols, and the symbols' values in m; None if absent or too long."""
     key = base.robot, base.parameters, base.kept, base.certificate.method, version("sympy")
     packages = "kinematics", "reduction", "report", "short_numbers"
     texts = cached_result(("symbols", *key), packages, partial(_symbolic_texts, base))
@@ -281,6 +281,7 @@ def symbolic_sums(base: BaseParameters) -> dict[str, list[Any]] | None:
 
 
 def _symbolic_texts(base: BaseParameters) -> tuple[list[str], list[tuple[str, float]]] | None:
+    """Return base parameters as HTML formulas with the lengths in them; None if too long."""
     try:
         lines = base.expressions(symbols=True)
     except ModelError:

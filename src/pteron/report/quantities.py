@@ -28,12 +28,12 @@ class JointQuantity:
 
     @property
     def common_unit(self) -> str:
-        """The unit, if all have the same."""
+        """The unit, if it is the same for all joints."""
         return self.units[0] if len(set(self.units)) == 1 else ""
 
     @property
     def heading(self) -> str:
-        """The name, with the unit if all have the same."""
+        """The name, with the unit if it is the same for all joints."""
         unit = self.common_unit.replace(" ", _NARROW)
         return f"{self.name} ({unit})" if unit else self.name
 
@@ -43,12 +43,12 @@ class JointQuantity:
         return f"{self.name} ({', '.join(dict.fromkeys(self.units))})"
 
     def unit_suffix(self, i: int) -> str:
-        """Return the unit of leg i, from 0, if the heading does not have it."""
+        """Return the unit of leg i, from 0, unless the heading has it."""
         return "" if self.common_unit else f" {self.units[i]}"
 
 
 def coordinate(joints: Sequence[ActuatedJoint]) -> JointQuantity:
-    """Return the joint coordinates, as people read them."""
+    """Return the joint coordinates, in display units."""
     names = _distinct(joint.coordinate for joint in joints)
     name = ", ".join(SYMBOLS.get(letter, letter) for letter in names)
     shown = [SHOWN[joint.unit] for joint in joints]
@@ -76,7 +76,7 @@ def nouns(joints: Sequence[ActuatedJoint]) -> str:
 
 
 def readable(value: float, unit: str, places: int = 1) -> str:
-    """Return a coordinate of a joint or a pose as people read it.
+    """Return the text of a coordinate, in display units.
 
     Examples
     --------
@@ -88,7 +88,7 @@ def readable(value: float, unit: str, places: int = 1) -> str:
 
 
 def angles_text(robot: Manipulator, pose: Array) -> str:
-    """Return the angles of a pose (m,) with their symbols; empty where the platform has none."""
+    """Return the angles of a pose (m,) with their symbols; empty without angles."""
     pairs = zip(robot.coordinates, pose, strict=True)
     return ", ".join(
         f"{pose_coordinate(name).symbol} = {readable(value, 'rad', 0)}"
@@ -98,4 +98,5 @@ def angles_text(robot: Manipulator, pose: Array) -> str:
 
 
 def _distinct(words: Iterable[str]) -> list[str]:
+    """Return words in their order, without repetition."""
     return list(dict.fromkeys(words))

@@ -49,7 +49,7 @@ _TERM = re.compile(r"([+-]?)\s*([\d.]+)?\s*([A-Za-z]\w*)")
 
 @dataclass(frozen=True)
 class Row:
-    """One base parameter: its name in the paper, ``P_b1`` to ``P_b26``, and the one it has here.
+    """A base parameter: its name in the paper, ``P_b1`` to ``P_b26``, and its name here.
 
     The sums agree where they have the same terms, and every computed coefficient rounds to the
     printed one. Where the scan of the paper is damaged the row is restored, see `RESTORED`.
@@ -64,7 +64,7 @@ class Row:
 
 
 def rows(robot: RobotLike = "quadrupteron") -> tuple[Row, ...]:
-    """Return the rows of Table 1, computed for a Quadrupteron: by default that of the catalog."""
+    """Return the rows of Table 1, computed for a Quadrupteron, by default the catalog's."""
     base = base_parameters(robot)  # Table 1
     columns = base.names, PRINTED, base.expressions(), base.expressions(digits=12)
     return tuple(
@@ -74,7 +74,7 @@ def rows(robot: RobotLike = "quadrupteron") -> tuple[Row, ...]:
 
 
 def agree(printed: str, computed: str) -> bool:
-    """Say whether two sums agree, as `Row` has it."""
+    """Return whether two sums agree in the printed digits, as `Row` defines."""
     printed_terms, computed_terms = terms(printed), terms(computed)
     return printed_terms.keys() == computed_terms.keys() and all(
         round(float(computed_terms[name]), len(text.partition(".")[2])) == float(text)
@@ -83,7 +83,7 @@ def agree(printed: str, computed: str) -> bool:
 
 
 def terms(text: str) -> dict[str, str]:
-    """Return the coefficient of each term of a row as text, which shows its printed digits."""
+    """Return the coefficient of each term of a row as text, with its printed digits."""
     return {
         name: ("-" if sign == "-" else "") + (size or "1")
         for sign, size, name in _TERM.findall(text)

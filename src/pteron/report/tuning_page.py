@@ -44,7 +44,7 @@ _CHANGED = {
 
 
 def tuning_page(tuning: Tuning, trials: pl.DataFrame) -> str:
-    """Return the page of a tuning and its trials, as HTML without reference to another file."""
+    """Return the page of a tuning and its trials, as self-contained HTML."""
     robot, controller = tuning.robot, tuning.controller
     worst = tuning.margins[tuning.worst]
     moment = tuning.moments[tuning.worst]
@@ -87,7 +87,7 @@ def tuning_page(tuning: Tuning, trials: pl.DataFrame) -> str:
 
 
 def _gain_units(tuning: Tuning) -> list[str]:
-    """Return the units of the gains of a joint, one for each kind; empty where joints differ."""
+    """Return the units of a joint's gains by kind; empty if joints differ."""
     units = {(leg.joint.force_unit, leg.joint.unit) for leg in tuning.robot.legs}
     if tuning.controller.law_name == "computed_torque":
         return ["1/s\u00b2", "1/s"]
@@ -99,7 +99,7 @@ def _gain_units(tuning: Tuning) -> list[str]:
 
 
 def _force_units(robot: Manipulator) -> list[str]:
-    """Return the units of the trials' forces: shares where a drive's largest force is known."""
+    """Return the units of the trials' forces: shares if a drive's largest force is known."""
     known = zip(np.isfinite(limits_of(robot).force), robot.legs, strict=True)
     units = ("share" if sure else leg.joint.force_unit for sure, leg in known)
     return list(dict.fromkeys(units))

@@ -46,7 +46,7 @@ _CODE = r"<code>\g<0></code>"
 
 
 def significant(value: float, digits: int = 3) -> str:
-    r"""Return a number with so many significant digits, tiny and huge ones with a power of ten.
+    r"""Return a number to significant digits, tiny and huge ones with a power of ten.
 
     Examples
     --------
@@ -67,7 +67,7 @@ def significant(value: float, digits: int = 3) -> str:
 
 
 def percent(value: float, digits: int = 3) -> str:
-    r"""Return a percentage; one below the least that is shown is "< least %".
+    r"""Return a percentage; below the least one shown it is "< least %".
 
     Examples
     --------
@@ -110,21 +110,22 @@ def value_with_uncertainty(value: float, half: float) -> tuple[str, str]:
 
 
 def _millimetres(metres: float, places: int = 1) -> str:
+    """Return a length in m as millimetres, to a number of decimals."""
     return format_fixed(1e3 * float(metres), places)
 
 
 def compact(value: float, digits: int = 4) -> str:
-    """Return a number with at most so many significant digits and no needless zeros."""
+    """Return a number to at most `digits` significant digits, without trailing zeros."""
     return "0" if abs(value) < 1e-9 else f"{value:.{digits}g}".replace("-", _MINUS)
 
 
 def triple(values: Iterable[float], factor: float = 1.0, digits: int = 4) -> str:
-    """Return a vector, each component as `compact` has it."""
+    """Return a vector in brackets, each component formatted by `compact`."""
     return f"({', '.join(compact(factor * value, digits) for value in values)})"
 
 
 def prose(text: str) -> Markup:
-    """Return a message with true signs; commands and options are code, in one piece."""
+    """Return a message as HTML, with true signs, and commands and options as code."""
     signed = re.sub(r"(?<![\w.-])-(?=\d)", "\u2212", str(escape(text)))
     signed = re.sub(r"(?<=\d) x (?=\w)", " \u00d7 ", signed).replace("^2", "²")
     commands = re.sub(_COMMAND, lambda command: re.sub(r"\S+", _CODE, command[0]), signed)
@@ -132,7 +133,7 @@ def prose(text: str) -> Markup:
 
 
 def resource(name: str, folder: str = "report") -> Markup:
-    """Return the text of one of the report's files, to stand in a page as it is."""
+    """Return the text of a file of the report, to be embedded in a page."""
     return Markup((files("pteron") / folder / name).read_text(encoding="utf-8"))
 
 
@@ -143,14 +144,14 @@ def embed_json(data: Any) -> Markup:
 
 
 def _svg(figure: Figure, name: str, title: str, **options: Any) -> Markup:
-    """Return a figure for a page, where `name` is its own and `title` says what it shows."""
+    """Return a figure for a page, with a unique `name` and a `title` on what it shows."""
     from pteron.plots import svg  # Matplotlib is behind it, which few pages need.
 
     return svg(figure, name=name, title=title, **options)
 
 
 def template(name: str, folder: str = "report", **filters: Callable[..., Any]) -> Template:
-    """Return a page's template, with the style and filters of all pages and some of its own."""
+    """Return a page's template, with the common style and filters, and extra ones."""
     shared: dict[str, Callable[..., Any]] = {
         "compact": compact,
         "fixed": format_fixed,

@@ -25,7 +25,7 @@ _PAGES = (".html", ".htm")
 
 
 def write_report(robot: RobotLike, folder: str | Path, *, motion: Given | None = None) -> Path:
-    """Write the report on a machine: `report.html`, one page that needs no other file or network.
+    """Write the report on a machine: `report.html`, a self-contained page.
 
     `report.json` beside it holds the numbers. Each file is written whole or not at all, and the
     folder is made last.
@@ -70,7 +70,7 @@ def write_report(robot: RobotLike, folder: str | Path, *, motion: Given | None =
 
 
 def write_motion_page(robot: RobotLike, motion: Given, path: str | Path) -> Path:
-    """Write a page that shows a motion: the machine in 3-D, and what its joints and drives do.
+    """Write a page that shows a motion: the machine in 3-D, its joints and drives.
 
     The page needs no other file or network. It is written whole or not at all.
 
@@ -119,7 +119,7 @@ def write_motion_page(robot: RobotLike, motion: Given, path: str | Path) -> Path
 
 
 def checked_page(path: str | Path) -> Path:
-    """Return the file of a page after a check, which leaves nothing behind, that it can be written.
+    """Return a page's file after a check, without side effects, that it can be written.
 
     Raises
     ------
@@ -141,7 +141,7 @@ def checked_page(path: str | Path) -> Path:
 
 
 def checked_folder(path: str | Path) -> Path:
-    """Return a folder after a check, which leaves nothing behind, that it can be written."""
+    """Return a folder after a check, without side effects, that it can be written."""
     if str(path) == "":
         raise OutputError("the folder's name is empty; name one")
     target = Path(path)

@@ -12,7 +12,7 @@ from pteron.json_values import json_text
 
 @dataclass(frozen=True)
 class Written:
-    """The files that were written; `model`, the machine's, is None where there is no machine."""
+    """The paths of the files written; `model`, the machine's file, may be None."""
 
     page: Path
     numbers: Path
@@ -29,6 +29,6 @@ class Written:
 def write_found(
     folder: Path, stem: str, page: str, numbers: dict[str, Any], model: dict[str, str]
 ) -> Written:
-    """Write a page, numbers and perhaps a machine's file by its name: all of them, or none."""
+    """Write a page, numbers and perhaps a machine's file: all of them, or none."""
     paths = write_texts(folder, {f"{stem}.html": page, f"{stem}.json": json_text(numbers), **model})
     return Written(paths[0], paths[1], paths[2] if model else None)

@@ -28,7 +28,7 @@ _DATA = {
 
 
 class Record(NamedTuple):
-    """A line that is not blank, or several with a quoted line end; lines count from 0."""
+    """A line that is not blank, or lines joined by a quoted line end; lines count from 0."""
 
     line: int
     after: int
@@ -36,7 +36,7 @@ class Record(NamedTuple):
 
 
 class Cut(NamedTuple):
-    """A file's cells as one separator cuts them."""
+    """A file's cells, split by a separator."""
 
     separator: Separator
     decimal: Decimal
@@ -49,7 +49,7 @@ class Cut(NamedTuple):
     """Cells that are a number or a time."""
 
     def is_row(self, record: Record) -> bool:
-        """Return whether it has a number or time in every column that holds them."""
+        """Return whether a record has a number or time in every numeric column."""
         return (
             bool(self.columns)
             and len(record.cells) == self.width
@@ -71,7 +71,7 @@ def single_blanks(text: bytes) -> bytes:
 
 
 def best_cut(text: Sequence[str], declared: Dialect) -> Cut | None:
-    """Return the file as cut by the separator that makes most of its cells numbers."""
+    """Return the file split by the separator that makes most of its cells numbers."""
     separators = [declared.separator] if declared.separator else list(SEPARATORS)
     decimals = [declared.decimal] if declared.decimal else list(get_args(Decimal))
     cuts = [
@@ -92,6 +92,7 @@ def best_cut(text: Sequence[str], declared: Dialect) -> Cut | None:
 
 
 def _split_cells(text: Sequence[str], separator: Separator, decimal: Decimal) -> Cut:
+    """Return a text's records, cut by a separator, with the columns that mostly hold numbers."""
     records = list(_records(text, separator))
     width = Counter(len(record.cells) for record in records).most_common(1)[0][0] if records else 0
     full_rows = [record.cells for record in records if len(record.cells) == width]
@@ -102,6 +103,7 @@ def _split_cells(text: Sequence[str], separator: Separator, decimal: Decimal) ->
 
 
 def _records(text: Sequence[str], separator: Separator) -> Iterator[Record]:
+    """Yield the records that are not empty, with their lines, up to a fault of CSV."""
     if separator == " ":
         text = [single_blanks(line.encode()).decode() for line in text]
     reader, last_line = csv.reader(text, delimiter=separator), 0

@@ -103,7 +103,7 @@ class CsvFile:
             self._mend += ", or export with another separator: blanks cannot mark an empty cell"
 
     def tables(self, columns: Sequence[str] | None = None) -> Iterator[Table]:
-        """Yield the cells as text, a block of rows at a time; blank lines are skipped.
+        """Yield the cells as text, in blocks of rows; blank lines are skipped.
 
         Parameters
         ----------
@@ -137,6 +137,7 @@ class CsvFile:
             line += block.count(b"\n")
 
     def _read_head(self) -> bytes:
+        """Return the bytes at the beginning of the file, from which its layout is detected."""
         if isinstance(self._data, bytes):
             return self._data[:_HEAD]
         with self._data.open("rb") as file:
@@ -188,7 +189,7 @@ class CsvFile:
         return names, sum(map(len, lines[:read])), read + 1
 
     def _other_dialect(self, header: str, row: bytes) -> str | None:
-        """Say in which dialect a file seems to be written that must be plain."""
+        """Return the dialect that a file seems to have instead of the plain one; None if plain."""
         other = next((s for s in SEPARATORS if s not in ", " and s in header), None)
         if self._found or len(self.columns) > 1 or other is None:
             return None
@@ -200,7 +201,7 @@ class CsvFile:
         )
 
     def _read_by_polars(self, block: bytes, names: Sequence[str]) -> pl.DataFrame | None:
-        """Return the cells as Polars reads them, or None where it might read them otherwise.
+        """Return the cells as Polars reads them; None where Polars might misread them.
 
         Polars fills short rows and takes blank lines for rows, which separators that are not there
         tell; and it is lenient with quotes.
@@ -221,6 +222,7 @@ class CsvFile:
         return frame.rename({str(j): self.columns[j] for j in indices})
 
     def _read_by_record(self, block: bytes, row: int, line: int) -> pl.DataFrame:
+        """Return a block's rows as text, read by `csv`; errors name the line of the row."""
         names, rows = self.columns, list[list[str | None]]()
         try:
             for begins, cells in self._records(block, line):
@@ -249,12 +251,14 @@ class CsvFile:
             begins = line + reader.line_num
 
     def _line_of(self, block: bytes, line: int, index: int) -> int:
+        """Return the line of the file at which the row of an index in a block begins."""
         try:
             return next(islice(self._records(block, line), index, None))[0]
         except csv.Error:  # a cell longer than `csv` reads, which Polars did: each row is a line
             return line + index
 
     def _not_text(self) -> DataError:
+        """Return the error that the file is not text in its encoding."""
         message = f"{self.source}: not {self._encoding.upper()} text; save it as CSV in UTF-8"
         if self._found:
             message += ", or say what it is in a TOML file beside it, such as"
@@ -263,12 +267,12 @@ class CsvFile:
 
 
 def _is_not_blank(cells: Sequence[str]) -> bool:
-    """Say whether a record is more than a blank line."""
+    """Return whether a record is more than a blank line."""
     return len(cells) > 1 or bool(cells and cells[0].strip())
 
 
 def _end_of_records(block: bytes) -> int:
-    """Return the length of the whole records in a block: up to its last line end outside quotes."""
+    """Return the length of the complete records in a block: to its last unquoted line end."""
     cut = block.rfind(b"\n") + 1
     while cut and block.count(b'"', 0, cut) % 2:
         cut = block.rfind(b"\n", 0, block.rfind(b'"', 0, cut)) + 1

@@ -25,7 +25,7 @@ SEPARATORS: dict[Separator, str] = {
 
 @dataclass(frozen=True)
 class Dialect:
-    """The dialect of a CSV file; each part that is None is found from the file's beginning.
+    """The dialect of a CSV file; each part that is None is detected.
 
     Parameters
     ----------

@@ -72,7 +72,7 @@ def open_table(
 
 
 def read_table(path: str | Path) -> Table:
-    """Read a table from a CSV or Parquet file, or as CSV from standard input (``-``).
+    """Return the table in a CSV or Parquet file, or in CSV from standard input (``-``).
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ def read_table(path: str | Path) -> Table:
 
 
 def whole_table(file: CsvFile | ParquetFile) -> Table:
-    """Return all rows of an open file as one table.
+    """Return all rows of an open file as a single table.
 
     Raises
     ------
@@ -126,6 +126,7 @@ def whole_table(file: CsvFile | ParquetFile) -> Table:
 
 
 def _join_tables(tables: list[Table]) -> Table:
+    """Return the tables of a file as a single table that gives each row's line in the file."""
     if len(tables) == 1:
         return tables[0]
 
@@ -140,6 +141,7 @@ def _join_tables(tables: list[Table]) -> Table:
 
 @contextmanager
 def _name_in_errors(source: str) -> Iterator[None]:
+    """Raise errors of the file system in a block as a `DataError` that names the source."""
     try:
         yield
     except FileNotFoundError:
@@ -151,7 +153,7 @@ def _name_in_errors(source: str) -> Iterator[None]:
 
 
 def check_output(path: str | Path, dialect: Dialect | None = None) -> Path:
-    """Return `path` after a check, before the work begins, that a table can be written there.
+    """Return `path`, checked beforehand for whether a table can be written there.
 
     Raises
     ------
@@ -168,7 +170,7 @@ def check_output(path: str | Path, dialect: Dialect | None = None) -> Path:
 
 
 def write_table(frame: pl.DataFrame, path: str | Path, dialect: Dialect | None = None) -> Path:
-    """Write a table to a CSV or Parquet file, whole or not at all.
+    """Write a table to a CSV or Parquet file, atomically.
 
     Parameters
     ----------
@@ -209,5 +211,6 @@ ENDINGS: dict[str, Callable[[pl.DataFrame, io.BytesIO, Dialect], None]] = {
 
 
 def _ending_fault(file: Path, noun: str) -> str:
+    """Return the text of the fault of a file's ending, with the valid endings."""
     fault = f"unknown ending {shorten(file.suffix)}" if file.suffix else "no ending"
     return f"{fault}; a {noun}'s file ends in {' or '.join(ENDINGS)}"

@@ -72,7 +72,7 @@ class Layout:
 
 
 def find_encoding(head: bytes, declared: str | None, source: str) -> str:
-    """Return the encoding: the declared one, that of a byte order mark, UTF-8, or else cp1252."""
+    """Return the encoding: declared, by byte order mark, UTF-8, or else cp1252."""
     if declared is not None:
         return declared
     if head.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
@@ -145,7 +145,7 @@ def _check_commas(rows: Cut, source: str) -> None:
 
 
 def _first_row(rows: Cut, header_lines: int | None) -> int:
-    """Return the line of the first row, from 0."""
+    """Return the line of the first row of data, from 0."""
     if header_lines is not None:
         below = [record for record in rows.records if record.line >= header_lines]
         return below[0].after if below and _are_units(below[0]) else header_lines
@@ -162,7 +162,7 @@ def _first_row(rows: Cut, header_lines: int | None) -> int:
 def _names(
     rows: Cut, above: Sequence[Record], header_lines: int | None, source: str
 ) -> tuple[tuple[str, ...], tuple[str, ...], bool]:
-    """Return names and units of the columns, and whether the units have a line of their own."""
+    """Return names and units of the columns, and whether units are on a separate line."""
     width = rows.width
     # Rows may end in a separator where the line of names does not.
     fitting = [record for record in above if len(record.cells) in (width, width - 1)]
@@ -187,6 +187,7 @@ def _names(
 
 
 def _are_units(record: Record) -> bool:
+    """Return whether all cells of a record are units, and at least two are not empty."""
     cells = [cell for cell in record.cells if cell]
     return len(cells) > 1 and all(map(_UNIT.fullmatch, cells))
 
@@ -212,6 +213,7 @@ def _scope_names(
 
 
 def _nameless(rows: Cut, above: Sequence[Record], source: str) -> DataError:
+    """Return the error that no line above the rows names their columns."""
     if not above:
         return DataError(f"{source}: no line names the columns; the first line must name them")
     last = above[-1]

@@ -45,7 +45,7 @@ class ParquetFile:
         self.columns = tuple(self._kinds)
 
     def tables(self, columns: Sequence[str] | None = None) -> Iterator[Table]:
-        """Yield the rows in order, a block of them at a time.
+        """Yield the rows in order, in blocks.
 
         Parameters
         ----------

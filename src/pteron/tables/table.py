@@ -20,7 +20,7 @@ _ROWS_AT_A_TIME = 10_000
 
 @dataclass(frozen=True)
 class Table:
-    """Rows with named columns, and where they came from.
+    """Rows with named columns, and their places in a source.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ class Table:
         return array
 
     def with_columns(self, results: Mapping[str, ArrayLike]) -> Table:
-        """Return the table with columns added behind its own; one of the same name is replaced.
+        """Return the table with columns appended; a column of the same name is replaced.
 
         NaN becomes an empty cell.
         """
@@ -115,7 +115,7 @@ class Table:
         return replace(self, frame=others.hstack(added))
 
     def empty(self, column: str) -> int:
-        """Return how many cells of a column are empty."""
+        """Return the number of empty cells in a column."""
         return self.frame[column].null_count()
 
     def rows(self, columns: Sequence[str], most: int) -> Iterator[tuple[Any, ...]]:
@@ -123,7 +123,7 @@ class Table:
         return self.frame.select(columns).head(most).iter_rows()
 
     def json(self) -> str:
-        """Return the rows as a JSON list of objects; what is not a finite number is null."""
+        """Return the rows as a JSON list of objects; non-finite numbers are null."""
         for name, kind in self.frame.schema.items():
             # Polars would panic, which nobody can catch quietly.
             if any(word in str(kind) for word in ("Binary", "Object")):
@@ -131,7 +131,7 @@ class Table:
         return parse_numeric_columns(self.frame).write_json()
 
     def text(self) -> Iterator[str]:
-        """Yield the rows as CSV, some at a time, the header first."""
+        """Yield the rows as CSV, in pieces, the header first."""
         for start in range(0, len(self), _ROWS_AT_A_TIME):
             part = self.frame.slice(start, _ROWS_AT_A_TIME)
             try:
@@ -140,9 +140,11 @@ class Table:
                 raise self._unfit("CSV", str(error).splitlines()[0]) from None
 
     def _unfit(self, kind: str, reason: str) -> DataError:
+        """Return the error that the table cannot be written as a kind of file, and why."""
         return DataError(f"{self.source}: cannot be written as {kind} ({reason}); drop the column")
 
     def _require(self, columns: Sequence[str]) -> None:
+        """Raise a `DataError` that names the missing columns, if there are any."""
         missing = [name for name in columns if name not in self.columns]
         if not missing:
             return
@@ -153,7 +155,7 @@ class Table:
         )
 
     def _cells(self, name: str) -> tuple[pl.Series, pl.Series]:
-        """Return a column's cells, null where there are none, and their numbers, else null."""
+        """Return a column's cells, null if empty, and their numbers, null if not numeric."""
         cells = self.frame[name]
         if cells.dtype == pl.String:
             cells = cells.str.strip_chars()
@@ -171,6 +173,7 @@ class Table:
         return cells, signs.cast(pl.Float64, strict=False)
 
     def _fault(self, row: int, column: str, *, is_text: bool, choice: bool) -> str:
+        """Return the text of a cell's fault, an empty cell or no finite number, with its place."""
         cell = self.frame[column][row]
         name = shorten(column, bare=True)
         fault = f"the cell is empty; {name} needs a number"
@@ -185,18 +188,19 @@ class Table:
 
 
 def join_names(names: Sequence[str]) -> str:
-    """Return names as a message lists them: not all of very many, and none at full length."""
+    """Return names in a list for messages, shortened if there are many or long ones."""
     some = ", ".join(shorten(name, bare=True) for name in names[:20])
     return some + (", ..." if len(names) > 20 else "")
 
 
 def parse_numeric_columns(frame: pl.DataFrame) -> pl.DataFrame:
-    """Return the frame with each column of text that holds numbers only made numeric."""
+    """Return the frame with text columns of numbers converted to numeric types."""
     columns = [_number_column(column) for column in frame.get_columns()]
     return pl.DataFrame(columns)
 
 
 def _number_column(column: pl.Series) -> pl.Series:
+    """Return a text column as integers or floats if all its cells are numbers, else unchanged."""
     if column.dtype != pl.String or column.null_count() == len(column):
         return column
     text = column.str.strip_chars()

@@ -63,7 +63,7 @@ def convert_to_si(table: Table, units: Mapping[str, str]) -> Table:
 
 
 def _si_factor(unit: str, si: str) -> float | None:
-    """Return the factor from a unit to an SI unit, None if it measures something else."""
+    """Return the factor from a unit to an SI unit; None for another quantity."""
     (numerator, _, per), (base, _, si_per) = unit.partition("/"), si.partition("/")
     if re.sub("[ ^]", "", per) != re.sub("[ ^]", "", si_per):
         return None

@@ -80,7 +80,7 @@ def follow_joints(
 def _last_good_pose(
     try_shares: Callable[[Array], tuple[Array, NDArray[np.bool_]]], start: Array, pieces: int
 ) -> tuple[Array, Array | None]:
-    """Return the last pose that is allowed and the first that is not, by repeated subdivision."""
+    """Return the last feasible pose and the first infeasible one, by repeated subdivision."""
     low, high, last = 0.0, 1.0, start
     beyond: Array | None = None
     for _ in range(_ROUNDS):
@@ -96,7 +96,7 @@ def _last_good_pose(
 
 
 def stop_reason(robot: Manipulator, beyond: Array) -> str:
-    """Return the leg or limit that forbids a pose (m,), as a sentence without its full stop.
+    """Return the text of the leg or limit that excludes a pose (m,), without a full stop.
 
     A pose that nothing forbids is one at which an assembly mode ends.
     """

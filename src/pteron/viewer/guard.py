@@ -12,7 +12,7 @@ import socket
 
 
 def is_local_address(host: str) -> bool:
-    """Say whether only this machine can reach a host's address."""
+    """Return whether a host's address is reachable from this machine only."""
     try:
         addresses = socket.getaddrinfo(host, None, type=socket.SOCK_STREAM)
     except (OSError, UnicodeError):
@@ -21,7 +21,7 @@ def is_local_address(host: str) -> bool:
 
 
 def refusal(host: str, here: bool, hosts: list[str], origins: list[str]) -> str | None:
-    """Return why a request is refused, None if it is not.
+    """Return why a request is refused; None if it is not.
 
     `hosts` and `origins` are the request's headers; programs that are no browsers send no `Origin`.
     If only this machine can reach the address, it is asked for by a name of this machine; a wider
@@ -50,6 +50,7 @@ def _name(header: str) -> str:
 
 
 def _is_loopback(name: str) -> bool:
+    """Return whether a name is an address of the loopback interface."""
     try:
         return ipaddress.ip_address(name.partition("%")[0]).is_loopback
     except ValueError:

@@ -43,7 +43,7 @@ _UNDONE = ("pose", "joint", "drag", "type", "payload", "home", "mode", "assembly
 
 
 class Live:
-    """A session with the tabs that show it, and a queue of actions for it.
+    """A session with the tabs that show it, and a queue of its actions.
 
     Attributes
     ----------
@@ -87,7 +87,7 @@ class Live:
         self._thread.join()
 
     def queue_action(self, name: str, act: Callable[[], object]) -> None:
-        """Queue an action; of waiting actions with one name only the last is done."""
+        """Queue an action; it replaces a waiting action with the same name."""
         with self._wake:
             self._actions.pop(name, None)
             self._actions[name] = act
@@ -118,7 +118,7 @@ class Live:
             self._files.pop(tab, None)
 
     def handle_message(self, tab: Tab, message: str | bytes) -> None:
-        """Handle a message of a tab; a file comes after its name."""
+        """Handle a tab's message; the contents of a file follow its name."""
         session = self.session
         if isinstance(message, bytes):
             name = self._files.pop(tab, "")
@@ -140,7 +140,7 @@ class Live:
         self.queue_action(name, act)
 
     def _push(self, drives: str) -> None:
-        """Compile the equations of motion in a thread of its own, then begin the push."""
+        """Compile the equations of motion in a thread, then begin the push."""
         session = self.session
 
         def prepare() -> None:
@@ -161,10 +161,12 @@ class Live:
         threading.Thread(target=compile_equations, name="pteron push", daemon=True).start()
 
     def _tell(self, text: str) -> None:
+        """Stop the motion and show a message."""
         self.session.playing = False
         self.session.state = stop_motion(self.session.state, _sentence(text))
 
     def _send(self, kind: str, data: dict[str, Any]) -> None:
+        """Send data of a kind to all tabs, and store it for new tabs."""
         text = json.dumps({kind: data}, allow_nan=False)
         with self._wake:
             self._kept[kind] = text
@@ -174,6 +176,7 @@ class Live:
     # The thread that owns the session.
 
     def _run(self) -> None:
+        """Run the thread: do queued actions, advance the motion, and send the state to the tabs."""
         session = self.session
         last = changed = monotonic()
         settled = True
@@ -214,6 +217,7 @@ class Live:
         return max(0.0, min(times)) if times else None
 
     def _run_action(self, name: str, act: Callable[[], object]) -> None:
+        """Do an action; the session is remembered before it if the action can be undone."""
         last_act, now = self._last, monotonic()
         if name.startswith(_UNDONE):
             if last_act[0] != name or now - last_act[1] > _ONE:
@@ -238,6 +242,7 @@ class Live:
     # What the page shows.
 
     def _show(self, *, settled: bool = False) -> None:
+        """Send the state to the tabs; `settled` also sends values that are slow to compute."""
         session = self.session
         state, push = session.state, session.push
         if state.robot != self._robot:
@@ -276,6 +281,7 @@ class Live:
                 self._show_slice()
 
     def _show_slice(self) -> None:
+        """Send the slice through the reach or the map of the chosen plane, if it has changed."""
         state, span = self.session.state, self.session.pose_range
         plane = choices(state.robot).get(self.session.plane)
         # A map shows where the machine is, too.
@@ -301,8 +307,10 @@ class Live:
 
 
 def _finite_or_none(values: Any) -> list[float | None]:
+    """Return values as floats; None, which JSON can hold, for NaN and infinities."""
     return [float(value) if np.isfinite(value) else None for value in values]
 
 
 def _sentence(text: str) -> str:
+    """Return a text that ends with a full stop or another mark."""
     return text if text.endswith((".", "?", "!")) else f"{text}."

@@ -53,6 +53,7 @@ def controls(session: Session) -> dict[str, Any]:
 
 
 def _sliders(names: Sequence[str], units: Sequence[str], ranges: Array) -> list[dict[str, Any]]:
+    """Return sliders for ranges (2, k) of quantities, in display units."""
     sliders = []
     for name, unit, (low, high) in zip(names, units, ranges.T, strict=True):
         word, factor = SHOWN[unit]
@@ -88,7 +89,7 @@ def values(session: Session, joints: Array) -> dict[str, Any]:
 
 
 def _pose_text(robot: Manipulator, pose: Array) -> str:
-    """Return a pose (m,) in a line, each unit once."""
+    """Return the text of a pose (m,), each unit named once."""
     values, units = pose_factors(robot) * pose, (SHOWN[unit][0] for unit in robot.units)
     named = zip(robot.coordinates, values, units, strict=True)
     groups = groupby(
@@ -99,7 +100,7 @@ def _pose_text(robot: Manipulator, pose: Array) -> str:
 
 
 def _label(robot: Manipulator, pose: Array) -> str:
-    """Return a pose (m,) as the list of assembly modes has it."""
+    """Return the label of a pose (m,) in the list of assembly modes."""
     parts = zip(pose_factors(robot) * pose, robot.platform.angular, strict=True)
     return " ".join(format_fixed(x) + "°" * bool(angle) for x, angle in parts)
 
@@ -111,7 +112,7 @@ def joints_in_display_units(robot: Manipulator, joints: Array) -> list[float]:
 
 
 def settled_values(session: Session, busy: Callable[[], bool]) -> dict[str, Any] | None:
-    """Return the slow values: assembly modes, and the span of each slider from this pose.
+    """Return values that are slow to compute: assembly modes, and sliders' spans at this pose.
 
     None if somebody acts meanwhile.
     """
@@ -132,7 +133,7 @@ def settled_values(session: Session, busy: Callable[[], bool]) -> dict[str, Any]
 
 
 def activity_text(session: Session) -> str:
-    """Return what the machine does as a sentence."""
+    """Return a sentence on what the machine does."""
     name, state = session.state.robot.name, session.state
     if words := _push_text(session):
         return words
@@ -143,7 +144,7 @@ def activity_text(session: Session) -> str:
 
 
 def _push_text(session: Session) -> str:
-    """Return what the machine does by itself, or is about to; empty where it does nothing."""
+    """Return the text of a push or of its preparation; empty without one."""
     if session.push is not None:
         return f"{session.push.does}. Pull at its platform."
     if session.preparing:
@@ -152,7 +153,7 @@ def _push_text(session: Session) -> str:
 
 
 def action(session: Session, text: str) -> _Action:
-    """Return the action that a page's request, JSON, asks for, with its name.
+    """Return name and action that a page's JSON request stands for.
 
     Raises
     ------
@@ -168,7 +169,7 @@ def action(session: Session, text: str) -> _Action:
 
 @dataclass(frozen=True)
 class _Request:
-    """A request of a page: its fields, as JSON has them, and the session that it is made to.
+    """A request of a page: its JSON fields, and the session it applies to.
 
     Methods return the name of an action, which undoing goes by, and the action.
     """
@@ -203,16 +204,19 @@ class _Request:
         return np.array([x, y, z]) @ view_frame(self.robot)
 
     def coordinate(self) -> _Action:
+        """Return the action that sets a coordinate of the pose."""
         i = self.index(self.robot.freedom)
         amount = self.number("value") / float(pose_factors(self.robot)[i])
         return f"pose{i}", lambda: self.session.set_coordinate(i, amount)
 
     def joint(self) -> _Action:
+        """Return the action that sets a joint's coordinate."""
         i = self.index(self.robot.joint_count)
         amount = self.number("value") / float(_joint_factors(self.robot)[i])
         return f"joint{i}", lambda: self.session.set_joint(i, amount)
 
     def drag(self) -> _Action:
+        """Return the action that drags the platform to a point, along an axis or freely."""
         axis = None if self.fields["axis"] is None else int(self.fields["axis"])
         to = self.point("to")
         if axis not in (None, 0, 1, 2):
@@ -220,6 +224,7 @@ class _Request:
         return "drag", lambda: self.session.drag(axis, to)
 
     def pull(self) -> _Action:
+        """Return the action that pulls the platform by a spring from a grip to a point."""
         grip, to, stiffness = self.point("grip"), self.point("to"), self.number("stiffness")
 
         def act() -> None:
@@ -231,6 +236,8 @@ class _Request:
         return "pull", act
 
     def release(self) -> _Action:
+        """Return the action that releases the spring."""
+
         def act() -> None:
             if self.session.push is not None:
                 self.session.push.release()
@@ -238,6 +245,7 @@ class _Request:
         return "pull", act
 
     def assembly(self) -> _Action:
+        """Return the action that goes to an assembly of the legs, by its number."""
         k = int(self.fields["i"])
 
         def act() -> None:
@@ -248,18 +256,22 @@ class _Request:
         return "assembly", act
 
     def mode(self) -> _Action:
+        """Return the action that sets the working mode."""
         elbows = {signs(mode): mode for mode in self.session.modes()}[self.fields["mode"]]
         return "mode", lambda: self.session.set_working_mode(elbows)
 
     def speed(self) -> _Action:
+        """Return the action that sets the speed of playback."""
         factor = SPEEDS[self.fields["speed"]]
         return "speed", lambda: setattr(self.session, "speed", factor)
 
     def plane(self) -> _Action:
+        """Return the action that chooses the plane of the slice or map."""
         choices(self.robot)[name := self.fields["plane"]]
         return "plane", lambda: setattr(self.session, "plane", name)
 
     def seek(self) -> _Action:
+        """Return the action that stops playback and seeks a time, s."""
         time = self.number("time")
 
         def act() -> None:
@@ -294,14 +306,16 @@ _ACTIONS: dict[str, Callable[[_Request], _Action]] = {
 
 
 def _joint_factors(robot: Manipulator) -> Array:
+    """Return the factors (n,) from joint coordinates, m or rad, to display units."""
     return np.array([SHOWN[leg.joint.unit][1] for leg in robot.legs])
 
 
 def _tenths(array: Array) -> list[float]:
+    """Return an array as a list, rounded to tenths."""
     rounded: list[float] = (np.round(array, 1) + 0.0).tolist()
     return rounded
 
 
 def signs(mode: Any) -> str:
-    """Return the sides of a working mode's elbows as signs."""
+    """Return the signs of a working mode's elbows as text."""
     return "".join("+" if side > 0 else "-" for side in mode)

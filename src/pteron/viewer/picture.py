@@ -45,7 +45,7 @@ Arrow = tuple[Any, str | int, float]
 
 
 class ViewerPicture:
-    """The picture of one machine in one working mode; guides are as long as poses (K, m) need.
+    """The picture of a machine in a working mode; guides span the joints of poses (K, m).
 
     The compared machine stands there too, so many times as far from the first one.
     """
@@ -68,7 +68,7 @@ class ViewerPicture:
     def moment(
         self, state: ViewerState, forces: Array, scale: Array, *, screws: bool
     ) -> dict[str, Any]:
-        """Return the machine in a state; its arrows are as long as forces (n,) over a scale."""
+        """Return the machine's picture in a state; arrow lengths are forces (n,) over a scale."""
         points = joint_points(state.robot, state.pose)
         return {
             "now": moving_parts(self._robot, points),
@@ -79,7 +79,7 @@ class ViewerPicture:
         }
 
     def _ghost(self, points: JointPoints, pose: Array) -> dict[str, Any] | None:
-        """Return the compared machine in a pose, if it reaches it."""
+        """Return the compared machine's picture at a pose; None if it does not reach it."""
         if self._compared is None:
             return None
         robot, times = self._compared
@@ -90,7 +90,7 @@ class ViewerPicture:
         return moving_parts(self._robot, moved)
 
     def legend(self, scale: Array) -> str:
-        """Return what the arrows of forces (n,) with a scale (n,) say."""
+        """Return the legend of the force arrows, with their scale (n,)."""
         square = self.still["grid"] / (_FORCE * self.size)
         stands = {"N": (square, "the length of a square"), "N m": (1.0, "half a turn")}
         units = [leg.joint.force_unit for leg in self._robot.legs]
@@ -104,6 +104,7 @@ class ViewerPicture:
         return f"arrows: what each drive gives{bent}; {', '.join(scales)}"
 
     def _arrow(self, points: Array, color: str | int, radius: float) -> Arrow:
+        """Return an arrow through points (2, 3), in the picture's frame."""
         return picture_points(self._robot, points), color, radius
 
     def _screws(self, state: ViewerState, points: JointPoints) -> list[Arrow]:

@@ -86,11 +86,11 @@ class Push:
 
     @property
     def spring(self) -> tuple[Array, Array] | None:
-        """The spring's ends, m."""
+        """The spring's ends, m; None without a spring."""
         return None if self._arm is None else (self._grip()[0], self._held)
 
     def pull(self, grip: Array, spring_end: Array) -> None:
-        """Attach the spring at `grip` (3,), m, if it is loose; hold its end (3,), m."""
+        """Attach a loose spring at `grip` (3,), m, and set its free end (3,), m."""
         if self._arm is None:
             place, axes = self._robot.platform.placement(self.pose)
             self._arm = axes @ (grip - place)
@@ -101,7 +101,7 @@ class Push:
         self._arm = None
 
     def go(self, span: float) -> None:
-        """Simulate a span of time, s.
+        """Simulate a time span, s.
 
         At a limit the platform slides along it, and loses the speed towards it: it has no more
         energy than it would have had behind it.
@@ -128,12 +128,12 @@ class Push:
             return
 
     def _begin(self, pose: Array, velocity: Array) -> None:
-        """Put the machine into a state, with transmissions bent as they are in equilibrium."""
+        """Set the machine's state, with transmissions deflected as in equilibrium."""
         self.pose, self.velocity = pose, velocity
         self._drives = drive_states(self._robot, pose, velocity)
 
     def _move(self, span: float) -> bool:
-        """Integrate over a span, s, under constant forces; return whether all of it succeeded."""
+        """Integrate over a span, s, at constant forces; return whether that succeeded."""
         count = int(np.ceil(span / self._step - 1e-9))
         state, step = (self.pose, self.velocity), span / max(count, 1)
         stepping = self._robot, *state, self.forces, step, count, self._wrench()
@@ -141,7 +141,7 @@ class Push:
         return bool(succeeded)
 
     def _energy(self, pose: Array, velocity: Array) -> float:
-        """Return the energy of bodies, rotors and spring in a state, J; NaN where there is none."""
+        """Return the energy of bodies, rotors and spring in a state, J; NaN where undefined."""
         robot, stretch = self._robot, 0.0
         rates = joint_rates(robot, pose, velocity, on_failure="nan").actuated
         rotors = np.array([leg.drive.inertia if leg.drive else 0.0 for leg in robot.legs])
@@ -153,6 +153,7 @@ class Push:
         return float(bodies + 0.5 * rotors @ rates**2 + 0.5 * self.stiffness * stretch**2)
 
     def _control(self) -> None:
+        """Update the drives' forces by the control law at the present state."""
         if self._law is None:
             return
         joints = inverse_kinematics(self._robot, self.pose)
@@ -163,7 +164,7 @@ class Push:
         self.forces = np.where(np.isfinite(forces), forces, self.forces)
 
     def _grip(self) -> tuple[Array, Array]:
-        """Return where the spring is fixed, and the arm from P to it, in the base frame."""
+        """Return the spring's point on the platform, and the arm from P to it, base frame, m."""
         place, axes = self._robot.platform.placement(self.pose)
         arm = np.zeros(3) if self._arm is None else self._arm @ axes
         return place + arm, arm

@@ -64,7 +64,7 @@ class Readings:
 
 
 def readings(state: ViewerState, forces: Array | None = None) -> Readings:
-    """Return the numbers of a state, each as the library has it.
+    """Return the numbers of a state, as the library computes them.
 
     Forces (n,) that are given are those of drives which somebody pushes against.
     """
@@ -100,7 +100,7 @@ def readings(state: ViewerState, forces: Array | None = None) -> Readings:
 
 
 def level(value: float) -> Level:
-    """Return the level of a margin, 1 at best.
+    """Return the level of a margin, which is at most 1.
 
     Examples
     --------

@@ -68,11 +68,12 @@ def readout(state: ViewerState, numbers: Readings) -> str:
 
 @cache
 def _template() -> Template:
+    """Return the template of the panel's numbers, loaded once."""
     return template("readout.html.j2", "viewer")
 
 
 def _share(share: float) -> dict[str, Any] | None:
-    """Return a drive's share of its limit, with its level and words for that."""
+    """Return a drive's share of its limit, with its level and a text."""
     if np.isnan(share):
         return None
     how: Level = "far" if share <= 0.8 else "near" if share <= 1.0 else "close"

@@ -84,6 +84,7 @@ class Tab:
             self._wake.notify()
 
     def _run(self) -> None:
+        """Run the thread: send queued messages until the tab is closed."""
         from websockets.exceptions import ConnectionClosed
 
         while True:
@@ -139,6 +140,7 @@ class Server:
         self._thread.join()
 
     def _answer(self, connection: ServerConnection, request: Request) -> Response | None:
+        """Return the HTTP response to a request; None for a web socket, whose handshake goes on."""
         hosts, origins = (request.headers.get_all(name) for name in ("Host", "Origin"))
         reason = refusal(self._host, self._here, hosts, origins)
         if reason is not None:
@@ -165,6 +167,7 @@ class Server:
         return response
 
     def _handle(self, connection: ServerConnection) -> None:
+        """Handle a web socket: open a tab, pass its messages on, and close it at the end."""
         from websockets.exceptions import ConnectionClosed
 
         assert connection.request is not None
@@ -186,7 +189,7 @@ class Server:
 
 
 def free_port(host: str, port: int) -> int:
-    """Return the first free port of a host from a given one on; 0 means any."""
+    """Return the first free port of a host, from a port on; 0 means any."""
     if not 0 <= port <= _LAST_PORT:
         raise DataError(
             f"port: {shorten(port)} given, a whole number from 0 to {_LAST_PORT} expected"
@@ -209,6 +212,7 @@ def free_port(host: str, port: int) -> int:
 
 
 def _is_free(family: int, address: Any, port: int) -> bool:
+    """Return whether a port is free; an address of another machine raises a `DataError`."""
     with socket.socket(family, socket.SOCK_STREAM) as tried:
         if os.name == "posix":  # elsewhere it would take a port that is in use
             tried.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -227,5 +231,5 @@ def _is_free(family: int, address: Any, port: int) -> bool:
 
 
 def _is_significant(record: logging.LogRecord) -> bool:
-    """Say whether a record of the log matters: browsers open connections that they do not use."""
+    """Return whether a log record matters: browsers open connections they do not use."""
     return record.levelno >= logging.ERROR and record.getMessage() != "opening handshake failed"

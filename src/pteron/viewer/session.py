@@ -108,7 +108,7 @@ class Session:
         self._set_ranges()
 
     def _set_ranges(self) -> None:
-        """Find what the sliders span, and poses all over the reach, in this working mode."""
+        """Set the sliders' ranges, and random poses in reach, of this working mode."""
         robot, home = self.state.robot, self.state.pose
         self.home = home
         self.examples = home[None]
@@ -145,12 +145,12 @@ class Session:
     # What people do.
 
     def remember(self) -> None:
-        """Keep the state as it is, for `undo`."""
+        """Save the state for `undo`."""
         if not self.playing and self.push is None:
             self._before = [*self._before[-_KEPT:], self.state]
 
     def undo(self) -> None:
-        """Go back to the state before the last action."""
+        """Restore the state before the last action."""
         if not self._before:
             self.state = stop_motion(self.state, "There is nothing to undo.")
             return
@@ -168,12 +168,12 @@ class Session:
         self.set_pose(target)
 
     def set_pose(self, target: Array) -> None:
-        """Move the platform to a pose (m,), or as near to it as it goes."""
+        """Move the platform to a pose (m,), or to the nearest reachable one."""
         self._end_motion()
         self.state = move_platform(self.state, target)
 
     def drag(self, axis: int | None, point: Array) -> None:
-        """Move P to a point (3,), m, or turn the platform so that one of its axes leads there."""
+        """Move P to a point (3,), m, or turn the platform to point an axis at it."""
         platform, target = self.state.robot.platform, self.state.pose.copy()
         if axis is None:
             target[~platform.angular] = platform.directions @ point
@@ -184,7 +184,7 @@ class Session:
         self.set_pose(target)
 
     def type_pose(self, text: str) -> None:
-        """Move the platform to a pose that is typed in mm or degrees, as its coordinates are."""
+        """Move the platform to a pose entered in mm or degrees, by coordinate."""
         pose = typed_pose(self.state.robot, text)
         self.set_pose(pose)
         if hint := metres_hint(self.state.robot, pose):
@@ -196,7 +196,7 @@ class Session:
         self.state = move_joint(self.state, i, value)
 
     def set_payload(self, text: str) -> None:
-        """Carry what is typed, kg."""
+        """Set the payload from a text, kg."""
         self.state = load_payload(self.state, text)
 
     def go_home(self) -> None:
@@ -209,7 +209,7 @@ class Session:
         return [tuple(leg.elbow for leg in robot.legs) for robot in working_modes(self._first)]
 
     def set_working_mode(self, elbows: Sequence[int]) -> bool:
-        """Put the elbows on given sides; say whether the machine is another one now."""
+        """Set the elbows' sides; return whether the machine has changed."""
         last_robot = self.state.robot
         self._end_motion()
         self.state = switch_working_mode(self.state, elbows)
@@ -228,48 +228,48 @@ class Session:
         return True
 
     def assemblies(self) -> tuple[Array, int | None]:
-        """Return the poses (K, m) of the joints as they are, and which of them is the pose."""
+        """Return poses (K, m) with the present joint coordinates, and the present index."""
         poses = assembly_poses(self.state)
         return poses, current_assembly(self.state, poses)
 
     def set_assembly(self, pose: Array) -> None:
-        """Take another of the poses that the joints have."""
+        """Move to another pose with the same joint coordinates."""
         self._end_motion()
         self.state = switch_assembly(self.state, pose)
 
     def _end_motion(self) -> None:
-        """End what plays, and what is pushed."""
+        """Stop playback and a push."""
         self.playing, self.push = False, None
 
     # What moves by itself.
 
     def prepare_push(self, drives: str) -> Push:
-        """Return the machine as a spring may pull at it; the first time takes some seconds."""
+        """Return the push simulation of the machine; the first compilation takes seconds."""
         if drives not in DRIVES:
             raise DataError(f"drives: {drives!r} given, one of {', '.join(DRIVES)} expected")
         return Push(self.state.robot_with_payload, self.state.pose, drives)
 
     def begin_push(self, drives: str) -> None:
-        """Let the machine move by itself from where it is."""
+        """Begin the dynamic simulation at the present pose."""
         self.playing, self.push = False, self.prepare_push(drives)
         self.state = stop_motion(self.state)
 
     def end_push(self) -> None:
-        """Bring the machine to rest where it is."""
+        """Stop the dynamic simulation, at rest at the present pose."""
         self.push = None
         self.state = stop_motion(self.state)
 
     def load(self, name: str, data: bytes) -> None:
-        """Take a motion from a file's name and content; it plays from its beginning."""
+        """Load a motion from a file's name and content; playback starts at its beginning."""
         motion = motion_of_file(self.state.robot, name, data, self.state.pose)
         self.take(motion, name)
 
     def load_standard(self) -> None:
-        """Take the standard pick-and-place cycle about the home pose."""
+        """Load the standard pick-and-place cycle about the home pose."""
         self.take(pick_and_place(self.state.robot, self.home), STANDARD)
 
     def take(self, motion: Motion, title: str) -> None:
-        """Take a motion, after a check that the machine can do it."""
+        """Load a motion, checked to be feasible for the machine."""
         check_motion(self.state.robot, motion)
         self.push = None
         self.motion, self.title = motion, title
@@ -277,14 +277,14 @@ class Session:
         self.seek(0.0)
 
     def play(self, *, on: bool) -> None:
-        """Start or stop the motion."""
+        """Start or pause playback."""
         if self.motion is None:
             self.state = stop_motion(self.state, "There is no motion to play: load one first.")
             return
         self.push, self.playing = None, on
 
     def step(self, count: int) -> None:
-        """Go on, or back, by so many sixtieths of a second of the motion."""
+        """Advance, or go back, by a number of sixtieths of a second of the motion."""
         self.playing = False
         self.seek(self.time + count * _FRAME)
 
@@ -295,7 +295,7 @@ class Session:
             self.state = state_in_motion(self.state, self.motion, self.time)
 
     def advance(self, elapsed: float) -> None:
-        """Let time go on for so many seconds of the clock; a motion begins again at its end."""
+        """Advance playback by a time of the clock, s; the motion repeats at its end."""
         if self.push is not None:
             self.push.go(self.speed * elapsed)
             message = f"{self.push.stops}." if self.push.stops else ""
@@ -307,7 +307,7 @@ class Session:
     # What is shown.
 
     def spans(self, busy: Callable[[], bool] = lambda: False) -> tuple[Array, Array] | None:
-        """Return how far each coordinate, and each joint, may go from here: (2, m), (2, n).
+        """Return the free range of each coordinate (2, m) and each joint (2, n) from here.
 
         None if somebody acts meanwhile, as `busy` tells.
         """
@@ -332,7 +332,7 @@ class Session:
         return ends, joint_ends
 
     def force_scale(self) -> Array:
-        """Return the force of each leg's drive, (n,), whose arrow has the usual length.
+        """Return the force of each drive, (n,), that has the standard arrow length.
 
         The largest of the motion, or at rest in the home pose; legs of one unit share a scale.
         """
@@ -351,7 +351,7 @@ class Session:
 
 
 def _rotation(start: Array, end: Array) -> Array:
-    """Return the least rotation (3, 3) that turns one direction to another."""
+    """Return the smallest rotation (3, 3) from one direction to another."""
     a, b = start / np.linalg.norm(start), end / max(float(np.linalg.norm(end)), 1e-12)
     normal, cosine = np.cross(a, b), float(a @ b)
     if cosine < -1.0 + 1e-9:

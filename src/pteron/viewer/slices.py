@@ -31,7 +31,7 @@ NONE = "none"
 
 
 def choices(robot: Manipulator) -> dict[str, Plane | None]:
-    """Return the choices of a slice: none, "xy" of two lengths, or a pair of names."""
+    """Return the planes of a slice by label: none, two lengths such as "xy", or a pair of names."""
     planes: dict[str, Plane | None] = {NONE: None}
     for first, second in combinations(slice_coordinates(robot), 2):
         if {first, second} <= set(robot.platform.lengths):
@@ -72,7 +72,7 @@ def slice_map(robot: Manipulator, pose: Array, plane: Plane, span: Array) -> str
 def _sides(
     robot: Manipulator, pose: Array, plane: str, sides: tuple[float, ...]
 ) -> tuple[float, float, float, float]:
-    """Return the extent of what the legs reach; a side where it goes on stays as it is."""
+    """Return the extent of the reach in a slice; a side beyond which it continues is unchanged."""
     first_low, first_high, low, high = sides
     wide, tall = first_high - first_low, high - low
     extent = first_low - wide, first_high + wide, low - tall, high + tall
@@ -94,7 +94,7 @@ def _sides(
 
 
 def _rings(first: Array, second: Array, field: Array) -> list[Array]:
-    """Return the closed lines (K, 2) about where a field (B, A) over a grid is not negative."""
+    """Return the closed outlines (K, 2) of the region where a field (B, A) is not negative."""
     if not field.max() > 0.0:
         return []
     axes = Figure().add_subplot()

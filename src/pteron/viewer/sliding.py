@@ -73,13 +73,14 @@ def nearest_reachable_pose(
 
 
 def _weights(robot: Manipulator) -> Array:
+    """Return weights (m,) that turn coordinates into lengths: m for each rad, 1 for lengths."""
     arm = max(float(np.linalg.norm(leg.platform_point)) for leg in robot.legs)
     size = max(leg.size for leg in robot.legs)
     return np.where(robot.platform.angular, max(arm, 0.1 * size), 1.0)
 
 
 def _step(robot: Manipulator, pose: Array, wish: Array, weights: Array) -> Array:
-    """Return the step (m,) nearest to a wished one that keeps the margins, taken as linear.
+    """Return the step (m,) nearest to a desired one that keeps the linearised margins.
 
     Least distance programming by non-negative least squares (Lawson and Hanson, chapter 23).
     """

@@ -27,7 +27,7 @@ _METRES = 3.0
 
 @dataclass(frozen=True, eq=False)
 class ViewerState:
-    """A machine in a pose, moving or at rest, with what it carries.
+    """A machine at a pose, moving or at rest, with its payload.
 
     Attributes
     ----------
@@ -61,7 +61,7 @@ class ViewerState:
 
     @property
     def payload_doubt(self) -> str:
-        """Why the payload is unlikely, a sentence; empty where it is not."""
+        """A sentence on why the payload is unlikely; empty if it is not."""
         doubt = payload_warning(self.robot, self.payload)
         return f"{doubt[:1].upper()}{doubt[1:]}"
 
@@ -73,7 +73,7 @@ def state_at_rest(robot: Manipulator, pose: Array | None = None) -> ViewerState:
 
 
 def move_platform(state: ViewerState, target: Array) -> ViewerState:
-    """Return the machine at rest in another pose (m,), or as near to it as it slides."""
+    """Return the machine at rest at a pose (m,), or the nearest one that sliding reaches."""
     if not np.isfinite(target).all():
         return replace(state, message="The pose is to have finite numbers.")
     last, beyond = nearest_reachable_pose(state.robot, state.pose, target)
@@ -85,7 +85,7 @@ def move_platform(state: ViewerState, target: Array) -> ViewerState:
 
 
 def move_joint(state: ViewerState, i: int, value: float) -> ViewerState:
-    """Return the machine with one joint, from 0, elsewhere; the platform keeps its assembly mode.
+    """Return the machine with a joint, from 0, moved; the assembly mode is unchanged.
 
     It stops where a leg, a limit or the end of the assembly mode stops it.
     """
@@ -110,7 +110,7 @@ def assembly_poses(state: ViewerState) -> Array:
 
 
 def current_assembly(state: ViewerState, poses: Array) -> int | None:
-    """Return the place of the machine's pose among those of its assembly modes, or None."""
+    """Return the index of the present pose among those of the assembly modes, or None."""
     differences = np.abs(poses - state.pose)
     around = np.abs((differences + np.pi) % (2.0 * np.pi) - np.pi)
     differences = np.where(state.robot.wraps, around, differences)
@@ -119,7 +119,7 @@ def current_assembly(state: ViewerState, poses: Array) -> int | None:
 
 
 def switch_assembly(state: ViewerState, pose: Array) -> ViewerState:
-    """Return the machine in another assembly mode, that of a pose with the same joints."""
+    """Return the machine in another assembly mode, at a pose with the same joints."""
     if not is_allowed(state.robot, pose):
         why = stop_reason(state.robot, pose)
         return replace(state, message=f"This assembly mode is not possible. {why}.")
@@ -127,7 +127,7 @@ def switch_assembly(state: ViewerState, pose: Array) -> ViewerState:
 
 
 def switch_working_mode(state: ViewerState, elbows: Sequence[int]) -> ViewerState:
-    """Return the machine with its elbows on given sides, in its pose or, failing that, at home."""
+    """Return the machine with other elbow sides, at its pose or else at home."""
     robot = with_elbows(state.robot, elbows)
     other = replace(state, robot=robot)
     if is_allowed(robot, state.pose):
@@ -145,7 +145,7 @@ def move_home(state: ViewerState) -> ViewerState:
 
 
 def load_payload(state: ViewerState, text: str) -> ViewerState:
-    """Return the machine with a payload that is typed in kg; one that cannot be changes nothing."""
+    """Return the machine with a payload from a text, kg; an invalid one changes nothing."""
     try:
         mass = _number(text, "payload", "a mass of 0 kg or more")
         loaded_robot(state.robot, mass)
@@ -155,7 +155,7 @@ def load_payload(state: ViewerState, text: str) -> ViewerState:
 
 
 def typed_pose(robot: Manipulator, text: str) -> Array:
-    """Return a pose that is typed in the units of its coordinates, mm or degrees.
+    """Return a pose from texts in the units of its coordinates, mm or degrees.
 
     Between numbers are blanks, semicolons or commas. Where blanks alone give the right count a
     comma within a number is its decimal sign, as where one number alone is typed.
@@ -183,7 +183,7 @@ def typed_pose(robot: Manipulator, text: str) -> Array:
 
 
 def metres_hint(robot: Manipulator, pose: Array) -> str:
-    """Return a hint where the lengths of a pose that was typed in mm are likely in m; else ""."""
+    """Return a hint if lengths entered in mm are probably in m; else ""."""
     lengths = ~robot.platform.angular
     typed = 1e3 * pose[lengths]
     meant = np.where(lengths, 1e3 * pose, pose)
@@ -199,12 +199,13 @@ def pose_factors(robot: Manipulator) -> Array:
 
 
 def pose_units(robot: Manipulator) -> str:
-    """Return the units in which a pose is typed: "mm", "degrees" or "mm and degrees"."""
+    """Return the units in which a pose is entered: "mm", "degrees" or "mm and degrees"."""
     words = {"m": "mm", "rad": "degrees"}
     return " and ".join(dict.fromkeys(words[unit] for unit in robot.units))
 
 
 def _number(text: str, name: str, expected: str) -> float:
+    """Return a text as a finite number; a `DataError` says what is expected."""
     try:
         value = float(text)
     except ValueError:
@@ -216,16 +217,17 @@ def _number(text: str, name: str, expected: str) -> float:
 
 
 def state_in_motion(state: ViewerState, motion: Motion, time: float) -> ViewerState:
-    """Return the machine as it is at a time of a motion, s from its beginning."""
+    """Return the machine's state in a motion at a time, s from its beginning."""
     pose, velocity, acceleration = motion.at(motion.time[0] + time)
     return replace(state, pose=pose, velocity=velocity, acceleration=acceleration, message="")
 
 
 def stop_motion(state: ViewerState, message: str = "") -> ViewerState:
-    """Return the machine at rest where it is."""
+    """Return the machine at rest at its present pose."""
     return _stop_at(state, state.pose, message)
 
 
 def _stop_at(state: ViewerState, pose: Array, message: str = "") -> ViewerState:
+    """Return the state at rest at a pose, with a message."""
     zeros = np.zeros_like(pose)
     return replace(state, pose=pose, velocity=zeros, acceleration=zeros, message=message)

@@ -27,7 +27,7 @@ STANDARD_CYCLE = "adept"
 
 
 class Viewer:
-    """A machine on a page that is being served; `view` makes it.
+    """A machine on a page that is being served, as `view` returns it.
 
     All tabs show the same machine, and a new tab shows it as it is.
 
@@ -61,7 +61,7 @@ class Viewer:
 
     @classmethod
     def _served_viewer(cls, live: Live, url: str, port: int) -> Viewer:
-        """Return the viewer of a machine whose page another one serves."""
+        """Return the viewer of a machine whose page another viewer's server serves."""
         viewer = cls.__new__(cls)
         viewer._live, viewer._server, viewer.beside = live, None, ()
         viewer.url, viewer.port = url, port
@@ -80,12 +80,12 @@ class Viewer:
 
     @property
     def state(self) -> ViewerState:
-        """The state that is shown."""
+        """The present state."""
         return self._live.session.state
 
     @property
     def home(self) -> Array:
-        """The pose, (m,), to which `Home` leads."""
+        """The pose, (m,), of the button `Home`."""
         return self._live.session.home
 
     @property
@@ -94,17 +94,17 @@ class Viewer:
         return tuple(self._live.faults)
 
     def move_to(self, pose: PoseLike) -> None:
-        """Move the platform to a pose (m,), m and rad, or as near to it as it goes."""
+        """Move the platform to a pose (m,), m and rad, or to the nearest reachable one."""
         target = np.asarray(pose, dtype=float)
         self._live.queue_action("move_to", lambda: self._live.session.set_pose(target))
 
     def play(self, motion: Motion | Simulation, title: str = "motion") -> None:
-        """Play a motion, or what a simulation did, again and again."""
+        """Play a motion, or a simulation's motion, repeatedly."""
         path = motion.motion if isinstance(motion, Simulation) else motion
         self._live.queue_action("load", lambda: self._live.session.take(path, title))
 
     def wait(self, timeout: float | None = None) -> bool:
-        """Wait until all that was asked for is done and sent to the page; say whether it is.
+        """Wait until all actions are done and sent to the page; return whether they are.
 
         Parameters
         ----------
@@ -123,6 +123,7 @@ class Viewer:
 
 
 def _render_side_by_side(names: Sequence[str]) -> str:
+    """Return the HTML page that shows viewers of several names side by side."""
     return template("beside.html.j2", "viewer").render(names=names)
 
 
@@ -199,6 +200,7 @@ def view(
 def _session(
     robot: RobotLike, payload: float, motion: Motion | Simulation | str | Path | None
 ) -> Session:
+    """Return the session of a machine with its payload and motion."""
     session = Session(as_manipulator(robot), payload)
     if isinstance(motion, Motion | Simulation):
         session.take(motion.motion if isinstance(motion, Simulation) else motion, "motion")
@@ -212,6 +214,7 @@ def _session(
 def _comparison(
     session: Session, compare: RobotLike | None, enlarge: float | None
 ) -> tuple[Manipulator, float] | None:
+    """Return the machine to compare with and the factor that enlarges differences; None if none."""
     if compare is None:
         return None
     robot, other = session.state.robot, as_manipulator(compare)

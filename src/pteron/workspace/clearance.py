@@ -164,6 +164,7 @@ def interference(robot: RobotLike, radii: Thickness | None = None) -> tuple[Cond
 
 
 def _to_radii(robot: Manipulator, thickness: Thickness | None) -> Radii:
+    """Return the radii of a machine's bodies, m: its file's, or a thickness for all or by name."""
     if thickness is None:
         return robot.radii or Radii()
     if isinstance(thickness, Radii):

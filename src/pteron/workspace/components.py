@@ -22,7 +22,7 @@ lattice, in which a cell is inside only where boxes fill it."""
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Component(Result):
-    """A part of the workspace in which a path leads from any pose to any other.
+    """A path-connected part of the workspace.
 
     Attributes
     ----------
@@ -125,7 +125,7 @@ def components(paving: Paving, *, smallest: float = 0.0) -> Components:
 
 
 class Lattice(NamedTuple):
-    """Equal cells over what is not proved outside."""
+    """Equal cells that cover everything not proved outside."""
 
     start: Array
     """(k,): the least corner of the first cell."""
@@ -138,7 +138,7 @@ class Lattice(NamedTuple):
 
 
 def lattice(paving: Paving, most: int = _CELLS) -> Lattice:
-    """Return a paving as a lattice, as fine as the smallest boxes, or as `most` cells allow."""
+    """Return a paving as a lattice with the spacing of its smallest boxes, or `most` cells."""
     moving = [paving.robot.coordinates.index(axis) for axis in paving.axes]
     start, extent = paving.box[0, moving], (paving.box[1] - paving.box[0])[moving]
     sizes = [list(paving.group_by_size(boxes)) for boxes in (paving.inner, paving.boundary)]
@@ -164,7 +164,7 @@ def _filled_shares(
     first: NDArray[np.int64],
     shape: tuple[int, ...],
 ) -> Array:
-    """Return which share of each cell boxes fill, given as by `Paving.by_size`."""
+    """Return the share of each cell that boxes fill, grouped as by `Paving.group_by_size`."""
     shares = np.zeros(int(np.prod(shape)))
     strides = np.cumprod(np.append(1, shape[:0:-1]))[::-1]
     for depth, places in sizes:

@@ -74,13 +74,14 @@ EDGES = ("stretched", "folded", _CAUSES["reach"])
 
 
 def _clause(edge: Edge) -> str:
+    """Return the phrase for the edge of a condition, such as "at the edge of its reach"."""
     return _CAUSES.get(edge.cause, edge.cause).format(edge.noun)
 
 
 def conditions(
     robot: RobotLike, *, type_i: float = 0.0, type_ii: float = 0.0
 ) -> tuple[Condition, ...]:
-    """Return the conditions on a pose: every leg's reach, the limits of all joints, and two floors.
+    """Return the conditions on a pose: each leg's reach, all joints' limits, and two floors.
 
     Parameters
     ----------
@@ -123,7 +124,7 @@ def conditions(
 
 @lru_cache(maxsize=64)
 def _edges(layout: Manipulator) -> tuple[Condition, ...]:
-    """Return the conditions of reach and limits: a search asks for those of many machines."""
+    """Return the conditions of reach and limits, cached for machines of a topology."""
     pose = ca.SX.sym("pose", layout.freedom)
     return tuple(
         Condition(edge.leg, _clause(edge), "room", "room", k)
@@ -132,7 +133,7 @@ def _edges(layout: Manipulator) -> tuple[Condition, ...]:
 
 
 def condition_margins(robot: Manipulator, required: Sequence[Condition], poses: Array) -> Array:
-    """Return the margins (..., C) to which poses keep conditions; NaN where undefined."""
+    """Return the margins (..., C) by which poses keep conditions; NaN where undefined."""
     margins = []
     results = {
         what: dict(zip((port.name for port in kernel.outputs), kernel(poses), strict=True))
@@ -152,7 +153,7 @@ def condition_margins(robot: Manipulator, required: Sequence[Condition], poses: 
 
 
 def keeps(robot: Manipulator, required: Sequence[Condition], poses: Array) -> NDArray[np.bool_]:
-    """Return which poses (...) keep all conditions, by ordinary evaluation."""
+    """Return which poses (...) keep all conditions, by floating-point evaluation."""
     return np.asarray((condition_margins(robot, required, poses) >= 0.0).all(axis=-1))
 
 
@@ -194,7 +195,7 @@ class IntervalTest:
         return outside, open_
 
     def undecided_conditions(self, low: Array, high: Array) -> NDArray[np.bool_]:
-        """Return which conditions (B, C) may fail in a part of a box where they are defined.
+        """Return which conditions (B, C) may fail in a box, where they are defined.
 
         A limit is not undefined by itself, but out of reach: it is the reach that ends there.
         """

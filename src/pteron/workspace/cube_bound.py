@@ -18,7 +18,7 @@ _WIDER = 1e-9
 
 
 def cube_bound(paving: Paving) -> float:
-    """Return an edge, m, that no cube along the pose's axes in a paved workspace exceeds.
+    """Return an upper bound, m, on the edge of axis-parallel cubes in a paved workspace.
 
     Cubes whose edges are along the pose's coordinates are bounded, as `largest_cube` finds them; in
     a plane, squares. Such a cube of edge a holds, along each axis, at least floor(a / h) - 1 whole
@@ -62,7 +62,7 @@ def cube_bound(paving: Paving) -> float:
 
 
 def _has_block(cells: Lattice, edge: float) -> bool:
-    """Return whether some block as a cube along the axes must hold may be all inside."""
+    """Return whether the lattice has a block of possible cells that a cube of an edge needs."""
     counts = np.maximum(np.floor(edge / cells.size).astype(int) - 1, 0)
     if not counts.all():
         return True

@@ -103,11 +103,11 @@ class SemiInfiniteProgram:
         return self.conditions.rows(geometry, samples.shape_poses(center, edge), self.side)
 
     def keeps(self, samples: Samples, z: Array) -> bool:
-        """Return whether all rows are kept; one that is NaN, out of reach, is not."""
+        """Return whether all rows are kept; a NaN row, out of reach, is not."""
         return bool((self.rows(samples, z) >= -EXACT).all())
 
     def failing_samples(self, z: Array) -> Samples:
-        """Return points of the shape that fail between those of a lattice that do not.
+        """Return points of the shape that fail between the points of a lattice.
 
         Known ones are among them, where the shape holds them and they still fail.
         """
@@ -147,7 +147,7 @@ class SemiInfiniteProgram:
 
 @one_thread()
 def improve_unknowns(program: SemiInfiniteProgram, samples: Samples, dense: Samples) -> Array:
-    """Return unknowns of a smaller objective, which keep the conditions at all samples.
+    """Return unknowns with a smaller objective that keep the conditions at all samples.
 
     Each round goes towards the solution of a program with few conditions as far as all of them are
     kept, so that what it has reached can always be used.
@@ -184,7 +184,7 @@ def improve_unknowns(program: SemiInfiniteProgram, samples: Samples, dense: Samp
 def _feasible_step(
     program: SemiInfiniteProgram, samples: Samples, feasible: Array, z: Array
 ) -> float:
-    """Return how far one may go from good unknowns to others, as a share of the step."""
+    """Return the feasible fraction of a step from feasible unknowns, by bisection."""
     if program.keeps(samples, z):
         return 1.0
     step = z - feasible
@@ -197,7 +197,7 @@ def _feasible_step(
 def _cut_step(
     program: SemiInfiniteProgram, samples: Samples, feasible: Array, z: Array, length: float
 ) -> float:
-    """Return a shorter step, at whose end nothing fails between the samples either."""
+    """Return a shorter step's fraction, at whose end nothing fails between the samples either."""
     for _ in range(_CUTS):
         length *= 0.6
         shorter = feasible + length * (z - feasible)
@@ -207,7 +207,7 @@ def _cut_step(
 
 
 def _worst_rows(rows: Array) -> set[tuple[int, int]]:
-    """Return points and rows: of each row the points where it is least."""
+    """Return (point, row) pairs: for each row the points where it is least."""
     sortable = np.where(np.isnan(rows), np.inf, rows).T
     count = min(_PER_ROW, sortable.shape[1])
     last = np.partition(sortable, count - 1, axis=1)[:, count - 1]
@@ -226,7 +226,7 @@ def _solve_subproblem(
     feasible: Array,
     share: float,
 ) -> Array:
-    """Return the solution with conditions at some points alone, near good unknowns."""
+    """Return the solution with the conditions at a subset of points, near feasible unknowns."""
     lengths = samples.units.shape[1]
     points, where = np.unique([i for i, _ in pairs], return_inverse=True)
     rows = np.array([r for _, r in pairs])

@@ -65,7 +65,7 @@ def largest_fit(
     shape: Shape,
     starts: int = 1,
 ) -> Fit:
-    """Return the largest shape whose poses all keep the conditions, at every orientation.
+    """Return the largest shape whose poses keep all conditions at every orientation.
 
     A grid finds where it is and about how large; then its centre and edge are unknowns of a program
     with exact slopes. At 13 points along each edge all conditions are kept, and so far as slopes
@@ -133,7 +133,7 @@ def proved_fit(
     shares: Iterable[float],
     freedom: int,
 ) -> tuple[Fit, tuple[Proof, ...]] | None:
-    """Return the largest fit that is found and proved, with its proofs; None where there is none.
+    """Return the largest fit that is proved, with its proofs; None if there is none.
 
     `search` takes poses (F, m) that fail, and returns the largest fit that holds none of them;
     `prove` takes a fit and returns its proofs, of which the last one does not hold, or all do.
@@ -162,14 +162,14 @@ def proved_fit(
 
 
 def _least(rows: Array) -> float:
-    """Return the least row; a NaN, which is out of reach, is below 0."""
+    """Return the least of all rows; a NaN, out of reach, counts as -1."""
     return float(np.nan_to_num(rows, nan=-1.0).min())
 
 
 def _fits_on_grid(
     program: Callable[[Fit], SemiInfiniteProgram], ball: tuple[Array, float], side: float, most: int
 ) -> list[Fit]:
-    """Return about the largest cubes: their middles are the grid's points furthest from failure."""
+    """Return approximate largest cubes, centred at the grid points with the largest margins."""
     low, high = ball[0] - ball[1], ball[0] + ball[1]
     fits = [Fit(ball[0], 0.0, side, -np.inf)]
     tested = program(fits[0])

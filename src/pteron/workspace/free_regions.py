@@ -73,7 +73,7 @@ class FreeRegion(Result):
 def free_of_singularities(
     robot: RobotLike, region: Box | ArrayLike, *, floor: float = 0.0, most: int = 100_000
 ) -> FreeRegion:
-    """Prove that a region of poses is free of type-II singularities, or return one that it holds.
+    """Return whether a region is proved free of type-II singularities, or a singular pose in it.
 
     Parameters
     ----------
@@ -143,6 +143,7 @@ def free_of_singularities(
 
 
 def _refutation(robot: Manipulator, pose: Array, examined: int) -> FreeRegion:
+    """Return the result that a region is not free of type-II singularities: a pose refutes it."""
     measure = abs(float(numeric(robot, "type_ii")(pose)[0]))
     return FreeRegion(False, pose, measure, examined, np.empty((0, 2, robot.freedom)))
 
@@ -155,7 +156,7 @@ def _reachable_measures(robot: Manipulator, poses: Array) -> Array:
 
 
 def _singular_between_samples(robot: Manipulator, region: Array) -> Array | None:
-    """Return a singular pose between random ones of the region, where they have either sign."""
+    """Return a singular pose between random poses of opposite sign, or None."""
     rng = np.random.default_rng(0)
     poses = rng.uniform(region[0], region[1], (_SAMPLES, robot.freedom))
     measures = _reachable_measures(robot, poses)
@@ -178,7 +179,7 @@ def _singular_between_samples(robot: Manipulator, region: Array) -> Array | None
 
 
 def _singular_by_steps(robot: Manipulator, region: Array, boxes: Array) -> Array | None:
-    """Return a singular pose of the region to which Newton's steps lead from boxes' middles."""
+    """Return a singular pose of the region, by Newton's method from boxes' middles."""
     chosen = boxes[np.linspace(0, len(boxes) - 1, min(len(boxes), _STARTS)).astype(int)]
     poses = chosen.mean(axis=1)
     smooth = smooth_conditions(robot, conditions(robot, type_ii=_SINGULAR)[-1:])
@@ -196,7 +197,7 @@ def _singular_by_steps(robot: Manipulator, region: Array, boxes: Array) -> Array
 
 
 def _least_singular(robot: Manipulator, poses: Array) -> Array | None:
-    """Return the pose of a batch at which the measure is least, if it vanishes there."""
+    """Return the pose of a batch with the least measure if it is singular, else None."""
     sizes = np.abs(_reachable_measures(robot, poses))
     if np.isnan(sizes).all():
         return None

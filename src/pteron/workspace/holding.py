@@ -34,7 +34,7 @@ _NEAR = 512
 
 @dataclass(frozen=True)
 class Holding:
-    """How the drives hold the platform, in units and numbers that do not depend on the machine.
+    """How well the drives hold the platform, in quantities comparable between machines.
 
     Attributes
     ----------
@@ -68,7 +68,7 @@ class Holding:
 
 
 def measure_holding(robot: Manipulator, home: Array) -> Holding:
-    """Return how the drives hold the platform at home (m,) and about it."""
+    """Return how well the drives hold the platform at home (m,) and near it."""
     poses = home[None]
     length, distance, everywhere = _singular_distances(geometry_only(robot), tuple(home.tolist()))
     nearby = _poses_near_home(robot, home)
@@ -92,7 +92,7 @@ def measure_holding(robot: Manipulator, home: Array) -> Holding:
 
 @lru_cache(maxsize=256)
 def _singular_distances(robot: Manipulator, home: tuple[float, ...]) -> tuple[float, float, float]:
-    """Return L, the changes of coordinates that make home and any pose at all singular, m."""
+    """Return L, and the distances to singularity, m: at home, and the greatest of all poses."""
     poses = np.array([home])
     drawn = draw_poses(robot, _POSES, np.random.default_rng(0), limits=False)
     distances = coordinate_distances(robot, np.vstack([poses, drawn]))
@@ -110,6 +110,7 @@ def _poses_near_home(robot: Manipulator, home: Array) -> Array:
 
 
 def _weight(robot: Manipulator) -> float:
+    """Return the weight, N, of the platform and all bodies of the legs."""
     masses = [getattr(body, "mass", 0.0) for leg in robot.legs for body in leg.bodies.values()]
     mass = robot.platform.total_inertia.mass + sum(masses)
     return float(mass * np.linalg.norm(robot.gravity))
@@ -123,7 +124,7 @@ def _holding_forces(robot: Manipulator, poses: Array) -> Array:
 
 
 def expect_regular(robot: Manipulator, home: Array) -> None:
-    """Refuse a machine that rounding of its file makes singular in every pose.
+    """Refuse a machine that is singular in every pose up to the rounding of its file.
 
     Raises
     ------
@@ -152,7 +153,7 @@ def expect_regular(robot: Manipulator, home: Array) -> None:
 
 
 def holding_warnings(of: Holding) -> tuple[str, ...]:
-    """Return warnings of a platform that is held badly at home, or singular within a tolerance."""
+    """Return warnings of a platform that drives hold badly at home, or nearly singular there."""
     warnings = []
     if of.everywhere <= INACCURATE * of.rounding:
         warnings.append(
@@ -184,5 +185,5 @@ def holding_warnings(of: Holding) -> tuple[str, ...]:
 
 
 def _length(metres: float) -> str:
-    """Return a length in words, in um below a tenth of a millimetre."""
+    """Return the text of a length, in um below 0.1 mm."""
     return f"{1e6 * metres:.2g} um" if metres < 1e-4 else f"{1e3 * metres:.2g} mm"

@@ -114,7 +114,7 @@ class HomePoses(Result):
 
 
 def home_pose(robot: RobotLike) -> Array:
-    """Return the pose with the best margin, rounded where that costs next to nothing.
+    """Return the pose with the best margin, rounded where that costs little of it.
 
     A machine's file may name it (`[home] pose`). Else the margin decides, the smallest of the
     type-I and type-II measures and of the joints' margins (see `PoseMargins`) and, where the
@@ -186,7 +186,7 @@ def home_poses(robot: RobotLike) -> HomePoses:
 
 
 def expect_usable(robot: Manipulator, pose: Array) -> None:
-    """Refuse a home pose (m,) of a file that legs do not reach, or that passes limits."""
+    """Refuse a file's home pose (m,) that is out of reach or beyond limits."""
     least = float(_worth(robot, pose[None])[0])
     if least <= 0.0:
         margins = pose_margins(robot, pose)
@@ -203,7 +203,7 @@ def expect_usable(robot: Manipulator, pose: Array) -> None:
 
 @lru_cache(maxsize=256)
 def _cached_home_poses(robot: Manipulator) -> tuple[tuple[float, ...], tuple[float, ...] | None]:
-    """Return both poses, worked out before, in another process too, or now."""
+    """Return both home poses, from the cache on disk if they are there."""
     key, packages = ("home_poses", geometry_only(robot)), ("dynamics", "kinematics", "workspace")
     return cached_result(key, packages, lambda: _both_sides(robot))
 
@@ -240,7 +240,7 @@ def _both_sides(robot: Manipulator) -> tuple[tuple[float, ...], tuple[float, ...
 
 
 def _are_mirrored(robot: Manipulator, poses: Array, margins: Array, side: Array) -> bool:
-    """Return whether poses (K, m) on both sides of the base are good, and none leads across."""
+    """Return whether good poses (K, m) lie on both sides of the base, without a path across."""
     branched = any(len(leg.branches) > 1 for leg in robot.legs)
     most = margins.max()
     good = margins >= (_BRANCHED_SIDE if branched else _SIDE) * most
@@ -257,13 +257,13 @@ def _are_mirrored(robot: Manipulator, poses: Array, margins: Array, side: Array)
 
 
 def _leads(robot: Manipulator, start: Array, end: Array, least: float) -> bool:
-    """Return whether poses on the straight line between two poses (m,) keep a margin."""
+    """Return whether all poses on the straight line between two poses (m,) keep a margin."""
     line = np.linspace(start, end, _BETWEEN)
     return bool((_worth(robot, line) > least).all())
 
 
 def _candidates(robot: Manipulator) -> Array:
-    """Return poses (K, m) among which the search begins, best first, closed forms before others."""
+    """Return the initial candidates (K, m) of the search, best first, closed forms foremost."""
     on_axis = axis_poses(robot)
     worth = _worth(robot, on_axis)
     mid_range = mid_range_poses(robot, on_axis[np.argsort(-worth, kind="stable")])
@@ -274,7 +274,7 @@ def _candidates(robot: Manipulator) -> Array:
 
 
 def _starts(robot: Manipulator, candidates: Array) -> Array:
-    """Return the best candidates on each side of the base, level and not, each far from others."""
+    """Return the best candidates on each side of the base, level and not, far apart."""
     side = sides(robot, candidates)
     level = ~candidates[:, robot.platform.angular].any(axis=-1)
     starts = []
@@ -285,17 +285,17 @@ def _starts(robot: Manipulator, candidates: Array) -> Array:
 
 
 def has_exact_home(robot: Manipulator) -> bool:
-    """Return whether home is a pose of its own: named in the file, or level where it tilts."""
+    """Return whether home is defined by itself: in the file, or as the level pose."""
     return robot.home is not None or bool(_tilting_angles(robot).any())
 
 
 def _tilting_angles(robot: Manipulator) -> NDArray[np.bool_]:
-    """Return which coordinates (m,) are 0 where the platform is level: none if it cannot tilt."""
+    """Return which coordinates (m,) are 0 at level poses: none if it cannot tilt."""
     return robot.platform.angular & robot.platform.tilts
 
 
 def _refine_level_starts(robot: Manipulator, starts: Array) -> Array:
-    """Return level poses of locally best margins, from those starts (S, m) that are level.
+    """Return level poses with locally best margins, from the level starts among (S, m).
 
     There are none of a platform that does not tilt: all its starts are improved as they are.
     """
@@ -306,7 +306,7 @@ def _refine_level_starts(robot: Manipulator, starts: Array) -> Array:
 
 
 def _simplest(robot: Manipulator, refined: Array, candidates: Array) -> Array:
-    """Return the simplest pose (m,) of nearly the best margin, near local optima and candidates."""
+    """Return the simplest pose (m,) with nearly the best margin, of optima and candidates."""
     margins = _worth(robot, refined)
     most = float(margins.max())
     level = _best_level_poses(robot, refined)
@@ -346,7 +346,7 @@ def _least_travel(robot: Manipulator, poses: Array) -> Array:
 
 
 def _best_level_poses(robot: Manipulator, poses: Array) -> Array:
-    """Return locally best poses whose angles are all 0; none where the platform does not tilt."""
+    """Return locally best poses with all angles 0; none if the platform does not tilt."""
     tilting = _tilting_angles(robot)
     if not tilting.any():
         return poses[:0]
@@ -382,13 +382,13 @@ def _move_onto_axis(robot: Manipulator, poses: Array) -> Array:
 
 
 def _distinct(poses: Array, spacing: Array) -> Array:
-    """Return the poses (K, m) but for those that are near one before them."""
+    """Return poses (K, m) without those near an earlier pose."""
     is_near = np.asarray((np.abs(poses[:, None] - poses) <= spacing).all(axis=-1))
     return poses[[not is_near[i, :i].any() for i in range(len(poses))]]
 
 
 def _worth(robot: Manipulator, poses: Array) -> Array:
-    """Return the least margin (...), which is 0 at most where the platform is turned back."""
+    """Return the least margin (...), at most 0 where the platform is turned back."""
     least = pose_margins(robot, poses).least
     turned_share = np.abs(poses[..., robot.platform.angular]) / np.pi
     worth = np.minimum(least, 1.0 - turned_share.max(axis=-1, initial=0.0))
@@ -396,19 +396,19 @@ def _worth(robot: Manipulator, poses: Array) -> Array:
 
 
 def longest_leg(robot: Manipulator) -> float:
-    """Return the length of the longest leg, m, which lengths of a home are in proportion to."""
+    """Return the length of the longest leg, m, the scale of home's lengths."""
     return max(leg.size for leg in robot.legs) or 1.0
 
 
 def _steps(robot: Manipulator, share: float, radians: float) -> Array:
-    """Return a step of each of the pose's coordinates, lengths as a share of the longest leg."""
+    """Return a step of each pose coordinate; lengths are a share of the longest leg."""
     return np.where(robot.platform.angular, radians, share * longest_leg(robot))
 
 
 def _refine_poses(
     robot: Manipulator, starts: Array, moved: NDArray[np.bool_] | None = None
 ) -> Array:
-    """Return poses (S, m) of locally best margins, by moving those coordinates that are marked."""
+    """Return poses (S, m) with locally best margins, varied in the marked coordinates."""
     movable = np.ones(robot.freedom, dtype=bool) if moved is None else moved
     units = _steps(robot, 1.0, 1.0)[movable]
 

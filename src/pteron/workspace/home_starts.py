@@ -44,7 +44,7 @@ _ACROSS = 1e-6
 
 
 def axis_poses(robot: Manipulator) -> Array:
-    """Return level poses (K, m) whose platform points have their mean on the machine's axis.
+    """Return level poses (K, m) that centre the platform points on the machine's axis.
 
     The axis is the platform's, through the centre of the ball that holds the reach.
     """
@@ -80,13 +80,13 @@ def grid_poses(robot: Manipulator) -> Array:
 
 
 def random_box_poses(robot: Manipulator) -> Array:
-    """Return random poses (K, m) of the box that holds the reach, in reach or not."""
+    """Return random poses (K, m) in the box of the reach, not necessarily in reach."""
     low, high = widest_box(robot)
     return np.random.default_rng(0).uniform(low, high, (_RANDOM, robot.freedom))
 
 
 def mid_range_poses(robot: Manipulator, starts: Array) -> Array:
-    """Return poses (K, m) with all joints in the middle of their ranges, from the first starts.
+    """Return poses (K, m) with all joints at mid-range, from several starts.
 
     A joint without limits has its zero for a middle.
     """
@@ -100,7 +100,7 @@ def mid_range_poses(robot: Manipulator, starts: Array) -> Array:
 
 
 def sides(robot: Manipulator, poses: Array) -> Array:
-    """Return on which side of the base the platform is at poses (K, m): 1, -1, or 0 for neither.
+    """Return the side of the base of the platform at poses (K, m): 1, -1, or 0 for neither.
 
     1 is the side along the platform's axis; of a platform that moves across its axis alone, the
     side against gravity. The base is the mean of the guide points, of sliders that of where they

@@ -33,7 +33,7 @@ _SHARES = 40
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Inscribed(Result):
-    """The largest shape that was found in the workspace.
+    """The largest shape in the workspace, by a search, with its proof.
 
     Attributes
     ----------
@@ -184,6 +184,7 @@ def _largest_shape(
     proved: bool,
     own_conditions: tuple[Condition, ...] | None,
 ) -> Inscribed:
+    """Return the largest shape of a kind at the orientation of a pose; `proved` proves it."""
     expect_places(robot, "it only turns; ask for its `largest_tilt`")
     expect_share("tolerance", tolerance)
     required = conditions(robot) if own_conditions is None else own_conditions

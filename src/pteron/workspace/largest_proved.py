@@ -26,7 +26,7 @@ def largest_proved(
     shares: Iterable[float],
     report: Callable[[float], None] = lambda share: None,
 ) -> tuple[float, Proof]:
-    """Return the size of the largest region that is proved to keep conditions, and its proof.
+    """Return the size of the largest region proved to keep conditions, with its proof.
 
     `region` and `poses` return the region of a size and poses (K, m) of it. The size is sought up
     to `most` by bisection, and the proof with these shares of it, the largest first. The proof does

@@ -31,7 +31,7 @@ are lower than those next to a tube."""
 def failing_places(
     slopes: Callable[[Array], tuple[Array, ...]], axes: Sequence[Array], rows: Array
 ) -> Array:
-    """Return positions (H, k) between the points of a lattice where a condition's row is below 0.
+    """Return positions (H, k) between lattice points where a condition's row is below 0.
 
     `slopes` takes positions (N, k) and returns rows (N, R) and their slopes (N, R, k); `axes` are
     the lattice's coordinates, evenly spaced, and `rows` (n1, ..., nk, R) the conditions at its

@@ -37,7 +37,7 @@ def layout_warnings(robot: Manipulator, home: Array) -> tuple[str, ...]:
 
 
 def _swap_warnings(robot: Manipulator) -> Iterator[str]:
-    """Yield the pairing of guide and platform points that has more symmetry than the file's."""
+    """Yield a pairing of guide and platform points with more symmetry than the file's."""
     count = len(robot.legs)
     if count < _FEWEST:
         return
@@ -59,6 +59,7 @@ def _swap_warnings(robot: Manipulator) -> Iterator[str]:
 
 
 def _pairings(count: int) -> Iterator[tuple[int, ...]]:
+    """Yield pairings of guide points with platform points: all, or swaps if legs are many."""
     if count <= _ALL:
         yield from permutations(range(count))
         return
@@ -69,7 +70,7 @@ def _pairings(count: int) -> Iterator[tuple[int, ...]]:
 
 
 def _figures(robot: Manipulator, *, middles: bool = True) -> tuple[Array, Array]:
-    """Return guide points and platform points (n, 3) in the platform's frame, about an axis.
+    """Return guide and platform points (n, 3) in the platform's frame, relative to its axis.
 
     Both count from the axis through their middles, or through the origins of both frames, over the
     greatest radius of each.
@@ -84,7 +85,7 @@ def _figures(robot: Manipulator, *, middles: bool = True) -> tuple[Array, Array]
 
 
 def _symmetries(base: Array, top: Array, order: Sequence[int], *, reflections: bool) -> int:
-    """Return how many turns about the axis, and reflections, lead each leg to a leg's place."""
+    """Return the number of turns, and reflections, that map each leg onto a leg."""
     legs = np.hstack([base, top[list(order)]])
     images = [_images(legs, turn) for turn in _turns(len(legs))]
     if reflections:
@@ -94,6 +95,7 @@ def _symmetries(base: Array, top: Array, order: Sequence[int], *, reflections: b
 
 
 def _turns(count: int) -> list[Array]:
+    """Return the rotation matrices (2, 2) of the multiples of a turn over `count`."""
     angles = 2.0 * np.pi * np.arange(count) / count
     return [np.array([[np.cos(a), -np.sin(a)], [np.sin(a), np.cos(a)]]) for a in angles]
 
@@ -104,7 +106,7 @@ def _mirror(angle: float) -> Array:
 
 
 def _images(legs: Array, plane: Array) -> tuple[int | None, ...]:
-    """Return the leg at whose place each leg (n, 6) is after a map of the plane; None: nowhere."""
+    """Return the leg onto which a map of the plane takes each leg (n, 6), or None."""
     image = legs.copy()
     for k in (0, 3):
         image[:, k : k + 2] = legs[:, k : k + 2] @ plane.T
@@ -113,7 +115,7 @@ def _images(legs: Array, plane: Array) -> tuple[int | None, ...]:
 
 
 def _place_warnings(robot: Manipulator) -> Iterator[str]:
-    """Yield the one leg that is out of place, where turns lead all others to one another's."""
+    """Yield a warning of the single leg that a symmetry of all other legs does not map."""
     count = len(robot.legs)
     if count <= _ALL:
         return  # of few legs, two or three in equal places are common
@@ -134,7 +136,7 @@ def _place_warnings(robot: Manipulator) -> Iterator[str]:
 
 
 def _crossing_warnings(robot: Manipulator, home: Array) -> Iterator[str]:
-    """Yield pairs of legs whose links cross at home, of machines that move in space."""
+    """Yield pairs of legs whose links cross at home, of spatial machines."""
     if robot.platform.plane_normal is not None:
         return
     links = [_segments(points) for points in numeric(robot, "joint_points")(home)[0]]
@@ -149,6 +151,7 @@ def _crossing_warnings(robot: Manipulator, home: Array) -> Iterator[str]:
 
 
 def _segments(points: Array) -> list[tuple[Array, Array]]:
+    """Return a leg's links as pairs of points (3,), without very short links and NaN points."""
     points = points[np.isfinite(points).all(axis=-1)]
     lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
     least = CROSSING * lengths.max(initial=0.0)
@@ -156,7 +159,7 @@ def _segments(points: Array) -> list[tuple[Array, Array]]:
 
 
 def _distance(start: Array, end: Array, other: Array, other_end: Array) -> float:
-    """Return the distance of two links that cross away from their ends, m; else infinity."""
+    """Return the distance, m, of two links that cross between their ends; else infinity."""
     way, other_way, offset = end - start, other_end - other, other - start
     system = np.array([[way @ way, -way @ other_way], [way @ other_way, -other_way @ other_way]])
     if abs(np.linalg.det(system)) < CROSSING**2 * (way @ way) * (other_way @ other_way):
@@ -170,7 +173,7 @@ def _distance(start: Array, end: Array, other: Array, other_end: Array) -> float
 
 
 def _length_warnings(robot: Manipulator) -> Iterator[str]:
-    """Yield lengths of one leg that differ from those of all others, which are equal."""
+    """Yield lengths of a leg that differ from those of all other legs, which are equal."""
     count = len(robot.legs)
     figures = _figures(robot)
     if count < _FEWEST or _symmetries(*figures, range(count), reflections=True) < _FEWEST:

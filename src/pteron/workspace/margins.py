@@ -22,7 +22,7 @@ from pteron.tolerances import ROUNDING
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PoseMargins(Result):
-    """Margins of poses to singularities and joint limits; each is 1 at best, 0 there.
+    """Margins of poses to singularities and joint limits; each is 1 at best and 0 there.
 
     Attributes
     ----------
@@ -102,12 +102,13 @@ def least_margin_text(robot: Manipulator, pose: Array) -> str:
 
 
 def _first_least(margins: Array) -> int:
-    """Return the first leg, from 1, with the least of values (n,): those of equal legs round."""
+    """Return the first leg, from 1, whose value (n,) is least up to rounding."""
     return int((margins <= margins.min() + ROUNDING).argmax()) + 1
 
 
 @lru_cache(maxsize=64)
 def _leg_sizes(robot: Manipulator) -> Array:
+    """Return the size of each leg, m, (n,)."""
     return np.array([leg.size for leg in robot.legs])
 
 
@@ -118,7 +119,7 @@ def joint_distances(robot: Manipulator, joints: Array) -> Array:
 
 
 def distance_to_limits(robot: Manipulator, poses: Array) -> Array:
-    """Return how far (..., n) legs may move until an actuated or passive joint meets its limit, m.
+    """Return the distance (..., n), m, to each leg's nearest actuated or passive joint limit.
 
     Very far without limits, and out of reach, where a joint may have no coordinate; so is a joint
     within its limits that turns with the platform alone, since no translation leads out of them.
@@ -132,7 +133,7 @@ def distance_to_limits(robot: Manipulator, poses: Array) -> Array:
 
 @lru_cache(maxsize=64)
 def _levers(robot: Manipulator) -> tuple[Array, NDArray[np.bool_]]:
-    """Return each joint's lever, m, and whether the joint turns with the platform alone."""
+    """Return each joint's lever, m, and whether only the platform's angle turns it."""
     levers = np.array([leg.lever for leg in robot.legs])
     return levers, np.array([leg.reach_bound is None for leg in robot.legs])
 

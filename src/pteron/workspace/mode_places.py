@@ -31,7 +31,7 @@ _ALIKE = 0.7
 
 @dataclass(frozen=True)
 class ModePlace:
-    """A working mode at the best of random poses.
+    """A working mode at the best of several random poses.
 
     Attributes
     ----------
@@ -63,12 +63,12 @@ class ModePlace:
 
     @property
     def signs(self) -> str:
-        """Its elbows as --elbows takes them, such as ++-."""
+        """Its elbows as text for the option --elbows, such as ++-."""
         return "".join("+" if sign > 0 else "-" for sign in self.elbows)
 
 
 def mode_places(robot: Manipulator, home: Array) -> tuple[ModePlace, ...]:
-    """Return where the platform is in each working mode, at home in the file's own.
+    """Return the platform's place in each working mode, at home for the file's mode.
 
     None of a machine that has one mode, or that gravity does not tell above from below.
     """
@@ -107,7 +107,7 @@ def mode_places(robot: Manipulator, home: Array) -> tuple[ModePlace, ...]:
 
 
 def _depth(robot: Manipulator, pose: Array) -> float:
-    """Return how far P is below the mean of the guide points, or of the sliders on them, m."""
+    """Return the depth of P, m, below the mean of the guide points or their sliders."""
     base = np.zeros(3)
     for leg, q in zip(robot.legs, inverse_kinematics(robot, pose), strict=True):
         slides = leg.joint.unit == "m" and leg.joint_axis is not None
@@ -117,7 +117,7 @@ def _depth(robot: Manipulator, pose: Array) -> float:
 
 
 def mode_warnings(modes: Sequence[ModePlace]) -> tuple[str, ...]:
-    """Return a warning that another working mode may be meant, where the platform stands upright.
+    """Return a warning that another working mode may be meant, if the platform is above its base.
 
     Most machines hang below their base. One that stands above it, and that would hang there with
     other elbows and much the same margin, was perhaps given the wrong ones.
@@ -134,4 +134,5 @@ def mode_warnings(modes: Sequence[ModePlace]) -> tuple[str, ...]:
 
 
 def _pose_text(pose: Array) -> str:
+    """Return a pose as text, to three digits."""
     return f"({', '.join(f'{coordinate:.3g}' for coordinate in pose)})"

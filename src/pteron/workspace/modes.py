@@ -32,7 +32,7 @@ _MOST = 200_000
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Contact(Result):
-    """Whether a machine can go over from one working mode to another through a type-I singularity.
+    """Whether a machine can pass between two working modes through a type-I singularity.
 
     Attributes
     ----------
@@ -82,7 +82,7 @@ def mode_pavings(
 
 
 def mode_contacts(pavings: dict[tuple[int, ...], Paving]) -> tuple[Contact, ...]:
-    """Return, for each two modes that differ in one leg, whether their workspaces meet.
+    """Return whether the workspaces of each two modes that differ in a single leg meet.
 
     They meet where that leg is at the edge of its reach and all else is kept in both. In a box in
     which nothing but this edge is undecided, and beyond which two corners lie on either side of it,
@@ -110,6 +110,7 @@ def mode_contacts(pavings: dict[tuple[int, ...], Paving]) -> tuple[Contact, ...]
 def _contact(
     first: Paving, second: Paving, elbows: tuple[tuple[int, ...], tuple[int, ...]], leg: int
 ) -> Contact:
+    """Return the contact of two working modes at a leg, by bisection of both pavings' boxes."""
     first_test, second_test = (
         interval_test(side.robot, side.conditions) for side in (first, second)
     )

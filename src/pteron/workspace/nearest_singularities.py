@@ -146,6 +146,7 @@ def nearest_singularities(
     for k, (by, vanishing) in enumerate(searches):
 
         def report_share(share: float, done: int = k) -> None:
+            """Report the share of all searches that is done."""
             report((done + share) / len(searches))
 
         nearest = _search(vanishing, reference, by, most, report_share)
@@ -158,6 +159,7 @@ def nearest_singularities(
 
 
 def _kinds(robot: Manipulator) -> Iterator[Vanishing]:
+    """Yield the functions that vanish at singular poses: type I leg by leg, type II, constraint."""
     for i in range(1, robot.joint_count + 1):
         yield Vanishing(robot, "I", i)
     yield Vanishing(robot, "II")
@@ -168,6 +170,7 @@ def _kinds(robot: Manipulator) -> Iterator[Vanishing]:
 def _singularity_of(
     robot: Manipulator, reference: Array, by: By, vanishing: Vanishing, nearest: Nearest
 ) -> NearestSingularity:
+    """Return the nearest singularity of a kind, with its distance, m or rad, and lower bound."""
     pose = np.full_like(reference, np.nan) if nearest.pose is None else nearest.pose
     distance = np.inf
     if nearest.pose is not None:
@@ -179,14 +182,14 @@ def _singularity_of(
 
 
 def _varying_coordinates(robot: Manipulator, by: By) -> NDArray[np.intp]:
-    """Return the coordinates that vary."""
+    """Return the indices of the coordinates that a translation or rotation varies."""
     return np.flatnonzero(robot.platform.angular == (by == "rotation"))
 
 
 def _search(
     vanishing: Vanishing, reference: Array, by: By, most: int, report: Callable[[float], None]
 ) -> Nearest:
-    """Return the nearest pose at which a function vanishes, moved or turned alone."""
+    """Return the nearest pose at which a function vanishes, by translation or rotation only."""
     robot, moving = vanishing.robot, _varying_coordinates(vanishing.robot, by)
     if by == "translation":
         try:

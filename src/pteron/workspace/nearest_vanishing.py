@@ -71,7 +71,7 @@ largest: of a pose on the edge."""
 
 
 class Nearest(NamedTuple):
-    """A pose at which a function vanishes; None where there is none."""
+    """A pose at which a function vanishes; None if there is none."""
 
     pose: Array | None
     measure: float
@@ -103,7 +103,7 @@ class Search:
         self.others = np.flatnonzero(others)
 
     def run(self, horizon: float, most: int) -> Nearest:
-        """Return the nearest place within the distance `horizon`, if there is one."""
+        """Return the nearest pose at which the function vanishes, within the distance `horizon`."""
         boxes, distances = self.box[None], self._distances(self.box[None])
         best, nearest, examined, rounds = None, horizon, 0, 0
         while len(boxes) and examined < most and distances.min() < (1.0 - _CLOSE) * nearest:
@@ -136,7 +136,7 @@ class Search:
     def _improve_nearest(
         self, boxes: Array, best: Array | None, nearest: float, most: int
     ) -> tuple[Array | None, float]:
-        """Return the nearest singular state and its distance, after looking into boxes (B, 2, k).
+        """Return the nearest singular state and its distance, updated from boxes (B, 2, k).
 
         From the nearest of them, `most` at most and none next to another, quadratic programs go on.
         """
@@ -169,10 +169,12 @@ class Search:
         return length, np.sqrt(np.where(most > 0.0, most, 1.0))
 
     def _pose(self, state: Array) -> Array:
+        """Return poses (..., m) of states (..., k + R)."""
         ways = self._sizes[0] * state[..., : len(self.moving)]
         return vary_coordinates(self.at, self.at[self.moving] + ways, self.moving)
 
     def _length(self, state: Array) -> float:
+        """Return the distance, m or rad, of a state's pose from the reference pose."""
         return self._sizes[0] * float(np.linalg.norm(state[: len(self.moving)]))
 
     def _values(self, states: Array) -> tuple[Array, Array, Array]:
@@ -206,7 +208,7 @@ class Search:
         )
 
     def _singular_states(self, places: Array) -> Array:
-        """Return singular states that Newton's steps, the shortest, lead to from places (K, k).
+        """Return singular states to which Newton's minimum-norm steps lead from places (K, k).
 
         Those that lead out of reach go on to where it ends: a sheet of singular poses may be in
         reach in a corner only.
@@ -229,7 +231,7 @@ class Search:
         return np.concatenate([states[singular], returned[self._is_singular(returned)]])
 
     def _solve_by_newton(self, states: Array, steps: int, *, into_reach: bool) -> Array:
-        """Return the states that Newton's steps reach from states (K, k + R).
+        """Return the states to which Newton's method leads from states (K, k + R).
 
         With `into_reach` the quantities that must not be negative count too.
         """
@@ -261,7 +263,7 @@ class Search:
         return np.asarray(vanishes & (nonnegative >= -_EDGE).all(axis=-1))
 
     def _descend(self, state: Array) -> Array:
-        """Return the nearest singular state that a descent from one finds."""
+        """Return the nearest singular state, by sequential quadratic programming from a state."""
         if len(self.moving) == 1 or self._length(state) == 0.0:
             return state
         with np.errstate(all="ignore"):
@@ -275,7 +277,7 @@ class Search:
         return state
 
     def _solve_programs(self, state: Array) -> Array:
-        """Return where sequential quadratic programs lead to."""
+        """Return the solution of sequential quadratic programming from a state."""
         # Kinematics load without SciPy.
         k, count = len(self.moving), 1 + len(self._sizes[1])
         scale = float(state[:k] @ state[:k])
@@ -306,7 +308,7 @@ class Search:
         return np.asarray(run.x)
 
     def _retract(self, state: Array) -> Array:
-        """Return a nearer singular state: by Newton's steps from places that are nearer by less.
+        """Return a nearer singular state, by Newton's method from places nearer than a state.
 
         Where the function touches zero it has no slope that quadratic programs could use.
         """
@@ -331,7 +333,7 @@ class Search:
         return vary_coordinates(self.at, boxes, self.moving)
 
     def _distances(self, boxes: Array) -> Array:
-        """Return how far the nearest places of boxes (B, 2, k) are."""
+        """Return the distances (B,) of boxes (B, 2, k) from the reference pose."""
         here = self.at[self.moving]
         gaps = np.maximum(np.maximum(boxes[:, 0] - here, here - boxes[:, 1]), 0.0)
         return np.asarray(np.linalg.norm(gaps, axis=-1))

@@ -36,7 +36,7 @@ _SMALLEST = 1e-18
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Paving(Result):
-    """The workspace of a machine, at one orientation or over an interval of them, in boxes.
+    """A machine's workspace in boxes, at an orientation or over an interval of orientations.
 
     Attributes
     ----------
@@ -83,7 +83,7 @@ class Paving(Result):
 
     @cached_property
     def causes(self) -> NDArray[np.bool_]:
-        """Whether a condition (M, C) is undecided in each box of the boundary: they name it."""
+        """Whether each condition (M, C) is undecided in each box of the boundary."""
         test, parts = interval_test(self.robot, self.conditions), []
         for start in range(0, len(self.boundary), _SLICE):
             low, high = self.corners(self.boundary[start : start + _SLICE])
@@ -91,11 +91,11 @@ class Paving(Result):
         return np.concatenate([np.empty((0, len(self.conditions)), bool), *parts])
 
     def corners(self, boxes: Array) -> tuple[Array, Array]:
-        """Return least and greatest poses (B, m), each, of boxes (B, 2, k)."""
+        """Return the least and greatest poses (B, m) of boxes (B, 2, k)."""
         return _corners(self.box, np.flatnonzero(self.box[0] < self.box[1]), boxes)
 
     def boundary_of(self, condition: Condition) -> Array:
-        """Return the boxes (B, 2, k) of the boundary in which a condition is all that is undecided.
+        """Return the boxes (B, 2, k) of the boundary in which only a condition is undecided.
 
         Where several are, edges meet.
         """
@@ -105,7 +105,7 @@ class Paving(Result):
 
     @cached_property
     def boundary_shares(self) -> dict[str, float]:
-        """Causes of the boundary: shares of its boxes in which one condition alone is undecided.
+        """The shares of the boundary's boxes in which a single condition is undecided, by cause.
 
         Conditions that end it nowhere are left out, the greatest share comes first. What is left of
         1 are boxes in which several are undecided: edges meet there, or boxes are large.
@@ -115,7 +115,7 @@ class Paving(Result):
         return dict(sorted(shares.items(), key=lambda pair: -pair[1]))
 
     def group_by_size(self, boxes: Array) -> Iterator[tuple[NDArray[np.int64], NDArray[np.int64]]]:
-        """Yield the places (P, k) of boxes (B, 2, k) of one size, in the lattice of all such boxes.
+        """Yield the lattice indices (P, k) of the boxes (B, 2, k) of each size.
 
         Before them comes how often each side of the whole was halved, (k,).
         """
@@ -128,7 +128,7 @@ class Paving(Result):
 
     @cached_property
     def _cells(self) -> list[tuple[int, NDArray[np.int64], Array]]:
-        """Boxes of one size: the verdict, how often each side was halved, and their keys."""
+        """Boxes grouped by size: the verdict, the halvings of each side, and sorted keys."""
         return [
             (verdict, depth, np.sort(_keys(cells, depth)))
             for boxes, verdict in ((self.inner, 1), (self.boundary, 0))
@@ -161,7 +161,7 @@ class Paving(Result):
 
 
 def _keys(cells: NDArray[Any], depth: NDArray[np.int64]) -> Array:
-    """Return a number for each cell (P, k) of a lattice; cells beyond it have no cell's number."""
+    """Return a unique number of each cell (P, k) of a lattice, and others for cells outside."""
     weights = np.cumprod(np.append(1.0, 2.0 ** depth[:-1] + 2.0))
     return np.asarray(np.clip(cells + 1.0, 0.0, 2.0**depth + 1.0) @ weights)
 
@@ -175,7 +175,7 @@ def paving(
     given: tuple[Condition, ...] | None = None,
     most: int = 6_000_000,
 ) -> Paving:
-    """Return the workspace at the orientation of a pose, in boxes that are proved.
+    """Return the workspace at the orientation of a pose, as boxes proved inside or outside.
 
     Boxes are halved until what is undecided is small enough beside what is inside. In each one
     interval arithmetic decides (see `pteron.kernels.bounds`): all that is kept in all of the box is
@@ -297,7 +297,7 @@ def _refine_boxes(
 
 
 def _corners(box: Array, moving: NDArray[np.intp], boxes: Array) -> tuple[Array, Array]:
-    """Return the corners (B, m), each, of boxes (B, 2, k) of the coordinates that vary."""
+    """Return the corners (B, m) of boxes (B, 2, k) of the varying coordinates."""
     return vary_coordinates(box[0], boxes[:, 0], moving), vary_coordinates(
         box[1], boxes[:, 1], moving
     )

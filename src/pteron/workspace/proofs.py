@@ -89,7 +89,7 @@ class Proof(Result):
 
     @property
     def why(self) -> str:
-        """The conditions that the counterexample fails: the leg, and by how much."""
+        """The conditions that the counterexample violates: the leg, and by how much."""
         if self.counterexample is None:
             return ""
         margins = numeric(self.robot, "reach")(self.counterexample)[0]
@@ -119,7 +119,7 @@ def prove(
     most: int = 1_000_000,
     progress: Progress | None = None,
 ) -> Proof:
-    """Prove that every pose of a region keeps reach, limits and floors, or show one that does not.
+    """Return a proof that every pose of a region keeps the conditions, or a counterexample.
 
     Interval arithmetic decides of a box as a whole; a box that it does not decide is halved. A
     counterexample is a pose that fails by ordinary evaluation and by intervals.
@@ -220,7 +220,7 @@ def _failed_conditions(
 
 
 def expect_space(robot: Manipulator, name: str) -> None:
-    """Refuse a cylinder, the argument of this name, of a machine without x, y and z in its pose."""
+    """Refuse a cylinder, an argument of this name, if the pose has no x, y and z."""
     lengths = robot.platform.lengths
     if len(lengths) != 3:
         motion, places = robot.platform.motion, ", ".join(lengths) or "no lengths"
@@ -233,7 +233,7 @@ def expect_space(robot: Manipulator, name: str) -> None:
 def _find_counterexample(
     robot: Manipulator, test: IntervalTest, region: Region, boxes: Array
 ) -> Array | None:
-    """Return a pose of the region that is proved to fail: a middle or a corner of boxes."""
+    """Return a pose of the region that is proved to fail, among boxes' middles and corners."""
     sample = boxes[:: max(len(boxes) // _TRIED, 1)]
     varies = np.flatnonzero((sample[:, 0] < sample[:, 1]).any(axis=0))
     poses = [0.5 * (sample[:, 0] + sample[:, 1])]

@@ -52,7 +52,7 @@ def quadrature_volume(
     lines: int = 200,
     given: tuple[Condition, ...] | None = None,
 ) -> Quadrature:
-    """Return the volume where the conditions hold, at the orientation of a pose: an estimate.
+    """Return an estimate of the volume where conditions hold, at the orientation of a pose.
 
     Lines along x fill the workspace's bounding box; where each one enters and leaves is found by
     halving, and the lengths inside are added up by the midpoint rule. Poses are evaluated in
@@ -102,6 +102,7 @@ def quadrature_volume(
 def _integral(
     robot: Manipulator, required: tuple[Condition, ...], reference: Array, box: Array, lines: int
 ) -> float:
+    """Return the volume of the workspace in a box (2, d), by the midpoint rule over lines."""
     steps = (box[1] - box[0])[1:] / lines
     sides = [
         low + step * (np.arange(lines) + 0.5) for low, step in zip(box[0, 1:], steps, strict=True)
@@ -121,7 +122,7 @@ def _inner_lengths(
     ends: Array,
     places: Array,
 ) -> Array:
-    """Return how much (L,) of lines along x between ends (2,), at places (L, k - 1), is inside."""
+    """Return the lengths (L,) inside of lines along x between ends (2,), at places (L, k - 1)."""
 
     def contains(x: Array, row: NDArray[np.intp]) -> NDArray[np.bool_]:
         poses = np.broadcast_to(reference, (*x.shape, len(reference))).copy()

@@ -24,7 +24,7 @@ _TOUCH = 1e-6
 
 
 def why_unreachable(robot: Manipulator) -> ModelError:
-    """Return the error for a machine that reaches no pose, or none within its joints' limits."""
+    """Return the error that a machine reaches no pose, or none within its joints' limits."""
     if not np.isfinite(robot.platform.placement(np.zeros(robot.freedom))[0]).all():
         return ModelError(
             "no pose is in reach of all legs: their planes have no place for the points of a level "
@@ -50,7 +50,7 @@ def why_unreachable(robot: Manipulator) -> ModelError:
 
 
 def _deepest(robot: Manipulator) -> tuple[Array, Array]:
-    """Return the pose whose least margin over the legs is greatest, and the random poses drawn."""
+    """Return the pose with the greatest margin of reach, and the random poses drawn."""
     center, radius = search_ball(robot)
     lengths = len(center)
     random_poses = np.random.default_rng(0).uniform(-1.0, 1.0, (_DRAWN, robot.freedom))
@@ -66,7 +66,7 @@ def _deepest(robot: Manipulator) -> tuple[Array, Array]:
 
 
 def limits_error(robot: Manipulator, poses: Array) -> ModelError:
-    """Return the error for a machine that passes joint limits at the best of poses in reach."""
+    """Return the error that a machine exceeds joint limits at all poses in reach."""
     pose = poses[distance_to_limits(robot, poses).min(axis=-1).argmax()]
     exceeded: dict[tuple[str, str], list[LimitedJoint]] = {}
     for joint in limited_joints(robot, pose):
@@ -82,7 +82,7 @@ def limits_error(robot: Manipulator, poses: Array) -> ModelError:
 
 
 def _coordinates_text(joints: list[LimitedJoint]) -> str:
-    """Return the coordinates of joints of one noun in words."""
+    """Return the text of the coordinates of joints with a common noun."""
     first, coordinates = joints[0], [joint.value for joint in joints]
     low, high = (f"{end:.4g}" for end in (min(coordinates), max(coordinates)))
     legs = f"{legs_text([joint.leg for joint in joints])}: " if first.leg else ""

@@ -36,7 +36,7 @@ Plane = str | tuple[str, str]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ReachSlice(Result):
-    """A grid of poses that differ in two of their coordinates.
+    """A grid of poses that vary in two coordinates.
 
     Attributes
     ----------
@@ -75,7 +75,7 @@ class ReachSlice(Result):
 
 
 def slice_planes(robot: Manipulator) -> tuple[Plane, ...]:
-    """Return the planes of pictures: in space three, of a planar machine one.
+    """Return the planes of slices in pictures: three in space, a single one if planar.
 
     Of a platform that tilts they are those of its lengths with two of its angles, or all pairs of
     coordinates where these are few.
@@ -90,7 +90,7 @@ def slice_planes(robot: Manipulator) -> tuple[Plane, ...]:
 
 
 def slice_coordinates(robot: Manipulator) -> tuple[str, ...]:
-    """Return the coordinates of which a slice may vary any two: lengths, and angles that tilt."""
+    """Return the coordinates that slices may vary in pairs: lengths, and tilt angles."""
     return robot.coordinates if robot.platform.tilts else robot.platform.lengths
 
 
@@ -169,11 +169,12 @@ def reach_slice(
 
 
 def _grid(center: Array, places: tuple[int, int], first: Array, second: Array) -> Array:
+    """Return poses (S, F, m) about a centre, with two coordinates varied over (F,) and (S,)."""
     return vary_coordinates(center, np.stack(np.meshgrid(first, second), axis=-1), list(places))
 
 
 def reach_sides(cut: ReachSlice) -> tuple[float, float, float, float]:
-    """Return the sides of a rectangle about the reach in a slice, with a rim."""
+    """Return the sides of a rectangle about the reach in a slice, with a margin."""
     inside = cut.status == REACHABLE
     sides: list[float] = []
     for coordinates, axis in ((cut.first, 0), (cut.second, 1)):
@@ -188,7 +189,7 @@ def reach_sides(cut: ReachSlice) -> tuple[float, float, float, float]:
 def _widest_sides(
     robot: Manipulator, pose: Array, i: int, j: int
 ) -> tuple[float, float, float, float]:
-    """Return sides about all that a slice through a pose may hold."""
+    """Return the sides of a rectangle that bounds the reach in a slice through a pose."""
     sides: list[float] = []
     limits = robot.platform.angle_limits
     for k in (i, j):

@@ -29,15 +29,15 @@ class Region(Protocol):
         """Least and greatest pose (2, m): the region lies between them."""
 
     def holds(self, poses: Array) -> NDArray[np.bool_]:
-        """Return which poses (..., m) lie in it."""
+        """Return which poses (..., m) lie in the region."""
 
     def misses(self, low: Array, high: Array) -> NDArray[np.bool_]:
-        """Return which boxes with corners (B, m) surely have no pose of it."""
+        """Return which boxes with corners (B, m) are certain not to meet the region."""
 
 
 @dataclass(frozen=True)
 class Box:
-    """All poses between two.
+    """All poses between two corner poses.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ class Box:
 
     @classmethod
     def around(cls, poses: ArrayLike, margin: ArrayLike = 0.0) -> Box:
-        """Return the least box that holds poses (..., m), such as those of a pick-and-place cycle.
+        """Return the smallest box that contains poses (..., m), such as those of a motion.
 
         With a margin (m,), or one for all coordinates, it is so much wider on each side.
         """
@@ -77,11 +77,11 @@ class Box:
         return np.array([self.low, self.high])
 
     def holds(self, poses: Array) -> NDArray[np.bool_]:
-        """Return which poses (..., m) lie in it."""
+        """Return which poses (..., m) lie in the region."""
         return np.asarray(((self.low <= poses) & (poses <= self.high)).all(axis=-1))
 
     def misses(self, low: Array, high: Array) -> NDArray[np.bool_]:
-        """Return which boxes with corners (B, m) surely have no pose of it."""
+        """Return which boxes with corners (B, m) are certain not to meet the region."""
         return np.asarray(((high < self.low) | (low > self.high)).any(axis=-1))
 
 
@@ -131,19 +131,19 @@ class Cylinder:
         return box
 
     def _axial_parts(self, poses: Array) -> tuple[Array, Array]:
-        """Return positions (..., 3) from the middle: their parts along the axis and across it."""
+        """Return components of positions (..., 3) along and across the axis, from the middle."""
         offsets, axis = poses[..., :3] - self.center[:3], np.array(self.axis)
         heights = offsets @ axis
         return heights, offsets - heights[..., None] * axis
 
     def holds(self, poses: Array) -> NDArray[np.bool_]:
-        """Return which poses (..., m) lie in it."""
+        """Return which poses (..., m) lie in the region."""
         heights, offsets = self._axial_parts(poses)
         inside = np.linalg.norm(offsets, axis=-1) <= self.radius
         return np.asarray(inside & (np.abs(heights) <= 0.5 * self.height))
 
     def misses(self, low: Array, high: Array) -> NDArray[np.bool_]:
-        """Return which boxes with corners (B, m) surely have no pose of it."""
+        """Return which boxes with corners (B, m) are certain not to meet the region."""
         heights, offsets = self._axial_parts(0.5 * (low + high))
         half, axis = 0.5 * (high - low)[:, :3], np.array(self.axis)
         slack = _WIDER * (1.0 + self.radius + self.height)
@@ -155,6 +155,7 @@ class Cylinder:
 
 
 def _checked_numbers(numbers: object, name: str) -> tuple[float, ...]:
+    """Return numbers of a sensible size as a tuple of floats; others raise a `DataError`."""
     try:
         array = np.asarray(numbers, dtype=float)
     except (TypeError, ValueError, OverflowError):

@@ -19,7 +19,7 @@ _POSES = 256
 
 
 def screw_lengths(robot: RobotLike, pose: PoseLike) -> PerJoint:
-    """Return what screws add to the rams' lengths if both ends of each are universal joints.
+    """Return the lengths that screws add to rams with universal joints at both ends.
 
     The joint at the platform has a first axis that is parallel to that of the joint at the base,
     `direction`, where the pose's angles are 0: there screws add nothing. Threads are right-handed.

@@ -24,7 +24,7 @@ class Shape(NamedTuple):
 
 
 def cube(count: int) -> Shape:
-    """Return a cube in `count` coordinates, its edges along them."""
+    """Return an axis-parallel cube in `count` coordinates."""
     return Shape(np.ones(count), lambda way: np.abs(way).max(axis=-1), np.empty((0, count)))
 
 
@@ -47,14 +47,14 @@ class Samples:
     inside: Array
 
     def shape_poses(self, center: Array, edge: float) -> Array:
-        """Return the poses (N, m) for a shape."""
+        """Return the poses (N, m) of the samples, for a shape's centre and edge."""
         poses = self.poses.copy()
         lengths = self.units.shape[1]
         poses[:, :lengths] += self.inside[:, None] * (center + 0.5 * edge * self.units)
         return poses
 
     def join(self, other: Samples) -> Samples:
-        """Return both, one after the other."""
+        """Return the samples of both, concatenated."""
         return Samples(
             np.vstack([self.poses, other.poses]),
             np.vstack([self.units, other.units]),
@@ -68,7 +68,7 @@ def lattice(shape: Shape, count: int) -> Array:
 
 
 def shape_samples(shape: Shape, orientations: Array, count: int) -> Samples:
-    """Return the points of a lattice, and of the rim, in a shape at every orientation (A, m)."""
+    """Return lattice and boundary points of a shape at every orientation (A, m)."""
     grid = np.stack(np.meshgrid(*lattice(shape, count), indexing="ij"), axis=-1)
     units = grid.reshape(-1, len(shape.half))
     units = np.vstack([units[shape.gauge(units) <= 1.0 + ROUNDING], shape.rim])
@@ -78,5 +78,5 @@ def shape_samples(shape: Shape, orientations: Array, count: int) -> Samples:
 
 
 def fixed_samples(poses: Array, lengths: int) -> Samples:
-    """Return points that do not move."""
+    """Return samples at fixed poses (N, m)."""
     return Samples(poses, np.zeros((len(poses), lengths)), np.zeros(len(poses)))

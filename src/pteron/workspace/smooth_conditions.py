@@ -21,7 +21,7 @@ from pteron.workspace.conditions import Condition, conditions
 
 
 class SmoothConditions:
-    """The conditions as rows, for a topology: all machines that differ in their geometry alone."""
+    """The conditions as rows, for all machines with a topology, which differ in geometry."""
 
     def __init__(self, robot: Manipulator, required: tuple[Condition, ...]) -> None:
         self.sides = (1.0, -1.0) if any(condition.sized for condition in required) else (1.0,)
@@ -41,7 +41,7 @@ class SmoothConditions:
         self._rows = ca.vertcat(*rows.values())
 
     def _scaled_rows(self, robot: Manipulator, floors: Mapping[int, float]) -> dict[str, ca.SX]:
-        """Return rows of reach and limits that are all about 1: a search moves better along them.
+        """Return rows of reach and limits, scaled to about 1 for searches.
 
         Squared type-I measures stand for the edges of reach; limits are shares of half a range.
         """
@@ -64,6 +64,7 @@ class SmoothConditions:
         }
 
     def _output(self, robot: Manipulator, what: str, name: str) -> ca.SX:
+        """Return an output of a machine's function, by name, as a symbolic column."""
         program = general_program(robot, what)
         inputs = {"geometry": self._symbols[2], "pose": self._symbols[0]}
         inputs["stored"] = ca.SX(ca.DM(FIXED["stored"](robot)))
@@ -71,7 +72,7 @@ class SmoothConditions:
         return ca.vec(ca.densify(outputs[[port.name for port in program.outputs].index(name)]))
 
     def rows(self, geometry: Array, poses: Array, side: float) -> Array:
-        """Return the rows (..., R); NaN where a leg does not reach and its joint has no place."""
+        """Return the rows (..., R); NaN where a leg or its joint has no solution."""
         row_values: Array = self._values(poses, geometry=geometry, side=np.array([side]))
         return row_values
 
@@ -89,17 +90,21 @@ class SmoothConditions:
 
     @cached_property
     def _values(self) -> Kernel:
+        """The compiled rows."""
         return self._kernel("vm" if compiler() is None else "c", "condition_rows", 0)
 
     @cached_property
     def _pose_slopes(self) -> Kernel:
+        """The compiled rows with their Jacobian by the pose."""
         return self._kernel("vm" if compiler() is None else "c", "condition_pose_slopes", 1)
 
     @cached_property
     def _all_slopes(self) -> Kernel:
+        """The compiled rows with their Jacobians by the pose and by the geometry."""
         return self._kernel("vm", "condition_slopes", 2)
 
     def _kernel(self, target: str, name: str, slopes: int) -> Kernel:
+        """Return the rows compiled for a target, with 0 to 2 Jacobians: by pose and by geometry."""
         pose, _, geometry = self._symbols
         variables = (pose, geometry)[:slopes]
         outputs = [self._rows, *(ca.jacobian(self._rows, symbol) for symbol in variables)]
@@ -118,7 +123,7 @@ class SmoothConditions:
 
 
 def smooth_conditions(robot: Manipulator, required: tuple[Condition, ...]) -> SmoothConditions:
-    """Return the rows of conditions for all machines that have the topology of one."""
+    """Return the rows of conditions for all machines with a machine's topology."""
     return _cached_conditions(geometry_only(robot), required)
 
 

@@ -43,7 +43,7 @@ _MOST = math.pi / 2.0
 
 @dataclass(frozen=True)
 class TiltedBall:
-    """All poses within a distance of a place that tilt by no more than an angle, to any side.
+    """All poses within a distance of a position, tilted by at most an angle to any side.
 
     The tilt is the angle between the platform's z and its direction at angles zero: of roll and
     pitch cos(tilt) = cos(roll) cos(pitch). The yaw, where the pose has one, stays.
@@ -80,14 +80,14 @@ class TiltedBall:
         return box
 
     def holds(self, poses: Array) -> NDArray[np.bool_]:
-        """Return which poses (..., m) lie in it."""
+        """Return which poses (..., m) lie in the region."""
         away = poses[..., self.lengths] - np.array(self.center)[list(self.lengths)]
         level = np.cos(poses[..., self.angles]).prod(axis=-1)
         near = (away * away).sum(axis=-1) <= self.radius**2
         return np.asarray(near & (level >= math.cos(self.tilt)))
 
     def misses(self, low: Array, high: Array) -> NDArray[np.bool_]:
-        """Return which boxes with corners (B, m) surely have no pose of it."""
+        """Return which boxes with corners (B, m) are certain not to meet the region."""
         center = np.array(self.center)[list(self.lengths)]
         ahead, behind = low[:, self.lengths] - center, center - high[:, self.lengths]
         nearest = np.maximum(np.maximum(ahead, behind), 0.0)
@@ -99,7 +99,7 @@ class TiltedBall:
     sampled = former_attribute("sampled", "sample_poses")
 
     def sample_poses(self) -> Array:
-        """Return poses (K, m) spread over it, a third of them on its rim."""
+        """Return poses (K, m) spread over the region, a third of them on its boundary."""
         free = len(self.lengths) + 2
         shares = _sobol_points(free)
         tilt = self.tilt * np.sqrt(shares[:, 0])
@@ -145,7 +145,7 @@ class LargestTilt(Result):
 
 @lru_cache(maxsize=4)
 def _sobol_points(count: int) -> Array:
-    """Return scrambled Sobol points (_SAMPLES, count), from disk if they are there.
+    """Return scrambled Sobol points (_SAMPLES, count), cached on disk.
 
     SciPy's statistics are slow to import.
     """
@@ -165,7 +165,7 @@ def largest_tilt(
     given: tuple[Condition, ...] | None = None,
     progress: Progress | None = None,
 ) -> LargestTilt:
-    """Return the largest tilt to every side at a place that is proved to lie in the workspace.
+    """Return the largest tilt, to every side at a position, proved to lie in the workspace.
 
     Parameters
     ----------
@@ -212,7 +212,7 @@ def largest_ball(
     given: tuple[Condition, ...] | None = None,
     progress: Progress | None = None,
 ) -> LargestTilt:
-    """Return the largest ball of places at each of which every tilt up to a given one is reached.
+    """Return the largest ball of positions that all allow every tilt up to an angle.
 
     Parameters
     ----------
@@ -249,6 +249,7 @@ def largest_ball(
 
 
 def _expect_tilting(robot: RobotLike, pose: PoseLike) -> tuple[Manipulator, Array]:
+    """Return a machine and a pose (m,); a platform that does not tilt to every side is refused."""
     machine = as_manipulator(robot)
     platform = machine.platform
     upright = not platform.second_axis or (
@@ -275,6 +276,7 @@ def _largest_region(
     sizes: Callable[[float], tuple[float, float]],
     report: Callable[[float], None],
 ) -> LargestTilt:
+    """Return the largest proved region of positions and tilts, of sizes up to `most`."""
     expect_share("tolerance", tolerance)
     required = conditions(robot) if own_conditions is None else own_conditions
     angular = np.flatnonzero(robot.platform.angular)

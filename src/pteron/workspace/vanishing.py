@@ -49,11 +49,11 @@ class Vanishing:
 
     @property
     def smooth(self) -> Smooth:
-        """The function, of pose and roots."""
+        """The function in terms of pose and roots."""
         return _smooth(self.robot, self.kind, self.leg)
 
     def proves_absence(self, boxes: Array) -> NDArray[np.bool_]:
-        """Return for which boxes (B, 2, m) intervals prove that it vanishes at no pose in reach."""
+        """Return which boxes (B, 2, m) are proved, by intervals, to have no zero in reach."""
         squares = bounds(self.robot, "squared_type_i", boxes)["squares"]
         is_absent = np.asarray((squares.high < 0.0).any(axis=-1))
         if self.leg:
@@ -104,6 +104,7 @@ class Smooth(NamedTuple):
 
 @lru_cache(maxsize=256)
 def _smooth(robot: Manipulator, kind: Kind, leg: int) -> Smooth:
+    """Return a measure of singularity, in pose and roots, with its Jacobian; cached."""
     graph = graph_of(bounded_function(robot, _PROGRAM[kind]).function)
     pose = ca.SX.sym("pose", robot.freedom)
     radicands, roots = [], []

@@ -83,7 +83,7 @@ class ReachVolume(Result):
 
 
 def expect_places(robot: Manipulator, instead: str) -> None:
-    """Refuse a machine whose platform only turns, with a clause that says what to do instead."""
+    """Refuse a platform that only rotates, with a clause on what to do instead."""
     if not robot.platform.lengths:
         raise ModelError(
             f"a {robot.platform.motion} platform has no places to move to: {instead}",
@@ -127,7 +127,7 @@ def bounding_box(robot: RobotLike, pose: PoseLike) -> Array:
     count = len(robot.platform.lengths)
 
     def depths(p: Array) -> Array:
-        """Return how far inside every bound positions are, m."""
+        """Return the distances (..., C), m, of positions inside every bound; negative outside."""
         at = vary_coordinates(reference, p)
         limits = distance_to_limits(robot, at)
         return np.concatenate([numeric(robot, "reach")(at)[0], np.minimum(limits, _FAR)], axis=-1)
@@ -178,7 +178,7 @@ def _endless_translations(robot: Manipulator, size: float) -> Iterator[Array]:
 
 
 def deepest(depths: Callable[[Array], Array], start: Array) -> Array:
-    """Return a position that is deeper inside every bound, from one that need not be inside."""
+    """Return a position with locally greatest distance inside every bound, from any start."""
     solution = scipy.optimize.minimize(
         lambda v: -v[-1],
         np.append(start, float(depths(start).min())),
@@ -196,7 +196,7 @@ def _front(
     size: float,
     rng: np.random.Generator,
 ) -> Array:
-    """Return positions inside every bound of small objective . p, the least first."""
+    """Return positions inside every bound with small objective . p, the least first."""
     spread = _SPREAD * size
     for _ in range(_ROUNDS):
         inside = inside[np.argsort(inside @ objective)[:_FRONT]]
@@ -208,7 +208,7 @@ def _front(
 
 
 def _furthest(depths: Callable[[Array], Array], start: Array, objective: Array) -> float:
-    """Return the least value of objective . p inside every bound, from a position inside."""
+    """Return the least objective . p inside every bound, by SLSQP from a position inside."""
     solution = scipy.optimize.minimize(
         lambda p: float(objective @ p),
         start,
@@ -227,7 +227,7 @@ def _furthest(depths: Callable[[Array], Array], start: Array, objective: Array) 
 def reach_volume(
     robot: RobotLike, pose: PoseLike, *, count: int = 50_000, seed: Seed = 0
 ) -> ReachVolume:
-    """Return the volume in reach at the orientation of a pose, by random positions in its box.
+    """Return the volume in reach at the orientation of a pose, by Monte Carlo integration.
 
     A planar machine has an area instead.
 

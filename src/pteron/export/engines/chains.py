@@ -94,7 +94,7 @@ def shaft_ratio(robot: Manipulator, i: int) -> float:
 
 
 def _numbers_before_the_cut(robot: Manipulator, i: int, motion: LegMotion) -> tuple[int, ...]:
-    """Return the places in its chain of a leg's joints, up to that of its last body."""
+    """Return the indices, in a leg's chain, of its joints up to its last body."""
     leg = robot.legs[i]
     carried = [joint.body for joint in motion.chain if joint.body]
     if sorted(carried) != sorted(motion.bodies):
@@ -116,13 +116,14 @@ def _numbers_before_the_cut(robot: Manipulator, i: int, motion: LegMotion) -> tu
 
 @lru_cache(maxsize=64)
 def _states(robot: Manipulator) -> tuple[Any, State]:
+    """Return the symbolic pose (m,) of a machine and its kinematic state there."""
     pose = ca.SX.sym("pose", robot.freedom)
     return pose, Machine.numeric(robot).state(pose)
 
 
 @lru_cache(maxsize=64)
 def _function(robot: Manipulator) -> tuple[Any, list[tuple[Any, ...]]]:
-    """Return the function from the pose to what a stance holds, and what its outputs are."""
+    """Return the CasADi function from a pose to a stance's arrays, and the key of each output."""
     pose, state = _states(robot)
     parts: dict[tuple[Any, ...], Any] = {}
     for i, (motion, point) in enumerate(zip(state.legs, state.platform.points, strict=True)):

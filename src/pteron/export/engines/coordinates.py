@@ -66,7 +66,7 @@ def coordinates(opened: Tree, poses: PoseLike) -> Array:
 
 
 def _leg(home: LegStance, away: LegStance) -> list[Array]:
-    """Return how far each joint of a leg has moved from the home pose, (K,) each."""
+    """Return the displacement of each joint of a leg from the home pose, (K,) each."""
     count = len(away.end)
     turn, shift = np.broadcast_to(np.eye(3), (count, 3, 3)), np.zeros((count, 3))
     motions: list[Array] = []
@@ -95,6 +95,7 @@ def _leg(home: LegStance, away: LegStance) -> list[Array]:
 
 
 def _next_point(leg: LegStance, k: int) -> Array:
+    """Return the points (K, 3) of the joint after joint `k` of a leg, or of the leg's end."""
     return leg.points[k + 1] if k + 1 < len(leg.points) else leg.end
 
 

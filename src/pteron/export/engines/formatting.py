@@ -49,7 +49,7 @@ def look(values: Sequence[float] | Array | float) -> str:
 
 
 def _finite(value: float) -> float:
-    """Return a float, or refuse one that no engine reads: infinity and NaN never enter a file."""
+    """Return a finite float; infinity and NaN, which no engine reads, are refused."""
     if not np.isfinite(value):
         raise ModelError(
             f"a number of the model is {value} in its home pose; give another home, or report it "
@@ -59,7 +59,7 @@ def _finite(value: float) -> float:
 
 
 def frame(body: TreeBody) -> Array:
-    """Return a body's frame at the home pose, (4, 4): from its own axes to the base frame."""
+    """Return a body's frame (4, 4) at the home pose, from body axes to the base frame."""
     placement = np.eye(4)
     placement[:3, :3], placement[:3, 3] = body.axes, body.origin
     return placement
@@ -74,12 +74,12 @@ def inverse(motion: Array) -> Array:
 
 
 def body_frame_points(body: TreeBody, points: Array) -> Array:
-    """Return points (..., 3), given in the base frame at home, in a body's own frame."""
+    """Return points (..., 3) of the base frame at home in a body's frame."""
     return np.asarray((points - body.origin) @ body.axes)
 
 
 def from_parent(bodies: Sequence[TreeBody], body: TreeBody) -> Array:
-    """Return a body's frame (4, 4) in that of its parent, one of the bodies, or of the base."""
+    """Return a body's frame (4, 4) relative to its parent, a body or the base."""
     if body.parent == BASE:
         return frame(body)
     return np.asarray(inverse(frame(bodies[body.parent])) @ frame(body))
@@ -107,7 +107,7 @@ def omission_notes(opened: Tree, written: Sequence[str]) -> list[str]:
 
 
 def head(opened: Tree, language: str) -> list[str]:
-    """Return the first lines of every file: its machine, and the numbers that are made up."""
+    """Return the head comment of every file: machine, home pose, and assumed numbers."""
     robot = opened.robot
     name = re.sub(r"[^\w ,.+-]|--+", "?", " ".join(robot.name.split()))
     pairs = zip(robot.coordinates, opened.home, strict=True)
@@ -127,7 +127,7 @@ def head(opened: Tree, language: str) -> list[str]:
 
 
 def direction(body: TreeBody, axis: Array) -> Array:
-    """Return a unit vector (3,) of the base frame at the home pose in a body's own frame."""
+    """Return a unit vector (3,) of the base frame at home in a body's frame."""
     return np.asarray(axis @ body.axes)
 
 

@@ -26,7 +26,7 @@ _SEARCHES = ((200, 0.3), (200, 0.02), (200, 0.0))
 
 
 def chosen_home(robot: Manipulator, home: PoseLike | None) -> Array:
-    """Return the pose given, checked, or one chosen by the joints' ranges.
+    """Return the home pose argument, checked, or a default from the joints' ranges.
 
     Of a platform that tilts it is the home pose, which is level where that can be; so it is where
     the machine's file names its home.
@@ -47,7 +47,7 @@ def chosen_home(robot: Manipulator, home: PoseLike | None) -> Array:
 
 @lru_cache(maxsize=64)
 def _middle(robot: Manipulator) -> tuple[float, ...]:
-    """Return the pose with all joints in the middle of their ranges, zero where they have none.
+    """Return the pose with all joints at mid-range; a joint without limits is at 0.
 
     Where no such pose is away from singularities it is the best of random ones, within the joints'
     limits if any are.
@@ -75,7 +75,7 @@ def _middle(robot: Manipulator) -> tuple[float, ...]:
 
 
 def _best(worth: Array) -> int:
-    """Return the first of the best, so that rounding does not choose between mirrored poses."""
+    """Return the first index of the maximum up to rounding, which mirrored poses may share."""
     return int((worth >= worth.max() - ROUNDING).argmax())
 
 

@@ -83,7 +83,7 @@ def massless_inertia(mass: float, moments: Array) -> tuple[float, Array]:
 def shared_masses(
     mass: float, moment: Array, inertia: float, places: Array
 ) -> tuple[Array, float, Array, float]:
-    """Return masses (K,) taken from a plane body for parts at places (K, 2), and what is left.
+    """Return masses (K,) split off a planar body for parts at places (K, 2), and the remainder.
 
     The parts' masses and what is left, mass (kg), first moment (2,) (kg m) and moment of inertia
     (kg m^2), are together the body that was given.

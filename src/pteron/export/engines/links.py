@@ -36,7 +36,7 @@ class Link(NamedTuple):
 
 
 def links_of(bodies: Sequence[TreeBody]) -> list[Link]:
-    """Return the links of bodies, one for each joint."""
+    """Return the links of bodies: a link for each joint."""
     links = []
     for body in bodies:
         parent = "base" if body.parent == BASE else bodies[body.parent].name

@@ -113,7 +113,7 @@ def mjcf(opened: Tree, *, step: float = STEP) -> str:
 
 
 def _notes(opened: Tree) -> list[str]:
-    """Return notes on what the file cannot hold, and on how a shaft is driven."""
+    """Return notes on data that MJCF cannot represent, and on shaft-driven joints."""
     written = ("inertia", "viscous", "coulomb", "offset", "max_force")
     said = [
         f"{motor.name} turns {motor.joint}; its actuator's gear is the shaft's ratio."
@@ -124,7 +124,7 @@ def _notes(opened: Tree) -> list[str]:
 
 
 def _frame_texts(opened: Tree, body: TreeBody) -> tuple[str, str]:
-    """Return where a body is in the frame of the one before, and how it is turned there."""
+    """Return a body's position and quaternion (w x y z) in its parent's frame, as texts."""
     there = from_parent(opened.bodies, body)
     x, y, z, w = scipy.spatial.transform.Rotation.from_matrix(there[:3, :3]).as_quat(canonical=True)
     return row(there[:3, 3]), row([w, x, y, z])
@@ -136,7 +136,7 @@ def _moments(body: TreeBody) -> list[str]:
 
 
 def _hold(opened: Tree) -> Array:
-    """Return the controls that hold the machine at its home pose, as far as its drives can."""
+    """Return the controls (n,) that hold the machine at home, clipped to the drives' limits."""
     zeros = np.zeros(opened.robot.freedom)
     forces = inverse_dynamics(opened.robot, opened.home, zeros, zeros, on_failure="nan")
     forces = forces + [motor.drive.offset for motor in opened.motors]
@@ -156,7 +156,7 @@ def _sites(opened: Tree) -> list[list[tuple[str, Array]]]:
 
 
 def _scene(opened: Tree) -> dict[str, Any]:
-    """Return where floor, light and camera are."""
+    """Return the poses of floor, light and camera."""
     shapes: list[BodyShape] = [shape for body in opened.bodies for shape in body.shapes]
     points = np.vstack([shape.ends for shape in [*shapes, *(shape for _, shape in opened.base)]])
     gravity = np.array(opened.robot.gravity)

@@ -23,7 +23,7 @@ BASE = -1
 
 @dataclass(frozen=True)
 class TreeJoint:
-    """A joint between a body and the one before.
+    """A joint between a body and its parent.
 
     Attributes
     ----------
@@ -54,7 +54,7 @@ class TreeJoint:
 
 @dataclass(frozen=True)
 class BodyShape:
-    """The shape of a body: a round bar from one point to another, or a box along them.
+    """The shape of a body: a round bar between two points, or a box along them.
 
     Attributes
     ----------
@@ -123,7 +123,7 @@ class TreeBody:
 
 @dataclass(frozen=True)
 class Closing:
-    """A point where a loop was cut: one point of two bodies.
+    """A point where a loop was cut, common to two bodies.
 
     Attributes
     ----------
@@ -246,7 +246,7 @@ def bodies_at_zero(tree: Tree) -> tuple[TreeBody, ...]:
 
 
 def displacement(joint: TreeJoint, by: float) -> Array:
-    """Return the displacement (4, 4) of a body whose joint moves by so many m or rad."""
+    """Return the displacement (4, 4) of a body by its joint's motion, m or rad."""
     moved = np.eye(4)
     if joint.is_prismatic:
         moved[:3, 3] = by * joint.axis
@@ -258,5 +258,5 @@ def displacement(joint: TreeJoint, by: float) -> Array:
 
 
 def moved_point(motion: Array, point: Array) -> Array:
-    """Return where a point (3,) is after a motion (4, 4)."""
+    """Return a point (3,) displaced by a rigid motion (4, 4)."""
     return np.asarray(motion[:3, :3] @ point + motion[:3, 3])

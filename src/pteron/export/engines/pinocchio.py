@@ -73,7 +73,7 @@ def export_pinocchio(
 
 
 def pinocchio_model(robot: RobotLike, *, home: PoseLike | None = None) -> Any:
-    """Return what `build()` of the exported file returns: a Pinocchio model with its constraints.
+    """Return the Pinocchio model and its constraints, as the exported file's `build()` does.
 
     Parameters
     ----------
@@ -164,7 +164,7 @@ def _merge_gears(bodies: Sequence[TreeBody]) -> list[TreeBody]:
 
 
 def _with_gear(body: TreeBody, gear: TreeBody, ratio: float) -> TreeBody:
-    """Return a body joined with a balanced one at its origin that turns `ratio` times faster.
+    """Return a body merged with a balanced one at its origin that turns `ratio` times as fast.
 
     Only the moment about z acts, and it is exact.
     """
@@ -178,8 +178,10 @@ def _with_gear(body: TreeBody, gear: TreeBody, ratio: float) -> TreeBody:
 
 
 def _bound(value: float | None, infinite: str) -> str:
+    """Return a joint limit as a literal; the text for infinity if there is no limit."""
     return infinite if value is None else number(value)
 
 
 def _list(values: Any) -> str:
+    """Return an array's values, flattened, as literals with commas."""
     return ", ".join(map(number, np.ravel(values)))

@@ -35,7 +35,7 @@ Pieces = tuple[list[TreeBody], list[int], list[Closing]]
 
 
 def platform_bodies(robot: Manipulator, pose: Array) -> Pieces:
-    """Return the platform's bodies at a pose, which of them each leg carries, and their closings.
+    """Return the platform's bodies at a pose, the body that each leg carries, and closings.
 
     The first bodies have the joints of the pose's coordinates, in their order.
     """
@@ -165,7 +165,7 @@ def _joints(platform: Platform, pose: Array) -> list[TreeJoint]:
 
 
 def _angle(platform: Platform, pose: Array) -> tuple[str, float]:
-    """Return the name of the one angle that the platform has, and its value."""
+    """Return the name and value of the platform's single angle."""
     (name,), (value,) = platform.angles, pose[platform.angular].tolist()
     return name, value
 
@@ -201,13 +201,13 @@ def _tilting_body(
 def _still_body(
     platform: Platform, name: str, parent: int, joints: Sequence[TreeJoint], at: Array, mass: float
 ) -> TreeBody:
-    """Return a body that does not turn, its mass where it is."""
+    """Return a body that does not rotate, with its mass at its origin."""
     axes, moments = np.array(platform.frame).T, cube_moments(mass, _SIDE)
     return TreeBody(name, parent, tuple(joints), at, axes, mass, at, moments, 0)
 
 
 def _gears(platform: Platform, pose: Array, masses: Array, against: float) -> list[TreeBody]:
-    """Return what gears turn, on a body that itself turns by `against` times the angle."""
+    """Return the bodies that gears turn, relative to a body that turns at ratio `against`."""
     p, axes = platform.placement(pose)
     turned, angle = _angle(platform, pose) if platform.geared else ("", 0.0)
     bodies = []
@@ -221,12 +221,12 @@ def _gears(platform: Platform, pose: Array, masses: Array, against: float) -> li
 
 
 def _share_axis(first: Array, second: Array) -> bool:
-    """Return whether two places of the platform are on one axis of it."""
+    """Return whether two places are on a common axis of the platform."""
     return bool(np.abs(first - second)[:2].max() <= ROUNDING)
 
 
 def _distinct(places: Sequence[Array]) -> list[Array]:
-    """Return the places but for those that are on the axis of one before them."""
+    """Return places without those on the axis of an earlier place."""
     return [
         place
         for k, place in enumerate(places)

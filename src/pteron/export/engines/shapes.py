@@ -105,4 +105,5 @@ def _platform(opened: Tree, looks: list[list[BodyShape]], thick: float) -> None:
 
 
 def _arm(start: Array, stop: Array, radius: float) -> BodyShape:
+    """Return a capsule between two points (3,), of a radius in m."""
     return BodyShape("capsule", np.array([start, stop]), radius)

@@ -90,7 +90,7 @@ def tree(robot: RobotLike, home: PoseLike | None = None) -> Tree:
 
 
 def _expect_axes(stances: Sequence[LegStance], pose: Array) -> None:
-    """Refuse a pose in which an axis of a leg's joints is undefined, so that a file would be."""
+    """Refuse a home pose at which the axis of a leg's joint is undefined."""
     for i, stance in enumerate(stances, start=1):
         places = (*stance.axes, *stance.points, *stance.references.values(), stance.end)
         if not np.isfinite(np.concatenate(places)).all():
@@ -125,7 +125,7 @@ def _size(stances: list[LegStance], p: Array) -> float:
 def _leg(
     leg: LegKind, number: int, stance: LegStance, actuated: str, count: int, size: float
 ) -> list[TreeBody]:
-    """Return a leg's bodies, of which `count` others come before."""
+    """Return a leg's bodies; `count` bodies precede them in the tree."""
     bodies: list[TreeBody] = []
     waiting: list[TreeJoint] = []
     joints = stance.numbers, stance.prismatic, stance.carries, stance.axes, stance.points
@@ -148,7 +148,7 @@ def _leg(
 
 
 def _body(leg: LegKind, stance: LegStance, letter: str, joint: TreeJoint, size: float) -> TreeBody:
-    """Return a body that a joint carries; its name, its parent and its joints come later."""
+    """Return the body that a joint carries; the caller sets its name, parent and joints."""
     mass, (x, y), moment = central_inertia(leg.bodies[letter])
     reference = stance.references[letter]
     if letter not in stance.along:

@@ -24,7 +24,7 @@ _LEVELS, _RINGS, _DIRECTIONS = 200, 20, 24
 
 
 def bed(robot: Manipulator, reach: float, low: float, high: float) -> tuple[float, float]:
-    """Return P's z at the bed, and the radius about the axis that is good there: at most `reach`.
+    """Return P's z at the bed, and the usable radius about the axis there, at most `reach`, m.
 
     The tool is at 0 there if the machine can work at 0 and below the end stops; else the bed is the
     lowest level between `low` and `high` on which P goes far.
@@ -52,7 +52,7 @@ def bed(robot: Manipulator, reach: float, low: float, high: float) -> tuple[floa
 
 
 def told_bed(robot: Manipulator, level: float, good: float, most: float) -> tuple[str, ...]:
-    """Return comments on the bed: its place, and the share of Klipper's range that is good."""
+    """Return comments on the bed: its height, and the usable part of Klipper's range."""
     tool = tool_of(robot)
     who = "the tool's" if tool.any() else "the pose's"
     comments = [
@@ -78,7 +78,7 @@ def tool_of(robot: Manipulator) -> Array:
 
 
 def _radius(robot: Manipulator, reach: float, level: float) -> float:
-    """Return how far from the axis all of a level is good, 0 where homing cannot begin."""
+    """Return the radius, m, within which all of a level is usable; 0 if homing cannot begin."""
     angles = np.linspace(0.0, 2.0 * math.pi, _DIRECTIONS, endpoint=False)
     ring = np.stack([np.cos(angles), np.sin(angles), np.zeros(_DIRECTIONS)], axis=-1)
     radii = np.linspace(0.0, reach, _RINGS + 1)

@@ -95,7 +95,7 @@ def _sum(row: Array) -> str:
 def _box(
     robot: Manipulator, rows: Array, offsets: Array, tool: Array
 ) -> tuple[list[tuple[str | None, str | None]], tuple[str, ...]]:
-    """Return ranges of x, y and z, mm, that keep the joints' limits, and what to say of them."""
+    """Return ranges of x, y and z, mm, within the joints' limits, and comments on them."""
     if any(leg.limits is None for leg in robot.legs):
         return [(None, None)] * 3, ("The machine's file has no limits of the joints.",)
     limits = 1000.0 * np.array([leg.limits for leg in robot.legs]) - offsets[:, None]

@@ -21,7 +21,7 @@ SAME = 1e-6
 
 @dataclass(frozen=True)
 class Center:
-    """The centre of the sphere on which P moves while a joint q is held.
+    """The centre of the sphere on which P moves at a fixed joint coordinate q.
 
     It is at + q along, or at + along cos(q) + across sin(q); P is the platform's reference point.
     """
@@ -39,7 +39,7 @@ class Center:
 
     @classmethod
     def from_leg(cls, machine: Machine, leg: int) -> Center | None:
-        """Return the centre for a leg; None if P moves on no sphere while its joint is held."""
+        """Return the centre for a leg; None if P moves on no sphere at a fixed joint."""
         q = ca.SX.sym("q")
         locus, offset = machine.legs[leg].locus(q), machine.platform.offsets[leg]
         if not isinstance(locus, SphereLocus):

@@ -65,7 +65,7 @@ def _lines(
     of_ends: Callable[[Sequence[float]], Any],
     sign: float,
 ) -> list[str]:
-    """Return M665 and M666; `of_ends` gives the height, from which ends are told with a sign."""
+    """Return M665 and M666; `of_ends` gives the height that end stops are measured from."""
     height, end_lines = "", []
     if numbers.ends is not None:
         level = float(of_ends(numbers.ends))
@@ -117,6 +117,7 @@ def export_reprap(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
 
 
 def _write(robot: RobotLike, folder: str | Path, firmware: str, lines: Sequence[str]) -> list[Path]:
+    """Write G-code lines under a commented head to a file in a folder, and return its path."""
     machine = as_manipulator(robot)
     numbers, order = _numbers(machine)
     towers = ", ".join(f"{axis} is leg {i + 1}" for axis, i in zip("XYZ", order, strict=True))
@@ -147,7 +148,7 @@ def _numbers(robot: Manipulator) -> tuple[LinearDelta, list[int]]:
 
 
 def _turns(numbers: LinearDelta, order: Sequence[int]) -> list[float]:
-    """Return each tower's angle less the one that it has in the firmware, degrees."""
+    """Return each tower's angle less the firmware's, degrees."""
     return [
         float(_wrap_degrees(numbers.angles[i] - firmware_angle))
         for i, firmware_angle in zip(order, _TOWERS, strict=True)
@@ -155,13 +156,16 @@ def _turns(numbers: LinearDelta, order: Sequence[int]) -> list[float]:
 
 
 def _wrap_degrees(angle: float | np.ndarray) -> np.ndarray:
+    """Return angles, degrees, wrapped to -180 (included) to 180 (excluded)."""
     return np.asarray((np.asarray(angle) + 180.0) % 360.0 - 180.0)
 
 
 def _lettered_values(letters: str, values: Sequence[float], factor: float = 1000.0) -> str:
+    """Return G-code words: each letter with its value, scaled by `factor`, to four decimals."""
     pairs = zip(letters, values, strict=True)
     return "".join(f" {letter}{round(factor * value, 4) + 0.0:.4f}" for letter, value in pairs)
 
 
 def _mm(metres: float) -> str:
+    """Return a length in m as millimetres to four decimals."""
     return f"{1000.0 * metres:.4f}"

@@ -106,7 +106,7 @@ class LinearDelta:
 
     @classmethod
     def from_centers(cls, robot: Manipulator, centers: Sequence[Center], taker: str) -> LinearDelta:
-        """Return the numbers from the spheres on which P moves; errors name the `taker`."""
+        """Return the numbers from the spheres on which P moves; errors name `taker`."""
         for i, center in enumerate(centers, start=1):
             if np.hypot(*center.along[:2]) > _LEAN:
                 raise differs(robot, i, "its guide is not vertical, along z", taker)

@@ -88,7 +88,7 @@ def printer_cfg(text: str, source: str = "printer.cfg") -> configparser.RawConfi
 
 
 def setting(config: configparser.RawConfigParser, section: str, key: str) -> float | None:
-    """Return a number of a printer.cfg; None where it is not given.
+    """Return a number of a printer.cfg; None if it is absent.
 
     Raises
     ------
@@ -107,7 +107,7 @@ def setting(config: configparser.RawConfigParser, section: str, key: str) -> flo
 
 
 def _way_a_turn(config: configparser.RawConfigParser, tower: str) -> float | None:
-    """Return a joint's way a turn of its motor, mm or rad; None where the file does not say."""
+    """Return a joint's travel per motor turn, mm or rad; None if the file does not define it."""
     section = f"stepper_{tower}"
     turn = setting(config, section, "rotation_distance")
     text = config.get(section, "gear_ratio", fallback="")
@@ -123,7 +123,7 @@ def _way_a_turn(config: configparser.RawConfigParser, tower: str) -> float | Non
 
 
 def way_a_step(config: configparser.RawConfigParser, tower: str) -> float | None:
-    """Return a joint's way a step of its motor, mm or rad; None where the file does not say."""
+    """Return a joint's travel per motor step, mm or rad; None if the file does not define it."""
     section = f"stepper_{tower}"
     turn, micro = _way_a_turn(config, tower), setting(config, section, "microsteps")
     if turn is None or micro is None:
@@ -255,7 +255,7 @@ def _crank(leg: LegKind, turn: float, base: list[float], lengths: list[float]) -
 def _place_leg(
     leg: LegKind, turn: float, radius: float, height: float, lengths: dict[str, float]
 ) -> LegKind:
-    """Return a leg turned about z, at a radius and height, with links of given lengths, m."""
+    """Return a leg turned about z, at a radius and height, m, with new link lengths, m."""
     cos, sin = math.cos(turn), math.sin(turn)
 
     def turn_vector(v: Vector) -> Vector:

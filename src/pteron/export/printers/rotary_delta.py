@@ -136,7 +136,7 @@ def _refuse_elbows_inside(robot: Manipulator, arms: Sequence[_Arm], height: floa
 def _bed(
     robot: Manipulator, arms: Sequence[_Arm], radius: float, height: float, top: float
 ) -> tuple[float, tuple[str, ...]]:
-    """Return P's z at Klipper's bed, and what is said of it."""
+    """Return P's z at Klipper's bed, m, and comments on it."""
     for arm in arms:
         if arm.upper + arm.lower <= radius:
             raise differs(robot, arm.number, "its arms do not reach the z axis", _TAKER)
@@ -148,7 +148,7 @@ def _bed(
 
 
 def _gear(robot: Manipulator, leg: int) -> str | None:
-    """Return the gear ratio, None where the machine's file does not say."""
+    """Return the gear ratio as text, such as 5:1; None if the machine's file has none."""
     drive = robot.legs[leg].drive
     scale = (robot.legs[leg].reading or Reading()).scale
     return None if drive is None or drive.ratio is None else f"{number(abs(drive.ratio / scale))}:1"

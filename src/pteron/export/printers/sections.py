@@ -13,7 +13,7 @@ INSTEAD = "use --linuxcnc, or --c for a controller of your own"
 
 
 def differs(robot: Manipulator, leg: int, reason: str, taker: str) -> ModelError:
-    """Return the error that refuses a machine because of one of its legs."""
+    """Return the error that the firmware does not fit a machine because of a leg."""
     return ModelError(f"{robot.name}: {taker} does not fit leg {leg}: {reason}; {INSTEAD}")
 
 
@@ -34,7 +34,7 @@ def signed_number(value: float) -> str:
 
 
 def rotation_distance(robot: Manipulator, leg: int) -> str | None:
-    """Return mm a turn of the motor, None where the machine's file does not say."""
+    """Return mm per turn of the motor; None if the machine's file has no ratio."""
     scale = (robot.legs[leg].reading or Reading()).scale
     drive = robot.legs[leg].drive
     if drive is None or drive.ratio is None:
@@ -43,7 +43,7 @@ def rotation_distance(robot: Manipulator, leg: int) -> str | None:
 
 
 def reading_comment(robot: Manipulator, leg: int, key: str) -> tuple[str, ...]:
-    """Return what is said of a drive that counts its joint otherwise than its `ratio` says."""
+    """Return a comment on a drive whose reading differs from the joint coordinate, if any."""
     reading = robot.legs[leg].reading
     if reading is None:
         return ()

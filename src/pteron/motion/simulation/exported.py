@@ -25,14 +25,14 @@ class ExportedLaw(Law):
 
 @dataclass(frozen=True, eq=False)
 class ExportedCustomLaw(CustomLaw):
-    """A law of one's own whose forces come from exported C."""
+    """A custom law whose forces come from exported C."""
 
     linked: LinkedLaw | None = None
 
 
 @dataclass(frozen=True)
 class Exported:
-    """A controller whose exported C is compiled into the loop of `simulate`, as it is.
+    """A controller whose exported C is compiled into the loop of `simulate`, unmodified.
 
     The numbers are those of its tables, as on the machine: gains, inertial parameters, drives; the
     `model` of `simulate` says only what memory begins with, and what the drives read where they do
@@ -79,7 +79,7 @@ class Exported:
         return self.controller.period
 
     def law(self, model: RobotLike) -> ExportedLaw | ExportedCustomLaw:
-        """Return its law, which runs in the loop alone."""
+        """Return its law, which runs in the simulation's loop only."""
         plain_law, law_name = self.controller.law(model), self.controller.law_name
         header, source, function = self._text  # type: ignore[attr-defined]
         tables = []
@@ -113,7 +113,7 @@ class Exported:
         return ExportedLaw(plain_law.what, plain_law.model, plain_law.gains, plain_law.base, linked)
 
     def _expect_period(self, source: str, table: str) -> None:
-        """Refuse gains that are for another period."""
+        """Refuse gains that were exported for another period."""
         period_match = re.search(
             rf"\b{table}\[\d+\] = {{[^}}]*?([-+.\w]+),?\s*/\* period \*/", source
         )

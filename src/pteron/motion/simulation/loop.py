@@ -49,7 +49,7 @@ class ControlLaw(Protocol):
     """A controller's law for one machine; `pteron.controllers` has some."""
 
     def memory(self, pose: Array, velocity: Array) -> Array:
-        """Return its memory at the start, (K,)."""
+        """Return the initial memory, (K,)."""
 
     def __call__(
         self,
@@ -65,18 +65,18 @@ class ControlLaw(Protocol):
 
 @runtime_checkable
 class ProgramLaw(Protocol):
-    """A controller's law that is an expression, and runs in the loop's C."""
+    """A controller's law that is an expression, and is compiled into the loop's C."""
 
     @property
     def program(self) -> Program:
-        """Forces, and the next memory, of readings, reference, memory and its own numbers."""
+        """The program from readings, reference, memory and parameters to forces and next memory."""
 
     @property
     def numbers(self) -> dict[str, Array]:
-        """Its numbers, as `pteron.kernels.loops.Loop.run` takes them."""
+        """The law's parameters, as `pteron.kernels.loops.Loop.run` takes them."""
 
     def memory(self, pose: Array, velocity: Array) -> Array:
-        """Return its memory at the start, (K,)."""
+        """Return the initial memory, (K,)."""
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,7 @@ class Loads:
 
 @dataclass(frozen=True)
 class Timing:
-    """The delays of forces and of readings, and how steps between samples are made."""
+    """The delays of forces and of readings, and the integration steps between samples."""
 
     delay: float
     method: Method
@@ -122,7 +122,7 @@ class Timing:
 
 
 def split_delay(delay: float, period: float) -> tuple[float, int]:
-    """Return a delay's part of a sample, and its whole samples."""
+    """Return a delay as a fraction of a sample, s, and a number of complete samples."""
     samples = int(delay / period + ROUNDING)
     part = max(delay - samples * period, 0.0)
     return (part if part > ROUNDING * period else 0.0), samples
@@ -140,7 +140,7 @@ def run_simulation(
     limits: bool,
     progress: Progress | None = None,
 ) -> Simulation:
-    """Simulate; `limits` says whether joints' limits and singularities of type II end it.
+    """Return a simulation; `limits` ends it at joints' limits and type-II singularities.
 
     The source of forces is a controller's law, or forces at each sample.
     """
@@ -250,7 +250,7 @@ def _simulation_columns(robot: Manipulator, columns: dict[str, Array]) -> dict[s
 def _fault_text(
     robot: Manipulator, arrays: dict[str, Array], joints: Array, *, has_callback: bool
 ) -> str | None:
-    """Return why a loop ended before its time, None if it did not."""
+    """Return why a loop ended before its time; None if it did not."""
     fault, m = arrays["fault"].item(), robot.freedom
     if fault == _ASKED and has_callback:
         return "no forces are asked for: the controller returns some that are not finite numbers"
@@ -285,7 +285,7 @@ def loop_arrays(
     sensors: Sensors,
     counts: Sequence[int],
 ) -> dict[str, Array]:
-    """Return the arrays for a loop's `run` of a machine, with a control law or without.
+    """Return the arrays for a loop's `run` of a machine, with or without a control law.
 
     `counts` are those of `Timing.parts`.
     """
@@ -308,7 +308,7 @@ def loop_arrays(
 def _callback(
     law: ControlLaw, reference: Motion, joints: int, memories: list[Array]
 ) -> Callable[[int, int, Array], Array]:
-    """Return the callback that evaluates a controller in Python and appends to `memories`."""
+    """Return the callback that evaluates a Python controller and appends to `memories`."""
 
     def ask(_: int, sample: int, measured: Array) -> Array:
         parts = reference.pose, reference.velocity, reference.acceleration
@@ -331,7 +331,7 @@ def _callback(
 
 
 def _accelerations(loads: Loads, pose: Array, velocity: Array, forces: Array) -> Array:
-    """Return the accelerations of states whose friction is smooth."""
+    """Return accelerations (T, m) at states with smooth friction; NaN where there are none."""
     accelerations, masses = np.empty_like(pose), loads.masses[: len(pose)]
     for mass, machine in loads.machines.items():
         chosen: Any = masses == mass

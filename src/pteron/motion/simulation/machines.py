@@ -73,7 +73,7 @@ class Machines:
             self._expect_numbers(name)
 
     def _expect_numbers(self, name: str) -> None:
-        """Refuse numbers that no machine has, and say whose the first of them is."""
+        """Refuse numbers that no machine can have, and name the first of them."""
         array, columns = getattr(self, name), tuple[str, ...]()
         least = np.full(array.shape[-1], 0.0 if name == "payload" else -np.inf)
         if name == "parameters":
@@ -104,7 +104,7 @@ class Machines:
         return self.parameters + self.payload[:, None] * unit_payload
 
     def rows(self, chosen: slice) -> Machines:
-        """Return some of them."""
+        """Return a slice of the machines."""
         parts = self.parameters[chosen], self.drives[chosen], self.payload[chosen]
         return Machines(
             self.robot, *parts, None if self.geometry is None else self.geometry[chosen]
@@ -134,7 +134,7 @@ def machines_about(
     directions: float = 0.0,
     seed: Seed = 0,
 ) -> Machines:
-    """Return random machines about one: tolerances of masses, drives, payload and geometry.
+    """Return random machines about a nominal machine, by tolerances of masses, drives and so on.
 
     Each body is made of lighter or heavier material (one factor a body, so that it stays a real
     one), and each drive has factors of its dry friction, Stribeck's included, of its viscous

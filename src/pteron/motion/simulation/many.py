@@ -45,7 +45,7 @@ _WHY = ("", "no forces were asked for", "a leg came to the edge of its reach, or
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Batch(Result):
-    """Figures of many simulated machines, a row each, over the samples that each has.
+    """Statistics of many simulated machines, a row each, over the samples before each one's end.
 
     Attributes
     ----------
@@ -92,7 +92,7 @@ def simulate_many(
     out: str | Path | None = None,
     threads: Workers = 1,
 ) -> Batch:
-    """Simulate many machines that follow a motion under one controller.
+    """Return statistics of many simulated machines that follow a motion under a controller.
 
     Each is what `simulate` makes of it, to the same bits but for the noise, whose seed is that of
     the sensors with the machine's number; where machines have a geometry of their own, to rounding.
@@ -192,7 +192,7 @@ def simulate_many(
 
 
 def _expect_own_controller(controller: object) -> None:
-    """Refuse a controller that is none of Pteron's, whose law is no program."""
+    """Refuse a custom controller, whose law is no program."""
     if not isinstance(controller, Controller | Custom):
         raise DataError(
             f"controller: {controller!r} given, one of pteron.controllers expected: `simulate` "
@@ -222,7 +222,7 @@ def _limit_forces(simulator: Loop, robot: Manipulator, samples: dict[str, Array]
 def _group_statistics(
     samples: dict[str, Array], arrays: dict[str, Array], reference: Array, ended: NDArray[np.bool_]
 ) -> dict[str, Array]:
-    """Return the figures of a group of machines, by name; `ended` marks samples after its end."""
+    """Return the statistics of a group of machines; `ended` marks samples after its end."""
     error = samples["states"][..., : reference.shape[-1]] - reference
     error[ended] = np.nan
     force = np.abs(samples["forces"])
@@ -242,7 +242,7 @@ def _group_statistics(
 def _start_arrays(
     simulator: Loop, group: Machines, arrays: dict[str, Array], period: float
 ) -> dict[str, Array]:
-    """Return encoders and motors of machines whose joints, in one pose, are their own."""
+    """Return the initial encoders and motors of machines at a common pose."""
     robot, state = group.robot, arrays["state"].copy()
     m, n = robot.freedom, robot.joint_count
     motion = {"pose": state[:, 0, :m], "velocity": state[:, 0, m : 2 * m]}
@@ -260,6 +260,7 @@ def _start_arrays(
 
 
 def _make_empty_folder(out: str | Path) -> Path:
+    """Return the output folder, created on demand; refuse a folder with results of another run."""
     folder = make_folder(out)
     there = sorted(folder.glob("machines-*.parquet"))
     if there:
@@ -282,7 +283,7 @@ def _table(
     samples: dict[str, Array],
     is_valid: NDArray[np.bool_],
 ) -> pl.DataFrame:
-    """Return the samples of some machines that each came to."""
+    """Return the valid samples of machines as a table."""
     import polars as pl
 
     robot = machines.robot

@@ -40,7 +40,7 @@ def advance(
     machines: Machines | None = None,
     drives: ArrayLike | None = None,
 ) -> tuple[Array, Array, Array, Any]:
-    """Return the states of machines after some steps of Runge and Kutta's method of fourth order.
+    """Return machines' states after several fourth-order Runge-Kutta steps.
 
     Friction and the motors' inertia count; a joint at rest sticks while its drive and its loads are
     less than its dry friction. Where there is a C compiler the steps are one loop of machine code,
@@ -144,7 +144,7 @@ def advance(
 
 
 def drive_states(robot: Manipulator, pose: Array, velocity: Array) -> Array:
-    """Return the state (..., K) of drives that bend or lag and hold the machine without haste."""
+    """Return the states (..., K) of drives with extra states at zero acceleration."""
     states = motor_states(robot, pose, velocity, np.zeros_like(pose))
     return np.concatenate([np.empty((*pose.shape[:-1], 0)), *states.values()], axis=-1)
 
@@ -152,7 +152,7 @@ def drive_states(robot: Manipulator, pose: Array, velocity: Array) -> Array:
 def motor_states(
     robot: Manipulator, pose: Array, velocity: Array, acceleration: Array
 ) -> dict[str, Array]:
-    """Return the states of drives that bend or lag, (..., n) each, as a motion needs them."""
+    """Return the extra drive states, (..., n) each, that a motion requires, by name."""
     kind = DriveKind.from_robot(robot)
     if not kind.extra_states:
         return {}
@@ -192,7 +192,7 @@ class AdaptivePlant:
     def go(
         self, steps: int, step: float, loads_held: Loads, arrays: Mapping[str, Array], alive: Array
     ) -> None:
-        """Go on by so many steps, as `pteron.kernels.samples.Plant.go` does."""
+        """Advance the state by several steps, like `pteron.kernels.samples.Plant.go`."""
         state, clock, span = arrays["state"][0, 0], arrays["clock"][0, 0], steps * step
         m, loads = len(state) // 2, (loads_held["forces"][0], loads_held["wrench"][0])
 

@@ -109,7 +109,7 @@ def encoder_arrays(
 
 
 def encoder_memory(joints: Array, rates: Array, steps: Array, period: float) -> Array:
-    """Return the memory (..., 4 E) of encoders that begin with joints and rates (..., E).
+    """Return the initial memory (..., 4 E) of encoders at joints and rates (..., E).
 
     `steps` (E,) are theirs, `period` is from one sample to the next.
     """
@@ -122,7 +122,7 @@ def encoder_memory(joints: Array, rates: Array, steps: Array, period: float) -> 
 def encoder_noise(
     sensors: Sensors, robot: Manipulator, samples: int, machines: range | None = None
 ) -> dict[str, Array]:
-    """Return the noise of the samples over its deviation: of one machine, or of numbered ones."""
+    """Return standardised noise of the samples, of a machine or of numbered machines."""
     count = robot.joint_count * (2 if DriveKind.from_robot(robot).bends else 1)
     if not np.any(sensors.noise):
         return {"noise": np.zeros((1, 1, count))}
@@ -132,7 +132,7 @@ def encoder_noise(
 
 
 def encoder_of(drive: Drive | None) -> str:
-    """Return where a drive's encoder is: "motor", "joint" or "both"; a rigid one has both."""
+    """Return the place of a drive's encoder: "motor", "joint" or "both"; rigid drives have both."""
     return drive.elastic.encoder if drive and drive.elastic else "rigid"
 
 
@@ -173,6 +173,7 @@ def expect_encoders(robot: Manipulator, law: Program) -> None:
 
 
 def _joint_array(setting: float | tuple[float, ...], name: str, count: int) -> Array:
+    """Return a sensor setting for each joint (n,); a scalar is broadcast."""
     array = np.asarray(setting, dtype=float)
     if array.shape not in ((), (count,)):
         raise DataError(

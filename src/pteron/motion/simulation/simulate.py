@@ -57,7 +57,7 @@ class Controls(Protocol):
         """Time between two samples, s."""
 
     def law(self, model: Manipulator) -> ControlLaw:
-        """Return what it does for a machine."""
+        """Return the control law for a machine."""
 
 
 def simulate(
@@ -81,7 +81,7 @@ def simulate(
     error: float | None = None,
     progress: Progress | None = None,
 ) -> Simulation:
-    """Simulate a machine with its drives under a controller, or under given forces, or free.
+    """Return the simulation of a machine with drives under a controller, under forces, or free.
 
     The rigid bodies and the motors' inertia move under the drives' forces and friction. Dry
     friction sticks: a joint at rest does not move until it is pulled by more than its friction
@@ -198,7 +198,7 @@ def simulate(
 def _refine_steps(
     run_with: Callable[[Timing], Simulation], timing: Timing, error: float, period: float
 ) -> Simulation:
-    """Return a simulation whose steps are shortened until no pose changes by more than the error.
+    """Return a simulation with steps refined until no pose changes by more than the error.
 
     A step that holds a joint's reversal is of first order in its length and depends on where in the
     step that is. So each run has an odd number of steps more than twice the last one's, by which no
@@ -226,7 +226,7 @@ def _refine_steps(
 
 
 def _expect_method(robot: Manipulator, method: Method) -> None:
-    """Refuse a method of integration that there is not, or that the drives do not allow."""
+    """Refuse an unknown method of integration, or a method that the drives do not allow."""
     expect(method in get_args(Method), "method", repr(method), '"rk4" or "dop853"')
     if method == "dop853" and not DriveKind.from_robot(robot).plain:
         raise DataError(
@@ -236,7 +236,7 @@ def _expect_method(robot: Manipulator, method: Method) -> None:
 
 
 def _expect_controller(controller: object, forces: object) -> None:
-    """Refuse an argument that is no controller, and forces given beside one."""
+    """Refuse an argument that is no controller, and forces in addition to a controller."""
     period = getattr(controller, "period", None)
     if isinstance(controller, type) or not isinstance(period, float | int):
         raise DataError(
@@ -252,6 +252,7 @@ def check_delay(delay: float) -> None:
 
 
 def _is_number(number: object) -> bool:
+    """Return whether a value is a finite real number."""
     return isinstance(number, int | float | np.number) and bool(np.isfinite(number))
 
 
@@ -275,7 +276,7 @@ def reference_of(
     duration: float | None,
     period: float,
 ) -> Motion:
-    """Return the reference motion at the samples: the given one, or rest at the start."""
+    """Return the reference motion at the samples: the motion argument, or rest at the start."""
     if motion is not None:
         motion.expect_ascending()
     if duration is None:
@@ -323,7 +324,7 @@ def _sample_source(
     name: str,
     time: Array,
 ) -> Array:
-    """Return a machine's forces or a wrench at each of the times, or once if they stay."""
+    """Return a machine's forces or a wrench at each time (T, k); constant rows are repeated."""
     columns = robot.column_names[name]
     size = len(columns)
 

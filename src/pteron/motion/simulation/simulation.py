@@ -79,10 +79,11 @@ class Simulation(Result):
         return f"<Simulation of {self.robot.name!r}: {rows}{end}>"
 
     def summary(self) -> str:
-        """Return errors and drives' loads, for people, as lines of text."""
+        """Return errors and drives' loads as lines of text."""
         return self._overview().text
 
     def _overview(self) -> Overview:
+        """Return errors, speeds, forces and saturation as a table, for notebooks."""
         headings = ("error, rms", "error, largest", "peak speed", "peak force", "at its limit")
         columns = [Column("coordinate"), *(Column(name, "number") for name in headings[:2])]
         columns += [Column("joint"), *(Column(name, "number") for name in headings[2:])]
@@ -123,7 +124,7 @@ class Simulation(Result):
 
     @property
     def saturated_share(self) -> Array:
-        """Share of the samples, (n,), in which a drive could not give what was asked for."""
+        """Share of the samples, (n,), in which a drive's commanded force exceeded its limits."""
         beyond = np.abs(self.asked) > limits_of(self.robot).force
         beyond |= (
             np.abs(limit_to_motors(self.robot, self.asked, self.motor_rates) - self.asked) > 0.0

@@ -29,7 +29,7 @@ _SHORTEST = 1e-8
 
 
 def longest_step(robot: RobotLike, poses: PoseLike, machines: Machines | None = None) -> float:
-    """Return the longest stable step of the simulation, s; infinite where nothing limits it.
+    """Return the longest stable step of the simulation, s; infinite if nothing limits it.
 
     The fastest of these limits it: the decay of rates by viscous friction or by a winding at its
     supply's limit, the vibration of motors and joints on transmissions that bend, and the lag of
@@ -43,7 +43,7 @@ def longest_step(robot: RobotLike, poses: PoseLike, machines: Machines | None = 
 def _longest_stable_step(
     robot: Manipulator, poses: PoseLike, machines: Machines | None = None
 ) -> tuple[float, str]:
-    """Return the longest stable step, s, and its cause as the beginning of a sentence."""
+    """Return the longest stable step, s, and a clause that begins a sentence on its cause."""
     kind, drives = DriveKind.from_robot(robot), drives_of(robot)
     if machines is not None:
         parts = machines.drives.reshape(len(machines), len(drives), -1)

@@ -34,14 +34,14 @@ def why_not_further(robot: Manipulator, pose: Array, velocity: Array) -> str:
 
 
 def first_beyond_limits(robot: Manipulator, poses: Array, joints: PerJoint) -> int | None:
-    """Return the first of some poses (T, m) at which a joint is beyond its limits, or None."""
+    """Return the first index of poses (T, m) at which a joint is beyond its limits, or None."""
     beyond = (joint_distances(robot, joints) < -ROUNDING).any(axis=-1)
     beyond |= (numeric(robot, "passive_room")(poses)[1] < -ROUNDING).any(axis=-1)
     return int(beyond.argmax()) if beyond.any() else None
 
 
 def limit_text(robot: Manipulator, pose: Array) -> str:
-    """Return which joint is beyond its limits in a pose (m,)."""
+    """Return a text on the joint that is beyond its limits at a pose (m,)."""
     worst = max(
         limited_joints(robot, pose),
         key=lambda joint: max(joint.least - joint.value, joint.value - joint.most),
@@ -52,7 +52,7 @@ def limit_text(robot: Manipulator, pose: Array) -> str:
 
 
 def first_singular(robot: Manipulator, poses: Array) -> int | None:
-    """Return the first of some poses (T, m) at or beyond a singularity of type II, or None."""
+    """Return the first index of poses (T, m) at or beyond a type-II singularity, or None."""
     measure = numeric(robot, "type_ii")(poses)[0]
     beyond = ~(measure * np.sign(measure[0]) > TYPE_II * best_type_ii(robot))
     return int(beyond.argmax()) if beyond.any() else None

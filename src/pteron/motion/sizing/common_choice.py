@@ -17,7 +17,7 @@ have when they are built and measured."""
 
 
 def alike_legs(robot: RobotLike) -> tuple[tuple[int, ...], ...]:
-    """Return the legs, from 1, that are alike, in groups of two or more.
+    """Return groups, of two or more, of identical legs, from 1.
 
     They are of one kind and have links of the same lengths: what makes one drive fit all of them.
 
@@ -62,7 +62,7 @@ def _dimensions(leg: LegKind) -> dict[str, float]:
 def choose_common(
     sizing: Sizing, motors: Sequence[Motor], *, margin: float = 1.0
 ) -> tuple[CommonFit, ...]:
-    """Return how each motor suits the legs that are alike, with one ratio for all of them.
+    """Return how each motor suits identical legs, with a common ratio for them.
 
     A machine is built with the same drive at legs that are alike, though its cycle does not ask
     the same of each. The best is first, as `choose` has it.

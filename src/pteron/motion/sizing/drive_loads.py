@@ -79,10 +79,11 @@ class Sizing(Result):
         return f"<Sizing of {self.robot.name!r}: a cycle of {self.duration:.6g} s>"
 
     def summary(self) -> str:
-        """Return the loads of each drive, for people, as lines of text."""
+        """Return the loads of each drive as lines of text."""
         return self._overview().text
 
     def _overview(self) -> Overview:
+        """Return the loads on each drive as a table, for notebooks."""
         headings = ("peak force", "rms force", "peak speed", "peak power", "mean power")
         columns = [Column("joint"), *(Column(name, "number") for name in headings)]
         columns_of_numbers = (
@@ -129,7 +130,7 @@ class Sizing(Result):
 
     @cached_property
     def _quantities_at_places(self) -> dict[str, Array]:
-        """Each quantity at each place, (W, n); W = 1 where the cycle is done as it stands."""
+        """Each quantity at each place, (W, n); W = 1 without places."""
         shape = len(self.time), -1, self.robot.joint_count
         forces, speeds = self.forces.reshape(shape), self.speeds.reshape(shape)
         power = forces * speeds
@@ -146,6 +147,7 @@ class Sizing(Result):
         }
 
     def _greatest(self, quantity: str) -> PerJoint:
+        """Return the greatest value of a quantity over all places, for each joint (n,)."""
         return np.asarray(self._quantities_at_places[quantity].max(axis=0))
 
     def integral(self, samples: Array) -> Array:
@@ -165,7 +167,7 @@ class Sizing(Result):
 
     @property
     def rms_forces(self) -> PerJoint:
-        """Root mean square of each force over the cycle, N or N m: what heats a motor."""
+        """Root mean square of each force over the cycle, N or N m, which heats the motor."""
         return self._greatest("rms_force")
 
     @property
@@ -185,33 +187,33 @@ class Sizing(Result):
 
     @property
     def peak_power(self) -> PerJoint:
-        """Largest power that each drive gives, W."""
+        """Largest power that each drive delivers, W."""
         return self._greatest("peak_power")
 
     @property
     def peak_braking(self) -> PerJoint:
-        """Largest power that each drive takes back, W, as a positive number."""
+        """Largest power that each drive absorbs, W, as a positive number."""
         return self._greatest("peak_braking")
 
     @property
     def given_energy(self) -> PerJoint:
-        """Energy that each drive gives over the cycle while it drives, J."""
+        """Energy that each drive delivers over the cycle while it drives, J."""
         return self._greatest("given_energy")
 
     @property
     def braked_energy(self) -> PerJoint:
-        """Energy that each drive takes back over the cycle while it brakes, J, 0 or more."""
+        """Energy that each drive absorbs over the cycle while it brakes, J, 0 or more."""
         return self._greatest("braked_energy")
 
     @property
     def energy(self) -> PerJoint:
-        """Energy that each drive gives over the cycle, less what it takes back, J."""
+        """Energy that each drive delivers over the cycle, less the energy it absorbs, J."""
         quantities = self._quantities_at_places
         return np.asarray((quantities["given_energy"] - quantities["braked_energy"]).max(axis=0))
 
     @property
     def net_energy(self) -> float:
-        """Energy that all drives together give over the cycle, less what they take back, J.
+        """Energy that all drives deliver over the cycle, less the energy they absorb, J.
 
         It is what friction takes, and the motion leaves; 0 where it is none but for rounding.
         """
@@ -223,17 +225,17 @@ class Sizing(Result):
 
     @property
     def mean_power(self) -> PerJoint:
-        """Mean of what each drive gives while it drives, over the whole cycle, W."""
+        """Mean over the cycle of the power that each drive delivers, rests included, W."""
         return self.given_energy / self.duration
 
     @property
     def mean_braking(self) -> PerJoint:
-        """Mean of what each drive takes back while it brakes, over the whole cycle, W."""
+        """Mean over the cycle of the power that each drive absorbs, rests included, W."""
         return self.braked_energy / self.duration
 
     @property
     def drives(self) -> tuple[Drive, ...]:
-        """The drives; an empty one where the file has none."""
+        """The drives; an empty drive where the file has none."""
         return tuple(leg.drive or Drive() for leg in self.robot.legs)
 
     @property
@@ -243,7 +245,7 @@ class Sizing(Result):
 
     @property
     def inertia_ratios(self) -> PerJoint:
-        """The greatest load's inertia over the motor's, at the joint; NaN where it has no rotor."""
+        """The greatest load inertia over the motor's, at the joint; NaN without a rotor inertia."""
         rotors = self.rotor_inertia
         return np.where(
             rotors > 0.0, self.load_inertia[1] / np.where(rotors > 0.0, rotors, 1.0), np.nan
@@ -251,7 +253,7 @@ class Sizing(Result):
 
     @property
     def motor_torques(self) -> tuple[PerJoint, PerJoint]:
-        """Root mean square and peak at each motor, N m; of one without a ratio as at the joint."""
+        """Root mean square and peak torque of each motor, N m; at the joint without a ratio."""
         gears = np.array([abs(drive.gear) for drive in self.drives])
         return self.rms_forces / gears, self.peak_forces / gears
 
@@ -265,24 +267,25 @@ class Sizing(Result):
 
     @cached_property
     def _squares(self) -> tuple[Array, Array, Array]:
+        """Means over the cycle of force^2, force times acceleration, and acceleration^2."""
         f, a = self.loads, self.accelerations
         return self.mean(f * f), self.mean(f * a), self.mean(a * a)
 
     @cached_property
     def margins(self) -> tuple[DriveMargin, ...]:
-        """The limits of the drives in the machine's file over what the cycle asks, leg by leg."""
+        """The margins of the limits of the file's drives over the cycle's loads, leg by leg."""
         needed = {name: self._greatest(name) for name in ("rms_force", "peak_force", "peak_speed")}
         return drive_margins(self.robot, needed, self.forces, self.speeds)
 
     @cached_property
     def overloads(self) -> tuple[str, ...]:
-        """Loads beyond the drives' limits, a line each: which leg, which limit, and by how much."""
+        """Loads beyond the drives' limits, a line each: the leg, the limit, the excess."""
         exceeded = [margin for margin in self.margins if margin.margin < 1.0]
         exceeded.sort(key=lambda margin: margin.quantity == "rms_force")
         return tuple(margin.overload_text(self.place_text(margin)) for margin in exceeded)
 
     def place_text(self, margin: DriveMargin) -> str:
-        """Return in words at which of several places a margin is so small; else an empty text."""
+        """Return the text of the place with the least margin; empty without places."""
         if not self.places:
             return ""
         leg = margin.leg - 1
@@ -292,7 +295,7 @@ class Sizing(Result):
         return f" {self.places[self.worst(margin.quantity)[leg]]}"
 
     def table(self) -> pl.DataFrame:
-        """Return a table, one row a leg: SI units, at the joint but for motor_torque.
+        """Return a table with a row per leg, in SI units at the joint, but for motor_torque.
 
         What a drive has not is empty.
         """
@@ -336,7 +339,7 @@ class Sizing(Result):
 
 
 def best_ratio(sizing: Sizing, leg: int, rotor_inertia: float) -> float:
-    """Return the ratio at which a motor's root mean square torque over the cycle is least.
+    """Return the ratio that minimises a motor's root mean square torque over the cycle.
 
     T^2 = <f^2> / i^2 + 2 J <f q''> + J^2 i^2 <q''^2> is least at i^2 = rms(f) / (J rms(q'')): the
     load and the rotor then take equal parts of the torque.
@@ -394,7 +397,7 @@ def mean_squares(sizing: Sizing, leg: int, ratio: float, rotor_inertia: float) -
 
 
 def best_ratios(sizing: Sizing) -> PerJoint:
-    """Return the best ratio of each drive's own motor, rad/m or rad/rad; NaN where it has no rotor.
+    """Return the best ratio of each drive's motor, rad/m or rad/rad; NaN without rotor inertia.
 
     Parameters
     ----------

@@ -34,11 +34,11 @@ class DriveMargin(Result):
 
     @property
     def margin(self) -> float:
-        """The limit over what is needed: from 1 on it is enough."""
+        """The limit over the load: 1 or more suffices."""
         return self.most / self.needed if self.needed > 0.0 else math.inf
 
     def overload_text(self, where: str) -> str:
-        """Return in a line that the limit is too small for what is needed at a place."""
+        """Return a line that says by which load, and where, the limit is exceeded."""
         needed = f"{self.needed:.4g} {self.unit}"
         if self.quantity == "rms_force":
             return (
@@ -59,7 +59,7 @@ class DriveMargin(Result):
 def drive_margins(
     robot: Manipulator, needed: Mapping[str, PerJoint], forces: Array, speeds: Array
 ) -> tuple[DriveMargin, ...]:
-    """Return the margins of the limits that the file has, leg by leg.
+    """Return the margins of the limits in the file, leg by leg.
 
     `needed` has what a cycle takes of each joint (n,), by quantity: of some or of all. `forces` and
     `speeds` (..., n) are those of its moments.

@@ -58,7 +58,7 @@ class DutyCycle:
 
     @cached_property
     def course(self) -> Course:
-        """The motions' paths, from their middle."""
+        """The tool's paths of the motions, relative to their middle."""
         return Course.from_motions(self.robot, self.motions)
 
     def thin_out(self) -> DutyCycle:
@@ -72,7 +72,7 @@ class DutyCycle:
         return replace(self, motions=tuple(motions))
 
     def loads_at(self, places: Sequence[CyclePlace] = ()) -> Sizing:
-        """Return the loads at places, or as it stands if none is given."""
+        """Return the loads at places, or of the original motions without places."""
         curves: list[Curve] = [(m.pose, m.velocity, m.acceleration) for m in self.motions]
         if places:
             count = sum(2.0 * curve[0].size for curve in curves)
@@ -125,7 +125,7 @@ class DutyCycle:
 
     @property
     def drives(self) -> tuple[Drive, ...]:
-        """The drives of the machine's file, or empty ones."""
+        """The drives of the machine's file; an empty drive where the file has none."""
         return tuple(leg.drive or Drive() for leg in self.robot.legs)
 
     def _loads(self, pose: Array, velocity: Array, acceleration: Array) -> Curve:
@@ -138,7 +138,7 @@ class DutyCycle:
         )
 
     def _inertia(self, poses: Array) -> tuple[Array, Array]:
-        """Return the least and the greatest inertia that each joint moves (n,), the others held."""
+        """Return least and greatest inertia at each joint (n,), the other joints fixed."""
         rows, mass = jacobian(self.robot, poses), mass_matrix(self.robot, poses)
         joint_inertias = moved_inertias(rows, mass).reshape(-1, self.robot.joint_count)
         return joint_inertias.min(axis=0), joint_inertias.max(axis=0)
@@ -151,7 +151,7 @@ class DutyCycle:
 
 
 def _sample_curve(time: Array, curve: Curve, middles: Array) -> Curve:
-    """Return a curve (T, ..., m) at other times."""
+    """Return a curve (T, ..., m) interpolated at other times."""
     flat = Motion(time, *(part.reshape(len(time), -1) for part in curve))
     shape = len(middles), *curve[0].shape[1:]
     pose, velocity, acceleration = (part.reshape(shape) for part in flat.at(middles))
@@ -159,12 +159,13 @@ def _sample_curve(time: Array, curve: Curve, middles: Array) -> Curve:
 
 
 def _interleave(samples: Array, middles: Array) -> Array:
+    """Return samples (T, ...) with the middles (T - 1, ...) between them: (2 T - 1, ...)."""
     interleaved = np.empty((2 * len(samples) - 1, *samples.shape[1:]))
     interleaved[::2], interleaved[1::2] = samples, middles
     return interleaved
 
 
 def _join_parts(parts: Sequence[Array]) -> Array:
-    """Return parts one behind the other; between two, an interval of no length keeps the pairs."""
+    """Return parts concatenated, with an interval of zero length between two."""
     rows = [row for part in parts for row in (part, part[-1:])]
     return np.concatenate(rows[:-1])

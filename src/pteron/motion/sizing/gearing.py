@@ -43,7 +43,7 @@ NONE = Span(math.inf, 0.0)
 
 
 def torques(sizing: Sizing, leg: int, ratio: float, rotor_inertia: float) -> tuple[float, float]:
-    """Return the torque that a motor would have over the cycle: root mean square and peak.
+    """Return root mean square and peak of a motor's torque over the cycle, N m.
 
     N m, at a ratio in rad/m or rad/rad, of a motor with this inertia of its rotor, kg m^2.
     """

@@ -19,7 +19,7 @@ from pteron.tolerances import ROUNDING
 
 @dataclass(frozen=True, eq=False, repr=False)
 class MotorFit(Result):
-    """A motor at a joint over a cycle: the ratios at which it serves, and its margins.
+    """A motor at a joint over a cycle: its feasible ratios, and its margins.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class MotorFit(Result):
 
     @property
     def fits(self) -> bool:
-        """Whether there is a ratio at which it serves."""
+        """Whether the motor is feasible at some ratio."""
         return bool(self.span)
 
     @property
@@ -66,6 +66,7 @@ class MotorFit(Result):
 
     @property
     def _margins(self) -> dict[str, float]:
+        """The margins of the motor, limit over load, by the limit's name."""
         return {
             "rated torque": self.rated_margin,
             "peak torque": self.peak_margin,
@@ -75,7 +76,7 @@ class MotorFit(Result):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CommonFit(Result):
-    """A motor at several legs over a cycle, behind the same ratio at each.
+    """A motor at several legs over a cycle, with an equal ratio at each.
 
     Attributes
     ----------
@@ -107,7 +108,7 @@ class CommonFit(Result):
 
 
 def choose(sizing: Sizing, motors: Sequence[Motor], *, margin: float = 1.0) -> tuple[MotorFit, ...]:
-    """Return how each motor suits each joint: first what serves, the smallest motor before others.
+    """Return how each motor suits each joint: feasible motors first, by size, then others.
 
     A motor serves at a ratio if, times the margin, its root mean square torque over the cycle, the
     rest included, is no more than its rated torque, its greatest torque no more than its peak
@@ -152,7 +153,7 @@ def choose(sizing: Sizing, motors: Sequence[Motor], *, margin: float = 1.0) -> t
 def rank_motors(
     sizing: Sizing, groups: Sequence[tuple[int, ...]], motors: Sequence[Motor], margin: float
 ) -> list[CommonFit]:
-    """Return how each motor suits each group of legs, with one ratio for all of a group.
+    """Return how each motor suits each group of legs, with a common ratio per group.
 
     What serves comes first in a group, the smallest motor before others; then what comes nearest.
     """
@@ -164,11 +165,13 @@ def rank_motors(
 
 
 def _order(fit: CommonFit) -> tuple[bool, float]:
+    """Return a sort key: feasible motors first, by size; then infeasible ones, by margin."""
     size = fit.motor.rated_torque * fit.motor.max_speed
     return not fit.span, size if fit.span else -fit.worst.margin
 
 
 def _fit(sizing: Sizing, legs: tuple[int, ...], motor: Motor, margin: float) -> CommonFit:
+    """Return a motor's fit to legs with a common ratio, within the ratios feasible at each leg."""
     span = fast = Span(0.0, math.inf)
     for leg in legs:
         fast = fast.intersect(speed_span(sizing, leg, motor.max_speed / margin))
@@ -182,7 +185,7 @@ def _fit(sizing: Sizing, legs: tuple[int, ...], motor: Motor, margin: float) -> 
 
 
 def serving_span(sizing: Sizing, leg: int, motor: Motor, margin: float) -> Span:
-    """Return the ratios at which a motor keeps its speed and its torques."""
+    """Return the ratios at which a motor keeps its speed and torque limits."""
     rotor = motor.rotor_inertia
     span = speed_span(sizing, leg, motor.max_speed / margin)
     span = span.intersect(rated_span(sizing, leg, rotor, motor.rated_torque / margin))
@@ -190,7 +193,7 @@ def serving_span(sizing: Sizing, leg: int, motor: Motor, margin: float) -> Span:
 
 
 def _best_ratio(sizing: Sizing, legs: tuple[int, ...], rotor_inertia: float) -> float:
-    """Return the ratio at which the largest root mean square torque of all legs is least."""
+    """Return the ratio that minimises the largest root mean square torque of all legs."""
     optimal_ratios = [best_ratio(sizing, leg, rotor_inertia) for leg in legs]
     moving = [ratio for ratio in optimal_ratios if math.isfinite(ratio)]
     if not moving:
@@ -231,4 +234,5 @@ def fit_at(sizing: Sizing, leg: int, motor: Motor, span: Span, ratio: float) -> 
 
 
 def _margin(limit: float, needed: float) -> float:
+    """Return limit / needed; infinity where nothing is needed."""
     return limit / needed if needed > 0.0 else np.inf

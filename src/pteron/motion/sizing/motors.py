@@ -32,7 +32,7 @@ _NUMBERS = ("rotor_inertia", "rated_torque", "peak_torque", "max_speed")
 @checked_arguments
 @dataclass(frozen=True)
 class Motor:
-    """A rotary motor; everything is at its own shaft.
+    """A rotary motor; all values are at its shaft.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ class Motor:
 
 
 def read_motors(path: str | Path) -> tuple[Motor, ...]:
-    """Return the motors that a file lists.
+    """Return the motors listed in a file.
 
     Parameters
     ----------
@@ -154,12 +154,14 @@ _Rows = list[tuple[str, dict[str, Any]]]
 
 
 def _read_toml_motors(path: str | Path) -> _Rows:
+    """Return the motors of a TOML file as rows: the file's name and the motor's values."""
     document = read_toml(path, DataError, "no such file")
     motor_file = to_model(_MotorsFile, document, str(path), DataError)
     return [(str(path), motor.model_dump(exclude={"price"})) for motor in motor_file.motors]
 
 
 def _read_table_motors(path: str | Path) -> _Rows:
+    """Return the motors of a table as rows: the place in the file and the motor's values."""
     table = read_table(path)
     numbers = table.numbers(_NUMBERS)
     if "name" in table.columns:

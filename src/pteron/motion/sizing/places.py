@@ -66,7 +66,7 @@ class CyclePlace(Result):
 
 @dataclass(frozen=True)
 class Course:
-    """Motions that are moved as one: the tool's path of each, from their middle.
+    """Motions that are moved as a unit: the tool's path of each, from their common middle.
 
     Attributes
     ----------
@@ -157,7 +157,7 @@ def region_fits(course: Course, region: Region | None) -> tuple[Array, Fits]:
 
 
 def places_in(course: Course, box: Array, fits: Fits) -> tuple[CyclePlace, ...]:
-    """Return places at which the whole of a course lies in a region.
+    """Return places at which all of a course lies in a region.
 
     They are on a grid that goes to the ends of the region's box, for turns by 30 degrees; the
     platform is turned as the path is, too, unless the box has a range of that. Where the region
@@ -182,7 +182,7 @@ def places_in(course: Course, box: Array, fits: Fits) -> tuple[CyclePlace, ...]:
 
 
 def _quasirandom_places(course: Course, box: Array) -> Iterator[CyclePlace]:
-    """Yield places evenly spread over a box and all turns, each other with its platform turned.
+    """Yield quasi-random places in a box and all turns; every other one turns the platform.
 
     They are the quasirandom sequence of M. Roberts, "The unreasonable effectiveness of quasirandom
     sequences" (2018): multiples of powers of a generalised golden ratio.
@@ -202,12 +202,12 @@ def _quasirandom_places(course: Course, box: Array) -> Iterator[CyclePlace]:
 
 
 def stays(course: Course, place: CyclePlace, fits: Fits) -> bool:
-    """Say whether the whole of a course lies in a region at a place."""
+    """Return whether all of a course lies in a region at a place."""
     return all(fits(poses[:, 0]) for poses, *_ in course.curves_at([place]))
 
 
 def with_platform(place: CyclePlace, yaw: Array, turn: float) -> CyclePlace:
-    """Return a place whose platform is turned by at most half a turn, as `Course.yaw` has it."""
+    """Return a place with the platform turned by an angle, wrapped to half a turn, along `yaw`."""
     pose = np.array(place.pose) + yaw * np.angle(np.exp(1j * turn))
     return CyclePlace(tuple(map(float, pose)), place.turn)
 
@@ -251,7 +251,7 @@ def _axis(robot: Manipulator) -> Array | None:
 
 
 def _yaw(robot: Manipulator, axis: Array | None) -> Array:
-    """Return by how much a pose grows where the platform turns by 1 rad about an axis."""
+    """Return the change (m,) of the pose for a platform rotation of 1 rad about an axis."""
     platform, rates = robot.platform, np.zeros(robot.freedom)
     last = len(rates) - 1
     about = platform.spin_axis
@@ -263,7 +263,7 @@ def _yaw(robot: Manipulator, axis: Array | None) -> Array:
 
 
 def _is_in_box(region: Region, poses: Array) -> NDArray[np.bool_]:
-    """Return which poses (..., m) lie in a box but for rounding."""
+    """Return which poses (..., m) lie in a region's box, up to rounding."""
     if not isinstance(region, Box):
         return np.zeros(poses.shape[:-1], dtype=bool)
     low, high = region.box
@@ -271,7 +271,7 @@ def _is_in_box(region: Region, poses: Array) -> NDArray[np.bool_]:
 
 
 def expect_places_of(robot: Manipulator, places: Sequence[CyclePlace]) -> tuple[CyclePlace, ...]:
-    """Return the places after a check: at least one, each with the machine's coordinates."""
+    """Return places after a check: at least one, each with the machine's coordinates."""
     expect(places, "places", "none", "at least one")
     for i, place in enumerate(places):
         if len(place.pose) != robot.freedom:
@@ -283,7 +283,7 @@ def expect_places_of(robot: Manipulator, places: Sequence[CyclePlace]) -> tuple[
 
 
 def motion_at_place(robot: RobotLike, motion: Motion, place: CyclePlace) -> Motion:
-    """Return a motion at another place: it keeps its shape and its time.
+    """Return a motion at another place, with its shape and duration.
 
     Parameters
     ----------

@@ -125,7 +125,7 @@ def size(
 def _size_at_places(
     cycle: DutyCycle, places: Region | Sequence[CyclePlace] | Literal["workspace"]
 ) -> Sizing:
-    """Return the loads at given places, or at those of a region, and nearer about the worst."""
+    """Return the loads at places, or at those of a region, refined about the worst."""
     cycle = cycle.thin_out()
     if not (isinstance(places, Region) or places == "workspace"):
         return cycle.loads_at(expect_places_of(cycle.robot, places))
@@ -172,7 +172,7 @@ def _size_at_places(
 
 
 def _check(robot: Manipulator, motion: Motion, dwell: float) -> None:
-    """Refuse a motion that is not one of this machine, and a rest that cannot be."""
+    """Refuse a motion of unfit shape, and a rest that is invalid or after a moving end."""
     expected = (len(motion.time), robot.freedom)
     for name in ("pose", "velocity", "acceleration"):
         if getattr(motion, name).shape != expected:

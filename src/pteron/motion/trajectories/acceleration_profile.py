@@ -12,7 +12,7 @@ from pteron.kernels import Array
 
 
 class Profile(NamedTuple):
-    """s(t) with constant accelerations between nodes (K,), as TOPP-RA finds it."""
+    """s(t) with piecewise constant accelerations between nodes (K,), computed by TOPP-RA."""
 
     time: Array
     s: Array

@@ -57,7 +57,7 @@ def check_path(robot: RobotLike, path: Path) -> None:
 def check_motion(
     robot: RobotLike, motion: Motion, place: Callable[[float], str] | None = None
 ) -> None:
-    """Refuse a motion that the machine cannot do, as `check_path` does; it says at what time.
+    """Refuse a motion that the machine cannot do, like `check_path`; the error names the time.
 
     Parameters
     ----------
@@ -117,7 +117,7 @@ def check_curve(
 
 
 class _Curve(NamedTuple):
-    """A curve of poses (K, m) over a parameter (K,), and words for a place on it."""
+    """A curve of poses (K, m) over a parameter (K,), with a text for a place on it."""
 
     robot: Manipulator
     poses: Callable[[Array], Array]
@@ -128,18 +128,20 @@ class _Curve(NamedTuple):
         return np.asarray(numeric(self.robot, what)(self.poses(at))[index])
 
     def place_text(self, at: float) -> str:
-        """Return where that is, and the pose."""
+        """Return the text of a parameter's place on the curve and of the pose there."""
         return f"{self.place(at)}, pose {pose_text(self.poses(np.array([at]))[0])}"
 
 
 class _Failure(NamedTuple):
-    """The place where a curve fails, and the error that says so."""
+    """The place where a curve fails, and the error to raise."""
 
     at: float
     error: PteronError
 
 
 def _reach_failure(curve: _Curve, marks: Array) -> _Failure | None:
+    """Return the first place where a leg does not reach or is singular (type I), else None."""
+
     def squares(at: Array) -> Array:
         return np.nan_to_num(curve.value("squared_type_i", at), nan=-1.0)
 
@@ -176,6 +178,8 @@ def _reach_failure(curve: _Curve, marks: Array) -> _Failure | None:
 
 
 def _joint_failure(curve: _Curve, marks: Array) -> _Failure | None:
+    """Return the first place where an actuated joint passes its limits, else None."""
+
     def margin(at: Array) -> Array:
         return joint_distances(curve.robot, curve.value("joint_coordinates", at))
 
@@ -194,6 +198,8 @@ def _joint_failure(curve: _Curve, marks: Array) -> _Failure | None:
 
 
 def _passive_failure(curve: _Curve, marks: Array) -> _Failure | None:
+    """Return the first place where a passive joint passes its limits, else None."""
+
     def margin(at: Array) -> Array:
         return curve.value("passive_room", at, 1)
 
@@ -215,11 +221,13 @@ def _passive_failure(curve: _Curve, marks: Array) -> _Failure | None:
 
 
 def _limit_failure(curve: _Curve, at: float, leg: int, fault: str, metres: float) -> _Failure:
+    """Return the failure of a leg's limit at a place on a curve, passed by a length, m."""
     text = f"{curve.place_text(at)}: {fault}; take another path"
     return _Failure(at, UnreachablePose(text, leg=leg, shortfall=metres, index=()))
 
 
 def _type_ii_failure(curve: _Curve, marks: Array) -> _Failure | None:
+    """Return the first place where the type-II measure changes its sign, else None."""
     if closure_of(curve.robot).vanishes() is False and not curve.robot.platform.angles:
         return None
     # Its sign is that of the beginning, as far as the actuators hold the platform.

@@ -58,7 +58,7 @@ def quintic(tau: Array, begin: float, end: float) -> tuple[Array, Array, Array]:
 
 @dataclass(frozen=True)
 class Cycle:
-    """The cycle about a pose, in which the tool is half way across and half way up.
+    """The pick-and-place cycle about a pose, at which it is half way across and half way up.
 
     Attributes
     ----------
@@ -138,17 +138,17 @@ class Cycle:
 
     @property
     def _turns_across(self) -> NDArray[np.bool_]:
-        """Whether each angle turns on the way across: the last one."""
+        """Whether each angle (a,) rotates on the way across: the last angle does."""
         count = len(self.platform.angles)
         return np.asarray(np.arange(count) == count - 1)
 
     @property
     def _turns_up(self) -> NDArray[np.bool_]:
-        """Whether each angle rises and sinks: the others, where no lengths go across."""
+        """Whether each angle (a,) rises and falls: all but the last, for fewer than two lengths."""
         return np.asarray(~self._turns_across & (len(self.platform.lengths) < 2))
 
     def acceleration(self, tau: Array, radius: float) -> Array:
-        """Return the tool's acceleration (T, k) by tau, whatever moves it.
+        """Return the tool's acceleration (T, k) by tau; angular accelerations follow if it tilts.
 
         Of a platform that tilts that of a point at a radius from P, m, as it turns, comes behind.
         """
@@ -163,7 +163,7 @@ _Shares = tuple[Array, Array, Array]
 
 
 def _shares(tau: Array) -> tuple[_Shares, _Shares]:
-    """Return the shares of the moves across and up, less a half, and two derivatives by tau.
+    """Return the progress of the moves across and up, from -1/2 to 1/2, with two derivatives.
 
     The first half of the time is the path out, the second the same path back.
     """
@@ -179,7 +179,7 @@ def _shares(tau: Array) -> tuple[_Shares, _Shares]:
 def moves(
     robot: Manipulator, direction: ArrayLike | None, count: int
 ) -> tuple[tuple[Array, Array], ...]:
-    """Return pairs of unit vectors across and up: those of a direction, or some to choose from.
+    """Return pairs of unit vectors across and up: for a direction, or `count` candidates.
 
     Up is against gravity, or the platform's axis where there is none, and of a tripod; of a planar
     machine, against what gravity does in its plane or, where that is nothing, the axis times

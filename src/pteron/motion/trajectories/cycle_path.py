@@ -39,13 +39,16 @@ class CyclePath:
         self.rests = (0.0, self.length)
 
     def _curve(self, tau: Array) -> Curve:
+        """Return the platform's poses and two derivatives at parameters of the cycle."""
         platform = self._cycle.platform
         return tool_motion(platform, *self._cycle.at(tau))
 
     def _weighted_pose(self, tau: Array) -> Array:
+        """Return poses (..., m) with angles weighted to lengths, m."""
         return self._curve(tau)[0] * self._weights
 
     def _speed(self, tau: Array) -> Array:
+        """Return the arc length's derivative by the parameter of the cycle (...,)."""
         return np.asarray(np.linalg.norm(self._curve(tau)[1] * self._weights, axis=-1))
 
     def at(self, s: Array) -> Curve:
@@ -76,5 +79,5 @@ class CyclePath:
         return tau
 
     def place(self, s: float) -> str:
-        """Return the place of s on the path in words."""
+        """Return the text of a place on the path, by its s."""
         return f"{s:.4g} m along its path of {self.length:.4g} m"

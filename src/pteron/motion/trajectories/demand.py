@@ -77,7 +77,7 @@ class Demand(NamedTuple):
 
 
 def demand(robot: Manipulator, pose: Array, first: Array, second: Array) -> Demand:
-    """Return the demand of poses (K, m) on a curve with these derivatives by p."""
+    """Return the demand of poses (K, m) on a curve with first and second derivatives by p."""
     zero_rates = np.zeros_like(pose)
     weight = evaluate_unchecked(robot, "inverse_dynamics", pose, zero_rates, zero_rates)
     rates = evaluate_unchecked(robot, "joint_rates", pose, first)[0]
@@ -120,7 +120,7 @@ def demand_between(
 def _reversals(
     robot: Manipulator, states: Callable[[Array], Curve], at: Array
 ) -> tuple[Array, NDArray[np.intp]]:
-    """Return where (R,) joints reverse between places (K,) or on them, and which (R,)."""
+    """Return the places (R,) where joints reverse, and the joint of each (R,)."""
 
     def rates(places: Array) -> Array:
         return np.asarray(evaluate_unchecked(robot, "joint_rates", *states(places)[:2])[0])
@@ -147,7 +147,7 @@ def curve_rate(
 def most_rate(
     robot: Manipulator, needs: Demand, limits: MotionLimits, poses: Array, most: float = np.inf
 ) -> float:
-    """Return the largest constant p', `most` at most, at which a curve keeps the limits.
+    """Return the largest constant p', at most `most`, at which a curve keeps the limits.
 
     Infinite where it meets none.
     """
@@ -192,7 +192,7 @@ def most_rate(
 def _expect_strength(
     robot: Manipulator, static_forces: Array, limits: MotionLimits, poses: Array
 ) -> None:
-    """Refuse a curve on which a drive cannot even creep."""
+    """Refuse a curve on which static forces exceed a drive's limit at any speed."""
     joints, force, _, _ = limits.force_lines
     strength = np.full(static_forces.shape[-1], np.inf)
     np.minimum.at(strength, joints, force)
@@ -229,7 +229,7 @@ class Peak(Result):
 
     @property
     def share(self) -> float:
-        """The size over the limit; 0 without one, infinite where it is 0."""
+        """The size over the limit; 0 without a limit, infinite if the limit is 0."""
         return self.size / self.limit if self.limit else math.inf
 
     def phrase(self) -> str:
@@ -246,7 +246,7 @@ class Peak(Result):
 def peaks(
     robot: RobotLike, pose: Array, velocity: Array, acceleration: Array, limits: MotionLimits
 ) -> tuple[Peak, ...]:
-    """Return the largest sizes in a motion (T, m), one for each leg and quantity, then the tool's.
+    """Return the largest sizes in a motion (T, m): for each leg and quantity, then the tool.
 
     Parameters
     ----------

@@ -114,13 +114,13 @@ def fourier_bases(times: Array, harmonics: int, period: float) -> Iterator[Array
 
 
 def row_blocks(rows: int) -> Iterator[slice]:
-    """Yield the rows in blocks of bounded size; one empty block where there are none."""
+    """Yield the rows in blocks of bounded size; an empty block if there are no rows."""
     for start in range(0, max(rows, 1), _BLOCK):
         yield slice(start, min(start + _BLOCK, rows))
 
 
 def fourier_motion(robot: RobotLike, series: FourierSeries, step: float = STEP) -> Motion:
-    """Return one period of a Fourier series as a motion; it is already moving when it begins.
+    """Return a period of a Fourier series as a motion; its initial velocity is not zero.
 
     Parameters
     ----------

@@ -129,11 +129,12 @@ def jerk_limited(
 
 
 def _wrap_half_turn(angles: Array) -> Array:
-    """Return angles, rad, less whole turns: from -pi to pi."""
+    """Return angles, rad, wrapped to [-pi, pi]."""
     return (angles + np.pi) % (2.0 * np.pi) - np.pi
 
 
 def _end_joints(robot: Manipulator, name: str, pose: Array) -> Array:
+    """Return the joint coordinates (n,) at a pose, which errors call by a name."""
     try:
         return inverse_kinematics(robot, pose)
     except UnreachablePose as error:
@@ -144,7 +145,7 @@ def _end_joints(robot: Manipulator, name: str, pose: Array) -> Array:
 
 
 def _expect_modes(robot: Manipulator, motion: Motion, planned: Any, end: Array) -> None:
-    """Refuse a motion that leaves the machine's working mode, or ends in another pose."""
+    """Refuse a motion that leaves the working mode, or ends in another assembly mode."""
     end_error = motion.pose[-1] - end
     end_error = np.where(robot.wraps, _wrap_half_turn(end_error), end_error)
     joints = np.array([planned.at_time(t)[0] for t in motion.time])
@@ -160,6 +161,7 @@ def _expect_modes(robot: Manipulator, motion: Motion, planned: Any, end: Array) 
 
 
 def _lost_error(text: str) -> UnreachablePose:
+    """Return an error for a motion that leaves reach, without a leg or a distance."""
     return UnreachablePose(text, leg=0, shortfall=float("nan"), index=())
 
 

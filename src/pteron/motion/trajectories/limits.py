@@ -79,7 +79,7 @@ def limits_of(
     tool_speed: float | None = None,
     tool_acceleration: float | None = None,
 ) -> MotionLimits:
-    """Return given limits of a motion; those of speed and force are by default the drives' own.
+    """Return the limits of a motion; those of speed and force are by default the drives'.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ def limits_of(
 def limit_array(
     robot: Manipulator, name: str, setting: PerJointLimit, defaults: Sequence[float | None]
 ) -> Array:
-    """Return a limit of each joint (n,), by default its own, infinite where it has none."""
+    """Return a limit of each joint (n,), by default the joint's, infinite without a limit."""
     if setting is None:
         return np.array([math.inf if limit is None else limit for limit in defaults])
     several = list(setting) if isinstance(setting, Sequence | np.ndarray) else [setting]
@@ -138,6 +138,7 @@ def limit_array(
 
 
 def _positive_number(name: str, setting: object) -> float:
+    """Return a setting as a float; it must be a number above 0."""
     number = number_or_nan(setting)
     if not number > 0.0:
         text = setting if isinstance(setting, float) else shorten(setting)

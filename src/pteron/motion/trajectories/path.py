@@ -49,7 +49,7 @@ class Path(Protocol):
         """Return poses (T, m) at s (T,), and two derivatives by s."""
 
     def place(self, s: float) -> str:
-        """Return in words where on the path s is."""
+        """Return the text of a place on the path, by its s."""
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ class LinePath:
         return pose_motion(self.platform, *curve)
 
     def place(self, s: float) -> str:
-        """Return in words where on the path s is."""
+        """Return the text of a place on the path, by its s."""
         k = int(np.clip(np.searchsorted(self.corners, s, side="right"), 1, len(self.corners) - 1))
         between = f", between poses {k} and {k + 1}" if len(self.corners) > 2 else ""
         return f"{s:.4g} m along its {self.length:.4g} m{between}"
@@ -164,14 +164,14 @@ def line_path(robot: RobotLike, poses: ArrayLike, corner: float = 0.0) -> LinePa
 
 
 def path_weights(platform: Platform) -> Array:
-    """Return the length of path (m,) that a unit of each coordinate counts as: m/m or m/rad."""
+    """Return the weight (m,) of each coordinate in the path's length: m/m or m/rad."""
     return np.where(platform.angular, TURN, 1.0)
 
 
 def _round_corners(
     platform: Platform, places: Array, directions: Array, sizes: Array, corner: float
 ) -> LinePath:
-    """Return the path through places (K, m), its lines having these directions and lengths."""
+    """Return the path through places (K, m), with rounded corners between its lines."""
     controls: list[Array] = []
     knots, rests, corners = [0.0], [0.0], [0.0]
     here = places[0]
@@ -202,7 +202,7 @@ def _round_corners(
 
 
 class BackPath:
-    """A path, and the same path back."""
+    """A path followed by its reverse."""
 
     def __init__(self, out: Path) -> None:
         self._out = out
@@ -217,19 +217,19 @@ class BackPath:
         return pose, np.where(back[:, None], -first, first), second
 
     def place(self, s: float) -> str:
-        """Return in words where on the path s is."""
+        """Return the text of a place on the path, by its s."""
         if s <= self._out.length:
             return self._out.place(s)
         return f"{self._out.place(self.length - s)}, on the path back"
 
 
 def return_path(path: Path) -> BackPath:
-    """Return the path and, after a rest at its end, the same path back."""
+    """Return the path and, after a rest at its end, its reverse."""
     return BackPath(path)
 
 
 def poses_of(path: Path, count: int) -> tuple[Array, Array]:
-    """Return s (K,) evenly along a path, its rests included, about `count` of them, and poses."""
+    """Return about `count` values of s (K,) along a path, its rests included, and poses (K, m)."""
     spans = np.diff(path.rests)
     parts: Sequence[Array] = [
         np.linspace(a, b, max(2, int(np.ceil(count * (b - a) / spans.sum()))), endpoint=False)

@@ -92,13 +92,13 @@ def replay(
 
 
 def _place(rows: Table, motion: Motion, at: float) -> str:
-    """Return the row of a table that a time, s, is at or behind."""
+    """Return the text of a table's row at or before a time, s."""
     k = int(np.searchsorted(motion.time, at, side="right")) - 1
     return f"{rows.place(max(k, 0))}, at {at:.4g} s"
 
 
 def rows_of(source: str | File | Table | Columns, useful: Sequence[str]) -> Table:
-    """Return a table with its useful columns, or the file's of that name."""
+    """Return a table, an object's useful columns as a table, or the table in a file."""
     if isinstance(source, Table):
         return source
     if isinstance(source, str | File):
@@ -131,7 +131,7 @@ def _read_columns(rows: Table, columns: Sequence[str]) -> tuple[Array, Array]:
 
 
 def _unwrap_angles(robot: Manipulator, poses: Array) -> Array:
-    """Return poses (T, m) whose angles are continuous where, in a table, they jump by a turn."""
+    """Return poses (T, m) with angles made continuous where a table has jumps by a turn."""
     return np.where(robot.platform.angular, np.unwrap(poses, axis=0), poses)
 
 
@@ -148,7 +148,7 @@ def _spline(time: Array, samples: Array) -> tuple[Array, Array, Array]:
 def _follow_joints(
     robot: Manipulator, time: Array, joints: Array, start: PoseLike | None
 ) -> Motion:
-    """Return the platform's motion as its joints move so, (T, n)."""
+    """Return the platform's motion that follows joint coordinates (T, n) over time."""
     if start is None:
         raise DataError(
             "start: the table holds joint coordinates, which may have several poses; give one of "

@@ -45,7 +45,7 @@ _WORTH = 1.01
 
 
 def least_margin(robot: RobotLike, around: PoseLike) -> float:
-    """Return the margin that a cycle about a pose keeps, if nothing else is said.
+    """Return the default margin to singularities that a cycle about a pose keeps.
 
     It is 0.2; a machine with little margin moves where it has half of what the pose has.
 
@@ -139,7 +139,7 @@ def scaled_to_reach(
 
 
 def _largest_scale(robot: Manipulator, cycle: Cycle, least: float, minimum: int) -> int:
-    """Return the largest scale that fits, in thousandths; 0 if it is less than is wanted."""
+    """Return the largest feasible scale, in thousandths; 0 if it is below `minimum`."""
     way = np.linspace(0.0, 0.5, _SAMPLES)
 
     def fits(thousandths: int) -> bool:
@@ -154,7 +154,7 @@ def _largest_scale(robot: Manipulator, cycle: Cycle, least: float, minimum: int)
 
 
 def keeps_margin(robot: Manipulator, poses: Array, least: float) -> bool:
-    """Say whether all poses keep the margins and the joints' limits."""
+    """Return whether all poses keep the margins and the joints' limits."""
     type_i = numeric(robot, "reach")(poses)[1]
     if not (type_i >= least + _DIP).all():  # NaN, out of reach, compares false
         return False

@@ -43,7 +43,7 @@ suffice."""
 def shortest(
     robot: RobotLike, curve: Callable[[Array], Curve], limits: MotionLimits, step: float = STEP
 ) -> Motion:
-    """Return a curve of poses, gone as it is, in the shortest time that keeps the limits.
+    """Return the motion along a curve of poses in the shortest time that keeps the limits.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ def time_curve(
     limits: MotionLimits,
     step: float = STEP,
 ) -> Motion:
-    """Return a curve of poses, gone as it is, in a duration, s, or the shortest."""
+    """Return the motion along a curve of poses in a duration, s, or the shortest."""
     if duration is None:
         return shortest(robot, curve, limits, step)
     course = Timed(curve, _expect_time("duration", duration))
@@ -90,6 +90,7 @@ def time_curve(
 
 
 def _no_limit_error() -> DataError:
+    """Return the error that neither a duration nor a limit determines the motion's time."""
     return DataError(
         "neither a duration nor a limit that the motion meets is given, and the machine's drives "
         "have none; give a duration, or limits such as speed and acceleration of the joints"
@@ -105,7 +106,7 @@ def polynomial_motion(
     law: PolynomialLaw = "quintic",
     step: float = STEP,
 ) -> Motion:
-    """Return the motion along a path that is one polynomial in time between two rests.
+    """Return the motion along a path that is a polynomial in time between two rests.
 
     Parameters
     ----------
@@ -189,7 +190,7 @@ def stretch_times(
 def _expect_kept(
     robot: Manipulator, course: Timed, limits: MotionLimits, shortest: float | None = None
 ) -> None:
-    """Refuse a course that is too fast for the limits; it names the worst one."""
+    """Refuse a motion that is too fast for the limits; the error names the worst limit."""
     curve = course.at(np.linspace(0.0, course.duration, _LOOK))
     if curve_rate(robot, curve, limits, 1.0) * KEPT >= 1.0:
         return
@@ -204,7 +205,7 @@ def _expect_kept(
 
 
 def limit_motion(robot: Manipulator, course: Timed, limits: MotionLimits, step: float) -> Motion:
-    """Return a course as a motion that keeps the limits at ten times its samples too.
+    """Return a course as a motion, slowed down to keep the limits at ten times its samples too.
 
     And where a joint reverses between them.
 
@@ -226,7 +227,7 @@ def limit_motion(robot: Manipulator, course: Timed, limits: MotionLimits, step: 
 
 
 def sample_curve(states: Callable[[Array], Curve], duration: float, step: float = STEP) -> Motion:
-    """Return a motion's samples from its beginning to its end, evenly and at most a step apart.
+    """Return a motion's samples from beginning to end, equidistant, at most a step apart.
 
     `states` takes times (T,), s, and returns pose, velocity and acceleration, (T, m) each.
     """
@@ -241,5 +242,6 @@ def sample_curve(states: Callable[[Array], Curve], duration: float, step: float 
 
 
 def _expect_time(name: str, seconds: float) -> float:
+    """Return a time, s; it must be finite and above 0."""
     expect(np.isfinite(seconds) and seconds > 0.0, name, seconds, "a time above 0 s")
     return seconds

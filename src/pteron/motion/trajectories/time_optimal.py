@@ -78,7 +78,7 @@ _SLOWEST = 1e-4
 
 @dataclass(frozen=True, eq=False, repr=False)
 class TimeOptimal(Motion):
-    """A motion along a path in next to the shortest time.
+    """A motion along a path in nearly the shortest time.
 
     Attributes
     ----------
@@ -202,6 +202,7 @@ def _fastest_law(
         # Limits are tightened by what the spread motion exceeds them.
 
         def evaluate_law(tau: Array, progress: Progress = progress) -> Curve:
+            """Return states at shares of the duration."""
             return states(progress(tau)[0])
 
         tau, needs, _ = demand_between(robot, evaluate_law, np.linspace(0.0, 1.0, _LOOK))
@@ -260,7 +261,7 @@ def _largest_in_ranges(ranges: Array, quantities: Array) -> Array:
 def _solve_pass(
     toppra: Any, rows: LimitRows, grid: Array, last_squares: Array, ahead: float
 ) -> Array:
-    """Return x = s'^2 on the grid, by TOPP-RA, from that of the pass before.
+    """Return x = s'^2 on the grid, by TOPP-RA, from the solution of the previous pass.
 
     With viscous friction it is at most `ahead` times as large: there the chord ends.
     """

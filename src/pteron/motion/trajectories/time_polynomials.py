@@ -15,7 +15,7 @@ PolynomialLaw = Literal["quintic", "seventh"]
 
 @runtime_checkable
 class Progress(Protocol):
-    """A time law from rest to rest: the share of the path covered, over one unit of time."""
+    """A time law from rest to rest: the fraction of the path covered, over a unit of time."""
 
     def __call__(self, tau: Array, /) -> tuple[Array, Array, Array]:
         """Return a share of the path in [0, 1] and two derivatives, (T,) each, at tau (T,)."""

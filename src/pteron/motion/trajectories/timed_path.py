@@ -15,7 +15,7 @@ from pteron.motion.trajectories.tool import Curve
 
 @dataclass(frozen=True)
 class Timed:
-    """A curve of poses over one unit of time, traversed in a given duration.
+    """A curve of poses over a unit of time, traversed in a duration.
 
     Attributes
     ----------
@@ -29,7 +29,7 @@ class Timed:
     duration: float
 
     def slow_down(self, factor: float) -> Timed:
-        """Return the same curve with its duration multiplied by a factor."""
+        """Return the curve with its duration multiplied by a factor."""
         return Timed(self.curve, factor * self.duration)
 
     def at(self, time: Array) -> Curve:

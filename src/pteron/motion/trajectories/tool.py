@@ -39,6 +39,7 @@ def tool_path(platform: Platform, pose: Array, first: Array, second: Array) -> C
 
 
 def _shift_curve(platform: Platform, curve: Curve, side: float) -> Curve:
+    """Return a curve shifted by the tool's arm: to the tool with `side` 1, back to P with -1."""
     turning = [
         part for axis, part in zip("xyz", platform.tool, strict=True) if axis in platform.arm_axes
     ]
@@ -53,12 +54,12 @@ def _shift_curve(platform: Platform, curve: Curve, side: float) -> Curve:
 
 
 def carries(platform: Platform) -> bool:
-    """Say whether the pose's lengths can hold the tool in place while its angles change."""
+    """Return whether the pose's lengths can compensate the tool's displacement by its angles."""
     return bool(platform.angles) and set(platform.arm_axes) <= set(platform.lengths)
 
 
 def arm_motion(platform: Platform, angles: Array, rates: Array, growths: Array) -> Curve:
-    """Return the part of the arm from P to the tool that turns, and two derivatives, (..., k).
+    """Return the rotating part of the arm from P to the tool, and two derivatives, (..., k).
 
     The k components are along the pose's lengths; angles, rates and growths, their second
     derivatives, are (..., j). The platform is one that `carries` its tool.
@@ -77,6 +78,7 @@ def arm_motion(platform: Platform, angles: Array, rates: Array, growths: Array) 
 
 
 def _pose_of_angles(platform: Platform, angles: Array) -> Array:
+    """Return poses (..., m) with the platform's angles (..., a) and zeros for lengths."""
     pose = np.zeros((*angles.shape[:-1], len(platform.coordinates)))
     pose[..., platform.angular] = angles
     return pose

@@ -23,7 +23,7 @@ derivative."""
 
 @dataclass(frozen=True)
 class LinearLaw:
-    """A controller near a state: m' = A m + B (q, q'), F = C m + D (q, q') at each sample.
+    """A controller linearised at a state: m' = A m + B (q, q'), F = C m + D (q, q') per sample.
 
     All are small changes: of its memory, m (K,) and m' at the next sample, of the measured joints
     and their rates, (2 n,), and of the forces F (n,) that it asks for.
@@ -36,7 +36,7 @@ class LinearLaw:
 
 
 def linearised_law(law: Law, pose: Array, velocity: Array, acceleration: Array) -> LinearLaw:
-    """Linearise a law where the measured state is the wanted one, (m,) each.
+    """Return a law linearised where the measured state is the reference, (m,) each.
 
     The derivatives are exact. Its model has no dry friction there, as the plant has none.
     """

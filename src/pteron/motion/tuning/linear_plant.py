@@ -27,7 +27,7 @@ from pteron.shapes import PoseLike
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LinearPlant(Result):
-    """A machine with its drives near a state: s' = A s + B F, and C s is what its encoders tell.
+    """A machine with its drives, linearised: s' = A s + B F, with encoder readings C s.
 
     s are small changes of (q, q'), then of the motors' coordinates and rates where transmissions
     bend, and of the currents' forces where these lag: S numbers in all.
@@ -59,11 +59,11 @@ class LinearPlant(Result):
 
     @property
     def poles(self) -> Array:
-        """Eigenvalues of A, (S,), rad/s: the machine's own, its drives' forces held."""
+        """Eigenvalues of A, (S,), rad/s: of the machine at constant drive forces."""
         return np.asarray(np.linalg.eigvals(self.matrix))
 
     def zero_order_hold(self, span: float) -> tuple[Array, Array]:
-        """Return exp(A t) and the integral of exp(A s) B over the span: forces held, exactly."""
+        """Return exp(A t) and the integral of exp(A s) B over a span: exact for constant forces."""
         size, count = self.inputs.shape
         block = np.zeros((size + count, size + count))
         block[:size] = np.hstack([self.matrix, self.inputs]) * span
@@ -79,7 +79,7 @@ def linearise(
     velocity: PoseLike | None = None,
     acceleration: PoseLike | None = None,
 ) -> LinearPlant:
-    """Linearise a machine with its drives at a pose, at rest, or at a moment of a motion.
+    """Return a machine with its drives, linearised at a pose at rest or a moment of a motion.
 
     The drives' forces are those that hold the machine there, or that the motion needs. The closed
     chain is kept whole: at rest A has (J M^-1 J^T) times the change of the forces of gravity, and B
@@ -163,7 +163,7 @@ def linearise(
 
 
 def with_linear_drives(robot: Manipulator) -> Manipulator:
-    """Return a machine whose drives have no dry friction, no play, no ripple and no limits."""
+    """Return a machine whose drives have no dry friction, backlash, ripple or limits."""
     drives = [
         drive
         and Drive(
@@ -182,7 +182,7 @@ def with_linear_drives(robot: Manipulator) -> Manipulator:
 
 @lru_cache(maxsize=16)
 def _derivatives(robot: Manipulator, kind: DriveKind) -> ca.Function:
-    """Return derivatives of the state's rates by state and forces, and those of J x' by x."""
+    """Return Jacobians of the state's rates by state and by forces, and of J x' by x."""
     plant_program = motion_program(robot, kind)
     names, symbols = [port.name for port in plant_program.inputs], plant_program.function.sx_in()
     by_name = dict(zip(names, symbols, strict=True))

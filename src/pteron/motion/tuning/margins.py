@@ -33,7 +33,7 @@ _MOST = 60.0, 1000.0
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LoopMargins(Result):
-    """Gain, phase and delay that a sampled loop bears until it is unstable.
+    """Gain, phase and delay margins of a sampled loop.
 
     At each drive, the other loops closed: `gain`, the factor on its force above 1, `phase`, rad,
     and `delay`, s, beyond the loop's own, all (n,), from the frequency response; and `crossover`,
@@ -60,27 +60,27 @@ class LoopMargins(Result):
 
     @cached_property
     def gain(self) -> Array:
-        """The factor on the drive's force above 1, (n,)."""
+        """The gain margin above 1 of each drive's loop, (n,)."""
         return np.asarray(self._single_margins[0])
 
     @cached_property
     def phase(self) -> Array:
-        """The phase that it may lose, or gain, rad, (n,)."""
+        """The phase margin of each drive's loop, lag or lead, rad, (n,)."""
         return np.asarray(self._single_margins[1])
 
     @cached_property
     def delay(self) -> Array:
-        """The further delay of its force, s, (n,)."""
+        """The delay margin of each drive's loop, s, (n,)."""
         return np.asarray(self._single_margins[2])
 
     @cached_property
     def crossover(self) -> Array:
-        """The highest frequency at which its loop has the gain 1, rad/s, (n,)."""
+        """The highest gain crossover frequency of each drive's loop, rad/s, (n,)."""
         return np.asarray(self._single_margins[3])
 
     @cached_property
     def common_gain(self) -> float:
-        """The smallest factor above 1 on all forces for which a pole reaches the unit circle."""
+        """The least common factor above 1 on all forces that makes the loop unstable."""
         matrix, inputs, force_rows = self.loop.open_loop()
         fed_back = inputs @ force_rows
         return self._stable and 1.0 + _smallest_change(
@@ -89,7 +89,7 @@ class LoopMargins(Result):
 
     @cached_property
     def common_delay(self) -> float:
-        """The smallest further delay of all forces for which one does, s."""
+        """The least additional delay of all forces that makes the loop unstable, s."""
         return self._stable and _smallest_change(
             lambda added: radius(self.loop.closed_loop(added)), self.loop.period, 0
         )
@@ -110,7 +110,7 @@ class LoopMargins(Result):
 
     @property
     def least(self) -> dict[str, float]:
-        """The least of each kind, of single drives and of all at once: factors, rad and s."""
+        """The least margin of each kind, of single drives and of all together: factors, rad, s."""
         return {
             "gain": float(min(self.gain.min(), self.common_gain)),
             "phase": float(self.phase.min()),
@@ -120,12 +120,12 @@ class LoopMargins(Result):
 
     @cached_property
     def slowest(self) -> float:
-        """The rate at which the slowest pole decays, 1/s; negative where it grows."""
+        """The decay rate of the slowest pole, 1/s; negative for an unstable pole."""
         return float(-np.log(radius(self.loop.closed_loop())) / self.loop.period)
 
     @cached_property
     def drive_loops(self) -> Array:
-        """Frequency response of each drive's loop, the others closed, (W, n); of `frequencies`."""
+        """Frequency response of each drive's loop, the others closed, (W, n), at `frequencies`."""
         sensitivity = np.linalg.inv(np.eye(len(self._response[0])) + self._response)
         return np.asarray(1.0 / np.diagonal(sensitivity, axis1=1, axis2=2) - 1.0)
 
@@ -136,14 +136,17 @@ class LoopMargins(Result):
 
     @cached_property
     def _stable(self) -> float:
+        """Stability of the closed loop: 1.0 if it is stable, else 0.0."""
         return float(self.slowest > 0.0)
 
     @cached_property
     def _response(self) -> Array:
+        """Frequency response of the loop at `frequencies`, (W, n, n)."""
         return self.loop.response(self.frequencies)
 
     @cached_property
     def _single_margins(self) -> Array:
+        """Margins of gain, phase (rad), delay (s), and crossover (rad/s), of each drive (4, n)."""
         n = self.loop.plant.inputs.shape[1]
         if not self._stable:
             return np.array([0.0, 0.0, 0.0, np.nan])[:, None] * np.ones(n)
@@ -152,13 +155,13 @@ class LoopMargins(Result):
 
 
 def radius(matrix: Array) -> float:
-    """Return the greatest modulus of a pole, those at 1 left out."""
+    """Return the spectral radius of a matrix, without eigenvalues at 1."""
     poles = np.linalg.eigvals(matrix)
     return float(np.abs(poles[np.abs(poles - 1.0) > _AT_ONE]).max(initial=0.0))
 
 
 def _smallest_change(radius_of: Callable[[float], float], unit: float, which: int) -> float:
-    """Return the smallest amount for which the greatest pole is on the unit circle, or inf."""
+    """Return the least change that puts the dominant pole on the unit circle, or inf."""
     step, below = _STEPS[which] * unit, 0.0
     while below < _MOST[which] * unit:
         above = below + max(step, 0.1 * below)
@@ -193,7 +196,7 @@ def _classical(omega: Array, loop: Array) -> tuple[float, float, float, float]:
 
 
 def _values_at_zeros(signal: Array, others: Array) -> Array:
-    """Return other values where values (W,) change their sign, by straight lines between."""
+    """Return another signal's values at sign changes of a signal (W,), by interpolation."""
     k = np.flatnonzero(np.signbit(signal[1:]) != np.signbit(signal[:-1]))
     share = signal[k] / (signal[k] - signal[k + 1])
     return others[k] + share * (others[k + 1] - others[k])

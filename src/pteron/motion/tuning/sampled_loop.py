@@ -17,7 +17,7 @@ from pteron.renamed import former_attribute
 
 @dataclass(frozen=True)
 class SampledLoop:
-    """A machine under a controller near a state, from one sample to the next.
+    """A machine under a controller, linearised, from a sample to the next.
 
     Forces are held for a period and act a delay after their sample, of any length; both are exact.
     Encoders' steps do not count, but the lag of rates by differences and of their filter does.
@@ -44,10 +44,10 @@ class SampledLoop:
     share: float | Array | None = None
 
     def open_loop(self, more: float = 0.0) -> tuple[Array, Array, Array]:
-        """Return (F, G, H) of s' = F s + G u, asked = H s: the loop opened at all drives.
+        """Return (F, G, H) of s' = F s + G u, commands = H s: the loop opened at all drives.
 
-        s are the changes of the plant's state, joints and rates told last, memory, and the forces
-        asked for that still wait; u are forces asked for, `more` is a delay, s, beyond the loop's.
+        s are the changes of the plant's state, last readings of joints and rates, memory, and
+        commanded forces not yet applied; u are commanded forces, `more` is an extra delay, s.
         """
         period, law, n = self.period, self.law, self.plant.inputs.shape[1]
         late, delay_samples = split_delay(self.delay + more, period)
@@ -100,7 +100,7 @@ class SampledLoop:
         return matrix, inputs, force_rows
 
     def closed_loop(self, more: float = 0.0) -> Array:
-        """Return the closed loop's matrix, all forces delayed more, s."""
+        """Return the closed loop's matrix; `more` is an additional delay of all forces, s."""
         matrix, inputs, force_rows = self.open_loop(more)
         return matrix + inputs @ force_rows
 
@@ -110,7 +110,7 @@ class SampledLoop:
         return np.asarray(np.linalg.eigvals(self.closed_loop()))
 
     def response(self, frequencies: Array) -> Array:
-        """Return the loop's frequency response L (W, n, n), from drives to what is asked of them.
+        """Return the loop's frequency response L (W, n, n), from drive forces to commanded forces.
 
         Opened at all drives; I + L is singular where the closed loop has a pole. In rad/s, at most
         pi / period.

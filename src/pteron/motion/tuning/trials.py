@@ -40,7 +40,7 @@ _UNKNOWN = (float("nan"),) * 7
 
 @dataclass(frozen=True, eq=False, repr=False)
 class GainTrial(Result):
-    """A machine's motion under a controller, and the rest at its end, in figures.
+    """Figures of a machine's motion under a controller, and of the rest at its end.
 
     Attributes
     ----------
@@ -79,7 +79,7 @@ def trial(
     sensors: Sensors | None = None,
     delay: float = 0.0,
 ) -> GainTrial:
-    """Simulate a motion and the rest at its end, and return its figures.
+    """Return the figures of a simulated motion and of the rest at its end.
 
     Parameters are those of `simulate`, and so is what it raises.
     """
@@ -189,12 +189,12 @@ def trials(
 
 
 def bends(robot: Manipulator) -> bool:
-    """Return whether a transmission of a machine bends."""
+    """Return whether a machine has an elastic transmission."""
     return any(leg.drive and leg.drive.elastic for leg in robot.legs)
 
 
 def _stiffer(robot: Manipulator, factor: float) -> Manipulator:
-    """Return the machine with all its transmissions so much stiffer."""
+    """Return the machine with the stiffness of all transmissions multiplied by a factor."""
     expect(0.0 < factor < np.inf, "stiffnesses", f"{factor:g}", "factors above 0")
 
     def stiffen(drive: Drive | None) -> Drive | None:
@@ -208,6 +208,7 @@ def _stiffer(robot: Manipulator, factor: float) -> Manipulator:
 
 
 def _tool_places(robot: Manipulator, poses: Array) -> Array:
+    """Return the tool's positions (..., k) at poses (..., m); the poses if it has none."""
     zero_rates = np.zeros_like(poses)
     place = tool_path(robot.platform, poses, zero_rates, zero_rates)[0]
     return place if place.shape[-1] else poses

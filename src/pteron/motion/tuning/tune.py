@@ -76,7 +76,7 @@ class Required:
         expect(0.0 <= self.delay < np.inf, "delay margin", shorten(self.delay), "0 s or more")
 
     def share(self, found: LoopMargins) -> float:
-        """Return the least of margin over required margin; a loop serves from 1 on."""
+        """Return the least ratio of margin to required margin; 1 or more suffices."""
         each = self._share(found.gain.min(), found.delay.min()), found.phase.min() / self.phase
         if min(each) < 1.0:  # those of all drives at once take longer to compute
             return float(min(each))
@@ -84,6 +84,7 @@ class Required:
         return float(min(*each, self._share(found.common_gain, delay)))
 
     def _share(self, gain: float, delay: float) -> float:
+        """Return min(log gain / log required gain, delay / required delay)."""
         factor = np.log(max(gain, 1.0)) / np.log(self.gain)
         return float(min(factor, delay / self.delay if self.delay else np.inf))
 
@@ -120,7 +121,7 @@ class Tuning(Result):
 
     @property
     def worst(self) -> int:
-        """The state whose margins are the least share of those required."""
+        """The index of the state with the least ratio of margin to required margin."""
         return int(np.argmin([self.required.share(margins) for margins in self.margins]))
 
     @property
@@ -130,7 +131,7 @@ class Tuning(Result):
         return {name: min(least[name] for least in each) for name in each[0]}
 
     def gains(self) -> dict[str, list[float]]:
-        """Return proportional and derivative gains of each joint, or what else the law has."""
+        """Return proportional (or slope) and derivative gains of each joint, by name."""
         law = self.controller.law(self.robot)
         n = self.robot.joint_count
         first = "proportional" if isinstance(self.controller, Feedback) else "slope"
@@ -167,7 +168,7 @@ def tune(
     delay: float = 0.0,
     progress: Progress | None = None,
 ) -> Tuning:
-    """Return the controller of the greatest bandwidth that has the margins asked for everywhere.
+    """Return the controller of the greatest bandwidth that has the required margins everywhere.
 
     The loop of machine, drives, encoders, controller and delay is linearised at moments of the
     motion, frozen there, and at poses of the workspace, at rest. All coupling of the closed chain
@@ -278,6 +279,7 @@ class _Search:
     steps: Steps
 
     def loop(self, controller: Controller, i: int) -> SampledLoop:
+        """Return the sampled loop of a controller at state `i`."""
         law = linearised_law(controller.law(self.model), *self.states[i])
         return SampledLoop(self.plants[i], law, controller.period, **self.how)
 
@@ -286,7 +288,7 @@ class _Search:
         return min((self.required.share(LoopMargins(self.loop(controller, i))), i) for i in which)
 
     def choose_controller(self) -> Controller:
-        """Return the controller with the greatest bandwidth that serves at all states."""
+        """Return the controller with the greatest bandwidth whose margins suffice at all states."""
         controller, every = self.controller, range(len(self.states))
         most = np.pi / controller.period
         has_gains = (
@@ -328,7 +330,7 @@ class _Search:
         few: list[int],
         tried: list[tuple[float, Controller]],
     ) -> Controller | None:
-        """Return the controller with the greatest bandwidth that serves, or None.
+        """Return the controller with the greatest bandwidth whose margins suffice, or None.
 
         `few` are the states that decided so far, `tried` what was tried, with its share.
         """
@@ -356,6 +358,7 @@ class _Search:
             high = low
 
     def _margins_text(self, controller: Controller, i: int) -> str:
+        """Return the text of a controller's margins at state `i` beside the required margins."""
         least, required = LoopMargins(self.loop(controller, i)).least, self.required
         delay_text = f", {1e3 * required.delay:.3g} ms" if required.delay else ""
         rate = controller.bandwidth

@@ -22,7 +22,7 @@ _QUANTILE = 1.96
 
 @dataclass(frozen=True)
 class FirmwareFit:
-    """A calibration of the firmware's six values, in its own units, and what it leaves."""
+    """A calibration of the firmware's six values, in its own units, and its residuals."""
 
     rows: tuple[CalibrationRow, ...]
     sentence: str
@@ -30,7 +30,7 @@ class FirmwareFit:
     result: Calibration
 
     def as_dict(self) -> dict[str, Any]:
-        """Return it as plain data: values in mm and degrees, as texts with their digits."""
+        """Return it as plain data: values in mm and degrees, as texts with significant digits."""
         values = [
             {"name": row.name, "drawn": row.drawn, "found": row.found, "unit": row.unit}
             for row in self.rows
@@ -39,7 +39,7 @@ class FirmwareFit:
 
 
 def firmware_fit(result: Calibration) -> FirmwareFit | None:
-    """Return the firmware's values fitted to a calibration's measurements; None for no printer."""
+    """Return the firmware's values fitted to a calibration's data; None if that is impossible."""
     try:
         drawn = LinearDelta.from_robot(result.drawn)
         loose = dict.fromkeys(("radius", "angles", "zeros"), float("inf"))
@@ -69,6 +69,7 @@ def firmware_fit(result: Calibration) -> FirmwareFit | None:
 
 
 def _row(name: str, drawn: float, estimated: float, unit: str, deviation: float) -> CalibrationRow:
+    """Return the row of a firmware value: drawn, estimated, their change, and its 95 % interval."""
     half = _QUANTILE * deviation
     change = estimated - drawn
     if unit == "°":
@@ -89,6 +90,7 @@ def _row(name: str, drawn: float, estimated: float, unit: str, deviation: float)
 
 
 def _sentence(fitted: Calibration) -> str:
+    """Return a sentence on the errors in rows that were not fitted, with and without the fit."""
     held_out = fitted.held_out
     if held_out is None:
         return "With these six values alone no rows were left for a check."

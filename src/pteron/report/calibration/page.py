@@ -49,7 +49,7 @@ class ErrorMap(NamedTuple):
 
 
 def page(result: Calibration, *, written: bool = True, firmware: FirmwareFit | None = None) -> str:
-    """Return the page as HTML without reference to another file; robot.toml may not be written."""
+    """Return the page as self-contained HTML; `written` says whether robot.toml is written."""
     document = template("calibration/page.html.j2", error_text=error_text)
     return document.render(
         result=result,
@@ -67,11 +67,12 @@ def page(result: Calibration, *, written: bool = True, firmware: FirmwareFit | N
 
 
 def error_text(value: float, kind: str) -> str:
-    """Return an error of a kind of measurement with its unit, the same all over the page."""
+    """Return an error of a kind of measurement with its unit, in the page's format."""
     return f"{significant(1e3 * value)} {_unit(kind)}"
 
 
 def _unit(kind: str) -> str:
+    """Return the unit that a kind of residual is shown in."""
     return "mrad" if kind == "angle" else "mm"
 
 
@@ -105,7 +106,7 @@ def error_maps(result: Calibration) -> list[ErrorMap]:
 
 
 def levels(values: Array) -> list[float]:
-    """Return round levels of a map, of which the first is below all of its values."""
+    """Return round contour levels of a map, the first below all values."""
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
     step = nice_step(max((high - low) / _LEVELS, 1e-3 * high, 1e-12))
     first, last = int(np.floor(low / step)), int(np.ceil(high / step))
@@ -113,6 +114,7 @@ def levels(values: Array) -> list[float]:
 
 
 def _figures(result: Calibration) -> dict[str, Any]:
+    """Return the figures of the page by name; None for those that the machine does not allow."""
     fit, robot = result.fit, result.drawn
     kinds = [*["position"] * 3, *["angle"] * int(robot.platform.angular.sum())]
     rows = [*kinds, "height", "distance"]

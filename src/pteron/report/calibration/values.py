@@ -32,7 +32,7 @@ class CalibrationRow:
 
 
 def value_rows(result: Calibration) -> tuple[CalibrationRow, ...]:
-    """Return the values of a calibration, those that changed most first."""
+    """Return the values of a calibration, the greatest changes first."""
     rows = []
     for value in result.values:
         factor, unit = _UNITS[value.unit]
@@ -52,7 +52,7 @@ def value_rows(result: Calibration) -> tuple[CalibrationRow, ...]:
 def next_steps(
     result: Calibration, *, written: bool = True, printer: bool = False
 ) -> tuple[str, ...]:
-    """Return what to do next: the verdict's advice, then the commands that go on from the files."""
+    """Return the next steps: the verdict's advice, then commands that use the files."""
     if not written:
         return (
             *result.verdict.next_steps,
@@ -72,7 +72,7 @@ def next_steps(
 
 
 def notes(result: Calibration) -> tuple[str, ...]:
-    """Return what a user of the found machine must know: its zeros, and its bodies' parameters."""
+    """Return notes for a user of the calibrated machine: zeros, and bodies' parameters."""
     reading_legs = [str(i) for i, leg in enumerate(result.robot.legs, start=1) if leg.reading]
     sentences = []
     if any(finding.kind == "mistake" for finding in result.findings):

@@ -74,7 +74,7 @@ def write_calibration(
 
 
 def numbers(result: Calibration, firmware: FirmwareFit | None = None) -> dict[str, Any]:
-    """Return the numbers of a calibration as JSON has them, null where one is not finite."""
+    """Return the numbers of a calibration for JSON, null for non-finite ones."""
     contents = result.as_dict() | {"notes": list(notes(result))}
     if firmware is not None:
         contents["firmware"] = firmware.as_dict()
@@ -83,6 +83,7 @@ def numbers(result: Calibration, firmware: FirmwareFit | None = None) -> dict[st
 
 
 def _header(result: Calibration) -> list[str]:
+    """Return the comments at the head of the machine's file: origin, verdict, reasons, notes."""
     return [
         f"{result.drawn.name}, calibrated from {len(result.measurements)} rows of measurements.",
         f"Verdict: {result.verdict.grade}.",

@@ -20,7 +20,7 @@ from pteron.report.typeset import template
 
 
 def write_choice(choice: Choice, folder: str | Path) -> list[Path]:
-    """Write choose.html, choose.json and KIND.toml for each kind that serves.
+    """Write choose.html, choose.json and KIND.toml for each feasible kind.
 
     Machines of an earlier choice that no longer serve are removed, if they are as they were
     written.
@@ -41,7 +41,7 @@ def write_choice(choice: Choice, folder: str | Path) -> list[Path]:
 
 
 def _machines(file: Path) -> dict[str, str]:
-    """Return the machines' files of an earlier choice by their names; none if it is not one."""
+    """Return the machine files of an earlier choice by name; empty if it is no choice."""
     try:
         kinds = json.loads(file.read_text(encoding="utf-8"))["kinds"]
         return {f"{kind['kind']}.toml": kind["robot"] for kind in kinds if kind["serves"]}
@@ -78,7 +78,7 @@ def reasons(choice: Choice, serving: list[Candidate]) -> list[str]:
 
 
 def next_steps(choice: Choice, serving: list[Candidate]) -> list[str]:
-    """Return what to do after a choice, a sentence each."""
+    """Return the next steps after a choice, a sentence each."""
     if not serving:
         return [
             "See below what each kind misses by how much: ask for less of that, or give stronger "
@@ -103,7 +103,7 @@ def picture(candidate: Candidate) -> Figure:
 
 
 def page(choice: Choice) -> str:
-    """Return the page as HTML without reference to another file."""
+    """Return the page as self-contained HTML."""
     serving = [candidate for candidate in choice.candidates if candidate.serves]
     headings = list(dict.fromkeys(key for candidate in serving for key in candidate.figure_texts))
     figure = None

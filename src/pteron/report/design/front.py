@@ -33,7 +33,7 @@ def write_front(report: FrontReport, folder: str | Path) -> list[Path]:
 
 
 def draw_front(report: FrontReport) -> Figure:
-    """Return the figure of a front, with the designs of the report and the machine before."""
+    """Return the figure of a front, with the reported designs and the original machine."""
     front = report.front
     names = [o.quantity for o in front.task.spec.objectives]
     return front_figure(

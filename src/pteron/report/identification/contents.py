@@ -37,7 +37,7 @@ _LAGS = 40
 
 @dataclass(frozen=True)
 class PageRecording:
-    """A recording: its name on the page, its forces as predicted, and the stretch to draw.
+    """A recording: its displayed name, its predicted forces, and the stretch to draw.
 
     The stretch is where the predictions miss the measured forces most.
     """
@@ -82,18 +82,18 @@ class Contents:
 
     @property
     def worst_floor(self) -> float:
-        """The part of the largest held-out error that noise alone makes, percent."""
+        """The part of the largest held-out error due to noise alone, percent."""
         shown = max(self.held_out, key=lambda recording: float(recording.prediction.nrms.max()))
         return float(shown.prediction.floor[int(np.argmax(shown.prediction.nrms))])
 
     @property
     def essential(self) -> int:
-        """Number of values that the data show."""
+        """Number of values that the data determine."""
         return sum(not row.weak for row in self.parameters)
 
 
 def short_sources(result: Identification) -> dict[str, str]:
-    """Return the names of recordings on a page: without folders, unless two would be alike."""
+    """Return display names of recordings: without folders, unless names coincide."""
     every = list(
         dict.fromkeys(prediction.source for prediction in (*result.fitted, *result.held_out))
     )
@@ -151,6 +151,7 @@ def contents(result: Identification) -> Contents:
 
 
 def _page_recording(prediction: Prediction, names: dict[str, str]) -> PageRecording:
+    """Return a recording with the stretch of greatest error, which is drawn."""
     time = prediction.time
     step = float(time[-1] - time[0]) / max(len(time) - 1, 1)
     length = min(max(int(_STRETCH / max(step, 1e-9)), _FEWEST), len(time))
@@ -161,7 +162,7 @@ def _page_recording(prediction: Prediction, names: dict[str, str]) -> PageRecord
 
 
 def _residuals(result: Identification) -> Array:
-    """Return the residuals of the equations; an equation that is not used has none."""
+    """Return the residuals of the equations; NaN for unused equations."""
     residuals = result.estimate.residuals
     if not residuals.size:
         return np.full((0, len(result.robot.legs)), np.nan)

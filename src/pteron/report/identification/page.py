@@ -27,7 +27,7 @@ from pteron.report.typeset import template, value_with_uncertainty
 
 
 def page(result: Identification, model_file: str | None = None) -> str:
-    """Return the page as HTML, with a link to the machine's file beside it and to no other."""
+    """Return the page as HTML; its only link is to the machine's file beside it."""
     document = template(
         "identification/page.html.j2",
         measured=lambda row: value_with_uncertainty(row.value, row.half),
@@ -52,7 +52,7 @@ def page(result: Identification, model_file: str | None = None) -> str:
 
 
 def figures(page_contents: Contents) -> dict[str, Any]:
-    """Return the pictures by name; those of residuals are None if the estimator keeps none."""
+    """Return the pictures by name; residual pictures are None if the estimator has none."""
     rows = page_contents.parameters
     joints = [leg.joint for leg in page_contents.result.robot.legs]
     names = [row.name for row in rows]

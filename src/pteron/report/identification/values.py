@@ -23,7 +23,7 @@ _NORMAL = 1.959963984540054
 
 @dataclass(frozen=True)
 class ReportedParameter:
-    """One value of the model, and whether the data show it.
+    """A value of the model, and whether the data determine it.
 
     `half` is half of its 95 % interval, `relative` its standard deviation over its size, `ratio`
     the inverse of that. The CAD model says nothing of friction and other terms. The partner is the
@@ -44,7 +44,7 @@ class ReportedParameter:
 
     @property
     def weak(self) -> bool:
-        """Whether the data hardly show it."""
+        """Whether the data hardly determine the value."""
         return self.status != "essential"
 
 
@@ -79,7 +79,7 @@ def parameter_rows(result: Identification) -> tuple[ReportedParameter, ...]:
 
 
 def _partners(correlation: Array) -> tuple[Array, Array]:
-    """Return for each value which other one goes with it most, and how much."""
+    """Return the most correlated other value of each value (p,), and the correlation (p,)."""
     p = len(correlation)
     off = np.where(np.eye(p, dtype=bool), 0.0, np.nan_to_num(correlation))
     partners = np.argmax(np.abs(off), axis=1)
@@ -88,7 +88,7 @@ def _partners(correlation: Array) -> tuple[Array, Array]:
 
 @dataclass(frozen=True)
 class ReportedBody:
-    """A body as it was identified and as it was drawn.
+    """A body as identified and as drawn.
 
     Values are the mass, kg; for a body that turns also the centre of mass, m, None where it has no
     such coordinate, and the moment of inertia about the body's reference point, kg m^2. A body on
@@ -103,7 +103,7 @@ class ReportedBody:
 
 
 def body_rows(result: Identification) -> tuple[ReportedBody, ...]:
-    """Return the bodies of an identification; none where there are no real ones."""
+    """Return the bodies of an identification; empty if no physical bodies exist."""
     consistency = result.consistency
     if consistency is None:
         return ()
@@ -129,5 +129,6 @@ def body_rows(result: Identification) -> tuple[ReportedBody, ...]:
 
 
 def _values(inertia: Inertia) -> tuple[float | None, ...]:
+    """Return m, mgx, mgy and I of an inertia with a moment of inertia, else its mass alone."""
     values = with_center(inertia)
     return tuple(map(values.get, ("m", "mgx", "mgy", "I"))) if "I" in values else (values["m"],)

@@ -56,13 +56,14 @@ def write_identification(
 
 
 def model_path(folder: str | Path, name: str, sources: Iterable[str | Path] = ()) -> Path:
-    """Return a path for the model file that is no file that was read and no log's description."""
+    """Return a path for the model file that replaces no input and no log's description."""
     stem = _SAFE.sub("_", name).strip("._") or "robot"
     path = Path(folder) / f"{stem[:100]}.toml"
     return checked_output(path, sources)
 
 
 def _header(result: Identification) -> list[str]:
+    """Return the comments at the head of the model file: origin, verdict, and what is uncertain."""
     consistency = result.consistency
     assert consistency is not None
     names = short_sources(result)
@@ -88,6 +89,6 @@ def _header(result: Identification) -> list[str]:
 
 
 def numbers(result: Identification) -> dict[str, Any]:
-    """Return the numbers of an identification as JSON has them, null where one is not finite."""
+    """Return the numbers of an identification for JSON, null for non-finite ones."""
     ready: dict[str, Any] = json_ready(result.as_dict())
     return ready
