@@ -189,6 +189,7 @@ def _add_check(function: types.FunctionType) -> types.FunctionType:
     expect = expect_kinds
 
     def call(*args: Any, **named: Any) -> Any:
+        """Call the function, after its arguments are checked against its type hints."""
         expect(function, args, named)
         return function(*args, **named)
 
@@ -318,6 +319,7 @@ def _sequence(every: _Kind | None, *, lazy: bool = False, count: int | None = No
     """Return the kind of a sequence with elements of a kind; `lazy` accepts iterators too."""
 
     def holds(argument: Any) -> bool:
+        """Return whether an argument is a sequence of the right length and kind of elements."""
         if isinstance(argument, str | bytes | Mapping) or not hasattr(argument, "__iter__"):
             return False
         if np.ndim(argument) == 0 if isinstance(argument, np.ndarray) else lazy:

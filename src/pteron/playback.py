@@ -205,6 +205,7 @@ def playback_of_log(robot: Manipulator, log: Log) -> Playback:
         forces = np.concatenate([part.forces for part in parts])
 
     def join_columns(name: str) -> Array:
+        """Return a column of the log's pieces by its name, joined (T, ...)."""
         return np.concatenate([getattr(state, name) for state in states])
 
     time = join_columns("time")

@@ -65,6 +65,7 @@ def publish(
     listed = names.setdefault("__all__", sorted({*listed, *places} - lacking))
 
     def public(name: str, value: Any) -> Any:
+        """Return a value under its public name; functions check their arguments if they are to."""
         if isinstance(value, FunctionType) and (checked is True or name in (checked or ())):
             from pteron.arguments import with_checked_arguments  # NumPy
 

@@ -198,6 +198,7 @@ def former_attribute(former: str, present: str) -> property:
     """
 
     def attribute(own: Any) -> Any:
+        """Return the attribute under its present name; warn that it was renamed."""
         owner = own if isinstance(own, type) else type(own)
         warn_former(f"{owner.__name__}.{former}", f".{present}", depth=4)
         return getattr(own, present)

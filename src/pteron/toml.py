@@ -379,6 +379,7 @@ def _schema(model: Any) -> _Node:
     schema = TypeAdapter(model).json_schema(by_alias=True)
 
     def resolve_reference(node: Any) -> Any:
+        """Return a schema's node with references resolved and choices of null dropped."""
         if isinstance(node, list):
             return [resolve_reference(member) for member in node]
         if not isinstance(node, dict):

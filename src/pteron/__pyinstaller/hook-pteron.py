@@ -11,6 +11,7 @@ _BACKENDS = [f"matplotlib.backends.backend_{name}" for name in ("agg", "pdf", "s
 
 
 def _is_needed(module: str) -> bool:
+    """Return whether an application needs a module (dotted name): not this package's hooks."""
     return not module.startswith("pteron.__pyinstaller")
 
 

@@ -279,6 +279,7 @@ def _held_out_errors(
     kinds = {kind: usable & (other.kind_of == kind) for kind in fit.noise}
 
     def rms(squares: Array) -> dict[str, float]:
+        """Return the root mean square of each kind's usable cells from squares (N, columns)."""
         return {k: float(np.sqrt(squares[here].mean())) for k, here in kinds.items() if here.any()}
 
     errors = map(rms, (drawn.residuals**2, fitted.residuals**2, spread + noise**2))

@@ -165,21 +165,25 @@ def _read_rows(robot: Manipulator, opened: _Opened, source: str) -> Measurements
     n = len(table)
 
     def column(name: str) -> Array:
+        """Return a column (rows,) by name in SI units; NaN if the table lacks it."""
         if name not in columns:
             return np.full(n, np.nan)
         header, factor = columns[name]
         return factor * _numbers(table, header, faults)
 
     def texts(name: str) -> tuple[str, ...]:
+        """Return a column's texts (rows,) by its name; TOOL where cell or column is missing."""
         if name not in columns:
             return (TOOL,) * n
         cells = table.frame[columns[name][0]].cast(pl.String).fill_null(TOOL)
         return tuple(cells.str.strip_chars().to_list())
 
     def several(names: Sequence[str]) -> Array:
+        """Return columns (rows, k) by name in SI units; NaN where the table lacks a column."""
         return np.stack([column(name) for name in names], axis=-1) if names else np.empty((n, 0))
 
     def fault(row: np.integer[Any], text: str) -> None:
+        """Append a fault's text, after the place of its row in the file, to the faults."""
         faults.append(f"{table.place_in_file(int(row))}{text}")
 
     readings = several(robot.joint_names)

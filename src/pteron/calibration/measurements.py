@@ -107,9 +107,10 @@ def position_axes(robot: Manipulator) -> Array:
 
 
 def _rows_of(values: PoseLike | None, name: str, rows: int, columns: Sequence[str] = ()) -> Array:
-    """Return values as an array (rows, len(columns)), or (rows,) without; NaN where there are none.
+    """Return measured values as an array (rows, len(columns)), or (rows,) without columns.
 
-    Of a table they are the columns of these names.
+    All are NaN if `values` is None. From a table, the `columns` are selected by their names. The
+    `name` of the argument begins the message of an error.
     """
     shape = (rows, *([len(columns)] if columns else []))
     if values is None:

@@ -112,6 +112,7 @@ def _multiply_fields(factors: Mapping[str, ArrayLike]) -> Callable[[Measurements
     """Return the change that multiplies fields of measurements by factors."""
 
     def undo(measurements: Measurements) -> Measurements:
+        """Return the measurements with fields multiplied by the factors."""
         changed: Any = {
             name: getattr(measurements, name) * factor for name, factor in factors.items()
         }
@@ -126,6 +127,7 @@ def _transform_joints(
     """Return the change of readings that takes joint coordinates q to offset + factor q."""
 
     def undo(measurements: Measurements) -> Measurements:
+        """Return the measurements with readings at the joint coordinates offset + factor q."""
         joints = offsets + factors * guess.joints(measurements.readings)
         return replace(measurements, readings=guess.readings(joints))
 
@@ -194,6 +196,7 @@ def _swapped_marks(measurements: Measurements, guess: Guess) -> Iterator[Mistake
     for a, b in combinations(sorted(set(measurements.marks)), 2):
 
         def undo(rows: Measurements, a: str = a, b: str = b) -> Measurements:
+            """Return the measurements with the marks a and b exchanged."""
             other = {a: b, b: a}
             return replace(rows, marks=tuple(other.get(name, name) for name in rows.marks))
 
@@ -273,6 +276,7 @@ def _swapped_legs(measurements: Measurements, guess: Guess) -> Iterator[Mistake]
             text = f"the readings stand in another order of the legs ({where}): rename the columns"
 
         def undo(rows: Measurements, order: tuple[int, ...] = order) -> Measurements:
+            """Return the measurements with the legs' readings in another order."""
             return reorder_readings(rows, order)
 
         yield Mistake(text, undo)
@@ -306,6 +310,7 @@ def _shifted_rows(measurements: Measurements, guess: Guess) -> Iterator[Mistake]
     for shift in (1, -1, 2, -2):
 
         def undo(rows: Measurements, shift: int = shift) -> Measurements:
+            """Return the rows with all their values `shift` rows later; NaN beyond the ends."""
             changed: dict[str, Array] = {}
             for name in VALUES:
                 column = np.roll(getattr(rows, name), shift, axis=0)
@@ -427,6 +432,7 @@ def _name_readings(guess: Guess, fitted: Guess, freedom: int) -> Iterator[Mistak
         return
 
     def undo(measurements: Measurements) -> Measurements:
+        """Return the measurements with the guess's readings at the joints of the fit."""
         return replace(measurements, readings=guess.readings(fitted.joints(measurements.readings)))
 
     yield Mistake(

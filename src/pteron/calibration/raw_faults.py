@@ -186,6 +186,7 @@ def _change_by_order(
     middle = np.tile(np.median(fit.poses[fit.kept], axis=0), (len(measurements), 1))
 
     def places(guess: Guess, readings: Array) -> Array:
+        """Return the positions (N, 3), m, of the marks of a machine with readings (N, n)."""
         poses = slopes.poses(guess, guess.joints(readings), middle)
         return guess.points(measurements.marks, poses)
 

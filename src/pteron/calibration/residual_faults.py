@@ -272,6 +272,7 @@ def _trials(test: _ScoreTest) -> Iterator[FaultTrial]:
     places = [measurements.places[i] for i in rows]
 
     def beginnings(most: int) -> range:
+        """Return the evenly spaced row indices, about `most`, at which an event may begin."""
         return range(3, len(rows) - 3, max(1, len(rows) // most))
 
     legs = test.start.robot.legs

@@ -104,6 +104,7 @@ class MeasuredLog(TomlTable):
         """Return the setup of the measurements: noise, marks, planes, anchors, frame."""
 
         def places(tables: dict[str, PlaceTable]) -> dict[str, Place]:
+            """Return places by name from their tables; known unless a table says `free`."""
             return {name: Place(table.at, not table.free) for name, table in tables.items()}
 
         return Setup(

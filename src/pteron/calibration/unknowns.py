@@ -63,6 +63,7 @@ def blocks_of(
     names_free = [g for g in GROUPS if g != "tool" or placed] if free is None else list(free)
 
     def unknown(name: str, group: str, unit: str) -> Unknown:
+        """Return an unknown with its tolerance, by its name or its group, else by default."""
         where = f"{group}, rad" if group == "zeros" and unit == "rad" else group
         tolerance = tolerances.get(
             name, tolerances.get(where, tolerances.get(group, TOLERANCES[where]))
@@ -70,6 +71,7 @@ def blocks_of(
         return Unknown(name, group, unit, float(tolerance))
 
     def free_indices(unknowns: Sequence[Unknown]) -> tuple[int, ...]:
+        """Return the indices of the unknowns that are free by their group's name or their name."""
         return tuple(
             i for i, u in enumerate(unknowns) if u.group in names_free or u.name in names_free
         )

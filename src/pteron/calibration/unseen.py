@@ -100,6 +100,7 @@ def _named_combinations(
     place = {name: k for k, name in enumerate(names)}
 
     def vector(**parts: float) -> Array:
+        """Return a combination (p,) of unknowns by their shares; 0 for all others."""
         combination = np.zeros(len(names))
         for name, share in parts.items():
             if share:

@@ -39,6 +39,7 @@ def insistent_interrupts() -> Iterator[None]:
     timer = threading.Timer(_AGAIN, _interrupt)
 
     def again() -> None:
+        """Start a timer that raises the interrupt again, unless it runs."""
         nonlocal timer
         if not timer.is_alive():
             timer = threading.Timer(_AGAIN, _interrupt)
@@ -46,12 +47,14 @@ def insistent_interrupts() -> Iterator[None]:
             timer.start()
 
     def hook(args: UnraisableHookArgs) -> None:
+        """Handle an exception that Python discards: raise an interrupt again, print all others."""
         if issubclass(args.exc_type, KeyboardInterrupt):
             again()  # not at once: that would still be inside the callback
         else:
             usual(args)
 
     def handler(number: int, frame: FrameType | None) -> None:
+        """Handle SIGINT: try again later within CasADi, a few times, else raise an interrupt."""
         nonlocal waits, raised
         waits += 1
         if waits <= _WAITS and _is_in_casadi(frame):

@@ -91,6 +91,7 @@ def parsed_command(
 
     @wraps(command)
     def run(**values: Any) -> None:
+        """Run the command with the values of its options and the machine of its file, if any."""
         passed = {name: value for name, value in values.items() if name in arguments}
         if "before" in vars(command):  # a missing extra is told before a machine is read
             vars(command)["before"](passed)

@@ -64,6 +64,7 @@ def _cell_violation(evaluator: KindEvaluator, rating: Rating) -> str:
     robot = rating.machine
 
     def extents(poses: Array) -> Array:
+        """Return the machine's extents (K, 6 + boxes), m, at poses (K, m) about the middle."""
         return evaluator.machine_space.extents(robot, rating.middle + poses, rating.middle)
 
     sizes, misses = evaluator.machine_space.judge_extents(evaluator.worst(robot, extents, DENSE)[0])
@@ -106,7 +107,10 @@ def _candidate(
     figures |= margins.figures
 
     def least(values_of: Callable[[Array], ArrayLike]) -> float:
+        """Return the least value of a quantity over poses, refined between dense samples."""
+
         def column(poses: Array) -> Array:
+            """Return the quantity (K, 1) at poses (K, m) about the middle."""
             return np.reshape(values_of(rating.middle + poses), (-1, 1))
 
         return float(evaluator.worst(robot, column, DENSE, _WORST)[0][0])

@@ -179,6 +179,7 @@ def choose_machine(
     shares = {name: float(name in candidates) for name in evaluators}
 
     def tell(name: str, share: float) -> None:
+        """Report the progress of a kind (0 to 1) as a share of the search of all kinds."""
         shares[name] = share if name in candidates else _SEARCH * share
         if progress is not None:
             progress(Share(sum(shares.values()) / len(shares), name))

@@ -86,6 +86,7 @@ def _best_fit(sizing: Sizing, leg: int, motor: Motor) -> MotorFit:
     span, fastest = serving_span(sizing, leg, motor, 1.0), float(sizing.peak_speeds[leg - 1])
 
     def fit_at_log(log_ratio: float) -> MotorFit:
+        """Return the fit of the motor at a ratio, rad/m or rad/rad, from the ratio's logarithm."""
         return fit_at(sizing, leg, motor, span, float(np.exp(log_ratio)))
 
     middle = np.log(motor.max_speed / fastest if fastest else 1.0)

@@ -45,6 +45,7 @@ def search_kind(
     objectives = evaluator.job.objectives
 
     def rate(units: Array) -> Rating:
+        """Rate a design (v,), scaled to 0 to 1 by its bounds; record it and report progress."""
         ratings.append(evaluator.rate(low + np.clip(units, 0.0, 1.0) * (high - low)))
         if progress is not None:
             progress(len(ratings) / evaluations)
@@ -111,6 +112,7 @@ def _refine(
     """
 
     def cost(units: Array) -> float:
+        """Return the objective's cost of a design (v,), scaled to 0 to 1 by its bounds."""
         return rate(units).cost(objective)
 
     free = counts == 0

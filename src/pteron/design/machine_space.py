@@ -169,6 +169,7 @@ def _depths(starts: Array, ends: Array, low: Array, high: Array) -> Array:
     """
 
     def depth(share: Array) -> Array:
+        """Return the depths (...), m, of the lines' points at shares (...) from 0 to 1."""
         at = starts + share[..., None] * (ends - starts)
         return np.asarray(np.minimum(at - low, high - at).min(axis=-1))
 

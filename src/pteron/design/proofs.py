@@ -144,6 +144,7 @@ def proved_cube(design: Design) -> ProvedCube | None:
     capped = task.floats and "scale" not in task.quantity_names
 
     def search(failing: Array) -> Fit:
+        """Return the largest cube without failing positions (F, k); at most `least` if capped."""
         fit = design.cube_without(failing) if len(failing) else design.cube
         if not capped:
             return fit
@@ -151,6 +152,7 @@ def proved_cube(design: Design) -> ProvedCube | None:
         return replace(fit, edge=min(fit.edge, least) if fits else 0.0)
 
     def proofs(fit: Fit) -> tuple[Proof, ...]:
+        """Return the proofs that a fitted cube keeps the design's requirements."""
         return cube_proofs(design, fit.center, fit.edge)
 
     shares = _PLACED if capped else _SHARES

@@ -37,6 +37,7 @@ def workspace_shape(workspace: WorkspaceTable, count: int) -> tuple[Shape, float
     rim[..., axis] = half[axis] * np.linspace(-1.0, 1.0, 5)[:, None]
 
     def gauge(vectors: Array) -> Array:
+        """Return the scale (...) of the cylinder that vectors (..., 3) reach: 1 at its surface."""
         scaled = vectors / half
         away = np.linalg.norm(scaled[..., radial], axis=-1)
         return np.asarray(np.maximum(away, np.abs(scaled[..., axis])))

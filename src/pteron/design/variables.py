@@ -141,6 +141,7 @@ def geometry_slopes(
     """
 
     def geometry(point: Array) -> Array:
+        """Return the machine's numbers (G,) at variable values (V,)."""
         return np.array(numbers(move_variables(robot, variables, point.tolist(), stretch=False)))
 
     return slopes_of(geometry, variables, point).T

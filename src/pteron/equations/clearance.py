@@ -108,6 +108,7 @@ def squared_distance(first: Segment, second: Segment) -> Expression:
     u_square, v_square = ca.fmax(uu, _TINY), ca.fmax(vv, _TINY)
 
     def square(s: Expression, t: Expression) -> Expression:
+        """Return the squared distance, m^2, of the points at shares s and t of the segments."""
         separation = w + s * u - t * v
         return ca.dot(separation, separation)
 

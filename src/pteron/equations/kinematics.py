@@ -164,6 +164,7 @@ def link_vectors(state: State) -> tuple[Expression, Expression]:
     """Return l_u and l_l of every leg, each (n, 3), m; NaN where a leg lacks one."""
 
     def rows(k: int) -> Expression:
+        """Return each leg's link k as a row (n, 3), m; NaN where a leg has none."""
         links = (leg.links[k] for leg in state.legs)
         return ca.horzcat(*(ca.SX.nan(3, 1) if link is None else link for link in links)).T
 
@@ -232,6 +233,7 @@ def joint_screws(state: State) -> list[Expression]:
     p = state.platform.body.position
 
     def screw(joint: Joint) -> Expression:
+        """Return a joint's unit screw (6, 1) about P: linear before angular part."""
         if joint.kind == "P":
             return ca.vertcat(ca.SX(3, 1), joint.axis)  # Eq. (8), of P
         return ca.vertcat(joint.axis, ca.cross(joint.point - p, joint.axis))  # Eq. (8), of R

@@ -99,6 +99,7 @@ def exported_functions(
     controllers: dict[str, Controller | Custom] = {**CONTROLLERS, **named}
 
     def request(name: str) -> ExportRequest:
+        """Return a function's export request by its name, with tables, controller and folding."""
         what = name if name in custom else name.removesuffix(BASE)
         folded, controller = specialised or (not tables and what == PAYLOAD), controllers.get(what)
         return ExportRequest(robot, name, identified, folded, tables, wrench, output, controller)

@@ -60,6 +60,7 @@ def export_named(name: str) -> Callable[[RobotLike, str | Path], list[Path]]:
         raise ModelError(f"{extension_value(GROUP, name)} is no function")
 
     def export(robot: RobotLike, folder: str | Path) -> list[Path]:
+        """Write a robot's files to a folder and return their paths; raise if none are listed."""
         written: Any = write(as_manipulator(robot), Path(folder))
         if not isinstance(written, Iterable) or isinstance(written, str | bytes):
             written = None

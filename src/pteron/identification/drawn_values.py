@@ -92,9 +92,10 @@ class DrawnValues:
         )
 
     def rows_beside(self, observations: Observations, noise: Array) -> Observations:
-        """Return observations with a row for each value known from the drawing.
+        """Return the observations followed by a row for each value known from the drawing.
 
-        Rows are scaled by the forces' `noise` (n,), so that all rows have the same weight.
+        The input rows come first, unchanged: T + K of them in all, later by their times. A row has
+        the value of a single joint, scaled so that it weighs as a force with the `noise` (n,).
         """
         count = len(self.places)
         if not count:

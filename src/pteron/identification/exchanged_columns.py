@@ -190,6 +190,7 @@ def _other_faults(
     """Yield faults of joints, of legs and of gravity that explain the forces far better."""
 
     def trials() -> Iterator[tuple[list[ColumnFault], Observations, Model]]:
+        """Yield faults, the observations to which they apply, and their model."""
         for fault, observations in _moved_joints(none, model, log, how):
             yield _with_signs(fault, {none.order, fault.joint_order}), observations, model
         if any(model.robot.gravity):

@@ -187,6 +187,7 @@ def _row_counter(steps: Steps, step: str, total: int) -> Callable[[int], None]:
     steps.report(step)
 
     def count_rows(rows: int) -> None:
+        """Add rows to those done and report the step's share, 0 to 1."""
         nonlocal done
         done += rows
         steps.report(step, done / max(total, 1))

@@ -294,6 +294,7 @@ def _periodic(
         time, shown = fine, moving
 
     def regressor(part: slice) -> Array:
+        """Return the regressor (rows, n p) at a slice of the period's samples."""
         phases = None if log.payload is None else np.full(len(time[part]), log.payload[0])
         about: dict[str, Any] = {"source": log.source, "first_row": log.first_row + part.start}
         motion, start = series.at(time[part]), preprocessing.start

@@ -331,6 +331,7 @@ def _payload(
     chosen = [estimate.names.index(name) for name in names]
 
     def value_of_kinds(*kinds: str) -> tuple[float, ...] | None:
+        """Return the payload's values of kinds like "m"; None unless the fit has each."""
         value_names = [f"{kind}_L" for kind in kinds]
         return tuple(map(estimate.value, value_names)) if set(value_names) <= set(names) else None
 

@@ -175,6 +175,7 @@ def _fit_transmission(
         blocks = np.array_split(np.arange(len(bent)), _BLOCKS)
 
     def values(left_out: NDArray[np.int64]) -> tuple[float, float, float]:
+        """Return stiffness, damping and backlash without the samples `left_out` (indices)."""
         rows, known = np.delete(columns, left_out, axis=0), np.delete(bent, left_out)
         sizes = np.linalg.norm(rows, axis=0)
         give, lag, *offsets = np.linalg.lstsq(rows / sizes, known)[0] / sizes

@@ -170,6 +170,7 @@ def search_speeds(model: Model, observe: Observe, usual: Array) -> Array:
     shares = np.geomspace(_SLOWEST, _FASTEST, _COLUMNS)
 
     def columns(states: States) -> Array:
+        """Return the model's columns and those of falling friction at the states."""
         rates = states.joint_rates[..., None]
         falls = np.exp(-((rates / (usual[:, None] * shares)) ** 2))
         return np.concatenate([model.matrix(states), np.sign(rates) * falls], axis=-1)

@@ -171,6 +171,7 @@ class Block:
         ports = self.program.inputs
 
         def name(i: int, j: int) -> str:
+            """Return the C expression of element j of input i."""
             where = "numbers" if ports[i].shared else "in"
             return f"{where}[{self.first_rows[ports[i].name] + j}][k]"
 

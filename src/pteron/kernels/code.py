@@ -168,6 +168,7 @@ def module_values(
     ]
 
     def input_name(i: int, j: int) -> str:
+        """Return the expression of element j of input i in the module's language."""
         return f"{inputs[i].name}[{j}]" if inputs[i].shared else language.cell.format(rows[i, j])
 
     names = names_of(graph, input_name, language.constant)

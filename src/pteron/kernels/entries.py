@@ -94,6 +94,7 @@ def _entry_of(build: Any, inputs: tuple[str, ...], outputs: str, needs: tuple[Ne
     names = outputs.split()
 
     def build_outputs(m: Machine, v: Symbols) -> Outputs:
+        """Return the results of a build by their names."""
         results = build(m, v)
         return dict(zip(names, results if len(names) > 1 else [results], strict=True))
 

@@ -253,13 +253,16 @@ def _operations(field: Field[Element]) -> dict[str, Callable[..., Element]]:
     zero, unit = field.number(0), field.number(1)
 
     def sine(t: Element) -> Element:
+        """Return the sine of an angle from t, the tangent of its half."""
         return field.divide(field.add(t, t), field.add(unit, field.multiply(t, t)))
 
     def cosine(t: Element) -> Element:
+        """Return the cosine of an angle from t, the tangent of its half."""
         square = field.multiply(t, t)
         return field.divide(field.subtract(unit, square), field.add(unit, square))
 
     def select(test: Element, chosen: Element) -> Element:
+        """Return zero if the test is zero; raise NoSquareRoot otherwise."""
         # What is left out of range is NaN in floats; an exact number it is not.
         if test != zero:
             raise NoSquareRoot

@@ -109,6 +109,7 @@ def graph_of(function: ca.Function, inputs: tuple[Port, ...] = ()) -> Graph:
     outputs = [[-1] * function.nnz_out(i) for i in range(function.n_out())]
 
     def add(node: Node) -> int:
+        """Return the index of a node in the graph, added unless an equal node exists."""
         key = (node.operation, node.arguments, node.value.hex())
         if key not in seen:
             seen[key] = len(nodes)
@@ -116,6 +117,7 @@ def graph_of(function: ca.Function, inputs: tuple[Port, ...] = ()) -> Graph:
         return seen[key]
 
     def constant(number: float) -> int:
+        """Return the index of the node of a constant."""
         return add(Node(CONSTANT, value=number, shared=True))
 
     for k in range(function.n_instructions()):
@@ -162,6 +164,7 @@ def rewrite_operations(
     entries = [symbol.nonzeros() for symbol in function.sx_in()]
 
     def rule(node: Node, arguments: list[Expression]) -> Expression:
+        """Return a node's expression, by the rule of its operation where a rule exists."""
         replacement = rules.get(node.operation)
         return replacement(*arguments) if replacement else expression(node, arguments)
 

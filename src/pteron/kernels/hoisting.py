@@ -31,6 +31,7 @@ def hoist_invariants(program: Program, name: str) -> tuple[Program, ca.Function]
         return numbers.setdefault(k, (computed, ca.SX.sym(f"n{len(numbers)}")))[1]
 
     def rule(node: Node, computed: list[Expression]) -> Expression:
+        """Return a node's expression with the values of shared nodes replaced by symbols."""
         if not node.shared:
             computed = [symbol_of(k, v) for k, v in zip(node.arguments, computed, strict=True)]
         return expression(node, computed)

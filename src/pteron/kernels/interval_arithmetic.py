@@ -195,6 +195,7 @@ def _wave(a: Interval, function: Callable[[Bound], Bound], peak: float) -> Inter
     slack = _NEAR * (1.0 + np.abs(a.low) + np.abs(a.high))
 
     def contains_extreme(at: float) -> Bound:
+        """Return whether the intervals may contain a point at `at` plus a multiple of 2 pi."""
         first = np.floor((a.low - at - slack) / (2.0 * np.pi))
         return first < np.floor((a.high - at + slack) / (2.0 * np.pi))
 

@@ -72,6 +72,7 @@ class Traced(Kernel):
         jnp = jax.numpy
 
         def stack(*values: Any) -> Any:
+            """Return values, broadcast together, stacked on a new last axis."""
             return jnp.stack(jnp.broadcast_arrays(*values), axis=-1)
 
         names = ("sqrt", "sin", "cos", "exp", "floor", "fmin", "fmax", "where", "nan")
@@ -81,6 +82,7 @@ class Traced(Kernel):
         function = space[self.name]
 
         def evaluate(*values: Any) -> Any:
+            """Return the outputs as JAX arrays; leading axes of the inputs are broadcast."""
             arrays = [jnp.asarray(part, np.dtype(self.dtype)) for part in values]
             lead = jnp.broadcast_shapes(
                 *(

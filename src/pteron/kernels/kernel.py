@@ -236,6 +236,7 @@ class ArrayKernel(Kernel):
         bounds = [batch * k // count for k in range(count + 1)]
 
         def run(start: int, stop: int) -> None:
+            """Compute the outputs of the states `start` to `stop`."""
             self._run(stop - start, *slice_states(inputs, outputs, start, stop))
 
         with ThreadPoolExecutor(count) as pool:

@@ -257,6 +257,7 @@ class LoopCode:
         joints = arrays["most"].shape[2]
 
         def answer_request(machine: int, sample: int, measured: Any, forces: Any) -> None:
+            """Fill in the forces (n,) for readings (2 n,) at a sample; NaN after a failure."""
             commanded = np.ctypeslib.as_array(forces, (joints,))
             commanded[:] = np.nan
             if not failures:

@@ -137,6 +137,7 @@ class Loop:
         ended = Event()
 
         def part(start: int, stop: int) -> None:
+            """Run the machines `start` to `stop`, piece by piece, until the run is ended."""
             cut = {n: a[start:stop] if len(a) == batch else a for n, a in arrays.items()}
             for piece, size, numbers in _pieces(cut, samples, counts, stop - start):
                 if ended.is_set():

@@ -61,6 +61,7 @@ class Jitted(ArrayKernel):
         name = self._entry
 
         def build(folder: Path) -> None:
+            """Write the module's source to a folder and load it there, which compiles it."""
             (folder / _FILE).write_text(self.source, encoding="utf-8")
             _load(folder / _FILE, name)
 
@@ -86,6 +87,7 @@ class Jitted(ArrayKernel):
         ]
 
         def call(*values: Any, **fixed: Any) -> Any:
+            """Return the outputs: directly for plain vectors, otherwise by the general callable."""
             if not fixed and len(values) == count and getattr(values[0], "ndim", 0) == 1:
                 outputs = [empty(size) for size in sizes]
                 try:

@@ -75,6 +75,7 @@ def _share_divisions(old: TermGraph, roots: list[int]) -> tuple[TermGraph, list[
         return None
 
     def rule(new: TermGraph, k: int, values: list[int]) -> int:
+        """Return the node of k in the new graph: a reciprocal if it divides several times."""
         several = old.is_kind("inverse", k) and uses[k] > 1
         return new.reciprocal(values[0]) if several else old.copy_node(new, k, values)
 
@@ -101,6 +102,7 @@ def _flatten_terms(old: TermGraph, roots: list[int]) -> tuple[TermGraph, list[in
     uses = old.uses(roots)
 
     def rule(new: TermGraph, k: int, values: list[int]) -> int:
+        """Return the node of k in the new graph, with nested sums or products merged."""
         kind = old.kinds[k]
         if kind == "reciprocal" and uses[k] == 1:
             return new.inverse(values[0])
@@ -126,6 +128,7 @@ def _factor_sums(old: TermGraph, roots: list[int]) -> tuple[TermGraph, list[int]
     uses = old.uses(roots)
 
     def rule(new: TermGraph, k: int, values: list[int]) -> int:
+        """Return the node of k in the new graph, a sum with its common factors taken out."""
         if not old.is_kind("sum", k):
             return old.copy_node(new, k, values)
         terms = []

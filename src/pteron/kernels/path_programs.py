@@ -35,6 +35,7 @@ def path_kernel(closed: Closed, start: Parts | None) -> TieredKernel:
     count = closed.numbers
 
     def build() -> Program:
+        """Return the program of a step along the path: next state, remaining correction."""
         at = ca.SX.sym("at", closed.path_state_size)
         ends, inputs = [], {"at": at}
         for name, fixed in (("start", start), ("target", None)):
@@ -59,6 +60,7 @@ def rows_kernel(closed: Closed) -> TieredKernel:
     """Return the kernel of the residuals of a machine's closures at a real z, and their slopes."""
 
     def build() -> Program:
+        """Return the program of the slopes and residuals of the closures at z of a machine."""
         z, machine = ca.SX.sym("z", closed.size), ca.SX.sym("machine", closed.numbers)
         slopes, missed = rows(closed, numbers(machine), numbers(z))
         return Program.from_named_expressions(
@@ -78,6 +80,7 @@ def _spheres(robot: Manipulator) -> TieredKernel:
     """Return the kernel of the spheres that the joints' coordinates constrain, cached."""
 
     def build() -> Program:
+        """Return the program of the spheres' centers and squared radii at joint coordinates."""
         joints = ca.SX.sym("joints", robot.joint_count)
         centers, squares = held_spheres(Machine.numeric(robot), joints)
         return Program.from_named_expressions(

@@ -201,6 +201,7 @@ def _cached_geometry_only(robot: Manipulator) -> Manipulator:
     ones = ("m", "I", "Ixx", "Iyy", "Izz")
 
     def plain(body: Any) -> Any:
+        """Return a body with mass and moments of inertia 1, and all other values 0."""
         return body.of_values([float(kind in ones) for kind in body.kinds])
 
     legs = tuple(

@@ -29,6 +29,7 @@ def to_term_graph(function: ca.Function) -> tuple[TermGraph, list[int]]:
     graph, operations = TermGraph(), graph_of(function)
 
     def rule(node: Node, operands: list[int]) -> int:
+        """Return the term graph's node for a CasADi node from its operands' nodes."""
         if node.operation == CONSTANT:
             return graph.constant(node.value)
         if node.operation in _ARITHMETIC:
@@ -49,12 +50,14 @@ def to_function(graph: TermGraph, roots: list[int], function: ca.Function) -> ca
     expressions: dict[int, tuple[Any, int]] = {}
 
     def signed_expression(operand: int) -> tuple[Any, int]:
+        """Return an operand's unsigned expression and its sign, 1 or -1."""
         size, sign = expressions[abs(operand)]
         return size, sign * sign_of(operand)
 
     negatives: dict[int, Any] = {}
 
     def plain_expression(operand: int) -> Any:
+        """Return an operand's signed expression; each node is negated at most once."""
         size, sign = signed_expression(operand)
         if sign < 0 and abs(operand) not in negatives:
             negatives[abs(operand)] = -size

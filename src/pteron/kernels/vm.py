@@ -145,6 +145,7 @@ def _casadi_operation(node: Node, shape: tuple[int, ...]) -> Callable[..., None]
     lowered = node.operation in ("sin", "cos")
 
     def operation(*arrays: Array) -> None:
+        """Fill the last array with the operation of the others; within LIMIT skip sines."""
         *arguments, out = arrays
         if lowered and np.abs(arguments[0]).max() <= LIMIT:
             return
@@ -244,6 +245,7 @@ def _lower(function: ca.Function) -> ca.Function:
     """Return a function in plain arithmetic, from disk if it is there: rewriting takes 10 ms."""
 
     def rewrite() -> str:
+        """Return the function as serialised text, rewritten in plain arithmetic."""
         lowered: str = _with_lowered_sines(with_lowered_exponentials(function)).serialize()
         return lowered
 

@@ -52,7 +52,11 @@ def _slopes(robot: Manipulator, poses: Array) -> Array:
 
 
 def _rows_of(robot: Manipulator, changes: list[Variation], amounts: Array, poses: Array) -> Array:
-    """Return the twist Jacobians (B, K, n, 6) of machines that differ by amounts (B, changes)."""
+    """Return the twist Jacobians (B, K, n, 6) of B changed machines at poses (K, m).
+
+    `amounts` (B, len(changes)), m, are the sizes of the changes of each machine. A Jacobian maps
+    the twist (v, omega) of P, (6,), to the joint rates (n,).
+    """
     geometry = varied_numbers(robot, changes, amounts)
     function = general_program(robot, "twist_jacobian").function
     several = np.repeat(geometry, len(poses), axis=0).T

@@ -62,6 +62,7 @@ def _best_type_ii(robot: Manipulator) -> float:
     """Return the largest type-II measure of poses in reach, by local searches from random poses."""
 
     def measure(poses: Array) -> Array:
+        """Return the type-II measures (K,) of poses (K, m); 0 out of reach."""
         reached = ~np.isnan(numeric(robot, "reach")(poses)[1]).any(axis=-1)
         return np.where(reached, type_ii_sizes(robot, poses), 0.0)
 
@@ -139,6 +140,7 @@ def _sign_changes(robot: Manipulator, position: Array) -> Array:
     """Return the angles at which the type-II measure at a position changes its sign, in reach."""
 
     def measure(angles: Array) -> Array:
+        """Return the type-II measures (K,) at the position with angles (K,), rad."""
         positions = np.broadcast_to(position, (*angles.shape, len(position)))
         poses = np.concatenate([positions, angles[:, None]], axis=-1)
         return np.asarray(numeric(robot, "type_ii")(poses)[0])

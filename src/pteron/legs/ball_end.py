@@ -1,4 +1,8 @@
-"""Cone, hinges and plane of legs that end in a ball joint at a tilting platform."""
+"""Parts of legs that end in a ball joint at the platform: R-R-S, P-R-S, R-P-S and rods.
+
+The axes about which the ball joint leaves the platform free, its limit (the cone), and its
+equivalent hinges; of planar legs also the plane in which they keep their platform point.
+"""
 
 from __future__ import annotations
 
@@ -13,23 +17,27 @@ from pteron.legs.leg import Joint, LegMotion, Passive
 
 
 def every_axis() -> tuple[Vector, ...]:
-    """Return three axes that span the rotations of a ball joint."""
+    """Return three orthogonal unit vectors: a ball joint lets the platform turn about any axis."""
     return (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 
 
 @property  # type: ignore[misc]
 def held_plane(leg: Any) -> HeldPlane:
-    """The plane through the guide point in which a planar leg keeps its platform point."""
+    """The plane that a leg's platform point never leaves.
+
+    It is normal to the leg's direction `d` and contains its guide point `r`.
+    """
     return HeldPlane(leg.d, leg.r)
 
 
 def ball_cone(
     cone: Cone | None, motion: LegMotion, socket: Expression, length: float
 ) -> list[Passive]:
-    """Return the angle between a leg's last link and the platform's socket, with its cone as limit.
+    """Return the limit of the ball joint at the platform; an empty list if `cone` is None.
 
-    The columns of `socket` (3, 3) are the platform's axes in the base frame; `length`, m, is that
-    of the link.
+    It is the angle, rad, between the link that ends at the platform (`length`, m) and the axis of
+    `cone`, in the platform's frame. The columns of `socket` (3, 3) are the platform's axes in the
+    base frame.
     """
     link = motion.links[1]
     assert link is not None
@@ -43,10 +51,12 @@ def ball_joint(
     rate: Expression,
     acceleration: Expression,
 ) -> list[Joint]:
-    """Return the ball joint at c as hinges about the axes of the platform's turns.
+    """Return hinges that together equal the ball joint at c (3, 1), m, of the platform.
 
-    `row` (3, 6), `rate` and `acceleration` (3, 1) are the angular velocity of the leg's last link,
-    against which the platform turns.
+    One for each turn of the platform's rotation, about that turn's axis; its rate is the platform's
+    turn relative to the leg's last link. `rate` (3, 1), rad/s, and `acceleration` (3, 1), rad/s^2,
+    are the link's angular velocity and acceleration; `row` (3, 6) are the velocity's derivatives by
+    (c', omega).
     """
     return [
         Joint(

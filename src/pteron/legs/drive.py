@@ -18,6 +18,7 @@ def _number_check(
     """Return the validator of a number, which is None where an optional one is omitted."""
 
     def check(value: object, key: str) -> float | None:
+        """Return a number that meets the condition; None if it is optional and omitted."""
         if value is None and optional:
             return None
         converted = number(value, key)

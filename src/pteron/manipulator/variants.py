@@ -81,6 +81,7 @@ def turned(robot: RobotLike, rotation: ArrayLike, *, gravity: bool = True) -> Ma
         raise ModelError("rotation: the matrix is a reflection (determinant -1); negate one column")
 
     def turn(v: Vector) -> Vector:
+        """Return a vector rotated by the matrix."""
         return vector((matrix @ v).tolist(), "rotation")
 
     # A 2R platform's frame is the base frame at angles zero.

@@ -55,6 +55,7 @@ def _function(
     }
 
     def evaluate(pose: Any, *axis_values: Any) -> dict[str, Any]:
+        """Return the indices and the status, by name, on the grid through a pose."""
         columns = [jnp.broadcast_to(coordinate, shape) for coordinate in pose]
         for k, (place, coordinate) in enumerate(zip(places, axis_values, strict=True)):
             columns[place] = jnp.broadcast_to(

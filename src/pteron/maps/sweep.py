@@ -173,6 +173,7 @@ def _run_elsewhere(
     distributed = _import_distributed()
 
     def submit_chunk(numbered_chunk: tuple[int, Any]) -> Future[None]:
+        """Return the future of a chunk, with its number, submitted to the cluster."""
         # Each is a task of its own: that its result is none does not mean it is not needed.
         future: Future[None] = client.submit(task, *numbered_chunk, pure=False)
         return future

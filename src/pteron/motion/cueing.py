@@ -297,6 +297,7 @@ def _box(robot: Manipulator, middle: Array, demand: Array, type_ii: float) -> tu
     half, shares = np.maximum(demand, least), (0.9**k for k in range(1, _TRIES))
 
     def region(size: float) -> Box:
+        """Return the box about the middle that is `size` times the half sides."""
         return Box(tuple(middle - size * half), tuple(middle + size * half))
 
     size, proof = largest_proved(

@@ -207,7 +207,11 @@ def _links(leg: LegKind, chain: Array, coordinate: Array, end: Array) -> Array:
 
 
 def _parts(robot: Manipulator, poses: Array, p: Array) -> tuple[Part, ...]:
-    """Return the platform's parts in poses (..., m), with P at points (..., 3)."""
+    """Return the platform's rigid parts at poses (..., m), in the base frame, m.
+
+    `p` (..., 3) are the positions of the platform's reference point P, the hub of the first part;
+    each further part is at a hinge of the platform and does not turn with it.
+    """
     platform = robot.platform
     frame = np.array(platform.frame)
     arms = np.array([leg.platform_point for leg in robot.legs])

@@ -40,9 +40,11 @@ def faults(platform: Platform, seed: int = 0) -> tuple[str, ...]:
     rng = np.random.default_rng(seed)
 
     def drawn(*shape: int) -> Expression:
+        """Return a CasADi matrix of this shape of normally distributed random numbers."""
         return ca.SX(ca.DM(rng.normal(size=shape)))
 
     def points(flat: bool) -> list[Expression]:
+        """Return random points (3, 1), flat ones at height 0."""
         high = 0.0 if flat else 1.0  # what slides moves across the axis
         return [ca.SX(ca.DM(rng.normal(size=3) * (1.0, 1.0, high))) for _ in range(_POINTS)]
 

@@ -68,6 +68,7 @@ def map_film(
     rate = ENCODERS[target.suffix.lower()].rate(fps)
 
     def drawn(value: float) -> Figure:
+        """Return the figure of the map at a value of its last coordinate."""
         return map_panels([(index_map.slice_at(last.name, value), name)], scales, index_map.causes)
 
     values = last.values.tolist()

@@ -56,6 +56,7 @@ def reach_figure(
     figure, axes, first, second = _sheet(cut, ax)
 
     def fill(field: Array, color: str, alpha: float, level: float = 0.0) -> None:
+        """Fill where a field (rows, columns) exceeds a level, with a color."""
         if field.max() > level:
             axes.contourf(first, second, field, levels=[level, np.inf], colors=[color], alpha=alpha)
 

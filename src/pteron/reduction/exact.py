@@ -239,7 +239,11 @@ def _certificate(
     fresh: int,
     seed: int,
 ) -> ExactCertificate:
-    """Return the certificate: the checks, and the probability that a false vector passes."""
+    """Return the certificate: the checks, and the probability that a false vector passes.
+
+    `fresh` is the prime, none of the elimination's, modulo which the vectors are checked: the
+    larger it is, the less likely a false vector passes.
+    """
     robot, geometry = regressor.robot, regressor.geometry
     degree = degree_bound(geometry_only(robot))
     # A pose is drawn among the 1 in 2^n whose n radicands are squares, and the 2^n choices of their

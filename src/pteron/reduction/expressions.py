@@ -38,6 +38,7 @@ def as_text(columns: Sequence[Parameter], terms: Terms, digits: int) -> str:
     """Return a base parameter such as ``m_p1 + m_u1 + 20.11 I_l1``."""
 
     def product(column: int, share: Share) -> tuple[bool, str]:
+        """Return whether a column's term is subtracted, and its text."""
         minus, size = _write_terms(share, digits, str)
         size = size.replace("**", "^")
         return minus, f"{size} {columns[column].name}" if size else columns[column].name
@@ -49,6 +50,7 @@ def as_html(columns: Sequence[Parameter], terms: Terms, digits: int) -> str:
     """Return a base parameter in HTML, in the paper's notation; each term stays on one line."""
 
     def product(column: int, share: Share) -> tuple[bool, str]:
+        """Return whether a column's term is subtracted, and its HTML."""
         minus, size = _write_terms(share, digits, _html_share)
         name = html_name(columns[column])
         gap = " " if _is_symbolic(share) else _NARROW
@@ -61,6 +63,7 @@ def as_latex(columns: Sequence[Parameter], terms: Terms, digits: int) -> str:
     """Return a base parameter in LaTeX, in the paper's notation."""
 
     def product(column: int, share: Share) -> tuple[bool, str]:
+        """Return whether a column's term is subtracted, and its LaTeX."""
         if _is_symbolic(share):
             from sympy import latex
 

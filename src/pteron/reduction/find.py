@@ -115,6 +115,7 @@ def _grouping(
     """Return the grouping of a machine's columns, in an order of preference."""
 
     def compute_grouping() -> Grouping:
+        """Return the grouping of the columns by the method."""
         columns, sharing = share(layout, groups)
         if method == "exact":
             by_mass = transfers(layout, columns)

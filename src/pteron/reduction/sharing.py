@@ -53,6 +53,7 @@ def share(
     columns = parameter_data(robot, groups)
 
     def joins(p: Parameter, c: Parameter) -> bool:
+        """Return whether a column comprises a parameter: kind, body and legs agree."""
         return (p.kind, p.body) == (c.kind, c.body) and set(p.legs) <= set(c.legs)
 
     return columns, np.array([[float(joins(p, c)) for c in columns] for p in everything])
@@ -64,6 +65,7 @@ def default_order(columns: Sequence[Parameter]) -> list[int]:
     preference = PREFERENCE if kinds <= set(PREFERENCE) else TILTING_PREFERENCE
 
     def rank(column: int) -> tuple[int, int]:
+        """Return a column's place in the order of preference by kind and body, then by index."""
         parameter = columns[column]
         return preference.index((parameter.kind, parameter.body)), column
 

@@ -226,6 +226,7 @@ def _tilt(robot: Manipulator, home: Array) -> float | None:
     """Return the largest tilt, rad, at a pose, cached between runs; None if there is none."""
 
     def tilt() -> float | None:
+        """Return the largest tilt, rad; None if the platform does not tilt, or not from level."""
         with suppress(ModelError):  # it does not tilt, or not from the level
             return largest_tilt(robot, home).tilt
         return None

@@ -131,6 +131,7 @@ def _join_tables(tables: list[Table]) -> Table:
         return tables[0]
 
     def line_of(index: int) -> int:
+        """Return the line in the file of a row, by its index in the joined table."""
         table = next(table for table in reversed(tables) if table.first_row <= index)
         assert table.line_of is not None
         return table.line_of(index - table.first_row)

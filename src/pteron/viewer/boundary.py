@@ -50,6 +50,7 @@ def farthest_reachable_pose(
         return target, None
 
     def try_shares(shares: Array) -> tuple[Array, NDArray[np.bool_]]:
+        """Return poses (S, m) at shares (S,) of the straight path and whether each is allowed."""
         poses = start + shares[:, None] * (target - start)
         return poses, is_allowed(robot, poses)
 
@@ -68,6 +69,7 @@ def follow_joints(
     turn = 2.0 * np.pi
 
     def try_shares(shares: Array) -> tuple[Array, NDArray[np.bool_]]:
+        """Return poses (S, m) at shares (S,) of the joints' path and whether each is allowed."""
         way = joints + shares[:, None] * (target - joints)
         poses = follow(robot, way, pose, on_failure="nan")
         differences = np.abs(inverse_kinematics(robot, poses, on_failure="nan") - way)

@@ -21,11 +21,12 @@ def is_local_address(host: str) -> bool:
 
 
 def refusal(host: str, here: bool, hosts: list[str], origins: list[str]) -> str | None:
-    """Return why a request is refused; None if it is not.
+    """Return why a request is refused, a sentence; None if it is accepted.
 
-    `hosts` and `origins` are the request's headers; programs that are no browsers send no `Origin`.
-    If only this machine can reach the address, it is asked for by a name of this machine; a wider
-    one may have names that nobody here knows.
+    `host` is the address or name at which the viewer is served, and `here` whether only this
+    machine can reach it: the request's host must then be that name, localhost or a loopback
+    address; an address that others reach may have any name. `hosts` and `origins` are the values of
+    the request's headers `Host` and `Origin`; only browsers send an `Origin`.
     """
     if len(hosts) != 1 or len(origins) > 1:
         return "one Host and at most one Origin expected"

@@ -144,15 +144,18 @@ class Live:
         session = self.session
 
         def prepare() -> None:
+            """Stop playback, and all motion but that of a push, until equations are compiled."""
             session.playing, session.preparing = False, True
             if session.push is None:
                 session.state = stop_motion(session.state)
 
         def begin() -> None:
+            """Begin the push, compiled by now."""
             session.preparing = False
             session.begin_push(drives)
 
         def compile_equations() -> None:
+            """Compile the equations of the push, then queue its beginning."""
             with suppress(Exception):  # `begin` raises it again, and reports it
                 session.prepare_push(drives)
             self.queue_action("push", begin)

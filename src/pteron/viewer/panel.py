@@ -228,6 +228,7 @@ class _Request:
         grip, to, stiffness = self.point("grip"), self.point("to"), self.number("stiffness")
 
         def act() -> None:
+            """Pull the platform from the grip to the point; the stiffness is 0 to 1e6 N/m."""
             push = self.session.push
             if push is not None:
                 push.stiffness = min(max(stiffness, 0.0), 1e6)
@@ -239,6 +240,7 @@ class _Request:
         """Return the action that releases the spring."""
 
         def act() -> None:
+            """Release the spring."""
             if self.session.push is not None:
                 self.session.push.release()
 
@@ -249,6 +251,7 @@ class _Request:
         k = int(self.fields["i"])
 
         def act() -> None:
+            """Set the session to the assembly of this number, if there are enough."""
             poses = self.session.assemblies()[0]
             if 0 <= k < len(poses):
                 self.session.set_assembly(poses[k])
@@ -275,6 +278,7 @@ class _Request:
         time = self.number("time")
 
         def act() -> None:
+            """Stop playback and seek the time."""
             self.session.playing = False
             self.session.seek(time)
 

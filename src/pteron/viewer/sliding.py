@@ -48,6 +48,7 @@ def nearest_reachable_pose(
     weights = _weights(robot)
 
     def distance_to_target(there: Array) -> float:
+        """Return the weighted distance, m, of a pose (m,) to the target."""
         return float(np.linalg.norm(weights * (target - there)))
 
     distance = distance_to_target(start)

@@ -132,6 +132,7 @@ class SemiInfiniteProgram:
         count = len(axes)
 
         def slopes(places: Array) -> tuple[Array, Array]:
+            """Return conditions' rows (F, R) at places (F, k), and their slopes (F, R, k)."""
             poses = vary_coordinates(fixed, places)
             rows, slopes = self.conditions.slopes(geometry, poses, self.side)
             return rows, slopes[..., :count]
@@ -236,6 +237,7 @@ def _solve_subproblem(
 
     @lru_cache(maxsize=1)
     def rows_and_slopes(key: bytes) -> tuple[Array, Array]:
+        """Return constraints (C,), at least 0 where they hold, and their slopes (C, v)."""
         z = np.frombuffer(key)
         geometry, center, edge = program.parts(z)
         row_values, by_pose, *by_geometry = program.conditions.slopes(

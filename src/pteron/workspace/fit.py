@@ -91,6 +91,7 @@ def largest_fit(
     lengths, size = len(ball[0]), ball[1]
 
     def program(fit: Fit) -> SemiInfiniteProgram:
+        """Return the semi-infinite program of the largest shape that starts from a fit."""
         return SemiInfiniteProgram(
             conditions,
             fit.side,
@@ -109,6 +110,7 @@ def largest_fit(
     samples, dense = (shape_samples(shape, orientations, n) for n in (_FIRST, POINTS))
 
     def grow(fit: Fit) -> Fit:
+        """Return the largest fit near a start, which is shrunk until its samples do not fail."""
         for _ in range(_SHRINKINGS):
             attempt = program(fit)
             if _least(attempt.rows(dense, attempt.start)) >= 0.0 and not len(

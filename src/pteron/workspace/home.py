@@ -413,6 +413,7 @@ def _refine_poses(
     units = _steps(robot, 1.0, 1.0)[movable]
 
     def poses(scaled: Array) -> Array:
+        """Return poses (..., m) from scaled values (..., k) of movable coordinates, others 0."""
         # Simplices (S, ..., k), or points (4, S, k): coordinates that stay are alike, or 0.
         all_coordinates = np.zeros((*scaled.shape[:-1], robot.freedom))
         all_coordinates[..., movable] = scaled * units

@@ -106,6 +106,7 @@ def largest_cube(
     count = len(robot.platform.lengths)
 
     def region(center: Array, size: float) -> Region:
+        """Return the box of poses with a center (m,) and a half edge, m, in its positions."""
         half = np.zeros(len(reference))
         half[:count] = size
         return Box(tuple(center - half), tuple(center + half))
@@ -162,9 +163,11 @@ def largest_cylinder(
     rim = np.concatenate([ring + h * unit for h in heights])
 
     def region(center: Array, size: float) -> Region:
+        """Return the cylinder with a center (m,) and a radius, m."""
         return Cylinder(tuple(center), size, 2.0 * ratio * size, axis)
 
     def gauge(vectors: Array) -> Array:
+        """Return the radius (...), m, of the least cylinder of this shape with vectors (..., 3)."""
         heights = vectors @ unit
         radii = np.linalg.norm(vectors - heights[..., None] * unit, axis=-1)
         return np.asarray(np.maximum(radii, np.abs(heights) / ratio))
@@ -192,13 +195,16 @@ def _largest_shape(
     lengths = len(robot.platform.lengths)
 
     def inscribed_shape(fit: Fit, proof: Proof | None) -> Inscribed:
+        """Return a fit as a shape with its proof."""
         center = np.append(fit.center, reference[lengths:])
         return Inscribed(center, 0.5 * fit.edge, region(center, 0.5 * fit.edge), proof)
 
     def fit_in_ball(ball: tuple[Array, float], failing: Array) -> Fit:
+        """Return the largest shape in a ball (center, radius in m) without failing positions."""
         return largest_fit(smooth, geometry, reference[None], ball, failing, shape, _STARTS)
 
     def search(failing: Array) -> Fit:
+        """Return the largest shape without failing positions, in the search ball or the box."""
         fit = fit_in_ball(search_ball(robot), failing)
         if fit.edge > 0.0:
             return fit
@@ -207,6 +213,7 @@ def _largest_shape(
         return fit_in_ball((0.5 * (low + high), 0.5 * float((high - low).max())), failing)
 
     def proofs(fit: Fit) -> tuple[Proof, ...]:
+        """Return the proof that a fit's region keeps the conditions."""
         return (prove(robot, inscribed_shape(fit, None).region, given=required),)
 
     if proved:

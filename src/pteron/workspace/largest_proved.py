@@ -36,6 +36,7 @@ def largest_proved(
     halved = itertools.count(1)
 
     def keeps_all(size: float) -> bool:
+        """Return whether all sample poses at a size keep the conditions; report progress."""
         report(0.5 * next(halved) / halvings)
         return bool(keeps(robot, required, poses(size)).all())
 

@@ -283,14 +283,17 @@ class Search:
         scale = float(state[:k] @ state[:k])
 
         def distance(x: Array) -> tuple[float, Array]:
+            """Return half the scaled squared distance to the pose and its gradient at x."""
             way = np.concatenate([x[:k], np.zeros(len(x) - k)])
             return 0.5 * float(way @ way) / scale, way / scale
 
         @lru_cache(maxsize=1)
         def residuals(x: bytes) -> list[Array]:
+            """Return equality and inequality residuals, and slopes, at a state in bytes."""
             return [part[0] for part in self._values(np.frombuffer(x)[None])]
 
         def part(i: int, rows: slice) -> dict[str, object]:
+            """Return a SciPy constraint: residuals i, equality for 0, with `rows` of slopes."""
             return {
                 "type": ("eq", "ineq")[i],
                 "fun": lambda x: residuals(x.tobytes())[i],

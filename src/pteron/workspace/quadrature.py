@@ -125,6 +125,7 @@ def _inner_lengths(
     """Return the lengths (L,) inside of lines along x between ends (2,), at places (L, k - 1)."""
 
     def contains(x: Array, row: NDArray[np.intp]) -> NDArray[np.bool_]:
+        """Return whether positions x on lines `row` (indices) keep the conditions."""
         poses = np.broadcast_to(reference, (*x.shape, len(reference))).copy()
         poses[..., 0], poses[..., 1 : 1 + places.shape[1]] = x, places[row]
         return keeps(robot, required, poses)

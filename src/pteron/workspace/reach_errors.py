@@ -58,6 +58,7 @@ def _deepest(robot: Manipulator) -> tuple[Array, Array]:
     random_poses[:, lengths:] *= np.pi
 
     def margins(pose: Array) -> Array:
+        """Return the margins of reach at poses (..., m)."""
         return np.asarray(numeric(robot, "reach")(pose)[0])
 
     starts = random_poses[np.argsort(-margins(random_poses).min(axis=-1))[:_STARTS]]

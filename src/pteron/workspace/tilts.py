@@ -151,6 +151,7 @@ def _sobol_points(count: int) -> Array:
     """
 
     def draw() -> Array:
+        """Return scrambled Sobol points (_SAMPLES, count) in the unit cube."""
         return np.asarray(scipy.stats.qmc.Sobol(count, seed=0).random(_SAMPLES))
 
     return cached_result(("sobol", count, _SAMPLES, version("scipy")), (), draw)
@@ -198,6 +199,7 @@ def largest_tilt(
     robot, reference = _expect_tilting(robot, pose)
 
     def sizes(tilt: float) -> tuple[float, float]:
+        """Return the radius, m, and the tilt, rad, of a region with this tilt."""
         return radius, tilt
 
     return _largest_region(robot, reference, _MOST, tolerance, given, sizes, report)
@@ -243,6 +245,7 @@ def largest_ball(
     reach = sum(leg.size for leg in robot.legs)
 
     def sizes(radius: float) -> tuple[float, float]:
+        """Return the radius, m, and the tilt, rad, of a region with this radius."""
         return radius, tilt
 
     return _largest_region(robot, reference, reach, tolerance, given, sizes, report)
@@ -284,6 +287,7 @@ def _largest_region(
     angles = int(angular[0]), int(angular[1])
 
     def region(size: float) -> TiltedBall:
+        """Return the region of positions and tilts of a size (radius or tilt)."""
         radius, tilt = sizes(size)
         return TiltedBall(tuple(reference.tolist()), radius, tilt, lengths, angles)
 

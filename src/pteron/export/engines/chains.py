@@ -61,6 +61,7 @@ def leg_stances(robot: Manipulator, poses: Array) -> list[LegStance]:
     batch = poses.shape[:-1]
 
     def vector(*name: Any) -> Array:
+        """Return stacked values (..., size) by name, with the axes of the batch of poses first."""
         stances = np.asarray(values[name]).T
         return stances.reshape(*batch, -1)
 

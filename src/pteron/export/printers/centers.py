@@ -49,6 +49,7 @@ class Center:
         )
 
         def center(value: float) -> Array:
+            """Return the centre (3,), m, at a joint coordinate, m or rad."""
             return np.array(function(value)[0]).ravel()
 
         radius = float(function(0.0)[1])

@@ -191,6 +191,7 @@ def from_klipper(config: str | Path, *, name: str = "printer") -> Manipulator:
         )
 
     def length(section: str, key: str, default: float | None = None) -> float:
+        """Return a setting, m, of a section with mm; raise if it is missing or not positive."""
         value = setting(parser, section, key)
         metres = default if value is None else 1e-3 * value
         if metres is None or metres <= 0.0:
@@ -259,6 +260,7 @@ def _place_leg(
     cos, sin = math.cos(turn), math.sin(turn)
 
     def turn_vector(v: Vector) -> Vector:
+        """Return a vector (3,) turned about the z axis by the leg's angle."""
         return (cos * v[0] - sin * v[1], sin * v[0] + cos * v[1], v[2])
 
     moved = leg.map_vectors(turn_vector)

@@ -196,7 +196,12 @@ class Excitation(Result):
     def frame(
         self, rate: float = 1000.0, periods: int = 1, layout: MotionLayout | None = None
     ) -> pl.DataFrame:
-        """Return the trajectory from rest to rest, `rate` rows a second; see `write_csv`."""
+        """Return the trajectory, lead-in and lead-out included, as a data frame.
+
+        A row for each sample, `rate` a second, from rest to rest. Columns, in SI units: t; rho1
+        ... (theta1 ... at cranks); x y z phi; drho1 ...; ddrho1 ...; dx ...; ddx ...; force1 ...
+        (torque1 ...). A `layout` selects, renames and converts them.
+        """
         check_sampling(self.motion.period, rate, periods)
         return (layout or MotionLayout()).frame(self.with_leads(periods), rate)
 

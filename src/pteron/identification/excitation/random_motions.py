@@ -112,6 +112,7 @@ def random_excitation(
     shape = rng.normal(size=(2 * harmonics, n)) * sizes(robot, space)
 
     def rest_motion(pose: Array) -> FourierMotion:
+        """Return the motion at rest at a pose (m,): a Fourier motion without amplitudes."""
         center = (
             pose if space == "platform" else evaluate_unchecked(robot, "joint_coordinates", pose)
         )
@@ -154,6 +155,7 @@ def shrink_into_limits(motion: FourierMotion, limits: Limits) -> FourierMotion |
     """
 
     def keeps_limits(scale: float) -> bool:
+        """Return whether the motion, scaled about its center, keeps the limits at fine samples."""
         return is_clear(_scale(motion, scale), limits, _FINE * motion.harmonics)
 
     high = 1.0
@@ -172,9 +174,11 @@ def _largest(center_motion: FourierMotion, shape: Array, limits: Limits) -> Four
     """Return the largest motion of a shape about a center within limits; None without room."""
 
     def resize(scale: float) -> FourierMotion:
+        """Return the motion about its center with coefficients `scale` times the shape."""
         return center_motion.with_coefficients(np.vstack([center_motion.center, scale * shape]))
 
     def keeps_limits(scale: float) -> bool:
+        """Return whether the shape at a scale keeps the limits by a margin at coarse samples."""
         return is_clear(resize(scale), limits, _COARSE * center_motion.harmonics, _COARSE_CLEAR)
 
     low, high = 0.0, 1.0

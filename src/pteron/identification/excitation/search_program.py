@@ -85,6 +85,7 @@ def minimise(
     deadline = time.monotonic() + seconds
 
     def measure(z: Array) -> tuple[float, Array]:
+        """Return the cost and its gradient, flat, at flat coefficients z."""
         value, gradient = cost(z.reshape(start.shape))
         return float(_numbers(value).item()), _numbers(gradient).ravel()
 

@@ -62,15 +62,18 @@ def sequential_minimum(
 
     @lru_cache(maxsize=1)
     def evaluate(x: bytes) -> tuple[float, Array, Array]:
+        """Return cost, gradient (v,) and constraint margins at variables packed in bytes."""
         variables = np.frombuffer(x)
         return *program.cost(variables), program.margins(variables)
 
     def cost(x: Array) -> float:
+        """Return the cost at variables (v,); infinite where it has no value."""
         # An infinite cost makes the line search shorten a step to where there is no value.
         size, _, margins = evaluate(x.tobytes())
         return size if np.isfinite(size + margins.sum()) else np.inf
 
     def gradient(x: Array) -> Array:
+        """Return the gradient (v,) and note the iterate; raise StopIteration if `stop` says so."""
         nonlocal iterate
         iterate = x.copy()
         if stop():
@@ -78,6 +81,7 @@ def sequential_minimum(
         return evaluate(x.tobytes())[1]
 
     def margins(x: Array) -> Array:
+        """Return the margins of the constraints at variables (v,), 0 instead of NaN."""
         return np.nan_to_num(evaluate(x.tobytes())[2])
 
     if not np.isfinite(cost(start)):

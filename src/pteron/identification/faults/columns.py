@@ -249,10 +249,12 @@ def _ratio(joints: Sequence[int]) -> Family:
     some = list(joints)
 
     def columns(m: FittedMotion) -> Array:
+        """Return the slopes (T, n, 1) of the forces by the relative change of the joints' ratio."""
         force = diagonal(m.forces())[..., some].sum(axis=-1, keepdims=True)
         return np.asarray(m.ratio_slopes[..., some].sum(axis=-1, keepdims=True) - force)
 
     def sizes(model: Model) -> Sequence[str]:
+        """Return the joint's name, or "all joints" if several share the ratio."""
         names = [model.robot.joint_names[i] for i in some]
         return names if len(names) == 1 else ["all joints"]
 

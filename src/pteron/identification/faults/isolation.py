@@ -197,6 +197,7 @@ def _isolate_in_parts(
     noise = np.mean([part.how.force_noise for part in parts], axis=0)
 
     def observe(some: Sequence[SearchedPart]) -> Observations:
+        """Return the observations of parts, with rows for values known from the drawing."""
         rows = observe_parts(some)
         return rows if drawn is None else drawn.rows_beside(rows, estimate.noise)
 

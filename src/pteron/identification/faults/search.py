@@ -208,6 +208,7 @@ def _fit_fault(
         chosen = [*zip(places, mixes, strict=True), (model.places[k], mix)]
 
         def append_combinations(rows: Observations) -> Observations:
+            """Return observations of p columns and a column for each chosen combination."""
             parts = [rows.matrix[..., place] @ combination for place, combination in chosen]
             return rows.with_matrix(np.concatenate([rows.matrix[..., :p], *parts], axis=-1))
 

@@ -79,6 +79,7 @@ def _insert_samples(log: Log, missing: NDArray[np.int64]) -> Log:
     rows = rows_of(log)
 
     def interpolate(values: Array, degree: int) -> Array:
+        """Return values (T, k) with missing samples filled in by local polynomials of a degree."""
         filled = _interpolate_locally(log.time, values, places, instants, degree)
         return np.asarray(np.concatenate([values, filled])[order])
 

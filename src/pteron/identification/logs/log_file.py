@@ -327,10 +327,12 @@ def open_log(
         raise DataError(f"{shorten(str(origin), bare=True, longest=1000)}: {error}") from None
 
     def open_described(described: Description) -> LogFile:
+        """Return the opened log file, read as the description says."""
         dialect = described.csv or Dialect()
         return LogFile(open_table(path, noun="log", dialect=dialect), robot, described)
 
     def check_described(described: Description) -> None:
+        """Read the first piece of the log as the description says; raise on faults."""
         next(open_described(described).pieces(), None)
 
     try:
@@ -392,6 +394,7 @@ def read_log(
     total, done = file.rows_estimate or 1, 0
 
     def count_rows(rows: int) -> None:
+        """Add rows to those read and report the log's share, 0 to 1."""
         nonlocal done
         done += rows
         progress(min(done / total, 1.0))

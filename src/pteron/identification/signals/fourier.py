@@ -174,6 +174,7 @@ def _fit_coefficients(
     first = projection.coefficients(lambda rows: signal[rows], size)
 
     def residuals_of(rows: slice) -> Array:
+        """Return the residuals (rows, k) of the first solution in a block of samples."""
         return np.asarray(signal[rows] - projection.basis(rows) @ first)
 
     # A step of iterative refinement removes the rounding of the first solution.

@@ -197,6 +197,7 @@ class AdaptivePlant:
         m, loads = len(state) // 2, (loads_held["forces"][0], loads_held["wrench"][0])
 
         def rates(_: float, state: Array) -> Array:
+            """Return the rates (2 m,) of a state of pose and velocity; NaN without a solution."""
             velocity = state[m:]
             acceleration, status = self._accelerations(state[:m], velocity, *loads)
             return np.concatenate([velocity, acceleration if status else np.full(m, np.nan)])

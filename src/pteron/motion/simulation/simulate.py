@@ -188,6 +188,7 @@ def simulate(
     loads = Loads(masses, machines, _sample_source(wrench, robot, "wrench", reference.time))
 
     def run_with(timing: Timing) -> Simulation:
+        """Return the simulation with this timing of the samples."""
         arguments = (pose, velocity), reference, source, loads, sensors, timing
         ends = limits and controller is not None
         return run_simulation(robot, *arguments, limits=ends, progress=progress)
@@ -329,6 +330,7 @@ def _sample_source(
     size = len(columns)
 
     def numbers(row: PoseLike, title: str) -> Array:
+        """Return a row as an array of finite numbers (k,), or raise with its title."""
         array = as_array(pick_columns(row, columns, title), title, (size,))
         expect(array.ndim == 1, title, f"shape {array.shape}", f"({size},)")
         expect(np.isfinite(array).all(), title, shorten(array.tolist()), "finite numbers")

@@ -205,6 +205,7 @@ def _best_ratio(sizing: Sizing, legs: tuple[int, ...], rotor_inertia: float) -> 
         return most
 
     def largest(log: float) -> float:
+        """Return the largest mean square torque of all legs, (N m)^2, at a ratio's logarithm."""
         ratio = math.exp(log)
         return max(float(mean_squares(sizing, leg, ratio, rotor_inertia).max()) for leg in legs)
 

@@ -41,6 +41,7 @@ class Profile(NamedTuple):
         stretched_duration = self.duration + 2.0 * h
 
         def progress(tau: Array) -> tuple[Array, Array, Array]:
+            """Return s and its first two derivatives by tau, (T,) each, at tau from 0 to 1."""
             t = np.clip(stretched_duration * tau - h, -h, self.duration + h)
             s, rate = self._state(t)
             ahead, behind = self._moments(t, h), self._moments(t, -h)

@@ -143,6 +143,7 @@ def _reach_failure(curve: _Curve, marks: Array) -> _Failure | None:
     """Return the first place where a leg does not reach or is singular (type I), else None."""
 
     def squares(at: Array) -> Array:
+        """Return squared type-I measures at places of the curve; -1 where a leg does not reach."""
         return np.nan_to_num(curve.value("squared_type_i", at), nan=-1.0)
 
     first = first_below(squares, marks, TYPE_I**2)
@@ -181,6 +182,7 @@ def _joint_failure(curve: _Curve, marks: Array) -> _Failure | None:
     """Return the first place where an actuated joint passes its limits, else None."""
 
     def margin(at: Array) -> Array:
+        """Return the distances of actuated joints to their limits at places, m or rad."""
         return joint_distances(curve.robot, curve.value("joint_coordinates", at))
 
     first = first_below(margin, marks, -ROUNDING)
@@ -201,6 +203,7 @@ def _passive_failure(curve: _Curve, marks: Array) -> _Failure | None:
     """Return the first place where a passive joint passes its limits, else None."""
 
     def margin(at: Array) -> Array:
+        """Return the distances of passive joints to their limits at places of the curve."""
         return curve.value("passive_room", at, 1)
 
     first = first_below(margin, marks, -ROUNDING)

@@ -123,6 +123,7 @@ def _reversals(
     """Return the places (R,) where joints reverse, and the joint of each (R,)."""
 
     def rates(places: Array) -> Array:
+        """Return the joint rates (R, n) at places (R,)."""
         return np.asarray(evaluate_unchecked(robot, "joint_rates", *states(places)[:2])[0])
 
     known = rates(at)

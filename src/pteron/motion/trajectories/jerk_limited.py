@@ -105,6 +105,7 @@ def jerk_limited(
     planned = _plan_trajectory(first, last, motion_limits, jerks)
 
     def curve(tau: Array) -> Curve:
+        """Return poses and their first two derivatives by tau, (T, m) each, at tau from 0 to 1."""
         joints, rates, gains = (
             np.array(part)
             for part in zip(*map(planned.at_time, tau * planned.duration), strict=True)

@@ -43,6 +43,7 @@ def limit_rows(needs: Demand, limits: MotionLimits, unit: float) -> LimitRows:
     a, b, c, v = [none], [none], [none], [none]
 
     def add(linear: Array, square: Array, constant: Array, root: Array, limit: Array) -> None:
+        """Append rows to a, b, c and v: the coefficients by the limit, where it is finite."""
         has = np.isfinite(limit)
         for part, coefficients in zip(
             (a, b, c, v), (linear / unit**2, square / unit**2, constant, root / unit), strict=True

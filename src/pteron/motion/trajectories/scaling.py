@@ -143,6 +143,7 @@ def _largest_scale(robot: Manipulator, cycle: Cycle, least: float, minimum: int)
     way = np.linspace(0.0, 0.5, _SAMPLES)
 
     def fits(thousandths: int) -> bool:
+        """Return whether a scale, in thousandths, keeps margins at poses of half the cycle."""
         return keeps_margin(robot, replace(cycle, scale=thousandths / _STEPS).at(way)[0], least)
 
     if minimum > _STEPS or not fits(minimum):

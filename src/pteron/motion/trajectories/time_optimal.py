@@ -185,6 +185,7 @@ def _fastest_law(
     grid = _EVEN * even + (1.0 - _EVEN) * (0.5 - 0.5 * np.cos(np.pi * even))
 
     def states(share: Array) -> Curve:
+        """Return pose and two derivatives by the share, (T, m) each, at shares (T,)."""
         pose, first, second = path.at(begin + (end - begin) * share)
         return pose, (end - begin) * first, (end - begin) ** 2 * second
 

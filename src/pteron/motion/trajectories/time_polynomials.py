@@ -43,6 +43,7 @@ def polynomial(law: PolynomialLaw) -> Progress:
     ds, dds = s.deriv(1), s.deriv(2)
 
     def progress(tau: Array) -> tuple[Array, Array, Array]:
+        """Return the share of the path and its first two derivatives by tau, (T,) each."""
         t = np.clip(tau, 0.0, 1.0)
         return s(t), ds(t), dds(t)
 

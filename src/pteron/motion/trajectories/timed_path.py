@@ -44,6 +44,7 @@ def timed_path(path: Path, durations: Sequence[float], laws: Sequence[Progress])
     starts = np.concatenate([[0.0], np.cumsum(durations)]) / duration
 
     def curve(tau: Array) -> Curve:
+        """Return poses and their first two derivatives by tau, (T, m) each, at tau from 0 to 1."""
         k = np.clip(np.searchsorted(starts, tau, side="right") - 1, 0, len(laws) - 1)
         s, rate, gain = np.zeros((3, len(tau)))
         for j, law in enumerate(laws):

@@ -198,6 +198,7 @@ def _stiffer(robot: Manipulator, factor: float) -> Manipulator:
     expect(0.0 < factor < np.inf, "stiffnesses", f"{factor:g}", "factors above 0")
 
     def stiffen(drive: Drive | None) -> Drive | None:
+        """Return a drive with its stiffness multiplied; unchanged if it is not elastic."""
         if drive is None or drive.elastic is None:
             return drive
         stiffness = factor * drive.elastic.stiffness

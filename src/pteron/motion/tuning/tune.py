@@ -336,6 +336,7 @@ class _Search:
         """
 
         def share(bandwidth: float) -> float:
+            """Return the least share of the required margins at a bandwidth, rad/s."""
             attempt = replace(controller, bandwidth=bandwidth)
             tried.append((self.share(attempt, few)[0], attempt))
             self.steps.report("Searching", len(tried) / (len(tried) + _USUAL_TRIALS))
