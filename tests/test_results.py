@@ -4,6 +4,7 @@ import importlib
 import inspect
 import pickle
 import pkgutil
+import subprocess
 import sys
 import typing
 from dataclasses import fields, is_dataclass, replace
@@ -417,3 +418,13 @@ def test_nan_equals_nan_and_other_shapes_do_not():
     assert hash(unknown) == hash(replace(margins, least=np.full(2, np.nan)))
     assert unknown != margins
     assert workspace.pose_margins("five-bar", [HOME]) != margins
+
+
+def test_a_hash_is_the_same_in_every_process():
+    """Else sets of results, and what comes first in them, would differ from run to run."""
+    code = "from pteron.motion import CyclePlace; print(hash(CyclePlace((0.1, -0.2), 0.3)))"
+    hashes = {
+        subprocess.run([sys.executable, "-c", code], capture_output=True, check=True).stdout
+        for _ in range(3)
+    }
+    assert len(hashes) == 1

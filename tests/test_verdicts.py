@@ -10,12 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from built_machines import SORTS, least_singular_value, machine_text
-from mechanisms import CATALOG, CLIENTS, TILTED, gated, scaled
+from mechanisms import CATALOG, CLIENTS, TILTED, gated, random_machine, scaled
 from typer.testing import CliRunner
 
 import pteron
 from pteron.cli.main import app
 from pteron.kinematics.singular_distance import coordinate_distances
+from pteron.kinematics.unit_rows import row_frame, unit_rows
 from pteron.manipulator import with_dimensions
 from pteron.manipulator.commented_file import commented_text
 from pteron.manipulator.machine_warnings import machine_warnings
@@ -468,3 +469,29 @@ def test_the_page_of_verdicts_has_the_thresholds_as_they_are():
         (threshold,) = (text for key, text in rows.items() if key.startswith(words))
         assert threshold.startswith(value)
         assert same
+
+
+def test_a_platform_whose_angle_slides_its_points_has_a_home():
+    """No twist says how phi moves its points: its rows stand against the pose's rates."""
+    robot = random_machine(0, "PRSSI")
+    assert robot.platform.slides
+    home = home_pose(robot)
+    assert np.isfinite(pteron.inverse_kinematics(robot, home)).all()
+    frame = row_frame(robot, home[None])
+    distance = coordinate_distances(robot, home[None])[0]
+    assert distance > 1e-4
+
+    # The distance is what the slopes of the rows say, and a slope is that of a machine so changed.
+    step = 1e-6 * frame.length
+    leg = robot.legs[1]
+
+    def unit_rows_with(change):
+        point = (leg.platform_point[0] + change, *leg.platform_point[1:])
+        legs = (robot.legs[0], replace(leg, platform_point=point), *robot.legs[2:])
+        changed = replace(robot, legs=legs)
+        return frame.normalise(pteron.jacobian(changed, home[None]))[0]
+
+    slope = (unit_rows_with(step) - unit_rows_with(-step)) / (2.0 * step)
+    u, sizes, v = np.linalg.svd(unit_rows(robot, home[None]).rows[0])
+    one = abs(float(u[:, -1] @ slope[0] @ v[-1]))
+    assert 0.0 < one < sizes[-1] / distance

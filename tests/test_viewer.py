@@ -53,6 +53,22 @@ from pteron.viewer.state import (
     typed_pose,
 )
 
+
+@pytest.fixture(scope="module")
+def viewer():
+    with view(pteron.load("quadrupteron"), port=0) as found:
+        yield found
+        assert found.faults == ()
+
+
+@pytest.fixture(scope="module")
+def tab(browser, viewer):
+    """A tab with the page, for all tests."""
+    with opened(browser, viewer.url) as found:
+        unfold(found, "player", "pushed", "plots", "looks")
+        yield found
+
+
 QUICK = ["quadrupteron", "delta", "five-bar", "3-rrr"]
 
 

@@ -4,11 +4,6 @@ from __future__ import annotations
 
 from contextlib import contextmanager
 
-import pytest
-
-import pteron
-from pteron.viewer import view
-
 
 @contextmanager
 def opened(browser, url, width=1100, height=800, **context):
@@ -40,18 +35,3 @@ def slide(tab, label, keys):
 def unfold(tab, *names):
     for name in names:
         tab.evaluate("id => { document.getElementById(id).open = true; }", name)
-
-
-@pytest.fixture(scope="module")
-def viewer():
-    with view(pteron.load("quadrupteron"), port=0) as found:
-        yield found
-        assert found.faults == ()
-
-
-@pytest.fixture(scope="module")
-def tab(browser, viewer):
-    """A tab with the page, for all tests."""
-    with opened(browser, viewer.url) as found:
-        unfold(found, "player", "pushed", "plots", "looks")
-        yield found

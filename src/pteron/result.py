@@ -127,7 +127,8 @@ class Result:
 
     def __hash__(self) -> int:
         """Return a hash that equal results share."""
-        return hash((type(self), *(_hashable(part) for _, part in _compared_fields(self))))
+        # Without the type, whose hash differs from process to process: sets have one order.
+        return hash(tuple(_hashable(part) for _, part in _compared_fields(self)))
 
 
 def _shown_parts(result: Result) -> Iterator[tuple[str, Any]]:

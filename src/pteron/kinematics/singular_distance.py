@@ -12,7 +12,7 @@ import numpy as np
 
 from pteron.equations.variations import Variation, variations, varied_numbers
 from pteron.kernels import Array, general_program
-from pteron.kinematics.unit_rows import motion_frame, normalise_rows, unit_rows
+from pteron.kinematics.unit_rows import row_frame, unit_rows
 from pteron.manipulator import Manipulator
 
 _STEP = 1e-6
@@ -42,23 +42,25 @@ def coordinate_distances(robot: Manipulator, poses: Array) -> Array:
 def _slopes(robot: Manipulator, poses: Array) -> Array:
     """Return the derivatives (B, K, n, m) of unit rows by points and lengths, 1/m."""
     changes = [v for v in variations(robot) if v.group in ("points", "lengths")]
-    motion, arm, length = motion_frame(robot, poses)
-    step = _STEP * length
+    frame = row_frame(robot, poses)
+    step = _STEP * frame.length
     amounts = step * np.concatenate([np.eye(len(changes)), -np.eye(len(changes))])
-    rows = _rows_of(robot, changes, amounts, poses)
-    rows = np.stack([normalise_rows(machine_rows, arm, length)[0] for machine_rows in rows])
-    ahead, behind = np.split(np.nan_to_num(rows) @ motion, 2)
+    rows = _rows_of(robot, frame.kernel, changes, amounts, poses)
+    unit = np.stack([frame.normalise(machine_rows)[0] for machine_rows in rows])
+    ahead, behind = np.split(np.nan_to_num(unit), 2)
     return np.asarray((ahead - behind) / (2.0 * step))
 
 
-def _rows_of(robot: Manipulator, changes: list[Variation], amounts: Array, poses: Array) -> Array:
-    """Return the twist Jacobians (B, K, n, 6) of B changed machines at poses (K, m).
+def _rows_of(
+    robot: Manipulator, kernel: str, changes: list[Variation], amounts: Array, poses: Array
+) -> Array:
+    """Return the rows (B, K, n, 6 or m) of B changed machines at poses (K, m).
 
-    `amounts` (B, len(changes)), m, are the sizes of the changes of each machine. A Jacobian maps
-    the twist (v, omega) of P, (6,), to the joint rates (n,).
+    `kernel` is that of a `RowFrame`, and `amounts` (B, len(changes)), m, are the sizes of the
+    changes of each machine.
     """
     geometry = varied_numbers(robot, changes, amounts)
-    function = general_program(robot, "twist_jacobian").function
+    function = general_program(robot, kernel).function
     several = np.repeat(geometry, len(poses), axis=0).T
     rows = np.array(function(several, np.tile(poses, (len(geometry), 1)).T))
-    return rows.reshape(6, len(geometry), len(poses), robot.joint_count).transpose(1, 2, 3, 0)
+    return rows.reshape(-1, len(geometry), len(poses), robot.joint_count).transpose(1, 2, 3, 0)

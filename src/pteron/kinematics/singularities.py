@@ -31,7 +31,7 @@ _DRAWN = 4096
 _FOREMOST = 6
 """The best of these poses, each improved by a local search."""
 
-_TRIES = 200
+_TRIES = 200.0
 """Evaluations of the measure in each local search."""
 
 _IMPROVED = 1e-7

@@ -8,9 +8,11 @@ the legs.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pteron.kernels import Array, numeric
 from pteron.manipulator import Manipulator
@@ -28,28 +30,64 @@ class UnitRows(NamedTuple):
     sizes: Array
     """Joint rates over the unit rows' rates (K, n): force of the joint = force of the row / size,
     1/m for a crank and 1 for a ram or a slider along its row."""
-    motion: Array
-    """Orthonormal directions of the platform's motion (K, 6, m) in (v, L omega)."""
     length: float
     """L, m: the greatest distance of a platform point from the middle of them all, or from the
-    centre that a platform turns about."""
+    centre that a platform turns about; m/rad where the platform's angle slides its points."""
+
+
+@dataclass(frozen=True)
+class RowFrame:
+    """What makes unit rows of the rows that a kernel returns at poses.
+
+    Parameters
+    ----------
+    kernel : {"twist_jacobian", "jacobian"}
+        Name of the kernel: rows against a twist, or against the pose's rates where its angle slides
+        the platform points, which no twist says.
+    length : float
+        L, see `UnitRows`.
+    motion : array, shape (K, 6, m), or None
+        Orthonormal directions of the platform's motion in (v, L omega), for rows against a twist.
+    arm : array, shape (K, 3)
+        From P to the middle of the platform points, m.
+    angular : array of bool, shape (m,)
+        Which coordinates are angles.
+    """
+
+    kernel: str
+    length: float
+    motion: Array | None
+    arm: Array
+    angular: NDArray[np.bool_]
+
+    def normalise(self, rows: Array) -> tuple[Array, Array]:
+        """Return unit rows (..., K, n, m) of a kernel's rows, and their divisors (..., K, n)."""
+        if self.motion is None:
+            scaled = np.where(self.angular, rows / self.length, rows)
+            sizes = np.linalg.norm(scaled[..., ~self.angular], axis=-1)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                return scaled / sizes[..., None], sizes
+        unit, sizes = normalise_rows(rows, self.arm, self.length)
+        return unit @ self.motion, sizes
 
 
 def unit_rows(robot: Manipulator, poses: Array) -> UnitRows:
     """Return the unit rows of the legs at poses (K, m)."""
-    twists: Array = numeric(robot, "twist_jacobian")(poses)[0]
-    motion, arm, length = motion_frame(robot, poses)
-    rows, sizes = normalise_rows(twists, arm, length)
-    return UnitRows(rows @ motion, sizes, motion, length)
+    frame = row_frame(robot, poses)
+    rows, sizes = frame.normalise(numeric(robot, frame.kernel)(poses)[0])
+    return UnitRows(rows, sizes, frame.length)
 
 
-def motion_frame(robot: Manipulator, poses: Array) -> tuple[Array, Array, float]:
-    """Return directions of motion (K, 6, m), the way from P to their reference (K, 3), and L."""
+def row_frame(robot: Manipulator, poses: Array) -> RowFrame:
+    """Return what makes unit rows of a kernel's rows at poses (K, m)."""
     points = np.array([leg.platform_point for leg in robot.legs])
     middle = np.zeros(3) if robot.platform.center else points.mean(axis=0)
     length = float(np.linalg.norm(points - middle, axis=1).max())
     length = length if length > 0.0 else max(leg.size for leg in robot.legs)
     arm = middle @ np.nan_to_num(robot.platform.placement(poses)[1])
+    angular = robot.platform.angular
+    if angular.any() and not robot.platform.rotation_axes:
+        return RowFrame("jacobian", length, None, arm, angular)
     steps = np.eye(robot.freedom)
     twists = [
         numeric(robot, "twist")(poses, np.broadcast_to(step, poses.shape))[0] for step in steps
@@ -63,7 +101,7 @@ def motion_frame(robot: Manipulator, poses: Array) -> tuple[Array, Array, float]
         np.linalg.norm(twist_columns, axis=1, keepdims=True), np.finfo(float).tiny
     )
     directions = np.linalg.svd(twist_columns, full_matrices=False)[0]
-    return directions, arm, length
+    return RowFrame("twist_jacobian", length, directions, arm, angular)
 
 
 def normalise_rows(twists: Array, arm: Array, length: float) -> tuple[Array, Array]:

@@ -159,7 +159,7 @@ def _size_at_places(
                     worst[quantity, leg] = greatest, sizing.places[i]
         candidates = (
             n
-            for place in {p for _, p in worst.values()}
+            for place in dict.fromkeys(p for _, p in worst.values())
             for n in neighbours(place, steps, turn, yaw, oblique=not boxed)
         )
         new = [place for place in dict.fromkeys(candidates) if place not in known]
