@@ -68,8 +68,8 @@ def test_another_machine_too_is_identified_with_its_calibrated_geometry_only():
     page = nbformat.read(FOLDER / "8-calibrate-then-identify.ipynb", as_version=nbformat.NO_CONVERT)
     code = "\n".join(cell.source for cell in page.cells if cell.cell_type == "code")
     assert code.count("default_rng(3)") == 1
-    # It checks itself. In other machines, as of seed 6, the drawing costs less than 1 % of a cycle's
-    # forces, and is not named.
+    # It checks itself. In other machines, as of seed 6, the drawing costs less than 1 % of the
+    # forces of a cycle, and is not named.
     exec(code.replace("default_rng(3)", "default_rng(8)"), {"display": str})
 
 
