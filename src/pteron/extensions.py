@@ -1,4 +1,4 @@
-"""What installed packages add to Pteron, as entry points; `EXTENSION_GROUPS` says what they may be.
+"""Additions of installed packages, as entry points of the groups in `EXTENSION_GROUPS`.
 
 A package is imported when its name is asked for, not before.
 """

@@ -43,5 +43,5 @@ def _data(value: Any) -> Any:
     if hasattr(value, "tolist") or hasattr(value, "as_dict"):
         return value.tolist() if hasattr(value, "tolist") else value.as_dict()
     if isinstance(value, list | tuple):
-        return [_data(one) for one in value]
+        return [_data(element) for element in value]
     return asdict(value) if is_dataclass(value) and not isinstance(value, type) else value

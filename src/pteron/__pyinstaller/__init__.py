@@ -1,4 +1,4 @@
-"""What PyInstaller needs to put Pteron into an application: the folder of its hook."""
+"""The folder of the hook by which PyInstaller puts Pteron into an application."""
 
 from pathlib import Path
 

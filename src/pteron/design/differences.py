@@ -45,7 +45,7 @@ class Change(Result):
 
     @property
     def cells(self) -> tuple[str, str, str, str]:
-        """What changes, both values with their unit, and by how much it grows."""
+        """The quantity's name, both values with their unit, and the relative change."""
         start, end = self.format_value(self.before), self.format_value(self.after)
         return self.what, start, end, self.relative_change
 

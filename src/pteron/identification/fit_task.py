@@ -1,4 +1,4 @@
-"""What an identification fits: recordings, divided into rows to fit and to hold out, and a model.
+"""The task of an identification: a model, and recordings with rows to fit and to hold out.
 
 `read_task` reads and checks the logs, and builds the model with the rotors that are known.
 """
@@ -72,7 +72,7 @@ class Motions:
 
 @dataclass(frozen=True)
 class FitTask:
-    """What is fitted, and how.
+    """The model, the recordings and the method of a fit.
 
     Attributes
     ----------

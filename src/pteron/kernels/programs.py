@@ -101,10 +101,9 @@ def program(
 
     With `columns` the dynamics are those of base parameters, which are then the input; with
     `wrench` a wrench on the platform is an input too; with `guarded` a last output, `status`, is 1
-    where the result counts and 0 where the pose is out of reach or singular, or a number is
-    not finite; with `plain` the
-    equations are as they are written, without the pass that saves operations; with `named` vectors
-    are along the base's axes, as the names of exported code say.
+    where the result is valid and 0 where the pose is out of reach or singular, or a number is not
+    finite; with `plain` the equations are as they are written, without the pass that saves
+    operations; with `named` vectors are along the base's axes, as the names of exported code say.
 
     Raises
     ------
@@ -136,8 +135,8 @@ def numeric_program(
 ) -> Program:
     """Return the program that computes numbers: general within `sharing_programs`."""
     like = ALIKE.get()
-    own = _OF_ONE_MACHINE if like is True else BY_CASES
-    if like is None or columns is not None or what in own:
+    specialised_names = _OF_ONE_MACHINE if like is True else BY_CASES
+    if like is None or columns is not None or what in specialised_names:
         plain = plain or like is not None
         return program(robot, what, columns, wrench=wrench, guarded=guarded, plain=plain)
     return _general(layout_of(robot), _Form(what, wrench, guarded, plain=True))

@@ -37,7 +37,7 @@ class UnitRows(NamedTuple):
 
 @dataclass(frozen=True)
 class RowFrame:
-    """What makes unit rows of the rows that a kernel returns at poses.
+    """The scaling of a kernel's rows at poses to unit rows.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def unit_rows(robot: Manipulator, poses: Array) -> UnitRows:
 
 
 def row_frame(robot: Manipulator, poses: Array) -> RowFrame:
-    """Return what makes unit rows of a kernel's rows at poses (K, m)."""
+    """Return the scaling of a kernel's rows at poses (K, m) to unit rows."""
     points = np.array([leg.platform_point for leg in robot.legs])
     middle = np.zeros(3) if robot.platform.center else points.mean(axis=0)
     length = float(np.linalg.norm(points - middle, axis=1).max())

@@ -184,12 +184,14 @@ def read_store(path: Path) -> Map:
 def save_store(index_map: Map, path: Path) -> Path:
     """Write a map to a Zarr store, atomically."""
     plan = {"robot": index_map.machine or index_map.robot, "saved": True}
-    names, own = tuple(index_map.values), index_map.own_indices
+    names, own_indices = tuple(index_map.values), index_map.own_indices
     if path.exists():
-        MapStore.create(path, index_map.robot, index_map.grid, names, plan, own)
+        MapStore.create(path, index_map.robot, index_map.grid, names, plan, own_indices)
     with _temporary_beside(path) as work:
         new_store = work / path.name
-        store = MapStore.create(new_store, index_map.robot, index_map.grid, names, plan, own)
+        store = MapStore.create(
+            new_store, index_map.robot, index_map.grid, names, plan, own_indices
+        )
         for number, region in enumerate(index_map.grid.regions()):
             arrays = {name: array[region] for name, array in index_map.values.items()}
             store.write(number, arrays | {_STATUS: index_map.status[region]})
