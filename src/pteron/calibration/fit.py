@@ -233,7 +233,9 @@ class Fitter:
         if not len(lost):
             return at
         joints, poses = at.guess.joints(self.measurements.readings)[lost], at.poses.copy()
-        for i, modes in zip(lost, direct_kinematics(at.guess.robot, joints), strict=True):
+        for i, modes in zip(
+            lost, direct_kinematics(at.guess.robot, joints, on_failure="nan"), strict=True
+        ):
             off = np.abs(modes - self.begin_poses[i]).max(axis=-1)
             if np.isfinite(off).any():
                 poses[i] = modes[np.nanargmin(off)]

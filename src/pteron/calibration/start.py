@@ -63,7 +63,9 @@ def starting_poses(guess: Guess, measurements: Measurements, *, modes: bool = Tr
     if not modes:
         poses[other] = np.nan
     sought = np.flatnonzero(other if modes else np.zeros_like(other))
-    for i, assembly_modes in zip(sought, direct_kinematics(robot, joints[sought]), strict=True):
+    for i, assembly_modes in zip(
+        sought, direct_kinematics(robot, joints[sought], on_failure="nan"), strict=True
+    ):
         several = assembly_modes[~np.isnan(assembly_modes).any(axis=-1)]
         if not len(several):
             poses[i] = np.nan

@@ -103,7 +103,7 @@ def move_joint(state: ViewerState, i: int, value: float) -> ViewerState:
 def assembly_poses(state: ViewerState) -> Array:
     """Return the poses (K, m) with the same joint coordinates, in the robot's working mode."""
     try:
-        poses = direct_kinematics(state.robot, state.joints)
+        poses = direct_kinematics(state.robot, state.joints, on_failure="nan")
     except PteronError:
         return state.pose[None]
     return np.asarray(poses[~np.isnan(poses).any(axis=-1)])

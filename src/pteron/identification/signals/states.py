@@ -177,7 +177,7 @@ def start_pose(robot: Manipulator, log: Log) -> tuple[float, ...]:
         poses = assembly_modes(robot, log.joints[seen])
         column = int(np.argmin(np.median(_distances_to(robot, poses, log.pose[seen]), axis=0)))
     else:
-        poses, column = direct_kinematics(robot, log.joints[seen]), declared - 1
+        poses, column = direct_kinematics(robot, log.joints[seen], on_failure="nan"), declared - 1
         if declared > closure.modes:
             raise DataError(
                 f"{log.source}: assembly_mode = {declared}; {robot.name} has "
@@ -224,7 +224,7 @@ def _no_pose(
     values = ", ".join(f"{value:.4f}" for value in joints[row])
     followed = not closure_of(robot).closed_form
     rows = [row] if followed else lost  # of what comes after the first nothing is known
-    others = ~np.isnan(direct_kinematics(robot, joints[rows])).any(axis=(0, -1))
+    others = ~np.isnan(direct_kinematics(robot, joints[rows], on_failure="nan")).any(axis=(0, -1))
     count = len(joints[rows])
     count_text = f", nor those of {count - 1} more rows" if count > 1 else ""
     what = f"no pose of {robot.name} has the joints ({values}){count_text}"
