@@ -168,6 +168,18 @@ class CPrinter:
 
     prefix: str
     real: Real
+    device: bool = False
+    """Whether it is CUDA, whose functions and constants are of the file that includes them."""
+
+    @property
+    def table(self) -> str:
+        """What precedes a constant table's type."""
+        return "static __device__ " if self.device else ""
+
+    @property
+    def helper(self) -> str:
+        """What precedes the type of a function that the exported ones call."""
+        return "static __device__ " if self.device else "static "
 
     def number(self, value: float) -> str:
         """Return a literal; `NAN` itself is a float."""
@@ -195,7 +207,7 @@ class CPrinter:
 
     def prototype(self, item: ExportedFunction) -> str:
         """Return a function's declaration."""
-        head = f"int {self.prefix}_{item.name}("
+        head = f"{self.table}int {self.prefix}_{item.name}("
         pointer = f"{self.real} *{self.prefix.upper()}_RESTRICT"
         arguments = [f"const {pointer} {port.name}" for port in item.inputs]
         arguments += [f"{pointer} {port.name}" for port in item.outputs]
