@@ -94,11 +94,19 @@ def _show(parameters: BaseParameters, symbols: Symbols) -> None:
     columns = zip(expressions, parameters.values(), units, strict=True)
     rows = ((str(i), plain(e), f"{v:.5g}", u) for i, (e, v, u) in enumerate(columns, start=1))
     show(
-        f"[bold]{plain(parameters.robot.name)}[/bold]: {parameters.rank} base parameters of "
-        f"{len(parameters.columns)} inertial parameters",
+        f"[bold]{plain(parameters.robot.name)}[/bold]: {parameters.rank} base parameters, sums of "
+        f"{len(parameters.columns)} inertial parameters; only these sums act on the drive forces.",
         table("", "base parameter", "value", "unit", rows=rows, numbers=("", "value")),
+        _SYMBOLS,
         *closing,
     )
+
+
+_SYMBOLS = (
+    "Symbols: m mass, mgx mgy mgz first moment (mass times centre of mass), I inertia; of the "
+    "bodies p slider, u upper link, l lower link with the leg's number, e platform."
+)
+"""The legend of inertial parameters."""
 
 
 def _geometry(parameters: BaseParameters, symbols: Symbols) -> dict[str, float]:
@@ -112,7 +120,7 @@ def _closing_lines(parameters: BaseParameters, symbols: Symbols) -> list[str]:
     if symbols:
         geometry = _geometry(parameters, symbols)
         lengths = ", ".join(f"{name} = {v:g}" for name, v in geometry.items())
-        lines.append(f"In metres: {lengths}.")
+        lines.append(f"Geometry in metres: {lengths}.")
         shared = parameters.shared_symbols.items()
         if shared and symbols == "leg":
             text = "; ".join(", ".join((symbol, *others)) for symbol, others in shared)
@@ -157,11 +165,15 @@ def table1() -> CommandResult:
         for r in computed_rows
     )
     restored = [r.parameter for r in computed_rows if r.restored]
-    agree = f"{len(computed_rows) - wrong} of {len(computed_rows)} rows agree."
+    agree = (
+        f"{len(computed_rows) - wrong} of {len(computed_rows)} base parameters of the paper's "
+        "Table 1 agree with those computed here."
+    )
     if restored:
         agree += (
             f" Cells of {', '.join(restored)} (*) are damaged in our text of the paper and "
             "restored from its other rows."
         )
-    lines = [table("", "printed", "computed", "agrees", rows=rows), agree]
+    headings = ("", "printed", "computed", "agrees")
+    lines = [agree, table(*headings, rows=rows), _SYMBOLS]
     return CommandResult(data, lines, code=1 if wrong else 0)

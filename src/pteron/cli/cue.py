@@ -10,7 +10,7 @@ from pteron.cli.arguments import MachineArgument
 from pteron.cli.motion_table import motion_frame, peaks_table
 from pteron.cli.progress import spinner
 from pteron.cli.result import CommandResult
-from pteron.cli.terminal import note
+from pteron.cli.terminal import note, percent, plain
 from pteron.errors import DataError
 
 if TYPE_CHECKING:
@@ -101,9 +101,10 @@ def cue(
         "files": files,
     }
     lines = [
-        f"{cued.duration:.4g} s, {len(cued.time)} samples, within a box that is proved: "
-        f"{_box_text(machine, cued)}",
-        f"amplitudes reduced by at most {cued.pressed:.0%}, so that the motion stays in the box",
+        f"[bold]{plain(machine.name)}[/bold], motion of {plain(motion)}: {cued.duration:.4g} s "
+        f"({len(cued.time)} samples), in a box of poses proved to be in reach and within limits: "
+        f"{_box_text(machine, cued)}.",
+        f"Amplitudes are reduced by {percent(cued.pressed)} at most to keep the motion in the box.",
         peaks_table(largest),
     ]
     return CommandResult(data, lines, files)

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Literal
 
 from pteron.cli.arguments import MachineArgument, check_rate, parsed_list
 from pteron.cli.motion_argument import Carried, given_pose, read_motion
-from pteron.cli.motion_table import motion_frame, peaks_table
+from pteron.cli.motion_table import motion_frame, peaks_table, travel_text
 from pteron.cli.planned_motions import joint_motion, line_motion, standard_motion
 from pteron.cli.progress import spinner
 from pteron.cli.result import CommandResult
-from pteron.cli.terminal import note, show
+from pteron.cli.terminal import note, plain, show
 from pteron.errors import DataError
 from pteron.json_values import json_fields
 from pteron.tolerances import SAME
@@ -41,6 +41,14 @@ _KINDS_OF: dict[str, tuple[Kind, ...]] = {
     "jerk": ("joints",),
 }
 """Kinds of motion that an option belongs to."""
+
+_NOUNS = {
+    "adept": "standard pick-and-place cycle",
+    "line": "straight lines",
+    "joints": "motion straight in the joint coordinates",
+    "replay": "motion of the table",
+}
+"""The kinds of motion in words."""
 
 _DENSE = 10
 """Moments per sample at which a motion's peaks are sought."""
@@ -214,9 +222,13 @@ def _result(
         ],
         "file": out,
     }
-    text = f"{motion.duration:.4g} s, {len(motion.time)} samples"
+    text = (
+        f"[bold]{plain(machine.name)}[/bold]{plain(str(carried))}, {_NOUNS[way]}: "
+        f"{motion.duration:.4g} s ({len(motion.time)} samples)"
+    )
     if bound is not None:
-        text += f"; a polynomial in time along the same path takes {bound:.4g} s"
+        text += f"; without --optimal the same path takes {bound:.4g} s"
+    text += f". Travel: {travel_text(machine, motion)}."
     return CommandResult(
         data, partial(_show, [text, peaks_table(largest)], out), [out] if out else []
     )
@@ -226,4 +238,4 @@ def _show(lines: list[str | Table], out: str | None) -> None:
     """Print the lines and tables, and a hint to `--out` where no file was written."""
     show(*lines)
     if out is None:
-        note("Note: no file is written; to have the motion, add --out FILE.csv")
+        note("Note: no file is written; --out FILE.csv saves the motion")

@@ -9,11 +9,21 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from pteron.cli.arguments import STANDARD, MachineArgument, check_rate, load_robot
 from pteron.cli.destination import Destination
-from pteron.cli.motion_argument import Carried, cycle_of
+from pteron.cli.motion_argument import Carried, cycle_of, cycle_text
 from pteron.cli.motion_table import force_word
 from pteron.cli.progress import spinner
 from pteron.cli.result import CommandResult
-from pteron.cli.terminal import is_terminal, note, plain, show, table, warn, write
+from pteron.cli.terminal import (
+    is_terminal,
+    note,
+    percent,
+    plain,
+    show,
+    significant,
+    table,
+    warn,
+    write,
+)
 from pteron.errors import DataError
 
 if TYPE_CHECKING:
@@ -207,26 +217,35 @@ def _tell(simulation: Simulation, data: dict[str, Any], carried: Carried, out: s
         write(simulation.table().write_csv())
 
 
+def _micro_text(error: float, unit: str) -> str:
+    """Return an error in millionths of its unit, below a thousandth of that as such."""
+    return f"{significant(1e6 * error)} u{unit}" if error >= 1e-9 else f"< 0.001 u{unit}"
+
+
 def _show(simulation: Simulation, data: dict[str, Any], carried: Carried) -> None:
     """Print tables of the tracking errors and of the drives' loads."""
     robot = simulation.robot
     steps = "DOP853" if data["step"] is None else f"steps of {data['step'] * 1e3:.3g} ms"
     errors = (
-        (row["coordinate"], *(f"{1e6 * row[key]:.3g} u{unit}" for key in ("largest", "rms")))
+        (row["coordinate"], *(_micro_text(row[key], unit) for key in ("largest", "rms")))
         for row, unit in zip(data["tracking"], robot.units, strict=True)
     )
     drives = []
     for leg, row in zip(robot.legs, data["drives"], strict=True):
         force, speed = leg.joint.force_unit, f"{leg.joint.unit}/s"
         units = {"peak_force": force, "rms_force": force, "peak_speed": speed, "peak_power": "W"}
-        sizes = (f"{row[key]:.4g} {unit}" for key, unit in units.items())
+        sizes = (f"{significant(row[key])} {unit}" for key, unit in units.items())
         limited = leg.drive and leg.drive.max_force
-        drives.append((str(row["leg"]), *sizes, f"{row['at_its_limit']:.1%}" if limited else "-"))
+        share = percent(row["at_its_limit"]) if limited else "no limit"
+        drives.append((str(row["leg"]), *sizes, share))
     word = force_word(robot)
-    names = ("leg", f"peak {word}", f"RMS {word}", "peak speed", "peak power", "at its limit")
+    saturated = f"time at {word} limit"
+    names = ("leg", f"peak {word}", f"RMS {word}", "peak speed", "peak power", saturated)
+    end = "stopped early" if simulation.stopped else "completed"
     show(
-        f"[bold]{plain(robot.name)}[/bold]{plain(str(carried))}, cycle {plain(data['cycle'])}, "
-        f"{plain(data['controller'])}: {data['duration']:.4g} s in {steps}",
-        table("error", "largest", "RMS", rows=errors, numbers=("largest", "RMS")),
+        f"[bold]{plain(robot.name)}[/bold]{plain(str(carried))}, "
+        f"{plain(cycle_text(data['cycle']))} {end}: {data['duration']:.4g} s in {steps}, "
+        f"controller {plain(data['controller'])}",
+        table("tracking error", "largest", "RMS", rows=errors, numbers=("largest", "RMS")),
         table(*names, rows=drives, numbers=names),
     )

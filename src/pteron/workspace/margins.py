@@ -86,19 +86,18 @@ def pose_margins(robot: RobotLike, pose: PoseLike) -> PoseMargins:
     return PoseMargins(type_i, type_ii, shares, least)
 
 
-def least_margin_text(robot: Manipulator, pose: Array) -> str:
-    """Return the least margin of a pose (m,) and its cause, in words: "0.59 of the type-II ..."."""
+def least_margin_text(robot: Manipulator, pose: Array) -> tuple[str, str]:
+    """Return the least margin of a pose (m,) in percent, and what it is the distance from."""
     margins = pose_margins(robot, pose)
     least = float(margins.least)
     if float(margins.type_ii) <= least:
-        what = "of the greatest type-II measure of this layout, 0 where drives hold nothing"
+        cause = "0 % at a type-II singularity, 100 % at the pose farthest from one"
     elif float(margins.type_i.min()) <= least:
-        leg = _first_least(margins.type_i)
-        what = f"of leg {leg}'s type-I measure, 0 where it is stretched or folded"
+        cause = f"0 % where leg {_first_least(margins.type_i)} is stretched or folded"
     else:
         leg = _first_least(margins.joints)
-        what = f"of half the range of leg {leg}'s joint that is nearest to a limit"
-    return f"{least:.2f} {what}"
+        cause = f"0 % at a joint limit of leg {leg}, 100 % in mid-range"
+    return f"{100.0 * least:.0f} %", cause
 
 
 def _first_least(margins: Array) -> int:
