@@ -17,6 +17,7 @@ from pteron.cli.terminal import (
     note,
     plain,
     show,
+    significant,
     table,
 )
 from pteron.errors import DataError
@@ -206,52 +207,54 @@ def _show(result: Identification) -> None:
     worst = max(float(prediction.nrms.max()) for prediction in result.held_out)
     color = GRADE_COLORS[verdict.grade]
     show(
-        f"[bold {color}]{plain(result.robot.name)}: {verdict.grade}[/bold {color}], "
-        f"held-out error up to {worst:.3g} %",
+        f"[bold {color}]{plain(result.robot.name)}: {verdict.grade}[/bold {color}]; error of the "
+        f"forces predicted in held-out data: up to {worst:.3g} % (NRMS)",
         _errors(result),
+        *map(plain, verdict.reasons),
         _values(result),
-        *(plain(text) for text in (*verdict.reasons, *verdict.next_steps, *_bodies(result))),
+        *map(plain, _bodies(result)),
         *_payload(result),
+        *(f"Next: {plain(step)}" for step in verdict.next_steps),
         *(f"[yellow]Note:[/yellow] {plain(finding.message)}" for finding in result.findings),
     )
 
 
 def _errors(result: Identification) -> Table:
     """Return a table of each actuator's NRMS of prediction (%), its noise, and no friction."""
-    from pteron.report.typeset import significant
-
-    headings = ("held-out NRMS (%)", "noise", "no friction")[: 2 if _narrow() else 3]
+    columns = ("error (%)", "noise alone (%)", "without friction terms (%)")
+    headings = columns[: 2 if _narrow() else 3]
     rows = []
     for prediction in result.held_out:
         where = f" in {prediction.source}" if len(result.held_out) > 1 else ""
-        columns = prediction.nrms, prediction.floor, prediction.nrms_without_friction
-        for i, values in enumerate(zip(*columns[: len(headings)], strict=True), start=1):
-            rows.append((plain(f"{i}{where}"), *map(significant, values)))
-    return table("actuator", *headings, rows=rows, numbers=headings)
+        errors = prediction.nrms, prediction.floor, prediction.nrms_without_friction
+        for i, values in enumerate(zip(*errors[: len(headings)], strict=True), start=1):
+            cells = (significant(v) if v >= 0.01 else "< 0.01" for v in values)
+            rows.append((plain(f"{i}{where}"), *cells))
+    caption = "RMS error of the predicted forces over their standard deviation (NRMS)."
+    return table("actuator", *headings, rows=rows, numbers=headings, caption=caption)
 
 
 def _values(result: Identification) -> Table:
     """Return a table of base parameters with 95 % half-widths (absolute, and relative in %)."""
     from pteron.report.identification import parameter_rows, value_with_uncertainty
-    from pteron.report.typeset import significant
 
     short = result.has_understated_errors
-    headings = ("value", "+- 95 % (!)" if short else "+- 95 %", "rel. (%)")
+    headings = ("value", "+- (95 %, too short)" if short else "+- (95 %)", "+- in %")
     numbers = headings[: 2 if _narrow() else 3]
     columns = ["parameter", *numbers, *(() if _narrow() else ("unit",)), ""]
-    caption = "Base parameters are sums, named by one term; the page has them in full."
+    caption = "Base parameters are sums, named by their first term; the page has them in full."
     negative = [row.name for row in parameter_rows(result) if row.unit == "kg" and row.value < 0.0]
     if negative:
-        caption += f" A sum may be below zero, as {negative[0]}: in it masses are subtracted."
+        caption += f" A sum that subtracts masses may be negative, such as {negative[0]}."
     if short:
-        caption += " (!) Too short: they do not allow for the faults that are named."
+        caption += " Too short: the intervals do not allow for the faults named above."
+    if result.essential.dropped:
+        caption += " Weak: not significantly different from 0."
     value_table = table(*columns, numbers=numbers, caption=caption)
     marks = {"essential": "", "dropped": "[yellow]weak[/]", "unseen": "[yellow]unseen[/]"}
     for row in parameter_rows(result):
         value, half = map(ascii_number, value_with_uncertainty(row.value, row.half))
-        relative = (
-            ">999" if row.relative >= 9.995 else ascii_number(significant(100.0 * row.relative, 2))
-        )
+        relative = "> 999" if row.relative >= 9.995 else significant(100.0 * row.relative, 2)
         further_cells = () if _narrow() else (relative, row.unit)
         value_table.add_row(plain(row.name), value, half, *further_cells, marks[row.status])
     return value_table
@@ -265,7 +268,10 @@ def _payload(result: Identification) -> list[str]:
     if payload is None:
         return []
     if not (payload.real and payload.is_significant):
-        return ["The payload is no real body's, or is not felt: record it longer, or faster."]
+        return [
+            "No real body has this payload, or it does not act on the forces: record longer, or "
+            "faster."
+        ]
     return [plain(f"The payload: {payload.call(result.robot)}")]
 
 
@@ -279,11 +285,13 @@ def _bodies(result: Identification) -> tuple[str, ...]:
     consistency = result.consistency
     if consistency is None:
         return result.notes
-    border = f"; at the border: {', '.join(consistency.at_border)}" if consistency.at_border else ""
-    lines = [f"Real bodies have exactly these base parameters{border}."]
+    at_border = ", ".join(consistency.at_border)
+    border = f"; at the limit of consistency: {at_border}" if at_border else ""
+    lines = [f"Physically consistent: real bodies can have exactly these base parameters{border}."]
     if not consistency.feasible:
         away = f"the nearest are {consistency.distance:.2g} standard deviations away{border}."
-        lines = [f"No real bodies have exactly these base parameters; {away}"]
+        lines = [f"Not physically consistent: no real bodies have these base parameters; {away}"]
     if not consistency.cad_feasible:
-        lines.append(f"The CAD model itself is not real: {'; '.join(consistency.cad_violations)}.")
+        violations = "; ".join(consistency.cad_violations)
+        lines.append(f"The CAD model itself is physically inconsistent: {violations}.")
     return (*lines, *result.notes)
