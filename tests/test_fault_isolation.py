@@ -377,9 +377,8 @@ def test_play_cannot_be_told_where_no_load_changes_its_direction(gentle):
     forces += 1e-3 * forces.std(axis=0) * np.random.default_rng(0).normal(size=forces.shape)
     joints = pteron.inverse_kinematics(robot, motion.pose)
     result = found(robot, Log("log.csv", motion.time, joints, forces))
-    told = any(
-        said.startswith("Play (backlash) in the drives would not be seen") for said in result.verdict.reasons
-    )
+    hidden = "Play (backlash) in the drives would not be seen"
+    told = any(said.startswith(hidden) for said in result.verdict.reasons)
     assert told == gentle == ("play" in result.fault_isolation.hidden)
     assert ("play" in result.fault_isolation.tried) != gentle
 

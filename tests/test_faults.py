@@ -183,7 +183,8 @@ def test_small_motion_is_not_accused_of_flipped_signs(seed):
     log = noisy(log_of(robot, seed=seed, **how), seed)
     result = found(robot, log)
     assert result.unseen
-    assert any(step.startswith("Not determined by this motion") for step in result.verdict.next_steps)
+    steps = result.verdict.next_steps
+    assert any(step.startswith("Not determined by this motion") for step in steps)
 
 
 @pytest.mark.parametrize("name", gated(["quadrupteron", "delta", "par4", "mixed"], ["mixed"]))
