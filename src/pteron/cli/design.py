@@ -94,7 +94,7 @@ def _tell_resumed(folder: Path) -> None:
     for name, word in ((_GENERATIONS, "generations"), (_SURVEY, "blocks")):
         count = len([*(folder / name).glob("[0-9]*")])
         if count:
-            note(f"Note: {folder / name}: going on; an earlier run has begun {count} {word}")
+            note(f"Note: {folder / name}: resumed; an earlier run has begun {count} {word}")
 
 
 def _search_front(
@@ -121,15 +121,15 @@ def _show(summary: FrontReport) -> None:
     front = summary.front
     name, _, counts = front.summary().partition(": ")
     show(f"[bold]{plain(name)}[/bold]: {counts}")
-    show(*(f"Asked for: {plain(line)}" for line in front.task.spec.requirement_lines()))
+    show(*(f"Required: {plain(line)}" for line in front.task.spec.requirement_lines()))
     lines = (*summary.start.proofs, *summary.start.missing_quantities)
-    show(*(f"To begin with: {plain(line)}" for line in lines))
-    numbers = ("to begin with", "now", "change")
+    show(*(f"Initial machine: {plain(line)}" for line in lines))
+    numbers = ("initial", "design", "change")
     for reported in summary.selection:
         rows = (map(plain, change.cells) for change in reported.changes)
         show(
             "",
-            f"[bold]{plain(reported.name.replace('-', ' '))}[/bold]",
-            table("what", *numbers, rows=rows, numbers=numbers),
+            f"[bold]{plain(reported.name.replace('-', ' ').capitalize())}[/bold]",
+            table("quantity", *numbers, rows=rows, numbers=numbers),
             *(plain(line) for line in (*reported.proofs, *reported.covers)),
         )
