@@ -412,8 +412,8 @@ def test_all_assembly_modes_of_one_machine():
 def test_joints_beyond_their_limits_are_told_beside_the_numbers():
     told = run("direct delta 1.2 0.1 1.3").stderr
     assert told == (
-        "Note: beyond the joints' limits: theta1 (1.2 for -1.5 to 0.9 rad), "
-        "theta3 (1.3 for -1.5 to 0.9 rad)\n"
+        "Note: beyond the joints' limits: theta1 (1.2, limits -1.5 to 0.9 rad), "
+        "theta3 (1.3, limits -1.5 to 0.9 rad)\n"
     )
     poses = "x,y,z\n0,0,-0.9\n0.7,0,-0.7\n0.6,0,-0.6\n"
     told = run("inverse delta --table -", poses).stderr

@@ -13,7 +13,7 @@ from pteron.cli.table_rows import (
     rows_of_table,
     single_row,
 )
-from pteron.cli.terminal import note
+from pteron.cli.terminal import note, plain
 from pteron.errors import DataError
 from pteron.tolerances import ROUNDING
 
@@ -68,7 +68,11 @@ def inverse(
     )
     _note_limits(machine, from_readings(machine, joints))
     result = rows.table.with_columns(dict(zip(added, joints.T, strict=True)))
-    deliver(machine, result, added, out=out, as_json=json, single=rows.single)
+    name = plain(machine.name)
+    joints_text = dict.fromkeys(f"{leg.joint.noun} {leg.joint.coordinate}" for leg in machine.legs)
+    nouns = ", ".join(joints_text)
+    caption = f"[bold]{name}[/bold]: coordinates of the actuated joints ({nouns})"
+    deliver(machine, result, added, out=out, as_json=json, caption=caption, single=rows.single)
 
 
 def direct(
@@ -119,7 +123,11 @@ def direct(
     _note_limits(machine, from_readings(machine, rows.table.numbers(columns, failure)))
     result = _modes(rows.table, poses, machine.coordinates)
     shown = added[1:] if rows.single else added
-    deliver(machine, result, shown, out=out, as_json=json)
+    caption = (
+        f"[bold]{plain(machine.name)}[/bold]: all poses with these joint coordinates, one for each "
+        "assembly mode"
+    )
+    deliver(machine, result, shown, out=out, as_json=json, caption=caption)
 
 
 def _note_limits(machine: Manipulator, joints: NDArray[Any]) -> None:
@@ -136,8 +144,8 @@ def _note_limits(machine: Manipulator, joints: NDArray[Any]) -> None:
                 if len(coordinates) > 1
                 else ""
             )
-            limits = f"{low:g} to {high:g} {leg.joint.unit}"
-            violations.append(f"{name} ({rows}{coordinates[beyond.argmax()]:.4g} for {limits})")
+            limits = f"limits {low:g} to {high:g} {leg.joint.unit}"
+            violations.append(f"{name} ({rows}{coordinates[beyond.argmax()]:.4g}, {limits})")
     if violations:
         note(f"Note: beyond the joints' limits: {', '.join(violations)}")
 
@@ -247,7 +255,13 @@ def forces(
     for text in overloads(machine, served[:, n : 2 * n], served[:, 2 * n :]) if limited else ():
         note(f"Note: {text}")
     result = rows.table.with_columns(dict(zip(added, delivered.T, strict=True)))
-    deliver(machine, result, added, out=out, as_json=json, single=rows.single)
+    terms = (
+        "drives, with friction and the motors' inertia"
+        if drives
+        else "actuated joints for the bodies alone; --drives adds friction and the motors' inertia"
+    )
+    caption = f"[bold]{plain(machine.name)}[/bold]: forces of the {terms}"
+    deliver(machine, result, added, out=out, as_json=json, caption=caption, single=rows.single)
 
 
 def _typed_row(typed: list[str | None], motion: list[str], loads: tuple[str, ...]) -> TableRows:
