@@ -37,16 +37,16 @@ def base(
 ) -> CommandResult:
     """Find the base inertial parameters: the sums of parameters that act on the forces.
 
-    The format latex prints lines of mathematics, booktabs a table with values for a paper.
+    The format latex prints formulas, booktabs a LaTeX table with values.
 
     Options
     -------
-    --method: Exact arithmetic with a proof, or a numerical rank.
-    --keep NAMES: Parameters to keep before others: I_l1,m_l4.
-    --shared: All legs share one set of inertial parameters.
-    --format: The form in which they are printed.
+    --method: Exact arithmetic with a proof, or a numerical rank by SVD or QR.
+    --keep NAMES: Parameters by which sums are named in preference to others: I_l1,m_l4.
+    --shared: All legs have the same inertial parameters.
+    --format: Format of the output.
     --symbols: Write the coefficients in symbols of the geometry.
-    --leg-symbols: The same, with symbols of each leg: equal lengths share none.
+    --leg-symbols: The same, but equal lengths of different legs have different symbols.
 
     Examples
     --------

@@ -44,13 +44,13 @@ def calibrate(
     plane: str | None = None,
     anyway: bool = False,
 ) -> CommandResult:
-    """Find a machine's true geometry from measurements, and say what they cannot show.
+    """Find a machine's true geometry from measurements, and what they leave undetermined.
 
-    The folder gets calibration.html to read, calibration.json with all numbers, and the machine as
-    it was found, robot.toml, unless that is not trustworthy. The exit code is 0 whatever the
-    verdict.
+    The folder gets the report calibration.html, calibration.json with all numbers, and the
+    calibrated machine, robot.toml, unless the result is not trustworthy. The exit code is 0
+    whatever the verdict.
 
-    With --plan, poses that show the geometry best are written as a table of joints and poses.
+    With --plan, poses that determine the geometry best are written as a table of joints and poses.
 
     Arguments
     ---------
@@ -58,18 +58,18 @@ def calibrate(
 
     Options
     -------
-    --robot ROBOT: The machine as it is drawn.
-    --out DIR|FILE: The folder to write it to; with --plan the table.
-    --held-out LOG: What to judge by; once for each. By default every fifth row, if there are
-        enough.
-    --free GROUP: Seek only this; once for each: zeros, scales, lengths, points, directions, tool,
-        radius, angles, or a value by its name in calibration.json.
-    --prior TOML: Standard deviations by group or value, m and rad.
-    --plan N: Choose so many poses to measure, in place of a LOG.
-    --measure: What will be measured at the planned poses.
-    --plane z=HEIGHT: The level that a planned probe touches, m. [default: z=0 where the tool works
-        down to it, as on a printer's bed; else the bottom of the proved poses]
-    --anyway: Write robot.toml even where it is not trustworthy.
+    --robot ROBOT: The machine as drawn: a machine of the catalog or a TOML file.
+    --out DIR|FILE: Folder for the results; with --plan the file of the table.
+    --held-out LOG: Log that validates the result; repeat for several. [default: every fifth row, if
+        there are enough]
+    --free GROUP: Fit these values alone; repeat for several: zeros, scales, lengths, points,
+        directions, tool, radius, angles, or a value by its name in calibration.json.
+    --prior TOML: File of tolerances: standard deviations by group or value, m and rad.
+    --plan N: Choose this number of poses to measure, instead of reading a LOG.
+    --measure: Quantity to be measured at the planned poses.
+    --plane z=HEIGHT: Height of the plane that a planned probe touches, m. [default: z=0 if the tool
+        reaches down to it, as on a printer's bed; else the bottom of the proved poses]
+    --anyway: Write robot.toml even if it is not trustworthy.
 
     Examples
     --------

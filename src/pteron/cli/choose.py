@@ -27,25 +27,25 @@ def choose(
 ) -> CommandResult:
     """Choose a machine for a job: which kind, which dimensions, which motors.
 
-    The file says what the machine must do: workspace, payload, cycles, accuracy, stiffness, room,
-    motors to choose from, and what is to be small. All kinds of the catalog that can do the motion
-    are searched; the best design of each is proved over the workspace, and its drives are told
-    with their margins at the worst place and in the worst direction.
+    The file states the requirements: workspace, payload, cycles, accuracy, stiffness, room, motors
+    to choose from, and the objectives to minimise. All kinds of the catalog that have the degrees
+    of freedom are searched; the best design of each is proved over the workspace, and its drives
+    are listed with their margins at the worst place and in the worst direction.
 
-    What is tried is told at the start, and each kind when it is finished, on standard error.
+    Notes on standard error report the kinds at the start, and each kind when it is finished.
 
-    A folder gets choose.html, choose.json and a TOML file for each machine, with its drives. Kinds
-    that are finished are kept there, so that the same command goes on where it was ended. The exit
-    code is 1 if no machine does the job.
+    A folder gets choose.html, choose.json and a TOML file for each machine, with its drives.
+    Finished kinds are kept there, so that the same command resumes after an interruption. The exit
+    code is 1 if no machine meets all requirements.
 
     Arguments
     ---------
-    JOB: What the machine must do, a TOML file.
+    JOB: Requirements, a TOML file.
 
     Options
     -------
-    --out FOLDER: Write the results to a folder, and go on there if ended.
-    --workers: Processes that do the work.
+    --out FOLDER: Folder for the results, and to resume from.
+    --workers: Number of processes.
 
     Examples
     --------

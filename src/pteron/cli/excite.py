@@ -125,64 +125,65 @@ def excite(
     search: _SearchOptions,
     json: bool = False,
 ) -> CommandResult:
-    """Find a periodic trajectory from whose forces the base parameters are seen best.
+    """Find a periodic trajectory whose forces determine the base parameters best.
 
-    The file leads in from rest, repeats the trajectory, and leads out to rest in the pose where it
-    began, all on the trajectory's own way: take the machine to the first row, and play it. Every
-    limit is kept, at ten times as many samples too. Beside motion.csv, motion-held-out.csv has
-    pick-and-place cycles within the same limits, to judge the identified model by; and, with
-    --stribeck, motion-slow.csv the same way slowly from rest to rest, which shows how friction
-    falls with speed: record all, and pteron identify log.csv slow.csv --stribeck auto.
+    The motion leads in from rest, repeats the trajectory, and leads out to rest in the pose where
+    it began, all on the same path: move the machine to the first row, and play the file. All limits
+    are kept, also between the samples. Beside motion.csv, motion-held-out.csv has pick-and-place
+    cycles within the same limits, to validate the identified model; with --stribeck,
+    motion-slow.csv has the same path slowly from rest to rest, which shows how friction falls with
+    speed: record all of them, then pteron identify log.csv slow.csv --stribeck auto.
 
     The columns are t rho1 ... x y z phi and their rates (d..., dd..., per s), and force1 ... by the
     machine's nominal inertia and its drives' friction; theta1 ... and torque1 ... of cranks. The
-    TOML file beside each motion tells units, columns, period and assembly mode. Copy it beside the
+    TOML file beside each motion has units, columns, period and assembly mode. Copy it beside the
     log, log.toml beside log.csv, and pteron identify reads a log in the same layout.
 
-    The search takes about a minute: --seconds. Ctrl-C ends it and keeps the best until then.
+    The search takes about a minute (--seconds). Ctrl-C ends it and keeps the best motion so far.
 
     Options
     -------
-    --out FILE: Write it to a .csv or .parquet file, with others beside it.
+    --out FILE: Write the motion to a .csv or .parquet file, with the others beside it.
 
     Motion
     ------
-    --space: Whose coordinates the Fourier series are of.
-    --harmonics: How many.
-    --period: In s.
-    --periods: Between lead-in and lead-out.
-    --stribeck: Slow passages too, for friction that falls with speed.
+    --space: Coordinates that are Fourier series of time: the platform's or the joints'.
+    --harmonics: Number of harmonics.
+    --period: Period, s.
+    --periods: Number of periods between lead-in and lead-out.
+    --stribeck: Add slow passages, for friction that falls with speed.
 
     Limits
     ------
-    --speed: Of the joints, m/s or rad/s. [default: the drives', else 1]
-    --acceleration: The same per s.
-    --force: Of the drives, N or N m. [default: the drives', else none]
-    --type-i: Least type-I measure of every leg.
-    --type-ii: Least type-II measure.
-    --clearance: Of the joints from their limits, m or rad.
-    --keep-off: The same, share of each joint's range; the larger of the two is kept.
-    --passive-clearance: Of passive joints and the platform's angles, share of half their range.
+    --speed: Joint speed, m/s or rad/s. [default: max_speed of the drives, else 1]
+    --acceleration: Joint acceleration, m/s^2 or rad/s^2.
+    --force: Drive force, N or N m. [default: max_force of the drives, else none]
+    --type-i: Least type-I measure of every leg: 0 stretched or folded, 1 at best.
+    --type-ii: Least type-II measure: 0 where the drives cannot hold the platform.
+    --clearance: Least distance of the joints from their limits, m or rad.
+    --keep-off: The same as a share of each joint's range; the larger of the two applies.
+    --passive-clearance: Least distance of passive joints and platform angles from their limits, as
+        a share of half their range.
 
     File
     ----
-    --rate: Samples a second.
-    --contents: All columns, or t with the joints or the poses only.
+    --rate: Samples per second.
+    --contents: Write all columns, or t with the joints or the poses only.
     --columns NAMES: Names of the joints' columns, such as A1,A2.
-    --length-unit: Of sliders and poses.
-    --angle-unit: Of cranks and the pose's angles.
-    --time-unit: Of t.
-    --separator: Of the cells. [default: , or ; with a decimal comma]
-    --decimal: The decimal sign.
+    --length-unit: Unit of sliders and positions.
+    --angle-unit: Unit of cranks and the pose's angles.
+    --time-unit: Unit of t.
+    --separator: Separator of the cells. [default: , or ; with a decimal comma]
+    --decimal: Decimal sign.
 
     Search
     ------
-    --criterion: What is made small.
-    --starts: Random motions improved.
-    --draws: Random motions drawn.
-    --seconds: Time for the search; three times as long where it would not identify the machine.
-    --seed: Of the random motions.
-    --workers: Processes at a time. [default: one a core, up to 4]
+    --criterion: Quantity to minimise: the condition number, or minus the log determinant.
+    --starts: Number of random motions that are optimised.
+    --draws: Number of random motions that are drawn.
+    --seconds: Time of the search, s; three times as long if the motion does not identify all yet.
+    --seed: Seed of the random motions.
+    --workers: Number of processes. [default: one per core, up to 4]
 
     Examples
     --------

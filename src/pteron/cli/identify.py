@@ -69,14 +69,15 @@ def identify(
     cad: str = "robot",
     box: list[str] | None = None,
 ) -> CommandResult:
-    """Identify a machine from recorded motions, and say whether the result can be trusted.
+    """Identify inertia and friction from recorded motions, with a verdict on the result.
 
-    With --payload, the inertia of a payload is found from the motion recorded with it and without:
-    in one log whose column payload is 0, then 1, or in two logs, without.csv and with.csv, each
-    with that column, 0 throughout or 1. It is printed as the call set_payload of exported C.
+    With --payload, the inertia of a payload is identified from a motion recorded with and without
+    it: in one log whose column payload is 0, then 1, or in two logs, without.csv and with.csv, each
+    with that column, 0 or 1 throughout. It is printed as the call set_payload of exported C.
 
-    The folder gets identification.html to read, identification.json with all numbers, and the
-    machine with real bodies as NAME.toml. The exit code is 0 whatever the verdict.
+    The folder gets the report identification.html, identification.json with all numbers, and the
+    identified machine with physically consistent bodies as NAME.toml. The exit code is 0 whatever
+    the verdict.
 
     Arguments
     ---------
@@ -84,25 +85,28 @@ def identify(
 
     Options
     -------
-    --robot ROBOT: The machine as it is drawn.
-    --out DIR: The folder to write it to.
-    --held-out LOG: A log to judge by; once for each. By default the last 30 % of every log.
+    --robot ROBOT: The machine as drawn: a machine of the catalog or a TOML file.
+    --out DIR: Folder for the results.
+    --held-out LOG: Log that validates the model; repeat for several. [default: the last 30 % of
+        every log]
     --description TOML: Description of all logs. [default: the one beside each, or logs.toml]
-    --estimator: How the equations are solved.
-    --without TERMS: Leave out: coulomb,viscous,offset.
-    --joints: Viscous friction in the passive joints.
-    --stribeck SPEED,...|auto: Friction falls with this speed, m/s or rad/s.
-    --delay S|auto: How late forces are for positions, s; by default it is found where the
-        forces show one. 0 leaves it in.
-    --rotors: With the inertia of the motors.
-    --payload: A payload too: logs with it and without, column payload 1 and 0.
-    --shared: All legs share one set of inertial parameters.
-    --derivatives: How positions are differentiated; the data decide.
-    --cutoff HZ: Cut-off of the positions' filter.
-    --band HZ: Cut-off of the parallel filter, on forces and regressor.
-    --period S: Time after which the motion repeats.
-    --cad WHICH: Bodies are sought near those of: robot, none, or a machine's file.
-    --box BODY=X0,X1,Y0,Y1: Box, m, that holds all mass of u1, l3, e, u, ...
+    --estimator: Estimator that solves the equations.
+    --without TERMS: Terms to leave out of the model: coulomb,viscous,offset.
+    --joints: Viscous friction in the passive joints: none, one value for all, or one each.
+    --stribeck SPEED,...|auto: Friction that falls with speed, with these Stribeck speeds, m/s or
+        rad/s, or identified ones.
+    --delay S|auto: Delay of the forces behind the positions, s; 0 assumes none. [default:
+        identified, if the forces show one]
+    --rotors: Include the inertia of the motors.
+    --payload: Identify a payload: logs with and without it, column payload 1 and 0.
+    --shared: All legs have the same inertial parameters.
+    --derivatives: Method by which positions are differentiated. [default: chosen by the data]
+    --cutoff HZ: Cut-off of the filter on positions. [default: chosen by the data]
+    --band HZ: Cut-off of the filter on forces and regressor. [default: chosen by the data]
+    --period S: Period of the motion. [default: the description's]
+    --cad WHICH: Choose the bodies as near as possible to those of: robot, none, or a machine's
+        file.
+    --box BODY=X0,X1,Y0,Y1: Box, m, that contains all mass of the body u1, l3, e, u, ...
 
     Examples
     --------

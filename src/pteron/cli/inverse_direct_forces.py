@@ -37,14 +37,14 @@ def inverse(
     """Compute the joint coordinates at poses.
 
     A table has the columns x y z phi or x y z roll pitch yaw, those that the machine has, in m and
-    rad, or in units that their names say: x (mm), roll (deg). The result has its columns, in SI
+    rad, or in units that their names state: x (mm), roll (deg). The result has its columns, in SI
     units, and rho1, rho2, ... of sliders, m, or theta1, theta2, ... of cranks, rad, as the drives
-    count them where a leg has a `reading`. A crank is at 0 along its zero_direction and counts by
-    the right hand about its axis, `direction`; pteron check tells it of each joint.
+    count them if a leg has a `reading`. A crank is at 0 along its zero_direction, positive by the
+    right-hand rule about its axis, `direction`; pteron check describes each joint.
 
     Arguments
     ---------
-    POSE: x y z phi, x y z roll pitch yaw, or those that the machine has; m and rad.
+    POSE: The pose x y z phi, x y z roll pitch yaw, or what the machine has; m and rad.
 
     Examples
     --------
@@ -88,16 +88,16 @@ def direct(
 
     A table has the columns rho1, theta2, ... as the machine's joints are; the result has one row
     for each real pose, with the table's row (from 1) and its columns, the assembly mode (from 1)
-    and x y z phi, those that the machine has. Where there is no real pose, these are empty.
+    and x y z phi, those that the machine has. Without a real pose, these are empty.
 
     Arguments
     ---------
-    JOINTS: One a leg: rho of a slider, m; theta of a crank, rad.
+    JOINTS: Joint coordinates, one a leg: rho of a slider, m; theta of a crank, rad.
 
     Options
     -------
-    --on-failure: Stop where no pose has the joint coordinates, or leave the row empty; raise for
-        those typed here, nan for a table.
+    --on-failure: If no pose has the joint coordinates, stop (raise) or leave the row empty (nan).
+        [default: raise for coordinates typed here, nan for a table]
 
     Examples
     --------
@@ -195,17 +195,18 @@ def forces(
     A table has the columns x y z phi dx dy dz dphi ddx ddy ddz ddphi and, if a wrench acts on the
     platform, fx fy fz mk: of each four those that the machine's pose has, or roll, pitch and yaw in
     place of phi; a platform that tilts has fx fy fz mx my mz. The result has its columns and
-    force1, force2, ... of sliders, N, or torque1, torque2, ... of cranks, N m. They are those of
-    the bodies or, with --drives, those of the drives. Where these are more than a drive's limits in
-    the machine's file, a note says so.
+    force1, force2, ... of sliders, N, or torque1, torque2, ... of cranks, N m. These forces move
+    the bodies; with --drives they include friction and the motors' inertia. A note says if they
+    exceed a drive's limits in the machine's file.
 
     Options
     -------
-    --pose NUMBERS: x y z phi, or those it has; m and rad.
-    --velocity NUMBERS: Its rate; at rest if left out.
-    --acceleration NUMBERS: The rate of that; zero if left out.
-    --wrench NUMBERS: fx fy fz mk, or fx fy fz mx my mz where it tilts, at P; N and N m.
-    --drives: What the drives must give: with friction and the motors' inertia.
+    --pose NUMBERS: Pose x y z phi, or what the machine has; m and rad.
+    --velocity NUMBERS: Time derivative of the pose. [default: 0]
+    --acceleration NUMBERS: Second time derivative of the pose. [default: 0]
+    --wrench NUMBERS: External wrench on the platform at its point P: fx fy fz mk, or fx fy fz mx my
+        mz of a platform that tilts; N and N m.
+    --drives: Forces of the drives: with friction and the motors' inertia.
 
     Examples
     --------

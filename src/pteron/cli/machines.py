@@ -83,10 +83,10 @@ def new(
     out: str | None = None,
     overwrite: bool = False,
 ) -> CommandResult:
-    """Write a file for a machine of your own, which says what every key is.
+    """Write a file for a machine of your own, with a comment that explains every key.
 
-    It is a machine like KIND, to put your numbers into; without KIND the kinds are listed. The
-    dimensions that are given hold for all legs, and the file says what follows from them.
+    The file describes a machine like KIND, for you to edit; without KIND the kinds are listed. The
+    dimensions of the options apply to all legs; comments in the file say what follows from them.
 
     Arguments
     ---------
@@ -98,12 +98,12 @@ def new(
     --platform-radius: Greatest distance of a platform point from the platform's axis, m.
     --crank: Length of the cranks or upper links, m.
     --rod: Length of the rods or lower links, m.
-    --limits LOW:HIGH: Of the joints, m or rad; of rams their length.
-    --mass-from STOCK: Masses and inertias of links as cut from aluminium-tube:30x2 or steel-rod:8,
-        mm; again, with upper= or lower= before it, for one of the two.
-    --platform-mass: Of the platform with its bars, kg; its inertia is in proportion.
-    --out FILE: Write it to this TOML file.
-    --overwrite: Replace the file if it is there.
+    --limits LOW:HIGH: Limits of the actuated joints, m or rad; of rams the lengths.
+    --mass-from STOCK: Compute masses and inertias of links as if cut from aluminium-tube:30x2 or
+        steel-rod:8 (mm); with upper= or lower= before it, of these links alone (repeat it).
+    --platform-mass: Mass of the platform with its bars, kg; its inertia is scaled with it.
+    --out FILE: The TOML file to write. [default: the screen]
+    --overwrite: Replace an existing file.
 
     Examples
     --------
@@ -162,16 +162,17 @@ def _machine(robot: Manipulator) -> dict[str, Any]:
 
 
 def check(file: str, *, elbows: str | None = None) -> CommandResult:
-    """Check a machine's file and say what the machine is.
+    """Check a machine's file and describe the machine.
 
-    It fails if the file is not valid, telling all its faults, if the machine is singular at every
-    pose, or within what files are rounded to of one that is, or if no pose is in reach of all its
-    legs. It says where the platform is in each working mode, above its base, below or inside, which
-    is the file's and which is likely meant; of more than eight modes the file's, its opposite, and
-    those with all elbows alike. What is possible but unlikely, such as a length in millimetres, a
-    centre of mass beyond its link, or legs that look swapped, is told as a warning. How well drives
-    hold the platform at home is measured in absolute terms: docs/verdicts.md has the measures and
-    their thresholds. The exit code is 2 where it fails, and 0 where not, warnings or none.
+    The check fails, with exit code 2, if the file is not valid (all faults are reported), if the
+    machine is singular at every pose within the rounding of the file, or if no pose is in reach of
+    all legs. Otherwise the exit code is 0, and what is possible but unlikely is a warning, such as
+    a length in millimetres, a centre of mass beyond its link, or legs that look swapped.
+
+    The output shows the legs, the home pose, how well the drives hold the platform there, beside
+    the thresholds (docs/verdicts.md explains them), and where the platform is in each working mode:
+    above the base, below or inside. Of more than eight modes it shows the file's, its opposite, and
+    those with all elbow signs equal.
 
     Arguments
     ---------

@@ -27,15 +27,15 @@ def report(
     motion: str | None = None,
     carried: Carried,
 ) -> CommandResult:
-    """Write a report on a machine: one page with pictures, and its numbers.
+    """Write a report on a machine: one HTML page with figures, and its numbers.
 
     The page is report.html, the numbers are in report.json beside it. Forces are computed for the
-    machine with its payload; if the motion's file has forces too, the page says where they differ.
+    machine with its payload; if the motion's file has forces too, the page shows where they differ.
 
     Options
     -------
-    --out DIR: The folder to write it to.
-    --motion FILE: Show this motion in place of the standard cycle: a table of it, or a log.
+    --out DIR: Folder for report.html and report.json.
+    --motion FILE: Show this motion in place of the standard cycle: a table of a motion, or a log.
 
     Examples
     --------

@@ -60,30 +60,29 @@ def simulate(
 ) -> CommandResult:
     """Simulate a machine with its drives under a controller.
 
-    The rigid bodies with the payload, the drives' friction and rotors move under what the
-    controller asks for, held from sample to sample; no drive gives more than its max_force. A
-    cycle that is more than the drives can do is refused, with the leg and by how much.
+    The rigid bodies with the payload, and the drives with friction and rotors, move under the
+    forces that the controller commands, held from sample to sample; no drive exceeds its max_force.
+    A cycle beyond what the drives can do is refused, with the leg and by how much.
 
-    The table has a row for each sample: t, the pose x y z phi, its rates and accelerations, what
-    it was to be (xref ...), the joints and their rates, forces, and what the machine carries. A
-    folder gets simulation.csv, simulation.json, tracking.svg and forces.svg. The exit code is 1 if
-    the machine does not come to the end; why is said.
+    The table has a row for each sample: t, the pose x y z phi, its rates and accelerations, the
+    reference (xref ...), the joints and their rates, forces, and the payload. A folder gets
+    simulation.csv, simulation.json, tracking.svg and forces.svg. The exit code is 1 if the
+    simulation stops before the end of the cycle, and a note says why.
 
     Options
     -------
-    --controller: What makes the machine follow the cycle; see docs/controllers.md.
-    --cycles: How many, one after the other.
-    --rate: Samples of the controller a second.
-    --bandwidth: Of the controller, rad/s. [default: a tenth of the rate]
-    --gains FILE: The controller of pteron tune's gains.toml, its law and rate too.
-    --model ROBOT: What the controller takes the machine for; by default what it is, payload and
-        all.
-    --encoder: Step of the encoders at the joints, m or rad; 0 is exact.
-    --delay: From a sample to the drives' force, s.
-    --step: Of the integration, s.
-    --method: Fixed steps, compiled, or SciPy's DOP853.
-    --anyway: Simulate a cycle that is more than the drives can do, too.
-    --out DIR|FILE: Write a table and pictures to a folder, or the table to a file.
+    --controller: Control law; see docs/controllers.md.
+    --cycles: Number of cycles, one after the other.
+    --rate: Sample rate of the controller, Hz.
+    --bandwidth: Bandwidth of the controller, rad/s. [default: a tenth of the rate]
+    --gains FILE: Use the controller in pteron tune's gains.toml, with its law, gains and rate.
+    --model ROBOT: Model of the machine in the controller. [default: the machine, with its payload]
+    --encoder: Resolution of the joints' encoders, m or rad; 0 is exact.
+    --delay: Delay from a sample to the drives' force, s.
+    --step: Step of the integration, s.
+    --method: Integrator: compiled Runge-Kutta of fixed step (rk4), or SciPy's DOP853.
+    --anyway: Simulate even a cycle beyond what the drives can do.
+    --out DIR|FILE: Write a table and figures to a folder, or the table to a file.
 
     Examples
     --------

@@ -50,35 +50,36 @@ def size(
 ) -> CommandResult:
     """Size the motors: peak and RMS force, speed, power and energy of each drive over a cycle.
 
-    The standard cycle is done at all places of the workspace and at all turns about the vertical,
-    the platform turned with it or not, and the worst of them counts and is named; a motion from a
-    table is done as it stands. Several cycles are done one after the other, each with its rest.
+    The standard cycle is placed everywhere in the workspace and turned in all directions about the
+    vertical, the platform turned with it or not; the largest value of each quantity counts, with
+    its place. A motion from a table is taken as it is. Several cycles follow one another, each with
+    its dwell.
 
-    Forces are those of the drives: the bodies with the payload, friction and the rotors, as the
-    machine's file has them. What is not enough is told by leg and amount, of the drives in the file
-    as of a list of motors, and the exit code is 1.
+    Forces are those of the drives: the bodies with the payload, friction and the rotors, as in the
+    machine's file. If the drives in the file, or all motors of a list, are too weak, a warning says
+    for which leg and by how much, and the exit code is 1.
 
     A list of motors has the columns name, rotor_inertia (kg m^2), rated_torque and peak_torque
-    (N m), max_speed (rad/s). For each joint it is told which serve, the smallest first, from what
-    ratio to what ratio, and which ratio is best: least RMS torque. For legs that are alike the one
-    motor and ratio for all of them is told, too.
+    (N m), max_speed (rad/s). For each joint the output lists the motors that are strong enough, the
+    smallest first, with their range of gear ratios and the best one, of least RMS torque; for equal
+    legs also the one motor and ratio for all of them.
 
-    A folder gets sizing.csv, sizing.json, power.svg, force-speed.svg and motors.csv; the pictures
-    are of the place where the most power is needed.
+    A folder gets sizing.csv, sizing.json, power.svg, force-speed.svg and motors.csv; the figures
+    are for the place where the most power is needed.
 
     Options
     -------
-    --cycle CYCLE: adept, the standard pick-and-place cycle, or a table of a motion; again for more.
-        [default: adept]
-    --dwell: Rest after each cycle, s; again for that after each of several.
-    --within REGION: Where the cycle is done: workspace, here (as it stands), or a box of poses such
-        as x=-0.1:0.1,y=-0.1:0.1; along what it leaves out the cycle has the room that it takes as
-        it stands. [default: workspace; here of a table]
-    --friction SHARE: Dry friction of a drive that has none in the file, over its largest force; 0
-        leaves it out.
-    --motors FILE: Choose from the motors in this CSV or TOML file.
-    --margin: What drives and motors must be able to do, over what the cycle asks.
-    --out DIR|FILE: Write tables, numbers and pictures to a folder, or one table.
+    --cycle CYCLE: adept, the standard pick-and-place cycle, or the table of a motion; repeat for
+        several. [default: adept]
+    --dwell: Time at rest after each cycle, s; repeat for each of several cycles.
+    --within REGION: Where the cycle is placed: workspace, here (where it is defined), or a box of
+        poses such as x=-0.1:0.1,y=-0.1:0.1; coordinates not named keep the range of the cycle where
+        it is defined. [default: workspace; here for a table]
+    --friction SHARE: Dry friction of a drive without friction in the file, as a share of its
+        largest force; 0 assumes none.
+    --motors FILE: List of motors to choose from, a CSV or TOML file.
+    --margin: Required margin: limits of drives and motors over what the cycle needs.
+    --out DIR|FILE: Write tables, numbers and figures to a folder, or one table to a file.
 
     Examples
     --------

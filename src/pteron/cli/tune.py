@@ -52,11 +52,11 @@ def tune(
     """Choose gains of a controller with stability margins that hold in a cycle and the workspace.
 
     The loop of machine, drives, encoders, controller and delay is linearised at moments of the
-    cycle and at poses of the workspace, with all coupling of the closed chain; from sample to
-    sample it is exact. The greatest bandwidth is chosen that has the margins everywhere, with more
-    damping where none has. Transmissions that bend and currents that lag, as the drives in the
-    robot's file say, are in it. Then the cycle is simulated with other bandwidths, delays, encoders
-    and, where transmissions bend, stiffnesses.
+    cycle and at poses of the workspace, with all coupling of the closed chain, and discretised
+    exactly. The result is the largest bandwidth that has the margins at all of them; if none has,
+    damping is increased. Elastic transmissions and lagging currents, as the drives in the robot's
+    file state them, are included. Then the cycle is simulated with other bandwidths, delays,
+    encoders and, for elastic transmissions, stiffnesses.
 
     A folder gets gains.toml, which pteron simulate, pteron export and
     pteron.controllers.read_gains take, tuning.html, tuning.csv with the margins of each pose, and
@@ -64,16 +64,16 @@ def tune(
 
     Options
     -------
-    --controller: Whose gains; see docs/controllers.md.
-    --rate: Samples of the controller a second.
-    --bandwidth: Take this one, rad/s; refused where it has not the margins.
-    --gain-margin: Factor on a drive's force, or on all, at which the loop becomes unstable.
-    --phase-margin: At each drive, degrees.
-    --delay-margin: Further delay, s, beyond --delay; 0 asks for none.
-    --encoder: Step of the encoders at the joints, m or rad; rates are then differences.
-    --cutoff: Of the filter on these rates, Hz. [default: no filter]
-    --delay: From a sample to the drives' force, s.
-    --encoders STEPS: Steps of the encoders in the trials, m or rad.
+    --controller: Control law to tune; see docs/controllers.md.
+    --rate: Sample rate of the controller, Hz.
+    --bandwidth: Use this bandwidth, rad/s; an error if it lacks the margins.
+    --gain-margin: Required factor on one drive's force, or on all, before the loop is unstable.
+    --phase-margin: Required phase margin at each drive, degrees.
+    --delay-margin: Required further delay, s, beyond --delay; 0 requires none.
+    --encoder: Resolution of the joints' encoders, m or rad; rates are then differences.
+    --cutoff: Cut-off of the filter on these rates, Hz. [default: no filter]
+    --delay: Delay from a sample to the drives' force, s.
+    --encoders STEPS: Resolutions of the encoders in the trials, m or rad.
     --out DIR|FILE: Write gains, margins and page to a folder, or the table of margins to a file.
 
     Examples

@@ -111,21 +111,19 @@ class Excitation(Result):
     def progress_text(self) -> str:
         """How far the search came, and whether its motion identifies the machine, in sentences."""
         finished = sum(start.finished for start in self.starts)
-        reached = self.conditioning.scaled
         search = (
             f"Search: {self.draws} random motions drawn, {finished} of {len(self.starts)} "
             f"optimised to convergence, {self.seconds:.0f} s."
         )
-        if reached <= IDENTIFIES:
-            return (
-                "This motion identifies all base parameters: condition number "
-                f"{reached:.3g}, at most {IDENTIFIES:g} allowed. {search}"
-            )
+        condition = self.conditioning.scaled
+        size = f"{condition:.0f}" if 1e3 <= condition < 1e6 else f"{condition:.3g}"
+        reached = f"condition number {size}, at most {IDENTIFIES:g} allowed"
+        if condition <= IDENTIFIES:
+            return f"This motion identifies all base parameters: {reached}. {search}"
         return (
-            "This motion does not identify all base parameters: condition number "
-            f"{reached:.3g}, at most {IDENTIFIES:g} allowed. {search} Search longer (--seconds), "
-            "allow more speed and acceleration, take more --harmonics; or identify equal legs "
-            "together with --shared."
+            f"This motion does not identify all base parameters: {reached}. {search} Search longer "
+            "(--seconds), allow more speed and acceleration, take more --harmonics; or identify "
+            "equal legs together with --shared."
         )
 
     def with_leads(self, periods: int = 1) -> LedMotion:
