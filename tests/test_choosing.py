@@ -257,7 +257,7 @@ def test_a_cycle_between_the_poses_of_a_list_keeps_the_limits():
     joints = inverse_kinematics(kept.robot, kept.middle + line)
     assert (joints >= low).all()
     assert (joints <= high).all()
-    assert "so do the cycles between them" in proof_sentence(evaluator, [])
+    assert "so are the cycles between them" in proof_sentence(evaluator, [])
 
 
 def test_margins_are_those_between_the_directions_of_a_cycle_too(chosen):

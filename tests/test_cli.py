@@ -95,7 +95,7 @@ def test_help_names_every_function_that_can_be_exported():
     with pytest.raises(pteron.ModelError) as caught:
         pteron.export_c(pteron.load("tripteron"), "none", "there")
     names = str(caught.value).split("choose from ")[1]
-    assert f"again for more: {names}.".replace(" ", "") in text
+    assert f"repeat for several: {names}.".replace(" ", "") in text
 
 
 def test_the_package_runs_as_a_module():
@@ -959,7 +959,7 @@ def test_base_parameters_as_asked_for():
 
 def test_a_person_sees_base_parameters_with_values():
     text = read("base quadrupteron")
-    assert "26 base parameters of 40" in text
+    assert "26 base parameters, sums of 40" in " ".join(text.split())
     assert "kg m^2" in text
     assert max(map(len, text.splitlines())) <= 60
 
@@ -968,7 +968,7 @@ def test_table_1_stands_printed_beside_computed(monkeypatch: pytest.MonkeyPatch)
     from pteron.report import table1
 
     text = done("table1")
-    assert "26 of 26 rows agree." in text
+    assert "26 of 26 base parameters of the paper" in text
     rows = json.loads(done("table1 --json"))
     assert rows[0]["printed"] == "m_p1 + m_u1 + 20.11 I_l1"
     assert all(row["agrees"] for row in rows)

@@ -391,7 +391,7 @@ def test_what_changed_is_told_in_words(found):
     summary = FrontReport(found[0])
     page = summary.page()
     assert "| cube | 167.2 mm |" in page
-    assert "cube proved: every position of the cube with edge" in page
+    assert "cube proved: every position in the cube with edge" in page
     assert "slider of leg 1:" in page
     best = summary.selection[0]
     lengths = [c for c in best.changes if c.what.startswith("upper length")]

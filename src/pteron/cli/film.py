@@ -75,10 +75,10 @@ def film(
         ),
         "file": str(written.path),
     }
-    pace = "in real time" if written.speed == 1.0 else f"at {written.speed:.3g} times its speed"
+    pace = "in real time" if written.speed == 1.0 else f"at {written.speed:.3g} times real speed"
     summary = (
-        f"{motion.duration:.4g} s of {plain(machine.name)} {pace}: {written.duration:.3g} s, "
-        f"{written.frames} frames of {written.size[0]}x{written.size[1]}"
+        f"{plain(machine.name)}: {motion.duration:.4g} s of motion {pace}; the film has "
+        f"{written.duration:.3g} s, {written.frames} frames of {written.size[0]}x{written.size[1]}"
     )
     return CommandResult(data, [summary], [written.path])
 

@@ -98,7 +98,8 @@ class TableRows:
             serve(values[row])
         except PteronError as error:
             is_millimetres = isinstance(error, UnreachablePose) and error.millimetres
-            doubt = f"; {unlikely}" if unlikely and not is_millimetres else ""
+            is_told = is_millimetres or unlikely in str(error)
+            doubt = f"; {unlikely}" if unlikely and not is_told else ""
             if self.single:
                 raise PteronError(f"{error}{doubt}") from None
             raise PteronError(
