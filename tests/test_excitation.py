@@ -653,7 +653,7 @@ def test_the_command_writes_both_files_and_a_table(tmp_path: Path, monkeypatch):
     assert (result.exit_code, result.stderr) == (0, "")
     for words in (
         "best of 4 random",
-        "of length 1",
+        "scaled to length 1",
         "type-I measure",
         "speed (m/s)",
         "motion.toml",

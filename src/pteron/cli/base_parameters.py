@@ -97,12 +97,12 @@ def _show(parameters: BaseParameters, symbols: Symbols) -> None:
         f"[bold]{plain(parameters.robot.name)}[/bold]: {parameters.rank} base parameters, sums of "
         f"{len(parameters.columns)} inertial parameters; only these sums act on the drive forces.",
         table("", "base parameter", "value", "unit", rows=rows, numbers=("", "value")),
-        _SYMBOLS,
+        SYMBOLS,
         *closing,
     )
 
 
-_SYMBOLS = (
+SYMBOLS = (
     "Symbols: m mass, mgx mgy mgz first moment (mass times centre of mass), I inertia; of the "
     "bodies p slider, u upper link, l lower link with the leg's number, e platform."
 )
@@ -175,5 +175,5 @@ def table1() -> CommandResult:
             "restored from its other rows."
         )
     headings = ("", "printed", "computed", "agrees")
-    lines = [agree, table(*headings, rows=rows), _SYMBOLS]
+    lines = [agree, table(*headings, rows=rows), SYMBOLS]
     return CommandResult(data, lines, code=1 if wrong else 0)

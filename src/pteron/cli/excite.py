@@ -289,9 +289,9 @@ def _quality(excitation: Excitation) -> Table:
     if not math.isfinite(best.nominal):
         caption = "-: undefined, because a base parameter's nominal value is 0"
     numbers = (
-        ("of length 1", best.scaled, random.scaled),
+        ("scaled to length 1", best.scaled, random.scaled),
         ("times nominal values", best.nominal, random.nominal),
-        ("in SI units", best.unscaled, random.unscaled),
+        ("unscaled, in SI units", best.unscaled, random.unscaled),
     )
     rows = ((n, _number(a, 3), _number(b, 3), _number(b / a, 3)) for n, a, b in numbers)
     title = "condition number, regressor columns"
@@ -332,7 +332,7 @@ def _margins(margins_by_motion: dict[str, Margins]) -> Table:
     """Return a table of each limit's least margin, its leg and time, and those of other motions."""
     headings = ("margin to it", "leg", "at (s)")
     others = list(margins_by_motion)[1:]
-    names = [f"margin, {other} motion" for other in others]
+    names = [f"margin, {other.replace(' ', '-')} motion" for other in others]
     margin_table = table("limit", *headings, *names, numbers=(*headings, *names))
     for margin in margins_by_motion["motion"]:
         name = _MEASURES.get(margin.limit, margin.limit.replace("_", " "))

@@ -8,6 +8,7 @@ from shutil import get_terminal_size
 from typing import TYPE_CHECKING, Any, Literal
 
 from pteron.cli.arguments import MachineArgument, load_robot, split_numbers
+from pteron.cli.base_parameters import SYMBOLS
 from pteron.cli.progress import Times, progress_bar, spinner
 from pteron.cli.result import CommandResult
 from pteron.cli.terminal import (
@@ -216,6 +217,7 @@ def _show(result: Identification) -> None:
         _errors(result),
         *map(plain, verdict.reasons),
         _values(result),
+        f"{SYMBOLS} Fc is dry and Fv viscous friction of a drive.",
         *map(plain, _bodies(result)),
         *_payload(result),
         *(f"Next: {plain(step)}" for step in verdict.next_steps),

@@ -54,8 +54,12 @@ def catalog() -> CommandResult:
     rows = (tuple(c if isinstance(c, str) else " ".join(c) for c in row) for row in cells)
     machine_table = table("name", "motion", "legs", "machine", rows=rows, names=("name",))
     legs = [leg for name in descriptions() for leg in kept_machine(name)[0].legs]
-    motion = "Motion: degrees of freedom of the platform, such as 3T1R: 3 translations, 1 rotation."
-    return CommandResult(machines, [machine_table, motion, _legs_text(legs)])
+    lines = (
+        "Motion: degrees of freedom of the platform, such as 3T1R: 3 translations, 1 rotation.",
+        _legs_text(legs),
+        "Next: pteron view NAME, or pteron new NAME --out robot.toml for a machine of your own.",
+    )
+    return CommandResult(machines, [machine_table, *lines])
 
 
 def _legs_text(legs: Sequence[LegKind]) -> str:
@@ -198,7 +202,9 @@ def check(file: str, *, elbows: str | None = None) -> CommandResult:
         warn(findings["doubts"][len(unlikely) :], f"{file}: ")
     except PteronError as error:
         raise ModelError(error.message, subject=file) from None
-    return CommandResult(findings, partial(_show, robot, findings))
+    place = plain(file)
+    further = f"Next: pteron cycle {place}, pteron size {place}, pteron report {place} --out DIR"
+    return CommandResult(findings, partial(_show, robot, findings, further))
 
 
 def _findings(robot: Manipulator) -> dict[str, Any]:
@@ -263,8 +269,8 @@ def _leg(leg: LegKind) -> dict[str, Any]:
     }
 
 
-def _show(robot: Manipulator, findings: dict[str, Any]) -> None:
-    """Print the results of a machine's examination: the verdict, tables, and sentences."""
+def _show(robot: Manipulator, findings: dict[str, Any], further: str) -> None:
+    """Print the results of a machine's examination: verdict, tables, sentences, what is next."""
     from pteron.manipulator.commented_file import crank_direction_text
 
     joints = dict.fromkeys(leg.joint for leg in robot.legs)
@@ -291,6 +297,7 @@ def _show(robot: Manipulator, findings: dict[str, Any]) -> None:
             f"The platform can move with its rams locked {text}"
             for text in findings["self_motions"]
         ),
+        further,
     )
 
 
@@ -354,14 +361,14 @@ def _home_table(robot: Manipulator, findings: dict[str, Any]) -> Table:
     from pteron.workspace.margins import least_margin_text
 
     hold = findings["holding"]
-    moments = f", moments / {hold['length']:.3g} m" if robot.platform.angles else ""
+    moments = f" (moments / {hold['length']:.3g} m)" if robot.platform.angles else ""
     distance = "none" if hold["distance"] == math.inf else f"{1e3 * hold['distance']:.3g} mm"
     least = 1.0 / hold["least_singular_value"] if hold["least_singular_value"] else math.inf
     margin, cause = least_margin_text(robot, np.array(findings["home_pose"]))
     rows = [
-        (f"margin ({cause})", margin, "above 0 %"),
+        (f"smallest margin: to {cause}", margin, "above 0 %"),
         (
-            f"largest leg force over load, worst direction{moments}",
+            f"largest leg force over load, in the worst direction{moments}",
             *(f"{least:.2g}", f"at most {1.0 / LEAST_SINGULAR_VALUE:g}"),
         ),
         (

@@ -181,7 +181,7 @@ def _show(tuning: Tuning, controller: str, tried: pl.DataFrame) -> None:
         f"gain {least['gain']:.3g} ({required.gain:g}), "
         f"phase {np.degrees(least['phase']):.3g} deg ({np.degrees(required.phase):.3g}), "
         f"delay {1e3 * least['delay']:.3g} ms ({1e3 * required.delay:g}), "
-        f"disk margin {least['disk']:.3g}.",
+        f"disk margin {least['disk']:.3g} (errors of gain and phase in all drives; 0 is unstable).",
         table(
             *("joint", *headings),
             rows=((name, *(significant(g, 4) for g in joint_gains)) for name, *joint_gains in rows),

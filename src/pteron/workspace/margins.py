@@ -87,16 +87,15 @@ def pose_margins(robot: RobotLike, pose: PoseLike) -> PoseMargins:
 
 
 def least_margin_text(robot: Manipulator, pose: Array) -> tuple[str, str]:
-    """Return the least margin of a pose (m,) in percent, and what it is the distance from."""
+    """Return the least margin of a pose (m,) in percent, and what it is the distance to."""
     margins = pose_margins(robot, pose)
     least = float(margins.least)
     if float(margins.type_ii) <= least:
-        cause = "0 % at a type-II singularity, 100 % at the pose farthest from one"
+        cause = "a type-II singularity, where the drives cannot hold the platform (100 % is best)"
     elif float(margins.type_i.min()) <= least:
-        cause = f"0 % where leg {_first_least(margins.type_i)} is stretched or folded"
+        cause = f"leg {_first_least(margins.type_i)} stretched or folded (100 % is best)"
     else:
-        leg = _first_least(margins.joints)
-        cause = f"0 % at a joint limit of leg {leg}, 100 % in mid-range"
+        cause = f"a joint limit of leg {_first_least(margins.joints)} (100 % is mid-range)"
     return f"{100.0 * least:.0f} %", cause
 
 
