@@ -363,7 +363,7 @@ def test_no_delay_is_taken_out_of_a_log_that_has_none(noise):
     result = found(robot, noisy(log, noise=noise) if noise else log)
     assert result.unknowns.delay == 0.0
     assert not result.notes
-    assert not any(said.startswith("Below zero") for said in result.verdict.reasons)
+    assert not any(said.startswith("Friction is below zero") for said in result.verdict.reasons)
 
 
 @pytest.mark.parametrize("gentle", [True, False])
@@ -401,5 +401,6 @@ def test_friction_below_zero_is_told_before_all_else():
     log = noisy(log_of(robot, friction=pushed, **brisk(robot)), noise=1e-3)
     hidden, first, *_ = found(robot, log).verdict.reasons
     assert hidden.startswith("These logs cannot show")
-    assert first.startswith("Below zero beyond its interval, which no friction is: Fv1 = -")
+    below = "Friction is below zero beyond its interval, which is impossible: Fv1 = -"
+    assert first.startswith(below)
     assert "Fv2" not in first
