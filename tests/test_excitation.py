@@ -574,7 +574,7 @@ def test_a_motion_that_would_not_identify_the_machine_is_said_to():
         CATALOG["tripteron"], harmonics=1, starts=1, draws=10, workers=1, seconds=1.0
     )
     bad = replace(found, conditioning=replace(found.conditioning, scaled=6165.0))
-    assert "leaves some base parameters open" in bad.progress_text
+    assert "does not identify all base parameters" in bad.progress_text
     assert "--shared" in bad.progress_text
     good = replace(found, conditioning=replace(found.conditioning, scaled=50.0))
     assert "leaves" not in good.progress_text
@@ -653,7 +653,7 @@ def test_the_command_writes_both_files_and_a_table(tmp_path: Path, monkeypatch):
     assert (result.exit_code, result.stderr) == (0, "")
     for words in (
         "best of 4 random",
-        "of length 1",
+        "scaled to length 1",
         "type-I measure",
         "speed (m/s)",
         "motion.toml",

@@ -458,7 +458,7 @@ def test_the_page_of_verdicts_has_the_thresholds_as_they_are():
             (rounding_tolerance(1.0), rounding_tolerance(1e-3)) == (1e-4, 1e-6),
         ),
         "coordinates that differ by ... make the machine": ("ten times that", INACCURATE == 10.0),
-        "least singular value": ("0.02", LEAST_SINGULAR_VALUE == 0.02),
+        "leg forces are up to": ("0.02", LEAST_SINGULAR_VALUE == 0.02),
         "to hold the weight": ("10", HOLDING_FORCE == 10.0),
         "near it a leg": ("100", HOLDING_FORCE_NEAR == 100.0),
         "their links cross": ("2 %", CROSSING == 0.02),

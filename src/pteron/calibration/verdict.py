@@ -35,8 +35,8 @@ _GREAT_TILT = 0.1
 """Tilt, rad, from which its size says no more than that nothing shows it."""
 
 _ROD_ADVICE = (
-    "Measure both rods of each pair: rods that differ tilt the platform, and where positions are "
-    "not measured a fit takes that for geometry."
+    "Measure both rods of each pair: unequal rods tilt the platform, and without measured "
+    "positions a fit attributes that to the geometry."
 )
 
 
@@ -122,20 +122,20 @@ def _error_reasons(evidence: Evidence) -> Iterator[_Reason]:
         for kind, error in fitted_errors(evidence.fit, evidence.measurements).items():
             if error > thresholds.ordinary_error(kind, stated.get(kind)):
                 size = _size_text(error, kind)
-                text = f"Even at the rows that were fitted the {kind} error is {size}"
+                text = f"Even at the fitted rows the {kind} error is {size}"
                 yield _Reason(f"{text}, more than ordinary tolerances.", "", "not trustworthy")
         return
     for kind, fitted in held_out.after.items():
         expected, drawn = held_out.expected[kind], held_out.before[kind]
         text = (
-            f"At {held_out.rows} rows that the fit did not see the {kind} error is "
-            f"{_size_text(fitted, kind)}, {_size_text(drawn, kind)[: -len(_unit(kind)) - 1]} before"
+            f"At {held_out.rows} rows held out of the fit the {kind} error is "
+            f"{_size_text(fitted, kind)}, {_size_text(drawn, kind)} before the calibration"
         )
         most = thresholds.ordinary_error(kind, stated.get(kind))
         fine = fitted <= thresholds.FINE_SHARE * most
         if fitted > most:
             yield _Reason(
-                f"{text}: more than {_size_text(most, kind)}, which ordinary tolerances leave.",
+                f"{text}: more than the {_size_text(most, kind)} of ordinary tolerances.",
                 "",
                 "not trustworthy",
             )
@@ -148,11 +148,11 @@ def _error_reasons(evidence: Evidence) -> Iterator[_Reason]:
         ratio = fitted / expected
         if ratio <= max(thresholds.AT_THE_NOISE, chance):
             grade: Grade = "trustworthy" if fine else "usable with care"
-            yield _Reason(f"{text}: as noise and intervals expect.", "", grade)
+            yield _Reason(f"{text}: as expected from noise and intervals.", "", grade)
             continue
         lost = ratio > _FAR and fitted > thresholds.FALLEN_SHARE * drawn
         yield _Reason(
-            f"{text}: {ratio:.2g} times what noise and intervals expect.",
+            f"{text}: {ratio:.2g} times as much as expected from noise and intervals.",
             "",
             "not trustworthy" if lost else "usable with care",
         )
@@ -238,7 +238,7 @@ def _far_value_reasons(evidence: Evidence) -> Iterator[_Reason]:
         several = f"{', '.join(far[:4])}{' ...' if len(far) > 4 else ''}"
         yield _Reason(
             f"More than {thresholds.OFF_TOLERANCES:g} tolerances from the drawing: {several}.",
-            "Check the robot's file at these values, or say by `prior` how far off they may be.",
+            "Check these values in the robot's file, or state their tolerances with --prior.",
             "usable with care",
         )
 
@@ -260,11 +260,13 @@ def _unseen_reasons(shown: Observability) -> Iterator[_Reason]:
     open_values = shown.columns - shown.determined_count
     if open_values:
         potential = (
-            f"; at more poses {shown.rank} would" if shown.rank > shown.determined_count else ""
+            f"; more poses would determine {shown.rank}"
+            if shown.rank > shown.determined_count
+            else ""
         )
         yield _Reason(
-            f"{shown.determined_count} of {shown.columns} combinations show in these measurements, "
-            f"the other {open_values} are kept at the drawing{potential}."
+            f"These measurements determine {shown.determined_count} of {shown.columns} "
+            f"combinations of values; the other {open_values} keep their drawn values{potential}."
         )
 
 

@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 _MOST = 12
 """Values that the terminal shows, those that changed most; the page has them all."""
 
+_WEAK = 2
+"""Weakly determined combinations that are shown; the page has all of them."""
+
 Measure = Literal["positions", "heights", "poses", "distances"]
 """Quantities that may be measured at planned poses."""
 
@@ -41,13 +44,13 @@ def calibrate(
     plane: str | None = None,
     anyway: bool = False,
 ) -> CommandResult:
-    """Find a machine's true geometry from measurements, and say what they cannot show.
+    """Find a machine's true geometry from measurements, and what they leave undetermined.
 
-    The folder gets calibration.html to read, calibration.json with all numbers, and the machine as
-    it was found, robot.toml, unless that is not trustworthy. The exit code is 0 whatever the
-    verdict.
+    The folder gets the report calibration.html, calibration.json with all numbers, and the
+    calibrated machine, robot.toml, unless the result is not trustworthy. The exit code is 0
+    whatever the verdict.
 
-    With --plan, poses that show the geometry best are written as a table of joints and poses.
+    With --plan, poses that determine the geometry best are written as a table of joints and poses.
 
     Arguments
     ---------
@@ -55,18 +58,18 @@ def calibrate(
 
     Options
     -------
-    --robot ROBOT: The machine as it is drawn.
-    --out DIR|FILE: The folder to write it to; with --plan the table.
-    --held-out LOG: What to judge by; once for each. By default every fifth row, if there are
-        enough.
-    --free GROUP: Seek only this; once for each: zeros, scales, lengths, points, directions, tool,
-        radius, angles, or a value by its name in calibration.json.
-    --prior TOML: Standard deviations by group or value, m and rad.
-    --plan N: Choose so many poses to measure, in place of a LOG.
-    --measure: What will be measured at the planned poses.
-    --plane z=HEIGHT: The level that a planned probe touches, m. [default: z=0 where the tool works
-        down to it, as on a printer's bed; else the bottom of the proved poses]
-    --anyway: Write robot.toml even where it is not trustworthy.
+    --robot ROBOT: The machine as drawn: a machine of the catalog or a TOML file.
+    --out DIR|FILE: Folder for the results; with --plan the file of the table.
+    --held-out LOG: Log that validates the result; repeat for several. [default: every fifth row, if
+        there are enough]
+    --free GROUP: Fit these values alone; repeat for several: zeros, scales, lengths, points,
+        directions, tool, radius, angles, or a value by its name in calibration.json.
+    --prior TOML: File of tolerances: standard deviations by group or value, m and rad.
+    --plan N: Choose this number of poses to measure, instead of reading a LOG.
+    --measure: Quantity to be measured at the planned poses.
+    --plane z=HEIGHT: Height of the plane that a planned probe touches, m. [default: z=0 if the tool
+        reaches down to it, as on a printer's bed; else the bottom of the proved poses]
+    --anyway: Write robot.toml even if it is not trustworthy.
 
     Examples
     --------
@@ -142,17 +145,16 @@ def _plan(
         path = write_table(pl.DataFrame(poses.columns()), out)
     box = {name: list(side) for name, side in zip(("low", "high"), poses.region.box, strict=True)}
     expected = {"before": poses.before, "after": poses.after}
-    what, unit = ("tool's place", "mm") if machine.platform.lengths else ("angles", "mrad")
-    off = "is" if unit == "mm" else "are"
+    what, unit = ("tool's position", "mm") if machine.platform.lengths else ("angles", "mrad")
     few = (
-        f"From {poses.checked} poses on, some are held out to check the calibration by; with "
-        "fewer give a second log (--held-out)."
+        f"From {poses.checked} poses on, some are held out to check the calibration; with fewer, "
+        "give a second log (--held-out)."
     )
     lines = [
         f"{plain(machine.name)}: {count} poses at which to measure {measure}{_plane_text(poses)}, "
-        f"in a {_region(poses)}; every pose of it is proved to serve",
-        f"The {what} {off} off by up to {1e3 * poses.before:.3g} {unit} as drawn (one standard "
-        f"deviation of the tolerances); {1e3 * poses.after:.3g} {unit} are expected to be left.",
+        f"in a {_region(poses)}; every pose in it is proved to be in reach",
+        f"Expected error of the {what} (one standard deviation): up to {1e3 * poses.before:.3g} "
+        f"{unit} as drawn, from the tolerances; {1e3 * poses.after:.3g} {unit} once calibrated.",
         *([few] if count < poses.checked else []),
     ]
     return CommandResult({"file": str(path), "expected": expected, "region": box}, lines, [path])
@@ -174,7 +176,7 @@ def _plane_text(planned: Plan) -> str:
     plane = planned.plane
     if plane is None:
         return ""
-    known = "" if plane.known else ", which is found with the geometry"
+    known = "" if plane.known else ", which is fitted with the geometry"
     return f" over the plane z = {1e3 * plane.offset + 0.0:.4g} mm{known}"
 
 
@@ -201,20 +203,22 @@ def _show(result: Calibration, firmware: FirmwareFit | None, left_out: str) -> N
     from pteron.report.calibration.values import notes
 
     verdict, shown = result.verdict, result.observability
-    color = GRADE_COLORS[verdict.grade]
+    color, more = GRADE_COLORS[verdict.grade], len(shown.weak) - _WEAK
     lines: list[str | Table] = [plain(verdict.reasons[0])]
     if firmware:
         lines += [_table(firmware.rows), plain(firmware.sentence)]
     show(
         f"[bold {color}]{plain(result.drawn.name)}: {verdict.grade}[/bold {color}], "
-        f"{shown.determined_count} of {shown.columns} combinations shown",
+        f"{shown.determined_count} of {shown.columns} combinations of values determined",
         *lines,
         _values(result),
         *_errors(result),
-        *map(plain, (*verdict.reasons[1:], *verdict.next_steps)),
-        *(f"Cannot be seen, as drawn: {plain(line)}" for line in shown.unseen),
-        *(f"[yellow]Weak:[/yellow] {plain(line)}" for line in shown.weak),
+        *map(plain, verdict.reasons[1:]),
+        *(f"Not determined, kept as drawn: {plain(line)}" for line in shown.unseen),
+        *(f"[yellow]Weakly determined:[/yellow] {plain(line)}" for line in shown.weak[:_WEAK]),
+        *([f"{more} more weakly determined combinations are on the page."] if more > 0 else []),
         *map(plain, notes(result)),
+        *(f"Next: {plain(step)}" for step in verdict.next_steps),
         *([f"[red]{plain(left_out)}[/red]"] if left_out else []),
     )
 
@@ -227,15 +231,18 @@ def _values(result: Calibration) -> Table:
     omitted = len(rows) - _MOST
     return _table(
         rows[:_MOST],
-        f"{omitted} more, which changed less, are on the page." if omitted > 0 else None,
+        f"{omitted} more, which changed less, are on the page. Determined by: measurements (data), "
+        "tolerances of the drawing, or both."
+        if omitted > 0
+        else None,
     )
 
 
 def _table(rows: Sequence[CalibrationRow], caption: str | None = None) -> Table:
     """Return a table of fitted values: drawn, change, 95 % half-width, unit and origin."""
-    numbers = ("drawn", "change", "+- 95 %")
+    numbers = ("drawn", "change", "+- (95 %)")
     return table(
-        *("value", *numbers, "unit", "made by"),
+        *("value", *numbers, "unit", "determined by"),
         rows=[
             (
                 plain(row.name),
@@ -264,5 +271,5 @@ def _errors(result: Calibration) -> list[Table]:
         values = (held_out.before[kind], held_out.after[kind], held_out.expected[kind])
         unit = "mrad" if kind == "angle" else "mm"
         rows.append((kind, *(ascii_number(significant(1e3 * value)) for value in values), unit))
-    caption = f"Errors at {held_out.rows} rows that were not fitted."
-    return [table("held out", *numbers, "unit", rows=rows, numbers=numbers, caption=caption)]
+    caption = f"At {held_out.rows} rows held out of the fit; expected from noise and intervals."
+    return [table("error", *numbers, "unit", rows=rows, numbers=numbers, caption=caption)]

@@ -30,7 +30,8 @@ _SHAPES = {1: ("length", "interval"), 2: ("area", "square"), 3: ("volume", "cube
 """Nouns for the size of a workspace and the shape inscribed in it, by its number of lengths."""
 
 _MAY_BE_SINGULAR = (
-    "Reach and limits count; poses may be singular. --type-ii FLOOR leaves out those that are near."
+    "Reach and joint limits are proved; poses may be singular. --type-ii FLOOR excludes poses near "
+    "type-II singularities."
 )
 """A note under proofs without a least type-II measure."""
 
@@ -116,7 +117,8 @@ class RequestedProofs:
         data = {"robot": robot.name, "floors": self.floors, "tilt": leans.tilt}
         lines = [
             _heading(robot, dict(list(_angles(robot, pose).items())[2:]), self.floors),
-            f"It leans by {math.degrees(leans.tilt):.4g} deg to every side: proved.",
+            f"Proved: the platform can tilt by {math.degrees(leans.tilt):.4g} deg in all "
+            "directions.",
         ]
         return CommandResult(data | {"proved": True, "warnings": warnings}, lines + self._unsure)
 
@@ -135,7 +137,7 @@ class RequestedProofs:
             except ModelError:
                 cube = None
         if not paved.complete:
-            note(f"Warning: the gap is not {percent(tolerance)}: there were too many boxes")
+            note(f"Warning: too many boxes: the gap is still above {percent(tolerance)}")
         contents = paved, pose, self.floors, cube
         return CommandResult(
             _paving_data(*contents) | {"warnings": warnings}, partial(_show, *contents)
@@ -216,26 +218,26 @@ def _show(paved: Paving, pose: Array, floors: dict[str, float], cube: Inscribed 
     robot, shares, (noun, shape) = paved.robot, paved.boundary_shares, _SHAPES[len(paved.axes)]
     show(_heading(robot, _angles(robot, pose), floors))
     if not paved.outer_volume:
-        show("Proved: no position serves.")
+        show("Proved: no position is reachable under these conditions.")
         return
     show(
-        f"Proved {noun}: {paved.inner_volume:.5g} to {paved.outer_volume:.5g} {paved.unit}, "
-        f"gap {percent(paved.gap)} ({len(paved.inner)} boxes inside, "
-        f"{len(paved.boundary)} undecided)"
+        f"Proved {noun} of the workspace: between {paved.inner_volume:.5g} and "
+        f"{paved.outer_volume:.5g} {paved.unit}, gap {percent(paved.gap)} "
+        f"({len(paved.inner)} boxes inside, {len(paved.boundary)} undecided)"
     )
     if cube is None:
-        show(f"No {shape} of any size was found in it.")
+        show(f"No {shape} inside the workspace was found.")
     else:
         center = zip(robot.coordinates, cube.center.round(6).tolist(), strict=True)
         lengths = robot.platform.lengths
         coordinates = ", ".join(pose_text(name, value) for name, value in center if name in lengths)
-        show(f"Largest {shape} that was found, proved: edge {cube.edge:.4g} m about {coordinates}")
+        show(f"Largest {shape} found, proved inside: edge {cube.edge:.4g} m, centre {coordinates}")
     undistinguished = 1.0 - sum(shares.values())
     causes = {plain(cause): share for cause, share in shares.items()}
-    causes |= {"several, not told apart": undistinguished} if undistinguished > 0.0 else {}
+    causes |= {"several of these": undistinguished} if undistinguished > 0.0 else {}
     rows = ((cause, percent(share)) for cause, share in causes.items())
     number = "share of the boundary"
-    show(table("what ends it", number, rows=rows, numbers=(number,)))
+    show(table("what limits the workspace", number, rows=rows, numbers=(number,)))
     if not floors["type_ii"]:
         show(_MAY_BE_SINGULAR)
 
@@ -245,7 +247,7 @@ def _heading(robot: Manipulator, angles: Mapping[str, float], floors: dict[str, 
     where = ", ".join(pose_text(name, angle) for name, angle in angles.items())
     minimums = ", ".join(f"{name} {value:g}" for name, value in floors.items() if value)
     text = f"[bold]{plain(robot.name)}[/bold]{f' at {where}' if where else ''}"
-    return f"{text}, with floors {minimums}" if minimums else text
+    return f"{text}, poses with at least {minimums}" if minimums else text
 
 
 def _angles(robot: Manipulator, pose: Array) -> dict[str, float]:

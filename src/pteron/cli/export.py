@@ -54,16 +54,16 @@ def export(
     tool: str | None = None,
     gains: str | None = None,
 ) -> CommandResult:
-    """Write code for a controller, or the machine as another engine or tool wants it.
+    """Write code for a controller, or the machine in the format of another engine or tool.
 
     With --c or --st: kinematics, Jacobian, dynamics and regressor, in functions that return a
     status, without allocation or state; with a test program and a CMakeLists.txt. Function blocks
     for a PLC are inverse kinematics and inverse dynamics unless others are named. A machine with
-    drives has `feed_forward` as well: what the drives must give, with friction, and
-    `joint_feed_forward`, the same from the motion of the joints. With --base they take what `pteron
-    identify` found, as it lists it, and are called `feed_forward_base` and
-    `joint_feed_forward_base`. The others write one thing each, with no options but --tool,
-    --elbows and --json.
+    drives has `feed_forward` as well, the drives' forces with friction, and `joint_feed_forward`,
+    the same from the motion of the joints. With --base they take the base parameters that `pteron
+    identify` found, in its order, and are called `feed_forward_base` and
+    `joint_feed_forward_base`. The other formats are written one at a time, with no options but
+    --tool, --elbows and --json.
 
     Options
     -------
@@ -81,14 +81,14 @@ def export(
     --linuxcnc DIR: Write kinematics for LinuxCNC.
     --target NAME=DIR: Write with the export NAME of an installed package.
     --float: C: float instead of double.
-    --specialised: C: fold the inertial parameters in.
-    --wrench: Dynamics take a wrench on the platform too.
-    --output UNIT: What drives are told: force at the joints, torque of the motors, or percent of
-        what they are rated for.
-    --base FILE: The identification.json of pteron identify: its values go into the code.
-    --tool NAME: Mount a tool of the machine's file: its body is in the parameters and models that
-        are written, its centre point is the tool's.
-    --gains FILE: The gains.toml of pteron tune: its controller, with these gains, beside what
+    --specialised: C: insert the inertial parameters as constants.
+    --wrench: Dynamics take an external wrench on the platform as input.
+    --output UNIT: Output to the drives: force at the joints, torque of the motors, or percent of
+        the motors' rated torque.
+    --base FILE: The identification.json of pteron identify, whose values go into the code.
+    --tool NAME: Mount a tool that the machine's file lists under tools: the code has its body and
+        its centre point.
+    --gains FILE: The gains.toml of pteron tune: its controller is written too, beside what
         --function names.
 
     Examples

@@ -187,8 +187,8 @@ class Commands(Mapping[str, Any]):
 def pteron(context: Context, *, version: bool = False) -> None:
     """Kinematics, dynamics and base parameters of parallel manipulators (Quadrupteron, Delta, ...).
 
-    SI units and radians everywhere. Where the output goes into a pipe or a file, tables of poses
-    and indices are CSV, without the sentences that a screen gets; --json gives data for programs.
+    All quantities are in SI units and radians. Output to a pipe or a file has tables of poses and
+    indices as CSV, without the sentences of the screen; --json prints data for programs.
 
     Options
     -------

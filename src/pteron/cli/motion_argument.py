@@ -23,6 +23,11 @@ _UNLIKE = 3.0
 """Greatest ratio of a motion's length by its velocities to that by its poses, or inverse of it."""
 
 
+def cycle_text(cycle: str) -> str:
+    """Return the noun for a cycle: the standard one's name, or the table of a motion."""
+    return "standard pick-and-place cycle" if cycle == STANDARD else f"motion of {cycle}"
+
+
 def cycle_of(robot: Manipulator, cycle: str, duration: float | None) -> Motion:
     """Return a cycle by its name, or from a table: of poses, or of joints, from the home pose."""
     if cycle == STANDARD:

@@ -98,7 +98,8 @@ class TableRows:
             serve(values[row])
         except PteronError as error:
             is_millimetres = isinstance(error, UnreachablePose) and error.millimetres
-            doubt = f"; {unlikely}" if unlikely and not is_millimetres else ""
+            is_told = is_millimetres or unlikely in str(error)
+            doubt = f"; {unlikely}" if unlikely and not is_told else ""
             if self.single:
                 raise PteronError(f"{error}{doubt}") from None
             raise PteronError(
@@ -167,9 +168,13 @@ def deliver(
     *,
     out: str | None,
     as_json: bool,
+    caption: str,
     single: bool = False,
 ) -> None:
-    """Write a result with all its columns to a file or a program, or show some to a person."""
+    """Write a result with all its columns to a file or a program, or show some to a person.
+
+    `caption` says what the shown columns are.
+    """
     # The last column shown is empty in a row that failed.
     empty = result.empty(shown[-1])
     without = f", {empty} of them without a result" if empty else ""
@@ -186,7 +191,7 @@ def deliver(
         write(text[1:-1] if single else text)
         write("\n")
     elif is_terminal():
-        _show(robot, result, shown, single=single)
+        _show(robot, result, shown, caption, single=single)
     else:
         for text in result.text():
             write(text)
@@ -195,7 +200,12 @@ def deliver(
 
 
 def _show(
-    robot: Manipulator, result: Table | TypedRow, shown: Sequence[str], *, single: bool
+    robot: Manipulator,
+    result: Table | TypedRow,
+    shown: Sequence[str],
+    caption: str,
+    *,
+    single: bool,
 ) -> None:
     """Print the first rows of a result as a table, with units in its headings."""
     known = robot.column_units
@@ -205,6 +215,7 @@ def _show(
         [str(i), *map(_text, cells, units)]
         for i, cells in enumerate(result.rows(shown, SHOWN_ROWS), start=1)
     ]
+    show(caption)
     if single or "mode" in shown:
         show(table(*headings, rows=(row[1:] for row in rows), numbers=tuple(headings)))
     else:

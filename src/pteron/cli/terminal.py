@@ -146,6 +146,18 @@ def percent(share: float) -> str:
     return "under 0.1 %" if 0.0 < share < 1e-3 else f"{100.0 * share:.3g} %"
 
 
+def significant(value: float, digits: int = 3) -> str:
+    """Return a number with significant digits, without an exponent below a million.
+
+    Examples
+    --------
+    >>> significant(5526.8), significant(0.31437)
+    ('5527', '0.314')
+    """
+    text = f"{value:.{digits}g}"
+    return f"{value:.0f}" if "e+" in text and abs(value) < 1e6 else text
+
+
 def ascii_number(text: str) -> str:
     """Return a typeset number with the minus that every terminal has."""
     return text.replace("\u2212", "-").replace("\u221e", "inf")

@@ -137,9 +137,9 @@ def friction_below_zero(model: Model, observations: Observations, fit: Estimate)
         for k in chosen
     )
     return (
-        f"Below zero beyond its interval, which no friction is: {negative}. Where there is none, "
-        "one in 40 is so by chance; else something acts that the model has not, and intervals are "
-        "too short.",
+        f"Friction is below zero beyond its interval, which is impossible: {negative}. Without any "
+        "friction one in 40 is so by chance; otherwise an effect acts that the model lacks, and "
+        "the intervals are too short.",
     )
 
 

@@ -107,7 +107,7 @@ def front_figure(
                 zorder=5,
             )
         if begun is not None and np.isfinite(begun[[0, k]]).all():
-            label = "to begin with" if k == 1 else None
+            label = "initial machine" if k == 1 else None
             spot(axes, begun[k], begun[0], INK, PAPER, 11.0, marker="*", label=label, zorder=6)
         axes.margins(0.08)
     legend(figure, 3)

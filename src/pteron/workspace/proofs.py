@@ -76,15 +76,13 @@ class Proof(Result):
         causes = ", ".join(map(str, self.causes))
         if self.holds:
             count = len(self.conditions)
-            return f"proved: every pose keeps all {count} conditions (boxes: {self.boxes})"
+            return f"proved: every pose meets all {count} conditions (boxes: {self.boxes})"
         if self.counterexample is not None:
-            return (
-                f"not so: pose {self.counterexample.round(6).tolist()} does not serve: {self.why}"
-            )
+            return f"disproved: pose {self.counterexample.round(6).tolist()} fails: {self.why}"
         assert self.undecided is not None
         low, high = (corner.round(6).tolist() for corner in self.undecided)
         return (
-            f"not decided of poses from {low} to {high}: {causes}; the region may touch that edge"
+            f"undecided for poses from {low} to {high}: {causes}; the region may touch the boundary"
         )
 
     @property
@@ -102,7 +100,8 @@ class Proof(Result):
             if joint is not None:
                 text += f" ({joint.value:.4g} {joint.unit} of {joint.limits_text('{:g}'.format)})"
             elif condition.floor:
-                text += f" ({excess + condition.floor:.4g}, at least {condition.floor:.4g} asked)"
+                value = excess + condition.floor
+                text += f" ({value:.4g}, at least {condition.floor:.4g} required)"
             elif condition.leg and margins[condition.leg - 1] < 0.0:
                 text += f" (it misses the pose by {-margins[condition.leg - 1]:.3g} m)"
             texts.append(text)

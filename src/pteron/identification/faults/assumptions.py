@@ -182,8 +182,8 @@ def hidden_orders(robot: Manipulator, log: Log, how: Preprocessing) -> str:
         )
     names = ", or ".join("-".join(str(k + 1) for k in order) for order in hidden)
     return (
-        f"These logs cannot show whether the legs are in another order, {names}: mirrored or "
-        "turned the machine explains the forces as well."
+        f"These logs cannot show whether the legs are in another order, {names}: the mirrored or "
+        "rotated machine explains the forces as well."
     )
 
 

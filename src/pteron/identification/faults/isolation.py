@@ -15,7 +15,7 @@ from pteron.identification.estimators import Estimate
 from pteron.identification.faults.columns import DELAY, Family, FaultColumns
 from pteron.identification.faults.cycle import ReferenceCycle
 from pteron.identification.faults.cycle_errors import expected_errors
-from pteron.identification.faults.fault import ORDER, FaultName, IsolatedFault
+from pteron.identification.faults.fault import IN_WORDS, ORDER, FaultName, IsolatedFault
 from pteron.identification.faults.hidden import hidden_faults
 from pteron.identification.faults.log_faults import LogFault
 from pteron.identification.faults.play import PlayRecord, backlash_signature
@@ -41,8 +41,8 @@ _ROUNDS = 6
 """Greatest number of times that a delay is corrected and sought again."""
 
 _OF_FACTOR = (
-    "All forces of the bodies are {factor:.2g} times those of the drawing, as where the gain of "
-    "all torques or the gear ratio is off by that factor: check gains, rated torque and gear "
+    "All forces of the bodies are {factor:.2g} times those of the drawing, as if the gain of all "
+    "torques or the gear ratio were wrong by that factor: check gains, rated torque and gear "
     "ratio, or the drawing's masses."
 )
 """Sentence on forces that have a factor in common beside those of the drawing."""
@@ -83,11 +83,14 @@ class FaultIsolation(Result):
         Faults of the logs as such.
     factor : float
         Forces of the bodies over those of the drawing, where all have that factor in common.
+    small : tuple of (str, float)
+        Faults that show but are too small to be named among `faults`: the name, and the largest
+        error that the fault makes in the forces of a reference cycle, percent.
     """
 
     ROWS = "faults"
 
-    tried: tuple[str, ...]
+    tried: tuple[FaultName, ...]
     faults: tuple[IsolatedFault, ...]
     uncertain: Array
     spoiled: Array
@@ -96,6 +99,7 @@ class FaultIsolation(Result):
     late: bool = False
     log: tuple[LogFault, ...] = ()
     factor: float = 1.0
+    small: tuple[tuple[FaultName, float], ...] = ()
 
     suspicions = former_attribute("suspicions", "faults")
 
@@ -111,6 +115,25 @@ class FaultIsolation(Result):
             for k, fault in enumerate(ranked)
         ]
         return (*(fault.message for fault in self.log), *of_file, *machine)
+
+    @property
+    def small_faults_text(self) -> str:
+        """A clause on the faults that show but are too small to matter, or that none shows."""
+        if not self.small:
+            return "No fault shows in the residuals"
+        names = ", ".join(IN_WORDS[name] for name, _ in self.small)
+        most = max(percent for _, percent in self.small)
+        effect = "less than 0.01" if most < 0.01 else f"up to {most:.2g}"
+        threshold = f"below the threshold of {_NAMED:g} %" if most < _NAMED else "a negligible size"
+        return (
+            f"No fault that matters shows in the residuals: {names} changes the forces of a cycle "
+            f"by {effect} % ({threshold})"
+        )
+
+    @property
+    def tested(self) -> tuple[str, ...]:
+        """The faults that were tried, in words."""
+        return tuple(IN_WORDS[name] for name in self.tried)
 
     @property
     def expected_error(self) -> Array:
@@ -209,7 +232,7 @@ def _isolate_in_parts(
         columns, states, other, estimate, plain, found_faults
     )
     step = 1.0 / max(part.how.rate for part in parts)
-    faults = _named_faults(columns, plain, found_faults, each, step)
+    faults, small = _named_faults(columns, plain, found_faults, each, step)
 
     # Play, which no column has
     play, looked = _play(parts, estimate.values, step)
@@ -227,8 +250,9 @@ def _isolate_in_parts(
             gain = replace(gain, as_well=("clock",))
         faults.insert(0, gain)
         spoiled = np.hypot(spoiled, gain.cycle)
-    names = dict.fromkeys(family.name for family in columns.families)
-    tried = (*names, *["play"] * looked, *["gain"] * (factor is not None))
+    names: dict[FaultName, None] = dict.fromkeys(family.name for family in columns.families)
+    further: dict[FaultName, bool] = {"play": looked, "gain": factor is not None}
+    tried = (*names, *(name for name, was_tried in further.items() if was_tried))
     if factor is None or not factor.is_detectable:
         left_open.insert(0, "gain")
     if not looked:
@@ -240,6 +264,7 @@ def _isolate_in_parts(
         spoiled,
         hidden=tuple(name for name in left_open if name not in {fault.fault for fault in faults}),
         late=any(fault.family is DELAY for fault in found_faults),
+        small=small,
     )
 
 
@@ -271,15 +296,19 @@ def _named_faults(
     found_faults: Sequence[FoundFault],
     each: Sequence[Array],
     step: float,
-) -> list[IsolatedFault]:
-    """Return the faults that change a cycle's forces by enough to be named."""
+) -> tuple[list[IsolatedFault], tuple[tuple[FaultName, float], ...]]:
+    """Return the faults that change a cycle's forces by enough to be named, and the smaller ones.
+
+    Of these the name and the largest change, percent.
+    """
     p = len(columns.model.names)
     fits = [plain, *(fault.fit for fault in found_faults)]
     shifts = [
         float(np.abs((b.values[:p] - a.values[:p]) / b.deviations[:p]).max())
         for a, b in pairwise(fits)
     ]
-    faults = []
+    faults: list[IsolatedFault] = []
+    small: list[tuple[FaultName, float]] = []
     for fault, shift, spoils in zip(found_faults, shifts, each, strict=True):
         family = fault.family
         negligible = np.abs(fault.sizes).max() <= family.tolerance.negligible
@@ -288,7 +317,9 @@ def _named_faults(
             speeds = None if family.speed is None else family.speed * columns.usual
             labels = tuple(family.sizes(columns.model))
             faults.append(IsolatedFault(family.name, labels, *seen, speeds, step, fault.as_well))
-    return faults
+        else:
+            small.append((family.name, float(np.max(spoils))))
+    return faults, tuple(small)
 
 
 def _wrong_gain(

@@ -179,7 +179,7 @@ def delay_fault(delay: float, deviation: float) -> LogFault:
     said = (
         f"The {late} are {1e3 * abs(delay):.3g} ms (+- {2e3 * deviation:.1g}) late for the {early}"
     )
-    return LogFault("delay", f"{said}; that is taken out (--delay 0 leaves it in).", delay, False)
+    return LogFault("delay", f"{said}; this is corrected (--delay 0 leaves it in).", delay, False)
 
 
 def lost_share(log: Log) -> float:

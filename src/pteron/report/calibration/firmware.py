@@ -95,11 +95,11 @@ def _sentence(fitted: Calibration) -> str:
     if held_out is None:
         return "With these six values alone no rows were left for a check."
     parts = [
-        f"the {kind} error is {1e3 * after:.3g} mm, {1e3 * held_out.before[kind]:.3g} before"
+        f"the {kind} error is {1e3 * after:.3g} mm ({1e3 * held_out.before[kind]:.3g} mm before)"
         for kind, after in held_out.after.items()
         if kind != "angle"
     ]
     return (
-        f"With these six values alone, at {held_out.rows} rows that were not fitted, "
+        f"With these six values alone, at {held_out.rows} rows held out of the fit, "
         f"{' and '.join(parts)}."
     )

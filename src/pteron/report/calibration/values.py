@@ -77,18 +77,18 @@ def notes(result: Calibration) -> tuple[str, ...]:
     sentences = []
     if any(finding.kind == "mistake" for finding in result.findings):
         sentences.append(
-            "The machine as found belongs to the log with its mistake undone: mend the log, or the "
-            "controller that wrote it, before readings lead to poses."
+            "The calibrated machine belongs to the log with its mistake undone: correct the log, "
+            "or the controller that wrote it, before you compute poses from readings."
         )
     if any(value.group in ("zeros", "scales") for value in result.values):
         sentences.append(
-            f"Zeros and scales of joints {', '.join(reading_legs)} are the legs' reading in "
-            "robot.toml: joint coordinate = zero + scale x reading."
+            f"Zeros and scales of joints {', '.join(reading_legs)} are in robot.toml as reading of "
+            "the legs: joint coordinate = zero + scale x reading."
             if reading_legs
-            else "The geometry has taken the joints' zeros: joint coordinates are readings."
+            else "The geometry contains the joints' zeros: joint coordinates equal readings."
         )
     sentences.append(
-        "Masses, centres of mass, moments of inertia and friction are as they were on the drawn "
-        "geometry: where they were identified, identify them again on this one."
+        "Masses, centres of mass, moments of inertia and friction are unchanged: if they were "
+        "identified with the drawn geometry, identify them again with this one."
     )
     return tuple(sentences)
