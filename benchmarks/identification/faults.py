@@ -512,10 +512,11 @@ def misjudged(said: dict[Key, Said]) -> list[str]:
     count = sum(k[1] in CORRECT for k in said)
     return [
         f"{len(said) - count} logs with a fault, {count} without.",
-        f"Logs with the grade trustworthy although the error in the cycle is above 3 %: {len(trusted)}.",
-        f"Among these, logs whose verdict does not say that it cannot tell the fault: {untold or 'none'}.",
-        f"Logs without a fault that were refused, or in which a fault was named: {accused or 'none'}.",
-        f"Logs whose verdict says \"cannot tell\" although such a fault was found in a like log: {wrong or 'none'}.",
+        f"Logs graded trustworthy although the error in the cycle is above 3 %: {len(trusted)}.",
+        f"Among these, verdicts that do not say that the fault cannot show: {untold or 'none'}.",
+        f"Logs without a fault that were refused, or with a fault named: {accused or 'none'}.",
+        'Verdicts that say "cannot tell" although a fault of this kind was found in a similar log: '
+        f"{wrong or 'none'}.",
     ]
 
 
@@ -577,10 +578,10 @@ how wrong the identified model is. It is for readers who want to know how far a 
 trusted. Every log is simulated, so that the true machine is known.
 
 `python benchmarks/identification/faults.py` makes the table: {} log per cell, twice as many in the
-rows without a fault. A machine whose bodies differ by up to 20 % from the drawing moves along random
-Fourier series for 10 s (Par4 and five-bar: 8 s) at 400 Hz. It has friction, encoders (resolution
-1 um, or 20 bits per turn) and noise of 1 % of each force. A second motion is held out: it is not
-fitted but serves to judge the model.
+rows without a fault. A machine whose bodies differ by up to 20 % from the drawing moves along
+random Fourier series for 10 s (Par4 and five-bar: 8 s) at 400 Hz.
+It has friction, encoders (resolution 1 um, or 20 bits per turn) and noise of 1 % of each force. A
+second motion is held out: it is not fitted but serves to judge the model.
 
 Each cell has up to four lines:
 
