@@ -450,14 +450,17 @@ def test_no_message_suggests_other_dimensions_where_poses_are_in_reach():
 def test_the_page_of_verdicts_has_the_thresholds_as_they_are():
     """A threshold that changes is to change on the page, beside the sentence that explains it."""
     page = (Path(__file__).parents[1] / "docs" / "verdicts.md").read_text("utf-8")
-    table = page[page.index("| words | measure") :].split("\n\n")[0]
+    table = page[page.index("| words in the message |") :].split("\n\n")[0]
     rows = {row.split("|")[1].strip(): row.split("|")[3].strip() for row in table.splitlines()[2:]}
     shown = {
         "singular everywhere within": (
-            "0.1 mm, or L/1000",
+            "0.1 mm, or $L/1000$",
             (rounding_tolerance(1.0), rounding_tolerance(1e-3)) == (1e-4, 1e-6),
         ),
-        "coordinates that differ by ... make the machine": ("ten times that", INACCURATE == 10.0),
+        "coordinates that differ by ... make the machine": (
+            "ten times the previous threshold",
+            INACCURATE == 10.0,
+        ),
         "leg forces are up to": ("0.02", LEAST_SINGULAR_VALUE == 0.02),
         "to hold the weight": ("10", HOLDING_FORCE == 10.0),
         "near it a leg": ("100", HOLDING_FORCE_NEAR == 100.0),

@@ -512,10 +512,11 @@ def misjudged(said: dict[Key, Said]) -> list[str]:
     count = sum(k[1] in CORRECT for k in said)
     return [
         f"{len(said) - count} logs with a fault, {count} without.",
-        f"Trustworthy with a cycle more than 3 % off: {len(trusted)}.",
-        f"Of these the verdict does not say that they cannot tell the fault: {untold or 'none'}.",
-        f"Correct logs that are refused, or of which a fault was named: {accused or 'none'}.",
-        f"Logs of which the verdict says wrongly what they can tell: {wrong or 'none'}.",
+        f"Logs graded trustworthy although the error in the cycle is above 3 %: {len(trusted)}.",
+        f"Among these, verdicts that do not say that the fault cannot show: {untold or 'none'}.",
+        f"Logs without a fault that were refused, or with a fault named: {accused or 'none'}.",
+        'Verdicts that say "cannot tell" although a fault of this kind was found in a similar log: '
+        f"{wrong or 'none'}.",
     ]
 
 
@@ -572,13 +573,29 @@ def table(said: dict[Key, Said], machines: Sequence[str]) -> str:
 
 _HEAD = """# Verdicts on logs with a fault
 
-`python benchmarks/identification/faults.py`, {} log a cell, twice as many without a fault. A
-machine 20 % off its drawing moves along random Fourier series, 10 s (Par4, five-bar: 8 s) at
-400 Hz, with friction, encoders (1 um, or 20 bits a turn) and noise of 1 % of each force; another
-motion is held out. Each cell: grades; what was named, and in how many logs; how far the model
-file's forces are off on a pick-and-place cycle as fast as the motion (largest of the actuators,
-percent of the forces' standard deviation); what the verdict says that these logs cannot tell: a
-factor of all forces (gain), one force's scale, the rate of the clock.
+This page shows, for each kind of fault in a recorded log, which verdict `pteron identify` gives and
+how wrong the identified model is. It is for readers who want to know how far a verdict can be
+trusted. Every log is simulated, so that the true machine is known.
+
+`python benchmarks/identification/faults.py` makes the table: {} log per cell, twice as many in the
+rows without a fault. A machine whose bodies differ by up to 20 % from the drawing moves along
+random Fourier series for 10 s (Par4 and five-bar: 8 s) at 400 Hz.
+It has friction, encoders (resolution 1 um, or 20 bits per turn) and noise of 1 % of each force. A
+second motion is held out: it is not fitted but serves to judge the model.
+
+Each cell has up to four lines:
+
+1. the grade, with the number of logs that got it;
+2. the faults that the verdict names, with the number of logs. If the grade is "refused",
+   `identify` ended with an error, and this line has its reason: reversed or exchanged columns
+   (columns), joint coordinates of which no pose exists (no pose), an encoder that wraps around
+   (wrapped), or a log that contradicts the robot file (contradicted);
+3. the error of the identified model in a pick-and-place cycle as fast as the motion: the root mean
+   square error of a force, in per cent of the standard deviation of the force, for the worst
+   actuator;
+4. "cannot tell": quantities about which, according to the verdict, the logs contain no information.
+   These are a common factor of all forces (gain), the scale of one force (scale), the rate of the
+   clock (clock), and backlash (play).
 
 """
 

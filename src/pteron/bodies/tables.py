@@ -45,28 +45,34 @@ class TomlTable(BaseModel):
 class Slider(TomlTable):
     """`{ mass }` of a body that does not turn."""
 
-    mass: Number = Field(description="kg")
+    mass: Number = Field(description="mass, kg")
 
 
 class BarTable(TomlTable):
     """`{ mass, hinge }` of a part that moves with the platform and does not turn."""
 
-    mass: Number = Field(description="kg")
-    hinge: Three = Field(description="its hinge on the part that turns, in the platform frame, m")
+    mass: Number = Field(description="mass, kg")
+    hinge: Three = Field(
+        description="place of its hinge on the part that turns, in the platform frame, m"
+    )
 
 
 class GearedTable(TomlTable):
     """`{ inertia, ratio }` of a part that a gear turns with the platform."""
 
-    inertia: Number = Field(description="about its own axis, which is parallel to axis, kg m^2")
-    ratio: Number = Field(description="its angle over phi")
+    inertia: Number = Field(
+        description="moment of inertia about its own axis, parallel to axis, kg m^2"
+    )
+    ratio: Number = Field(description="angle of the part divided by phi")
 
 
 class _Body(TomlTable):
-    mass: Number = Field(description="kg")
+    mass: Number = Field(description="mass, kg")
     center_of_mass: Any = None
     first_moment: Any = None
-    inertia: Any = Field(description="about the origin, not the centre of mass, kg m^2")
+    inertia: Any = Field(
+        description="moment of inertia about the origin, not the centre of mass, kg m^2"
+    )
 
     kind: ClassVar[type[PlanarInertia] | type[RodInertia] | type[SpatialInertia]]
 
@@ -111,15 +117,17 @@ class _Body(TomlTable):
         )
 
 
-_CENTER = "in the body's frame, m"
-_MOMENT = "mass times center_of_mass, which it may replace, kg m"
+_CENTER = "of the centre of mass in the body's frame, m"
+_MOMENT = "mass times center_of_mass, kg m; instead of it"
 
 
 class PlanarBody(_Body):
     """`{ mass, inertia, center_of_mass or first_moment }` of a body in a plane."""
 
     kind = PlanarInertia
-    inertia: Number = Field(description="about the origin, not the centre of mass, kg m^2")
+    inertia: Number = Field(
+        description="moment of inertia about the origin, not the centre of mass, kg m^2"
+    )
     center_of_mass: Two | None = Field(None, description=f"[x, y] {_CENTER}")
     first_moment: Two | None = Field(None, description=_MOMENT)
 
@@ -128,7 +136,9 @@ class RodBody(_Body):
     """`{ mass, inertia, center_of_mass or first_moment }` of a rod, whose vectors have x only."""
 
     kind = RodInertia
-    inertia: Number = Field(description="about the origin, not the centre of mass, kg m^2")
+    inertia: Number = Field(
+        description="moment of inertia about the origin, not the centre of mass, kg m^2"
+    )
     center_of_mass: One | None = Field(None, description=f"[x] {_CENTER}")
     first_moment: One | None = Field(None, description=_MOMENT)
 

@@ -85,8 +85,8 @@ class _Motion(TomlTable):
         'axis. "2T1R": also phi. Tilting: "3T3R", "3R" and "2R" about center, "1T2R" of a tripod'
     )
     axis: Three = key(
-        "k, which the platform turns about; the normal of a planar machine's plane; "
-        "the platform frame's z at angles zero",
+        "k, the axis about which the platform turns; for planar machines the normal of the plane; "
+        "for others the platform frame's z at angles zero",
         (0.0, 0.0, 1.0),
     )
     x_axis: Three | None = key(
@@ -99,11 +99,9 @@ class _Motion(TomlTable):
 class PlatformTable(PlanarBody, _Motion):
     """`[platform]`: its body's origin is P, its frame turns with phi."""
 
-    slides: bool = key(
-        "whether phi slides the platform points, m/rad, as an I4's nacelle does", False
-    )
+    slides: bool = key("whether phi moves the platform points straight, m/rad, as in an I4", False)
     limits: Two | None = key(
-        "least and greatest phi, rad, where hinges allow no more; may be several turns",
+        "least and greatest phi that the hinges allow, rad; may be several turns",
         None,
         [-0.8, 0.8],
     )
@@ -114,7 +112,7 @@ class PlatformTable(PlanarBody, _Motion):
         [{"mass": 0.1, "hinge": [0.05, 0.0, 0.0]}],
     )
     geared: list[GearedTable] = key(
-        "balanced parts, such as a tool, that a gear turns with the platform",
+        "balanced parts, such as a tool, that a gear turns when the platform turns",
         [],
         [{"inertia": 6e-5, "ratio": 4.0}],
     )
@@ -124,17 +122,17 @@ class TiltingTable(SpatialBody, _Motion):
     """`[platform]` that tilts: its body's origin is P, its frame turns by the pose's angles."""
 
     angles: AngleOrder = key(
-        'of 3T3R and 3R, "rpy": R = Rz(yaw) Ry(pitch) Rx(roll). "xyz": R = Rx(rx) Ry(ry) Rz(rz)',
+        'for 3T3R and 3R, "rpy": R = Rz(yaw) Ry(pitch) Rx(roll). "xyz": R = Rx(rx) Ry(ry) Rz(rz)',
         "rpy",
     )
     center: Three | None = key(
-        "of 3R and 2R: P, on the joint that the platform turns about, m", None, [0.0, 0.0, 0.1]
+        "for 3R and 2R: P, at the joint about which the platform turns, m", None, [0.0, 0.0, 0.1]
     )
     second_axis: Three | None = key(
-        "of 2R: what beta turns about, at alpha = 0; alpha turns about axis", None, [0.0, 1.0, 0.0]
+        "for 2R: the axis of beta at alpha = 0; the axis of alpha is axis", None, [0.0, 1.0, 0.0]
     )
     limits: list[Two] | None = key(
-        "least and greatest of each angle, rad", None, [[-0.5, 0.5], [-0.5, 0.5], [-0.5, 0.5]]
+        "least and greatest value of each angle, rad", None, [[-0.5, 0.5], [-0.5, 0.5], [-0.5, 0.5]]
     )
     tool: Three = key("the tool's centre point in the platform frame, m", (0.0, 0.0, 0.0))
 
@@ -148,15 +146,15 @@ def platform_table(motion: Any) -> type[PlatformTable] | type[TiltingTable]:
 class ToolTable(TomlTable):
     """`[[tools]]`: a tool that the platform can carry, which --tool and `with_tool` mount."""
 
-    name: str = key("what it is called")
-    point: Three = key("its centre point in the platform frame, m", (0.0, 0.0, 0.0))
-    mass: Number = key("kg", 0.0)
+    name: str = key("name of the tool")
+    point: Three = key("centre point of the tool in the platform frame, m", (0.0, 0.0, 0.0))
+    mass: Number = key("mass, kg", 0.0)
     center_of_mass: Three | None = key(
-        "in the platform frame, m; its point if left out", None, [0.0] * 3
+        "centre of mass in the platform frame, m; if omitted, point", None, [0.0] * 3
     )
     central_inertia: Number | Six = key(
-        "about its own centre of mass, kg m^2: along axis; where the platform tilts "
-        "[Ixx, Ixy, Ixz, Iyy, Iyz, Izz]",
+        "moment of inertia about its own centre of mass, kg m^2: along axis; for platforms that "
+        "tilt [Ixx, Ixy, Ixz, Iyy, Iyz, Izz]",
         0.0,
     )
 
@@ -164,35 +162,33 @@ class ToolTable(TomlTable):
 class HomeTable(TomlTable):
     """`[home]`: where the machine stands before it moves."""
 
-    pose: list[Number] = key("the pose's coordinates in their order, m and rad")
+    pose: list[Number] = key("coordinates of the pose in their order, m and rad")
 
 
 class MachineTable(TomlTable):
     """The whole file; each of `legs` is read by its own kind."""
 
-    name: str = key("what the machine is called")
+    name: str = key("name of the machine")
     gravity: Three = key("acceleration of gravity in the base frame, m/s^2", STANDARD_GRAVITY)
     radii: RadiiTable | None = key(  # type: ignore[valid-type]
-        "how thick the bodies are round their centre lines, m: for clearances",
+        "radii of the bodies around their centre lines, m: for clearances",
         None,
         {"guide": 0.01, "upper": 0.01, "lower": 0.008, "platform": 0.01},
     )
     tools: list[ToolTable] = key(
-        "tools that the platform can carry, beside what it is",
+        "exchangeable tools that the platform can carry",
         [],
         [{"name": "gripper", "point": [0.0, 0.0, -0.08], "mass": 0.3}],
     )
     home: HomeTable | None = key(
-        "where the machine stands; left out, it is found: see home_pose", None
+        "pose where motions begin; chosen by Pteron if omitted: see home_pose", None
     )
-    owner: dict[str, Any] = key(
-        "data of its owner: kept as it is, without effect", {}, {"serial": "Q-07"}
-    )
-    platform: PlatformTable = key("what the legs carry")
-    legs: list[Any] = key("one table for each freedom of the platform")
+    owner: dict[str, Any] = key("data of the owner: kept, without effect", {}, {"serial": "Q-07"})
+    platform: PlatformTable = key("the platform, which the legs carry")
+    legs: list[Any] = key("the legs: one table for each degree of freedom of the platform")
 
 
 class TiltingMachineTable(MachineTable):
     """The same of a machine whose platform tilts."""
 
-    platform: TiltingTable = key("what the legs carry")  # type: ignore[assignment]
+    platform: TiltingTable = key("the platform, which the legs carry")  # type: ignore[assignment]
