@@ -13,7 +13,7 @@ import numpy as np
 import scipy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
-from pteron.identification.errors import OfLog
+from pteron.identification.errors import LogSourceMixin
 from pteron.identification.logs import Log
 from pteron.identification.signals import Preprocessing, States
 from pteron.identification.signals.derivatives import EVEN, FourierFit
@@ -58,7 +58,7 @@ _ROWS = ("matrix", "forces", "time", "gain", "payload")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Observations(OfLog, Result):
+class Observations(LogSourceMixin, Result):
     """Rows of F = W beta, after the parallel filter.
 
     Rows are divided by the filter's gain for white noise: the residuals of a fit have the standard

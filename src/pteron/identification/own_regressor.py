@@ -164,7 +164,7 @@ def estimate(
         if error.reason == "too little motion" and not reduce:
             error.args = (f"{error}; or give reduce=True, which leaves out dependent columns",)
         raise
-    prediction = _prediction(check, values, repeats=held_out is None)
+    prediction = _predict(check, values, repeats=held_out is None)
     return RegressorFit(
         values,
         essential_parameters(fit, values, solve),
@@ -208,7 +208,7 @@ def _estimate_by_instruments(
 ) -> Estimate:
     """Return the estimate by instruments, or by a function that returns them for values."""
     if callable(instruments):
-        return instrumental(fit, lambda values: read(instruments(values)))
+        return instrumental(fit, lambda beta: read(instruments(beta)))
     return instrumental(fit, read(instruments))
 
 
@@ -226,7 +226,7 @@ def _instruments(
     return part if independent is None else part.columns(independent.kept)
 
 
-def _prediction(check: Observations, estimate: Estimate, *, repeats: bool) -> Prediction:
+def _predict(check: Observations, estimate: Estimate, *, repeats: bool) -> Prediction:
     """Return the prediction of held-out forces by the estimated values, with its errors."""
     predicted = check.matrix @ estimate.values
     without = np.full(predicted.shape, np.nan)

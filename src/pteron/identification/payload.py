@@ -150,7 +150,8 @@ class Payload(Result):
     def call(self, robot: RobotLike) -> str:
         """Return the call of exported C that sets the payload, and the command-line option."""
         mass, center, inertia = (
-            ", ".join(f"{value:.9g}" for value in np.ravel(part)) for part in self.arguments(robot)
+            ", ".join(f"{number:.9g}" for number in np.ravel(part))
+            for part in self.arguments(robot)
         )
         option = "@".join((mass, center, inertia)).replace(" ", "")
         return (
@@ -186,9 +187,9 @@ class Payload(Result):
     def summary(self) -> str:
         """Return the payload, for people, as lines of text."""
         lines = ["Payload, about P in the platform's frame:"]
-        for name, value, deviation in zip(self.names, self.values, self.deviations, strict=True):
+        for name, size, deviation in zip(self.names, self.values, self.deviations, strict=True):
             unit = self.estimate.units[self.estimate.names.index(name)]
-            lines.append(f"  {name:<6} {value:+.5g} +- {deviation:.2g} {unit}")
+            lines.append(f"  {name:<6} {size:+.5g} +- {deviation:.2g} {unit}")
         if self.center_of_mass is not None:
             center = ", ".join(f"{x:+.5g}" for x in self.center_of_mass)
             lines.append(f"Centre of mass: ({center}) m.")
@@ -202,7 +203,7 @@ class Payload(Result):
         if not self.has_valid_errors:
             lines.append("The stated errors do not allow for that.")
         lines += [f"Note: {finding.message}" for finding in self.findings]
-        residuals = ", ".join(f"{value:.2g}" for value in self.residual)
+        residuals = ", ".join(f"{size:.2g}" for size in self.residual)
         lines.append(
             f"Residuals of the actuator forces: {residuals} (standard deviations, N or N m)."
         )
@@ -305,7 +306,7 @@ def identify_payload(
         )
         if cause and len(hidden) > _MOST_UNSEEN * model.base.rank:
             raise fit[0].log.fault("left over", cause)  # no verdict of a payload could say so
-    return _payload(
+    return _payload_of_fit(
         model,
         estimate,
         isolate_faults(model, estimate, fit, plans),
@@ -313,14 +314,19 @@ def identify_payload(
     )
 
 
-def payload_in(found: Identification) -> Payload | None:
+def payload_in(identification: Identification) -> Payload | None:
     """Return the payload that `identify` found beside the machine; None without its mass."""
-    if "m_L" not in found.estimate.names:
+    if "m_L" not in identification.estimate.names:
         return None
-    return _payload(found.model, found.estimate, found.fault_isolation, [found.findings])
+    return _payload_of_fit(
+        identification.model,
+        identification.estimate,
+        identification.fault_isolation,
+        [identification.findings],
+    )
 
 
-def _payload(
+def _payload_of_fit(
     model: Model,
     estimate: Estimate,
     isolation: FaultIsolation,

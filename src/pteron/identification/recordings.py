@@ -14,7 +14,7 @@ import numpy as np
 from pteron.errors import DataError
 from pteron.identification.logs import Finding, Log, LogFile
 from pteron.identification.logs.bridging import fill_gaps
-from pteron.identification.logs.log import TimeStamps
+from pteron.identification.logs.time_stamps import TimeStamps
 from pteron.identification.signals.repetition import repeating_rows
 from pteron.kernels import Array
 
@@ -98,7 +98,7 @@ def read_recording(
     progress: Callable[[int], None] | None = None,
     period: float | None = None,
 ) -> Recording:
-    """Return a log as a recording; files of a usual length are read whole.
+    """Return a log as a recording, with gaps filled; files of a usual length are read whole.
 
     Of a log whose description says that its motion leads in and out, the rows that repeat after the
     period (s; by default as described) are taken.
@@ -163,7 +163,7 @@ def hold_same_samples(first: Recording, other: Recording) -> bool:
 
 
 def _rebase_times(time: Array) -> Array:
-    """Return times from the first on: far from zero, stamps are rounded.
+    """Return times (T,), s, relative to the first, without the rounding of large time stamps.
 
     Those of a steady clock are put on its ticks again, with the roundest step that fits them.
     """

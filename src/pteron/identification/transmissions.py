@@ -64,8 +64,8 @@ class Transmissions(Result):
     def add_to(self, robot: RobotLike) -> Manipulator:
         """Return a machine with elastic drives; insignificant damping and play are 0."""
         robot = as_manipulator(robot)
-        damping = _clear(self.damping, self.damping_deviations)
-        play = _clear(self.backlash, self.backlash_deviations)
+        damping = _significant(self.damping, self.damping_deviations)
+        play = _significant(self.backlash, self.backlash_deviations)
         bends = (part.tolist() for part in (self.stiffness, damping, play))
         legs = zip(robot.legs, *bends, strict=True)
         return replace(
@@ -79,9 +79,9 @@ class Transmissions(Result):
     in_drives_of = former_attribute("in_drives_of", "add_to")
 
 
-def _clear(values: Array, deviations: Array) -> Array:
+def _significant(estimates: Array, deviations: Array) -> Array:
     """Return values that differ from zero significantly, and 0 for the others."""
-    return np.where(values > _CLEAR * deviations, values, 0.0)
+    return np.where(estimates > _CLEAR * deviations, estimates, 0.0)
 
 
 def identify_transmissions(
@@ -154,9 +154,9 @@ def identify_transmissions(
     return Transmissions(*np.array(fits).T)
 
 
-def _interpolate(known: Array, values: Array, time: Array) -> Array:
+def _interpolate(known: Array, signals: Array, time: Array) -> Array:
     """Return signals (T, n), interpolated at other times."""
-    return np.column_stack([np.interp(time, known, column) for column in values.T])
+    return np.column_stack([np.interp(time, known, column) for column in signals.T])
 
 
 def _fit_transmission(

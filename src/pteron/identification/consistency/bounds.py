@@ -21,15 +21,15 @@ axis."""
 
 @dataclass(frozen=True)
 class LinearLimits:
-    """Linear limits `matrix @ parameters <= right`, and what each one is called."""
+    """Linear limits `matrix @ parameters <= right`, each with its name."""
 
     matrix: Array
     right: Array
     names: tuple[str, ...]
 
-    def violations(self, values: Array, tolerance: Array) -> tuple[str, ...]:
-        """Return the limits that parameters (N,) do not keep, and by how much, SI units."""
-        over = self.matrix @ values - self.right
+    def violations(self, parameters: Array, tolerance: Array) -> tuple[str, ...]:
+        """Return the limits that parameters (N,) violate, and by how much, SI units."""
+        over = self.matrix @ parameters - self.right
         return tuple(
             f"{name}: by {excess:.3g}"
             for name, excess, small in zip(self.names, over, tolerance, strict=True)
@@ -94,7 +94,7 @@ class Bounds:
                 raise ModelError(f"bounds: {name}: lower limit {low:g} is above the upper {high:g}")
 
     def limits(self, robot: Manipulator) -> LinearLimits:
-        """Return the limits as rows on the N parameters, with what every rod keeps.
+        """Return all limits as linear inequalities on the N parameters, with those of rods.
 
         The centre of mass of a rod is between its ends, whatever else is known.
 
@@ -136,7 +136,7 @@ class Bounds:
 
 
 def _rods(robot: Manipulator) -> dict[str, tuple[float, float]]:
-    """Return the ends of each rod along its x axis, m; rods without extents are left out."""
+    """Return the ends of each rod along its x axis, m, by body; without rods of no extent."""
     ends = {}
     for p in parameter_data(robot):
         if p.kind == "I" and p.legs:

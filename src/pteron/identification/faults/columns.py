@@ -64,7 +64,7 @@ _UNKNOWN = Tolerance()
 
 @dataclass(frozen=True)
 class Family:
-    """The columns of one fault.
+    """A family of fault columns: how one fault changes the forces.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ class Family:
     effect: Callable[[FittedMotion], Array] | None = None
 
     def deviation_columns(self, motion: FittedMotion) -> Array:
-        """Return the columns (R, n, k) by which the machine differs from the model without it."""
+        """Return the forces (R, n, k), per unit of the fault, that a model without it lacks."""
         return (self.effect or self.columns)(motion)
 
 
@@ -143,7 +143,7 @@ def _elasticity(m: FittedMotion) -> Array:
         # Noise of the accelerations would be in both, the residuals and the column.
         load = lowpass(load, pace, m.cutoff)
     rate = m.rate(load)
-    return m.give_slopes([load, rate, m.rate(rate)])
+    return m.lag_slopes([load, rate, m.rate(rate)])
 
 
 def _drift(m: FittedMotion) -> Array:
@@ -346,7 +346,7 @@ class FaultColumns:
         return FittedMotion(self.model, self.values, states, self.usual, share, stride, self.cutoff)
 
     def matrix(self, states: States) -> Array:
-        """Return all columns (R, n, p + k)."""
+        """Return the columns (R, n, p + k) of the model and of all faults at states."""
         share = (states.time - self.begin) / (self.end - self.begin) - 0.5
         motion = self.motion(states, share, self.stride)
         columns = [family.columns(motion) for family in self.families]

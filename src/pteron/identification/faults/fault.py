@@ -133,7 +133,7 @@ _REMEDY: dict[FaultName, str] = {
 
 
 def _format_size(size: float, angle: bool = False) -> str:
-    """Return a size in mm, or degrees, with the digits that an estimate has."""
+    """Return a size, m or rad, as text in mm or degrees, rounded as an estimate is."""
     number = np.degrees(size) if angle else 1e3 * size
     text = f"{number:.0f}" if number >= 10.0 else f"{number:.2g}"
     return f"{text} {'degrees' if angle else 'mm'}"
@@ -202,12 +202,12 @@ class IsolatedFault(Result):
 
     @property
     def understates(self) -> bool:
-        """Whether a value is off by more than its stated error, which does not allow for it."""
+        """Whether the fault shifts a value by more than its stated error."""
         return self.matters or self.shift > _SHIFT
 
     @property
     def matters(self) -> bool:
-        """Whether that lowers the grade: a delay of sampling hardly changes a machine's forces."""
+        """Whether the fault lowers the grade of the verdict."""
         if self.is_half_sample_delay:
             return bool((self.cycle > _CYCLE_OF_SAMPLING).any())
         # Play is no error of a value: what it makes is in the residuals, wherever it is.

@@ -13,11 +13,11 @@ from typing import Literal
 import numpy as np
 
 from pteron.identification.logs import Log
-from pteron.identification.logs.log import gaps
+from pteron.identification.logs.gaps import gaps
 from pteron.identification.logs.recorded import saturation_sentences
 from pteron.identification.signals import Preprocessing
 from pteron.identification.signals.derivatives import uniform
-from pteron.identification.signals.filters import DIFFERENCE, force_steps, lowpass
+from pteron.identification.signals.filters import DIFFERENCE, lowpass, quantisation_steps
 from pteron.json_values import json_fields
 from pteron.kernels import Array
 
@@ -128,7 +128,7 @@ def log_faults(
             message = _merge_limit_sentences(said)
             faults.append(LogFault("saturation", message, float("nan"), True))
     for log in logs:
-        steps = force_steps(log.forces) / np.maximum(log.forces.std(axis=0), 1e-300)
+        steps = quantisation_steps(log.forces) / np.maximum(log.forces.std(axis=0), 1e-300)
         if (coarse := float(steps.max(initial=0.0))) > _COARSE:
             name = log.force_names[int(np.argmax(steps))]
             message = (

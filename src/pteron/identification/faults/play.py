@@ -43,10 +43,10 @@ class PlayRecord(NamedTuple):
     """Where it moves: as it turns round, dry friction alone makes residuals."""
 
 
-class Knocks(NamedTuple):
-    """The ratio by which joints' residuals are larger where their loads change direction."""
+class BacklashSignature(NamedTuple):
+    """The signature of backlash: how much larger residuals are where loads reverse."""
 
-    looked: NDArray[np.bool_]
+    tested: NDArray[np.bool_]
     """(n,); False where the load changes direction too seldom to tell."""
     times: Array
     """(n,); NaN where too little is seen, or nothing."""
@@ -55,7 +55,7 @@ class Knocks(NamedTuple):
     """Mean square (n,) that this adds to the residuals, over all samples."""
 
 
-def backlash_signature(records: Sequence[PlayRecord], band: float) -> Knocks:
+def backlash_signature(records: Sequence[PlayRecord], band: float) -> BacklashSignature:
     """Return the signature of backlash in joints' drives, and the joints with enough data.
 
     Windows' mean squares are ranked (Mann and Whitney's test, over all joints, each in units of its
@@ -75,16 +75,18 @@ def backlash_signature(records: Sequence[PlayRecord], band: float) -> Knocks:
         power[joint] = max(float(np.mean(near)) - usual, 0.0) * share
         every[0].append(near / usual)
         every[1].append(far / usual)
-    looked, shows, chance = ~np.isnan(times), times >= _TIMES, 1.0
+    tested, shows, chance = ~np.isnan(times), times >= _TIMES, 1.0
     if shows.any():
         both = (np.concatenate(part) for part in every)
         chance = float(scipy.stats.mannwhitneyu(*both, alternative="greater").pvalue)
     shows &= chance <= _CHANCE
-    return Knocks(looked, np.where(shows, times, np.nan), chance, np.where(shows, power, 0.0))
+    return BacklashSignature(
+        tested, np.where(shows, times, np.nan), chance, np.where(shows, power, 0.0)
+    )
 
 
 def _windows(records: Sequence[PlayRecord], band: float, joint: int) -> tuple[Array, Array, float]:
-    """Return mean squares of windows at load reversals and elsewhere, and the share of the former.
+    """Return mean squares of windows at load reversals and elsewhere, and the former's share.
 
     A joint moves all through a window.
     """

@@ -84,7 +84,7 @@ class Clock:
     _days: int = field(default=0, repr=False)
 
     def fresh(self) -> Clock:
-        """Return the clock reset to before the first row."""
+        """Return a copy of the clock that is reset to before the first row."""
         return replace(self, _origin=None, _last=0, _days=0)
 
     def seconds(self, table: Table) -> Values:

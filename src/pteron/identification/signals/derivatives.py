@@ -89,7 +89,7 @@ class Curve:
 
 @dataclass(frozen=True)
 class _Sampled:
-    """The sampling rate and cut-off, Hz, and the delay of central differences and splines."""
+    """A differentiator with a sampling rate and a cut-off, Hz, and the forces' delay, s."""
 
     rate: float
     cutoff: float | None
@@ -109,7 +109,7 @@ class _Sampled:
         return Curve(spline.c, (bases[0], bases[1], bases[2]), ends)
 
     def fastest(self, band: float) -> float | None:
-        """Return the cut-off."""
+        """Return the cut-off, Hz: above it nothing passes, whatever the band; None without one."""
         return self.cutoff
 
 
@@ -119,12 +119,12 @@ class CentralDifferences(_Sampled):
 
     @property
     def edge(self) -> int:
-        """Rows that the filter takes to settle, and the differences' own ends."""
+        """Rows lost at each end: the filter's settling, the differences' own ends and the delay."""
         settling = ceil(SETTLING * self.rate / self.cutoff) if self.cutoff else 0
         return LOST + settling + self.shift
 
     def differentiate(self, block: Log, edge: int) -> Differentiated:
-        """Return the block at even steps of time."""
+        """Return a block's motion and forces at even times, without `edge` rows at each end."""
         time, joints = uniform(block.time, block.joints)
         even = joints is block.joints
         forces = block.forces if even else uniform(block.time, block.forces)[1]
@@ -147,12 +147,12 @@ class SmoothingSpline(_Sampled):
 
     @property
     def edge(self) -> int:
-        """Rows at a block's ends that the spline feels."""
+        """Rows lost at each end, where the spline depends on the block's end, and by the delay."""
         knot = 1.0 / (2.0 * self.cutoff) if self.cutoff else 1.0 / self.rate
         return ceil(_SPLINE_SETTLING * knot * self.rate) + self.shift
 
     def differentiate(self, block: Log, edge: int) -> Differentiated:
-        """Return the block at its own times."""
+        """Return a block's motion and forces at its own times, without `edge` rows at each end."""
         inner = slice(edge, block.rows - edge)
         q, dq, ddq = spline_motion(block.time, block.joints, self.cutoff, self.delay)
         smooth = np.ones(block.rows, dtype=bool)
@@ -178,7 +178,7 @@ class FourierFit:
         return series.later(self.delay)
 
     def differentiate(self, block: Log, edge: int) -> Differentiated:
-        """Return the log at its own times."""
+        """Return the log's motion and forces at its own times, all of them."""
         motion = self.series(block).at(block.time)
         return Differentiated(block.time, motion, block.forces, np.ones(block.rows, dtype=bool))
 
@@ -196,7 +196,7 @@ class FourierFit:
 
 
 def _earlier(time: Array, signal: Array, delay: float) -> Array:
-    """Return smooth signals (T, k) at times (T,) less a delay, s."""
+    """Return smooth signals (T, k) evaluated at times (T,) less a delay, s."""
     return np.asarray(scipy.interpolate.make_interp_spline(time, signal, k=5)(time - delay))
 
 
