@@ -131,6 +131,7 @@ def _read_stable_positions(robot: Manipulator, text: str, source: str) -> Measur
     rows: list[tuple[str, list[float], float, float, int]] = []
 
     def position(key: str) -> list[float]:
+        """Return a key's three step counts; without them append a fault and return zeros."""
         words = config.get("delta_calibrate", key, fallback=None)
         cells = [] if words is None else words.split(",")
         try:
@@ -291,7 +292,7 @@ _READERS = (_read_height_map, _read_g30, _read_klipper_log, _read_marlin)
 
 
 def _xyz(x: float, y: float, z: float) -> dict[str, float]:
-    """Return coordinates by axis letter."""
+    """Return coordinates, mm, by the letter of their axis."""
     return {"X": x, "Y": y, "Z": z}
 
 

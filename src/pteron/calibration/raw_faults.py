@@ -13,16 +13,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pteron.calibration.fit import CalibrationFit, Fitter
+from pteron.calibration.calibration_fit import CalibrationFit
+from pteron.calibration.fit import Fitter
 from pteron.calibration.guess import Guess, UnknownBlock, tolerances_of
 from pteron.calibration.measurements import Measurements
-from pteron.calibration.mistakes import (
-    QUICK_MODES,
-    Mistake,
-    leg_orders,
-    likely_mistakes,
-    reorder_readings,
-)
+from pteron.calibration.mistake import Mistake, leg_orders, reorder_readings
+from pteron.calibration.mistakes import likely_mistakes
+from pteron.calibration.reading_mistakes import QUICK_MODES
 from pteron.calibration.residuals import MachineSlopes
 from pteron.calibration.result import CalibrationFinding, HiddenOrder
 from pteron.calibration.start import place_surroundings, starting_poses

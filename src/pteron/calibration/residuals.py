@@ -114,7 +114,7 @@ class MachineSlopes:
     def rows(
         self, guess: Guess, measurements: Measurements, poses: Array, chosen: Numbers
     ) -> ResidualRows:
-        """Return the residuals of chosen rows (by number) at their poses (N, m), of all rows."""
+        """Return the residuals of the `chosen` rows (indices), at all rows' poses (N, m)."""
         measured = ~np.isnan(np.hstack([part[chosen] for part in measurements.parts.values()]))
         point, separations, slopes = self.slopes(guess, measurements, poses, chosen, measured)
         residuals = np.zeros(measured.shape)
@@ -286,9 +286,9 @@ class MachineSlopes:
         """Return vectors of the base frame (..., 3)."""
         return vectors
 
-    def _numbers(self, values: Array) -> Array:
+    def _numbers(self, array: Array) -> Array:
         """Return numbers in this class's arithmetic: floating point."""
-        return values
+        return array
 
     def _unit(self, vectors: Array) -> Array:
         """Return vectors (N, 3) divided by their lengths; zero vectors unchanged."""

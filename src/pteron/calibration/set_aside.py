@@ -55,7 +55,7 @@ class SetAside(NamedTuple):
 def rows_set_aside(
     start: Guess, measurements: Measurements, blocks: Sequence[UnknownBlock], poses: Array
 ) -> SetAside:
-    """Return the rows that the drawn machine does not reach, that lie beyond limits, or far off."""
+    """Return the rows out of reach, beyond limits or far off on the drawn machine, with reasons."""
     reasons: dict[int, str] = {}
     lost: Mask = np.asarray(np.isnan(poses).any(axis=1))
     depths = _depths_under_planes(start, measurements, poses)

@@ -9,7 +9,8 @@ import numpy as np
 import scipy  # type: ignore[import-untyped]
 
 from pteron.calibration import thresholds
-from pteron.calibration.fit import BEYOND, CalibrationFit
+from pteron.calibration.calibration_fit import CalibrationFit
+from pteron.calibration.fit import BEYOND
 from pteron.calibration.guess import UnknownBlock
 from pteron.calibration.measurements import Measurements
 from pteron.calibration.observability import Observability
@@ -59,6 +60,8 @@ class Evidence(NamedTuple):
 
 
 class _Reason(NamedTuple):
+    """A reason of the verdict: its text, advice on what to do next, and the grade it allows."""
+
     text: str
     step: str = ""
     grade: Grade = "trustworthy"

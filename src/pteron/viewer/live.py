@@ -168,9 +168,9 @@ class Live:
         self.session.playing = False
         self.session.state = stop_motion(self.session.state, _sentence(text))
 
-    def _send(self, kind: str, data: dict[str, Any]) -> None:
+    def _send(self, kind: str, content: dict[str, Any]) -> None:
         """Send data of a kind to all tabs, and store it for new tabs."""
-        text = json.dumps({kind: data}, allow_nan=False)
+        text = json.dumps({kind: content}, allow_nan=False)
         with self._wake:
             self._kept[kind] = text
             for tab in self._tabs:
@@ -309,9 +309,9 @@ class Live:
         self._send("slice", {"parts": parts, "map": map_})
 
 
-def _finite_or_none(values: Any) -> list[float | None]:
+def _finite_or_none(numbers: Any) -> list[float | None]:
     """Return values as floats; None, which JSON can hold, for NaN and infinities."""
-    return [float(value) if np.isfinite(value) else None for value in values]
+    return [float(value) if np.isfinite(value) else None for value in numbers]
 
 
 def _sentence(text: str) -> str:

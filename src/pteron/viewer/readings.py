@@ -99,7 +99,7 @@ def readings(state: ViewerState, forces: Array | None = None) -> Readings:
     )
 
 
-def level(value: float) -> Level:
+def level(share: float) -> Level:
     """Return the level of a margin, which is at most 1.
 
     Examples
@@ -107,6 +107,6 @@ def level(value: float) -> Level:
     >>> level(0.8), level(0.2), level(0.0)
     ('far', 'near', 'close')
     """
-    if value >= _NEAR:
+    if share >= _NEAR:
         return "far"
-    return "near" if value >= _CLOSE else "close"
+    return "near" if share >= _CLOSE else "close"

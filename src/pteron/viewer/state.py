@@ -84,14 +84,14 @@ def move_platform(state: ViewerState, target: Array) -> ViewerState:
     return _stop_at(state, last, f"{why}. The platform is {distance} from the pose asked for.")
 
 
-def move_joint(state: ViewerState, i: int, value: float) -> ViewerState:
+def move_joint(state: ViewerState, i: int, coordinate: float) -> ViewerState:
     """Return the machine with a joint, from 0, moved; the assembly mode is unchanged.
 
     It stops where a leg, a limit or the end of the assembly mode stops it.
     """
     joints = state.joints
     target = joints.copy()
-    target[i] = value
+    target[i] = coordinate
     last, beyond = follow_joints(state.robot, state.pose, joints, target)
     if beyond is None:
         return _stop_at(state, last)

@@ -81,7 +81,7 @@ def _clause(edge: Edge) -> str:
 def conditions(
     robot: RobotLike, *, type_i: float = 0.0, type_ii: float = 0.0
 ) -> tuple[Condition, ...]:
-    """Return the conditions on a pose: each leg's reach, all joints' limits, and two floors.
+    """Return the conditions on a pose: each leg's reach, all joints' limits, two optional floors.
 
     Parameters
     ----------
@@ -195,9 +195,10 @@ class IntervalTest:
         return outside, open_
 
     def undecided_conditions(self, low: Array, high: Array) -> NDArray[np.bool_]:
-        """Return which conditions (B, C) may fail in a box, where they are defined.
+        """Return which conditions (B, C) may fail in each box with corners (B, m).
 
-        A limit is not undefined by itself, but out of reach: it is the reach that ends there.
+        A condition that is undefined in a box, such as a limit out of reach, counts as kept: it is
+        the reach that fails there.
         """
         may_fail = np.empty((len(low), len(self.given)), bool)
         for c, condition in enumerate(self.given):

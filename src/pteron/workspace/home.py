@@ -186,7 +186,7 @@ def home_poses(robot: RobotLike) -> HomePoses:
 
 
 def expect_usable(robot: Manipulator, pose: Array) -> None:
-    """Refuse a file's home pose (m,) that is out of reach or beyond limits."""
+    """Raise ModelError where a file's home pose (m,) is out of reach or beyond limits."""
     least = float(_worth(robot, pose[None])[0])
     if least <= 0.0:
         margins = pose_margins(robot, pose)
@@ -209,7 +209,7 @@ def _cached_home_poses(robot: Manipulator) -> tuple[tuple[float, ...], tuple[flo
 
 
 def _both_sides(robot: Manipulator) -> tuple[tuple[float, ...], tuple[float, ...] | None]:
-    """Return the home pose, and the best pose on the other side of the base, if it is as good."""
+    """Return the home pose, and the best one on the base's other side if it is mirrored."""
     singular_orientations(robot)  # refuses a machine that is singular everywhere
     try:
         best_type_ii(robot)
@@ -257,7 +257,7 @@ def _are_mirrored(robot: Manipulator, poses: Array, margins: Array, side: Array)
 
 
 def _leads(robot: Manipulator, start: Array, end: Array, least: float) -> bool:
-    """Return whether all poses on the straight line between two poses (m,) keep a margin."""
+    """Return whether all poses on the line between two poses (m,) keep a margin above `least`."""
     line = np.linspace(start, end, _BETWEEN)
     return bool((_worth(robot, line) > least).all())
 
@@ -290,7 +290,7 @@ def has_exact_home(robot: Manipulator) -> bool:
 
 
 def _tilting_angles(robot: Manipulator) -> NDArray[np.bool_]:
-    """Return which coordinates (m,) are 0 at level poses: none if it cannot tilt."""
+    """Return which coordinates (m,) are 0 at level poses; none if the platform cannot tilt."""
     return robot.platform.angular & robot.platform.tilts
 
 
@@ -388,7 +388,7 @@ def _distinct(poses: Array, spacing: Array) -> Array:
 
 
 def _worth(robot: Manipulator, poses: Array) -> Array:
-    """Return the least margin (...), at most 0 where the platform is turned back."""
+    """Return the margin (...) of poses that the search maximises; at most 0 if turned back."""
     least = pose_margins(robot, poses).least
     turned_share = np.abs(poses[..., robot.platform.angular]) / np.pi
     worth = np.minimum(least, 1.0 - turned_share.max(axis=-1, initial=0.0))
@@ -401,7 +401,7 @@ def longest_leg(robot: Manipulator) -> float:
 
 
 def _steps(robot: Manipulator, share: float, radians: float) -> Array:
-    """Return a step of each pose coordinate; lengths are a share of the longest leg."""
+    """Return a step (m,) of each pose coordinate: a share of the longest leg, m, or radians."""
     return np.where(robot.platform.angular, radians, share * longest_leg(robot))
 
 

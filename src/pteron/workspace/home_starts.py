@@ -100,7 +100,7 @@ def mid_range_poses(robot: Manipulator, starts: Array) -> Array:
 
 
 def sides(robot: Manipulator, poses: Array) -> Array:
-    """Return the side of the base of the platform at poses (K, m): 1, -1, or 0 for neither.
+    """Return on which side of its base the platform is at poses (K, m): 1, -1, or 0 for neither.
 
     1 is the side along the platform's axis; of a platform that moves across its axis alone, the
     side against gravity. The base is the mean of the guide points, of sliders that of where they

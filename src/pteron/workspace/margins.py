@@ -87,7 +87,7 @@ def pose_margins(robot: RobotLike, pose: PoseLike) -> PoseMargins:
 
 
 def least_margin_text(robot: Manipulator, pose: Array) -> str:
-    """Return the least margin of a pose (m,) and its cause, in words: "0.59 of the type-II ..."."""
+    """Return the least margin of a pose (m,) with its cause, as text for a sentence."""
     margins = pose_margins(robot, pose)
     least = float(margins.least)
     if float(margins.type_ii) <= least:

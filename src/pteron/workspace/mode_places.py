@@ -68,7 +68,7 @@ class ModePlace:
 
 
 def mode_places(robot: Manipulator, home: Array) -> tuple[ModePlace, ...]:
-    """Return the platform's place in each working mode, at home for the file's mode.
+    """Return where the platform is in each working mode: at home in the file's, else at its best.
 
     None of a machine that has one mode, or that gravity does not tell above from below.
     """

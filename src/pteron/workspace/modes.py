@@ -144,9 +144,9 @@ def _contact(
 def _find_crossing(
     side: Paving, test: IntervalTest, k: int, low: Array, high: Array
 ) -> Array | None:
-    """Return a pose on a condition's boundary, bisected in a box.
+    """Return a pose where a condition changes its sign, bisected in a box; None without a box.
 
-    Of the box one corner is proved inside and one outside; None where there is no such box.
+    One corner of the box is proved inside, another outside.
     """
     corners = np.array(list(np.ndindex(*(2,) * low.shape[1])))
     for a, b in zip(low, high, strict=True):

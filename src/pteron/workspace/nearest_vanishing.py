@@ -71,7 +71,7 @@ largest: of a pose on the edge."""
 
 
 class Nearest(NamedTuple):
-    """A pose at which a function vanishes; None if there is none."""
+    """The nearest pose found at which a function vanishes, if any, and a proved lower bound."""
 
     pose: Array | None
     measure: float
@@ -180,8 +180,8 @@ class Search:
     def _values(self, states: Array) -> tuple[Array, Array, Array]:
         """Return equality residuals, inequality residuals and both Jacobians at states (K, k + R).
 
-        The value and r^2 - g, (K, 1 + R); r and the squares of the other legs' measures, (K, R + n)
-        or one less; the slopes (K, 1 + 2 R + n, k + R).
+        The residuals are the function's value and r^2 - g, (K, 1 + R); r and the squares of the
+        other legs' measures, (K, R + n) or one less; the Jacobians are (K, 1 + 2 R + n, k + R).
         """
         k, (length, sizes) = len(self.moving), self._sizes
         count, r = len(states), len(sizes)

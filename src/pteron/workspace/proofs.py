@@ -220,7 +220,7 @@ def _failed_conditions(
 
 
 def expect_space(robot: Manipulator, name: str) -> None:
-    """Refuse a cylinder, an argument of this name, if the pose has no x, y and z."""
+    """Raise DataError, naming an argument, if a cylinder is given but not x, y and z."""
     lengths = robot.platform.lengths
     if len(lengths) != 3:
         motion, places = robot.platform.motion, ", ".join(lengths) or "no lengths"

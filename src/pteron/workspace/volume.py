@@ -83,7 +83,7 @@ class ReachVolume(Result):
 
 
 def expect_places(robot: Manipulator, instead: str) -> None:
-    """Refuse a platform that only rotates, with a clause on what to do instead."""
+    """Raise ModelError, with a clause on what to do instead, if a platform only rotates."""
     if not robot.platform.lengths:
         raise ModelError(
             f"a {robot.platform.motion} platform has no places to move to: {instead}",
