@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pteron.calibration.measurements import Measurements
 from pteron.errors import DataError, shorten, warn_unlikely
@@ -113,20 +114,8 @@ def _read_stable_positions(robot: Manipulator, text: str, source: str) -> Measur
             f"{', '.join(lacking)} without rotation_distance and microsteps, or step_distance: "
             "stable positions are steps; give the whole printer.cfg"
         )
-    ends, downwards = [], []
-    for i, leg in enumerate(robot.legs, start=1):
-        axis = leg.joint_axis
-        if len(robot.legs) != 3 or leg.limits is None or not axis:
-            raise DataError(
-                f"stable positions count from three end stops, and leg {i} of {robot.name} is no "
-                "slider or crank with limits; give them: the upper is the end stop"
-            )
-        # A crank lifts about an axis across the way out.
-        out = np.cross([*leg.guide_point[:2], 0.0], [0.0, 0.0, 1.0])
-        up = (axis[2] if leg.joint.unit == "m" else out @ np.array(axis)) > 0.0
-        ends.append(leg.limits[1 if up else 0])
-        downwards.append((-1.0 if up else 1.0) * (1e-3 if leg.joint.unit == "m" else 1.0))
-    away = np.array(downwards) * np.array([step or 0.0 for step in steps])
+    ends, downwards = _end_stops(robot)
+    away = downwards * np.array([step or 0.0 for step in steps])
     faults: list[str] = []
     rows: list[tuple[str, list[float], float, float, int]] = []
 
@@ -158,13 +147,31 @@ def _read_stable_positions(robot: Manipulator, text: str, source: str) -> Measur
     if faults:
         raise DataError(joined_faults(faults))
     keys, counts, heights, distances, origins = zip(*rows, strict=True)
-    readings = to_readings(robot, np.array(ends) + away * np.array(counts))
+    readings = to_readings(robot, ends + away * np.array(counts))
     return replace(
         Measurements.from_readings(robot, readings, heights=1e-3 * np.array(heights)),
         distances=1e-3 * np.array(distances),
         origins=np.array(origins),
         places=tuple(f"{source}, {key}" for key in keys),
     )
+
+
+def _end_stops(robot: Manipulator) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return joint coordinates (3,) at the end stops, and a downward mm, or rad, in SI units (3,)."""
+    ends, downwards = [], []
+    for i, leg in enumerate(robot.legs, start=1):
+        axis = leg.joint_axis
+        if len(robot.legs) != 3 or leg.limits is None or not axis:
+            raise DataError(
+                f"stable positions count from three end stops, and leg {i} of {robot.name} is no "
+                "slider or crank with limits; give them: the upper is the end stop"
+            )
+        # A crank lifts about an axis across the way out.
+        out = np.cross([*leg.guide_point[:2], 0.0], [0.0, 0.0, 1.0])
+        up = (axis[2] if leg.joint.unit == "m" else out @ np.array(axis)) > 0.0
+        ends.append(leg.limits[1 if up else 0])
+        downwards.append((-1.0 if up else 1.0) * (1e-3 if leg.joint.unit == "m" else 1.0))
+    return np.array(ends), np.array(downwards)
 
 
 def _read_height_map(text: str, source: str) -> Iterator[_Touch]:

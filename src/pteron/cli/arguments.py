@@ -122,21 +122,21 @@ def _numeric(word: str) -> bool:
 def parsed_numbers(words: Sequence[str], names: Sequence[str], what: str) -> list[float]:
     """Return the finite numbers in words separated by blanks or commas, one for each name."""
     parts = " ".join(words).replace(",", " ").split()
-    values = []
+    numbers = []
     for part in parts:
         try:
-            value = float(part)
+            number = float(part)
         except ValueError:
             raise DataError(f"{what}: {part!r} is not a number; give {' '.join(names)}") from None
-        if not math.isfinite(value):
+        if not math.isfinite(number):
             raise DataError(f"{what}: {part!r} is not a finite number; give {' '.join(names)}")
-        values.append(value)
-    if len(values) != len(names):
-        noun = "value" if len(values) == 1 else "values"
+        numbers.append(number)
+    if len(numbers) != len(names):
+        noun = "value" if len(numbers) == 1 else "values"
         raise DataError(
-            f"{what}: {len(values)} {noun} given, {len(names)} expected: {' '.join(names)}"
+            f"{what}: {len(numbers)} {noun} given, {len(names)} expected: {' '.join(names)}"
         )
-    return values
+    return numbers
 
 
 def parsed_list(text: str | None, what: str) -> list[float] | None:
@@ -189,7 +189,7 @@ def load_robot(name_or_path: str, elbows: str | None = None, *, quiet: bool = Fa
 
 
 def check_rate(rate: float) -> None:
-    """Refuse a sampling rate that is not a number above 0."""
+    """Raise DataError unless a sampling rate is a number above 0."""
     if not 0.0 < rate < math.inf:
         raise DataError(f"--rate: {rate:g} given, samples a second above 0 expected")
 

@@ -81,8 +81,10 @@ def choose(
         from pteron.report.design.choice import write_choice
 
         files = write_choice(choice, out)
-    data = choice.as_dict() | ({"files": [str(file) for file in files]} if files else {})
-    return CommandResult(data, partial(_show, choice), files, _NONE if choice.best is None else 0)
+    document = choice.as_dict() | ({"files": [str(file) for file in files]} if files else {})
+    return CommandResult(
+        document, partial(_show, choice), files, _NONE if choice.best is None else 0
+    )
 
 
 class _Log:

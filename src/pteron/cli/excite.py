@@ -242,7 +242,7 @@ def _result(
     files: list[Path] = []
     if out is not None:
         files = excitation.write(out, rate, series.periods, file.layout, cycles, slow)
-    data = {
+    document = {
         **excitation.as_dict(),
         "start": led.start,
         "end": led.end,
@@ -265,7 +265,7 @@ def _result(
     if slow is not None:
         slowly = f"the same way in {slow.duration:g} s, for friction that falls with speed."
         lines.append(f"Slowly: {slowly}")
-    return CommandResult(data, lines, files)
+    return CommandResult(document, lines, files)
 
 
 def _held_out_cycles(excitation: Excitation, rate: float) -> RepeatedCycle | None:
@@ -294,9 +294,9 @@ def _quality(excitation: Excitation) -> Table:
     return table(title, *headings, rows=rows, numbers=headings, caption=caption)
 
 
-def _number(value: float, digits: int) -> str:
+def _number(number: float, digits: int) -> str:
     """Return a number with significant digits, or `-` where it is not finite."""
-    return f"{value:.{digits}g}" if math.isfinite(value) else "-"
+    return f"{number:.{digits}g}" if math.isfinite(number) else "-"
 
 
 def _clearance_sentence(

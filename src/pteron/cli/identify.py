@@ -131,14 +131,14 @@ def identify(
         times = Times(tell)
         model: dict[str, Any] = {"terms": terms, "shared": shared, "cad": drawn, "bounds": bounds}
         how: dict[str, Any] = {"estimator": estimator, "processing": processing}
-        result = identified(machine, fit, held_out=check, **model, **how, progress=times)
+        identification = identified(machine, fit, held_out=check, **model, **how, progress=times)
     with spinner("Drawing the report"):
         times.begin("Drawing the report")
-        files = write_identification(result, folder, sources=sources)
+        files = write_identification(identification, folder, sources=sources)
     if is_terminal():
         note(times.summary())
-    data = {"files": [str(path) for path in files.paths], **numbers(result)}
-    return CommandResult(data, partial(_show, result), files.paths)
+    document = {"files": [str(path) for path in files.paths], **numbers(identification)}
+    return CommandResult(document, partial(_show, identification), files.paths)
 
 
 def _speeds(text: str | None) -> tuple[float, ...] | Literal["auto"] | None:
@@ -200,73 +200,81 @@ def _box(text: str) -> tuple[str, Box]:
     return body.strip(), ((x0, x1), (y0, y1))
 
 
-def _show(result: Identification) -> None:
+def _show(identification: Identification) -> None:
     """Print the verdict, the errors, the values, the findings in the logs, and the files."""
-    verdict = result.verdict
-    worst = max(float(prediction.nrms.max()) for prediction in result.held_out)
+    verdict = identification.verdict
+    worst = max(float(prediction.nrms.max()) for prediction in identification.held_out)
     color = GRADE_COLORS[verdict.grade]
     show(
-        f"[bold {color}]{plain(result.robot.name)}: {verdict.grade}[/bold {color}], "
+        f"[bold {color}]{plain(identification.robot.name)}: {verdict.grade}[/bold {color}], "
         f"held-out error up to {worst:.3g} %",
-        _errors(result),
-        _values(result),
-        *(plain(text) for text in (*verdict.reasons, *verdict.next_steps, *_bodies(result))),
-        *_payload(result),
-        *(f"[yellow]Note:[/yellow] {plain(finding.message)}" for finding in result.findings),
+        _errors(identification),
+        _values(identification),
+        *(
+            plain(text)
+            for text in (*verdict.reasons, *verdict.next_steps, *_bodies(identification))
+        ),
+        *_payload(identification),
+        *(
+            f"[yellow]Note:[/yellow] {plain(finding.message)}"
+            for finding in identification.findings
+        ),
     )
 
 
-def _errors(result: Identification) -> Table:
+def _errors(identification: Identification) -> Table:
     """Return a table of each actuator's NRMS of prediction (%), its noise, and no friction."""
     from pteron.report.typeset import significant
 
     headings = ("held-out NRMS (%)", "noise", "no friction")[: 2 if _narrow() else 3]
     rows = []
-    for prediction in result.held_out:
-        where = f" in {prediction.source}" if len(result.held_out) > 1 else ""
+    for prediction in identification.held_out:
+        where = f" in {prediction.source}" if len(identification.held_out) > 1 else ""
         columns = prediction.nrms, prediction.floor, prediction.nrms_without_friction
-        for i, values in enumerate(zip(*columns[: len(headings)], strict=True), start=1):
-            rows.append((plain(f"{i}{where}"), *map(significant, values)))
+        for i, row in enumerate(zip(*columns[: len(headings)], strict=True), start=1):
+            rows.append((plain(f"{i}{where}"), *map(significant, row)))
     return table("actuator", *headings, rows=rows, numbers=headings)
 
 
-def _values(result: Identification) -> Table:
+def _values(identification: Identification) -> Table:
     """Return a table of base parameters with 95 % half-widths (absolute, and relative in %)."""
     from pteron.report.identification import parameter_rows, value_with_uncertainty
     from pteron.report.typeset import significant
 
-    short = result.has_understated_errors
+    short = identification.has_understated_errors
     headings = ("value", "+- 95 % (!)" if short else "+- 95 %", "rel. (%)")
     numbers = headings[: 2 if _narrow() else 3]
     columns = ["parameter", *numbers, *(() if _narrow() else ("unit",)), ""]
     caption = "Base parameters are sums, named by one term; the page has them in full."
-    negative = [row.name for row in parameter_rows(result) if row.unit == "kg" and row.value < 0.0]
+    negative = [
+        row.name for row in parameter_rows(identification) if row.unit == "kg" and row.value < 0.0
+    ]
     if negative:
         caption += f" A sum may be below zero, as {negative[0]}: in it masses are subtracted."
     if short:
         caption += " (!) Too short: they do not allow for the faults that are named."
     value_table = table(*columns, numbers=numbers, caption=caption)
     marks = {"essential": "", "dropped": "[yellow]weak[/]", "unseen": "[yellow]unseen[/]"}
-    for row in parameter_rows(result):
-        value, half = map(ascii_number, value_with_uncertainty(row.value, row.half))
+    for row in parameter_rows(identification):
+        estimate, half = map(ascii_number, value_with_uncertainty(row.value, row.half))
         relative = (
             ">999" if row.relative >= 9.995 else ascii_number(significant(100.0 * row.relative, 2))
         )
         further_cells = () if _narrow() else (relative, row.unit)
-        value_table.add_row(plain(row.name), value, half, *further_cells, marks[row.status])
+        value_table.add_row(plain(row.name), estimate, half, *further_cells, marks[row.status])
     return value_table
 
 
-def _payload(result: Identification) -> list[str]:
+def _payload(identification: Identification) -> list[str]:
     """Return lines with the payload as arguments of a controller and of other commands."""
     from pteron.identification.payload import payload_in
 
-    payload = payload_in(result)
+    payload = payload_in(identification)
     if payload is None:
         return []
     if not (payload.real and payload.is_significant):
         return ["The payload is no real body's, or is not felt: record it longer, or faster."]
-    return [plain(f"The payload: {payload.call(result.robot)}")]
+    return [plain(f"The payload: {payload.call(identification.robot)}")]
 
 
 def _narrow() -> bool:
@@ -274,11 +282,11 @@ def _narrow() -> bool:
     return get_terminal_size().columns < _NARROW
 
 
-def _bodies(result: Identification) -> tuple[str, ...]:
+def _bodies(identification: Identification) -> tuple[str, ...]:
     """Return sentences: whether real bodies have these parameters, the CAD model, and notes."""
-    consistency = result.consistency
+    consistency = identification.consistency
     if consistency is None:
-        return result.notes
+        return identification.notes
     border = f"; at the border: {', '.join(consistency.at_border)}" if consistency.at_border else ""
     lines = [f"Real bodies have exactly these base parameters{border}."]
     if not consistency.feasible:
@@ -286,4 +294,4 @@ def _bodies(result: Identification) -> tuple[str, ...]:
         lines = [f"No real bodies have exactly these base parameters; {away}"]
     if not consistency.cad_feasible:
         lines.append(f"The CAD model itself is not real: {'; '.join(consistency.cad_violations)}.")
-    return (*lines, *result.notes)
+    return (*lines, *identification.notes)

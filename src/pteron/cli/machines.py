@@ -107,18 +107,20 @@ def new(
         "stock": _stocks(mass_from),
         "platform_mass": platform_mass,
     }
-    dimensions = {key: value for key, value in dimensions.items() if value not in (None, {})}
+    dimensions = {
+        key: dimension for key, dimension in dimensions.items() if dimension not in (None, {})
+    }
     if out is not None and Path(out).exists() and not overwrite:
         raise OutputError(f"{out}: is there already; name another file, or say --overwrite")
     text = commented_text(kind, dimensions)
     if out is not None:
         write_text(out, text)
-    data = {"kind": kind, "file": out, "text": text}
+    document = {"kind": kind, "file": out, "text": text}
     if out is None:
-        return CommandResult(data, partial(write, text))
+        return CommandResult(document, partial(write, text))
     written = f"Written: {plain(out)}. Put in your numbers, then: pteron check {plain(out)}"
     return CommandResult(
-        data, [written, *map(plain, kept_numbers_sentence(load(kind), dimensions))]
+        document, [written, *map(plain, kept_numbers_sentence(load(kind), dimensions))]
     )
 
 
@@ -333,7 +335,7 @@ def _modes(modes: list[dict[str, Any]]) -> list[Table]:
         said = [*["the file's"] * mode["named"], *["likely"] * mode["likely"]]
         where = ("beyond limits", "-", "-")
         if mode["margin"] > 0.0:
-            at = f"({' '.join(f'{value:.3g}' for value in mode['pose'])})"
+            at = f"({' '.join(f'{coordinate:.3g}' for coordinate in mode['pose'])})"
             where = (f"{mode['place']} the base", at, f"{mode['margin']:.2f}")
         rows.append((mode["elbows"], *where, ", ".join(said)))
     headings = ("elbows", "platform", "pose", "least margin", "which")
@@ -346,13 +348,13 @@ def _passive(joints: list[dict[str, Any]]) -> list[Table]:
 
     rows = []
     for joint in (joint for joint in joints if not joint["actuated"]):
-        limits = LimitedJoint(**joint).limits_text(lambda value, unit: f"{value:.4g}")
+        limits = LimitedJoint(**joint).limits_text(lambda coordinate, unit: f"{coordinate:.4g}")
         at, unit = f"{round(joint['value'], 4) + 0.0:g}", joint["unit"]
         rows.append((str(joint["leg"] or ""), joint["noun"], at, f"{limits} {unit}"))
     headings = ("leg", "passive joint", "at home", "limits")
     return [table(*headings, rows=rows, numbers=("leg", "at home"))] if rows else []
 
 
-def _vector(values: Any, places: int = 4) -> str:
+def _vector(components: Any, places: int = 4) -> str:
     """Return numbers as text in parentheses, rounded to decimal places."""
-    return f"({', '.join(f'{round(value, places) + 0.0:g}' for value in values)})"
+    return f"({', '.join(f'{round(component, places) + 0.0:g}' for component in components)})"

@@ -66,24 +66,28 @@ def _index_data(index_map: Map, name: str) -> dict[str, Any]:
     return about | fields_as_json(summary, _SUMMARY, "poses=count undetermined=infinite")
 
 
-def map_rows(data: Mapping[str, Any]) -> Any:
-    """Return a table of the indices, a row each."""
+def map_rows(document: Mapping[str, Any]) -> Any:
+    """Return the JSON data of a map as a table with a row for each index."""
     import polars as pl
 
     from pteron.platforms.coordinates import COORDINATES
 
-    names = sorted([*data["held"], *(a["name"] for a in data["varies"])], key=[*COORDINATES].index)
+    names = sorted(
+        [*document["held"], *(a["name"] for a in document["varies"])], key=[*COORDINATES].index
+    )
     rows = []
-    for index in data["indices"]:
+    for index in document["indices"]:
         row = {key: index[key] for key in ("index", "unit", "best", "worst", "mean", "median")}
         for side in ("best", "worst"):
             pose = index[f"{side}_pose"] or [None] * len(names)
-            row |= {f"{side}_{name}": value for name, value in zip(names, pose, strict=True)}
+            row |= {
+                f"{side}_{name}": coordinate for name, coordinate in zip(names, pose, strict=True)
+            }
         rows.append(row)
     return pl.DataFrame(rows, infer_schema_length=None)
 
 
-def show_map(index_map: Map, volume: ReachVolume | None, data: Mapping[str, Any]) -> None:
+def show_map(index_map: Map, volume: ReachVolume | None, document: Mapping[str, Any]) -> None:
     """Print for a person: the reach, what ends it, and each index."""
     from pteron.platforms.coordinates import are_angles, coordinate
 
@@ -112,7 +116,7 @@ def show_map(index_map: Map, volume: ReachVolume | None, data: Mapping[str, Any]
         causes = sorted(index_map.causes.items(), key=lambda pair: -pair[1])
         lines.append("; ".join(f"{percent(share)} {text}" for text, share in causes))
     index_table = table("index", "", "value", "where", numbers=("value",))
-    for index in data["indices"]:
+    for index in document["indices"]:
         unit = f" ({index['unit']})" if index["unit"] else ""
         named = plain(f"{index['index']}{unit}")
         if index["best"] is None:
@@ -122,7 +126,7 @@ def show_map(index_map: Map, volume: ReachVolume | None, data: Mapping[str, Any]
             index_table.add_row(named, "", f"{index['best']:.4g}", "everywhere in reach")
         else:
             for side in ("best", "worst"):
-                pose = " ".join(f"{value + 0.0:.4g}" for value in index[f"{side}_pose"])
+                pose = " ".join(f"{component + 0.0:.4g}" for component in index[f"{side}_pose"])
                 index_table.add_row(
                     named if side == "best" else "", side, f"{index[side]:.4g}", pose
                 )

@@ -59,7 +59,7 @@ def common_table(robot: Manipulator, fits: Sequence[CommonFit]) -> list[rich.tab
 
 
 def _alone(fit: MotorFit) -> CommonFit:
-    """Return a leg's fit of a motor as the common fit of this leg alone."""
+    """Return one leg's fit of a motor as a common fit of that leg alone."""
     from pteron.motion import CommonFit
 
     return CommonFit((fit.leg,), fit.motor, fit.span, fit.ratio, (fit,))
@@ -86,7 +86,7 @@ def _table(robot: Manipulator, heading: str, fits: Iterable[CommonFit]) -> list[
         for i, fit in enumerate(islice(group, _BEST)):
             ends = tuple(f"{end:.4g}" for end in fit.span) if fit.span else ("none", "")
             ratio = f"{fit.ratio:.4g} {_ratio_unit(robot, fit)}"
-            margins = (f"{value:.2f}" for value in _margins(fit))
+            margins = (f"{margin:.2f}" for margin in _margins(fit))
             first = "" if i else " ".join(map(str, legs))
             rows.append((first, plain(fit.motor.name), ratio, *ends, *margins))
     numbers, caption = ("leg", *_NUMBERS), _CAPTIONS[heading]

@@ -51,7 +51,7 @@ def report(
         page = write_report(machine, out, motion=shown)
     contents = json.loads((page.parent / "report.json").read_text(encoding="utf-8"))
     warn([*contents["doubts"], *contents["cycle"]["overloads"]])
-    cycle = {key: value for key, value in contents["cycle"].items() if key not in _SERIES}
+    cycle = {key: series for key, series in contents["cycle"].items() if key not in _SERIES}
     tables = _machine(contents), _legs(contents["cycle"], contents["joints"])
     lines = [*tables, f"Written to {plain(str(page))}"]
     return CommandResult({"page": str(page), **contents, **asdict(carried), "cycle": cycle}, lines)
@@ -68,7 +68,7 @@ def _machine(contents: dict[str, Any]) -> Table:
     singular = ", ".join(f"{math.degrees(a):.4g}" for a in contents["singular_orientations"] or ())
     angles = [name for name in contents["coordinates"] if coordinate(name).unit == "rad"]
     cells = {
-        "home pose": " ".join(f"{value:.4g}" for value in home["pose"]),
+        "home pose": " ".join(f"{component:.4g}" for component in home["pose"]),
         "margin there": f"{home['reserve']:.3f} of 1",
         "condition number there": f"{home['condition_number']:.4g}",
     }

@@ -123,7 +123,7 @@ def size(
 
 @dataclass(frozen=True)
 class _Asked:
-    """The request, in the words of the options."""
+    """What was requested, in the words of the options, for the printed result."""
 
     cycle: str
     carried: Carried
@@ -259,9 +259,9 @@ def _energy(sizing: Sizing) -> list[str]:
     if sizing.assumed_friction.any():
         units = [leg.joint.force_unit for leg in sizing.robot.legs]
         forces = zip(sizing.assumed_friction, units, strict=True)
-        values = ", ".join(f"{force:.3g} {unit}" if force else "-" for force, unit in forces)
+        texts = ", ".join(f"{force:.3g} {unit}" if force else "-" for force, unit in forces)
         lines.append(
-            f"Friction is assumed where the file has none: dry, leg by leg {values}; --friction "
+            f"Friction is assumed where the file has none: dry, leg by leg {texts}; --friction "
             "SHARE changes it, 0 leaves it out"
         )
     return lines
@@ -295,7 +295,7 @@ def _places(sizing: Sizing) -> list[rich.table.Table]:
     """Return a table of the places where each leg's force and speed are greatest."""
     rows = []
     for worst in _worst(sizing):
-        pose = " ".join(f"{round(value, 6) + 0.0:.4g}" for value in worst["pose"])
+        pose = " ".join(f"{round(coordinate, 6) + 0.0:.4g}" for coordinate in worst["pose"])
         quantity = _NAMED[worst["quantity"]].format(sizing.robot.legs[worst["leg"] - 1].joint.force)
         leg = str(worst["leg"]) if worst["quantity"] == "peak_force" else ""
         rows.append((leg, quantity, pose, f"{math.degrees(worst['turn']) % 360:.4g} deg"))
@@ -323,7 +323,7 @@ def _powers(sizing: Sizing) -> rich.table.Table:
     names = ("leg", "peak (W)", "mean (W)", "brakes (W)", "gives (J)", "takes back (J)")
     powers = (sizing.peak_power, sizing.mean_power, sizing.peak_braking)
     columns = zip(*powers, sizing.given_energy, sizing.braked_energy, strict=True)
-    rows = ((str(i), *(f"{v:.4g}" for v in values)) for i, values in enumerate(columns, start=1))
+    rows = ((str(i), *(f"{v:.4g}" for v in row)) for i, row in enumerate(columns, start=1))
     return table(*names, rows=rows, numbers=names)
 
 

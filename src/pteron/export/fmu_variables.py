@@ -99,7 +99,11 @@ class FmuVariables:
                     "derivative": self[block.rate_of][k] if block.rate_of else None,
                     "start": variable.start,
                 }
-                yield {name: value for name, value in attributes.items() if value is not None}
+                yield {
+                    name: attribute
+                    for name, attribute in attributes.items()
+                    if attribute is not None
+                }
 
     @property
     def dependencies(self) -> dict[int, tuple[int, ...]]:
@@ -206,8 +210,14 @@ def _inertia(platform: Platform) -> Iterator[_Words]:
 
 def _drives(robot: Manipulator) -> Iterator[_Words]:
     """Yield the drives' numbers, in the order of the C code's table."""
-    values = iter(drive_numbers(robot).tolist())
+    numbers = iter(drive_numbers(robot).tolist())
     for name in Drives._fields:
         for i, leg in enumerate(robot.legs, start=1):
             row = _TABLE["drives"][name]
-            yield {"i": i, "name": name, "unit": row[leg.joint.unit], "number": next(values), **row}
+            yield {
+                "i": i,
+                "name": name,
+                "unit": row[leg.joint.unit],
+                "number": next(numbers),
+                **row,
+            }

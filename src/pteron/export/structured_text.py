@@ -125,22 +125,32 @@ def export_st(
         tables=False,
     )
     prefix = _camel(prefix_of(robot))
-    blocks = {f"{prefix}_{_camel(item.name)}": item for item in exported}
+    blocks = {f"{prefix}_{_camel(exported_item.name)}": exported_item for exported_item in exported}
     return write_texts(
-        folder, {f"{name}.st": _block(robot, name, item) for name, item in blocks.items()}
+        folder,
+        {
+            f"{name}.st": _block(robot, name, exported_item)
+            for name, exported_item in blocks.items()
+        },
     )
 
 
-def _block(robot: Manipulator, name: str, item: ExportedFunction) -> str:
+def _block(robot: Manipulator, name: str, function: ExportedFunction) -> str:
     """Return the Structured Text of a function block, with its comments."""
-    comments = [*banner(robot, "Structured Text"), "", item.summary]
-    comments.append(f"{item.operations} arithmetic operations.")
-    if item.name.startswith("set_payload"):
+    comments = [*banner(robot, "Structured Text"), "", function.summary]
+    comments.append(f"{function.operations} arithmetic operations.")
+    if function.name.startswith("set_payload"):
         comments += tool_lines(robot)
-    if any(node.operation == "atan2" for node in item.graph.nodes):
+    if any(node.operation == "atan2" for node in function.graph.nodes):
         comments.append("It calls ATAN2(y, x), which some controllers have in a library only.")
     return function_block(
-        name, item.graph, item.inputs, item.outputs, comments, item.meanings, item.names
+        name,
+        function.graph,
+        function.inputs,
+        function.outputs,
+        comments,
+        function.meanings,
+        function.names,
     )
 
 

@@ -156,18 +156,18 @@ def estimate(
     )
     try:
         if instruments is None:
-            values = solve(fit)
+            solution = solve(fit)
         else:
             read = partial(_instruments, observations, len(fit.time), independent)
-            values = _estimate_by_instruments(fit, instruments, read)
+            solution = _estimate_by_instruments(fit, instruments, read)
     except LogError as error:
         if error.reason == "too little motion" and not reduce:
             error.args = (f"{error}; or give reduce=True, which leaves out dependent columns",)
         raise
-    prediction = _predict(check, values, repeats=held_out is None)
+    prediction = _predict(check, solution, repeats=held_out is None)
     return RegressorFit(
-        values,
-        essential_parameters(fit, values, solve),
+        solution,
+        essential_parameters(fit, solution, solve),
         prediction,
         verdict_of([prediction], repeats=held_out is None),
         independent,

@@ -398,7 +398,7 @@ def _observe_phases(
 
 
 def _check_phases(log: Log) -> None:
-    """Refuse a single log without both phases."""
+    """Raise LogError where a single log does not have both phases."""
     phases = [] if log.payload is None else np.unique(log.payload).tolist()
     if len(phases) > 1:
         return

@@ -22,7 +22,7 @@ _MANY = 2
 
 
 def expect_same(path: str | Path, stored: Any, plan: Mapping[str, Any]) -> None:
-    """Refuse to resume a store whose plan differs.
+    """Raise OutputError, listing the differences, if a store's plan is not the run's.
 
     Plans are plain JSON data: the store's, and that of the run. Texts that are TOML, as a robot's
     is, are compared by their keys.

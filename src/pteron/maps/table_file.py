@@ -153,7 +153,7 @@ def _checksum(index_map: Map) -> str:
 
 
 def _expect_whole(source: Path, index_map: Map) -> None:
-    """Refuse a Parquet file whose checksum, if it has one, does not match its contents."""
+    """Raise DataError if a Parquet file has a checksum that does not match its contents."""
     import polars as pl
 
     metadata = pl.read_parquet_metadata(source)

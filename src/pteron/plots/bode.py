@@ -47,8 +47,8 @@ def bode_figure(
     axes = stack(figure, "frequency (rad/s)", ["gain", "phase (degrees)"])
     curves = list(range(responses.shape[1]))
     labels = list(names or (f"drive {i + 1}" for i in curves))
-    for plot, values, line in zip(axes, (np.abs(responses), phase), (1.0, -180.0), strict=True):
-        leg_curves(plot, omega, values, curves, 1.6, labels if plot is axes[0] else ())
+    for plot, curve, line in zip(axes, (np.abs(responses), phase), (1.0, -180.0), strict=True):
+        leg_curves(plot, omega, curve, curves, 1.6, labels if plot is axes[0] else ())
         plot.axhline(line, color=MUTED, linewidth=0.8, linestyle=(0, (4, 3)))
         plot.set_xscale("log")
     axes[0].set_yscale("log")

@@ -213,7 +213,7 @@ def enlargement(difference: float, size: float) -> float:
 
 
 def expect_alike(robot: Manipulator, other: Manipulator) -> None:
-    """Refuse two machines that differ in more than numbers."""
+    """Raise DataError if two machines differ in more than numbers."""
     if [leg.type for leg in robot.legs] != [leg.type for leg in other.legs] or (
         robot.coordinates != other.coordinates
     ):

@@ -303,13 +303,13 @@ def log_scale(axes: Axes, low: float, high: float) -> None:
     axes.xaxis.set_major_locator(FixedLocator(ticks.tolist()))
     axes.xaxis.set_minor_locator(NullLocator())
     far = len(ticks) and (ticks[0] < 1e-3 or ticks[-1] > 1e4)
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: _decade(value, bool(far))))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda number, _: _decade(number, bool(far))))
 
 
-def _decade(value: float, as_power: bool) -> str:
+def _decade(number: float, as_power: bool) -> str:
     """Return a tick label: a power of ten where that is exact and `as_power`, else digits."""
-    power = round(float(np.log10(value)))
-    return power_of_ten(power) if as_power and np.isclose(value, 10.0**power) else f"{value:g}"
+    power = round(float(np.log10(number)))
+    return power_of_ten(power) if as_power and np.isclose(number, 10.0**power) else f"{number:g}"
 
 
 def stack(
@@ -373,7 +373,7 @@ def axis_label(name: str) -> str:
 def leg_curves(
     axes: Axes,
     time: Array,
-    values: Array,
+    curves: Array,
     columns: Iterable[int],
     width: float,
     names: Sequence[str] = (),
@@ -385,10 +385,10 @@ def leg_curves(
     last one's label says so.
     """
     chosen = list(columns)
-    shown = values[:, chosen]
+    shown = curves[:, chosen]
     near = _SAME * float(np.ptp(shown[np.isfinite(shown)])) if np.isfinite(shown).any() else 0.0
     for i in chosen:
-        differences = np.abs(shown - values[:, [i]])
+        differences = np.abs(shown - curves[:, [i]])
         known = np.atleast_1d(np.isfinite(differences).any(axis=0))
         alike = [
             j
@@ -401,7 +401,7 @@ def leg_curves(
             style |= {"linestyle": (-_DASH * turn, (_DASH, _DASH * gap)), "dash_capstyle": "butt"}
             if label and i == alike[-1]:
                 label += f" (on {', '.join(names[j] for j in alike[:-1])})"
-        axes.plot(time, values[:, i], label=label, **style)
+        axes.plot(time, curves[:, i], label=label, **style)
     fit_time_scale(axes, time)
 
 
@@ -423,7 +423,7 @@ def zero_line(axes: Axes) -> None:
 
 
 def groups_of(kinds: Sequence[Kind]) -> dict[Kind, list[int]]:
-    """Return the columns of each kind, such as a unit, by kind.
+    """Return the indices of equal elements, such as units, by element.
 
     Examples
     --------
@@ -442,7 +442,7 @@ def nice_step(least: float) -> float:
 
 
 def spot(axes: Axes, x: float, y: float, face: str, edge: str, size: float, **options: Any) -> None:
-    """Draw a round mark."""
+    """Draw a round mark on axes, filled and outlined in colours."""
     style = {"marker": "o", "linestyle": "none", "markersize": size, **options}
     axes.plot([x], [y], markerfacecolor=face, markeredgecolor=edge, **style)
 

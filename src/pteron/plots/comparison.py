@@ -141,8 +141,8 @@ def residual_time_figure(
     for i, axes in enumerate(panels):
         zero_line(axes)
         counted = np.where(used[:, i], residuals[:, i], np.nan)
-        for values, color in ((residuals[:, i], MUTED), (counted, LEG_COLORS[i])):
-            low, high = (f.reduceat(values, starts) for f in (np.fmin, np.fmax))
+        for series, color in ((residuals[:, i], MUTED), (counted, LEG_COLORS[i])):
+            low, high = (f.reduceat(series, starts) for f in (np.fmin, np.fmax))
             axes.fill_between(middle, low, high, facecolor=color, edgecolor=color, linewidth=0.6)
         size = float(np.nanmax(np.abs(counted), initial=0.0)) or 1.0
         axes.set_ylim(-1.15 * size, 1.15 * size)

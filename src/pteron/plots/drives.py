@@ -93,8 +93,8 @@ def force_speed_figure(
         zero_line(axes)
         axes.axvline(0.0, color=MUTED, linewidth=0.8)
         sizes = []
-        for values, key in ((speeds, "speed"), (forces, "force")):
-            used = float(np.abs(values[:, legs]).max()) or 1.0
+        for columns, key in ((speeds, "speed"), (forces, "force")):
+            used = float(np.abs(columns[:, legs]).max()) or 1.0
             near = [getattr(abilities[i], key) or 0.0 for i in legs]
             near += [abilities[i].rated or 0.0 for i in legs] if key == "force" else []
             sizes.append(_ROOM * max(used, *(limit for limit in near if limit <= _FAR * used), 0.0))

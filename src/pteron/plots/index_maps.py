@@ -185,8 +185,8 @@ def _plane(
     axes.grid(visible=False)
     first, second = (_axis_values(axis) for axis in plane.grid.axes)
     factor = shown_unit(plane.index(name).unit)[0]
-    values = factor * np.ma.masked_invalid(plane.values[name].T)
-    drawn = np.ma.masked_where(plane.status.T != REACHABLE, values)
+    cells = factor * np.ma.masked_invalid(plane.values[name].T)
+    drawn = np.ma.masked_where(plane.status.T != REACHABLE, cells)
     better = plane.index(name).better == "more"
     mesh = axes.pcolormesh(
         first,
@@ -339,9 +339,9 @@ def _unit(index_map: Map, name: str) -> str:
 
 def _title(shown_map: Map) -> str:
     """Return the machine's name and the fixed coordinates."""
-    pairs = ((coordinate(name), value) for name, value in shown_map.grid.fixed_coordinates.items())
+    pairs = ((coordinate(name), fixed) for name, fixed in shown_map.grid.fixed_coordinates.items())
     constants = (
-        f"{c.symbol} = {c.shown_factor * value + 0.0:.4g}{' ' * (c.unit == 'm')}{c.shown_unit}"
-        for c, value in pairs
+        f"{c.symbol} = {c.shown_factor * fixed + 0.0:.4g}{' ' * (c.unit == 'm')}{c.shown_unit}"
+        for c, fixed in pairs
     )
     return "  ".join([shown_map.robot, *constants])

@@ -81,8 +81,8 @@ def condition_figure(
     >>> condition = np.linalg.cond(np.nan_to_num(jacobians))  # infinite where not in reach
     >>> figure = pteron.plots.condition_figure(cut.first, cut.second, condition)
     """
-    figure, axes, x, y, values = _map(first, second, condition, names, ax)
-    drawn = np.ma.masked_invalid(np.clip(values, 1.0, _LEVELS[-1]))
+    figure, axes, x, y, conditions = _map(first, second, condition, names, ax)
+    drawn = np.ma.masked_invalid(np.clip(conditions, 1.0, _LEVELS[-1]))
     for level in _LEVELS[1:-1]:
         if (drawn > level).any():
             axes.contourf(x, y, drawn, levels=[level, np.inf], colors=[REACH], alpha=0.17)
@@ -90,7 +90,7 @@ def condition_figure(
     if named:
         lines = axes.contour(x, y, drawn, levels=named, colors=[INK], linewidths=0.7)
         axes.clabel(lines, fmt="%g", fontsize=FONT_SIZE - 1.0, colors=[INK])
-    _rim(axes, x, y, values)
+    _rim(axes, x, y, conditions)
     return real_figure(figure)
 
 
@@ -138,10 +138,10 @@ def singularities_figure(
     >>> determinant = np.linalg.det(pteron.jacobian(robot, poses, on_failure="nan"))
     >>> figure = pteron.plots.singularities_figure(x, phi, determinant, names=("x", "phi"))
     """
-    figure, axes, x, y, values = _map(first, second, determinant, names, ax)
+    figure, axes, x, y, determinants = _map(first, second, determinant, names, ax)
     # Near type I it goes to infinity, which hides nothing of its sign.
-    size = float(np.nanmedian(np.abs(values))) if np.isfinite(values).any() else 1.0
-    drawn = np.ma.masked_invalid(np.arctan(values / (size or 1.0)))
+    size = float(np.nanmedian(np.abs(determinants))) if np.isfinite(determinants).any() else 1.0
+    drawn = np.ma.masked_invalid(np.arctan(determinants / (size or 1.0)))
     for sign, color, alpha in ((1.0, REACH, 0.30), (-1.0, GRID, 0.75)):
         if (sign * drawn > 0.0).any():
             axes.contourf(x, y, sign * drawn, levels=[0.0, 2.0], colors=[color], alpha=alpha)
@@ -149,7 +149,7 @@ def singularities_figure(
             remark(axes, "+" if sign > 0.0 else "\u2212", float(x[column]), float(y[row]), INK)
     if drawn.min() < 0.0 < drawn.max():
         axes.contour(x, y, drawn, levels=[0.0], colors=[WARNING], linewidths=2.0)
-    _rim(axes, x, y, values)
+    _rim(axes, x, y, determinants)
     return real_figure(figure)
 
 
@@ -163,11 +163,11 @@ def _middle(region: NDArray[np.bool_]) -> tuple[int, int]:
 def _map(
     first: ArrayLike,
     second: ArrayLike,
-    values: ArrayLike,
+    measure: ArrayLike,
     names: tuple[str, str],
     ax: Axes | SubFigure | None,
 ) -> tuple[Figure, Axes, Array, Array, Array]:
-    """Return a figure, its axes, both coordinates in mm and degrees, and the values (B, A)."""
+    """Return a figure, its axes, both coordinates in mm and degrees, and a measure (B, A)."""
     scaled, labels = [], []
     for axis_values, name in zip((first, second), names, strict=True):
         numbers = as_array(axis_values, name, ())
@@ -176,7 +176,7 @@ def _map(
         scaled.append(coordinate(name).shown_factor * numbers)
         labels.append(axis_label(name))
     x, y = scaled
-    array = np.asarray(values, dtype=float)
+    array = np.asarray(measure, dtype=float)
     if array.shape != (len(y), len(x)):
         raise DataError(f"values: shape {array.shape} given, ({len(y)}, {len(x)}) expected")
     alike = len(set(are_angles(names).tolist())) == 1
@@ -190,8 +190,8 @@ def _map(
     return figure, axes, x, y, np.where(np.isfinite(array), array, np.nan)
 
 
-def _rim(axes: Axes, x: Array, y: Array, values: Array) -> None:
-    """Draw the boundary of the region with values."""
-    known = np.isfinite(values).astype(float)
+def _rim(axes: Axes, x: Array, y: Array, measure: Array) -> None:
+    """Draw the boundary of the region in which a measure is finite."""
+    known = np.isfinite(measure).astype(float)
     if known.min() < known.max():
         axes.contour(x, y, known, levels=[0.5], colors=[MUTED], linewidths=1.0)

@@ -152,7 +152,7 @@ def _finish(axes: Axes, cut: ReachSlice, path: Array | None) -> None:
 
 
 def _territories(legs: Array) -> Iterator[tuple[Array, str]]:
-    """Yield fields (B, A), positive where a pose is infeasible, with colours, in painting order.
+    """Yield fields (B, A), positive where poses are infeasible, with their colours, to be painted.
 
     In the end a pose has the colour of the leg that misses it by most: the last leg's is painted
     wherever one does, then the others' over it where none after them does worse. Of legs that miss

@@ -164,8 +164,8 @@ def row_axes(figure: Figure, names: Sequence[str], xlabel: str, place: Any = Non
     return axes
 
 
-def _checked_values(names: Sequence[str], values: ArrayLike, what: str) -> Array:
+def _checked_values(names: Sequence[str], numbers: ArrayLike, what: str) -> Array:
     """Return values of named rows as an array (N,), checked for its shape."""
-    array = np.asarray(values, dtype=float)
+    array = np.asarray(numbers, dtype=float)
     expect(array.shape == (len(names),), what, f"shape {array.shape}", f"({len(names)},)")
     return array

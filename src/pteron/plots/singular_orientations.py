@@ -56,9 +56,9 @@ def regularity_figure(
         rise = 3.0 if roomy or i % 2 else 14.0
         remark(axes, text.replace("-", "\u2212"), float(angle), inf, WARNING, rise)
     if home is not None:
-        at, value = float(np.degrees(home)), float(np.interp(home, angles, np.abs(type_ii)))
-        spot(axes, at, value, INK, PAPER, 6.0, zorder=4)
-        remark(axes, "home", at, value, INK, -12.0)
+        at, measure = float(np.degrees(home)), float(np.interp(home, angles, np.abs(type_ii)))
+        spot(axes, at, measure, INK, PAPER, 6.0, zorder=4)
+        remark(axes, "home", at, measure, INK, -12.0)
     axes.set_xlim(float(degrees[0]), float(degrees[-1]))
     axes.set_xticks(np.arange(-180, 181, 60))
     axes.set_ylim(0.0, 1.06)

@@ -42,7 +42,7 @@ def tracking_figure(
     return real_figure(figure)
 
 
-def _scale(values: Array) -> tuple[float, str]:
+def _scale(errors: Array) -> tuple[float, str]:
     """Return the factor and the SI prefix that make the largest value a number above 1."""
-    largest = float(np.abs(values).max(initial=0.0))
+    largest = float(np.abs(errors).max(initial=0.0))
     return next((pair for pair in _SCALES if largest * pair[0] >= 1.0), _SCALES[-1])

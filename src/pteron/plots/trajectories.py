@@ -142,30 +142,30 @@ def _courses_figure(
 ) -> Figure:
     """Return a figure of courses (T, k) over time: a row a derivative, a column a unit."""
     t = as_array(time, "time", ())
-    values = [as_array(course, words[min(k, 4)], ()) for k, course in enumerate(courses)]
-    _expect_fitting(t, values, len(names), words)
+    curves = [as_array(course, words[min(k, 4)], ()) for k, course in enumerate(courses)]
+    _expect_fitting(t, curves, len(names), words)
     labels = [
         [f"{word} ({unit}{order})" for unit in groups]
-        for word, order, _ in zip(words, _ORDERS, values, strict=False)
+        for word, order, _ in zip(words, _ORDERS, curves, strict=False)
     ]
-    figure = blank(_WIDE, _HEAD + _TALL * len(values), ax)
+    figure = blank(_WIDE, _HEAD + _TALL * len(curves), ax)
     axes_rows = panels(figure, "time (s)", labels)
     for column in zip(*axes_rows, strict=True):
         figure.align_ylabels(column)
-    for row, course in zip(axes_rows, values, strict=True):
+    for row, course in zip(axes_rows, curves, strict=True):
         for axes, columns in zip(row, groups.values(), strict=True):
             zero_line(axes)
-            leg_curves(axes, t, course, columns, 1.6, names if course is values[0] else (), noun)
+            leg_curves(axes, t, course, columns, 1.6, names if course is curves[0] else (), noun)
     legend(figure, len(names))
     return real_figure(figure)
 
 
-def _expect_fitting(time: Array, values: list[Array], width: int, words: Sequence[str]) -> None:
+def _expect_fitting(time: Array, curves: list[Array], width: int, words: Sequence[str]) -> None:
     """Raise a `DataError` if times or courses have unfit shapes, or there are too many courses."""
     if time.ndim != 1 or len(time) < 2:
         raise DataError(f"time: shape {time.shape} given, (T,) expected, T above 1")
-    if not 1 <= len(values) <= len(_ORDERS):
-        raise DataError(f"{len(values)} courses given, 1 to {len(_ORDERS)} expected")
-    for word, course in zip(words, values, strict=False):
+    if not 1 <= len(curves) <= len(_ORDERS):
+        raise DataError(f"{len(curves)} courses given, 1 to {len(_ORDERS)} expected")
+    for word, course in zip(words, curves, strict=False):
         if course.shape != (len(time), width):
             raise DataError(f"{word}: shape {course.shape} given, ({len(time)}, {width}) expected")

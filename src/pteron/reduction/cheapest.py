@@ -138,9 +138,9 @@ class _Model:
         """Return the operations for a state, before the optimisation pass, which is slow."""
         if base_columns not in self.known:
             base = ca.SX.sym("base", len(base_columns))
-            values = ca.SX(len(self.machine.parameters), 1)
-            values[list(base_columns)] = base
-            known = self.machine, self.state, values
+            base_values = ca.SX(len(self.machine.parameters), 1)
+            base_values[list(base_columns)] = base
+            known = self.machine, self.state, base_values
             self.known[base_columns] = min(
                 self._operations(base, inverse_dynamics(*known, carried=carried))
                 for carried in (True, False)

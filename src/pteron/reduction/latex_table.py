@@ -42,8 +42,8 @@ def latex_table(
         Significant digits of the values.
     """
     rows = [
-        rf"    {i} & ${_break_lines(text, plain)}$ & ${_number(value, digits)}$ & {_unit(unit)} \\"
-        for i, (text, plain, value, unit) in enumerate(
+        rf"    {i} & ${_break_lines(text, plain)}$ & ${_number(number, digits)}$ & {_unit(unit)} \\"
+        for i, (text, plain, number, unit) in enumerate(
             zip(sums, printed, values, units, strict=True), start=1
         )
     ]
@@ -94,9 +94,9 @@ def _terms(text: str) -> list[str]:
     return terms
 
 
-def _number(value: float, digits: int) -> str:
+def _number(number: float, digits: int) -> str:
     """Return a number in LaTeX with `digits` digits, a power of ten where it needs an exponent."""
-    mantissa, _, exponent = f"{value:.{digits}g}".partition("e")
+    mantissa, _, exponent = f"{number:.{digits}g}".partition("e")
     return rf"{mantissa} \times 10^{{{int(exponent)}}}" if exponent else mantissa
 
 

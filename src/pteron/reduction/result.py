@@ -94,11 +94,16 @@ class BaseParameters(Result):
         """Return the overview table: base parameters, their values and units, and the proof."""
         columns = [Column("", "number"), Column("base parameter", "long")]
         columns += [Column("value", "number"), Column("unit")]
-        sums, values = self.expressions("html"), self.values()
+        sums, base_values = self.expressions("html"), self.values()
         rows = [
-            (i, Markup(text), float(value), self.parameters[column].unit.replace("^2", "\u00b2"))
-            for i, (text, value, column) in enumerate(
-                zip(sums, values, self.kept, strict=True), start=1
+            (
+                i,
+                Markup(text),
+                float(base_value),
+                self.parameters[column].unit.replace("^2", "\u00b2"),
+            )
+            for i, (text, base_value, column) in enumerate(
+                zip(sums, base_values, self.kept, strict=True), start=1
             )
         ]
         about = f"{self.rank} base parameters of {len(self.columns)} inertial parameters"
@@ -189,21 +194,21 @@ class BaseParameters(Result):
     @property
     def geometry_values(self) -> dict[str, float]:
         """The geometric symbols of the expressions, and their values in metres."""
-        values = self.leg_geometry_values.items()
-        return {name: value for name, value in values if str(self._symbol_values[name]) == name}
+        lengths = self.leg_geometry_values.items()
+        return {name: length for name, length in lengths if str(self._symbol_values[name]) == name}
 
     @property
     def leg_geometry_values(self) -> dict[str, float]:
         """The geometric symbols where each leg has its own, and their values in metres."""
-        values = exact_geometry(self.robot).symbols().items()
-        return {name: float(value) for name, value in values if value.q != 0}
+        lengths = exact_geometry(self.robot).symbols().items()
+        return {name: float(length) for name, length in lengths if length.q != 0}
 
     @property
     def shared_symbols(self) -> dict[str, tuple[str, ...]]:
         """The geometric symbols that stand for several values, equal but for their sign."""
         bearers: dict[str, tuple[str, ...]] = {}
-        for name, value in self._symbol_values.items():
-            bearer = str(value).lstrip("-")
+        for name, symbol in self._symbol_values.items():
+            bearer = str(symbol).lstrip("-")
             if bearer not in (name, "0"):
                 bearers[bearer] = (*bearers.get(bearer, ()), name)
         return bearers

@@ -73,9 +73,9 @@ def costs(base: BaseParameters) -> tuple[Cost, ...]:
     return tuple(table)
 
 
-def fewer(value: float, reference: float, less: str = "fewer") -> str:
-    """Return the text of the percentage by which a value is below, or above, a reference."""
-    percent = 100.0 * (1.0 - value / reference)
+def fewer(count: float, reference: float, less: str = "fewer") -> str:
+    """Return the text of how many per cent a count is below a reference, or above it."""
+    percent = 100.0 * (1.0 - count / reference)
     return f"{abs(percent):.0f} % {less if percent >= 0.0 else 'more'}"
 
 

@@ -126,9 +126,9 @@ def line_samples(count: int) -> slice:
     return slice(None, None, max(1, count // _DRAWN))
 
 
-def _interpolate(time: Array, values: Array, at: Array) -> Array:
+def _interpolate(time: Array, columns: Array, at: Array) -> Array:
     """Return columns (T, k) interpolated linearly at times (F,): (F, k)."""
-    return np.column_stack([np.interp(at, time, column) for column in values.T])
+    return np.column_stack([np.interp(at, time, column) for column in columns.T])
 
 
 def scene(robot: Manipulator, shown: Frames) -> dict[str, Any]:

@@ -143,6 +143,6 @@ def _figures(motion_shown: ShownMotion) -> dict[str, Figure]:
     }
 
 
-def _joint_figure(time: Array, values: Array, quantity: JointQuantity) -> Figure:
+def _joint_figure(time: Array, columns: Array, quantity: JointQuantity) -> Figure:
     """Return the figure of a joint quantity (T, n) over time, in its display units."""
-    return forces_figure(time, values * np.array(quantity.factors), ylabel=quantity.axis)
+    return forces_figure(time, columns * np.array(quantity.factors), ylabel=quantity.axis)

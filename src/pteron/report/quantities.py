@@ -71,11 +71,11 @@ def speed(joints: Sequence[ActuatedJoint]) -> JointQuantity:
 
 
 def nouns(joints: Sequence[ActuatedJoint]) -> str:
-    """Return the nouns of the actuated joints: "slider", or "slider or crank"."""
+    """Return the noun of the actuated joints, such as "slider", or "slider or crank"."""
     return " or ".join(_distinct(joint.noun for joint in joints))
 
 
-def readable(value: float, unit: str, places: int = 1) -> str:
+def readable(coordinate: float, unit: str, places: int = 1) -> str:
     """Return the text of a coordinate, in display units.
 
     Examples
@@ -84,15 +84,16 @@ def readable(value: float, unit: str, places: int = 1) -> str:
     ('28.6°', '120.0 mm')
     """
     shown, factor = SHOWN[unit]
-    return f"{format_fixed(factor * float(value), places)}{shown if shown == '°' else ' ' + shown}"
+    text = format_fixed(factor * float(coordinate), places)
+    return f"{text}{shown if shown == '°' else ' ' + shown}"
 
 
 def angles_text(robot: Manipulator, pose: Array) -> str:
     """Return the angles of a pose (m,) with their symbols; empty without angles."""
     pairs = zip(robot.coordinates, pose, strict=True)
     return ", ".join(
-        f"{pose_coordinate(name).symbol} = {readable(value, 'rad', 0)}"
-        for name, value in pairs
+        f"{pose_coordinate(name).symbol} = {readable(angle, 'rad', 0)}"
+        for name, angle in pairs
         if name in robot.platform.angles
     )
 

@@ -28,7 +28,7 @@ _KINDS = {
 
 
 class _Changed(NamedTuple):
-    """A quantity that trials change, in headings and column heads, {} for the unit; its factor."""
+    """A quantity that trials vary: its heading, its column's head, {} for the unit, its factor."""
 
     many: str
     one: str

@@ -164,7 +164,7 @@ class Live:
         threading.Thread(target=compile_equations, name="pteron push", daemon=True).start()
 
     def _tell(self, text: str) -> None:
-        """Stop the motion and show a message."""
+        """Stop the motion, and show a message on the page."""
         self.session.playing = False
         self.session.state = stop_motion(self.session.state, _sentence(text))
 
@@ -278,9 +278,9 @@ class Live:
             },
         )
         if settled:
-            values = panel.settled_values(session, lambda: bool(self._actions))
-            if values is not None:
-                self._send("settled", values)
+            shown = panel.settled_values(session, lambda: bool(self._actions))
+            if shown is not None:
+                self._send("settled", shown)
                 self._show_slice()
 
     def _show_slice(self) -> None:
@@ -289,8 +289,8 @@ class Live:
         plane = choices(state.robot).get(self.session.plane)
         # A map shows where the machine is, too.
         fixed_coordinates = [
-            value
-            for name, value in zip(state.robot.coordinates, state.pose, strict=True)
+            coordinate
+            for name, coordinate in zip(state.robot.coordinates, state.pose, strict=True)
             if not isinstance(plane, str) or name not in plane
         ]
         key = (plane, state.robot, *np.round(fixed_coordinates, 9)) if plane else ()
@@ -311,7 +311,7 @@ class Live:
 
 def _finite_or_none(numbers: Any) -> list[float | None]:
     """Return values as floats; None, which JSON can hold, for NaN and infinities."""
-    return [float(value) if np.isfinite(value) else None for value in numbers]
+    return [float(number) if np.isfinite(number) else None for number in numbers]
 
 
 def _sentence(text: str) -> str:

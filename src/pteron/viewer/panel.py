@@ -90,8 +90,8 @@ def values(session: Session, joints: Array) -> dict[str, Any]:
 
 def _pose_text(robot: Manipulator, pose: Array) -> str:
     """Return the text of a pose (m,), each unit named once."""
-    values, units = pose_factors(robot) * pose, (SHOWN[unit][0] for unit in robot.units)
-    named = zip(robot.coordinates, values, units, strict=True)
+    coordinates, units = pose_factors(robot) * pose, (SHOWN[unit][0] for unit in robot.units)
+    named = zip(robot.coordinates, coordinates, units, strict=True)
     groups = groupby(
         ((f"{name} {format_fixed(x)}", unit) for name, x, unit in named), lambda pair: pair[1]
     )

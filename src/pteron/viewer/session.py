@@ -161,10 +161,10 @@ class Session:
             self._set_ranges()
         self.state = stop_motion(was)
 
-    def set_coordinate(self, i: int, value: float) -> None:
+    def set_coordinate(self, i: int, coordinate: float) -> None:
         """Move the platform along one of its pose's coordinates, from 0, to a value in m or rad."""
         target = self.state.pose.copy()
-        target[i] = value
+        target[i] = coordinate
         self.set_pose(target)
 
     def set_pose(self, target: Array) -> None:
@@ -190,10 +190,10 @@ class Session:
         if hint := metres_hint(self.state.robot, pose):
             self.state = replace(self.state, message=f"{hint} {self.state.message}".strip())
 
-    def set_joint(self, i: int, value: float) -> None:
+    def set_joint(self, i: int, coordinate: float) -> None:
         """Move one joint, from 0, to a value in m or rad."""
         self._end_motion()
-        self.state = move_joint(self.state, i, value)
+        self.state = move_joint(self.state, i, coordinate)
 
     def set_payload(self, text: str) -> None:
         """Set the payload from a text, kg."""
@@ -259,9 +259,9 @@ class Session:
         self.push = None
         self.state = stop_motion(self.state)
 
-    def load(self, name: str, data: bytes) -> None:
+    def load(self, name: str, content: bytes) -> None:
         """Load a motion from a file's name and content; playback starts at its beginning."""
-        motion = motion_of_file(self.state.robot, name, data, self.state.pose)
+        motion = motion_of_file(self.state.robot, name, content, self.state.pose)
         self.take(motion, name)
 
     def load_standard(self) -> None:

@@ -81,7 +81,7 @@ def _weights(robot: Manipulator) -> Array:
 
 
 def _step(robot: Manipulator, pose: Array, wish: Array, weights: Array) -> Array:
-    """Return the step (m,) nearest to a desired one that keeps the linearised margins.
+    """Return the step (m,) nearest to a desired one at which linearised margins stay positive.
 
     Least distance programming by non-negative least squares (Lawson and Hanson, chapter 23).
     """

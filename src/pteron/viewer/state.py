@@ -207,13 +207,13 @@ def pose_units(robot: Manipulator) -> str:
 def _number(text: str, name: str, expected: str) -> float:
     """Return a text as a finite number; a `DataError` says what is expected."""
     try:
-        value = float(text)
+        number = float(text)
     except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
+        number = math.nan
+    if not math.isfinite(number):
         comma = "; write the decimal sign as a point" if "," in text else ""
         raise DataError(f"{name}: {shorten(text)} given, {expected} expected{comma}")
-    return value
+    return number
 
 
 def state_in_motion(state: ViewerState, motion: Motion, time: float) -> ViewerState:

@@ -52,7 +52,7 @@ def bed(robot: Manipulator, reach: float, low: float, high: float) -> tuple[floa
 
 
 def told_bed(robot: Manipulator, level: float, good: float, most: float) -> tuple[str, ...]:
-    """Return comments on the bed: its height, and the usable part of Klipper's range."""
+    """Return comment lines on the bed: its height, and the usable part of Klipper's range."""
     tool = tool_of(robot)
     who = "the tool's" if tool.any() else "the pose's"
     comments = [

@@ -48,9 +48,9 @@ class Center:
             "center", [q], [locus.center - offset.a - offset.constant, locus.radius]
         )
 
-        def center(value: float) -> Array:
+        def center(coordinate: float) -> Array:
             """Return the centre (3,), m, at a joint coordinate, m or rad."""
-            return np.array(function(value)[0]).ravel()
+            return np.array(function(coordinate)[0]).ravel()
 
         radius = float(function(0.0)[1])
         start, step = center(0.0), center(1.0) - center(0.0)
@@ -66,20 +66,20 @@ class Center:
         return None
 
 
-def common(robot: Manipulator, values: Sequence[float], reason: str, taker: str) -> float:
-    """Return the value that the legs share.
+def common(robot: Manipulator, numbers: Sequence[float], reason: str, taker: str) -> float:
+    """Return the common value of all legs, m; `reason` and `taker` are for the error's message.
 
     Raises
     ------
     ModelError
         If they do not, by more than a micrometre.
     """
-    for i, value in enumerate(values[1:], start=2):
-        if abs(value - values[0]) > SAME:
-            first_value, second_value = (round(1000.0 * v, 6) + 0.0 for v in (value, values[0]))
+    for i, number in enumerate(numbers[1:], start=2):
+        if abs(number - numbers[0]) > SAME:
+            first_value, second_value = (round(1000.0 * v, 6) + 0.0 for v in (number, numbers[0]))
             text = f"{reason.format(first_value)}, leg 1 {second_value:.6g} mm"
             raise differs(robot, i, text, taker)
-    return float(np.mean(values))
+    return float(np.mean(numbers))
 
 
 def degrees(point: Array) -> float:

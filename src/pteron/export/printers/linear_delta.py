@@ -176,7 +176,7 @@ def _fit_numbers(
 
 
 def _refuse_sliders_below(robot: Manipulator, centers: Sequence[Center], taker: str) -> None:
-    """Refuse a machine whose sliders are below its platform."""
+    """Raise ModelError if a machine's sliders are below its platform."""
     poses = random_poses(robot, 50, seed=1, type_i=0.02, type_ii=0.0, limits=False)
     joints = inverse_kinematics(robot, poses)
     for i, center in enumerate(centers):

@@ -111,7 +111,7 @@ def rotary(robot: Manipulator, centers: Sequence[Center]) -> dict[str, Any]:
 
 
 def _refuse_elbows_inside(robot: Manipulator, arms: Sequence[_Arm], height: float) -> None:
-    """Refuse a machine whose elbows are not where kin_rotary_delta.c takes them: outside.
+    """Raise ModelError if elbows are not where kin_rotary_delta.c takes them: outside.
 
     The platform is below the shoulders; of the two elbows it takes that of the greater angle.
     """

@@ -91,8 +91,7 @@ def maximum_likelihood(
     for _ in search.steps(iterations):
         observations = _sample_observations(model, log, curve, preprocessing)
         if search.iterations <= _RENEWED:
-            used, start = observations.gain, preprocessing.start
-            slopes = _slopes(model, beta, log, curve, used, start)
+            slopes = _slopes(model, beta, log, curve, observations.gain, preprocessing.start)
         # Linearised about the present motion
         weights = np.tile(1.0 / noise, (len(observations.time), 1))
         w = (weights[..., None] * observations.matrix).reshape(-1, len(beta))
@@ -109,28 +108,27 @@ def maximum_likelihood(
         step = inverse @ (w.T @ residuals - coupling.T @ solved[:, -1])
         motion_step = solved[:, -1] - solved[:, :-1] @ step
         beta = beta + step
-        shifted = curve.coefficients + motion_step.reshape(measured.shape)
-        curve = replace(curve, coefficients=shifted)
+        coefficients = curve.coefficients + motion_step.reshape(measured.shape)
+        curve = replace(curve, coefficients=coefficients)
         # What is left of the forces, less what the values and the motion took.
         remainder = (residuals - w @ step - s @ motion_step).reshape(weights.shape) * noise
         spent = 1.0 - len(beta) / observations.rows
-        noise = np.sqrt(
-            (remainder**2).sum(axis=0) / np.maximum(observations.equation_counts, 1) / spent
-        )
-        noise = np.maximum(noise, least)
+        counts = np.maximum(observations.equation_counts, 1)
+        noise = np.maximum(np.sqrt((remainder**2).sum(axis=0) / counts / spent), least)
         search.converged = bool((np.abs(step) <= _SETTLED * np.sqrt(np.diag(inverse))).all())
     # The values' own part of the forces: what the motion could do as well is taken out of it.
     moved = solved[:, :-1]
     projected_rows = (w - s @ moved).reshape(observations.matrix.shape) * noise[:, None]
     observations = _sample_observations(model, log, curve, preprocessing)
-    motion_spread, factor = moved.T @ (information @ moved), qr_factor(observations, 1.0 / noise)
-    solution, weights = (search, observations, factor, beta), 1.0 / noise
     return estimate_of(
-        *solution,
-        weights=weights,
+        search,
+        observations,
+        qr_factor(observations, 1.0 / noise),
+        beta,
+        weights=1.0 / noise,
         inverse=inverse,
         instruments=projected_rows,
-        extra=motion_spread,
+        extra=moved.T @ (information @ moved),
     )
 
 

@@ -96,7 +96,7 @@ def conditioning(
     ModelError
         If `base` belongs to a machine of another layout.
     """
-    return conditioning_of(information_root(motion, base, samples), base.values(motion.robot))
+    return condition_numbers(information_root(motion, base, samples), base.values(motion.robot))
 
 
 def information_root(
@@ -115,7 +115,7 @@ def information_root(
     return np.asarray(triangle(pieces, base.rank) / np.sqrt(count))
 
 
-def conditioning_of(root: Array, base_values: Array) -> Conditioning:
+def condition_numbers(root: Array, base_values: Array) -> Conditioning:
     """Return the condition numbers of `information_root`, for base parameters of these values."""
     if not np.isfinite(root).all():
         return Conditioning(np.inf, np.inf, np.inf, -np.inf)

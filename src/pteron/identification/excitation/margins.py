@@ -139,7 +139,7 @@ def relative_margins(motion: Movement, limits: Limits, times: Array) -> dict[str
 
 
 def check_rest(robot: Manipulator, home: Array, limits: Limits) -> None:
-    """Refuse limits that the machine violates at rest in its home pose; the message names one."""
+    """Raise ModelError if the machine violates limits at rest in its home pose, naming one."""
     zero = np.zeros((1, len(home)))
     at_rest = FullMotion.from_platform(robot, home[None], zero, zero)
     for name, at_home in _margins_of(robot, limits, at_rest).items():

@@ -17,7 +17,7 @@ from pteron.errors import DataError
 from pteron.identification.excitation.conditioning import (
     Conditioning,
     condition_with_penalty,
-    conditioning_of,
+    condition_numbers,
     information_root,
 )
 from pteron.identification.excitation.excitation import IDENTIFIES, Excitation, Start
@@ -236,7 +236,7 @@ class _Search:
     def judge_motion(self, motion: FourierMotion) -> _Candidate:
         """Return a motion with its conditioning and the root of its information matrix."""
         root = information_root(motion, self.base)
-        return _Candidate(motion, conditioning_of(root, self.base.values(motion.robot)), root)
+        return _Candidate(motion, condition_numbers(root, self.base.values(motion.robot)), root)
 
     def lengths(self) -> Array:
         """Return the columns' root mean square lengths (p,) over the random motions."""

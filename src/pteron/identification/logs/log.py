@@ -294,7 +294,7 @@ class Log(LogSourceMixin):
         """Return the log's samples at rows, a slice or their numbers."""
         arrays = {name: getattr(self, name) for name in _ARRAYS}
         changed: dict[str, Any] = {
-            name: values[rows] for name, values in arrays.items() if values is not None
+            name: samples[rows] for name, samples in arrays.items() if samples is not None
         }
         return replace(self, **changed)
 
