@@ -157,7 +157,7 @@ def _read_stable_positions(robot: Manipulator, text: str, source: str) -> Measur
 
 
 def _end_stops(robot: Manipulator) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return joint coordinates (3,) at the end stops, and a downward mm, or rad, in SI units (3,)."""
+    """Return joint coordinates (3,) at the end stops, and a downward mm, or rad, in SI (3,)."""
     ends, downwards = [], []
     for i, leg in enumerate(robot.legs, start=1):
         axis = leg.joint_axis

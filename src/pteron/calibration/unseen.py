@@ -135,7 +135,9 @@ def _named_combinations(
     for letter in "xyz":
         parts = {f"legs[{i + 1}].platform_point.{letter}": 1.0 for i in range(len(robot.legs))}
         parts |= {
-            name: 1.0 for name in place if name.endswith(f".{letter}") and _is_on_platform(name)
+            name: 1.0
+            for name in place
+            if name.endswith(f".{letter}") and name.startswith(("tool.", "marks."))
         }
         if all(name in place for name in parts):
             text = "tool and platform points show against each other only, as P is none of them"
@@ -144,11 +146,6 @@ def _named_combinations(
         if block.kind == "frame":
             yield from _rigid_motions(start, blocks, names)
     yield "the size of all: a measured length gives it", "", _uniform_growth(start, blocks)
-
-
-def _is_on_platform(name: str) -> bool:
-    """Return whether an unknown is a coordinate of a point on the platform."""
-    return name.startswith(("tool.", "marks."))
 
 
 def _rigid_motions(

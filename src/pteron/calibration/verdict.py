@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import scipy  # type: ignore[import-untyped]
 
+from pteron.arguments import join_words
 from pteron.calibration import thresholds
 from pteron.calibration.calibration_fit import CalibrationFit
 from pteron.calibration.fit import BEYOND
@@ -185,6 +186,7 @@ def _open_error_reasons(evidence: Evidence) -> Iterator[_Reason]:
         far = [name for name in names if evidence.open_errors[name] > least]
         if far:
             most = max(evidence.open_errors[name] for name in far)
+            coordinates = join_words(far, "and")
             measured = " and ".join(f"{name}s" for name in kinds)
             where = "" if measurements.setup.frame_known else " in an unknown frame"
             them = "it" if len(far) == 1 else "them"
@@ -192,17 +194,17 @@ def _open_error_reasons(evidence: Evidence) -> Iterator[_Reason]:
             hidden = evidence.hidden_order
             if hidden and kind == "position":
                 size = _size_text(hidden.error, "position")
+                legs = join_words([*map(str, hidden.legs)], "and")
                 order = (
-                    f", nor the order of the legs {_join([*map(str, hidden.legs)])}: if it is "
-                    f"another, {_join(far)} may be off by {size} more"
-                )
-            rods = ""
+                    f", nor the order of the legs {legs}: if it is another, {coordinates} may be "
+                    f"off by {size} more"
+                )rods = ""
             if kind == "position" and "position" not in kinds and _hides_rod_tilt(evidence):
                 rods = f", nor rods of one pair that differ and {_tilt_text(evidence)}"
             yield _Reason(
-                f"{_join(far)} may be off by {_size_text(most, kind)} (95 %): "
+                f"{coordinates} may be off by {_size_text(most, kind)} (95 %): "
                 f"{measured}{where} do not show {them}{rods}{order}.",
-                f"Measure {_join(far)} too: positions, or distances across the work space.",
+                f"Measure {coordinates} too: positions, or distances across the work space.",
             )
 
 
@@ -279,8 +281,3 @@ def _unit(kind: str) -> str:
 def _size_text(error: float, kind: str) -> str:
     """Return an error as text in mrad or mm."""
     return f"{1e3 * error:.3g} {_unit(kind)}"
-
-
-def _join(names: Sequence[str]) -> str:
-    """Return names joined by commas and "and"."""
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

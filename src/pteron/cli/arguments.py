@@ -183,7 +183,7 @@ def load_robot(name_or_path: str, elbows: str | None = None, *, quiet: bool = Fa
     if set(elbows) - set("+-") or len(elbows) != len(robot.legs):
         raise DataError(
             f"--elbows: {elbows!r} given, {len(robot.legs)} signs + or - expected, one for each "
-            f"leg of {robot.name}, such as {signs(robot)}"
+            f"leg of {robot.name}, such as {elbows_text(robot)}"
         )
     return with_elbows(robot, [int(f"{sign}1") for sign in elbows])
 
@@ -194,6 +194,8 @@ def check_rate(rate: float) -> None:
         raise DataError(f"--rate: {rate:g} given, samples a second above 0 expected")
 
 
-def signs(robot: Manipulator) -> str:
+def elbows_text(robot: Manipulator) -> str:
     """Return a machine's working mode as text: + or - for each leg."""
-    return "".join("+" if leg.elbow > 0 else "-" for leg in robot.legs)
+    from pteron.manipulator.variants import elbow_signs
+
+    return elbow_signs(leg.elbow for leg in robot.legs)

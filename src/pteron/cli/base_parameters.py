@@ -59,16 +59,16 @@ def base(
 
         names = None if keep is None else [name.strip() for name in keep.split(",")]
         parameters = base_parameters(machine, method, names, shared=shared)
-    document = parameters.as_dict()
+    record = parameters.as_dict()
     if written:
-        document["symbolic"] = list(parameters.expressions(symbols=written))
-        document["geometry"] = _geometry(parameters, written)
-        document["shared_symbols"] = {} if written == "leg" else parameters.shared_symbols
+        record["symbolic"] = list(parameters.expressions(symbols=written))
+        record["geometry"] = _geometry(parameters, written)
+        record["shared_symbols"] = {} if written == "leg" else parameters.shared_symbols
     if format_ == "json":
-        return CommandResult(document, partial(show_json, document))
+        return CommandResult(record, partial(show_json, record))
     if format_ == "text":
-        return CommandResult(document, partial(_show, parameters, written))
-    return CommandResult(document, partial(_write, parameters, written, format_))
+        return CommandResult(record, partial(_show, parameters, written))
+    return CommandResult(record, partial(_write, parameters, written, format_))
 
 
 def _write(
@@ -140,7 +140,7 @@ def table1() -> CommandResult:
 
         computed_rows = computed()
     wrong = sum(not row.agrees for row in computed_rows)
-    document = [
+    record = [
         json_fields(
             parameter=r.parameter,
             kept=r.kept,
@@ -164,4 +164,4 @@ def table1() -> CommandResult:
             "restored from its other rows."
         )
     lines = [table("", "printed", "computed", "agrees", rows=rows), agree]
-    return CommandResult(document, lines, code=1 if wrong else 0)
+    return CommandResult(record, lines, code=1 if wrong else 0)

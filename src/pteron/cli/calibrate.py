@@ -102,10 +102,8 @@ def calibrate(
         files = write_calibration(
             calibration, out, sources=sources, anyway=anyway, firmware=firmware
         )
-    document = {"files": [str(path) for path in files.paths], **numbers(calibration, firmware)}
-    return CommandResult(
-        document, partial(_show, calibration, firmware, files.left_out), files.paths
-    )
+    record = {"files": [str(path) for path in files.paths], **numbers(calibration, firmware)}
+    return CommandResult(record, partial(_show, calibration, firmware, files.left_out), files.paths)
 
 
 def _prior(path: str) -> dict[str, float]:

@@ -97,8 +97,8 @@ class RequestedProofs:
             proof = prove(robot, region, type_i=type_i, type_ii=type_ii, progress=bar)
         lines = [f"[bold]{plain(robot.name)}[/bold]: {_spans(robot, region)}", plain(str(proof))]
         lines += self._unsure if proof.holds else []
-        document = _proof(proof, self.floors) | {"warnings": warnings}
-        return CommandResult(document, lines, code=0 if proof.holds else _NOT_PROVED)
+        record = _proof(proof, self.floors) | {"warnings": warnings}
+        return CommandResult(record, lines, code=0 if proof.holds else _NOT_PROVED)
 
     @property
     def _unsure(self) -> list[str]:
@@ -113,14 +113,12 @@ class RequestedProofs:
         required = conditions(robot, **self.floors)
         with progress_bar(f"Proving how far {robot.name} leans") as bar:
             leans = largest_tilt(robot, pose, given=required, progress=bar)
-        document = {"robot": robot.name, "floors": self.floors, "tilt": leans.tilt}
+        record = {"robot": robot.name, "floors": self.floors, "tilt": leans.tilt}
         lines = [
             _heading(robot, dict(list(_angles(robot, pose).items())[2:]), self.floors),
             f"It leans by {math.degrees(leans.tilt):.4g} deg to every side: proved.",
         ]
-        return CommandResult(
-            document | {"proved": True, "warnings": warnings}, lines + self._unsure
-        )
+        return CommandResult(record | {"proved": True, "warnings": warnings}, lines + self._unsure)
 
     def _certify(self, robot: Manipulator, pose: Array, warnings: list[str]) -> CommandResult:
         """Prove bounds of the workspace's volume at a pose's angles, and its largest cube."""

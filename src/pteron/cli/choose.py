@@ -81,10 +81,8 @@ def choose(
         from pteron.report.design.choice import write_choice
 
         files = write_choice(choice, out)
-    document = choice.as_dict() | ({"files": [str(file) for file in files]} if files else {})
-    return CommandResult(
-        document, partial(_show, choice), files, _NONE if choice.best is None else 0
-    )
+    record = choice.as_dict() | ({"files": [str(file) for file in files]} if files else {})
+    return CommandResult(record, partial(_show, choice), files, _NONE if choice.best is None else 0)
 
 
 class _Log:

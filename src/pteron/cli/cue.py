@@ -91,7 +91,7 @@ def cue(
             note(f"Note: {peak.phrase()}; a smaller --scale asks less")
     low, high = cued.region.box
     box = np.stack([low, high], axis=-1).tolist()
-    document = {
+    record = {
         "robot": machine.name,
         "duration": cued.duration,
         "samples": len(cued.time),
@@ -106,7 +106,7 @@ def cue(
         f"amplitudes reduced by at most {cued.pressed:.0%}, so that the motion stays in the box",
         peaks_table(largest),
     ]
-    return CommandResult(document, lines, files)
+    return CommandResult(record, lines, files)
 
 
 def _write(machine: Manipulator, cued: Cue, out: str | None, page: str | None) -> list[str]:

@@ -195,7 +195,7 @@ def _result(
 
         write_table(motion_frame(machine, motion), out)
     bound = getattr(motion, "polynomial", None)
-    document = {
+    record = {
         "robot": machine.name,
         "kind": way,
         **asdict(carried),
@@ -218,7 +218,7 @@ def _result(
     if bound is not None:
         text += f"; a polynomial in time along the same path takes {bound:.4g} s"
     return CommandResult(
-        document, partial(_show, [text, peaks_table(largest)], out), [out] if out else []
+        record, partial(_show, [text, peaks_table(largest)], out), [out] if out else []
     )
 
 

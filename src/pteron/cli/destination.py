@@ -50,14 +50,14 @@ class Destination:
     def deliver(
         self,
         table: pl.DataFrame,
-        document: dict[str, Any],
+        record: dict[str, Any],
         further_files: Callable[[], dict[str, str]],
         person: Callable[[], None],
         code: int = 0,
     ) -> CommandResult:
         """Write the files if requested, and return the command's result.
 
-        `document` are the figures, `more` makes the other files of a folder, by name, and `person`
+        `record` are the figures, `more` makes the other files of a folder, by name, and `person`
         prints what a person reads.
         """
         files: list[Path] = []
@@ -71,8 +71,8 @@ class Destination:
 
             texts = {
                 f"{self.name}.csv": table.write_csv(),
-                f"{self.name}.json": json_text(document),
+                f"{self.name}.json": json_text(record),
             }
             files = write_texts(self.out, texts | further_files())
         written = {"files": [str(file) for file in files]} if files else {}
-        return CommandResult(document | written, person, files, code)
+        return CommandResult(record | written, person, files, code)

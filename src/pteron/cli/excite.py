@@ -242,7 +242,7 @@ def _result(
     files: list[Path] = []
     if out is not None:
         files = excitation.write(out, rate, series.periods, file.layout, cycles, slow)
-    document = {
+    record = {
         **excitation.as_dict(),
         "start": led.start,
         "end": led.end,
@@ -265,7 +265,7 @@ def _result(
     if slow is not None:
         slowly = f"the same way in {slow.duration:g} s, for friction that falls with speed."
         lines.append(f"Slowly: {slowly}")
-    return CommandResult(document, lines, files)
+    return CommandResult(record, lines, files)
 
 
 def _held_out_cycles(excitation: Excitation, rate: float) -> RepeatedCycle | None:

@@ -137,8 +137,8 @@ def identify(
         files = write_identification(identification, folder, sources=sources)
     if is_terminal():
         note(times.summary())
-    document = {"files": [str(path) for path in files.paths], **numbers(identification)}
-    return CommandResult(document, partial(_show, identification), files.paths)
+    record = {"files": [str(path) for path in files.paths], **numbers(identification)}
+    return CommandResult(record, partial(_show, identification), files.paths)
 
 
 def _speeds(text: str | None) -> tuple[float, ...] | Literal["auto"] | None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from typer import Exit
 
-from pteron.cli.arguments import load_robot, signs, split_numbers
+from pteron.cli.arguments import elbows_text, load_robot, split_numbers
 from pteron.cli.progress import spinner
 from pteron.cli.result import CommandResult
 from pteron.cli.terminal import complain, plain, show, table, warn, write
@@ -115,12 +115,12 @@ def new(
     text = commented_text(kind, dimensions)
     if out is not None:
         write_text(out, text)
-    document = {"kind": kind, "file": out, "text": text}
+    record = {"kind": kind, "file": out, "text": text}
     if out is None:
-        return CommandResult(document, partial(write, text))
+        return CommandResult(record, partial(write, text))
     written = f"Written: {plain(out)}. Put in your numbers, then: pteron check {plain(out)}"
     return CommandResult(
-        document, [written, *map(plain, kept_numbers_sentence(load(kind), dimensions))]
+        record, [written, *map(plain, kept_numbers_sentence(load(kind), dimensions))]
     )
 
 
@@ -140,7 +140,7 @@ def _machine(robot: Manipulator) -> dict[str, Any]:
         "motion": robot.platform.motion,
         "coordinates": list(robot.coordinates),
         "types": list(dict.fromkeys(leg.type for leg in robot.legs)),
-        "working_mode": signs(robot),
+        "working_mode": elbows_text(robot),
     }
 
 
@@ -273,7 +273,7 @@ def _show(robot: Manipulator, findings: dict[str, Any]) -> None:
     show(
         f"[bold]{plain(robot.name)}[/bold]: a {robot.platform.motion} machine with "
         f"{len(robot.legs)} legs, pose {' '.join(robot.coordinates)}, "
-        f"working mode {signs(robot)}",
+        f"working mode {elbows_text(robot)}",
         table(*headings, rows=rows, numbers=("leg",)),
         *(f"A {joint.noun} {joint.zero}." for joint in joints if joint.zero),
         *([f"At 0 cranks point {zero}."] if (zero := crank_direction_text(robot)) else []),

@@ -66,17 +66,17 @@ def _index_data(index_map: Map, name: str) -> dict[str, Any]:
     return about | fields_as_json(summary, _SUMMARY, "poses=count undetermined=infinite")
 
 
-def map_rows(document: Mapping[str, Any]) -> Any:
+def map_rows(record: Mapping[str, Any]) -> Any:
     """Return the JSON data of a map as a table with a row for each index."""
     import polars as pl
 
     from pteron.platforms.coordinates import COORDINATES
 
     names = sorted(
-        [*document["held"], *(a["name"] for a in document["varies"])], key=[*COORDINATES].index
+        [*record["held"], *(a["name"] for a in record["varies"])], key=[*COORDINATES].index
     )
     rows = []
-    for index in document["indices"]:
+    for index in record["indices"]:
         row = {key: index[key] for key in ("index", "unit", "best", "worst", "mean", "median")}
         for side in ("best", "worst"):
             pose = index[f"{side}_pose"] or [None] * len(names)
@@ -87,7 +87,7 @@ def map_rows(document: Mapping[str, Any]) -> Any:
     return pl.DataFrame(rows, infer_schema_length=None)
 
 
-def show_map(index_map: Map, volume: ReachVolume | None, document: Mapping[str, Any]) -> None:
+def show_map(index_map: Map, volume: ReachVolume | None, record: Mapping[str, Any]) -> None:
     """Print for a person: the reach, what ends it, and each index."""
     from pteron.platforms.coordinates import are_angles, coordinate
 
@@ -116,7 +116,7 @@ def show_map(index_map: Map, volume: ReachVolume | None, document: Mapping[str, 
         causes = sorted(index_map.causes.items(), key=lambda pair: -pair[1])
         lines.append("; ".join(f"{percent(share)} {text}" for text, share in causes))
     index_table = table("index", "", "value", "where", numbers=("value",))
-    for index in document["indices"]:
+    for index in record["indices"]:
         unit = f" ({index['unit']})" if index["unit"] else ""
         named = plain(f"{index['index']}{unit}")
         if index["best"] is None:

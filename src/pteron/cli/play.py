@@ -58,7 +58,7 @@ def play(
         playback = _playback(machine, motion or cycle or STANDARD)
         page = write_motion_page(machine, playback, out)
     samples, size = len(playback.motion.time), page.stat().st_size
-    document = {
+    record = {
         "robot": machine.name,
         "page": str(page),
         "bytes": size,
@@ -68,7 +68,7 @@ def play(
         "samples": samples,
     }
     summary = f"{plain(machine.name)}: {playback.motion.duration:.4g} s, {samples} samples"
-    return CommandResult(document, [summary, f"Written: {plain(str(page))}, {size / 1e6:.1f} MB"])
+    return CommandResult(record, [summary, f"Written: {plain(str(page))}, {size / 1e6:.1f} MB"])
 
 
 def _playback(machine: Manipulator, motion: str) -> Playback:

@@ -115,11 +115,11 @@ def simulate(
     warn(overloads)
     if simulation.stopped:
         note(f"Stopped {simulation.stopped}")
-    document = _data(simulation, law_name, cycle, carried)
-    person = partial(_tell, simulation, document, carried, out)
+    record = _data(simulation, law_name, cycle, carried)
+    person = partial(_tell, simulation, record, carried, out)
     code = _ENDED if simulation.stopped else 0
     return destination.deliver(
-        simulation.table(), document, partial(_pictures, simulation), person, code
+        simulation.table(), record, partial(_pictures, simulation), person, code
     )
 
 
@@ -200,25 +200,25 @@ def _pictures(simulation: Simulation) -> dict[str, str]:
 
 
 def _tell(
-    simulation: Simulation, document: dict[str, Any], carried: Carried, out: str | None
+    simulation: Simulation, record: dict[str, Any], carried: Carried, out: str | None
 ) -> None:
     """Print for a person; without --out a pipe gets the table."""
     if is_terminal() or out is not None:
-        _show(simulation, document, carried)
+        _show(simulation, record, carried)
     else:
         write(simulation.table().write_csv())
 
 
-def _show(simulation: Simulation, document: dict[str, Any], carried: Carried) -> None:
+def _show(simulation: Simulation, record: dict[str, Any], carried: Carried) -> None:
     """Print tables of the tracking errors and of the drives' loads."""
     robot = simulation.robot
-    steps = "DOP853" if document["step"] is None else f"steps of {document['step'] * 1e3:.3g} ms"
+    steps = "DOP853" if record["step"] is None else f"steps of {record['step'] * 1e3:.3g} ms"
     errors = (
         (row["coordinate"], *(f"{1e6 * row[key]:.3g} u{unit}" for key in ("largest", "rms")))
-        for row, unit in zip(document["tracking"], robot.units, strict=True)
+        for row, unit in zip(record["tracking"], robot.units, strict=True)
     )
     drives = []
-    for leg, row in zip(robot.legs, document["drives"], strict=True):
+    for leg, row in zip(robot.legs, record["drives"], strict=True):
         force, speed = leg.joint.force_unit, f"{leg.joint.unit}/s"
         units = {"peak_force": force, "rms_force": force, "peak_speed": speed, "peak_power": "W"}
         sizes = (f"{row[key]:.4g} {unit}" for key, unit in units.items())
@@ -227,8 +227,8 @@ def _show(simulation: Simulation, document: dict[str, Any], carried: Carried) ->
     word = force_word(robot)
     names = ("leg", f"peak {word}", f"RMS {word}", "peak speed", "peak power", "at its limit")
     show(
-        f"[bold]{plain(robot.name)}[/bold]{plain(str(carried))}, cycle {plain(document['cycle'])}, "
-        f"{plain(document['controller'])}: {document['duration']:.4g} s in {steps}",
+        f"[bold]{plain(robot.name)}[/bold]{plain(str(carried))}, cycle {plain(record['cycle'])}, "
+        f"{plain(record['controller'])}: {record['duration']:.4g} s in {steps}",
         table("error", "largest", "RMS", rows=errors, numbers=("largest", "RMS")),
         table(*names, rows=drives, numbers=names),
     )

@@ -144,18 +144,18 @@ def workspace(
         )
     if out is not None and ending in (*_PICTURES, *_FILMS):
         _draw(index_map, out, ending)
-    document = map_data(index_map, volume, [*warnings, *outside], out)
-    return CommandResult(document, partial(_show, index_map, volume, document, out))
+    record = map_data(index_map, volume, [*warnings, *outside], out)
+    return CommandResult(record, partial(_show, index_map, volume, record, out))
 
 
 def _show(
-    index_map: Map, volume: ReachVolume | None, document: dict[str, Any], out: str | None
+    index_map: Map, volume: ReachVolume | None, record: dict[str, Any], out: str | None
 ) -> None:
     """Print a map on a terminal, or write its rows as CSV to a pipe; then list the files."""
     if is_terminal():
-        show_map(index_map, volume, document)
+        show_map(index_map, volume, record)
     else:
-        write(map_rows(document).write_csv())
+        write(map_rows(record).write_csv())
     if out is not None:
         (show if is_terminal() else note)(*file_lines(out))
 

@@ -168,7 +168,7 @@ def _words(robot: Manipulator, pose: Array, forces: Array) -> dict[str, list[_Wo
             {
                 "i": i,
                 **vars(leg.joint),
-                "force_unit": _fmi_unit(leg.joint.force_unit),
+                "force_unit": leg.joint.force_unit.replace(" ", "."),  # as FMI writes it
                 "held": force,
             }
             for i, (leg, force) in legs
@@ -178,11 +178,6 @@ def _words(robot: Manipulator, pose: Array, forces: Array) -> dict[str, list[_Wo
         "inertia": list(_inertia(platform)),
         "drives": list(_drives(robot)),
     }
-
-
-def _fmi_unit(unit: str) -> str:
-    """Return a unit as FMI writes it, with points between its factors."""
-    return unit.replace(" ", ".")
 
 
 def _wrench(platform: Platform) -> Iterator[_Words]:

@@ -8,6 +8,7 @@ from itertools import combinations, permutations, product
 
 import numpy as np
 
+from pteron.arguments import join_words
 from pteron.errors import DataError
 from pteron.identification.estimators import weighted_least_squares
 from pteron.identification.logs import Log
@@ -80,7 +81,7 @@ class ColumnFault:
             parts.append("gravity points the other way than in the machine's file")
         if self.order == self.joint_order != usual:
             pairs = [f"leg {k + 1}" for k in usual if self.order[k] != k]
-            parts.append(f"{_join_names(pairs)} are exchanged, forces and joints alike")
+            parts.append(f"{join_words(pairs, 'and')} are exchanged, forces and joints alike")
         else:
             for names, order in ((self.joints, self.joint_order), (self.forces, self.order)):
                 parts += _order_clauses(names, order)
@@ -106,10 +107,10 @@ def _order_clauses(names: Sequence[str], order: Sequence[int]) -> Iterator[str]:
     """Yield a clause that states which columns are swapped or in another order, if any."""
     moved = [name for k, name in enumerate(names) if order[k] != k]
     if len(moved) == 2:
-        yield f"{_join_names(moved)} are swapped"
+        yield f"{join_words(moved, 'and')} are swapped"
     elif moved:
         right = ", ".join(names[k] for k in order)
-        yield f"{_join_names(moved)} are in another order (they should be {right})"
+        yield f"{join_words(moved, 'and')} are in another order (they should be {right})"
 
 
 def _sign_clauses(
@@ -118,7 +119,8 @@ def _sign_clauses(
     """Yield a clause that states which columns have the wrong sign, if any."""
     flipped = [names[order[k]] for k, sign in enumerate(signs) if sign < 0]
     if flipped:
-        yield f"{_join_names(flipped)} {'has' if len(flipped) == 1 else 'have'} the sign flipped"
+        verb = "has" if len(flipped) == 1 else "have"
+        yield f"{join_words(flipped, 'and')} {verb} the sign flipped"
 
 
 def column_fault(model: Model, log: Log, preprocessing: Preprocessing) -> ColumnFault | None:
@@ -266,8 +268,3 @@ def _count_unphysical(fault: ColumnFault, observations: Observations, model: Mod
     forces = observations.forces[:, list(fault.order)] * np.array(fault.signs)
     mended = observations.with_forces(forces)
     return unphysical(model, mended, weighted_least_squares(mended))
-
-
-def _join_names(names: Sequence[str]) -> str:
-    """Return names joined by commas and "and"."""
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

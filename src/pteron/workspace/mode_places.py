@@ -11,7 +11,7 @@ import numpy as np
 from pteron.kernels import Array, geometry_only
 from pteron.kinematics import inverse_kinematics, random_poses
 from pteron.manipulator import Manipulator, working_modes
-from pteron.manipulator.variants import with_elbows
+from pteron.manipulator.variants import elbow_signs, with_elbows
 from pteron.tolerances import ROUNDING
 from pteron.workspace.margins import pose_margins
 
@@ -64,7 +64,7 @@ class ModePlace:
     @property
     def signs(self) -> str:
         """Its elbows as text for the option --elbows, such as ++-."""
-        return "".join("+" if sign > 0 else "-" for sign in self.elbows)
+        return elbow_signs(self.elbows)
 
 
 def mode_places(robot: Manipulator, home: Array) -> tuple[ModePlace, ...]:

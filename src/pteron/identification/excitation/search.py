@@ -16,8 +16,8 @@ from pteron.arguments import expect, expect_one_of
 from pteron.errors import DataError
 from pteron.identification.excitation.conditioning import (
     Conditioning,
-    condition_with_penalty,
     condition_numbers,
+    condition_with_penalty,
     information_root,
 )
 from pteron.identification.excitation.excitation import IDENTIFIES, Excitation, Start

@@ -10,6 +10,7 @@ nothing of the positions is left. The band is that of the parallel filter, Hz.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from math import ceil
 from typing import ClassVar, Literal, NamedTuple
 
@@ -134,7 +135,9 @@ class CentralDifferences(_Sampled):
         inner, lost = slice(edge, len(time) - edge), slice(edge - LOST, len(first) - (edge - LOST))
         parts = [joints[LOST:-LOST], first, second]
         if self.delay:
-            parts = [_earlier(time[LOST:-LOST], part, self.delay) for part in parts]
+            known = time[LOST:-LOST]
+            spline = partial(scipy.interpolate.make_interp_spline, known, k=5)
+            parts = [spline(part)(known - self.delay) for part in parts]
         motion = parts[0][lost], parts[1][lost], parts[2][lost]
         return Differentiated(
             time[inner], motion, forces[inner], np.ones(len(motion[0]), dtype=bool)
@@ -193,11 +196,6 @@ class FourierFit:
     def fastest(self, band: float) -> float | None:
         """Return the highest frequency that passes, Hz: cut-off or band; None without a cut-off."""
         return None if self.cutoff is None else max(self.cutoff, band)
-
-
-def _earlier(time: Array, signal: Array, delay: float) -> Array:
-    """Return smooth signals (T, k) evaluated at times (T,) less a delay, s."""
-    return np.asarray(scipy.interpolate.make_interp_spline(time, signal, k=5)(time - delay))
 
 
 Differentiator = CentralDifferences | SmoothingSpline | FourierFit
