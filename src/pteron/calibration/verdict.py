@@ -198,7 +198,8 @@ def _open_error_reasons(evidence: Evidence) -> Iterator[_Reason]:
                 order = (
                     f", nor the order of the legs {legs}: if it is another, {coordinates} may be "
                     f"off by {size} more"
-                )rods = ""
+                )
+            rods = ""
             if kind == "position" and "position" not in kinds and _hides_rod_tilt(evidence):
                 rods = f", nor rods of one pair that differ and {_tilt_text(evidence)}"
             yield _Reason(
