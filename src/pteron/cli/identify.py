@@ -200,62 +200,54 @@ def _box(text: str) -> tuple[str, Box]:
     return body.strip(), ((x0, x1), (y0, y1))
 
 
-def _show(identification: Identification) -> None:
+def _show(fit: Identification) -> None:
     """Print the verdict, the errors, the values, the findings in the logs, and the files."""
-    verdict = identification.verdict
-    worst = max(float(prediction.nrms.max()) for prediction in identification.held_out)
+    verdict = fit.verdict
+    worst = max(float(prediction.nrms.max()) for prediction in fit.held_out)
     color = GRADE_COLORS[verdict.grade]
     show(
-        f"[bold {color}]{plain(identification.robot.name)}: {verdict.grade}[/bold {color}], "
+        f"[bold {color}]{plain(fit.robot.name)}: {verdict.grade}[/bold {color}], "
         f"held-out error up to {worst:.3g} %",
-        _errors(identification),
-        _values(identification),
-        *(
-            plain(text)
-            for text in (*verdict.reasons, *verdict.next_steps, *_bodies(identification))
-        ),
-        *_payload(identification),
-        *(
-            f"[yellow]Note:[/yellow] {plain(finding.message)}"
-            for finding in identification.findings
-        ),
+        _errors(fit),
+        _values(fit),
+        *(plain(text) for text in (*verdict.reasons, *verdict.next_steps, *_bodies(fit))),
+        *_payload(fit),
+        *(f"[yellow]Note:[/yellow] {plain(finding.message)}" for finding in fit.findings),
     )
 
 
-def _errors(identification: Identification) -> Table:
+def _errors(fit: Identification) -> Table:
     """Return a table of each actuator's NRMS of prediction (%), its noise, and no friction."""
     from pteron.report.typeset import significant
 
     headings = ("held-out NRMS (%)", "noise", "no friction")[: 2 if _narrow() else 3]
     rows = []
-    for prediction in identification.held_out:
-        where = f" in {prediction.source}" if len(identification.held_out) > 1 else ""
+    for prediction in fit.held_out:
+        where = f" in {prediction.source}" if len(fit.held_out) > 1 else ""
         columns = prediction.nrms, prediction.floor, prediction.nrms_without_friction
         for i, row in enumerate(zip(*columns[: len(headings)], strict=True), start=1):
             rows.append((plain(f"{i}{where}"), *map(significant, row)))
     return table("actuator", *headings, rows=rows, numbers=headings)
 
 
-def _values(identification: Identification) -> Table:
+def _values(fit: Identification) -> Table:
     """Return a table of base parameters with 95 % half-widths (absolute, and relative in %)."""
     from pteron.report.identification import parameter_rows, value_with_uncertainty
     from pteron.report.typeset import significant
 
-    short = identification.has_understated_errors
+    short = fit.has_understated_errors
     headings = ("value", "+- 95 % (!)" if short else "+- 95 %", "rel. (%)")
     numbers = headings[: 2 if _narrow() else 3]
     columns = ["parameter", *numbers, *(() if _narrow() else ("unit",)), ""]
     caption = "Base parameters are sums, named by one term; the page has them in full."
-    negative = [
-        row.name for row in parameter_rows(identification) if row.unit == "kg" and row.value < 0.0
-    ]
+    negative = [row.name for row in parameter_rows(fit) if row.unit == "kg" and row.value < 0.0]
     if negative:
         caption += f" A sum may be below zero, as {negative[0]}: in it masses are subtracted."
     if short:
         caption += " (!) Too short: they do not allow for the faults that are named."
     value_table = table(*columns, numbers=numbers, caption=caption)
     marks = {"essential": "", "dropped": "[yellow]weak[/]", "unseen": "[yellow]unseen[/]"}
-    for row in parameter_rows(identification):
+    for row in parameter_rows(fit):
         estimate, half = map(ascii_number, value_with_uncertainty(row.value, row.half))
         relative = (
             ">999" if row.relative >= 9.995 else ascii_number(significant(100.0 * row.relative, 2))
@@ -265,16 +257,16 @@ def _values(identification: Identification) -> Table:
     return value_table
 
 
-def _payload(identification: Identification) -> list[str]:
+def _payload(fit: Identification) -> list[str]:
     """Return lines with the payload as arguments of a controller and of other commands."""
     from pteron.identification.payload import payload_in
 
-    payload = payload_in(identification)
+    payload = payload_in(fit)
     if payload is None:
         return []
     if not (payload.real and payload.is_significant):
         return ["The payload is no real body's, or is not felt: record it longer, or faster."]
-    return [plain(f"The payload: {payload.call(identification.robot)}")]
+    return [plain(f"The payload: {payload.call(fit.robot)}")]
 
 
 def _narrow() -> bool:
@@ -282,11 +274,11 @@ def _narrow() -> bool:
     return get_terminal_size().columns < _NARROW
 
 
-def _bodies(identification: Identification) -> tuple[str, ...]:
+def _bodies(fit: Identification) -> tuple[str, ...]:
     """Return sentences: whether real bodies have these parameters, the CAD model, and notes."""
-    consistency = identification.consistency
+    consistency = fit.consistency
     if consistency is None:
-        return identification.notes
+        return fit.notes
     border = f"; at the border: {', '.join(consistency.at_border)}" if consistency.at_border else ""
     lines = [f"Real bodies have exactly these base parameters{border}."]
     if not consistency.feasible:
@@ -294,4 +286,4 @@ def _bodies(identification: Identification) -> tuple[str, ...]:
         lines = [f"No real bodies have exactly these base parameters; {away}"]
     if not consistency.cad_feasible:
         lines.append(f"The CAD model itself is not real: {'; '.join(consistency.cad_violations)}.")
-    return (*lines, *identification.notes)
+    return (*lines, *fit.notes)

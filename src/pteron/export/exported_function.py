@@ -246,14 +246,10 @@ def _meanings(
     request: ExportRequest, ports: Sequence[Port], shared: Sequence[str], taken: set[str]
 ) -> dict[str, str]:
     """Return the meanings of inputs and outputs, with their units."""
-    robot, what, command_unit = request.robot, request.function_name, request.output
-    meanings: dict[str, str] = {
-        port.name: port_meaning(robot, port, command_unit) for port in ports
-    }
+    robot, what, unit = request.robot, request.function_name, request.output
+    meanings: dict[str, str] = {port.name: port_meaning(robot, port, unit) for port in ports}
     if request.is_custom:
-        readings = {
-            name: port_meaning(robot, Port(name, (1,)), command_unit) for name in TEXTS["law"]
-        }
+        readings = {name: port_meaning(robot, Port(name, (1,)), unit) for name in TEXTS["law"]}
         own_tables = {name: f"see the table {what}_{name}" for name in shared}
         meanings = {**readings, **meanings} | own_tables
     if not request.tables:
@@ -281,11 +277,9 @@ def _table(
 ) -> NumberTable:
     """Return the machine's values for a shared input, or a controller's parameters."""
     if isinstance(controller, Custom):
-        law_parameters = controller.law(robot).numbers[f"law_{name}"].ravel()
-        names = tuple(f"{name}_{k}" for k in range(1, len(law_parameters) + 1))
-        return NumberTable(
-            f"{controller.law_name}_{name}", TEXTS["tables"]["own"], names, law_parameters
-        )
+        numbers = controller.law(robot).numbers[f"law_{name}"].ravel()
+        names = tuple(f"{name}_{k}" for k in range(1, len(numbers) + 1))
+        return NumberTable(f"{controller.law_name}_{name}", TEXTS["tables"]["own"], names, numbers)
     comment = TEXTS["tables"][name]
     if name == "gains":
         assert controller is not None
@@ -350,16 +344,14 @@ def _gains(function: Program, inputs: list[Array], results: tuple[Array, ...]) -
     gains = np.ones(len(results))
     for _ in range(_CHANGES):
         changed = [v * (1.0 + _CHANGE * rng.choice([-1.0, 1.0], np.shape(v))) for v in inputs]
-        outputs = function.function.call(
-            [np.reshape(changed_result, (-1, 1)) for changed_result in changed]
-        )
-        for k, (changed_result, nominal) in enumerate(zip(outputs, results, strict=True)):
+        outputs = function.function.call([np.reshape(array, (-1, 1)) for array in changed])
+        for k, (shifted, nominal) in enumerate(zip(outputs, results, strict=True)):
             columns = (
                 -1,
                 function.outputs[k].shape[-1] if len(function.outputs[k].shape) > 1 else 1,
             )
             size = np.abs(np.nan_to_num(nominal)).reshape(columns).max(axis=0, initial=0.0)
-            change = np.nan_to_num(np.array(changed_result).ravel("F") - nominal).reshape(columns)
+            change = np.nan_to_num(np.array(shifted).ravel("F") - nominal).reshape(columns)
             share = np.abs(change).max(axis=0, initial=0.0) / np.maximum(size, 1e-300)
             gains[k] = max(gains[k], float(share.max(initial=0.0)) / _CHANGE)
     return tuple(gains.tolist())

@@ -99,11 +99,7 @@ class FmuVariables:
                     "derivative": self[block.rate_of][k] if block.rate_of else None,
                     "start": variable.start,
                 }
-                yield {
-                    name: attribute
-                    for name, attribute in attributes.items()
-                    if attribute is not None
-                }
+                yield {name: a for name, a in attributes.items() if a is not None}
 
     @property
     def dependencies(self) -> dict[int, tuple[int, ...]]:
@@ -205,14 +201,8 @@ def _inertia(platform: Platform) -> Iterator[_Words]:
 
 def _drives(robot: Manipulator) -> Iterator[_Words]:
     """Yield the drives' numbers, in the order of the C code's table."""
-    numbers = iter(drive_numbers(robot).tolist())
+    sizes = iter(drive_numbers(robot).tolist())
     for name in Drives._fields:
         for i, leg in enumerate(robot.legs, start=1):
             row = _TABLE["drives"][name]
-            yield {
-                "i": i,
-                "name": name,
-                "unit": row[leg.joint.unit],
-                "number": next(numbers),
-                **row,
-            }
+            yield {"i": i, "name": name, "unit": row[leg.joint.unit], "number": next(sizes), **row}

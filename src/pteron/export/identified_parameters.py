@@ -72,13 +72,8 @@ def read_identified(robot: Manipulator, path: str | Path) -> Identified:
         known, drives, kinds = document[_NAME], document["drives"], document["kinds"]
         names, expressions = known["names"], known["expressions"]
         base_values = np.array(known["values"], dtype=float)
-        legs = [
-            _with_friction(leg, record) for leg, record in zip(robot.legs, drives, strict=False)
-        ]
-        all_names, texts = (
-            document["estimate"]["names"],
-            [str(record) for record in document["expressions"]],
-        )
+        legs = [_with_friction(leg, drive) for leg, drive in zip(robot.legs, drives, strict=False)]
+        all_names, texts = document["estimate"]["names"], [*map(str, document["expressions"])]
         if not (np.isfinite(base_values).all() and len(texts) >= len(base_values)):
             raise ValueError("values are missing")
         groups = [tuple(group) for group in known["shared"]]

@@ -125,32 +125,20 @@ def export_st(
         tables=False,
     )
     prefix = _camel(prefix_of(robot))
-    blocks = {f"{prefix}_{_camel(exported_item.name)}": exported_item for exported_item in exported}
-    return write_texts(
-        folder,
-        {
-            f"{name}.st": _block(robot, name, exported_item)
-            for name, exported_item in blocks.items()
-        },
-    )
+    blocks = {f"{prefix}_{_camel(f.name)}": f for f in exported}
+    return write_texts(folder, {f"{name}.st": _block(robot, name, f) for name, f in blocks.items()})
 
 
-def _block(robot: Manipulator, name: str, function: ExportedFunction) -> str:
+def _block(robot: Manipulator, name: str, code: ExportedFunction) -> str:
     """Return the Structured Text of a function block, with its comments."""
-    comments = [*banner(robot, "Structured Text"), "", function.summary]
-    comments.append(f"{function.operations} arithmetic operations.")
-    if function.name.startswith("set_payload"):
+    comments = [*banner(robot, "Structured Text"), "", code.summary]
+    comments.append(f"{code.operations} arithmetic operations.")
+    if code.name.startswith("set_payload"):
         comments += tool_lines(robot)
-    if any(node.operation == "atan2" for node in function.graph.nodes):
+    if any(node.operation == "atan2" for node in code.graph.nodes):
         comments.append("It calls ATAN2(y, x), which some controllers have in a library only.")
     return function_block(
-        name,
-        function.graph,
-        function.inputs,
-        function.outputs,
-        comments,
-        function.meanings,
-        function.names,
+        name, code.graph, code.inputs, code.outputs, comments, code.meanings, code.names
     )
 
 

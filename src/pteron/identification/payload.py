@@ -150,8 +150,7 @@ class Payload(Result):
     def call(self, robot: RobotLike) -> str:
         """Return the call of exported C that sets the payload, and the command-line option."""
         mass, center, inertia = (
-            ", ".join(f"{number:.9g}" for number in np.ravel(part))
-            for part in self.arguments(robot)
+            ", ".join(f"{x:.9g}" for x in np.ravel(part)) for part in self.arguments(robot)
         )
         option = "@".join((mass, center, inertia)).replace(" ", "")
         return (
@@ -314,16 +313,11 @@ def identify_payload(
     )
 
 
-def payload_in(identification: Identification) -> Payload | None:
+def payload_in(fit: Identification) -> Payload | None:
     """Return the payload that `identify` found beside the machine; None without its mass."""
-    if "m_L" not in identification.estimate.names:
+    if "m_L" not in fit.estimate.names:
         return None
-    return _payload_of_fit(
-        identification.model,
-        identification.estimate,
-        identification.fault_isolation,
-        [identification.findings],
-    )
+    return _payload_of_fit(fit.model, fit.estimate, fit.fault_isolation, [fit.findings])
 
 
 def _payload_of_fit(

@@ -96,13 +96,8 @@ class BaseParameters(Result):
         columns += [Column("value", "number"), Column("unit")]
         sums, base_values = self.expressions("html"), self.values()
         rows = [
-            (
-                i,
-                Markup(text),
-                float(base_value),
-                self.parameters[column].unit.replace("^2", "\u00b2"),
-            )
-            for i, (text, base_value, column) in enumerate(
+            (i, Markup(text), float(size), self.parameters[column].unit.replace("^2", "\u00b2"))
+            for i, (text, size, column) in enumerate(
                 zip(sums, base_values, self.kept, strict=True), start=1
             )
         ]
