@@ -15,10 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pteron.calibration.guess import Guess
 from pteron.calibration.measurements import VALUES, Measurements
-from pteron.calibration.mistake import (
-    Mistake,
-    multiply_fields,
-)
+from pteron.calibration.mistake import Mistake, multiply_fields
 from pteron.calibration.reading_mistakes import (
     reversed_joints,
     swapped_legs,

@@ -135,9 +135,7 @@ def _named_combinations(
     for letter in "xyz":
         parts = {f"legs[{i + 1}].platform_point.{letter}": 1.0 for i in range(len(robot.legs))}
         parts |= {
-            name: 1.0
-            for name in place
-            if name.endswith(f".{letter}") and name.startswith(("tool.", "marks."))
+            n: 1.0 for n in place if n.endswith(f".{letter}") and n.startswith(("tool.", "marks."))
         }
         if all(name in place for name in parts):
             text = "tool and platform points show against each other only, as P is none of them"

@@ -69,10 +69,8 @@ class Destination:
             from pteron.atomic import write_texts
             from pteron.json_values import json_text
 
-            texts = {
-                f"{self.name}.csv": table.write_csv(),
-                f"{self.name}.json": json_text(record),
-            }
+            printed = {"csv": table.write_csv(), "json": json_text(record)}
+            texts = {f"{self.name}.{format_}": text for format_, text in printed.items()}
             files = write_texts(self.out, texts | further_files())
         written = {"files": [str(file) for file in files]} if files else {}
         return CommandResult(record | written, person, files, code)

@@ -107,9 +107,7 @@ def new(
         "stock": _stocks(mass_from),
         "platform_mass": platform_mass,
     }
-    dimensions = {
-        key: dimension for key, dimension in dimensions.items() if dimension not in (None, {})
-    }
+    dimensions = {key: size for key, size in dimensions.items() if size not in (None, {})}
     if out is not None and Path(out).exists() and not overwrite:
         raise OutputError(f"{out}: is there already; name another file, or say --overwrite")
     text = commented_text(kind, dimensions)

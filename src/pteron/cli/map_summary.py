@@ -72,17 +72,14 @@ def map_rows(record: Mapping[str, Any]) -> Any:
 
     from pteron.platforms.coordinates import COORDINATES
 
-    names = sorted(
-        [*record["held"], *(a["name"] for a in record["varies"])], key=[*COORDINATES].index
-    )
+    varied = (axis["name"] for axis in record["varies"])
+    names = sorted([*record["held"], *varied], key=[*COORDINATES].index)
     rows = []
     for index in record["indices"]:
         row = {key: index[key] for key in ("index", "unit", "best", "worst", "mean", "median")}
         for side in ("best", "worst"):
             pose = index[f"{side}_pose"] or [None] * len(names)
-            row |= {
-                f"{side}_{name}": coordinate for name, coordinate in zip(names, pose, strict=True)
-            }
+            row |= {f"{side}_{name}": q for name, q in zip(names, pose, strict=True)}
         rows.append(row)
     return pl.DataFrame(rows, infer_schema_length=None)
 

@@ -126,9 +126,7 @@ def single_row(columns: Sequence[str], numbers: Sequence[float]) -> TableRows:
     """Return the typed row."""
     from pteron.cli.typed_row import TypedRow
 
-    return TableRows(
-        TypedRow({name: [number] for name, number in zip(columns, numbers, strict=True)})
-    )
+    return TableRows(TypedRow({name: [q] for name, q in zip(columns, numbers, strict=True)}))
 
 
 def rows_of_table(

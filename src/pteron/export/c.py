@@ -138,9 +138,7 @@ def c_texts(
         "real": real,
         "f": "f" if single else "",
         "printer": CPrinter(prefix, real),
-        "tables": {
-            table.name: table for function in exported for table in function.tables
-        }.values(),
+        "tables": {t.name: t for function in exported for t in function.tables}.values(),
         "functions": exported,
         "largest": 3.4028234e38 if single else 1.7976931348623157e308,
         "tolerance": _tolerance_of(float(np.finfo(np.float32 if single else np.float64).eps)),
@@ -152,9 +150,8 @@ def c_texts(
         f"test_{prefix}.c": "test.c.j2",
         "CMakeLists.txt": "CMakeLists.txt.j2",
     }
-    return {
-        file: render_template("pteron.export", name, **variables) for file, name in files.items()
-    }
+    folder = "pteron.export"
+    return {file: render_template(folder, name, **variables) for file, name in files.items()}
 
 
 def _tolerance_of(rounding: float) -> Callable[[float], float]:

@@ -233,7 +233,7 @@ def _fit_total_least_squares(
         forces=carried,
     )
     factor = qr_factor(homogeneous)
-    length = np.sqrt(factor.image @ factor.image + factor.residual_squares)
+    length = np.sqrt(factor.image @ factor.image + factor.rest)
     if length == 0.0:
         said = "the actuators do not feel the payload; move it about"
         raise observations.fault("no payload", said)
@@ -241,7 +241,7 @@ def _fit_total_least_squares(
     qr_factor(observations).check_seen()
     upper = np.zeros((p + n + 1, p + n + 1))
     upper[:-1, :-1] = factor.factor
-    upper[:, -1] = np.r_[factor.image, np.sqrt(factor.residual_squares)]
+    upper[:, -1] = np.r_[factor.image, np.sqrt(factor.rest)]
     corrections = smallest_corrections(upper, p, np.r_[np.ones(n), length])
     sizes = corrections.sizes
     if sizes[-2] <= _UNSEEN * sizes[0] or corrections.share <= _UNSEEN:

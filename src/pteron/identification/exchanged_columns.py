@@ -213,10 +213,8 @@ def _joint_corrections(
 ) -> Iterator[tuple[ColumnFault, Observations]]:
     """Yield each flipped sign or other order of joints that has poses, and observations."""
     n = len(unchanged.order)
-    faults = [
-        replace(unchanged, joint_signs=tuple(-1 if k == i else 1 for k in range(n)))
-        for i in range(n)
-    ]
+    flips = (1 - 2 * np.eye(n, dtype=int)).tolist()
+    faults = [replace(unchanged, joint_signs=tuple(signs)) for signs in flips]
     faults += [replace(unchanged, joint_order=order) for order in _orders(n)]
     for fault in faults:
         joints = log.joints[:, list(fault.joint_order)] * np.array(fault.joint_signs)

@@ -59,9 +59,8 @@ def fit_real_bodies(
         if bounds is not None and not isinstance(error, MissingSolver):
             raise
         return FittedBodies(None, notes=(f"No model of real bodies: {error}",))
-    shift = conditional_shift(
-        estimate.covariance, range(rank), consistency.base_values - identified
-    )
+    change = consistency.base_values - identified
+    shift = conditional_shift(estimate.covariance, range(rank), change)
     change = np.sqrt(((observations.matrix @ shift) ** 2).mean())
     residual = np.sqrt((estimate.residuals**2).mean())
     size, tiny = np.sqrt((observations.forces**2).mean()), np.finfo(float).tiny

@@ -69,9 +69,8 @@ def map_film(
 
     def drawn(coordinate: float) -> Figure:
         """Return the figure of the map at a value of its last coordinate."""
-        return map_panels(
-            [(index_map.slice_at(last.name, coordinate), name)], scales, index_map.causes
-        )
+        layer = index_map.slice_at(last.name, coordinate)
+        return map_panels([(layer, name)], scales, index_map.causes)
 
     coordinates = last.values.tolist()
     figure = drawn(coordinates[0])

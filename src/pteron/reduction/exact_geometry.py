@@ -64,9 +64,7 @@ class ExactLeg:
     def numbers(self) -> list[Surd]:
         """All numbers in one list."""
         return [
-            number
-            for quantity in (*self.values.values(), self.platform_point)
-            for number in quantity
+            number for vector in (*self.values.values(), self.platform_point) for number in vector
         ]
 
     def field_elements(self, field: Field[Element]) -> dict[str, list[Element]]:

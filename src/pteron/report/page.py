@@ -137,18 +137,16 @@ def geometry(robot: Manipulator) -> list[tuple[str, list[str]]]:
             directions = [
                 q.value for q in leg.quantities if q.name == name and q.role == "direction"
             ]
-            quantity: Any = directions[0] if directions else getattr(leg, name, None)
-            if quantity is None:
+            size: Any = directions[0] if directions else getattr(leg, name, None)
+            if size is None:
                 texts.append("\u2013")
             elif role in ("length", "number"):
-                texts.append(
-                    format_fixed(1e3 * quantity) if role == "length" else compact(quantity)
-                )
+                texts.append(format_fixed(1e3 * size) if role == "length" else compact(size))
             elif role == "count":
-                texts.append(str(quantity))
+                texts.append(str(size))
             else:
                 # Micrometres, and directions to a ten-thousandth: no rounding is shown beyond.
-                exact = np.round(quantity, 6 if "point" in role else 4) + 0.0
+                exact = np.round(size, 6 if "point" in role else 4) + 0.0
                 texts.append(triple(exact, 1e3) if "point" in role else triple(exact, digits=3))
         if any(text != "\u2013" for text in texts):
             rows.append((name.replace("_", " "), texts))

@@ -246,22 +246,18 @@ def _scale_problem(
 
 def _choose_aim(problem: _Problem) -> _Aim:
     """Return the identified values if they are feasible, else the nearest feasible values."""
-    real, target, identified, free = problem.real, problem.target, problem.values, problem.free
-    depth, deepest = deepest_point(
-        real, problem.inverse @ (identified / problem.sizes), free, _DEEPEST
-    )
+    real, target, beta, free = problem.real, problem.target, problem.values, problem.free
+    depth, deepest = deepest_point(real, problem.inverse @ (beta / problem.sizes), free, _DEEPEST)
     if depth >= _SHALLOW:
-        return _Aim(identified, deepest, 0.5 * depth)
-    count = free.shape[0]
-    inside = nearest_to_target(
-        real, np.zeros(count), np.eye(count), 1.0, target.matrix, target.right
-    )
+        return _Aim(beta, deepest, 0.5 * depth)
+    n = free.shape[0]
+    inside = nearest_to_target(real, np.zeros(n), np.eye(n), 1.0, target.matrix, target.right)
     if inside is None:
         raise ModelError(
             "bounds: no real bodies keep them all, whatever the identified values are; "
             f"loosen some of: {', '.join(problem.limits.names)}"
         )
-    solution = closest_to_values(real, problem.grouping, identified, problem.spread, _SHALLOW)
+    solution = closest_to_values(real, problem.grouping, beta, problem.spread, _SHALLOW)
     if solution is None:
         raise ModelError(_TOO_FAR)
     point, multipliers = solution

@@ -33,7 +33,7 @@ class QrFactor(LogSourceMixin):
     """R of the scaled W (p, p)."""
     image: Array
     """Q^T F (p,)."""
-    residual_squares: float
+    rest: float
     """Sum of squares of the least-squares residuals."""
     scale: Array
     """Lengths (p,) of W's columns: values = solution / scale."""
@@ -122,15 +122,8 @@ def qr_factor(
     divisor = np.where(scale > 0.0, scale, 1.0)
     blocks = _blocks(observations, weights, block)
     full = triangle((np.column_stack([rows / divisor, f]) for rows, f in blocks), p + 1)
-    return QrFactor(
-        full[:p, :p],
-        full[:p, p],
-        float(full[p, p] ** 2),
-        scale,
-        observations.rows,
-        observations.names,
-        observations.source,
-    )
+    labels = observations.rows, observations.names, observations.source
+    return QrFactor(full[:p, :p], full[:p, p], float(full[p, p] ** 2), scale, *labels)
 
 
 def _blocks(

@@ -83,9 +83,7 @@ def total(
     factor = qr_factor(observations, 1.0 / noise)
     given_errors = errors
     if given_errors is None:
-        relative = np.sqrt(
-            factor.residual_squares / (factor.residual_squares + factor.image @ factor.image)
-        )
+        relative = np.sqrt(factor.rest / (factor.rest + factor.image @ factor.image))
         errors = relative * factor.scale / np.sqrt(factor.rows)
         if observations.kinds:
             errors[np.isin(observations.kinds, _CONSTANT)] = 0.0
@@ -97,7 +95,7 @@ def total(
     exact = int((errors == 0.0).sum())
     p = len(order)
     stack = np.column_stack([factor.factor * factor.scale, factor.image])
-    stack = np.vstack([stack, np.r_[np.zeros(p), np.sqrt(factor.residual_squares)]])
+    stack = np.vstack([stack, np.r_[np.zeros(p), np.sqrt(factor.rest)]])
     upper = np.asarray(np.linalg.qr(stack[:, [*order, p]], mode="r"))
     forces, search = 1.0, SearchRecord("total")
     beta = np.empty(p)
@@ -110,17 +108,15 @@ def total(
                 "total least squares: noise explains all there is; record a livelier motion",
             )
         beta[order] = corrections.values
-        regressor_part = ((beta * errors) ** 2).sum()
+        modelled = ((beta * errors) ** 2).sum()
         # The residuals hold the noise of the columns as well as that of the forces.
         squares_left = (
-            factor.residual_squares
-            + ((factor.image - factor.factor @ (factor.scale * beta)) ** 2).sum()
+            factor.rest + ((factor.image - factor.factor @ (factor.scale * beta)) ** 2).sum()
         )
         variance = squares_left / factor.degrees
         search.converged = given_errors is None or variance == 0.0
         if not search.converged:
-            last_forces = forces
-            forces = np.sqrt(max(variance - regressor_part, _LEAST_SHARE * variance))
+            last_forces, forces = forces, np.sqrt(max(variance - modelled, _LEAST_SHARE * variance))
             search.converged = bool(abs(forces / last_forces - 1.0) < _SETTLED)
     # The normal equations without the bias of the columns' noise, least^2 times its variance.
     normal = (factor.scale[:, None] * factor.factor.T) @ (factor.factor * factor.scale)

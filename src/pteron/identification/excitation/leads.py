@@ -159,9 +159,8 @@ def found_lead(motion: FourierMotion, limits: Limits) -> Lead:
     phases = [float(phase) for phase in motion.uniform_times(_PHASES)]
     for length in _LENGTHS:
         leads = [Lead(length * motion.period, phase) for phase in phases]
-        rooms = [
-            _least_margin(LedMotion(motion, lead, 0), limits, 2 * length * coarse) for lead in leads
-        ]
+        step = 2 * length * coarse
+        rooms = [_least_margin(LedMotion(motion, lead, 0), limits, step) for lead in leads]
         for best in np.argsort(rooms)[::-1][:_TRIED]:
             led = LedMotion(motion, leads[best], 0)
             if rooms[best] > _CLEAR and is_clear(led, limits, 2 * length * fine, _CLEAR):

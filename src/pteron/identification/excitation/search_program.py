@@ -63,7 +63,7 @@ class Setting:
     limits: Limits
     criterion: Criterion
     short: tuple[float, ...]
-    """Column lengths (p,), root mean square, below which a column is short: `condition_of_long`."""
+    """RMS lengths (p,) below which a column is short for `condition_with_penalty`."""
 
 
 def minimise(

@@ -80,9 +80,8 @@ def backlash_signature(records: Sequence[PlayRecord], band: float) -> BacklashSi
         both = (np.concatenate(part) for part in every)
         chance = float(scipy.stats.mannwhitneyu(*both, alternative="greater").pvalue)
     shows &= chance <= _CHANCE
-    return BacklashSignature(
-        tested, np.where(shows, times, np.nan), chance, np.where(shows, power, 0.0)
-    )
+    times, power = np.where(shows, times, np.nan), np.where(shows, power, 0.0)
+    return BacklashSignature(tested, times, chance, power)
 
 
 def _windows(records: Sequence[PlayRecord], band: float, joint: int) -> tuple[Array, Array, float]:

@@ -136,9 +136,7 @@ class Channel:
                 self._make_finding("clipped", message, self._first_beyond, self._beyond)
             )
         for word, extreme in (("greatest", self._greatest), ("least", self._least)):
-            extreme_runs = [
-                run for run in runs if run.value == extreme and run.rows >= _CLIPPED_ROWS
-            ]
+            extreme_runs = [r for r in runs if r.value == extreme and r.rows >= _CLIPPED_ROWS]
             if self._limits is None and self._is_force and len(extreme_runs) >= _CLIPPED_RUNS:
                 rows, start = sum(run.rows for run in extreme_runs), extreme_runs[0].start
                 message = (

@@ -44,9 +44,7 @@ _WORDS: dict[str, tuple[str, ...]] = {
 CURRENTS = ("current", "i", "actcurrent", "actualcurrent", "iststrom")
 """Words that say amperes."""
 
-_SPELLED = "|".join(
-    re.escape(spelling) for units in UNITS.values() for spelling in units if len(spelling) > 1
-)
+_SPELLED = "|".join(re.escape(u) for units in UNITS.values() for u in units if len(u) > 1)
 _SPELLED += "|(?-i:[smANV%°])"
 """Units without brackets: a last single letter is one only as it is usually written."""
 

@@ -76,26 +76,22 @@ def pose_bounds(robot: Manipulator) -> list[Bound]:
 
 
 def check_bounds(
-    coordinates: NDArray[np.float64],
-    bounds: Sequence[Bound],
-    group: Group,
-    source: str,
-    first_row: int,
+    moved: NDArray[np.float64], bounds: Sequence[Bound], group: Group, source: str, first_row: int
 ) -> None:
-    """Raise a `DataError` where coordinates, (rows, n) in SI, are too large for the machine."""
+    """Raise a `DataError` where coordinates `moved`, (rows, n) in SI, exceed their bounds."""
     for j, (usual, owner, key) in enumerate(bounds):
-        beyond = np.abs(coordinates[:, j]) > (_TURNS if usual is None else _BEYOND * usual)
+        beyond = np.abs(moved[:, j]) > (_TURNS if usual is None else _BEYOND * usual)
         if not beyond.any():
             continue
         i, unit, name = int(np.argmax(beyond)), group.units[j], group.printable_names[j]
-        place = f"{source}: row {first_row + i + 1}, column {name}: {coordinates[i, j]:g}"
+        place = f"{source}: row {first_row + i + 1}, column {name}: {moved[i, j]:g}"
         if usual is None:
             raise DataError(
                 f"{place} rad, read as {unit}, is over two turns; {_declare('degrees', key, 'deg')}"
             )
         advice, peak = "check the unit, and that the log belongs to this machine", np.inf
         if unit == "m":
-            peak = float(np.abs(coordinates[:, j]).max())
+            peak = float(np.abs(moved[:, j]).max())
         for factor, smaller in reversed(_SMALLER):
             if peak / factor <= _BEYOND * usual:
                 advice = _declare(smaller, key, smaller)

@@ -92,9 +92,8 @@ def error_maps(calibration: Calibration) -> list[ErrorMap]:
     for plane in (level or planes)[:3]:
         with suppress(ModelError):
             cut = reach_slice(robot, home, plane, points=_POINTS)
-            drawn_errors, calibrated_errors = calibration.errors(
-                cut.poses.reshape(-1, robot.freedom)
-            )
+            poses = cut.poses.reshape(-1, robot.freedom)
+            drawn_errors, calibrated_errors = calibration.errors(poses)
             errors = np.linalg.norm(drawn_errors, axis=-1), calibrated_errors
             reached = (cut.status == 0).ravel() & np.isfinite(errors[0]) & np.isfinite(errors[1])
             if not reached.any() or not errors[0][reached].max() > 0.0:

@@ -95,9 +95,7 @@ class Contents:
 def short_sources(identification: Identification) -> dict[str, str]:
     """Return display names of recordings: without folders, unless names coincide."""
     every = list(
-        dict.fromkeys(
-            prediction.source for prediction in (*identification.fitted, *identification.held_out)
-        )
+        dict.fromkeys(p.source for p in (*identification.fitted, *identification.held_out))
     )
     names = [PurePath(source).name or source for source in every]
     return {

@@ -130,9 +130,5 @@ def body_rows(identification: Identification) -> tuple[ReportedBody, ...]:
 
 def _values(inertia: Inertia) -> tuple[float | None, ...]:
     """Return m, mgx, mgy and I of an inertia with a moment of inertia, else its mass alone."""
-    parameters = with_center(inertia)
-    return (
-        tuple(map(parameters.get, ("m", "mgx", "mgy", "I")))
-        if "I" in parameters
-        else (parameters["m"],)
-    )
+    by_name = with_center(inertia)
+    return tuple(map(by_name.get, ("m", "mgx", "mgy", "I"))) if "I" in by_name else (by_name["m"],)
