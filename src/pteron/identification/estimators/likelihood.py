@@ -120,15 +120,10 @@ def maximum_likelihood(
     moved = solved[:, :-1]
     projected_rows = (w - s @ moved).reshape(observations.matrix.shape) * noise[:, None]
     observations = _sample_observations(model, log, curve, preprocessing)
+    solution = search, observations, qr_factor(observations, 1.0 / noise), beta
+    extra = moved.T @ (information @ moved)
     return estimate_of(
-        search,
-        observations,
-        qr_factor(observations, 1.0 / noise),
-        beta,
-        weights=1.0 / noise,
-        inverse=inverse,
-        instruments=projected_rows,
-        extra=moved.T @ (information @ moved),
+        *solution, weights=1.0 / noise, inverse=inverse, instruments=projected_rows, extra=extra
     )
 
 
