@@ -16,7 +16,7 @@ from pteron.identification.logs import Log
 from pteron.identification.logs.description import KnownPayload
 from pteron.identification.model import Model, Terms, identification_model
 from pteron.identification.observation import Observations
-from pteron.identification.payload import observations_with_payload
+from pteron.identification.payload_phases import observations_with_payload
 from pteron.identification.signals import Processing
 from pteron.json_values import json_fields
 from pteron.kernels import Array

@@ -11,16 +11,8 @@ from matplotlib.figure import Figure, SubFigure
 from numpy.typing import ArrayLike
 
 from pteron.errors import DataError
-from pteron.plots.canvas import (
-    INK,
-    MUTED,
-    blank,
-    leg_curves,
-    legend,
-    plain_axes,
-    real_figure,
-    stack,
-)
+from pteron.plots.canvas import INK, MUTED, blank, legend, plain_axes, real_figure, stack
+from pteron.plots.leg_curves import leg_curves
 
 
 def bode_figure(

@@ -17,18 +17,8 @@ from pteron.kinematics.evaluate import finite_rows
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion import JointPoints, joint_guides, joint_points
 from pteron.motion.enlarged_points import enlarged_guides, enlarged_points, greatest_difference
-from pteron.plots.canvas import (
-    INK,
-    LEG_COLORS,
-    MUTED,
-    PAPER,
-    WARNING,
-    blank,
-    nice_step,
-    real_figure,
-    stack,
-    zero_line,
-)
+from pteron.plots.canvas import INK, MUTED, PAPER, WARNING, blank, real_figure, stack, zero_line
+from pteron.plots.leg_curves import LEG_COLORS
 from pteron.plots.machine_axes import MachineAxes
 from pteron.plots.machine_drawing import (
     Scene,
@@ -39,6 +29,7 @@ from pteron.plots.machine_drawing import (
     scene_of,
 )
 from pteron.plots.machine_figures import gravity_of, machine_figure
+from pteron.plots.ticks import nice_step
 from pteron.shapes import PoseLike
 from pteron.workspace import home_pose
 

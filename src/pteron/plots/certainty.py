@@ -20,21 +20,20 @@ from pteron.plots.canvas import (
     FONT_SIZE,
     GRID,
     INK,
-    LEG_COLORS,
     MUTED,
     PAPER,
     REACH,
     WARNING,
     blank,
-    leg_style,
     legend,
-    log_scale,
     plain_axes,
     real_figure,
     spot,
     zero_line,
 )
+from pteron.plots.leg_curves import LEG_COLORS, leg_style
 from pteron.plots.row_figures import row_axes
+from pteron.plots.ticks import log_scale
 
 _CERTAIN = 1.96
 """Standard deviations from zero beyond which a value is not zero, at 95 %."""

@@ -17,18 +17,17 @@ from pteron.plots.canvas import (
     FONT_SIZE,
     GRID,
     INK,
-    LEG_COLORS,
     MUTED,
     PAPER,
     blank,
-    fit_time_scale,
-    log_scale,
     plain_axes,
     real_figure,
     spot,
     stack,
     zero_line,
 )
+from pteron.plots.leg_curves import LEG_COLORS
+from pteron.plots.ticks import fit_time_scale, log_scale
 
 _COLUMNS = 360
 """Points of the curve over a whole recording, each the envelope of its samples."""

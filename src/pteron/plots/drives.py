@@ -16,14 +16,10 @@ from pteron.manipulator import RobotLike, as_manipulator
 from pteron.plots.canvas import (
     FONT_SIZE,
     INK,
-    LEG_COLORS,
     MUTED,
     PAPER,
     blank,
     groups_of,
-    leg_curves,
-    leg_numbers,
-    leg_style,
     legend,
     plain_axes,
     real_figure,
@@ -31,6 +27,7 @@ from pteron.plots.canvas import (
     zero_line,
 )
 from pteron.plots.joint_columns import joints_of, pick_machine_columns, rows
+from pteron.plots.leg_curves import LEG_COLORS, leg_curves, leg_numbers, leg_style
 
 _ROOM = 1.15
 """Half width of the axes over the largest value."""

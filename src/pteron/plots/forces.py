@@ -13,8 +13,6 @@ from pteron.plots.canvas import (
     MUTED,
     blank,
     groups_of,
-    leg_curves,
-    leg_numbers,
     legend,
     real_figure,
     remark,
@@ -22,6 +20,7 @@ from pteron.plots.canvas import (
     zero_line,
 )
 from pteron.plots.joint_columns import joints_of, pick_machine_columns, rows
+from pteron.plots.leg_curves import leg_curves, leg_numbers
 
 
 def forces_figure(

@@ -14,7 +14,8 @@ from matplotlib.figure import Figure, SubFigure
 from numpy.typing import ArrayLike
 
 from pteron.errors import DataError
-from pteron.plots.canvas import INK, LEG_COLORS, PAPER, blank, legend, plain_axes, real_figure, spot
+from pteron.plots.canvas import INK, PAPER, blank, legend, plain_axes, real_figure, spot
+from pteron.plots.leg_curves import LEG_COLORS
 
 _WIDE, _TALL = 5.4, 3.5
 """Width and height of the figure with one panel, inches."""

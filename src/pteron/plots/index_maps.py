@@ -22,7 +22,6 @@ from pteron.plots.canvas import (
     FONT_SIZE,
     GRID,
     INK,
-    LEG_COLORS,
     MUTED,
     PAPER,
     axis_label,
@@ -32,6 +31,7 @@ from pteron.plots.canvas import (
     shown_unit,
     spot,
 )
+from pteron.plots.leg_curves import LEG_COLORS
 from pteron.tolerances import EXACT, SAME
 from pteron.workspace import BEYOND_LIMITS, REACHABLE
 

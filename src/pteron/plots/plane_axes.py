@@ -12,8 +12,9 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 
 from pteron.kernels import Array
-from pteron.plots.canvas import Picture, nice_step, plain_axes
+from pteron.plots.canvas import Picture, plain_axes
 from pteron.plots.machine_axes import MachineAxes
+from pteron.plots.ticks import nice_step
 
 _RIM = 0.06
 """Margin around the drawing, as a share of its size."""

@@ -16,16 +16,16 @@ from pteron.platforms.coordinates import coordinate
 from pteron.plots.canvas import (
     FONT_SIZE,
     INK,
-    LEG_COLORS,
     MUTED,
     PAPER,
     REACH,
     blank,
-    nice_step,
     plain_axes,
     real_figure,
     spot,
 )
+from pteron.plots.leg_curves import LEG_COLORS
+from pteron.plots.ticks import nice_step
 from pteron.tolerances import ROUNDING
 from pteron.workspace import BEYOND_LIMITS, REACHABLE, ReachSlice
 

@@ -11,8 +11,9 @@ from numpy.typing import ArrayLike
 
 from pteron.kernels import Array
 from pteron.platforms.coordinates import coordinate
-from pteron.plots.canvas import blank, groups_of, leg_curves, legend, real_figure, stack, zero_line
+from pteron.plots.canvas import blank, groups_of, legend, real_figure, stack, zero_line
 from pteron.plots.joint_columns import rows
+from pteron.plots.leg_curves import leg_curves
 
 _SCALES = ((1.0, ""), (1e3, "m"), (1e6, "µ"), (1e9, "n"))
 """Factors and prefixes of units."""

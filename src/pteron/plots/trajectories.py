@@ -14,17 +14,9 @@ from pteron.errors import DataError
 from pteron.kernels import Array, as_array
 from pteron.manipulator import RobotLike
 from pteron.platforms.coordinates import coordinate
-from pteron.plots.canvas import (
-    blank,
-    groups_of,
-    leg_curves,
-    leg_numbers,
-    legend,
-    panels,
-    real_figure,
-    zero_line,
-)
+from pteron.plots.canvas import blank, groups_of, legend, panels, real_figure, zero_line
 from pteron.plots.joint_columns import joints_of
+from pteron.plots.leg_curves import leg_curves, leg_numbers
 
 _ORDERS = ("", "/s", "/s²", "/s³", "/s⁴")
 """Endings of the units of a quantity and its derivatives."""

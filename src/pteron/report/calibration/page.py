@@ -18,7 +18,7 @@ from pteron.plots import (
     row_residuals_figure,
     tool_errors_figure,
 )
-from pteron.plots.canvas import nice_step
+from pteron.plots.ticks import nice_step
 from pteron.report.calibration.firmware import FirmwareFit
 from pteron.report.calibration.values import next_steps, notes, value_rows
 from pteron.report.typeset import significant, template
