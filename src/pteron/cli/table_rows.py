@@ -123,7 +123,7 @@ def given_rows(
 
 
 def single_row(columns: Sequence[str], numbers: Sequence[float]) -> TableRows:
-    """Return the typed row."""
+    """Return numbers that were typed on the command line as a table of one row."""
     from pteron.cli.typed_row import TypedRow
 
     return TableRows(TypedRow({name: [q] for name, q in zip(columns, numbers, strict=True)}))

@@ -94,7 +94,7 @@ class ColumnFault:
 
 
 def _exchanges(order: Sequence[int]) -> int:
-    """Return the least number of exchanges of two that make an order."""
+    """Return the least number of swaps of two that turn an order into 0, 1, 2 ..."""
     unplaced, count = set(range(len(order))), len(order)
     while unplaced:
         at, count = unplaced.pop(), count - 1

@@ -203,7 +203,7 @@ def search_speeds(model: Model, observe: Observe, usual: Array) -> Array:
 
 
 def _coordinatewise(spline: Array, gram: Array, image: Array) -> NDArray[np.int64]:
-    """Return the index of the best speed for each joint (n,); -1 where none is significant."""
+    """Return the index of each joint's best speed (n,), joint by joint; -1: none is significant."""
     n = len(image)
     chosen = np.full(n, -1)
 

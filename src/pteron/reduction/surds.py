@@ -43,7 +43,7 @@ class Surd:
 
     @property
     def square(self) -> Fraction:
-        """q^2 s."""
+        """The square of the number: q^2 s."""
         return self.q * self.q * self.s
 
     def times(self, factor: Fraction) -> Surd:

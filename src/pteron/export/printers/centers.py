@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 
 from pteron.equations.machine import Machine
-from pteron.export.printers.sections import differs
+from pteron.export.printers.sections import unfit_error
 from pteron.kernels import Array
 from pteron.legs.leg import SphereLocus
 from pteron.manipulator import Manipulator
@@ -66,7 +66,7 @@ class Center:
         return None
 
 
-def common(robot: Manipulator, numbers: Sequence[float], reason: str, taker: str) -> float:
+def common_value(robot: Manipulator, numbers: Sequence[float], reason: str, taker: str) -> float:
     """Return the common value of all legs, m; `reason` and `taker` are for the error's message.
 
     Raises
@@ -78,12 +78,12 @@ def common(robot: Manipulator, numbers: Sequence[float], reason: str, taker: str
         if abs(number - numbers[0]) > SAME:
             first_value, second_value = (round(1000.0 * v, 6) + 0.0 for v in (number, numbers[0]))
             text = f"{reason.format(first_value)}, leg 1 {second_value:.6g} mm"
-            raise differs(robot, i, text, taker)
+            raise unfit_error(robot, i, text, taker)
     return float(np.mean(numbers))
 
 
-def degrees(point: Array) -> float:
-    """Return the direction of a point as seen from the z axis, 0 to 360."""
+def bearing(point: Array) -> float:
+    """Return the bearing of a point as seen from the z axis, degrees from x, 0 to 360."""
     angle = math.degrees(math.atan2(point[1], point[0])) % 360.0
     return 0.0 if 360.0 - angle < 1e-9 else angle
 

@@ -17,9 +17,9 @@ import scipy  # type: ignore[import-untyped]
 
 from pteron.equations.machine import Machine
 from pteron.errors import ModelError
-from pteron.export.printers.bed import bed, tool_of
-from pteron.export.printers.centers import SAME, Center, degrees
-from pteron.export.printers.sections import INSTEAD, differs, mm
+from pteron.export.printers.bed import find_bed, tool_of
+from pteron.export.printers.centers import SAME, Center, bearing
+from pteron.export.printers.sections import INSTEAD, mm, unfit_error
 from pteron.kernels import Array
 from pteron.kinematics import inverse_kinematics, jacobian, random_poses
 from pteron.manipulator import Manipulator
@@ -109,7 +109,7 @@ class LinearDelta:
         """Return the numbers from the spheres on which P moves; errors name `taker`."""
         for i, center in enumerate(centers, start=1):
             if np.hypot(*center.along[:2]) > _LEAN:
-                raise differs(robot, i, "its guide is not vertical, along z", taker)
+                raise unfit_error(robot, i, "its guide is not vertical, along z", taker)
         rises = np.array([np.sign(center.along[2]) for center in centers])
         limits = [leg.limits for leg in robot.legs]
         known = all(pair is not None for pair in limits)
@@ -126,15 +126,15 @@ class LinearDelta:
                 reason = (
                     f"its rod of {mm(arm)} mm is shorter than the radius, {mm(radii.mean())} mm"
                 )
-                raise differs(robot, i, reason, taker)
+                raise unfit_error(robot, i, reason, taker)
         radius = float(radii.mean())
         below = np.sqrt(arms**2 - radius**2)
         most = min(radius, float(arms.min()) - radius)
         level, good = -float(tool_of(robot)[2]), _INSIDE * most
         if known:
             low, high = (feet[:, 2] + end - below for end in (lowest, highest))
-            level, good = bed(robot, most, float(low.max()), float(high.min()))
-        angles = np.radians([degrees(tower) for tower in towers])
+            level, good = find_bed(robot, most, float(low.max()), float(high.min()))
+        angles = np.radians([bearing(tower) for tower in towers])
         start = np.array([radius, *angles, *arms, *(feet[:, 2] + highest - level)])
         solution, off = _fit_numbers(
             lambda p: _errors(robot, p, level, rises, highest, good), start, radius
@@ -144,7 +144,7 @@ class LinearDelta:
             reason = (
                 f"is {mm(round(radii[i - 1], 9))} mm from the z axis or leans, unlike the others"
             )
-            raise differs(robot, i, reason, taker)
+            raise unfit_error(robot, i, reason, taker)
         radius, angles, arms = solution[0], solution[1:4], solution[4:7]
         ends = solution[7:] - np.sqrt(arms**2 - radius**2)
         zeros = solution[7:] - highest
@@ -185,7 +185,7 @@ def _refuse_sliders_below(robot: Manipulator, centers: Sequence[Center], taker: 
             reason = (
                 "its slider is below the platform, and firmware has it above: turn the model over"
             )
-            raise differs(robot, i + 1, reason, taker)
+            raise unfit_error(robot, i + 1, reason, taker)
 
 
 def _errors(

@@ -9,15 +9,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pteron.errors import ModelError
-from pteron.export.printers.bed import bed, told_bed
-from pteron.export.printers.centers import SAME, Center, common, degrees, end_stop
+from pteron.export.printers.bed import bed_comments, find_bed
+from pteron.export.printers.centers import SAME, Center, bearing, common_value, end_stop
 from pteron.export.printers.sections import (
     INSTEAD,
-    differs,
     mm,
     number,
     reading_comment,
     signed_number,
+    unfit_error,
 )
 from pteron.kernels import Array
 from pteron.kinematics import inverse_kinematics, random_poses
@@ -51,10 +51,10 @@ class _Arm(NamedTuple):
         axis /= np.linalg.norm(axis)
         i, aside = center.leg + 1, 1000.0 * float(center.at @ axis)
         if abs(axis[2]) > SAME:
-            raise differs(robot, i, "its crank's axis is not horizontal", _TAKER)
+            raise unfit_error(robot, i, "its crank's axis is not horizontal", _TAKER)
         if abs(aside) > 1000.0 * SAME:
             reason = f"its crank's plane passes the z axis at {abs(aside):.6g} mm, not through it"
-            raise differs(robot, i, reason, _TAKER)
+            raise unfit_error(robot, i, reason, _TAKER)
         lift = float(np.sign(np.cross(out, [0.0, 0.0, 1.0]) @ axis))
         zero, upper = math.atan2(center.along[2], center.along @ out), np.linalg.norm(center.along)
         limits = robot.legs[center.leg].limits
@@ -75,9 +75,9 @@ def rotary(robot: Manipulator, centers: Sequence[Center]) -> dict[str, Any]:
     """Return the values of `rotary_delta`: arms that turn in vertical planes through z."""
     arms = [_Arm.from_center(robot, center) for center in centers]
     radii = [float(np.hypot(*arm.shoulder[:2])) for arm in arms]
-    radius = common(robot, radii, "has its shoulder {:.6g} mm from the z axis", _TAKER)
+    radius = common_value(robot, radii, "has its shoulder {:.6g} mm from the z axis", _TAKER)
     heights = [float(arm.shoulder[2]) for arm in arms]
-    height = common(robot, heights, "has its shoulder at z = {:.6g} mm", _TAKER)
+    height = common_value(robot, heights, "has its shoulder at z = {:.6g} mm", _TAKER)
     _refuse_elbows_inside(robot, arms, height)
     tops = [arm.top(radius) for arm in arms]
     highest = min((top for top in tops if top is not None), default=0.0)
@@ -94,7 +94,7 @@ def rotary(robot: Manipulator, centers: Sequence[Center]) -> dict[str, Any]:
         steppers.append(
             {
                 "comments": (place, *end_stop(end, "arm"), *reading),
-                "angle": number(degrees(arm.shoulder)),
+                "angle": number(bearing(arm.shoulder)),
                 "upper": mm(arm.upper),
                 "lower": mm(arm.lower),
                 "end": end,
@@ -130,7 +130,7 @@ def _refuse_elbows_inside(robot: Manipulator, arms: Sequence[_Arm], height: floa
                 "its elbow is inside while the platform is below, and Klipper has it outside; turn "
                 "a model over whose platform is above"
             )
-            raise differs(robot, arm.number, reason, _TAKER)
+            raise unfit_error(robot, arm.number, reason, _TAKER)
 
 
 def _bed(
@@ -139,12 +139,12 @@ def _bed(
     """Return P's z at Klipper's bed, m, and comments on it."""
     for arm in arms:
         if arm.upper + arm.lower <= radius:
-            raise differs(robot, arm.number, "its arms do not reach the z axis", _TAKER)
+            raise unfit_error(robot, arm.number, "its arms do not reach the z axis", _TAKER)
     reach = math.sqrt(min(arm.upper + arm.lower for arm in arms) ** 2 - radius**2)
     # Klipper lets the tool go so far from the axis, whatever the legs reach.
     most = min(radius + min(arm.upper for arm in arms), min(arm.lower for arm in arms) - radius)
-    level, good = bed(robot, most, height - reach, height + top)
-    return level, told_bed(robot, level, good, most)
+    level, good = find_bed(robot, most, height - reach, height + top)
+    return level, bed_comments(robot, level, good, most)
 
 
 def _gear(robot: Manipulator, leg: int) -> str | None:

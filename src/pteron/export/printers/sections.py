@@ -12,8 +12,8 @@ INSTEAD = "use --linuxcnc, or --c for a controller of your own"
 """Advice at the end of error messages."""
 
 
-def differs(robot: Manipulator, leg: int, reason: str, taker: str) -> ModelError:
-    """Return the ModelError that the firmware `taker` does not fit a machine because of a leg."""
+def unfit_error(robot: Manipulator, leg: int, reason: str, taker: str) -> ModelError:
+    """Return the ModelError that the firmware `taker` cannot move a machine because of a leg."""
     return ModelError(f"{robot.name}: {taker} does not fit leg {leg}: {reason}; {INSTEAD}")
 
 

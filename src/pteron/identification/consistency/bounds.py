@@ -147,7 +147,7 @@ def _rods(robot: Manipulator) -> dict[str, tuple[float, float]]:
 
 
 def _names_of_key(key: str, known: Mapping[str, str], what: str) -> list[str]:
-    """Return the name itself, or the names of all legs whose stem it is."""
+    """Return the names that a key stands for: itself, or all those with it as their stem."""
     names = [name for name, stem in known.items() if key in (name, stem)]
     if not names:
         raise ModelError(f"bounds: {key!r} is no {what} of this machine: {', '.join(known)}")

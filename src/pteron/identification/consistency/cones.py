@@ -40,7 +40,7 @@ class RealBodies:
 
     @property
     def counts(self) -> list[int]:
-        """Number of rows of each body: those of a triangle."""
+        """Number of constraint rows of each body: the entries of a symmetric matrix's triangle."""
         return [len(moments) * (len(moments) + 1) // 2 for moments in self.bodies.moments]
 
     @cached_property

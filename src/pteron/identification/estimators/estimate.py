@@ -190,7 +190,7 @@ def wald(shift: Array, covariance: Array) -> float:
 
 
 def residuals_of(observations: Observations, beta: Array) -> Array:
-    """Return the residuals F - W values (R, n) of fitted values (p,)."""
+    """Return the residuals F - W beta (R, n) of fitted values beta (p,)."""
     return np.asarray(observations.forces - observations.matrix @ beta)
 
 

@@ -60,7 +60,7 @@ _Class = TypeVar("_Class", bound=type)
 
 
 def _not_zero(factor: float) -> float:
-    """Return the value; raise where it is zero."""
+    """Return the factor; raise where it is zero."""
     if factor == 0.0:
         raise ValueError("0 given: its motor would not move the joint")
     return factor
