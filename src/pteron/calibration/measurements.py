@@ -90,6 +90,11 @@ class Setup:
     frame_known: bool = True
 
 
+def error_unit(kind: str) -> str:
+    """Return the unit in which errors of a kind of measurement are shown: mrad or mm."""
+    return "mrad" if kind == "angle" else "mm"
+
+
 def spread_rows(count: int, most: int) -> NDArray[np.int64]:
     """Return the indices of at most `most` of `count` rows, evenly spread."""
     return np.unique(np.linspace(0, count - 1, min(count, most)).astype(int))

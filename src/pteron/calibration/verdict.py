@@ -13,7 +13,7 @@ from pteron.calibration import thresholds
 from pteron.calibration.calibration_fit import CalibrationFit
 from pteron.calibration.fit import BEYOND
 from pteron.calibration.guess import UnknownBlock
-from pteron.calibration.measurements import Measurements
+from pteron.calibration.measurements import Measurements, error_unit
 from pteron.calibration.observability import Observability
 from pteron.calibration.result import CalibrationFinding, HeldOut, HiddenOrder
 from pteron.verdict import Grade, Opinion, Verdict
@@ -133,7 +133,7 @@ def _error_reasons(evidence: Evidence) -> Iterator[_Reason]:
         expected, drawn = held_out.expected[kind], held_out.before[kind]
         text = (
             f"At {held_out.rows} rows that the fit did not see the {kind} error is "
-            f"{_size_text(fitted, kind)}, {_size_text(drawn, kind)[: -len(_unit(kind)) - 1]} before"
+            f"{_size_text(fitted, kind)}, {1e3 * drawn:.3g} before"
         )
         most = thresholds.ordinary_error(kind, stated.get(kind))
         fine = fitted <= thresholds.FINE_SHARE * most
@@ -274,11 +274,6 @@ def _unseen_reasons(shown: Observability) -> Iterator[_Reason]:
         )
 
 
-def _unit(kind: str) -> str:
-    """Return the unit of residuals of a kind: mrad or mm."""
-    return "mrad" if kind == "angle" else "mm"
-
-
 def _size_text(error: float, kind: str) -> str:
     """Return an error as text in mrad or mm."""
-    return f"{1e3 * error:.3g} {_unit(kind)}"
+    return f"{1e3 * error:.3g} {error_unit(kind)}"

@@ -117,7 +117,8 @@ class Carried:
     def __str__(self) -> str:
         """Return the load in words that follow a machine's name; empty without a load."""
         tool = [] if self.tool is None else [f"tool {self.tool}"]
-        at = "" if self.payload_center is None else f" at {_vector_text(self.payload_center)} m"
+        center = [f"{component:g}" for component in self.payload_center or ()]
+        at = f" at ({', '.join(center)}) m" if center else ""
         words = [*tool, *([f"{self.payload:g} kg{at}"] if self.payload else [])]
         return f" with {' and '.join(words)}" if words else ""
 
@@ -164,8 +165,3 @@ def _check_rates(robot: Manipulator, rows: Table) -> None:
             f"{rows.source}: its poses go {far:.3g} m or rad, its velocities {meant:.3g} in the "
             "same time; t must be in s, and velocities per s"
         )
-
-
-def _vector_text(components: Sequence[float]) -> str:
-    """Return numbers as text in parentheses."""
-    return f"({', '.join(f'{component:g}' for component in components)})"

@@ -15,6 +15,7 @@ from pteron.identification.signals.filters import SETTLING, lowpass
 from pteron.kernels import Array
 from pteron.legs import Drive, Elastic
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.motion.motion import interpolate_columns
 from pteron.renamed import former_attribute
 from pteron.result import Result
 from pteron.shapes import PerJoint
@@ -142,8 +143,8 @@ def identify_transmissions(
     )
     bent = lowpass(motors - log.joints, log.rate, how.cutoff)
     rate = np.gradient(bent, log.time, axis=0)
-    side = lowpass(np.sign(_interpolate(time, load, log.time)), log.rate, how.cutoff)
-    bent, rate, side = (_interpolate(log.time, signal, time) for signal in (bent, rate, side))
+    side = lowpass(np.sign(interpolate_columns(time, load, log.time)), log.rate, how.cutoff)
+    bent, rate, side = (interpolate_columns(log.time, s, time) for s in (bent, rate, side))
     edge = SETTLING / (how.cutoff or log.rate)
     inner = (time > time[0] + edge) & (time < time[-1] - edge)
     fits = [
@@ -152,11 +153,6 @@ def identify_transmissions(
         for clear_rows in [inner & (np.abs(np.abs(side[:, j]) - 1.0) < _ACROSS)]
     ]
     return Transmissions(*np.array(fits).T)
-
-
-def _interpolate(known: Array, signals: Array, time: Array) -> Array:
-    """Return signals (T, n), interpolated at other times."""
-    return np.column_stack([np.interp(time, known, column) for column in signals.T])
 
 
 def _fit_transmission(

@@ -10,11 +10,10 @@ _NEEDS = r"% In the preamble: \usepackage{amsmath, booktabs}"
 _LONGEST = 55
 """Printed letters of a sum that stand in a line; the next term begins another."""
 
-_SPECIAL = {letter: rf"\{letter}" for letter in "&%$#_{}"} | {
-    "\\": r"\textbackslash{}",
-    "~": r"\textasciitilde{}",
-    "^": r"\textasciicircum{}",
-}
+_SPECIAL = str.maketrans(
+    {letter: rf"\{letter}" for letter in "&%$#_{}"}
+    | {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}"}
+)
 """Letters that mean something in LaTeX, and how they are written."""
 
 
@@ -51,7 +50,7 @@ def latex_table(
     lines = [
         *(_NEEDS, r"\begin{table}", r"  \centering"),
         *([r"  \renewcommand{\arraystretch}{1.4}"] if fractions else []),
-        rf"  \caption{{Base inertial parameters of {_escape_latex(name)}.}}",
+        rf"  \caption{{Base inertial parameters of {name.translate(_SPECIAL)}.}}",
         *(r"  \label{tab:base-parameters}", r"  \begin{tabular}{@{}rlrl@{}}", r"    \toprule"),
         r"    & Base parameter & Value & Unit \\",
         *(r"    \midrule", *rows, r"    \bottomrule"),
@@ -104,8 +103,3 @@ def _unit(unit: str) -> str:
     """Return a unit in LaTeX, upright in math mode."""
     spaced = unit.replace(" ", r"\,")
     return rf"$\mathrm{{{spaced}}}$"
-
-
-def _escape_latex(text: str) -> str:
-    """Return a text with LaTeX's special characters escaped."""
-    return "".join(_SPECIAL.get(letter, letter) for letter in text)

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pteron.arguments import expect
-from pteron.equations.edges import Edge, edges
+from pteron.equations.edges import edges
 from pteron.equations.machine import Machine
 from pteron.errors import DataError
 from pteron.kernels import Array, bounded_function, layout_of, numeric
@@ -73,11 +73,6 @@ EDGES = ("stretched", "folded", _CAUSES["reach"])
 """The causes that are edges of a leg's reach, where its elbow may change its side."""
 
 
-def _clause(edge: Edge) -> str:
-    """Return the phrase for the edge of a condition, such as "at the edge of its reach"."""
-    return _CAUSES.get(edge.cause, edge.cause).format(edge.noun)
-
-
 def conditions(
     robot: RobotLike, *, type_i: float = 0.0, type_ii: float = 0.0
 ) -> tuple[Condition, ...]:
@@ -127,8 +122,8 @@ def _edges(layout: Manipulator) -> tuple[Condition, ...]:
     """Return the conditions of reach and limits, cached for machines of a topology."""
     pose = ca.SX.sym("pose", layout.freedom)
     return tuple(
-        Condition(edge.leg, _clause(edge), "room", "room", k)
-        for k, edge in enumerate(edges(Machine.numeric(layout), pose))
+        Condition(e.leg, _CAUSES.get(e.cause, e.cause).format(e.noun), "room", "room", k)
+        for k, e in enumerate(edges(Machine.numeric(layout), pose))
     )
 
 

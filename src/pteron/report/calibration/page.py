@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from pteron.calibration import Calibration
+from pteron.calibration.measurements import error_unit
 from pteron.errors import ModelError, PteronError
 from pteron.kernels import Array
 from pteron.kinematics import random_poses
@@ -70,12 +71,7 @@ def page(
 
 def error_text(error: float, kind: str) -> str:
     """Return an error of a kind of measurement with its unit, in the page's format."""
-    return f"{significant(1e3 * error)} {_unit(kind)}"
-
-
-def _unit(kind: str) -> str:
-    """Return the unit that a kind of residual is shown in."""
-    return "mrad" if kind == "angle" else "mm"
+    return f"{significant(1e3 * error)} {error_unit(kind)}"
 
 
 def error_maps(calibration: Calibration) -> list[ErrorMap]:
@@ -104,7 +100,7 @@ def error_maps(calibration: Calibration) -> list[ErrorMap]:
             ]
             shades = levels(np.stack(errors_on_slice))  # of both, so that they compare
             drawn = [measure_figure(cut, part, levels=shades) for part in errors_on_slice]
-            maps.append(ErrorMap(tuple(plane), drawn[0], drawn[1], greatest, _unit(kind)))
+            maps.append(ErrorMap(tuple(plane), drawn[0], drawn[1], greatest, error_unit(kind)))
     return maps
 
 
