@@ -46,8 +46,7 @@ def event_trials(test: ScoreTest) -> Iterator[FaultTrial]:
         columns = test.joint_columns(steps * later[:, None])
         for i, (leg, name) in enumerate(zip(legs, test.start.robot.joint_names, strict=True)):
             unit = "mrad" if leg.joint.unit == "rad" else "mm"
-            column = columns[..., i : i + 1]
-            fall, amounts = test.score(column)
+            fall, amounts = test.score(column := columns[..., i : i + 1])
             text = (
                 f"The zero of joint {i + 1} ({name}) slipped by {1e3 * amounts[0]:+.3g} {unit} "
                 f"before {places[t]}: home it again, and measure anew from there."
@@ -57,18 +56,15 @@ def event_trials(test: ScoreTest) -> Iterator[FaultTrial]:
     columns = test.joint_columns(approach)
     for i, (leg, name) in enumerate(zip(legs, test.start.robot.joint_names, strict=True)):
         unit = "mrad" if leg.joint.unit == "rad" else "mm"
-        column = columns[..., i : i + 1]
-        fall, amounts = test.score(column)
+        fall, amounts = test.score(column := columns[..., i : i + 1])
         text = (
             f"Joint {i + 1} ({name}) stops {2e3 * abs(amounts[0]):.3g} {unit} apart by its "
             "direction of approach: approach poses from one side, or take up its play."
         )
         yield FaultTrial("backlash", text, 1, fall, column @ amounts)
-    times = (
-        measurements.times
-        if measurements.times is not None
-        else np.arange(float(len(measurements)))
-    )
+    times = measurements.times
+    if times is None:
+        times = np.arange(float(len(measurements)))
     if span := np.ptp(times):
         columns = test.joint_columns(steps * ((times - times.mean()) / span)[:, None])
         fall, amounts = test.score(columns)

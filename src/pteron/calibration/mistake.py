@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pteron.calibration.guess import Guess
 from pteron.calibration.measurements import Measurements
+from pteron.manipulator import Manipulator
 
 Array = NDArray[np.float64]
 
@@ -37,6 +38,18 @@ def leg_orders(guess: Guess) -> Iterator[tuple[int, ...]]:
         yield tuple(order)
     if count == 3:
         yield from ((1, 2, 0), (2, 0, 1))
+
+
+def travel_ends(robot: Manipulator) -> list[tuple[str, Array]]:
+    """Return joint coordinates (n,) that readings may count from, in words: zero and both ends.
+
+    The ends of the travel are left out where a joint has no limits.
+    """
+    ends = [("", np.zeros(len(robot.legs)))]
+    if all(leg.limits is not None for leg in robot.legs):
+        limits = np.array([leg.limits for leg in robot.legs])
+        ends += [(" from the upper end", limits[:, 1]), (" from the lower end", limits[:, 0])]
+    return ends
 
 
 def reorder_readings(measurements: Measurements, order: Sequence[int]) -> Measurements:

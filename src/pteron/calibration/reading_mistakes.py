@@ -15,6 +15,7 @@ from pteron.calibration.mistake import (
     leg_orders,
     reorder_readings,
     transform_joints,
+    travel_ends,
 )
 from pteron.calibration.start import starting_poses
 from pteron.calibration.thresholds import OFF_TOLERANCES
@@ -100,14 +101,10 @@ def reversed_joints(measurements: Measurements, guess: Guess) -> Iterator[Mistak
 
 def wrong_steps(measurements: Measurements, guess: Guess) -> Iterator[Mistake]:
     """Yield joints whose readings are perhaps in wrong steps, from zero or an end of the travel."""
-    names, legs = guess.robot.joint_names, guess.robot.legs
+    names = guess.robot.joint_names
     count = len(names)
-    ends = [("", np.zeros(count))]
-    if all(leg.limits is not None for leg in legs):
-        limits = np.array([leg.limits for leg in legs])
-        ends += [(" from the upper end", limits[:, 1]), (" from the lower end", limits[:, 0])]
     for factor, size, cause in _STEPS:
-        for where, end in ends:
+        for where, end in travel_ends(guess.robot):
             for joints in (range(count), *((i,) for i in range(count))):
                 factors = np.where(np.isin(np.arange(count), joints), factor, 1.0)
                 yield Mistake(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Iterable, Sequence
 from io import BytesIO
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -15,6 +15,7 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from numpy.typing import NDArray
 
 from pteron.errors import DataError
+from pteron.kernels import Array
 from pteron.platforms.coordinates import SHOWN, coordinate
 from pteron.plots.fonts import silence_glyph_warnings, take_fonts, warn_of_absent
 from pteron.plots.ticks import TickLabels, TickLocator
@@ -288,6 +289,15 @@ def spot(axes: Axes, x: float, y: float, face: str, edge: str, size: float, **op
     """Draw a round mark on axes, filled and outlined in colours."""
     style = {"marker": "o", "linestyle": "none", "markersize": size, **options}
     axes.plot([x], [y], markerfacecolor=face, markeredgecolor=edge, **style)
+
+
+def labelled_contours(
+    axes: Axes, x: Array, y: Array, measure: np.ma.MaskedArray[Any, Any], levels: Iterable[float]
+) -> None:
+    """Draw those of the levels that a measure (B, A) over x (A,) and y (B,) takes, with labels."""
+    if named := [level for level in levels if measure.min() < level < measure.max()]:
+        lines = axes.contour(x, y, measure, levels=named, colors=[INK], linewidths=0.7)
+        axes.clabel(lines, fmt="%.4g", fontsize=FONT_SIZE - 1.0, colors=[INK])
 
 
 def remark(axes: Axes, text: str, x: float, y: float, color: str, rise: float = 0.0) -> None:

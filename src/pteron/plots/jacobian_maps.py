@@ -12,7 +12,6 @@ from pteron.errors import DataError
 from pteron.kernels import Array, as_array
 from pteron.platforms.coordinates import are_angles, coordinate
 from pteron.plots.canvas import (
-    FONT_SIZE,
     GRID,
     INK,
     MUTED,
@@ -20,6 +19,7 @@ from pteron.plots.canvas import (
     WARNING,
     axis_label,
     blank,
+    labelled_contours,
     plain_axes,
     real_figure,
     remark,
@@ -86,10 +86,7 @@ def condition_figure(
     for level in _LEVELS[1:-1]:
         if (drawn > level).any():
             axes.contourf(x, y, drawn, levels=[level, np.inf], colors=[REACH], alpha=0.17)
-    named = [level for level in _LEVELS[:_NAMED] if drawn.min() < level < drawn.max()]
-    if named:
-        lines = axes.contour(x, y, drawn, levels=named, colors=[INK], linewidths=0.7)
-        axes.clabel(lines, fmt="%g", fontsize=FONT_SIZE - 1.0, colors=[INK])
+    labelled_contours(axes, x, y, drawn, _LEVELS[:_NAMED])
     _rim(axes, x, y, conditions)
     return real_figure(figure)
 

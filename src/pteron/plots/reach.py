@@ -14,12 +14,12 @@ from matplotlib.ticker import MultipleLocator
 from pteron.kernels import Array
 from pteron.platforms.coordinates import coordinate
 from pteron.plots.canvas import (
-    FONT_SIZE,
     INK,
     MUTED,
     PAPER,
     REACH,
     blank,
+    labelled_contours,
     plain_axes,
     real_figure,
     spot,
@@ -101,10 +101,7 @@ def measure_figure(
         for level in levels
         if level < extended.max()
     ]
-    named = [level for level in levels[::2] if inside.min() < level < inside.max()]
-    if named:
-        lines = axes.contour(first, second, inside, levels=named, colors=[INK], linewidths=0.7)
-        axes.clabel(lines, fmt="%.4g", fontsize=FONT_SIZE - 1.0, colors=[INK])
+    labelled_contours(axes, first, second, inside, levels[::2])
     edge = axes.contour(first, second, cut.margin, levels=[0.0], colors=[MUTED], linewidths=1.0)
     # Where the reach ends in a thread thinner than the grid, single cells of it are no picture.
     cell = np.array([np.ptp(first), np.ptp(second)]) / np.subtract(inside.shape, 1)
