@@ -53,7 +53,7 @@ class _Touch(NamedTuple):
     """A touch of the probe, as a controller logs it."""
 
     place: str
-    at: dict[str, float]
+    coordinates: dict[str, float]
     """By the letters of its axes, X to C, in mm and degrees."""
     height: float
     """Height of the tool over the plane, mm."""
@@ -311,9 +311,8 @@ def _match_place(text: str, match: re.Match[str], source: str) -> str:
 def _touched_heights(robot: Manipulator, touched: Sequence[_Touch]) -> Measurements:
     """Return touched heights as measurements, with readings by the drawn machine's kinematics."""
     platform, axes = robot.platform, linuxcnc_axes(robot)
-    poses = np.array(
-        [[touch.at.get(axis.letter, 0.0) / axis.scale for axis in axes] for touch in touched]
-    )
+    places = [[touch.coordinates.get(axis.letter, 0.0) for axis in axes] for touch in touched]
+    poses = np.array(places) / [axis.scale for axis in axes]
     tool = np.einsum("i,nij->nj", np.array(platform.tool), platform.placement(poses)[1])
     poses[:, ~platform.angular] -= tool @ platform.directions.T
     joints = inverse_kinematics(robot, poses, on_failure="nan")
@@ -321,9 +320,9 @@ def _touched_heights(robot: Manipulator, touched: Sequence[_Touch]) -> Measureme
     if lost.any():
         faults = [
             f"{touch.place}: the machine as drawn does not reach "
-            f"{' '.join(f'{a.letter}{touch.at.get(a.letter, 0.0):g}' for a in axes)}; is z = 0 the "
-            "bed in its file?"
-            for touch, bad in zip(touched, lost, strict=True)
+            f"{' '.join(f'{a.letter}{x:g}' for a, x in zip(axes, place, strict=True))}; "
+            "is z = 0 the bed in its file?"
+            for touch, place, bad in zip(touched, places, lost, strict=True)
             if bad
         ]
         if 2 * lost.sum() > len(lost):

@@ -117,7 +117,7 @@ class _ModularSlopes(MachineSlopes):
         self.start = replace(start, turn=np.eye(3), shift=np.zeros(3))
         self.prime, self.rng, self.field = prime, rng, PrimeField(prime)
         geometry = exact_geometry(robot)
-        self.own, self.vector = geometry.frame, geometry.field_elements(self.field)
+        self.frame, self.vector = geometry.frame, geometry.field_elements(self.field)
         deltas = general_program(geometry_only(robot), "discriminants").function
         self.deltas = Evaluation(deltas, self.field, [self.vector])
         self.turning_joints = [leg.joint.unit == "rad" for leg in robot.legs]
@@ -202,7 +202,7 @@ class _ModularSlopes(MachineSlopes):
         size = np.linalg.norm(outward)
         u, k = (
             np.array(
-                [n.field_element(self.field) for n in rational_unit(self.own @ v)], dtype=object
+                [n.field_element(self.field) for n in rational_unit(self.frame @ v)], dtype=object
             )
             for v in (outward / size if size > 0.0 else np.eye(3)[0], axis)
         )
@@ -224,7 +224,7 @@ class _ModularSlopes(MachineSlopes):
 
     def _base_vectors(self, vectors: Array) -> Residues:
         """Return vectors (..., 3) of the base frame as residues in the machine's frame."""
-        return self._numbers(vectors @ self.own.T)
+        return self._numbers(vectors @ self.frame.T)
 
     def _numbers(self, array: Array) -> Residues:
         """Return numbers as residues modulo the prime, by rational approximations."""

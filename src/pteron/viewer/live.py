@@ -64,7 +64,7 @@ class Live:
         self._actions: dict[str, Callable[[], object]] = {}
         self._wake = threading.Condition()
         self._closed = False
-        self._tabs, self._kept = set[Tab](), dict[str, str]()
+        self._tabs, self._last_messages = set[Tab](), dict[str, str]()
         self._files: dict[Tab, str] = {}
         self._last: tuple[str, float] = ("", 0.0)
         self._sliced: tuple[object, ...] = ()
@@ -108,7 +108,7 @@ class Live:
         """Send a new tab its contents."""
         with self._wake:
             self._tabs.add(tab)
-            for kind, message in self._kept.items():
+            for kind, message in self._last_messages.items():
                 tab.send(kind, message)
 
     def close_tab(self, tab: Tab) -> None:
@@ -172,7 +172,7 @@ class Live:
         """Send data of a kind to all tabs, and store it for new tabs."""
         text = json.dumps({kind: content}, allow_nan=False)
         with self._wake:
-            self._kept[kind] = text
+            self._last_messages[kind] = text
             for tab in self._tabs:
                 tab.send(kind, text)
 

@@ -104,7 +104,7 @@ class Session:
         self.push: Push | None = None
         self.preparing = False
         self.screws, self.plane = False, NONE
-        self._before = list[ViewerState]()
+        self._undo_states = list[ViewerState]()
         self._set_ranges()
 
     def _set_ranges(self) -> None:
@@ -147,15 +147,15 @@ class Session:
     def remember(self) -> None:
         """Save the state for `undo`."""
         if not self.playing and self.push is None:
-            self._before = [*self._before[-_KEPT:], self.state]
+            self._undo_states = [*self._undo_states[-_KEPT:], self.state]
 
     def undo(self) -> None:
         """Restore the state before the last action."""
-        if not self._before:
+        if not self._undo_states:
             self.state = stop_motion(self.state, "There is nothing to undo.")
             return
         self._end_motion()
-        was = self._before.pop()
+        was = self._undo_states.pop()
         if was.robot != self.state.robot:
             self.state = move_home(was)
             self._set_ranges()

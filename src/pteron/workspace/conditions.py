@@ -159,12 +159,12 @@ class IntervalTest:
     """
 
     def __init__(self, robot: Manipulator, required: Sequence[Condition]) -> None:
-        self.given = tuple(required)
-        if not 0 < len(self.given) <= _MOST:
-            raise DataError(f"given: {len(self.given)} conditions, 1 to {_MOST} expected")
-        self.all = np.uint64((1 << len(self.given)) - 1)
+        self.conditions = tuple(required)
+        if not 0 < len(self.conditions) <= _MOST:
+            raise DataError(f"given: {len(self.conditions)} conditions, 1 to {_MOST} expected")
+        self.all = np.uint64((1 << len(self.conditions)) - 1)
         self._rows = []
-        for condition in self.given:
+        for condition in self.conditions:
             function = bounded_function(robot, condition.what)
             self._rows.append((function, function.rows(condition.output)[condition.element]))
 
@@ -178,7 +178,7 @@ class IntervalTest:
         and none is any more of a box that lies outside.
         """
         outside, open_ = np.zeros(len(low), bool), open_.copy()
-        for c, condition in enumerate(self.given):
+        for c, condition in enumerate(self.conditions):
             bit = np.uint64(1 << c)
             chosen = np.flatnonzero((open_ & bit != 0) & ~outside)
             if not len(chosen):
@@ -195,8 +195,8 @@ class IntervalTest:
         A condition that is undefined in a box, such as a limit out of reach, counts as kept: it is
         the reach that fails there.
         """
-        may_fail = np.empty((len(low), len(self.given)), bool)
-        for c, condition in enumerate(self.given):
+        may_fail = np.empty((len(low), len(self.conditions)), bool)
+        for c, condition in enumerate(self.conditions):
             may_fail[:, c] = ~(self.bounds(c, low, high)[0] >= condition.floor)
         return may_fail
 
@@ -205,7 +205,7 @@ class IntervalTest:
         function, row = self._rows[c]
         enclosures = function(low, high, [row])
         least, most, defined = enclosures[0][:, 0], enclosures[1][:, 0], enclosures[2][:, 0]
-        if self.given[c].sized:
+        if self.conditions[c].sized:
             size = np.maximum(np.maximum(least, np.negative(most)), 0.0)
             least, most = size, np.maximum(np.negative(least), most)
         return least, most, defined

@@ -243,6 +243,7 @@ def _find_counterexample(
         poses.append(pose)
     candidates = np.concatenate(poses)
     candidates = candidates[region.holds(candidates)]
-    failing = candidates[~(condition_margins(robot, test.given, candidates) >= 0.0).all(axis=-1)]
+    margins = condition_margins(robot, test.conditions, candidates)
+    failing = candidates[~(margins >= 0.0).all(axis=-1)]
     proved: NDArray[np.bool_] = test(failing, failing, np.full(len(failing), test.all))[0]
     return failing[proved.argmax()] if proved.any() else None

@@ -21,13 +21,13 @@ SAME = 1e-6
 
 @dataclass(frozen=True)
 class Center:
-    """The centre of the sphere on which P moves at a fixed joint coordinate q.
+    """The centre of the sphere on which P, the platform's point, moves at a fixed joint q.
 
-    It is at + q along, or at + along cos(q) + across sin(q); P is the platform's reference point.
+    It is origin + q along, or origin + along cos(q) + across sin(q).
     """
 
     leg: int
-    at: Array
+    origin: Array
     along: Array
     across: Array | None
     radius: float
@@ -57,12 +57,12 @@ class Center:
         if np.allclose(center(2.0), start + 2.0 * step, rtol=0.0, atol=1e-12):
             return cls(leg, start, step, None, radius)
         half, quarter = center(math.pi), center(0.5 * math.pi)
-        at = 0.5 * (start + half)
-        cosine_arm, sine_arm = start - at, quarter - at
+        origin = 0.5 * (start + half)
+        cosine_arm, sine_arm = start - origin, quarter - origin
         if np.allclose(
-            center(1.0), at + math.cos(1.0) * cosine_arm + math.sin(1.0) * sine_arm, 0.0, 1e-12
+            center(1.0), origin + math.cos(1.0) * cosine_arm + math.sin(1.0) * sine_arm, 0.0, 1e-12
         ):
-            return cls(leg, at, cosine_arm, sine_arm, radius)
+            return cls(leg, origin, cosine_arm, sine_arm, radius)
         return None
 
 

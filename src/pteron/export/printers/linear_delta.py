@@ -115,7 +115,7 @@ class LinearDelta:
         known = all(pair is not None for pair in limits)
         travels = np.array([pair or (0.0, 0.0) for pair in limits]) * rises[:, None]
         lowest, highest = travels.min(axis=1), travels.max(axis=1)
-        feet = np.array([center.at for center in centers])
+        feet = np.array([center.origin for center in centers])
         leans = np.array([center.along for center in centers]) * rises[:, None]
         _refuse_sliders_below(robot, centers, taker)
         # Towers as they stand where the carriages are on their way.
@@ -180,7 +180,7 @@ def _refuse_sliders_below(robot: Manipulator, centers: Sequence[Center], taker: 
     poses = random_poses(robot, 50, seed=1, type_i=0.02, type_ii=0.0, limits=False)
     joints = inverse_kinematics(robot, poses)
     for i, center in enumerate(centers):
-        height = center.at[2] + center.along[2] * joints[:, i]
+        height = center.origin[2] + center.along[2] * joints[:, i]
         if not (height > poses[:, 2]).all():
             reason = (
                 "its slider is below the platform, and firmware has it above: turn the model over"

@@ -37,7 +37,7 @@ class _Kind(NamedTuple):
     template: str
     angles: tuple[float, float, float]
     """Degrees at which its towers stand where the file does not say."""
-    own: tuple[float, float, float]
+    template_angles: tuple[float, float, float]
     """Degrees at which the template's do."""
     printer: tuple[str, ...]
     tower: tuple[str, ...]
@@ -205,7 +205,7 @@ def from_klipper(config: str | Path, *, name: str = "printer") -> Manipulator:
     legs = []
     template = load(kind.template)
     for tower, usual, template_angle, leg in zip(
-        "abc", kind.angles, kind.own, template.legs, strict=True
+        "abc", kind.angles, kind.template_angles, template.legs, strict=True
     ):
         section = f"stepper_{tower}"
         angle = setting(parser, section, "angle")

@@ -34,7 +34,7 @@ class _Arm(NamedTuple):
     """The leg's, from 1."""
     limits: tuple[float, float] | None
     shoulder: Array
-    out: Array
+    outward: Array
     """From the z axis to the shoulder, a unit vector."""
     lift: float
     """1 where the arm lifts as its joint coordinate grows, else -1."""
@@ -46,10 +46,10 @@ class _Arm(NamedTuple):
     def from_center(cls, robot: Manipulator, center: Center) -> _Arm:
         """Return the arm of a leg whose crank turns in a vertical plane through z."""
         assert center.across is not None  # it turns
-        out = np.array([*center.at[:2], 0.0]) / np.hypot(*center.at[:2])
+        out = np.array([*center.origin[:2], 0.0]) / np.hypot(*center.origin[:2])
         axis = np.cross(center.along, center.across)
         axis /= np.linalg.norm(axis)
-        i, aside = center.leg + 1, 1000.0 * float(center.at @ axis)
+        i, aside = center.leg + 1, 1000.0 * float(center.origin @ axis)
         if abs(axis[2]) > SAME:
             raise unfit_error(robot, i, "its crank's axis is not horizontal", _TAKER)
         if abs(aside) > 1000.0 * SAME:
@@ -58,7 +58,7 @@ class _Arm(NamedTuple):
         lift = float(np.sign(np.cross(out, [0.0, 0.0, 1.0]) @ axis))
         zero, upper = math.atan2(center.along[2], center.along @ out), np.linalg.norm(center.along)
         limits = robot.legs[center.leg].limits
-        return cls(i, limits, center.at, out, lift, zero, float(upper), center.radius)
+        return cls(i, limits, center.origin, out, lift, zero, float(upper), center.radius)
 
     def top(self, radius: float) -> float | None:
         """Return z over the shoulder, on the axis, where its limits let it be highest."""
@@ -124,7 +124,7 @@ def _refuse_elbows_inside(robot: Manipulator, arms: Sequence[_Arm], height: floa
         )
     for arm, q in zip(arms, inverse_kinematics(robot, poses).T, strict=True):
         wrist = poses - arm.shoulder
-        down = np.arctan2(wrist[:, 2], wrist @ arm.out)
+        down = np.arctan2(wrist[:, 2], wrist @ arm.outward)
         if (np.sin(arm.lift * q + arm.zero - down) < 0.0).any():
             reason = (
                 "its elbow is inside while the platform is below, and Klipper has it outside; turn "

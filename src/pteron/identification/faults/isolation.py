@@ -194,7 +194,7 @@ def _isolate_in_parts(
 ) -> FaultIsolation:
     """Return the faults that the residuals of a fit to parts of a log show."""
     columns = parts[0].model
-    noise = np.mean([part.how.force_noise for part in parts], axis=0)
+    noise = np.mean([part.preprocessing.force_noise for part in parts], axis=0)
 
     def observe(some: Sequence[SearchedPart]) -> Observations:
         """Return the observations of parts, with rows for values known from the drawing."""
@@ -208,7 +208,7 @@ def _isolate_in_parts(
     uncertain, spoiled, each = expected_errors(
         columns, states, other, estimate, plain, found_faults
     )
-    step = 1.0 / max(part.how.rate for part in parts)
+    step = 1.0 / max(part.preprocessing.rate for part in parts)
     faults = _named_faults(columns, plain, found_faults, each, step)
 
     # Play, which no column has
@@ -314,9 +314,9 @@ def _isolate_play(
 
     Play shows as large residuals where loads change direction.
     """
-    records, band = [], max(part.how.band for part in parts)
+    records, band = [], max(part.preprocessing.band for part in parts)
     for part in parts:
-        model, how = part.model.model, part.how
+        model, how = part.model.model, part.preprocessing
         carried = np.isin(model.kinds, ("base", "payload"))
         for block in samples(model.robot, part.log, how):
             matrix = model.matrix(block.states)
@@ -349,7 +349,7 @@ def delay_of(
     """Return the delay, s, of recordings' forces that fits best, less the assumed delay."""
     parts = choose_parts(model, estimate, recordings, preprocessing, _ROWS)
     _, shifted = _isolate_delay(parts, observe_parts)
-    return shifted[0].how.delay - parts[0].how.delay
+    return shifted[0].preprocessing.delay - parts[0].preprocessing.delay
 
 
 def _search_families(
@@ -359,7 +359,7 @@ def _search_families(
 ) -> tuple[Estimate, list[FoundFault]]:
     """Return the fit of parts without faults, and the faults of some families that they show."""
     some = [replace(part, model=replace(part.model, families=families)) for part in parts]
-    noise = np.mean([part.how.force_noise for part in parts], axis=0)
+    noise = np.mean([part.preprocessing.force_noise for part in parts], axis=0)
     return search_faults(some[0].model, observe(some), noise=noise)
 
 
@@ -373,10 +373,10 @@ def _isolate_delay(
         if not found_faults:
             break
         first, late = late or found_faults[0], found_faults[0]
-        delay = shifted[0].how.delay + float(late.sizes[0])
+        delay = shifted[0].preprocessing.delay + float(late.sizes[0])
         delay = min(max(delay, -LATEST), LATEST)
-        shifted = [replace(part, how=replace(part.how, delay=delay)) for part in shifted]
+        shifted = [replace(p, preprocessing=replace(p.preprocessing, delay=delay)) for p in shifted]
     if late is not None:
-        total_delay = np.array([shifted[0].how.delay - parts[0].how.delay])
+        total_delay = np.array([shifted[0].preprocessing.delay - parts[0].preprocessing.delay])
         late = replace(late, sizes=total_delay, chance=first.chance)
     return late, shifted

@@ -65,9 +65,9 @@ class Channel:
         limits: tuple[float, float] | None = None,
     ) -> None:
         self._column, self._source = column, source
-        self._moved = _MOVED * spans
+        self._least_travel = _MOVED * spans
         if joint is not None:
-            self._moved[joint] = np.inf
+            self._least_travel[joint] = np.inf
         self._is_force, self._limits = joint is None, limits
         self._rows = self._beyond = self._first_beyond = 0
         self._least, self._greatest = np.inf, -np.inf
@@ -149,7 +149,7 @@ class Channel:
     def _is_frozen(self, run: _Run) -> bool:
         """Return whether other joints move too far in a stretch for the channel to be at rest."""
         at_the_end = run.start == 0 or run.stop == self._rows
-        moved = self._moved * (_RESTED if at_the_end else 1.0)
+        moved = self._least_travel * (_RESTED if at_the_end else 1.0)
         return bool((run.greatest - run.least > moved).any())
 
     def _make_finding(self, kind: Kind, message: str, start: int, count: int) -> Finding:

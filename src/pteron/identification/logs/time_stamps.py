@@ -21,7 +21,7 @@ class TimeStamps:
 
     def __init__(self, step: float, column: str, source: str) -> None:
         self._step, self._column, self._source = step, column, source
-        self._before = np.zeros(0)
+        self._previous = np.zeros(0)
         self._rows = 0
         self._gaps: list[tuple[int, float, float]] = []
         self._uneven = 0
@@ -43,8 +43,8 @@ class TimeStamps:
                 f"{time[i]:g} s a number's digits cannot tell time steps apart; correct the cell, "
                 "or declare the unit of time"
             )
-        first = not len(self._before)
-        earlier_times = time[:1] if first else self._before
+        first = not len(self._previous)
+        earlier_times = time[:1] if first else self._previous
         steps = np.diff(time, prepend=earlier_times[-1:])
         if first:
             steps[:1] = self._step
@@ -67,7 +67,7 @@ class TimeStamps:
         worst = int(np.argmax(deviations))
         if deviations[worst] > self._worst[0]:
             self._worst = (float(deviations[worst]), self._rows + worst)
-        self._before = np.concatenate([earlier_times, time])[-_CONTEXT:]
+        self._previous = np.concatenate([earlier_times, time])[-_CONTEXT:]
         self._rows += len(time)
 
     def findings(self) -> tuple[Finding, ...]:
