@@ -21,7 +21,7 @@ CHANCE = 1e-6
 """Probability, over all faults tried, of a finding where there is no fault."""
 
 _TRIED = 300
-"""Faults that are tried of a log of 60 rows, about: their logarithm counts."""
+"""Approximate number of faults that are tried on a log of 60 rows: its logarithm counts."""
 
 _GREATEST_TILT = 0.1
 """Tilt of a platform, rad, above which it is no fault of its joints: rods would come off."""

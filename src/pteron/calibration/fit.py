@@ -36,10 +36,10 @@ _SETTLED = 1e-4
 """A step smaller than this share of every unknown's interval ends the search."""
 
 _DOUBTED = 0.99
-"""Quantile of a row's squared residuals beyond which it counts less."""
+"""Quantile of a row's squared residuals above which its weight is reduced."""
 
 _LOST = 30.0
-"""Cost of a row whose readings lead to no pose, in variances, as if it hardly fitted."""
+"""Cost of a row whose readings lead to no pose, in variances: that of a row that hardly fits."""
 
 BEYOND = 1e3
 """Distance that marks such a row, so that it is left out in the end; no residual has just this."""

@@ -32,7 +32,7 @@ _FAR = 25.0
 mistakes are tried."""
 
 _NEAR = 9.0
-"""The same below which a mistake, undone, explains the residuals."""
+"""Median of the same below which a mistake, undone, explains the residuals."""
 
 _FALLEN = 0.1
 """Share of the misfit that a mistake, undone, leaves at most."""
@@ -41,7 +41,8 @@ _CLEAR = 2.0
 """Misfit that leaves no doubt: its expected value is below 1 where nothing is wrong."""
 
 _FINALISTS = 12
-"""Mistakes, those that leave least of rows one by one, of which all rows together decide."""
+"""Number of mistakes, those with the smallest misfit row by row, between which all rows together
+decide."""
 
 _ALIKE = 20.0
 """Excess of the squared residuals of all rows, in variances, up to which the mistake that is more
@@ -55,7 +56,7 @@ _LEFT_TOGETHER = 0.1
 Chosen: what leaves more is part of another cause, such as a zero that slipped."""
 
 _MOST_OF_ROW = 1000.0
-"""Most that a row counts there, in variances: a few rows may have faults of their own."""
+"""Greatest contribution of one row there, in variances: a few rows may have faults of their own."""
 
 _ROWS = 16
 """Rows that are examined, drawn at random."""
@@ -67,7 +68,7 @@ _CHUNK = 4096
 """Rows that are evaluated at a time."""
 
 _FIRST = 5
-"""Rows that are examined first of a mistake."""
+"""Rows that are evaluated first for each mistake."""
 
 _NOISE = 1e-4
 """Assumed noise, m and rad: small beside the effect of tolerances."""

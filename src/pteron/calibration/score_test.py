@@ -25,7 +25,8 @@ MOST_ROWS = 3000
 """Most rows that are examined, evenly spread."""
 
 _HEAVIEST = 3.0
-"""Most that a row may be off, in what a middle row is off: a few rows alone are no such fault."""
+"""Greatest residual of a row that counts, in units of the median row's: a few rows alone are no
+such fault."""
 
 
 class FaultTrial(NamedTuple):

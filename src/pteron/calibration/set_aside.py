@@ -42,7 +42,7 @@ _PUT_BACK = 0.1
 
 
 _TELLING = 2
-"""Least measured numbers of a row: with one, some factor of many fits by chance."""
+"""Least number of measured values in a row: with one, some factor of many fits by chance."""
 
 
 class SetAside(NamedTuple):

@@ -19,10 +19,11 @@ from pteron.calibration.result import CalibrationFinding, HeldOut, HiddenOrder
 from pteron.verdict import Grade, Opinion, Verdict
 
 EVERY = 5
-"""One row in so many is held out of the fit for a check."""
+"""One row in so many is held out of the fit as a check."""
 
 _PER_VALUE = {True: 1.0, False: 1.5}
-"""Measured numbers for each unknown below which none is, where their noise is given or is not."""
+"""Measured numbers for each unknown below which no row is held out, by whether their noise is
+given."""
 
 _FAR = 2.0
 """Held-out error, over the one expected, above which a fit that gained nothing is not trusted."""
@@ -34,7 +35,7 @@ _UNEXPLAINED = (
 
 
 _GREAT_TILT = 0.1
-"""Tilt, rad, from which its size says no more than that nothing shows it."""
+"""Tilt, rad, above which its size is not stated: it means only that nothing shows it."""
 
 _ROD_ADVICE = (
     "Measure both rods of each pair: rods that differ tilt the platform, and where positions are "

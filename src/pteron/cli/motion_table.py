@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from pteron.motion import Motion, Peak
 
 _BINDS = 0.98
-"""Share of a limit from which it is said to bind."""
+"""Share of a limit from which a peak counts as at the limit."""
 
 
 def peaks_table(largest: Sequence[Peak]) -> Table:

@@ -19,13 +19,13 @@ _SHORT = 0.05
 """Time below which a stage is not listed, s."""
 
 _APART = 1.0
-"""Time between the shares that a rate is taken from, s."""
+"""Least time between the progress reports from which a rate of work is computed, s."""
 
 _UNKNOWN, _LITTLE = 5.0, 0.02
 """Time, s, and share of the work, before which the time that is left is not known."""
 
 _RECENT = 60.0
-"""Time that a rate is taken over at least, s."""
+"""Least time over which a rate of work is computed, s."""
 
 
 @contextmanager

@@ -37,7 +37,7 @@ from pteron.manipulator import Manipulator, parameter_names, parameters
 from pteron.manipulator.readings import to_readings
 
 PAYLOAD = "set_payload"
-"""The function that makes the parameters of a payload."""
+"""The function that returns the parameters with those of a payload added."""
 
 BASE = "_base"
 """Suffix of the name of a function of base parameters."""

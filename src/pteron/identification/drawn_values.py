@@ -20,7 +20,8 @@ from pteron.kernels import Array
 from pteron.manipulator import parameters
 
 _LITTLE = 0.5
-"""Deviation after a fit, over that of the drawing, from which a value is called not shown."""
+"""Standard deviation after a fit, over that of the drawing, from which a value counts as not
+shown."""
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ from pteron.identification.signals import Preprocessing
 from pteron.tolerances import ROOT_OF_ROUNDING
 
 DECISIVE = 3.0
-"""Factor by which mending must reduce the error of the fit for a fault to count as found."""
+"""Factor by which a correction must reduce the error of the fit for a fault to count as found."""
 
 _EXPLAINED = 0.3
 """Error of a fit, relative to the forces, below which it explains them."""
@@ -36,7 +36,7 @@ _ROWS = 4000
 """Rows of the observations, at least, to which longer ones are thinned."""
 
 _LOOKED_INTO = 12
-"""Faults that fit alike, those of fewest changes, whose fits are tested for physical values."""
+"""Most faults of equal fit, those of fewest changes, whose fits are tested for physical values."""
 
 _ALL_ORDERS = 4
 """Joints of which all orders are tried: 23 others."""

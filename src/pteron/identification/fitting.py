@@ -52,7 +52,7 @@ _FEWEST = 20
 """Rows of a log from which a spectrum can be computed; the filters' edges take more."""
 
 _LOOK = 12_000
-"""Rows, at most, in which other orders of joints are tried."""
+"""Most rows in which other orders of joints are tried."""
 
 _MOST = 10.0
 """Largest ratio of the noise of two recordings that weights take into account."""

@@ -41,7 +41,7 @@ given."""
 
 _TOLD = 0.3
 """Largest difference of the bodies' forces from a multiple of the drawn ones, over them, for that
-multiple to be told: bodies that are up to 30 % denser or lighter than drawn differ by less."""
+multiple to be reported: bodies up to 30 % denser or lighter than drawn differ by less."""
 
 _APART = 1.5
 """Least common factor, or its inverse, that is a wrong scale rather than a bad drawing."""
@@ -61,7 +61,8 @@ _PUSHED = 0.05
 """Share of the forces from which friction that pushes counts, likewise."""
 
 _FELT = 1e-4
-"""Share of the forces from which friction below zero is told: without noise rounding has a sign."""
+"""Share of the forces from which friction below zero is reported: without noise rounding has a
+sign."""
 
 _FRICTION = ("coulomb", "viscous", "passive")
 """Terms of friction, which brakes."""
@@ -73,10 +74,10 @@ CHANCE = 1e-3
 """Probability below which infeasible values, or a payload's, are not chance."""
 
 CLEAR = 5.0
-"""Standard deviations from which a scale is told from one."""
+"""Distance of a scale from one, in standard deviations, from which it is reported."""
 
 WANTED = 0.05
-"""Share of the forces, or of the weight, that a log must be able to tell."""
+"""Share of the forces, or of the weight, that a log must be able to show."""
 
 _USUAL_ERROR = 0.02
 """Error of a payload's mass, or of a rotor's inertia, that is usual: kitchen scales and data sheets

@@ -19,7 +19,7 @@ from pteron.identification.signals.repetition import repeating_rows
 from pteron.kernels import Array
 
 _LOOKED_AT = 2_000_000
-"""Rows of a long file, at most, from which the errors of a fit to it are computed."""
+"""Most rows of a long file from which the errors of a fit to it are computed."""
 
 _END = int(np.iinfo(np.int64).max)
 """A row beyond the last one of every file: its number of rows is known only when it has been

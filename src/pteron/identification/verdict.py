@@ -45,7 +45,7 @@ _SEEN = 0.5
 noise the standard deviations are near zero."""
 
 _TAKEN_IN = "where a log cannot show that, other values take in what it does"
-"""The harm of a fault that a log cannot show."""
+"""The harm of a fault that a log cannot show, as a clause."""
 
 _HIDDEN: dict[str, tuple[str, str]] = {
     "gain": (

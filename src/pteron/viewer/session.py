@@ -55,13 +55,13 @@ _MARGIN = 0.08
 """Share by which the range of poses is extended for sliders."""
 
 _RIM = 0.05
-"""The same for joints."""
+"""Share by which the range of joint coordinates is extended for sliders."""
 
 _KEPT = 200
 """Most states that can be undone."""
 
 _ALONG = 241
-"""Poses along each coordinate at which the platform is asked whether it may go there."""
+"""Poses along each coordinate at which it is tested whether the platform may go there."""
 
 _FRAME = 1.0 / 60.0
 """Time of a step of a motion, s."""

@@ -22,7 +22,7 @@ from pteron.viewer.sliding import nearest_reachable_pose
 from pteron.workspace import home_pose
 
 _METRES = 3.0
-"""Largest length, mm, up to which it is asked whether what was typed is in m."""
+"""Largest length, mm, up to which a hint asks whether it was typed in m."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -44,7 +44,7 @@ _STARTS = 8
 """Best poses of each kind, on each side of the base, that are improved by a local search."""
 
 _NEAR = 200
-"""Best candidates among which those that differ are chosen, and that the axis is sought with."""
+"""Number of best candidates from which distinct starts, and poses for the axis, are taken."""
 
 
 _SIDE = 0.5
@@ -65,7 +65,7 @@ _ALIKE = 0.5
 none, and of others what a local search leaves."""
 
 _ENDS = 4
-"""Poses on each side from which such a way is sought."""
+"""Poses on each side between which a path across the base is tested."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -30,10 +30,10 @@ _RANDOM = 2048
 """Random poses, somewhat more than those of the grid."""
 
 _LED = 64
-"""Best poses that Newton's method starts from."""
+"""Best poses from which Newton's method starts."""
 
 _NEWTON = 25
-"""Its steps: it doubles the digits with each of the last ones."""
+"""Steps of Newton's method: it doubles the digits with each of the last ones."""
 
 _UPRIGHT = 0.1
 """Height of the platform over its base, as a share of a leg's length, from which it is clearly on

@@ -31,7 +31,7 @@ from pteron.workspace.nearest_vanishing import SINGULAR, Nearest, Search
 from pteron.workspace.vanishing import Kind, Vanishing
 
 _MOST = 20_000
-"""Boxes that the search for each kind and motion looks at by default before it ends undecided."""
+"""Boxes that the search for each kind and motion examines by default before it ends undecided."""
 
 By = Literal["translation", "rotation"]
 """The motion that leads to the singular pose, alone."""

@@ -30,7 +30,7 @@ _ROUND = (0.1, 0.05, 0.01, 0.005, 0.001, 0.0001)
 longest leg does not exceed."""
 
 _DEGREES = (30.0, 15.0, 5.0, 1.0)
-"""The same of angles, degrees."""
+"""Round numbers that angles are rounded to, coarsest first, degrees."""
 
 _WORTH = 0.99
 """Share of the best margin from which on a simpler pose is preferred."""
@@ -43,7 +43,8 @@ _LEVEL = 0.75
 """Share of the best margin from which on a level pose of a platform that tilts is preferred."""
 
 _MIDDLE = 0.9
-"""The share that the middle between equals must have: from there the machine moves every way."""
+"""Share of the best margin that the middle between equal poses must have: from there the machine
+moves every way."""
 
 
 def simplest_pose(robot: Manipulator, refined: Array, nearby: Array) -> Array:

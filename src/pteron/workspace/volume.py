@@ -49,7 +49,7 @@ _SLACK = 1e-8
 """Metres by which the optimiser may overstep a bound."""
 
 _BACK = 101
-"""Positions tried between the optimiser's start and its result, if that oversteps a bound."""
+"""Positions tested between the optimiser's start and its result, if that oversteps a bound."""
 
 _OPTIONS = {"ftol": 1e-10, "maxiter": 200}
 """Options of the optimiser SLSQP."""

@@ -52,13 +52,14 @@ scaled to length 1 alone a motion that all but rests in some direction would be 
 moves: that of a Delta with a shaft went straight up and down, and left the shaft's values open."""
 
 _FEWEST = 10
-"""Random motions that are drawn whatever the time: the best of one would be no choice."""
+"""Least number of random motions, whatever the time: the best of one would be no choice."""
 
 _LONGER = 3
-"""Times `seconds`, at most, that the search takes where its motion would not do."""
+"""Greatest duration of the search, in multiples of `seconds`, if its motion identifies too
+little."""
 
 _SEEN = 0.1
-"""The share of the progress that the random motions are."""
+"""Share of the progress bar that the random motions take."""
 
 
 def optimal_excitation(

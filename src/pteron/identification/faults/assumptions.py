@@ -28,17 +28,17 @@ from pteron.manipulator import Manipulator
 from pteron.manipulator.variants import working_modes
 
 _LOOK = 12_000
-"""Rows of the log, at most, that these samples are from."""
+"""Most rows of the log from which these samples are drawn."""
 
 _SAMPLES = 400
-"""Samples that each assumption is tried on: 800 equations or more for some 40 values."""
+"""Number of samples on which each assumption is tried: 800 equations or more for some 40 values."""
 
 _DECISIVE = 3.0
-"""Factor by which another assumption must lower what is left of the forces."""
+"""Factor by which another assumption must reduce the residual forces to be accepted."""
 
 _EXPLAINED = 0.03
-"""Share of the forces that may be left for them to count as explained, or three times their noise:
-with all parameters free other machines' logs leave 10 % or more."""
+"""Residual forces, as a share of the forces, up to which they count as explained, or three times
+their noise: with all parameters free other machines' logs leave 10 % or more."""
 
 _EXPLAINED_ALONE = 0.06
 """The same where the joints have no poses as the file has it: few assumptions give them any."""

@@ -45,11 +45,11 @@ _NEGLIGIBLE = 1e-3
 bias of smoothed positions next to singularities looks like up to 0.7 of them."""
 
 _LIGHT = 0.1
-"""Payload, over the platform's mass, that is none: it varies with time as freely as the bias of
-positions next to singularities, which looks like up to 0.09 of it."""
+"""Payload, as a share of the platform's mass, that is negligible: it varies with time as freely as
+the bias of positions next to singularities, which looks like up to 0.09 of it."""
 
 _DRY = ("coulomb", "stribeck")
-"""Kinds of terms that jump where a joint turns round."""
+"""Kinds of terms that jump where a joint reverses."""
 
 
 class Tolerance(NamedTuple):

@@ -40,7 +40,7 @@ ORDER: tuple[FaultName, ...] = (
     *("delay", "clock", "gain", "scale", "ratio", "zero", "gravity", "geometry"),
     *("play", "elasticity", "rotors", "payload", "drift", "stribeck", "load", "passive"),
 )
-"""The order in which faults are mended, and named: what comes first distorts what comes later."""
+"""The order in which faults are corrected and named: an earlier one distorts the later ones."""
 
 _SHIFT = 1.0
 """Change of a value by a fault, in standard deviations, above which the fault matters: a smaller

@@ -22,27 +22,28 @@ from pteron.json_values import json_fields
 from pteron.kernels import Array
 
 _LOST = 0.01
-"""Share of missing samples from which they are named: fewer cost less than a tenth of the
+"""Share of missing samples from which they are reported: fewer cost less than a tenth of the
 precision, and change no value beyond its interval."""
 
 _SURE = 6.0
-"""Standard deviations from which jitter is told: by chance in one of 10^9 logs."""
+"""Size of jitter, in standard deviations, from which it is reported: by chance in one of 10^9
+logs."""
 
 _LIKELY = 3.0
 """The same where a fault of the machine shows, such as drives that give: 5 % of a step made up to
 8 % of a cycle's forces of it (own plants)."""
 
 _FELT = 0.5
-"""Position errors of jitter, over the positions' other noise, from which it is named: below it adds
-less than an eighth to the noise."""
+"""Position errors by jitter, over the positions' other noise, from which it is reported: below it
+adds less than an eighth to the noise."""
 
 _UNEVEN = 0.05
-"""Jitter, over the time step, from which it is named. Chosen: 1 %, as of a usual clock, leaves the
-forces of a cycle within 0.2 %."""
+"""Jitter, over the time step, from which it is reported. Chosen: 1 %, as of a usual clock, leaves
+the forces of a cycle within 0.2 %."""
 
 _COARSE = 0.02
-"""Step of forces' values, over their deviation, from which it is named: rounding by 0.6 % of the
-deviation, more than usual noise of 0.5 %."""
+"""Step of the forces' values, over their standard deviation, from which it is reported: it is
+rounding by 0.6 % of the deviation, more than the usual noise of 0.5 %."""
 
 _EXTREME, _SHARE, _LEVEL = 0.01, 0.06, 5.0
 """Criteria of a plateau: the share of samples with the extreme value, the least share of samples
@@ -51,7 +52,7 @@ times as many, random motions without limits up to 0.1 and 4.8 (own plants), wit
 or more."""
 
 _LOOK = 60_000
-"""Rows that are looked at for jitter."""
+"""Most rows that are examined for jitter."""
 
 _ALIKE = (comb(32, 16) / comb(16, 8) ** 2) ** 0.5
 """Deviation of a sum of squares of eighth differences, over that of independent ones."""
@@ -195,7 +196,7 @@ def lost_share(log: Log) -> float:
 
 
 _PAUSE = 0.02
-"""Longest gap, over the log, that is lost samples rather than a pause."""
+"""Longest gap, as a share of the log, that counts as lost samples rather than as a pause."""
 
 
 def sampling_jitter(log: Log, how: Preprocessing) -> tuple[float, float, float]:

@@ -21,9 +21,8 @@ _LENGTH = 1.0
 """Length of a window, over the period of the highest frequency that the forces are seen at."""
 
 _TIMES = 2.5
-"""How many times as large residuals are there where there is play.
-
-What follows the load's rate, as all that is smooth does at most, is 1.6 times as large there."""
+"""Ratio of the residuals at load reversals to those elsewhere from which there is play. What
+follows the load's rate, as all that is smooth does at most, makes a ratio of 1.6."""
 
 _CHANCE = 1e-4
 """Chance that windows of all joints are so much larger by luck, below which it counts."""

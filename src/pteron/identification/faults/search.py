@@ -31,7 +31,7 @@ _AT_NOISE = 1.15
 """Residuals, over the forces' noise, that are noise: both are known to some per cent."""
 
 _TOLD = 3
-"""Faults, at most, that are named as explaining the residuals as well."""
+"""Most faults that are named as explaining the residuals equally well."""
 
 _VANISHED = 1e-3
 """Residuals, over those before, that count as none, in logs without noise."""

@@ -45,7 +45,7 @@ _FEWEST = 50
 """Least rows of a log; a shorter one is refused."""
 
 _AHEAD = 10_000
-"""Rows looked at when a log is opened: the usual step is their median."""
+"""Rows that are read when a log is opened: the usual step is their median."""
 
 _PER_METRE = {"mm": 1e3, "um": 1e6}
 

@@ -55,7 +55,7 @@ _CORRELATED = 12870.0 / 4900.0
 the mean of w^4 over the square of that of w^2."""
 
 _LOOK = 60_000
-"""Samples that the search for a cut-off looks at."""
+"""Samples that are used in the search for a cut-off."""
 
 _HALF = 4
 """Half the parallel filter's length, in samples that are kept."""

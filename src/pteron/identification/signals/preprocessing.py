@@ -53,8 +53,8 @@ _TOLERABLE = 0.5
 grows by a ninth, the root of 1 + 0.5^2."""
 
 _REPEATS = 0.02
-"""Largest residual of a series, as a share of the span, of a motion that is said to repeat: a
-controller that tracks badly leaves up to 1 % of it, another motion tens of percent."""
+"""Largest residual of a series, as a share of the span, of a motion that repeats: a controller that
+tracks badly leaves up to 1 % of it, another motion tens of percent."""
 
 _NOISE_ALONE = 1.25
 """Largest residual, over the positions' noise, that is noise alone: stick and slip above the last
@@ -64,10 +64,12 @@ _MIXED = 1.5
 """Reach of the positions' filter, its ringing included, in periods of its cut-off."""
 
 _UNSURE = 0.1
-"""Within which the smoothed rate may have the wrong sign, likewise: the filter's delay there."""
+"""Time about a reversal, in periods of the cut-off, within which the smoothed rate may have the
+wrong sign: the delay of the positions' filter there."""
 
 _MENTIONED = 0.1
-"""Speed, as a share of a joint's root mean square, from which its sign counts: noise's does not."""
+"""Speed, as a share of a joint's root mean square speed, above which its sign is that of the motion
+and not of noise."""
 
 _SPARED = 0.25
 """Share of the time between two reversals of a joint that is left out, at most, on each side, so
