@@ -41,8 +41,7 @@ _CLEAR = 2.0
 """Misfit that leaves no doubt: its expected value is below 1 where nothing is wrong."""
 
 _FINALISTS = 12
-"""Number of mistakes, those with the smallest misfit row by row, between which all rows together
-decide."""
+"""Number of mistakes of least misfit row by row, between which all rows together decide."""
 
 _ALIKE = 20.0
 """Excess of the squared residuals of all rows, in variances, up to which the mistake that is more

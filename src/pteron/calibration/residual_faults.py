@@ -38,8 +38,7 @@ _EXPLAINED = 0.3
 """Share of a row's residuals up to which the rest is explained by a fault."""
 
 _NOISY = 4.0
-"""Mean square residual along one leg's coordinate, in variances, above which the leg is
-reported."""
+"""Mean square residual along one leg's coordinate, in variances, above which it is reported."""
 
 
 _LISTED = 8

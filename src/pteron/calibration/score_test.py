@@ -25,8 +25,7 @@ MOST_ROWS = 3000
 """Most rows that are examined, evenly spread."""
 
 _HEAVIEST = 3.0
-"""Greatest residual of a row that counts, in units of the median row's: a few rows alone are no
-such fault."""
+"""Greatest weighted residual of a row, over the median row's: a few rows are no such fault."""
 
 
 class FaultTrial(NamedTuple):

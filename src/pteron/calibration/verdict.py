@@ -22,8 +22,7 @@ EVERY = 5
 """One row in so many is held out of the fit as a check."""
 
 _PER_VALUE = {True: 1.0, False: 1.5}
-"""Measured numbers for each unknown below which no row is held out, by whether their noise is
-given."""
+"""Least measured numbers per unknown to hold rows out, by whether their noise is given."""
 
 _FAR = 2.0
 """Held-out error, over the one expected, above which a fit that gained nothing is not trusted."""

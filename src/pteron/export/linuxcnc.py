@@ -65,6 +65,8 @@ class LinuxCncAxis:
 
 @dataclass(frozen=True)
 class _Joint:
+    """A joint of the INI and HAL files, in mm or degrees."""
+
     name: str
     angular: bool
     scale: float

@@ -20,8 +20,7 @@ from pteron.kernels import Array
 from pteron.manipulator import parameters
 
 _LITTLE = 0.5
-"""Standard deviation after a fit, over that of the drawing, from which a value counts as not
-shown."""
+"""Deviation after a fit, over that of the drawing, from which a value counts as not shown."""
 
 
 @dataclass(frozen=True)

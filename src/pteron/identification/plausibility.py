@@ -61,8 +61,7 @@ _PUSHED = 0.05
 """Share of the forces from which friction that pushes counts, likewise."""
 
 _FELT = 1e-4
-"""Share of the forces from which friction below zero is reported: without noise rounding has a
-sign."""
+"""Share of the forces from which friction below zero is reported: rounding has a sign."""
 
 _FRICTION = ("coulomb", "viscous", "passive")
 """Terms of friction, which brakes."""

@@ -43,8 +43,7 @@ _LEVEL = 0.75
 """Share of the best margin from which on a level pose of a platform that tilts is preferred."""
 
 _MIDDLE = 0.9
-"""Share of the best margin that the middle between equal poses must have: from there the machine
-moves every way."""
+"""Least share of the best margin in the middle between equals: from there all ways are open."""
 
 
 def simplest_pose(robot: Manipulator, refined: Array, nearby: Array) -> Array:

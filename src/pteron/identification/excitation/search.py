@@ -55,8 +55,7 @@ _FEWEST = 10
 """Least number of random motions, whatever the time: the best of one would be no choice."""
 
 _LONGER = 3
-"""Greatest duration of the search, in multiples of `seconds`, if its motion identifies too
-little."""
+"""Greatest duration of the search, over `seconds`, if its motion identifies too little."""
 
 _SEEN = 0.1
 """Share of the progress bar that the random motions take."""

@@ -26,8 +26,7 @@ _LOST = 0.01
 precision, and change no value beyond its interval."""
 
 _SURE = 6.0
-"""Size of jitter, in standard deviations, from which it is reported: by chance in one of 10^9
-logs."""
+"""Size of jitter, in standard deviations, to be reported: by chance in one of 10^9 logs."""
 
 _LIKELY = 3.0
 """The same where a fault of the machine shows, such as drives that give: 5 % of a step made up to

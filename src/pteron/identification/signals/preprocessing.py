@@ -68,8 +68,7 @@ _UNSURE = 0.1
 wrong sign: the delay of the positions' filter there."""
 
 _MENTIONED = 0.1
-"""Speed, as a share of a joint's root mean square speed, above which its sign is that of the motion
-and not of noise."""
+"""Speed, over a joint's root mean square speed, above which its sign is not that of noise."""
 
 _SPARED = 0.25
 """Share of the time between two reversals of a joint that is left out, at most, on each side, so
