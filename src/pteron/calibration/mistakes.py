@@ -53,7 +53,7 @@ def order_mistakes(measurements: Measurements, guess: Guess) -> Iterator[Mistake
 
 
 def _wrong_units(measurements: Measurements, guess: Guess) -> Iterator[Mistake]:
-    """Yield units that were perhaps meant: smaller ones where values vary beyond the machine."""
+    """Yield likely mistakes: smaller units, where values vary by more than the machine's size."""
     linear = np.array([leg.joint.unit == "m" for leg in guess.robot.legs])
     lengths = [
         f"{name}s" for name in ("position", "height", "distance") if name in measurements.kinds
@@ -84,7 +84,7 @@ def _wrong_units(measurements: Measurements, guess: Guess) -> Iterator[Mistake]:
 
 
 def _downward_heights(measurements: Measurements, guess: Guess) -> Iterator[Mistake]:
-    """Yield heights that perhaps count downwards."""
+    """Yield a likely mistake: heights that count downwards."""
     if "height" in measurements.kinds:
         text = "the heights count downwards: reverse their signs"
         yield Mistake(text, multiply_fields({"heights": -1.0}))
@@ -110,7 +110,7 @@ def _large_lengths(measurements: Measurements, guess: Guess, lengths: Sequence[s
 
 
 def _swapped_marks(measurements: Measurements, guess: Guess) -> Iterator[Mistake]:
-    """Yield marks that were perhaps swapped."""
+    """Yield likely mistakes: two marks that are swapped."""
     for a, b in combinations(sorted(set(measurements.marks)), 2):
 
         def undo(rows: Measurements, a: str = a, b: str = b) -> Measurements:
@@ -124,7 +124,7 @@ def _swapped_marks(measurements: Measurements, guess: Guess) -> Iterator[Mistake
 
 
 def _turned_frames(measurements: Measurements, guess: Guess) -> Iterator[Mistake]:
-    """Yield quarter turns of the instrument."""
+    """Yield likely mistakes: the instrument's frame turned by quarter turns."""
     if not _whole_positions(measurements):
         return
     for turn in _signed_axes(1.0):
@@ -136,7 +136,7 @@ def _turned_frames(measurements: Measurements, guess: Guess) -> Iterator[Mistake
 
 
 def _mirrored_frames(measurements: Measurements, guess: Guess) -> Iterator[Mistake]:
-    """Yield columns of positions that were perhaps exchanged or reversed: axes of a left hand."""
+    """Yield likely mistakes: columns of positions exchanged or reversed, as axes of a left hand."""
     if _whole_positions(measurements):
         for turn in _signed_axes(-1.0):
             text = (
@@ -179,7 +179,7 @@ def _rotate_positions(turn: Array) -> Callable[[Measurements], Measurements]:
 
 
 def _shifted_rows(measurements: Measurements, guess: Guess) -> Iterator[Mistake]:
-    """Yield measurements that perhaps stand a row or two beside their readings."""
+    """Yield likely mistakes: measurements a row or two off their readings."""
     if "distance" in measurements.kinds:  # rows name each other
         return
     for shift in (1, -1, 2, -2):

@@ -57,7 +57,7 @@ _STEPS = (
 
 
 def swapped_legs(measurements: Measurements, guess: Guess) -> Iterator[Mistake]:
-    """Yield orders of the legs in which the readings perhaps stand."""
+    """Yield likely mistakes: readings in another order of the legs."""
     names = guess.robot.joint_names
     for order in leg_orders(guess):
         moved = [i for i, k in enumerate(order) if i != k]
@@ -79,7 +79,7 @@ def swapped_legs(measurements: Measurements, guess: Guess) -> Iterator[Mistake]:
 
 
 def reversed_joints(measurements: Measurements, guess: Guess) -> Iterator[Mistake]:
-    """Yield joints whose readings perhaps count the other way.
+    """Yield likely mistakes: joints whose readings count the other way.
 
     About zero, or between the ends of their travel.
     """
@@ -100,7 +100,7 @@ def reversed_joints(measurements: Measurements, guess: Guess) -> Iterator[Mistak
 
 
 def wrong_steps(measurements: Measurements, guess: Guess) -> Iterator[Mistake]:
-    """Yield joints whose readings are perhaps in wrong steps, from zero or an end of the travel."""
+    """Yield likely mistakes: joints read in wrong steps, from zero or from an end of the travel."""
     names = guess.robot.joint_names
     count = len(names)
     for factor, size, cause in _STEPS:
@@ -115,7 +115,7 @@ def wrong_steps(measurements: Measurements, guess: Guess) -> Iterator[Mistake]:
 
 
 def wrong_zeros_and_scales(measurements: Measurements, guess: Guess) -> Iterator[Mistake]:
-    """Yield zeros and scales that rows together show to be off, of few joints and of all."""
+    """Yield likely mistakes: wrong zeros and scales of a few joints, or of all, fitted to rows."""
     for kinds in (("zeros",), ("scales",), ("scales", "zeros")):
         everything = range(len(guess.robot.legs))
         fitted = _fit_readings(measurements, guess, dict.fromkeys(kinds, everything))

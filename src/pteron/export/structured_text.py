@@ -124,8 +124,8 @@ def export_st(
         base=base,
         tables=False,
     )
-    prefix = _camel(prefix_of(robot))
-    blocks = {f"{prefix}_{_camel(f.name)}": f for f in exported}
+    prefix = _pascal_case(prefix_of(robot))
+    blocks = {f"{prefix}_{_pascal_case(f.name)}": f for f in exported}
     return write_texts(folder, {f"{name}.st": _block(robot, name, f) for name, f in blocks.items()})
 
 
@@ -142,7 +142,7 @@ def _block(robot: Manipulator, name: str, code: ExportedFunction) -> str:
     )
 
 
-def _camel(name: str) -> str:
+def _pascal_case(name: str) -> str:
     """Return a snake_case name in PascalCase."""
     return "".join(part.capitalize() for part in name.split("_"))
 

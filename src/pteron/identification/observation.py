@@ -39,14 +39,14 @@ class LinearModel(Protocol):
 
     @property
     def units(self) -> tuple[str, ...]:
-        """Their SI units."""
+        """SI units of the values."""
 
     @property
     def kinds(self) -> tuple[str, ...]:
         """The kinds of the values, as `Model.kinds`."""
 
     def matrix(self, states: States) -> Array:
-        """Return their columns (R, n, p) at states."""
+        """Return the regressor (R, n, p) at states: the columns of the values."""
 
 
 _LEAST_SHARE = 0.3

@@ -208,7 +208,7 @@ def _coordinatewise(spline: Array, gram: Array, image: Array) -> NDArray[np.int6
     chosen = np.full(n, -1)
 
     def gain(picked: NDArray[np.int64]) -> float:
-        """Return the drop of the squares with these speeds; below 0 if friction rises."""
+        """Return the drop of the squared residuals with friction at these speeds; -1: it rises."""
         seen = np.flatnonzero(picked >= 0)
         if not len(seen):
             return 0.0

@@ -48,7 +48,7 @@ def differences_figure(
     enlarge: float | None = None,
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return a machine in colours over another in grey, with their difference enlarged.
+    """Return a figure of a machine in colours over another in grey, their difference enlarged.
 
     Both bring the platform to the same pose.
 
@@ -112,7 +112,7 @@ def tool_errors_figure(
     enlarge: float | None = None,
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return the machine in its home pose with the tool's errors as lines, enlarged.
+    """Return a figure of the machine in its home pose, the tool's errors drawn as enlarged lines.
 
     Parameters
     ----------
@@ -155,7 +155,7 @@ def row_residuals_figure(
     *,
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return the residuals of measurements by row, with a panel for each kind.
+    """Return a figure of the residuals of measurements by row, with a panel for each kind.
 
     Parameters
     ----------

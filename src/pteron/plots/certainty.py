@@ -53,7 +53,7 @@ def histogram_figure(
     *,
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return a histogram of residuals in standard deviations, with the normal distribution.
+    """Return a figure of the histogram of residuals, in standard deviations, and the normal one.
 
     Residuals have shape (R, n), NaN where there is none.
     """
@@ -85,7 +85,7 @@ def autocorrelation_figure(
     *,
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return the autocorrelation of residuals, with the band of white noise.
+    """Return a figure of the autocorrelation of residuals, with the band of white noise.
 
     Correlations (L, n) are those at lags 1 to L; white noise keeps below the bound (n,) nineteen
     times in twenty.
@@ -116,7 +116,7 @@ def certainty_figure(
     *,
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return the ratio of each value to its standard deviation, on a logarithmic scale.
+    """Return a figure of the ratio of each value to its standard deviation, on a logarithmic scale.
 
     The p values have names, ratios (p,) of size to standard deviation, and are `weak` (p,) where
     the data hardly show them. The first `inertial` of them are inertial parameters.
@@ -147,7 +147,7 @@ def correlation_figure(
     *,
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return a correlation matrix (p, p): blue is positive, orange negative."""
+    """Return a figure of a correlation matrix (p, p): blue is positive, orange negative."""
     p = len(names)
     side = max(1.0 + 0.165 * p, 3.0)
     figure = blank(side, side, ax)

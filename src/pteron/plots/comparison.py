@@ -53,7 +53,7 @@ def comparison_figure(
     joint: ActuatedJoint = SLIDER,
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return an actuator's measured and predicted force over time, and their difference below.
+    """Return a figure of an actuator's measured and predicted force, and their difference below.
 
     Time (T,) is in s, forces (T,) in N or N m, the last one without friction and offset. Samples
     that are not `used` (T,) do not count and are shaded. `leg`, from 0, gives the colour, `joint`
@@ -89,7 +89,7 @@ def errors_figure(
     *,
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return the errors of a prediction beside the noise, on a logarithmic scale.
+    """Return a figure of the errors of a prediction beside the noise, on a logarithmic scale.
 
     The errors (n,) of the whole model and of that without friction and offset, and the noise, are
     in percent of the force's standard deviation.
@@ -125,7 +125,7 @@ def residual_time_figure(
     *,
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return the residuals of all actuators over a recording, one above the other.
+    """Return a figure of the residuals of all actuators over time, one above the other.
 
     Time (T,) is in s, residuals (T, n) in N or N m, as the joints have them. Samples that are not
     `used` (T, n) do not count: they are grey, and may lie outside.
@@ -159,7 +159,7 @@ def residual_speed_figure(
     joint: ActuatedJoint = SLIDER,
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return an actuator's residuals over its joint's speed: unmodelled friction shows here.
+    """Return a figure of an actuator's residuals over joint speed: unmodelled friction shows here.
 
     Speeds (T,) are in m/s or rad/s, residuals (T,) in N or N m. Samples that are not `used` (T,) do
     not count: they are grey, and may lie outside. `leg`, from 0, gives the colour, `joint` the

@@ -55,7 +55,7 @@ def force_speed_figure(
     robot: RobotLike | None = None,
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return each drive's force over its speed, within its limits.
+    """Return a figure of each drive's force over its speed, within its limits.
 
     A drive brakes in the quadrants where force and speed have different signs.
 
@@ -136,7 +136,7 @@ def power_figure(
     *,
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return the power (K, n) of all drives over time (K,), s, and their sum; W."""
+    """Return a figure of the power (K, n) of all drives over time (K,), s, and of their sum; W."""
     time, power = rows(time, power, "power")
     figure = blank(5.4, 3.3, ax)
     axes = plain_axes(figure, "time (s)", "power (W)")

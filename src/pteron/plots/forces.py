@@ -32,7 +32,7 @@ def forces_figure(
     robot: RobotLike | None = None,
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return the forces (T, n) of all legs, N or N m, over time (T,), s.
+    """Return a figure of the forces (T, n) of all legs, N or N m, over time (T,), s.
 
     `turning_point`, s, is marked as the beginning of the way back. With a robot whose legs give
     forces and torques, both have axes of their own. Other quantities of the legs may be shown, with

@@ -46,7 +46,7 @@ def condition_figure(
     names: tuple[str, str] = ("x", "y"),
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return the map of a condition number over two coordinates: dark is near a singularity.
+    """Return a figure of a condition number over two coordinates: dark is near a singularity.
 
     The levels are named, and are the same in every map, so that machines can be compared.
 
@@ -99,7 +99,7 @@ def singularities_figure(
     names: tuple[str, str] = ("x", "y"),
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return the map of a determinant's sign over two coordinates: it changes at singular poses.
+    """Return a figure of a determinant's sign over two coordinates: it changes at singular poses.
 
     Of the Jacobian of q' = J x' these are the type-II singularities, where the actuators, held
     still, no longer hold the platform. Regions of the two signs are shaded, and marked + and -: no

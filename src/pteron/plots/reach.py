@@ -48,7 +48,7 @@ def reach_figure(
     path: Array | None = None,
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return the map of a slice, with a motion's poses (T, m), or their lengths, on it.
+    """Return a figure of a slice through the reach, with a motion's poses (T, m) on it.
 
     In reach, the shade deepens with the margin. Outside, the colour is that of the leg that misses
     the pose by most; a line in a leg's colour is the end of its reach (type I).
@@ -86,7 +86,7 @@ def measure_figure(
     levels: Sequence[float] = _TENTHS,
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return the map of a measure (B, A) on a slice, where it is in reach.
+    """Return a figure of a measure (B, A) on a slice, where it is in reach.
 
     The shade deepens with the measure from level to level, by default tenths; every second line is
     named.

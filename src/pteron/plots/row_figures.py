@@ -46,7 +46,7 @@ def parameters_figure(
     reference: ArrayLike | None = None,
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return the values of parameters with their intervals, with a scale for each unit.
+    """Return a figure of parameters with their intervals, with a scale for each unit.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ def operations_figure(
     *,
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return bars of counts, such as operations, labelled with their values.
+    """Return a figure of bars of counts, such as operations, labelled with their values.
 
     Parameters
     ----------

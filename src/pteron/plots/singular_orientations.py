@@ -36,7 +36,7 @@ def regularity_figure(
     used: tuple[float, float] | None = None,
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return the size of the type-II measure over the platform's angle; NaN leaves a gap.
+    """Return a figure of the type-II measure's size over the platform's angle; NaN leaves a gap.
 
     The angles (A,) ascend; the singular orientations, the angle of the home pose, and the least and
     greatest angle of a motion are marked. All are in rad.

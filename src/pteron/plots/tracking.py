@@ -26,7 +26,7 @@ def tracking_figure(
     *,
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return the errors (T, m) of the pose over time (T,), s.
+    """Return a figure of the errors (T, m) of the pose over time (T,), s.
 
     `names` are its coordinates; angles, in rad, have axes of their own, lengths are in m.
     """

@@ -37,7 +37,7 @@ def trajectory_figure(
     names: Sequence[str],
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return a motion of the platform: pose, velocity, acceleration and jerk over time.
+    """Return a figure of the platform's pose, velocity, acceleration and jerk over time.
 
     Lengths and angles stand beside each other, derivatives below them.
 
@@ -84,7 +84,7 @@ def joints_figure(
     robot: RobotLike | None = None,
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return the joints' coordinates over time, above their speeds, accelerations and jerks.
+    """Return a figure of the joints' coordinates over time, with their derivatives below.
 
     Parameters
     ----------

@@ -100,7 +100,7 @@ def readings(state: ViewerState, forces: Array | None = None) -> Readings:
 
 
 def level(share: float) -> Level:
-    """Return the level of a margin, which is at most 1.
+    """Return the level of a margin, 1 at best and 0 at a singularity or limit: "far" and so on.
 
     Examples
     --------

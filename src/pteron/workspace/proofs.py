@@ -212,7 +212,7 @@ def prove(
 def _failed_conditions(
     robot: Manipulator, required: tuple[Condition, ...], pose: Array
 ) -> tuple[Condition, ...]:
-    """Return the conditions that a pose violates; out of reach limits have no margin."""
+    """Return the conditions that a pose violates or, if there are none, those undefined there."""
     margins = condition_margins(robot, required, pose)
     fails = margins < 0.0
     fails = fails if fails.any() else np.isnan(margins)

@@ -33,7 +33,7 @@ axes."""
 
 
 def cartesian(robot: Manipulator) -> dict[str, Any]:
-    """Return the values of `generic_cartesian`: each stepper a sum of x, y and z.
+    """Return the template's values for `generic_cartesian`: each stepper a sum of x, y and z.
 
     Raises
     ------

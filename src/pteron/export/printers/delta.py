@@ -19,7 +19,7 @@ from pteron.manipulator import Manipulator
 
 
 def delta(robot: Manipulator, centers: Sequence[Center]) -> dict[str, Any]:
-    """Return the values of `delta`: the numbers of `LinearDelta` as texts."""
+    """Return the template's values for Klipper's `delta`, from the numbers of `LinearDelta`."""
     numbers = LinearDelta.from_centers(robot, centers, "Klipper's delta")
     good = numbers.most if numbers.ends is None else numbers.bed
     steppers = []

@@ -72,7 +72,7 @@ class _Arm(NamedTuple):
 
 
 def rotary(robot: Manipulator, centers: Sequence[Center]) -> dict[str, Any]:
-    """Return the values of `rotary_delta`: arms that turn in vertical planes through z."""
+    """Return the template's values for Klipper's `rotary_delta`: arms in planes through z."""
     arms = [_Arm.from_center(robot, center) for center in centers]
     radii = [float(np.hypot(*arm.shoulder[:2])) for arm in arms]
     radius = common_value(robot, radii, "has its shoulder {:.6g} mm from the z axis", _TAKER)

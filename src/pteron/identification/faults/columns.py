@@ -330,7 +330,7 @@ class FaultColumns:
 
     @cached_property
     def places(self) -> tuple[slice, ...]:
-        """Columns of each family among all."""
+        """Slice of each family's columns among all columns of the extended model."""
         counts = (len(family.sizes(self.model)) for family in self.families)
         ends = np.cumsum([len(self.model.names), *counts]).tolist()
         return tuple(slice(a, b) for a, b in pairwise(ends))

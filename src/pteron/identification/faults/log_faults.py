@@ -174,7 +174,7 @@ def _plateaus(log: Log, noise: Array) -> tuple[str, ...]:
 
 
 def delay_fault(delay: float, deviation: float) -> LogFault:
-    """Return the fault of delayed forces (s), which is corrected."""
+    """Return the fault that forces are late by a delay, s, which the fit has corrected."""
     late, early = ("forces", "positions")[:: 1 if delay > 0.0 else -1]
     said = (
         f"The {late} are {1e3 * abs(delay):.3g} ms (+- {2e3 * deviation:.1g}) late for the {early}"
