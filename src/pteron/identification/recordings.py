@@ -192,12 +192,11 @@ def split_test_data(recording: Recording, period: float | None) -> tuple[Recordi
     log = recording.log
     period = period or log.description.period
     if isinstance(log, Log) and log.payload is not None and np.ptp(log.payload):
-        out = np.zeros(log.rows, dtype=bool)
+        held_out = np.zeros(log.rows, dtype=bool)
         for start, stop in log.phases:
-            out[start + _count_fitted_rows(log.part(start, stop), stop - start, period) : stop] = (
-                True
-            )
-        parts = log.drop_samples(out), log.drop_samples(~out)
+            count = _count_fitted_rows(log.part(start, stop), stop - start, period)
+            held_out[start + count : stop] = True
+        parts = log.drop_samples(held_out), log.drop_samples(~held_out)
         first, second = (Recording(part, 0, part.rows) for part in parts)
         return first, second
     cut = recording.start + _count_fitted_rows(log, recording.rows, period)

@@ -107,12 +107,8 @@ def model_forms(base: BaseParameters) -> dict[tuple[str, str], Kernel]:
                 (Port("forces", (machine.freedom,)),),
                 {"parameters": numbers},
             )
-    for name, parameter_set in (
-        ("complete", None),
-        ("reduced", base),
-        ("cheapest", cheapest_parameters(robot)),
-    ):
-        kernels["factored", name] = compile(
-            robot, "inverse_dynamics", base=parameter_set, grade="parametric"
-        )
+    bases = {"complete": None, "reduced": base, "cheapest": cheapest_parameters(robot)}
+    for name, chosen in bases.items():
+        kernel = compile(robot, "inverse_dynamics", base=chosen, grade="parametric")
+        kernels["factored", name] = kernel
     return kernels

@@ -302,8 +302,7 @@ class BaseParameters(Result):
 def _matrix(grouping: Grouping, columns: int) -> Array:
     """Return the matrix (rank, columns) that takes column parameters to base parameters."""
     matrix = np.zeros((len(grouping.kept), columns))
-    for row, column in enumerate(grouping.kept):
-        matrix[row, column] = 1.0
+    matrix[range(len(matrix)), list(grouping.kept)] = 1.0
     place = {column: row for row, column in enumerate(grouping.kept)}
     for column, shares in grouping.given.items():
         for k, share in shares.items():

@@ -6,7 +6,6 @@ import re
 from functools import partial
 from importlib.metadata import version
 from math import prod
-from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -121,8 +120,8 @@ def geometry(robot: Manipulator) -> list[tuple[str, list[str]]]:
     """Return the rows of the legs' geometry, mm: a name, and a text per leg."""
     roles = {"guide_point": "point"}
     # A leg with more lengths has those of the others among them, in its order.
-    counts = [sum(q.role == "length" for q in leg.quantities) for leg in robot.legs]
-    for _, leg in sorted(zip(counts, robot.legs, strict=True), key=itemgetter(0), reverse=True):
+    counts = {leg: sum(q.role == "length" for q in leg.quantities) for leg in robot.legs}
+    for leg in sorted(robot.legs, key=counts.__getitem__, reverse=True):
         roles |= {name: key.role for name, key in leg.keys.items()}
     roles["platform_point"] = "point of the platform"
     if any(any(leg.fixed_offset) for leg in robot.legs):

@@ -209,11 +209,8 @@ def _path(
     passive = program(robot, "passive_room").function(pose)[0].T
     limit_terms["passive_clearance"] = passive, limits.passive_clearance + _BACK_OFF, np.inf
     for name, motion in (("speed", rates), ("acceleration", seconds)):
-        limit_terms[name] = (
-            motion / joint_limits(limits, name, robot),
-            _BACK_OFF - 1.0,
-            1.0 - _BACK_OFF,
-        )
+        share = motion / joint_limits(limits, name, robot)
+        limit_terms[name] = share, _BACK_OFF - 1.0, 1.0 - _BACK_OFF
     dynamics, zeros = program(robot, "inverse_dynamics").function, ca.SX(pose.shape[0], 1)
     drives, inertia = Drives(*map(ca.DM, drives_of(robot))), ca.DM(parameters(robot))
     moving = dynamics(*state, inertia).T + drives.inertia * seconds + drives.viscous * rates
