@@ -62,9 +62,7 @@ def multiply_fields(factors: Mapping[str, ArrayLike]) -> Callable[[Measurements]
 
     def undo(measurements: Measurements) -> Measurements:
         """Return the measurements with fields multiplied by the factors."""
-        changed: Any = {
-            name: getattr(measurements, name) * factor for name, factor in factors.items()
-        }
+        changed: Any = {n: getattr(measurements, n) * factor for n, factor in factors.items()}
         return replace(measurements, **changed)
 
     return undo

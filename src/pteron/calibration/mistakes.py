@@ -55,9 +55,7 @@ def order_mistakes(measurements: Measurements, guess: Guess) -> Iterator[Mistake
 def _wrong_units(measurements: Measurements, guess: Guess) -> Iterator[Mistake]:
     """Yield likely mistakes: smaller units, where values vary by more than the machine's size."""
     linear = np.array([leg.joint.unit == "m" for leg in guess.robot.legs])
-    lengths = [
-        f"{name}s" for name in ("position", "height", "distance") if name in measurements.kinds
-    ]
+    lengths = [f"{k}s" for k in ("position", "height", "distance") if k in measurements.kinds]
     large = _large_lengths(measurements, guess, lengths)
     for factor, text in (
         (1e-3, "in millimetres"),

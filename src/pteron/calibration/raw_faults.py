@@ -245,9 +245,7 @@ def _cost_together(
     inf where the rows have no poses.
     """
     chosen = np.random.default_rng(0).permutation(len(measurements)) < _ROWS_TOGETHER
-    noise = {
-        kind: max(measurements.setup.noise.get(kind, 0.0), _NOISE) for kind in measurements.kinds
-    }
+    noise = {k: max(measurements.setup.noise.get(k, 0.0), _NOISE) for k in measurements.kinds}
     rows = replace(measurements.rows(chosen), setup=replace(measurements.setup, noise=noise))
     try:
         poses = _trial_poses(guess, rows)

@@ -124,9 +124,7 @@ def wrong_zeros_and_scales(measurements: Measurements, guess: Guess) -> Iterator
         far = {kind: _far_joints(guess, fitted, kind) for kind in kinds}
         count = sum(map(len, far.values()))
         if 0 < count < len(kinds) * len(everything):
-            few = _fit_readings(
-                measurements, guess, {kind: far[kind] for kind in kinds if far[kind]}
-            )
+            few = _fit_readings(measurements, guess, {k: far[k] for k in kinds if far[k]})
             if few is not None:
                 yield from _name_readings(guess, few, count)
         if kinds == ("scales",):

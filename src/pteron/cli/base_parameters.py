@@ -118,9 +118,7 @@ def _closing_lines(parameters: BaseParameters, symbols: Symbols) -> list[str]:
             text = "; ".join(", ".join((symbol, *others)) for symbol, others in shared)
             lines.append(f"Equal but for their sign, each with its symbol: {text}.")
         elif shared:
-            text = "; ".join(
-                f"{symbol} stands for {', '.join(others)} too" for symbol, others in shared
-            )
+            text = "; ".join(f"{s} stands for {', '.join(others)} too" for s, others in shared)
             lines.append(
                 f"Values that are equal but for their sign share a symbol: {text}. With "
                 "--leg-symbols each leg has its own."

@@ -120,9 +120,7 @@ def _show(choice: Choice) -> None:
     rows = {candidate.kind: candidate.figure_texts for candidate in serving}
     shown = list(dict.fromkeys(key for row in rows.values() for key in row))
     if serving:
-        table_rows = (
-            (kind, *(plain(row.get(n, "-")) for n in shown)) for kind, row in rows.items()
-        )
+        table_rows = ((k, *(plain(row.get(n, "-")) for n in shown)) for k, row in rows.items())
         show(table("kind", *shown, rows=table_rows, numbers=tuple(shown), names=("kind",)))
     for candidate in serving:
         show(

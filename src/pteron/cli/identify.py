@@ -10,15 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from pteron.cli.arguments import MachineArgument, load_robot, split_numbers
 from pteron.cli.progress import Times, progress_bar, spinner
 from pteron.cli.result import CommandResult
-from pteron.cli.terminal import (
-    GRADE_COLORS,
-    ascii_number,
-    is_terminal,
-    note,
-    plain,
-    show,
-    table,
-)
+from pteron.cli.terminal import GRADE_COLORS, ascii_number, is_terminal, note, plain, show, table
 from pteron.errors import DataError
 
 if TYPE_CHECKING:

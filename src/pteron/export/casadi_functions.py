@@ -83,9 +83,7 @@ def casadi_functions(robot: RobotLike) -> dict[str, ca.Function]:
     robot = as_manipulator(robot)
     refuse_readings(robot, "CasADi's functions")
     missing = "direct_step" if closure_of(robot).closed_form else "direct_kinematics"
-    functions = {
-        name: _plain(robot, name, what) for name, what in _NAMES.items() if name != missing
-    }
+    functions = {n: _plain(robot, n, what) for n, what in _NAMES.items() if n != missing}
     functions |= {function.name(): function for function in _drive_functions(robot)}
     return functions
 

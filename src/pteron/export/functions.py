@@ -115,9 +115,7 @@ def _usual_names(
     step = {"direct_kinematics": "direct_step"}
     names = [name if closed else step.get(name, name) for name in usual]
     if identified:  # which leaves the bodies unknown
-        inputs: Mapping[str, Sequence[str]] = {
-            name: TABLE[name].inputs for name in names if name in TABLE
-        }
+        inputs: Mapping[str, Sequence[str]] = {n: TABLE[n].inputs for n in names if n in TABLE}
         names = [name for name in names if "parameters" not in inputs.get(name, ())]
         names += [name + BASE for name in (*FEED, PAYLOAD)]
     elif has_drives(robot):

@@ -254,9 +254,7 @@ def assemble_observations(
 def _phases(log: Log, rate: float, fit: FourierFit) -> list[Log]:
     """Return the stretches of a periodic log with a constant payload and at least a period."""
     parts = [log.part(start, stop) for start, stop in log.phases]
-    long_enough = [
-        part for part in parts if part.duration + 1.0 / rate >= fit.period * (1.0 - 1e-3)
-    ]
+    long_enough = [p for p in parts if p.duration + 1.0 / rate >= fit.period * (1.0 - 1e-3)]
     if not long_enough:
         raise log.fault(
             "too short",
@@ -303,9 +301,7 @@ def _periodic(
 
     n, p = used.shape[1], len(model.names)
     basis = fourier_basis(instants, harmonics, period)
-    projection, force_projection = (
-        Projection(each, period, harmonics) for each in (time, log.time)
-    )
+    projection, force_projection = (Projection(t, period, harmonics) for t in (time, log.time))
     matrix = (basis @ projection.coefficients(regressor, n * p)).reshape(count, n, p)
     rows = basis @ force_projection.coefficients(lambda part: used[part] * log.forces[part], n)
     noise = projection.noise(shown, instants) * np.sqrt(len(time) / log.rows)

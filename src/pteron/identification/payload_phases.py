@@ -9,10 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pteron.identification.errors import LogError
-from pteron.identification.fitting import (
-    NO_COLUMN,
-    append_findings,
-)
+from pteron.identification.fitting import NO_COLUMN, append_findings
 from pteron.identification.logs import Log
 from pteron.identification.model import Model
 from pteron.identification.observation import Observations, observations_of, stack_observations

@@ -212,9 +212,7 @@ def known_values(
             kinds = model.robot.platform.inertia.kinds
             by_name |= zip((f"{kind}_L" for kind in kinds), payload.values, strict=True)
     least = SAME * max(map(abs, rotors.values()), default=0.0)
-    return {
-        name: size for name, size in by_name.items() if name in model.names and abs(size) > least
-    }
+    return {n: size for n, size in by_name.items() if n in model.names and abs(size) > least}
 
 
 def factor_of_forces(model: Model, fit: Estimate, known: Mapping[str, float]) -> Factor | None:

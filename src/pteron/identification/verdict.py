@@ -224,9 +224,7 @@ def predict_held_out(
             break
         lower = replace(preprocessing, cutoff=share * preprocessing.cutoff)
         other = predict(model, beta, recording, lower)
-        prediction = min(
-            prediction, other, key=lambda candidate: float(candidate.robust_nrms.max())
-        )
+        prediction = min(prediction, other, key=lambda p: float(p.robust_nrms.max()))
     return prediction
 
 

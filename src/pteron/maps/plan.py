@@ -69,9 +69,7 @@ def _machine(text: Any) -> Mapping[str, Any]:
 
 def _is_table_list(part: Any) -> bool:
     """Return whether a part of a plan is a list with tables."""
-    return isinstance(part, list) and any(
-        isinstance(entry_of_list, Mapping) for entry_of_list in part
-    )
+    return isinstance(part, list) and any(isinstance(element, Mapping) for element in part)
 
 
 def _difference_text(name: str, stored: Any, plan: Any) -> str:

@@ -280,9 +280,7 @@ def groups_of(kinds: Sequence[Kind]) -> dict[Kind, list[int]]:
     >>> groups_of(["m", "m", "rad"])
     {'m': [0, 1], 'rad': [2]}
     """
-    return {
-        kind: [i for i, column_kind in enumerate(kinds) if column_kind == kind] for kind in kinds
-    }
+    return {kind: [i for i, k in enumerate(kinds) if k == kind] for kind in kinds}
 
 
 def spot(axes: Axes, x: float, y: float, face: str, edge: str, size: float, **options: Any) -> None:

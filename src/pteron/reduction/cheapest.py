@@ -92,9 +92,7 @@ def _cheapest_columns(robot: Manipulator) -> tuple[int, ...]:
         candidates.add(
             start if many else _improve_by_exchange(model, grouping, start, [*leg_columns, *others])
         )
-    return min(
-        candidates, key=lambda base_columns: (_final_cost(robot, base_columns), base_columns)
-    )
+    return min(candidates, key=lambda columns: (_final_cost(robot, columns), columns))
 
 
 def _unitless_grouping(robot: Manipulator, base: BaseParameters) -> Array:

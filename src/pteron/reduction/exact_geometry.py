@@ -63,9 +63,7 @@ class ExactLeg:
     @property
     def numbers(self) -> list[Surd]:
         """All numbers in one list."""
-        return [
-            number for vector in (*self.values.values(), self.platform_point) for number in vector
-        ]
+        return [x for vector in (*self.values.values(), self.platform_point) for x in vector]
 
     def field_elements(self, field: Field[Element]) -> dict[str, list[Element]]:
         """Return the quantities and the platform point in a field, by name."""
@@ -78,9 +76,7 @@ class ExactLeg:
                 program = _plane_axis(*pole([float(c) for c in self.direction]))
                 elements[name] = evaluate(program, field, [d])[0]
         points = {"platform_point": self.platform_point, "fixed_offset": (ZERO, ZERO, ZERO)}
-        return elements | {
-            k: [number.field_element(field) for number in v] for k, v in points.items()
-        }
+        return elements | {k: [x.field_element(field) for x in v] for k, v in points.items()}
 
 
 @dataclass(frozen=True)

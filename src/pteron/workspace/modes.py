@@ -111,9 +111,7 @@ def _contact(
     first: Paving, second: Paving, elbows: tuple[tuple[int, ...], tuple[int, ...]], leg: int
 ) -> Contact:
     """Return the contact of two working modes at a leg, by bisection of both pavings' boxes."""
-    first_test, second_test = (
-        interval_test(side.robot, side.conditions) for side in (first, second)
-    )
+    first_test, second_test = (interval_test(s.robot, s.conditions) for s in (first, second))
     edges = [k for k, c in enumerate(first.conditions) if c.leg == leg and c.cause in EDGES]
     boxes = np.concatenate([first.inner, first.boundary])
     for _ in range(_ROUNDS):

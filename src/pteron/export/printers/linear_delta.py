@@ -94,9 +94,7 @@ class LinearDelta:
         """
         machine = Machine.numeric(robot)
         centers = [Center.from_leg(machine, i) for i in range(len(robot.legs))]
-        sliding_centers = [
-            center for center in centers if center is not None and center.is_prismatic
-        ]
+        sliding_centers = [c for c in centers if c is not None and c.is_prismatic]
         if robot.platform.coordinates != ("x", "y", "z") or len(sliding_centers) != 3:
             raise ModelError(
                 f"{robot.name}: no linear Delta, whose platform moves x, y and z by three rods on "
@@ -194,9 +192,7 @@ def _errors(
     """Return where the machine's tool is (K, 3), from where the firmware takes it to be, m."""
     radius, angles, arms, ends = numbers[0], numbers[1:4], numbers[4:7], numbers[7:]
     turns = np.linspace(0.0, 2.0 * math.pi, 12, endpoint=False)
-    rings = [
-        good * share * np.stack([np.cos(turns), np.sin(turns)], axis=-1) for share in (0.5, 1.0)
-    ]
+    rings = [good * s * np.stack([np.cos(turns), np.sin(turns)], axis=-1) for s in (0.5, 1.0)]
     places = np.concatenate([np.zeros((1, 2)), *rings])
     poses = np.concatenate(
         [np.column_stack([places, np.full(len(places), level + z)]) for z in (0.0, 0.3 * good)]

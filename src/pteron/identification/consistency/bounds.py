@@ -73,9 +73,7 @@ class Bounds:
     total_mass: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
-        pairs = {
-            name: (self.lower[name], self.upper[name]) for name in self.lower.keys() & self.upper
-        }
+        pairs = {n: (self.lower[n], self.upper[n]) for n in self.lower.keys() & self.upper}
         if self.total_mass is not None:
             pairs["total_mass"] = self.total_mass
         for body, box in self.boxes.items():

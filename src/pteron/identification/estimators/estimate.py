@@ -241,10 +241,8 @@ def estimate_of(
     noise_model = noise_of(rows, pulled, observations.gain > 0.0, weights, whitened)
     middle = noise_model.sum_covariance(rows, weights)
     covariance = bread @ (middle + extra) @ bread.T
-    symmetric, white = (
-        0.5 * (covariance + covariance.T),
-        whiteness(residuals, observations.gain > 0.0),
-    )
+    symmetric = 0.5 * (covariance + covariance.T)
+    white = whiteness(residuals, observations.gain > 0.0)
     figures = factor.condition, factor.rows, search.iterations, search.converged, residuals
     names, units = observations.names, observations.units
     return Estimate(search.method, names, units, beta, symmetric, noise, white, *figures)

@@ -99,9 +99,7 @@ def halves(
     not the same in two samples, as long as a joint passes a step or more between them, so that
     the halves are mutual instruments of each other, and no controller needs to be known.
     """
-    first, second = (
-        observations_of(model, _every_other(log, start), preprocessing) for start in (0, 1)
-    )
+    first, second = (observations_of(model, _every_other(log, s), preprocessing) for s in (0, 1))
     return first, second
 
 

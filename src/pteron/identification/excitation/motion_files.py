@@ -28,9 +28,7 @@ def motion_paths(path: str | Path, layout: MotionLayout | None = None) -> tuple[
     """
     dialect = None if layout is None else layout.dialect
     first = check_output(path, dialect)
-    held_out, slow = (
-        check_output(first.with_stem(first.stem + ending), dialect) for ending in _ENDINGS
-    )
+    held_out, slow = (check_output(first.with_stem(first.stem + e), dialect) for e in _ENDINGS)
     for table in (first, held_out, slow):
         toml = table.with_suffix(".toml")
         if toml.is_dir():

@@ -252,10 +252,8 @@ class IsolatedFault(Result):
 
     def _sentence(self) -> str:
         """Return a sentence that states the fault with its size and error."""
-        first, key = (
-            float(self.sizes[0]),
-            "sampling" if self.is_half_sample_delay else str(self.fault),
-        )
+        first = float(self.sizes[0])
+        key = "sampling" if self.is_half_sample_delay else str(self.fault)
         if key == "clock" and first <= -1.0:
             key = "sign"
         size, error = abs(first), float(self.deviations[0])

@@ -98,9 +98,7 @@ class Clock:
             If a cell holds no time; the message names the row.
         """
         if len(self.columns) == 2:
-            seconds_part, nanoseconds_part = (
-                self._integer_column(table, name) for name in self.columns
-            )
+            seconds_part, nanoseconds_part = (self._integer_column(table, n) for n in self.columns)
             if seconds_part is not None and nanoseconds_part is not None:
                 return self._seconds_of_counts(seconds_part * _NANO + nanoseconds_part, _NANO)
             numbers = table.numbers(self.columns)

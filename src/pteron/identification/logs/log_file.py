@@ -285,7 +285,7 @@ class LogFile(LogSourceMixin):
         spans, source, c = joint_spans(self._robot), self.source, self._columns
         limits = self.description.limits or (None,)
         joints = [
-            Channel(name, source, spans, joint=j) for j, name in enumerate(c.joints.printable_names)
+            Channel(n, source, spans, joint=j) for j, n in enumerate(c.joints.printable_names)
         ]
         forces = zip(
             c.forces.printable_names, cycle(limits), reading_scales(self._robot), strict=False

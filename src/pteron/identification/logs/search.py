@@ -80,9 +80,7 @@ class ColumnSearch(ColumnNames):
             return self._group_by_unit(sought, columns, guessed=False)
         names_by_number, guessed = dict[int, str](), False
         for kind in dict.fromkeys(sought):
-            numbers_of_kind = [
-                i for i, member in zip(numbers, sought, strict=True) if member == kind
-            ]
+            numbers_of_kind = [i for i, m in zip(numbers, sought, strict=True) if m == kind]
             names, by_name = self.family(kind, numbers_of_kind)
             names_by_number |= zip(numbers_of_kind, names, strict=True)
             guessed = guessed or by_name
