@@ -19,12 +19,7 @@ _NONE = 1
 """Exit code where no machine does the job."""
 
 
-def choose(
-    job: str,
-    *,
-    out: str | None = None,
-    workers: int = 1,
-) -> CommandResult:
+def choose(job: str, *, out: str | None = None, workers: int = 1) -> CommandResult:
     """Choose a machine for a job: which kind, which dimensions, which motors.
 
     The file says what the machine must do: workspace, payload, cycles, accuracy, stiffness, room,

@@ -21,11 +21,7 @@ _SERIES = ("time", "pose", "velocity", "acceleration", "forces")
 
 
 def report(
-    machine: MachineArgument,
-    *,
-    out: str,
-    motion: str | None = None,
-    carried: Carried,
+    machine: MachineArgument, *, out: str, motion: str | None = None, carried: Carried
 ) -> CommandResult:
     """Write a report on a machine: one page with pictures, and its numbers.
 

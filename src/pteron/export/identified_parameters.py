@@ -176,10 +176,8 @@ def _payload_program(robot: Manipulator, base: BaseParameters) -> Program:
     base_symbols = ca.SX.sym(_NAME, base.rank)
     grouping = ca.sparsify(ca.SX(ca.DM(base.grouping)))
     ports = (*load.inputs[:3], Port(_NAME, (base.rank,), shared=True))
-    loaded, loaded_values = (
-        Port(f"loaded_{_NAME}", (base.rank,)),
-        base_symbols + ca.mtimes(grouping, load_parameters.T),
-    )
+    loaded = Port(f"loaded_{_NAME}", (base.rank,))
+    loaded_values = base_symbols + ca.mtimes(grouping, load_parameters.T)
     return Program.from_expressions(
         load.name, [mass, center, inertia, base_symbols], ports, [loaded_values], [loaded]
     ).optimise()

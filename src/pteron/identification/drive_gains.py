@@ -281,8 +281,7 @@ def _fit_likelihood(
             break
         if iteration == _ITERATIONS:
             raise observations.fault(
-                "unsettled",
-                "the gains do not settle; record longer, or carry a heavier payload",
+                "unsettled", "the gains do not settle; record longer, or carry a heavier payload"
             )
     estimate = weighted_least_squares(linear)
     beta = estimate.values

@@ -222,9 +222,7 @@ def _fit_values(task: FitTask, equations: FitEquations, known: Array) -> FittedV
 
 
 def _estimate_with_drawing(
-    solve: Callable[[Observations], Estimate],
-    observations: Observations,
-    error: LogError,
+    solve: Callable[[Observations], Estimate], observations: Observations, error: LogError
 ) -> Estimate:
     """Return the fit of a log, with drawn values where it determines too little; or raise."""
     if error.reason != "too little motion":

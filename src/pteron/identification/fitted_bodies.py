@@ -65,9 +65,7 @@ def fit_real_bodies(
     residual = np.sqrt((estimate.residuals**2).mean())
     size, tiny = np.sqrt((observations.forces**2).mean()), np.finfo(float).tiny
     return FittedBodies(
-        consistency,
-        float(change / max(residual, tiny)),
-        float(100.0 * change / max(size, tiny)),
+        consistency, float(change / max(residual, tiny)), float(100.0 * change / max(size, tiny))
     )
 
 

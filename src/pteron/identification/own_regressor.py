@@ -175,9 +175,7 @@ def estimate(
 
 
 def _hold_out(
-    observations: Observations,
-    held_out: tuple[ArrayLike, ...] | None,
-    kinds: Sequence[str] | None,
+    observations: Observations, held_out: tuple[ArrayLike, ...] | None, kinds: Sequence[str] | None
 ) -> tuple[Observations, Observations]:
     """Return the observations to fit, and those for validation: another motion's or the last."""
     count = len(observations.time)

@@ -94,9 +94,7 @@ class Recording:
 
 
 def read_recording(
-    log: Log | LogFile,
-    progress: Callable[[int], None] | None = None,
-    period: float | None = None,
+    log: Log | LogFile, progress: Callable[[int], None] | None = None, period: float | None = None
 ) -> Recording:
     """Return a log as a recording, with gaps filled; files of a usual length are read whole.
 

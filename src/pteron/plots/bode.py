@@ -48,11 +48,7 @@ def bode_figure(
     return real_figure(figure)
 
 
-def poles_figure(
-    poles: Any,
-    *,
-    ax: Axes | SubFigure | None = None,
-) -> Figure:
+def poles_figure(poles: Any, *, ax: Axes | SubFigure | None = None) -> Figure:
     """Return a picture of a sampled loop's poles, complex, with the unit circle."""
     try:
         roots = np.asarray(poles, dtype=complex).ravel()

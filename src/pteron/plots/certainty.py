@@ -48,11 +48,7 @@ _REACH = 4.5
 """Width of a histogram to each side, in standard deviations."""
 
 
-def histogram_figure(
-    residuals: Array,
-    *,
-    ax: Axes | SubFigure | None = None,
-) -> Figure:
+def histogram_figure(residuals: Array, *, ax: Axes | SubFigure | None = None) -> Figure:
     """Return a figure of the histogram of residuals, in standard deviations, and the normal one.
 
     Residuals have shape (R, n), NaN where there is none.
@@ -80,10 +76,7 @@ def histogram_figure(
 
 
 def autocorrelation_figure(
-    correlations: Array,
-    bound: Array,
-    *,
-    ax: Axes | SubFigure | None = None,
+    correlations: Array, bound: Array, *, ax: Axes | SubFigure | None = None
 ) -> Figure:
     """Return a figure of the autocorrelation of residuals, with the band of white noise.
 
@@ -142,10 +135,7 @@ def certainty_figure(
 
 
 def correlation_figure(
-    names: Sequence[str],
-    correlation: Array,
-    *,
-    ax: Axes | SubFigure | None = None,
+    names: Sequence[str], correlation: Array, *, ax: Axes | SubFigure | None = None
 ) -> Figure:
     """Return a figure of a correlation matrix (p, p): blue is positive, orange negative."""
     p = len(names)

@@ -83,11 +83,7 @@ def comparison_figure(
 
 
 def errors_figure(
-    errors: Array,
-    without_friction: Array,
-    floor: Array,
-    *,
-    ax: Axes | SubFigure | None = None,
+    errors: Array, without_friction: Array, floor: Array, *, ax: Axes | SubFigure | None = None
 ) -> Figure:
     """Return a figure of the errors of a prediction beside the noise, on a logarithmic scale.
 

@@ -131,10 +131,7 @@ def _box(axes: Axes, ability: Ability, sizes: Sequence[float], color: str) -> No
 
 
 def power_figure(
-    time: ArrayLike,
-    power: ArrayLike,
-    *,
-    ax: Axes | SubFigure | None = None,
+    time: ArrayLike, power: ArrayLike, *, ax: Axes | SubFigure | None = None
 ) -> Figure:
     """Return a figure of the power (K, n) of all drives over time (K,), s, and of their sum; W."""
     time, power = rows(time, power, "power")

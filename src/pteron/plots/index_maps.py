@@ -59,11 +59,7 @@ _BELOW = 4.5
 """Sizes of a letter from the axes to the legend: the scale's numbers and its name stand there."""
 
 
-def map_figure(
-    index_map: Map,
-    *names: str,
-    ax: Axes | SubFigure | None = None,
-) -> Figure:
+def map_figure(index_map: Map, *names: str, ax: Axes | SubFigure | None = None) -> Figure:
     """Return the picture of a map: a panel for each index, in a column.
 
     Over one coordinate it is a curve, over two a plane. Over three it is the three planes through

@@ -43,10 +43,7 @@ _DASHES = ("-", "-", (0, (3, 2)), (0, (3, 2)), (0, (1, 1)), (0, (1, 1)))
 
 
 def reach_figure(
-    cut: ReachSlice,
-    *,
-    path: Array | None = None,
-    ax: Axes | SubFigure | None = None,
+    cut: ReachSlice, *, path: Array | None = None, ax: Axes | SubFigure | None = None
 ) -> Figure:
     """Return a figure of a slice through the reach, with a motion's poses (T, m) on it.
 

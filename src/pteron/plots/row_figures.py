@@ -109,10 +109,7 @@ def parameters_figure(
 
 
 def operations_figure(
-    names: Sequence[str],
-    counts: ArrayLike,
-    *,
-    ax: Axes | SubFigure | None = None,
+    names: Sequence[str], counts: ArrayLike, *, ax: Axes | SubFigure | None = None
 ) -> Figure:
     """Return a figure of bars of counts, such as operations, labelled with their values.
 

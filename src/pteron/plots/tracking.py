@@ -20,11 +20,7 @@ _SCALES = ((1.0, ""), (1e3, "m"), (1e6, "µ"), (1e9, "n"))
 
 
 def tracking_figure(
-    time: ArrayLike,
-    error: ArrayLike,
-    names: Sequence[str],
-    *,
-    ax: Axes | SubFigure | None = None,
+    time: ArrayLike, error: ArrayLike, names: Sequence[str], *, ax: Axes | SubFigure | None = None
 ) -> Figure:
     """Return a figure of the errors (T, m) of the pose over time (T,), s.
 

@@ -32,10 +32,7 @@ _WIDE, _TALL, _HEAD = 5.4, 1.35, 0.75
 
 
 def trajectory_figure(
-    time: ArrayLike,
-    *courses: ArrayLike,
-    names: Sequence[str],
-    ax: Axes | SubFigure | None = None,
+    time: ArrayLike, *courses: ArrayLike, names: Sequence[str], ax: Axes | SubFigure | None = None
 ) -> Figure:
     """Return a figure of the platform's pose, velocity, acceleration and jerk over time.
 

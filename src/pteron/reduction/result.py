@@ -67,11 +67,7 @@ class BaseParameters(Result):
 
     @classmethod
     def from_grouping(
-        cls,
-        robot: Manipulator,
-        columns: tuple[Parameter, ...],
-        sharing: Array,
-        grouping: Grouping,
+        cls, robot: Manipulator, columns: tuple[Parameter, ...], sharing: Array, grouping: Grouping
     ) -> BaseParameters:
         """Return the base parameters of a grouping; `sharing` is (N, columns)."""
         mean = (sharing / sharing.sum(axis=0)).T

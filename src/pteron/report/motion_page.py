@@ -125,12 +125,7 @@ def _force_origin(motion_shown: ShownMotion) -> tuple[str, str]:
 def _figures(motion_shown: ShownMotion) -> dict[str, Figure]:
     """Return the pictures, by their names in the template."""
     robot, motion, at = motion_shown.robot, motion_shown.playback.motion, motion_shown.frames
-    machine = robot_figure(
-        at.still,
-        at.guides,
-        gravity=gravity_of(robot),
-        path=at.points.tool,
-    )
+    machine = robot_figure(at.still, at.guides, gravity=gravity_of(robot), path=at.points.tool)
     joints = [leg.joint for leg in robot.legs]
     some = line_samples(len(motion.time))
     time = motion.time[some] - motion.time[0]

@@ -226,10 +226,7 @@ def _figures(report: Report) -> dict[str, Any]:
     out = slice(len(shown.time) // 2 + 1 if standard else None)
     path = shown.pose[out]
     machine = robot_figure(
-        shown.still,
-        shown.guides,
-        gravity=gravity_of(robot),
-        path=shown.points.tool[out],
+        shown.still, shown.guides, gravity=gravity_of(robot), path=shown.points.tool[out]
     )
     whose = "drive" if report.has_drives else "actuator"
     label = f"{whose} {force([leg.joint for leg in robot.legs]).axis}"

@@ -77,11 +77,7 @@ class NearestSingularity(Result):
 
 
 def nearest_singularities(
-    robot: RobotLike,
-    pose: PoseLike,
-    *,
-    most: int = _MOST,
-    progress: Progress | None = None,
+    robot: RobotLike, pose: PoseLike, *, most: int = _MOST, progress: Progress | None = None
 ) -> tuple[NearestSingularity, ...]:
     """Return the nearest singular poses of each kind, by translation and by rotation alone.
 

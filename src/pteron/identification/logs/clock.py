@@ -157,10 +157,7 @@ class Clock:
 
 
 def find_clock(
-    table: Table,
-    columns: tuple[str, ...],
-    unit: str | None,
-    declared: TimeFormat | None,
+    table: Table, columns: tuple[str, ...], unit: str | None, declared: TimeFormat | None
 ) -> Clock:
     """Return the format of a file's times.
 

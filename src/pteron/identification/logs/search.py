@@ -69,10 +69,7 @@ class ColumnSearch(ColumnNames):
         return group._replace(reported=group.reported or self.unit_of(columns[0], kind) is not None)
 
     def group(
-        self,
-        sought: Sequence[SoughtColumn],
-        declared: Sequence[str] | None,
-        numbers: Sequence[int],
+        self, sought: Sequence[SoughtColumn], declared: Sequence[str] | None, numbers: Sequence[int]
     ) -> Group:
         """Return the columns of quantities, one for each number, by declaration or by name."""
         if declared is not None:

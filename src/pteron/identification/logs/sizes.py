@@ -111,12 +111,7 @@ def check_step(step: float, column: str, source: str) -> None:
 
 
 def standstill_findings(
-    travelled: NDArray[np.float64],
-    robot: Manipulator,
-    group: Group,
-    source: str,
-    *,
-    declared: bool,
+    travelled: NDArray[np.float64], robot: Manipulator, group: Group, source: str, *, declared: bool
 ) -> tuple[Finding, ...]:
     """Return a finding where no joint moves by a thousandth of its span: the unit may be wrong.
 
