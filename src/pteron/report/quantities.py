@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from pteron.kernels import Array
@@ -49,30 +49,27 @@ class JointQuantity:
 
 def coordinate(joints: Sequence[ActuatedJoint]) -> JointQuantity:
     """Return the joint coordinates, in display units."""
-    names = _distinct(joint.coordinate for joint in joints)
+    names = dict.fromkeys(joint.coordinate for joint in joints)
     name = ", ".join(SYMBOLS.get(letter, letter) for letter in names)
-    shown = [SHOWN[joint.unit] for joint in joints]
-    return JointQuantity(
-        name, tuple(unit for unit, _ in shown), tuple(factor for _, factor in shown)
-    )
+    units, factors = zip(*(SHOWN[joint.unit] for joint in joints), strict=True)
+    return JointQuantity(name, units, factors)
 
 
 def force(joints: Sequence[ActuatedJoint]) -> JointQuantity:
     """Return the actuator forces."""
-    name = " or ".join(_distinct(joint.force for joint in joints))
+    name = " or ".join(dict.fromkeys(joint.force for joint in joints))
     return JointQuantity(name, tuple(joint.force_unit for joint in joints), (1.0,) * len(joints))
 
 
 def speed(joints: Sequence[ActuatedJoint]) -> JointQuantity:
     """Return the joint speeds."""
-    return JointQuantity(
-        "speed", tuple(f"{joint.unit}/s" for joint in joints), (1.0,) * len(joints)
-    )
+    units = tuple(f"{joint.unit}/s" for joint in joints)
+    return JointQuantity("speed", units, (1.0,) * len(joints))
 
 
 def nouns(joints: Sequence[ActuatedJoint]) -> str:
     """Return the noun of the actuated joints, such as "slider", or "slider or crank"."""
-    return " or ".join(_distinct(joint.noun for joint in joints))
+    return " or ".join(dict.fromkeys(joint.noun for joint in joints))
 
 
 def readable(coordinate: float, unit: str, places: int = 1) -> str:
@@ -96,8 +93,3 @@ def angles_text(robot: Manipulator, pose: Array) -> str:
         for name, angle in pairs
         if name in robot.platform.angles
     )
-
-
-def _distinct(words: Iterable[str]) -> list[str]:
-    """Return words in their order, without repetition."""
-    return list(dict.fromkeys(words))
