@@ -16,7 +16,7 @@ from mechanisms import CATALOG, CLIENTS
 import pteron
 from pteron.calibration import Measurements, Place, Setup, calibrate
 from pteron.calibration.guess import Guess
-from pteron.calibration.mistakes import reorder_readings
+from pteron.calibration.mistake import reorder_readings
 from pteron.calibration.residuals import MachineSlopes
 from pteron.errors import DataError
 from pteron.report.calibration import write_calibration

@@ -220,7 +220,7 @@ def test_columns_are_what_a_fault_does_to_the_forces(name):
     s = States.from_joints(robot, shifted, part.time, tuple(states.pose[0]))
     there = pteron.inverse_dynamics(robot, s.pose, s.velocity, s.acceleration)
     wanted = (there - here) / step
-    given = fitted.give_slopes(behind)[..., 1]
+    given = fitted.lag_slopes(behind)[..., 1]
     assert np.abs(given - wanted).max() < 1e-3 * np.abs(wanted).max() + 1e-5 * size
 
 

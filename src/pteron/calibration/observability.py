@@ -91,7 +91,7 @@ def observability_of(
     slopes: Array,
     seed: int = 0,
 ) -> Observability:
-    """Return the combinations of values that measurements show.
+    """Return which combinations of values measurements show, exactly and by singular values.
 
     Parameters
     ----------

@@ -91,7 +91,7 @@ def starting_poses(guess: Guess, measurements: Measurements, *, modes: bool = Tr
 def _measured_poses(
     guess: Guess, measurements: Measurements, home: Array
 ) -> tuple[Array, NDArray[np.bool_]]:
-    """Return the measured poses (N, m), home where not measured, and the mask of complete rows."""
+    """Return measured poses (N, m), home where none, and the mask (N,) of fully measured rows."""
     robot = guess.robot
     begin = np.tile(home, (len(measurements), 1))
     seen = ~np.isnan(measurements.angles)

@@ -135,7 +135,7 @@ def _named_combinations(
     for letter in "xyz":
         parts = {f"legs[{i + 1}].platform_point.{letter}": 1.0 for i in range(len(robot.legs))}
         parts |= {
-            name: 1.0 for name in place if name.endswith(f".{letter}") and _is_on_platform(name)
+            n: 1.0 for n in place if n.endswith(f".{letter}") and n.startswith(("tool.", "marks."))
         }
         if all(name in place for name in parts):
             text = "only the tool's position relative to the platform points has an effect"
@@ -145,11 +145,6 @@ def _named_combinations(
             yield from _rigid_motions(start, blocks, names)
     text = "the scale of the whole machine, which a measured length determines"
     yield text, "", _uniform_growth(start, blocks)
-
-
-def _is_on_platform(name: str) -> bool:
-    """Return whether an unknown is a coordinate of a point on the platform."""
-    return name.startswith(("tool.", "marks."))
 
 
 def _rigid_motions(

@@ -8,19 +8,21 @@ from typing import NamedTuple
 import numpy as np
 import scipy  # type: ignore[import-untyped]
 
+from pteron.arguments import join_words
 from pteron.calibration import thresholds
-from pteron.calibration.fit import BEYOND, CalibrationFit
+from pteron.calibration.calibration_fit import CalibrationFit
+from pteron.calibration.fit import BEYOND
 from pteron.calibration.guess import UnknownBlock
-from pteron.calibration.measurements import Measurements
+from pteron.calibration.measurements import Measurements, error_unit
 from pteron.calibration.observability import Observability
 from pteron.calibration.result import CalibrationFinding, HeldOut, HiddenOrder
 from pteron.verdict import Grade, Opinion, Verdict
 
 EVERY = 5
-"""One row in so many is held out of the fit for a check."""
+"""One row in so many is held out of the fit as a check."""
 
 _PER_VALUE = {True: 1.0, False: 1.5}
-"""Measured numbers for each unknown below which none is, where their noise is given or is not."""
+"""Least measured numbers per unknown to hold rows out, by whether their noise is given."""
 
 _FAR = 2.0
 """Held-out error, over the one expected, above which a fit that gained nothing is not trusted."""
@@ -32,7 +34,7 @@ _UNEXPLAINED = (
 
 
 _GREAT_TILT = 0.1
-"""Tilt, rad, from which its size says no more than that nothing shows it."""
+"""Tilt, rad, above which its size is not stated: it means only that nothing shows it."""
 
 _ROD_ADVICE = (
     "Measure both rods of each pair: unequal rods tilt the platform, and without measured "
@@ -59,6 +61,8 @@ class Evidence(NamedTuple):
 
 
 class _Reason(NamedTuple):
+    """A reason of the verdict: its text, advice on what to do next, and the grade it allows."""
+
     text: str
     step: str = ""
     grade: Grade = "trustworthy"
@@ -182,6 +186,7 @@ def _open_error_reasons(evidence: Evidence) -> Iterator[_Reason]:
         far = [name for name in names if evidence.open_errors[name] > least]
         if far:
             most = max(evidence.open_errors[name] for name in far)
+            coordinates = join_words(far, "and")
             measured = " and ".join(f"{name}s" for name in kinds)
             where = "" if measurements.setup.frame_known else " in an unknown frame"
             them = "it" if len(far) == 1 else "them"
@@ -189,17 +194,18 @@ def _open_error_reasons(evidence: Evidence) -> Iterator[_Reason]:
             hidden = evidence.hidden_order
             if hidden and kind == "position":
                 size = _size_text(hidden.error, "position")
+                legs = join_words([*map(str, hidden.legs)], "and")
                 order = (
-                    f", nor the order of the legs {_join([*map(str, hidden.legs)])}: if it is "
-                    f"another, {_join(far)} may be off by {size} more"
+                    f", nor the order of the legs {legs}: if it is another, {coordinates} may be "
+                    f"off by {size} more"
                 )
             rods = ""
             if kind == "position" and "position" not in kinds and _hides_rod_tilt(evidence):
                 rods = f", nor rods of one pair that differ and {_tilt_text(evidence)}"
             yield _Reason(
-                f"{_join(far)} may be off by {_size_text(most, kind)} (95 %): "
+                f"{coordinates} may be off by {_size_text(most, kind)} (95 %): "
                 f"{measured}{where} do not show {them}{rods}{order}.",
-                f"Measure {_join(far)} too: positions, or distances across the work space.",
+                f"Measure {coordinates} too: positions, or distances across the work space.",
             )
 
 
@@ -270,16 +276,6 @@ def _unseen_reasons(shown: Observability) -> Iterator[_Reason]:
         )
 
 
-def _unit(kind: str) -> str:
-    """Return the unit of residuals of a kind: mrad or mm."""
-    return "mrad" if kind == "angle" else "mm"
-
-
 def _size_text(error: float, kind: str) -> str:
     """Return an error as text in mrad or mm."""
-    return f"{1e3 * error:.3g} {_unit(kind)}"
-
-
-def _join(names: Sequence[str]) -> str:
-    """Return names joined by commas and "and"."""
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+    return f"{1e3 * error:.3g} {error_unit(kind)}"

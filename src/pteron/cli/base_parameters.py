@@ -59,16 +59,16 @@ def base(
 
         names = None if keep is None else [name.strip() for name in keep.split(",")]
         parameters = base_parameters(machine, method, names, shared=shared)
-    data = parameters.as_dict()
+    record = parameters.as_dict()
     if written:
-        data["symbolic"] = list(parameters.expressions(symbols=written))
-        data["geometry"] = _geometry(parameters, written)
-        data["shared_symbols"] = {} if written == "leg" else parameters.shared_symbols
+        record["symbolic"] = list(parameters.expressions(symbols=written))
+        record["geometry"] = _geometry(parameters, written)
+        record["shared_symbols"] = {} if written == "leg" else parameters.shared_symbols
     if format_ == "json":
-        return CommandResult(data, partial(show_json, data))
+        return CommandResult(record, partial(show_json, record))
     if format_ == "text":
-        return CommandResult(data, partial(_show, parameters, written))
-    return CommandResult(data, partial(_write, parameters, written, format_))
+        return CommandResult(record, partial(_show, parameters, written))
+    return CommandResult(record, partial(_write, parameters, written, format_))
 
 
 def _write(
@@ -126,9 +126,7 @@ def _closing_lines(parameters: BaseParameters, symbols: Symbols) -> list[str]:
             text = "; ".join(", ".join((symbol, *others)) for symbol, others in shared)
             lines.append(f"Equal but for their sign, each with its symbol: {text}.")
         elif shared:
-            text = "; ".join(
-                f"{symbol} stands for {', '.join(others)} too" for symbol, others in shared
-            )
+            text = "; ".join(f"{s} stands for {', '.join(others)} too" for s, others in shared)
             lines.append(
                 f"Values that are equal but for their sign share a symbol: {text}. With "
                 "--leg-symbols each leg has its own."
@@ -148,7 +146,7 @@ def table1() -> CommandResult:
 
         computed_rows = computed()
     wrong = sum(not row.agrees for row in computed_rows)
-    data = [
+    record = [
         json_fields(
             parameter=r.parameter,
             kept=r.kept,
@@ -176,4 +174,4 @@ def table1() -> CommandResult:
         )
     headings = ("", "printed", "computed", "agrees")
     lines = [agree, table(*headings, rows=rows), SYMBOLS]
-    return CommandResult(data, lines, code=1 if wrong else 0)
+    return CommandResult(record, lines, code=1 if wrong else 0)

@@ -99,12 +99,14 @@ def calibrate(
         measurements = read_measurements(machine, *(log or ()))
         check = read_measurements(machine, *held_out) if held_out else None
     with spinner(f"Calibrating {machine.name} from {len(measurements)} rows"):
-        result = calibrated(machine, measurements, free=free, prior=tolerances, held_out=check)
+        calibration = calibrated(machine, measurements, free=free, prior=tolerances, held_out=check)
     with spinner("Drawing the report"):
-        firmware = firmware_fit(result)
-        files = write_calibration(result, out, sources=sources, anyway=anyway, firmware=firmware)
-    data = {"files": [str(path) for path in files.paths], **numbers(result, firmware)}
-    return CommandResult(data, partial(_show, result, firmware, files.left_out), files.paths)
+        firmware = firmware_fit(calibration)
+        files = write_calibration(
+            calibration, out, sources=sources, anyway=anyway, firmware=firmware
+        )
+    record = {"files": [str(path) for path in files.paths], **numbers(calibration, firmware)}
+    return CommandResult(record, partial(_show, calibration, firmware, files.left_out), files.paths)
 
 
 def _prior(path: str) -> dict[str, float]:
@@ -112,13 +114,14 @@ def _prior(path: str) -> dict[str, float]:
     from pteron.toml import read_toml
 
     tolerances: dict[str, float] = {}
-    for name, value in read_toml(path, DataError, f"{path}: there is no such file").items():
-        if isinstance(value, bool) or not isinstance(value, int | float):
+    for name, tolerance in read_toml(path, DataError, f"{path}: there is no such file").items():
+        if isinstance(tolerance, bool) or not isinstance(tolerance, int | float):
             raise DataError(
-                f"{path}: {name} = {value!r}: a standard deviation in m or rad expected; a value's "
+                f"{path}: {name} = {tolerance!r}: a standard deviation in m or rad expected; a "
+                "value's "
                 'name stands in quotes, as in "zeros[2]" = 0.0001'
             )
-        tolerances[name] = float(value)
+        tolerances[name] = float(tolerance)
     return tolerances
 
 
@@ -172,7 +175,7 @@ def _level(text: str) -> Setup:
 
 
 def _plane_text(planned: Plan) -> str:
-    """Return over which plane heights are measured."""
+    """Return text that names the plane over which heights are measured."""
     plane = planned.plane
     if plane is None:
         return ""
@@ -192,42 +195,42 @@ def _region(planned: Plan) -> str:
         )
     ]
     if isinstance(region, Cylinder):
-        x, y = (f"{1e3 * value + 0.0:.4g}" for value in region.center[:2])
+        x, y = (f"{1e3 * coordinate + 0.0:.4g}" for coordinate in region.center[:2])
         disc = f"disc of radius {1e3 * region.radius:.0f} mm about x {x} mm, y {y} mm"
         return ", ".join([disc, *sides[2:]])
     return f"box, {', '.join(sides)}"
 
 
-def _show(result: Calibration, firmware: FirmwareFit | None, left_out: str) -> None:
+def _show(calibration: Calibration, firmware: FirmwareFit | None, left_out: str) -> None:
     """Print a verdict, what changed, what shows and what does not."""
     from pteron.report.calibration.values import notes
 
-    verdict, shown = result.verdict, result.observability
+    verdict, shown = calibration.verdict, calibration.observability
     color, more = GRADE_COLORS[verdict.grade], len(shown.weak) - _WEAK
     lines: list[str | Table] = [plain(verdict.reasons[0])]
     if firmware:
         lines += [_table(firmware.rows), plain(firmware.sentence)]
     show(
-        f"[bold {color}]{plain(result.drawn.name)}: {verdict.grade}[/bold {color}], "
-        f"{shown.determined_count} of {shown.columns} combinations of values determined",
+        f"[bold {color}]{plain(calibration.drawn.name)}: {verdict.grade}[/bold {color}], "
+        f"{shown.determined_count} of {shown.columns} combinations of errors determined",
         *lines,
-        _values(result),
-        *_errors(result),
+        _values(calibration),
+        *_errors(calibration),
         *map(plain, verdict.reasons[1:]),
         *(f"Not determined, kept as drawn: {plain(line)}" for line in shown.unseen),
         *(f"[yellow]Weakly determined:[/yellow] {plain(line)}" for line in shown.weak[:_WEAK]),
         *([f"{more} more weakly determined combinations are on the page."] if more > 0 else []),
-        *map(plain, notes(result)),
+        *map(plain, notes(calibration)),
         *(f"Next: {plain(step)}" for step in verdict.next_steps),
         *([f"[red]{plain(left_out)}[/red]"] if left_out else []),
     )
 
 
-def _values(result: Calibration) -> Table:
+def _values(calibration: Calibration) -> Table:
     """Return the table of the values that changed most, with a caption that counts the others."""
     from pteron.report.calibration import value_rows
 
-    rows = value_rows(result)
+    rows = value_rows(calibration)
     omitted = len(rows) - _MOST
     return _table(
         rows[:_MOST],
@@ -258,9 +261,9 @@ def _table(rows: Sequence[CalibrationRow], caption: str | None = None) -> Table:
     )
 
 
-def _errors(result: Calibration) -> list[Table]:
+def _errors(calibration: Calibration) -> list[Table]:
     """Return a table of errors (mm, mrad) of rows outside the fit, before and after; else none."""
-    held_out = result.held_out
+    held_out = calibration.held_out
     if held_out is None:
         return []
     from pteron.report.typeset import significant
@@ -268,8 +271,8 @@ def _errors(result: Calibration) -> list[Table]:
     numbers = ("before", "after", "expected")
     rows = []
     for kind in held_out.after:
-        values = (held_out.before[kind], held_out.after[kind], held_out.expected[kind])
+        errors = (held_out.before[kind], held_out.after[kind], held_out.expected[kind])
         unit = "mrad" if kind == "angle" else "mm"
-        rows.append((kind, *(ascii_number(significant(1e3 * value)) for value in values), unit))
+        rows.append((kind, *(ascii_number(significant(1e3 * value)) for value in errors), unit))
     caption = f"At {held_out.rows} rows held out of the fit; expected from noise and intervals."
     return [table("error", *numbers, "unit", rows=rows, numbers=numbers, caption=caption)]

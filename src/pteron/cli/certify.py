@@ -59,7 +59,7 @@ class RequestedProofs:
     type_ii: float | None
 
     @property
-    def any_requested(self) -> bool:
+    def has_requests(self) -> bool:
         """Whether there is anything to prove."""
         return self.certify or self.prove is not None
 
@@ -69,7 +69,7 @@ class RequestedProofs:
         return {"type_i": self.type_i or 0.0, "type_ii": self.type_ii or 0.0}
 
     def check(self, maps: Mapping[str, object], slice_: str | None) -> None:
-        """Refuse options that have no effect together, and numbers out of range."""
+        """Raise DataError on options that have no effect together, or numbers out of range."""
         numbers = {"tolerance": self.tolerance, "type-i": self.type_i, "type-ii": self.type_ii}
         if self.prove is not None:
             _expect_none({**maps, "slice": slice_, "certify": self.certify or None}, "--prove")
@@ -78,10 +78,10 @@ class RequestedProofs:
             _expect_none(maps, "--certify")
         else:
             _expect_none(numbers, "a map, but with --certify or --prove")
-        for name, value in numbers.items():
+        for name, number in numbers.items():
             least = "above 0" if name == "tolerance" else "of 0 or more"
-            if value is not None and not (value > 0.0 or (value == 0.0 and name != "tolerance")):
-                raise DataError(f"--{name}: {value:g} given, a number {least} expected")
+            if number is not None and not (number > 0.0 or (number == 0.0 and name != "tolerance")):
+                raise DataError(f"--{name}: {number:g} given, a number {least} expected")
 
     def result(self, robot: Manipulator, slice_: str | None, warnings: list[str]) -> CommandResult:
         """Run the proof and return its result; the exit code is 1 if a box is not proved."""
@@ -98,8 +98,8 @@ class RequestedProofs:
             proof = prove(robot, region, type_i=type_i, type_ii=type_ii, progress=bar)
         lines = [f"[bold]{plain(robot.name)}[/bold]: {_spans(robot, region)}", plain(str(proof))]
         lines += self._unsure if proof.holds else []
-        data = _proof(proof, self.floors) | {"warnings": warnings}
-        return CommandResult(data, lines, code=0 if proof.holds else _NOT_PROVED)
+        record = _proof(proof, self.floors) | {"warnings": warnings}
+        return CommandResult(record, lines, code=0 if proof.holds else _NOT_PROVED)
 
     @property
     def _unsure(self) -> list[str]:
@@ -114,13 +114,13 @@ class RequestedProofs:
         required = conditions(robot, **self.floors)
         with progress_bar(f"Proving how far {robot.name} leans") as bar:
             leans = largest_tilt(robot, pose, given=required, progress=bar)
-        data = {"robot": robot.name, "floors": self.floors, "tilt": leans.tilt}
+        record = {"robot": robot.name, "floors": self.floors, "tilt": leans.tilt}
         lines = [
             _heading(robot, dict(list(_angles(robot, pose).items())[2:]), self.floors),
             f"Proved: the platform can tilt by {math.degrees(leans.tilt):.4g} deg in all "
             "directions.",
         ]
-        return CommandResult(data | {"proved": True, "warnings": warnings}, lines + self._unsure)
+        return CommandResult(record | {"proved": True, "warnings": warnings}, lines + self._unsure)
 
     def _certify(self, robot: Manipulator, pose: Array, warnings: list[str]) -> CommandResult:
         """Prove bounds of the workspace's volume at a pose's angles, and its largest cube."""
@@ -145,9 +145,9 @@ class RequestedProofs:
 
 
 def _expect_none(options: Mapping[str, object], what: str) -> None:
-    """Refuse options that have no effect beside `what`."""
-    for name, value in options.items():
-        if value is not None and value != []:
+    """Raise DataError on options that have no effect beside `what`."""
+    for name, option in options.items():
+        if option is not None and option != []:
             raise DataError(f"--{name}: does not go with {what}")
 
 
@@ -245,7 +245,7 @@ def _show(paved: Paving, pose: Array, floors: dict[str, float], cube: Inscribed 
 def _heading(robot: Manipulator, angles: Mapping[str, float], floors: dict[str, float]) -> str:
     """Return the first line of a printout: the machine, the fixed angles, the nonzero floors."""
     where = ", ".join(pose_text(name, angle) for name, angle in angles.items())
-    minimums = ", ".join(f"{name} {value:g}" for name, value in floors.items() if value)
+    minimums = ", ".join(f"{name} {floor:g}" for name, floor in floors.items() if floor)
     text = f"[bold]{plain(robot.name)}[/bold]{f' at {where}' if where else ''}"
     return f"{text}, poses with at least {minimums}" if minimums else text
 
@@ -253,7 +253,7 @@ def _heading(robot: Manipulator, angles: Mapping[str, float], floors: dict[str, 
 def _angles(robot: Manipulator, pose: Array) -> dict[str, float]:
     """Return the angles (rad) of a pose by coordinate."""
     pairs = zip(robot.coordinates, pose.tolist(), strict=True)
-    return {name: value for name, value in pairs if name in robot.platform.angles}
+    return {name: angle for name, angle in pairs if name in robot.platform.angles}
 
 
 def _spans(robot: Manipulator, region: Box) -> str:

@@ -19,12 +19,7 @@ _NONE = 1
 """Exit code where no machine does the job."""
 
 
-def choose(
-    job: str,
-    *,
-    out: str | None = None,
-    workers: int = 1,
-) -> CommandResult:
+def choose(job: str, *, out: str | None = None, workers: int = 1) -> CommandResult:
     """Choose a machine for a job: which kind, which dimensions, which motors.
 
     The file states the requirements: workspace, payload, cycles, accuracy, stiffness, room, motors
@@ -81,8 +76,8 @@ def choose(
         from pteron.report.design.choice import write_choice
 
         files = write_choice(choice, out)
-    data = choice.as_dict() | ({"files": [str(file) for file in files]} if files else {})
-    return CommandResult(data, partial(_show, choice), files, _NONE if choice.best is None else 0)
+    record = choice.as_dict() | ({"files": [str(file) for file in files]} if files else {})
+    return CommandResult(record, partial(_show, choice), files, _NONE if choice.best is None else 0)
 
 
 class _Log:
@@ -125,9 +120,7 @@ def _show(choice: Choice) -> None:
     rows = {candidate.kind: candidate.figure_texts for candidate in serving}
     shown = list(dict.fromkeys(key for row in rows.values() for key in row))
     if serving:
-        table_rows = (
-            (kind, *(plain(row.get(n, "-")) for n in shown)) for kind, row in rows.items()
-        )
+        table_rows = ((k, *(plain(row.get(n, "-")) for n in shown)) for k, row in rows.items())
         show(table("kind", *shown, rows=table_rows, numbers=tuple(shown), names=("kind",)))
     for candidate in serving:
         show(

@@ -82,7 +82,7 @@ def cue(
         checked_page(page)
     options = scale, translation, return_speed, tilting, tilt_rate, rotation, smoothing
     named = zip((field.name for field in fields(Washout)), options, strict=True)
-    washout = Washout(**{name: value for name, value in named if value is not None})
+    washout = Washout(**{name: setting for name, setting in named if setting is not None})
     with spinner(f"Showing {motion} with {machine.name}"):
         cued = shown(machine, motion, washout=washout, type_ii=type_ii)
         largest = peaks(machine, cued.pose, cued.velocity, cued.acceleration, limits_of(machine))
@@ -92,7 +92,7 @@ def cue(
             note(f"Note: {peak.phrase()}; a smaller --scale asks less")
     low, high = cued.region.box
     box = np.stack([low, high], axis=-1).tolist()
-    data = {
+    record = {
         "robot": machine.name,
         "duration": cued.duration,
         "samples": len(cued.time),
@@ -108,7 +108,7 @@ def cue(
         f"Amplitudes are reduced by {percent(cued.pressed)} at most to keep the motion in the box.",
         peaks_table(largest),
     ]
-    return CommandResult(data, lines, files)
+    return CommandResult(record, lines, files)
 
 
 def _write(machine: Manipulator, cued: Cue, out: str | None, page: str | None) -> list[str]:

@@ -167,11 +167,11 @@ def cycle(
 
 
 def _expect_fitting(way: str, options: Mapping[str, object]) -> None:
-    """Refuse options of another kind of motion, and two that set its duration."""
+    """Raise DataError on options of another kind of motion, or two that set its duration."""
     if options["optimal"] and options["duration"] is not None:
         raise DataError("--duration and --optimal given; give one of them")
-    for name, value in options.items():
-        if value not in (None, False, 0.0) and way not in _KINDS_OF[name]:
+    for name, option in options.items():
+        if option not in (None, False, 0.0) and way not in _KINDS_OF[name]:
             raise DataError(
                 f"--{name}: has no use in a motion of kind {way}; leave it out, or give --kind "
                 f"{' or '.join(_KINDS_OF[name])}"
@@ -205,7 +205,7 @@ def _result(
 
         write_table(motion_frame(machine, motion), out)
     bound = getattr(motion, "polynomial", None)
-    data = {
+    record = {
         "robot": machine.name,
         "kind": way,
         **asdict(carried),
@@ -232,7 +232,7 @@ def _result(
         text += f"; without --optimal the same path takes {bound:.4g} s"
     text += f". Travel: {travel_text(machine, motion)}."
     return CommandResult(
-        data, partial(_show, [text, peaks_table(largest)], out), [out] if out else []
+        record, partial(_show, [text, peaks_table(largest)], out), [out] if out else []
     )
 
 

@@ -85,8 +85,8 @@ def design(
         from pteron.report.design.front import write_front
 
         files = write_front(summary, out)
-    data = summary.as_dict() | ({"files": [str(file) for file in files]} if files else {})
-    return CommandResult(data, partial(_show, summary), files)
+    record = summary.as_dict() | ({"files": [str(file) for file in files]} if files else {})
+    return CommandResult(record, partial(_show, summary), files)
 
 
 def _tell_resumed(folder: Path) -> None:

@@ -244,7 +244,7 @@ def _result(
     files: list[Path] = []
     if out is not None:
         files = excitation.write(out, rate, series.periods, file.layout, cycles, slow)
-    data = {
+    record = {
         **excitation.as_dict(),
         "start": led.start,
         "end": led.end,
@@ -269,7 +269,7 @@ def _result(
             f"Slow motion: the same path in {slow.duration:g} s, for friction that falls with "
             "speed."
         )
-    return CommandResult(data, lines, files)
+    return CommandResult(record, lines, files)
 
 
 def _held_out_cycles(excitation: Excitation, rate: float) -> RepeatedCycle | None:
@@ -298,9 +298,9 @@ def _quality(excitation: Excitation) -> Table:
     return table(title, *headings, rows=rows, numbers=headings, caption=caption)
 
 
-def _number(value: float, digits: int) -> str:
+def _number(number: float, digits: int) -> str:
     """Return a number with significant digits, or `-` where it is not finite."""
-    return significant(value, digits) if math.isfinite(value) else "-"
+    return significant(number, digits) if math.isfinite(number) else "-"
 
 
 def _clearance_sentence(

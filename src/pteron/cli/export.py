@@ -153,7 +153,7 @@ def _export_target(machine: Manipulator, target: str, folder: str) -> list[Path]
 
 
 def _check(targets: dict[str, str], options: list[str], tool: str | None) -> None:
-    """Refuse no target, or several (but C with Structured Text), and options of another target."""
+    """Raise DataError on no target, several (but C with Structured Text), or others' options."""
     if not targets:
         names = ", ".join(f"--{name}" for name in (*_TARGETS, "target"))
         raise DataError(f"{names}: none given; say what to write, such as --c controller")

@@ -63,7 +63,7 @@ def film(
     look: dict[str, Any] = {"fps": fps, "speed": speed, "size": sides, "turns": turns}
     with progress_bar(f"Filming {machine.name}") as tell:
         written = filmed(machine, motion, out, **look, forces=drawn, progress=tell)
-    data = {
+    record = {
         "robot": machine.name,
         "cycle": cycle,
         **json_fields(
@@ -80,7 +80,7 @@ def film(
         f"{plain(machine.name)}: {motion.duration:.4g} s of motion {pace}; the film has "
         f"{written.duration:.3g} s, {written.frames} frames of {written.size[0]}x{written.size[1]}"
     )
-    return CommandResult(data, [summary], [written.path])
+    return CommandResult(record, [summary], [written.path])
 
 
 def _expect_ffmpeg(options: dict[str, Any]) -> None:

@@ -137,14 +137,14 @@ def identify(
         times = Times(tell)
         model: dict[str, Any] = {"terms": terms, "shared": shared, "cad": drawn, "bounds": bounds}
         how: dict[str, Any] = {"estimator": estimator, "processing": processing}
-        result = identified(machine, fit, held_out=check, **model, **how, progress=times)
+        identification = identified(machine, fit, held_out=check, **model, **how, progress=times)
     with spinner("Drawing the report"):
         times.begin("Drawing the report")
-        files = write_identification(result, folder, sources=sources)
+        files = write_identification(identification, folder, sources=sources)
     if is_terminal():
         note(times.summary())
-    data = {"files": [str(path) for path in files.paths], **numbers(result)}
-    return CommandResult(data, partial(_show, result), files.paths)
+    record = {"files": [str(path) for path in files.paths], **numbers(identification)}
+    return CommandResult(record, partial(_show, identification), files.paths)
 
 
 def _speeds(text: str | None) -> tuple[float, ...] | Literal["auto"] | None:
@@ -206,32 +206,32 @@ def _box(text: str) -> tuple[str, Box]:
     return body.strip(), ((x0, x1), (y0, y1))
 
 
-def _show(result: Identification) -> None:
+def _show(fit: Identification) -> None:
     """Print the verdict, the errors, the values, the findings in the logs, and the files."""
-    verdict = result.verdict
-    worst = max(float(prediction.nrms.max()) for prediction in result.held_out)
+    verdict = fit.verdict
+    worst = max(float(prediction.nrms.max()) for prediction in fit.held_out)
     color = GRADE_COLORS[verdict.grade]
     show(
-        f"[bold {color}]{plain(result.robot.name)}: {verdict.grade}[/bold {color}]; error of the "
+        f"[bold {color}]{plain(fit.robot.name)}: {verdict.grade}[/bold {color}]; error of the "
         f"forces predicted in held-out data: up to {worst:.3g} % (NRMS)",
-        _errors(result),
+        _errors(fit),
         *map(plain, verdict.reasons),
-        _values(result),
+        _values(fit),
         f"{SYMBOLS} Fc is dry and Fv viscous friction of a drive.",
-        *map(plain, _bodies(result)),
-        *_payload(result),
+        *map(plain, _bodies(fit)),
+        *_payload(fit),
         *(f"Next: {plain(step)}" for step in verdict.next_steps),
-        *(f"[yellow]Note:[/yellow] {plain(finding.message)}" for finding in result.findings),
+        *(f"[yellow]Note:[/yellow] {plain(finding.message)}" for finding in fit.findings),
     )
 
 
-def _errors(result: Identification) -> Table:
+def _errors(fit: Identification) -> Table:
     """Return a table of each actuator's NRMS of prediction (%), its noise, and no friction."""
     columns = ("error (%)", "noise alone (%)", "without friction terms (%)")
     headings = columns[: 2 if _narrow() else 3]
     rows = []
-    for prediction in result.held_out:
-        where = f" in {prediction.source}" if len(result.held_out) > 1 else ""
+    for prediction in fit.held_out:
+        where = f" in {prediction.source}" if len(fit.held_out) > 1 else ""
         errors = prediction.nrms, prediction.floor, prediction.nrms_without_friction
         for i, values in enumerate(zip(*errors[: len(headings)], strict=True), start=1):
             cells = (significant(v) if v >= 0.01 else "< 0.01" for v in values)
@@ -240,37 +240,37 @@ def _errors(result: Identification) -> Table:
     return table("actuator", *headings, rows=rows, numbers=headings, caption=caption)
 
 
-def _values(result: Identification) -> Table:
+def _values(fit: Identification) -> Table:
     """Return a table of base parameters with 95 % half-widths (absolute, and relative in %)."""
     from pteron.report.identification import parameter_rows, value_with_uncertainty
 
-    short = result.has_understated_errors
+    short = fit.has_understated_errors
     headings = ("value", "+- (95 %, too short)" if short else "+- (95 %)", "+- in %")
     numbers = headings[: 2 if _narrow() else 3]
     columns = ["parameter", *numbers, *(() if _narrow() else ("unit",)), ""]
     caption = "Base parameters are sums, named by their first term; the page has them in full."
-    negative = [row.name for row in parameter_rows(result) if row.unit == "kg" and row.value < 0.0]
+    negative = [row.name for row in parameter_rows(fit) if row.unit == "kg" and row.value < 0.0]
     if negative:
         caption += f" A sum that subtracts masses may be negative, such as {negative[0]}."
     if short:
         caption += " Too short: the intervals do not allow for the faults named above."
-    if result.essential.dropped:
+    if fit.essential.dropped:
         caption += " Weak: not significantly different from 0."
     value_table = table(*columns, numbers=numbers, caption=caption)
     marks = {"essential": "", "dropped": "[yellow]weak[/]", "unseen": "[yellow]unseen[/]"}
-    for row in parameter_rows(result):
-        value, half = map(ascii_number, value_with_uncertainty(row.value, row.half))
+    for row in parameter_rows(fit):
+        estimate, half = map(ascii_number, value_with_uncertainty(row.value, row.half))
         relative = "> 999" if row.relative >= 9.995 else significant(100.0 * row.relative, 2)
         further_cells = () if _narrow() else (relative, row.unit)
-        value_table.add_row(plain(row.name), value, half, *further_cells, marks[row.status])
+        value_table.add_row(plain(row.name), estimate, half, *further_cells, marks[row.status])
     return value_table
 
 
-def _payload(result: Identification) -> list[str]:
+def _payload(fit: Identification) -> list[str]:
     """Return lines with the payload as arguments of a controller and of other commands."""
     from pteron.identification.payload import payload_in
 
-    payload = payload_in(result)
+    payload = payload_in(fit)
     if payload is None:
         return []
     if not (payload.real and payload.is_significant):
@@ -278,7 +278,7 @@ def _payload(result: Identification) -> list[str]:
             "No real body has this payload, or it does not act on the forces: record longer, or "
             "faster."
         ]
-    return [plain(f"The payload: {payload.call(result.robot)}")]
+    return [plain(f"The payload: {payload.call(fit.robot)}")]
 
 
 def _narrow() -> bool:
@@ -286,11 +286,11 @@ def _narrow() -> bool:
     return get_terminal_size().columns < _NARROW
 
 
-def _bodies(result: Identification) -> tuple[str, ...]:
+def _bodies(fit: Identification) -> tuple[str, ...]:
     """Return sentences: whether real bodies have these parameters, the CAD model, and notes."""
-    consistency = result.consistency
+    consistency = fit.consistency
     if consistency is None:
-        return result.notes
+        return fit.notes
     at_border = ", ".join(consistency.at_border)
     border = f"; at the limit of consistency: {at_border}" if at_border else ""
     lines = [f"Physically consistent: real bodies can have exactly these base parameters{border}."]
@@ -300,4 +300,4 @@ def _bodies(result: Identification) -> tuple[str, ...]:
     if not consistency.cad_feasible:
         violations = "; ".join(consistency.cad_violations)
         lines.append(f"The CAD model itself is physically inconsistent: {violations}.")
-    return (*lines, *result.notes)
+    return (*lines, *fit.notes)

@@ -67,12 +67,12 @@ def inverse(
         on_failure,
     )
     _note_limits(machine, from_readings(machine, joints))
-    result = rows.table.with_columns(dict(zip(added, joints.T, strict=True)))
+    with_joints = rows.table.with_columns(dict(zip(added, joints.T, strict=True)))
     name = plain(machine.name)
     joints_text = dict.fromkeys(f"{leg.joint.noun} {leg.joint.coordinate}" for leg in machine.legs)
     nouns = ", ".join(joints_text)
     caption = f"[bold]{name}[/bold]: coordinates of the actuated joints ({nouns})"
-    deliver(machine, result, added, out=out, as_json=json, caption=caption, single=rows.single)
+    deliver(machine, with_joints, added, out=out, as_json=json, caption=caption, single=rows.single)
 
 
 def direct(
@@ -114,20 +114,20 @@ def direct(
     check_destination(out, table, rows.table, added)
     poses = rows.evaluate(
         machine,
-        lambda values: direct_kinematics(
-            machine, from_readings(machine, values), on_failure=failure
+        lambda joint_rows: direct_kinematics(
+            machine, from_readings(machine, joint_rows), on_failure=failure
         ),
         columns,
         failure,
     )
     _note_limits(machine, from_readings(machine, rows.table.numbers(columns, failure)))
-    result = _modes(rows.table, poses, machine.coordinates)
+    with_poses = _modes(rows.table, poses, machine.coordinates)
     shown = added[1:] if rows.single else added
     caption = (
         f"[bold]{plain(machine.name)}[/bold]: all poses with these joint coordinates, one for each "
         "assembly mode"
     )
-    deliver(machine, result, shown, out=out, as_json=json, caption=caption)
+    deliver(machine, with_poses, shown, out=out, as_json=json, caption=caption)
 
 
 def _note_limits(machine: Manipulator, joints: NDArray[Any]) -> None:
@@ -238,10 +238,10 @@ def forces(
     limiting = ("max_force", "max_speed", "curve", "winding")
     limited = any(getattr(leg.drive, key, None) for leg in machine.legs for key in limiting)
 
-    def serve(values: NDArray[Any]) -> NDArray[Any]:
+    def serve(states: NDArray[Any]) -> NDArray[Any]:
         """Return forces to deliver, and forces and rates to hold against the drives' limits."""
         # A wrench has six components where the platform tilts.
-        parts = np.split(values, [k for k in (m, 2 * m, 3 * m) if k < len(columns)], axis=-1)
+        parts = np.split(states, [k for k in (m, 2 * m, 3 * m) if k < len(columns)], axis=-1)
         if not (drives or limited):
             return inverse_dynamics(machine, *parts, on_failure=on_failure)
         driven = drive_forces(machine, *parts, on_failure=on_failure)
@@ -255,14 +255,14 @@ def forces(
     _note_limits(machine, inverse_kinematics(machine, poses, on_failure="nan"))
     for text in overloads(machine, served[:, n : 2 * n], served[:, 2 * n :]) if limited else ():
         note(f"Note: {text}")
-    result = rows.table.with_columns(dict(zip(added, delivered.T, strict=True)))
+    with_forces = rows.table.with_columns(dict(zip(added, delivered.T, strict=True)))
     terms = (
         "drives, with friction and the motors' inertia"
         if drives
         else "actuated joints for the bodies alone; --drives adds friction and the motors' inertia"
     )
     caption = f"[bold]{plain(machine.name)}[/bold]: forces of the {terms}"
-    deliver(machine, result, added, out=out, as_json=json, caption=caption, single=rows.single)
+    deliver(machine, with_forces, added, out=out, as_json=json, caption=caption, single=rows.single)
 
 
 def _typed_row(typed: list[str | None], motion: list[str], loads: tuple[str, ...]) -> TableRows:
@@ -271,11 +271,11 @@ def _typed_row(typed: list[str | None], motion: list[str], loads: tuple[str, ...
     if typed[0] is None:
         raise DataError(f"no pose given; give --pose with {' '.join(motion[:m])}, or --table FILE")
     names: list[str] = []
-    values: list[float] = []
+    numbers: list[float] = []
     parts = (motion[:m], motion[m : 2 * m], motion[2 * m :], loads)
     for name, text, part in zip(MOTION, typed, parts, strict=True):
         if text is None and name == "--wrench":
             continue
         names += part
-        values += [0.0] * len(part) if text is None else parsed_numbers([text], part, name)
-    return single_row(names, values)
+        numbers += [0.0] * len(part) if text is None else parsed_numbers([text], part, name)
+    return single_row(names, numbers)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from typer import Exit
 
-from pteron.cli.arguments import load_robot, signs, split_numbers
+from pteron.cli.arguments import elbows_text, load_robot, split_numbers
 from pteron.cli.progress import spinner
 from pteron.cli.result import CommandResult
 from pteron.cli.terminal import complain, plain, show, table, warn, write
@@ -130,18 +130,18 @@ def new(
         "stock": _stocks(mass_from),
         "platform_mass": platform_mass,
     }
-    dimensions = {key: value for key, value in dimensions.items() if value not in (None, {})}
+    dimensions = {key: size for key, size in dimensions.items() if size not in (None, {})}
     if out is not None and Path(out).exists() and not overwrite:
         raise OutputError(f"{out}: is there already; name another file, or say --overwrite")
     text = commented_text(kind, dimensions)
     if out is not None:
         write_text(out, text)
-    data = {"kind": kind, "file": out, "text": text}
+    record = {"kind": kind, "file": out, "text": text}
     if out is None:
-        return CommandResult(data, partial(write, text))
+        return CommandResult(record, partial(write, text))
     written = f"Written: {plain(out)}. Put in your numbers, then: pteron check {plain(out)}"
     return CommandResult(
-        data, [written, *map(plain, kept_numbers_sentence(load(kind), dimensions))]
+        record, [written, *map(plain, kept_numbers_sentence(load(kind), dimensions))]
     )
 
 
@@ -161,7 +161,7 @@ def _machine(robot: Manipulator) -> dict[str, Any]:
         "motion": robot.platform.motion,
         "coordinates": list(robot.coordinates),
         "types": list(dict.fromkeys(leg.type for leg in robot.legs)),
-        "working_mode": signs(robot),
+        "working_mode": elbows_text(robot),
     }
 
 
@@ -277,7 +277,7 @@ def _show(robot: Manipulator, findings: dict[str, Any], further: str) -> None:
     counts = re.findall(r"(\d)([TR])", robot.platform.motion)
     nouns = {"T": "translation", "R": "rotation"}
     bends = any(len(leg.branches) > 1 for leg in robot.legs)
-    elbows = f", elbow signs {signs(robot)} (side to which each leg bends)" * bends
+    elbows = f", elbow signs {elbows_text(robot)} (side to which each leg bends)" * bends
     freedoms = " and ".join(f"{n} {nouns[letter]}{'s' * (n != '1')}" for n, letter in counts)
     show(
         f"[bold]{plain(robot.name)}[/bold]: {_verdict(findings)}",
@@ -421,7 +421,7 @@ def _passive(joints: list[dict[str, Any]]) -> list[Table]:
 
     rows: dict[tuple[str, str, str], list[str]] = {}
     for joint in (joint for joint in joints if not joint["actuated"]):
-        limits = LimitedJoint(**joint).limits_text(lambda value, unit: f"{value:.4g}")
+        limits = LimitedJoint(**joint).limits_text(lambda coordinate, unit: f"{coordinate:.4g}")
         at, unit = f"{round(joint['value'], 4) + 0.0:g}", joint["unit"]
         legs = rows.setdefault((joint["noun"], f"{at} {unit}", f"{limits} {unit}"), [])
         legs += [str(joint["leg"])] if joint["leg"] else []
@@ -430,6 +430,6 @@ def _passive(joints: list[dict[str, Any]]) -> list[Table]:
     return [table(*headings, rows=cells, numbers=("at home",))] if rows else []
 
 
-def _vector(values: Any, places: int = 4) -> str:
+def _vector(components: Any, places: int = 4) -> str:
     """Return numbers as text in parentheses, rounded to decimal places."""
-    return f"({', '.join(f'{round(value, places) + 0.0:g}' for value in values)})"
+    return f"({', '.join(f'{round(component, places) + 0.0:g}' for component in components)})"

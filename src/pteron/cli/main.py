@@ -174,10 +174,8 @@ class Commands(Mapping[str, Any]):
     def __getitem__(self, name: str) -> Any:
         if name not in self._made:
             panel, function = self._panels[name]
-            cls, command = (
-                NumbersCommand if function in _NUMERIC else Command,
-                parsed_command(function, general=function in _GENERAL),
-            )
+            cls = NumbersCommand if function in _NUMERIC else Command
+            command = parsed_command(function, general=function in _GENERAL)
             alone = Typer(add_completion=False, **_LOOKS)
             alone.command(cls=cls, rich_help_panel=panel, **help_of(command))(command)
             self._made[name] = get_command(alone)

@@ -66,24 +66,25 @@ def _index_data(index_map: Map, name: str) -> dict[str, Any]:
     return about | fields_as_json(summary, _SUMMARY, "poses=count undetermined=infinite")
 
 
-def map_rows(data: Mapping[str, Any]) -> Any:
-    """Return a table of the indices, a row each."""
+def map_rows(record: Mapping[str, Any]) -> Any:
+    """Return the JSON data of a map as a table with a row for each index."""
     import polars as pl
 
     from pteron.platforms.coordinates import COORDINATES
 
-    names = sorted([*data["held"], *(a["name"] for a in data["varies"])], key=[*COORDINATES].index)
+    varied = (axis["name"] for axis in record["varies"])
+    names = sorted([*record["held"], *varied], key=[*COORDINATES].index)
     rows = []
-    for index in data["indices"]:
+    for index in record["indices"]:
         row = {key: index[key] for key in ("index", "unit", "best", "worst", "mean", "median")}
         for side in ("best", "worst"):
             pose = index[f"{side}_pose"] or [None] * len(names)
-            row |= {f"{side}_{name}": value for name, value in zip(names, pose, strict=True)}
+            row |= {f"{side}_{name}": q for name, q in zip(names, pose, strict=True)}
         rows.append(row)
     return pl.DataFrame(rows, infer_schema_length=None)
 
 
-def show_map(index_map: Map, volume: ReachVolume | None, data: Mapping[str, Any]) -> None:
+def show_map(index_map: Map, volume: ReachVolume | None, record: Mapping[str, Any]) -> None:
     """Print for a person: the reach, what ends it, and each index."""
     from pteron.platforms.coordinates import are_angles, coordinate
 
@@ -116,7 +117,7 @@ def show_map(index_map: Map, volume: ReachVolume | None, data: Mapping[str, Any]
     units = "m and rad" if are_angles(coordinates).any() else "m"
     where = f"at {' '.join(coordinates)} ({units})"
     index_table = table("index", "", "value", where, numbers=("value",))
-    for index in data["indices"]:
+    for index in record["indices"]:
         unit = f" ({index['unit']})" if index["unit"] else ""
         named = plain(f"{index['index']}{unit}")
         if index["best"] is None:
@@ -135,5 +136,5 @@ def show_map(index_map: Map, volume: ReachVolume | None, data: Mapping[str, Any]
             share = index["undetermined"] / index_map.grid.size
             index_table.add_row("", "singular", "-", f"{percent(share)} of the poses")
     better = {"less": "smaller is better", "more": "larger is better"}
-    legend = (f"{i['index']}: {i['title']}, {better[i['better']]}" for i in data["indices"])
+    legend = (f"{i['index']}: {i['title']}, {better[i['better']]}" for i in record["indices"])
     show(*lines, index_table, *map(plain, legend))

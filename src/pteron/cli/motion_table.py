@@ -81,8 +81,8 @@ def motion_frame(machine: Manipulator, motion: Motion) -> pl.DataFrame:
     )
     for names, parts in ((machine.coordinates, path), (machine.joint_names, joints)):
         for order, part in zip(("", "d", "dd"), parts, strict=True):
-            for name, values in zip(names, part.T, strict=True):
-                columns[f"{order}{name}"] = np.asarray(values + 0.0)
+            for name, column in zip(names, part.T, strict=True):
+                columns[f"{order}{name}"] = np.asarray(column + 0.0)
     forces = drive_forces(machine, *path) * scales
     columns.update(zip(machine.force_names, forces.T, strict=True))
     return pl.DataFrame(columns)

@@ -60,7 +60,7 @@ def common_table(robot: Manipulator, fits: Sequence[CommonFit]) -> list[rich.tab
 
 
 def _alone(fit: MotorFit) -> CommonFit:
-    """Return a leg's fit of a motor as the common fit of this leg alone."""
+    """Return one leg's fit of a motor as a common fit of that leg alone."""
     from pteron.motion import CommonFit
 
     return CommonFit((fit.leg,), fit.motor, fit.span, fit.ratio, (fit,))

@@ -92,22 +92,22 @@ def parsed_command(
     options.setdefault("json", _option("json", bool, default=False))
 
     @wraps(command)
-    def run(**values: Any) -> None:
+    def run(**chosen: Any) -> None:
         """Run the command with the values of its options and the machine of its file, if any."""
-        passed = {name: value for name, value in values.items() if name in arguments}
+        passed = {name: argument for name, argument in chosen.items() if name in arguments}
         if "before" in vars(command):  # a missing extra is told before a machine is read
             vars(command)["before"](passed)
         if "carried" in arguments:
-            passed["carried"] = Carried.from_options(values["payload"], values["tool"])
+            passed["carried"] = Carried.from_options(chosen["payload"], chosen["tool"])
         for name, group in groups.items():
-            passed[name] = group(**{field.name: values[field.name] for field in fields(group)})
+            passed[name] = group(**{field.name: chosen[field.name] for field in fields(group)})
         if "machine" in arguments:
             quiet = "warns" in vars(command)  # the command tells the file's warnings itself
-            passed["machine"] = load_robot(values["robot"], values["elbows"], quiet=quiet)
+            passed["machine"] = load_robot(chosen["robot"], chosen["elbows"], quiet=quiet)
         with _share_programs() if general else nullcontext():
             outcome = command(**passed)
             if outcome is not None:
-                outcome.tell(as_json=values["json"])
+                outcome.tell(as_json=chosen["json"])
 
     run.__dict__["__signature__"] = Signature(list(options.values()))
     run.__annotations__ = {name: option.annotation for name, option in options.items()}

@@ -58,7 +58,7 @@ def play(
         playback = _playback(machine, motion or cycle or STANDARD)
         page = write_motion_page(machine, playback, out)
     samples, size = len(playback.motion.time), page.stat().st_size
-    data = {
+    record = {
         "robot": machine.name,
         "page": str(page),
         "bytes": size,
@@ -71,7 +71,7 @@ def play(
     duration = playback.motion.duration
     summary = f"{plain(machine.name)}, {shown}: {duration:.4g} s, {samples} samples"
     written = f"Written: {plain(str(page))}, {size / 1e6:.1f} MB (open it in a browser)"
-    return CommandResult(data, [summary, written])
+    return CommandResult(record, [summary, written])
 
 
 def _playback(machine: Manipulator, motion: str) -> Playback:

@@ -21,11 +21,7 @@ _SERIES = ("time", "pose", "velocity", "acceleration", "forces")
 
 
 def report(
-    machine: MachineArgument,
-    *,
-    out: str,
-    motion: str | None = None,
-    carried: Carried,
+    machine: MachineArgument, *, out: str, motion: str | None = None, carried: Carried
 ) -> CommandResult:
     """Write a report on a machine: one HTML page with figures, and its numbers.
 
@@ -51,7 +47,7 @@ def report(
         page = write_report(machine, out, motion=shown)
     contents = json.loads((page.parent / "report.json").read_text(encoding="utf-8"))
     warn([*contents["doubts"], *contents["cycle"]["overloads"]])
-    cycle = {key: value for key, value in contents["cycle"].items() if key not in _SERIES}
+    cycle = {key: series for key, series in contents["cycle"].items() if key not in _SERIES}
     tables = _machine(contents), _legs(contents["cycle"], contents["joints"])
     lines = [*tables, f"Written: {plain(str(page))} (open it in a browser)"]
     return CommandResult({"page": str(page), **contents, **asdict(carried), "cycle": cycle}, lines)

@@ -124,11 +124,11 @@ def simulate(
     warn(overloads)
     if simulation.stopped:
         note(f"Stopped {simulation.stopped}")
-    data = _data(simulation, law_name, cycle, carried)
-    person = partial(_tell, simulation, data, carried, out)
+    record = _data(simulation, law_name, cycle, carried)
+    person = partial(_tell, simulation, record, carried, out)
     code = _ENDED if simulation.stopped else 0
     return destination.deliver(
-        simulation.table(), data, partial(_pictures, simulation), person, code
+        simulation.table(), record, partial(_pictures, simulation), person, code
     )
 
 
@@ -208,10 +208,12 @@ def _pictures(simulation: Simulation) -> dict[str, str]:
     return {"tracking.svg": svg_file(tracking), "forces.svg": svg_file(forces)}
 
 
-def _tell(simulation: Simulation, data: dict[str, Any], carried: Carried, out: str | None) -> None:
+def _tell(
+    simulation: Simulation, record: dict[str, Any], carried: Carried, out: str | None
+) -> None:
     """Print for a person; without --out a pipe gets the table."""
     if is_terminal() or out is not None:
-        _show(simulation, data, carried)
+        _show(simulation, record, carried)
     else:
         write(simulation.table().write_csv())
 
@@ -221,16 +223,16 @@ def _micro_text(error: float, unit: str) -> str:
     return f"{significant(1e6 * error)} u{unit}" if error >= 1e-9 else f"< 0.001 u{unit}"
 
 
-def _show(simulation: Simulation, data: dict[str, Any], carried: Carried) -> None:
+def _show(simulation: Simulation, record: dict[str, Any], carried: Carried) -> None:
     """Print tables of the tracking errors and of the drives' loads."""
     robot = simulation.robot
-    steps = "DOP853" if data["step"] is None else f"steps of {data['step'] * 1e3:.3g} ms"
+    steps = "DOP853" if record["step"] is None else f"steps of {record['step'] * 1e3:.3g} ms"
     errors = (
         (row["coordinate"], *(_micro_text(row[key], unit) for key in ("largest", "rms")))
-        for row, unit in zip(data["tracking"], robot.units, strict=True)
+        for row, unit in zip(record["tracking"], robot.units, strict=True)
     )
     drives = []
-    for leg, row in zip(robot.legs, data["drives"], strict=True):
+    for leg, row in zip(robot.legs, record["drives"], strict=True):
         force, speed = leg.joint.force_unit, f"{leg.joint.unit}/s"
         units = {"peak_force": force, "rms_force": force, "peak_speed": speed, "peak_power": "W"}
         sizes = (f"{significant(row[key])} {unit}" for key, unit in units.items())
@@ -243,8 +245,8 @@ def _show(simulation: Simulation, data: dict[str, Any], carried: Carried) -> Non
     end = "stopped early" if simulation.stopped else "completed"
     show(
         f"[bold]{plain(robot.name)}[/bold]{plain(str(carried))}, "
-        f"{plain(cycle_text(data['cycle']))} {end}: {data['duration']:.4g} s in {steps}, "
-        f"controller {plain(data['controller'])}",
+        f"{plain(cycle_text(record['cycle']))} {end}: {record['duration']:.4g} s in {steps}, "
+        f"controller {plain(record['controller'])}",
         table("tracking error", "largest", "RMS", rows=errors, numbers=("largest", "RMS")),
         table(*names, rows=drives, numbers=names),
     )

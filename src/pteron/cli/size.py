@@ -263,10 +263,10 @@ def _energy(sizing: Sizing, share: float) -> list[str]:
     if sizing.assumed_friction.any():
         units = [leg.joint.force_unit for leg in sizing.robot.legs]
         forces = zip(sizing.assumed_friction, units, strict=True)
-        values = ", ".join(f"{force:.3g} {unit}" if force else "-" for force, unit in forces)
+        texts = ", ".join(f"{force:.3g} {unit}" if force else "-" for force, unit in forces)
         lines.append(
             f"Where the file has no friction, dry friction of {percent(share)} of the drive's peak "
-            f"is assumed, leg by leg: {values} (--friction SHARE; 0 leaves it out)"
+            f"is assumed, leg by leg: {texts} (--friction SHARE; 0 leaves it out)"
         )
     return lines
 

@@ -106,9 +106,9 @@ def write(text: str) -> None:
         sys.stdout.write(text[start : start + _PIECE])
 
 
-def show_json(data: Any) -> None:
+def show_json(record: Any) -> None:
     """Print data on standard output as JSON, with null for NaN and infinity."""
-    write(json.dumps(json_ready(data), indent=2, allow_nan=False) + "\n")
+    write(json.dumps(json_ready(record), indent=2, allow_nan=False) + "\n")
 
 
 def table(

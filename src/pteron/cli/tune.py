@@ -110,7 +110,7 @@ def tune(
             stiffnesses=_STIFFNESSES if bends(machine) else (),
             **how,
         )
-    data = {
+    record = {
         "robot": machine.name,
         "cycle": cycle,
         "controller": controller,
@@ -122,7 +122,7 @@ def tune(
         "trials": tried.to_dicts(),
     }
     person = partial(_show, tuning, controller, tried)
-    return destination.deliver(tuning.table(), data, partial(_files, tuning, tried), person)
+    return destination.deliver(tuning.table(), record, partial(_files, tuning, tried), person)
 
 
 def _files(tuning: Tuning, tried: pl.DataFrame) -> dict[str, str]:

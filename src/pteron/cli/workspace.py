@@ -112,7 +112,7 @@ def workspace(
     other = {"scheduler": scheduler, "engine": None if engine == "auto" else engine}
     proofs.check({**maps, **other}, slice_)
     warnings = _warnings(machine)
-    if proofs.any_requested:
+    if proofs.has_requests:
         return proofs.result(machine, slice_, warnings)
     from pteron.maps import map_index
 
@@ -144,18 +144,18 @@ def workspace(
         )
     if out is not None and ending in (*_PICTURES, *_FILMS):
         _draw(index_map, out, ending)
-    data = map_data(index_map, volume, [*warnings, *outside], out)
-    return CommandResult(data, partial(_show, index_map, volume, data, out))
+    record = map_data(index_map, volume, [*warnings, *outside], out)
+    return CommandResult(record, partial(_show, index_map, volume, record, out))
 
 
 def _show(
-    index_map: Map, volume: ReachVolume | None, data: dict[str, Any], out: str | None
+    index_map: Map, volume: ReachVolume | None, record: dict[str, Any], out: str | None
 ) -> None:
     """Print a map on a terminal, or write its rows as CSV to a pipe; then list the files."""
     if is_terminal():
-        show_map(index_map, volume, data)
+        show_map(index_map, volume, record)
     else:
-        write(map_rows(data).write_csv())
+        write(map_rows(record).write_csv())
     if out is not None:
         (show if is_terminal() else note)(*file_lines(out))
 
@@ -239,7 +239,7 @@ def _home(robot: Manipulator, names: Collection[str]) -> dict[str, float]:
     from pteron.workspace import home_pose
 
     pairs = zip(robot.coordinates, home_pose(robot).tolist(), strict=True)
-    return {name: value for name, value in pairs if name in names}
+    return {name: coordinate for name, coordinate in pairs if name in names}
 
 
 def _with_frames(grid: Grid) -> Grid:

@@ -28,9 +28,9 @@ _EQUAL = 1e-3
 def advice_on_hidden_values(
     base: BaseParameters, hidden: Sequence[str], *, clean: bool
 ) -> list[str]:
-    """Return advice on values that a motion does not show: shared legs, or more motion.
+    """Return advice on base parameters that a motion does not show: shared legs, or more motion.
 
-    Fewer values leave less room for a fault: legs are to be shared in a log that is `clean`.
+    Sharing is advised only for a log that is `clean`: fewer parameters absorb less of a fault.
     """
     robot, advice = base.robot, []
     if clean and not any(len(p.legs) > 1 for p in base.parameters) and _has_equal_legs(robot):
@@ -49,13 +49,13 @@ def advice_on_hidden_values(
 def _has_equal_legs(robot: Manipulator) -> bool:
     """Return whether all legs have the same kind and the same inertial parameters as drawn."""
     groups: dict[tuple[str, str], list[float]] = {}
-    for parameter, value in zip(parameter_data(robot), parameters(robot).tolist(), strict=True):
+    for parameter, size in zip(parameter_data(robot), parameters(robot).tolist(), strict=True):
         if parameter.legs:
-            groups.setdefault((parameter.kind, parameter.body), []).append(value)
+            groups.setdefault((parameter.kind, parameter.body), []).append(size)
     legs = len(robot.legs)
     return all(
-        len(values) == legs and np.ptp(values) <= _EQUAL * np.max(np.abs(values))
-        for values in groups.values()
+        len(group) == legs and np.ptp(group) <= _EQUAL * np.max(np.abs(group))
+        for group in groups.values()
     )
 
 

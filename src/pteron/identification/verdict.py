@@ -124,7 +124,7 @@ def verdict_of(
     factor: float = 1.0,
     hidden_orders: str = "",
     followed: frozenset[str] = frozenset(),
-    left: str = "",
+    residual_cause: str = "",
 ) -> Verdict:
     """Return the verdict on a model.
 
@@ -146,7 +146,7 @@ def verdict_of(
         A sentence on orders of the legs that the logs do not show; empty without any.
     followed : frozenset of str
         Options whose advice is followed already, and not given again.
-    left : str
+    residual_cause : str
         How far what the model leaves is above the noise, said where no cause shows.
     """
     opinion = Opinion()
@@ -165,8 +165,9 @@ def verdict_of(
         opinion.lower(part.grade)
         opinion.reasons += part.reasons
         opinion.steps += part.steps
-    if left and opinion.grade != "trustworthy" and not (faults is not None and faults.causes):
-        opinion.add(f"{left[0].upper()}{left[1:]}.")
+    has_causes = faults is not None and bool(faults.causes)
+    if residual_cause and opinion.grade != "trustworthy" and not has_causes:
+        opinion.add(f"{residual_cause[0].upper()}{residual_cause[1:]}.")
     if hidden_orders:
         opinion.add(hidden_orders)
     if repeats:
@@ -182,7 +183,7 @@ def verdict_of(
 
 
 def with_hidden_first(verdict: Verdict) -> Verdict:
-    """Return the verdict with what its logs cannot show at all in the first sentence."""
+    """Return the verdict with what its logs cannot show merged into one first reason."""
     hidden = [reason for reason in verdict.reasons if reason.startswith(_CANNOT)]
     others = [reason for reason in verdict.reasons if not reason.startswith(_CANNOT)]
     if not hidden:
@@ -192,7 +193,7 @@ def with_hidden_first(verdict: Verdict) -> Verdict:
 
 
 def with_bodies(verdict: Verdict, consistency: Consistency | None, off: float) -> Verdict:
-    """Return the verdict with a first reason, if no real bodies have the values.
+    """Return the verdict, lowered to "not trustworthy" with the reason if no real bodies are near.
 
     `off` is the difference of the forces of the nearest real bodies from those of the fit, percent.
     """
@@ -208,7 +209,7 @@ def with_bodies(verdict: Verdict, consistency: Consistency | None, off: float) -
 
 
 def predict_held_out(
-    model: Model, values: Array, recording: Recording, preprocessing: Preprocessing
+    model: Model, beta: Array, recording: Recording, preprocessing: Preprocessing
 ) -> Prediction:
     """Return the prediction by a model with values (p,) of a recording that was not fitted.
 
@@ -216,17 +217,15 @@ def predict_held_out(
     chosen for the whole recording, whose samples at rest have less noise but do not count. No value
     is fitted to the recording, and a wrong model stays wrong at every cut-off.
     """
-    prediction = predict(model, values, recording, preprocessing)
+    prediction = predict(model, beta, recording, preprocessing)
     if preprocessing.cutoff is None or preprocessing.derivatives == "periodic":
         return prediction
     for share in _LOWER:
         if _judge_prediction(prediction).grade == "trustworthy":
             break
         lower = replace(preprocessing, cutoff=share * preprocessing.cutoff)
-        other = predict(model, values, recording, lower)
-        prediction = min(
-            prediction, other, key=lambda candidate: float(candidate.robust_nrms.max())
-        )
+        other = predict(model, beta, recording, lower)
+        prediction = min(prediction, other, key=lambda p: float(p.robust_nrms.max()))
     return prediction
 
 
@@ -238,7 +237,7 @@ def _grade_error(percent: float, small: float) -> Grade:
 
 
 def _judge_prediction(prediction: Prediction) -> Opinion:
-    """Return the opinion on a prediction of forces: its error beyond the noise."""
+    """Return the opinion on a prediction of held-out forces, by its error beyond the noise."""
     ratio = prediction.robust_nrms / np.maximum(prediction.floor, 1e-12)
     missed = prediction.unexplained_error
     # The worst actuator is the one farthest beyond both limits.
@@ -312,7 +311,7 @@ def _judge_faults(shown: FaultIsolation) -> Opinion:
     return opinion
 
 
-def percentages(values: Iterable[float], places: int = 2) -> str:
+def percentages(percents: Iterable[float], places: int = 2) -> str:
     """Return percentages as text with `places` decimals, or that all are less than the last one.
 
     Examples
@@ -320,10 +319,10 @@ def percentages(values: Iterable[float], places: int = 2) -> str:
     >>> percentages([1.234, 0.0]), percentages([3e-10, 1e-12])
     ('1.23, 0.00 %', 'less than 0.01 %')
     """
-    shown, least = list(values), 10.0**-places
-    if all(0.0 <= value < least for value in shown):
+    shown, least = list(percents), 10.0**-places
+    if all(0.0 <= percent < least for percent in shown):
         return f"less than {least:g} %"
-    return f"{', '.join(f'{value:.{places}f}' for value in shown)} %"
+    return f"{', '.join(f'{percent:.{places}f}' for percent in shown)} %"
 
 
 def times(ratio: float) -> str:

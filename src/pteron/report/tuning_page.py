@@ -28,10 +28,10 @@ _KINDS = {
 
 
 class _Changed(NamedTuple):
-    """A quantity that trials change, in headings and column heads, {} for the unit; its factor."""
+    """A quantity that trials vary: its heading, its column's head, {} for the unit, its factor."""
 
-    many: str
-    one: str
+    heading: str
+    column: str
     factor: float
 
 
@@ -78,7 +78,7 @@ def tuning_page(tuning: Tuning, trials: pl.DataFrame) -> str:
             if len(trials) and name in trials["changed"]
         },
         changed={
-            name: change._replace(one=change.one.format(readings))
+            name: change._replace(column=change.column.format(readings))
             for name, change in _CHANGED.items()
         },
         length="rad" if robot.platform.angular.all() else "m",

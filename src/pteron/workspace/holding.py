@@ -92,7 +92,7 @@ def measure_holding(robot: Manipulator, home: Array) -> Holding:
 
 @lru_cache(maxsize=256)
 def _singular_distances(robot: Manipulator, home: tuple[float, ...]) -> tuple[float, float, float]:
-    """Return L, and the distances to singularity, m: at home, and the greatest of all poses."""
+    """Return the length L and the distances to singularity at home and at the best pose, m."""
     poses = np.array([home])
     drawn = draw_poses(robot, _POSES, np.random.default_rng(0), limits=False)
     distances = coordinate_distances(robot, np.vstack([poses, drawn]))
@@ -124,7 +124,7 @@ def _holding_forces(robot: Manipulator, poses: Array) -> Array:
 
 
 def expect_regular(robot: Manipulator, home: Array) -> None:
-    """Refuse a machine that is singular in every pose up to the rounding of its file.
+    """Raise ModelError if a machine is singular in every pose, up to the rounding of its file.
 
     Raises
     ------
@@ -153,7 +153,7 @@ def expect_regular(robot: Manipulator, home: Array) -> None:
 
 
 def holding_warnings(of: Holding) -> tuple[str, ...]:
-    """Return warnings of a platform that drives hold badly at home, or nearly singular there."""
+    """Return warnings of drives that hold the platform badly at home, or of a near singularity."""
     warnings = []
     if of.everywhere <= INACCURATE * of.rounding:
         warnings.append(

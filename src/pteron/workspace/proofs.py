@@ -211,7 +211,7 @@ def prove(
 def _failed_conditions(
     robot: Manipulator, required: tuple[Condition, ...], pose: Array
 ) -> tuple[Condition, ...]:
-    """Return the conditions that a pose violates; out of reach limits have no margin."""
+    """Return the conditions that a pose violates or, if there are none, those undefined there."""
     margins = condition_margins(robot, required, pose)
     fails = margins < 0.0
     fails = fails if fails.any() else np.isnan(margins)
@@ -219,7 +219,7 @@ def _failed_conditions(
 
 
 def expect_space(robot: Manipulator, name: str) -> None:
-    """Refuse a cylinder, an argument of this name, if the pose has no x, y and z."""
+    """Raise DataError, naming an argument, if a cylinder is given but not x, y and z."""
     lengths = robot.platform.lengths
     if len(lengths) != 3:
         motion, places = robot.platform.motion, ", ".join(lengths) or "no lengths"
@@ -242,6 +242,7 @@ def _find_counterexample(
         poses.append(pose)
     candidates = np.concatenate(poses)
     candidates = candidates[region.holds(candidates)]
-    failing = candidates[~(condition_margins(robot, test.given, candidates) >= 0.0).all(axis=-1)]
+    margins = condition_margins(robot, test.conditions, candidates)
+    failing = candidates[~(margins >= 0.0).all(axis=-1)]
     proved: NDArray[np.bool_] = test(failing, failing, np.full(len(failing), test.all))[0]
     return failing[proved.argmax()] if proved.any() else None

@@ -131,7 +131,7 @@ class Excitation(Result):
         return LedMotion(self.motion, self.lead, periods)
 
     def held_out(self, rate: float = 1000.0) -> RepeatedCycle:
-        """Return a motion of another kind, within the same limits, to judge a model by.
+        """Return a pick-and-place cycle within the same limits, to validate a model with.
 
         See `held_out_cycle` for `rate` and errors.
         """
@@ -279,7 +279,7 @@ def _describe(movement: Movement, layout: MotionLayout) -> Description:
 
 
 def _mode_of(movement: Movement) -> int | None:
-    """Return the pose of `direct_kinematics` throughout a movement, from 1."""
+    """Return the assembly mode of a movement, from 1; None where modes have no fixed number."""
     robot = movement.robot
     if not closure_of(robot).keeps_modes:
         return None

@@ -40,7 +40,7 @@ ORDER: tuple[FaultName, ...] = (
     *("delay", "clock", "gain", "scale", "ratio", "zero", "gravity", "geometry"),
     *("play", "elasticity", "rotors", "payload", "drift", "stribeck", "load", "passive"),
 )
-"""The order in which faults are mended, and named: what comes first distorts what comes later."""
+"""The order in which faults are corrected and named: an earlier one distorts the later ones."""
 
 _SHIFT = 1.0
 """Change of a value by a fault, in standard deviations, above which the fault matters: a smaller
@@ -133,7 +133,7 @@ _REMEDY: dict[FaultName, str] = {
 
 
 def _format_size(size: float, angle: bool = False) -> str:
-    """Return a size in mm, or degrees, with the digits that an estimate has."""
+    """Return a size, m or rad, as text in mm or degrees, rounded as an estimate is."""
     number = np.degrees(size) if angle else 1e3 * size
     text = f"{number:.0f}" if number >= 10.0 else f"{number:.2g}"
     return f"{text} {'degrees' if angle else 'mm'}"
@@ -202,12 +202,12 @@ class IsolatedFault(Result):
 
     @property
     def understates(self) -> bool:
-        """Whether a value is off by more than its stated error, which does not allow for it."""
+        """Whether the fault shifts a value by more than its stated error."""
         return self.matters or self.shift > _SHIFT
 
     @property
     def matters(self) -> bool:
-        """Whether that lowers the grade: a delay of sampling hardly changes a machine's forces."""
+        """Whether the fault lowers the grade of the verdict."""
         if self.is_half_sample_delay:
             return bool((self.cycle > _CYCLE_OF_SAMPLING).any())
         # Play is no error of a value: what it makes is in the residuals, wherever it is.
@@ -253,10 +253,8 @@ class IsolatedFault(Result):
 
     def _sentence(self) -> str:
         """Return a sentence that states the fault with its size and error."""
-        first, key = (
-            float(self.sizes[0]),
-            "sampling" if self.is_half_sample_delay else str(self.fault),
-        )
+        first = float(self.sizes[0])
+        key = "sampling" if self.is_half_sample_delay else str(self.fault)
         if key == "clock" and first <= -1.0:
             key = "sign"
         size, error = abs(first), float(self.deviations[0])
