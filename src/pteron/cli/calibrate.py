@@ -266,13 +266,14 @@ def _errors(calibration: Calibration) -> list[Table]:
     held_out = calibration.held_out
     if held_out is None:
         return []
+    from pteron.calibration.measurements import error_unit
     from pteron.report.typeset import significant
 
     numbers = ("before", "after", "expected")
     rows = []
     for kind in held_out.after:
         errors = (held_out.before[kind], held_out.after[kind], held_out.expected[kind])
-        unit = "mrad" if kind == "angle" else "mm"
-        rows.append((kind, *(ascii_number(significant(1e3 * value)) for value in errors), unit))
+        texts = (ascii_number(significant(1e3 * error)) for error in errors)
+        rows.append((kind, *texts, error_unit(kind)))
     caption = f"At {held_out.rows} rows held out of the fit; expected from noise and intervals."
     return [table("error", *numbers, "unit", rows=rows, numbers=numbers, caption=caption)]
