@@ -84,7 +84,7 @@ class Program:
 def shape_of(element: Expression) -> tuple[int, ...]:
     """Return the shape of an expression: a column is a vector, and of one element a number."""
     rows, columns = element.shape
-    return (rows, columns) if columns > 1 else (rows,) if rows > 1 else ()
+    return (rows, columns) if columns > 1 else () if rows == 1 else (rows,)
 
 
 def cached_program(key: tuple[Any, ...], build: Callable[[], Program]) -> Program:
