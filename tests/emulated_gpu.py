@@ -20,6 +20,7 @@ SHIM = """
 #include <cmath>
 #include <cstring>
 #define __CUDACC__ 1
+#define __CUDACC_RTC__ 1
 #define __device__
 #define __global__
 #define __forceinline__ inline

@@ -33,7 +33,7 @@ def library():
 
 
 def compiled(source, architecture="sm_90", options=("--fmad=false",)):
-    """Return the report on a source's kernel `run`; AssertionError with the compiler's log."""
+    """Return the worst of the reports on a source's kernels; AssertionError with the log."""
     nvrtc, program = library(), ctypes.c_void_p()
     texts = (source.encode(), b"kernel.cu")
     nvrtc.nvrtcCreateProgram(ctypes.byref(program), *texts, 0, None, None)
@@ -45,11 +45,11 @@ def compiled(source, architecture="sm_90", options=("--fmad=false",)):
     size = ctypes.c_size_t()
     nvrtc.nvrtcGetCUBINSize(program, ctypes.byref(size))
     nvrtc.nvrtcDestroyProgram(ctypes.byref(program))
-    registers = re.search(r"Used (\d+) registers", log)
-    spilled = re.search(r"(\d+) bytes stack frame, (\d+) bytes spill stores", log)
+    registers = re.findall(r"Used (\d+) registers", log)
+    spilled = re.findall(r"(\d+) bytes stack frame, (\d+) bytes spill stores", log)
     assert registers, log
-    stack, stores = map(int, spilled.groups()) if spilled else (0, 0)
-    return Report(int(registers[1]), stores, stack, size.value)
+    stack, stores = (max(map(int, column)) for column in zip(*spilled, strict=True))
+    return Report(max(map(int, registers)), stores, stack, size.value)
 
 
 def _text(size_of, text_of, program):

@@ -4,16 +4,23 @@ The CUDA code is compiled by g++ for the host; NVIDIA's compiler, which needs no
 for two generations of GPUs. Nothing here has run on a GPU.
 """
 
+import json
 from dataclasses import replace
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
 
 import numpy as np
 import nvrtc
 import pytest
+from commands import refused, run
 from emulated_gpu import BLOCK, GRID, DeviceArray, emulated
+from exported_code import compiled
 from mechanisms import CATALOG, CLIENTS, NIGHTLY, gated
 
 import pteron
 from pteron.controllers import ComputedTorque, PDGravity
+from pteron.export import export_cuda
+from pteron.export.functions import exported_functions
 from pteron.kernels import FUNCTIONS
 from pteron.kernels.loops import loop
 from pteron.legs import Drive
@@ -216,3 +223,79 @@ def test_nvidia_compiles_it(name, architecture):
             assert report.spilled == 0, (what, report)
     code = loop(robot, pteron.kernels.program(robot, "pd_gravity")).code(1)
     assert nvrtc.compiled(replace(code, device=True).source, architecture).registers <= 255
+
+
+# Exported code.
+
+
+def exported(folder, robot, functions=None, **options):
+    """Return the module of a machine's exported CUDA, as a user imports it."""
+    files = export_cuda(robot, functions, folder, **options)
+    (path,) = (file for file in files if file.suffix == ".py")
+    spec = spec_from_file_location(path.stem, path)
+    module = module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.parametrize("name", gated(pteron.catalog(), GATE))
+def test_exported_functions_have_results_and_status_of_c(cupy, name, tmp_path):
+    """Those of the exported C, compiled, at its own examples and at states that have no result."""
+    robot = pteron.load(name)
+    functions = ["inverse_kinematics", "inverse_dynamics", "forward_dynamics"]
+    module = exported(tmp_path, robot, functions)
+    call, _ = compiled(robot, functions, tmp_path / "c")
+    for item in exported_functions(robot, functions, specialised=False):
+        states = [
+            np.stack(arrays) for arrays in zip(*(e.inputs for e in item.examples), strict=True)
+        ]
+        states = [
+            array[:1].repeat(3, axis=0) if port.shared else array
+            for array, port in zip(states, item.inputs, strict=True)
+        ]
+        for k, number in enumerate(BAD[-2:]):
+            states[0][1 + k, 0] = number
+        inputs = [
+            array[0] if port.shared else array
+            for array, port in zip(states, item.inputs, strict=True)
+        ]
+        *results, status = getattr(module, item.name)(*map(cupy.asarray, inputs))
+        for k in range(3):
+            sizes = [port.size for port in item.outputs]
+            code, *expected = call(item.name, *(array[k] for array in states), sizes=sizes)
+            assert status[k] == code
+            for result, row in zip(results, expected, strict=True):
+                np.testing.assert_array_equal(np.ravel(result[k]), row)
+    assert {0, 1} <= set(np.ravel(status).tolist())
+
+
+def test_exported_parameters_are_the_default(cupy, tmp_path):
+    module = exported(tmp_path, "delta", ["inverse_dynamics"])
+    pose, zero = [0.0, 0.1, -0.9], np.zeros(3)
+    forces, status = module.inverse_dynamics(pose, zero, zero)
+    np.testing.assert_allclose(forces, pteron.inverse_dynamics("delta", pose, zero, zero))
+    assert status == 0
+    heavier = module.inverse_dynamics(pose, zero, zero, 2.0 * module.PARAMETERS)[0]
+    np.testing.assert_allclose(heavier, 2.0 * forces)
+    with pytest.raises(ValueError, match=r"pose: shape \(2,\) given, \(..., 3\) expected"):
+        module.inverse_dynamics([0.0, 0.0], zero, zero)
+
+
+@CLIENTS
+@pytest.mark.parametrize("real", ["double", "float"])
+@pytest.mark.parametrize("name", gated(pteron.catalog(), GATE))
+def test_nvidia_compiles_exported_code(name, real, tmp_path):
+    if nvrtc.library() is None:
+        pytest.skip("the wheel nvidia-cuda-nvrtc-cu12 is not installed")
+    files = export_cuda(name, None, tmp_path, real=real)
+    texts = [file.read_text() for file in files if file.suffix != ".py"]
+    header, kernels = sorted(texts, key=lambda text: "__global__" in text)
+    nvrtc.compiled(header + kernels)
+
+
+def test_the_command_writes_it(tmp_path):
+    files = json.loads(run(f"export tripteron --cuda {tmp_path / 'out'} --json").stdout)["files"]
+    names = sorted(Path(file).name for file in files)
+    assert names == ["tripteron.cu", "tripteron.cuh", "tripteron_cuda.py"]
+    line = f"export tripteron --cuda {tmp_path} --mjcf {tmp_path}"
+    assert "give one at a time; only --c, --st and --cuda go together" in refused(line)
