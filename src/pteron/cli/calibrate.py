@@ -206,7 +206,7 @@ def _show(calibration: Calibration, firmware: FirmwareFit | None, left_out: str)
     from pteron.report.calibration.values import notes
 
     verdict, shown = calibration.verdict, calibration.observability
-    color, more = GRADE_COLORS[verdict.grade], len(shown.weak) - _WEAK
+    color, hidden = GRADE_COLORS[verdict.grade], len(shown.weak) - _WEAK
     lines: list[str | Table] = [plain(verdict.reasons[0])]
     if firmware:
         lines += [_table(firmware.rows), plain(firmware.sentence)]
@@ -219,7 +219,7 @@ def _show(calibration: Calibration, firmware: FirmwareFit | None, left_out: str)
         *map(plain, verdict.reasons[1:]),
         *(f"Not determined, kept as drawn: {plain(line)}" for line in shown.unseen),
         *(f"[yellow]Weakly determined:[/yellow] {plain(line)}" for line in shown.weak[:_WEAK]),
-        *([f"{more} more weakly determined combinations are on the page."] if more > 0 else []),
+        *([f"{hidden} more weakly determined combinations are on the page."] if hidden > 0 else []),
         *map(plain, notes(calibration)),
         *(f"Next: {plain(step)}" for step in verdict.next_steps),
         *([f"[red]{plain(left_out)}[/red]"] if left_out else []),

@@ -230,7 +230,7 @@ def _show(paved: Paving, pose: Array, floors: dict[str, float], cube: Inscribed 
     else:
         center = zip(robot.coordinates, cube.center.round(6).tolist(), strict=True)
         lengths = robot.platform.lengths
-        coordinates = ", ".join(pose_text(name, value) for name, value in center if name in lengths)
+        coordinates = ", ".join(pose_text(name, q) for name, q in center if name in lengths)
         show(f"Largest {shape} found, proved inside: edge {cube.edge:.4g} m, centre {coordinates}")
     undistinguished = 1.0 - sum(shares.values())
     causes = {plain(cause): share for cause, share in shares.items()}

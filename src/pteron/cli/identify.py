@@ -233,8 +233,8 @@ def _errors(fit: Identification) -> Table:
     for prediction in fit.held_out:
         where = f" in {prediction.source}" if len(fit.held_out) > 1 else ""
         errors = prediction.nrms, prediction.floor, prediction.nrms_without_friction
-        for i, values in enumerate(zip(*errors[: len(headings)], strict=True), start=1):
-            cells = (significant(v) if v >= 0.01 else "< 0.01" for v in values)
+        for i, row in enumerate(zip(*errors[: len(headings)], strict=True), start=1):
+            cells = (significant(v) if v >= 0.01 else "< 0.01" for v in row)
             rows.append((plain(f"{i}{where}"), *cells))
     caption = "RMS error of the predicted forces over their standard deviation (NRMS)."
     return table("actuator", *headings, rows=rows, numbers=headings, caption=caption)

@@ -256,13 +256,16 @@ def forces(
     for text in overloads(machine, served[:, n : 2 * n], served[:, 2 * n :]) if limited else ():
         note(f"Note: {text}")
     with_forces = rows.table.with_columns(dict(zip(added, delivered.T, strict=True)))
-    terms = (
-        "drives, with friction and the motors' inertia"
-        if drives
-        else "actuated joints for the bodies alone; --drives adds friction and the motors' inertia"
-    )
-    caption = f"[bold]{plain(machine.name)}[/bold]: forces of the {terms}"
+    caption = _forces_caption(machine, drives=drives)
     deliver(machine, with_forces, added, out=out, as_json=json, caption=caption, single=rows.single)
+
+
+def _forces_caption(robot: Manipulator, *, drives: bool) -> str:
+    """Return the caption of a table of forces: of the drives, or for the bodies alone."""
+    terms = "actuated joints for the bodies alone; --drives adds friction and the motors' inertia"
+    if drives:
+        terms = "drives, with friction and the motors' inertia"
+    return f"[bold]{plain(robot.name)}[/bold]: forces of the {terms}"
 
 
 def _typed_row(typed: list[str | None], motion: list[str], loads: tuple[str, ...]) -> TableRows:

@@ -408,7 +408,7 @@ def _modes(modes: list[dict[str, Any]]) -> list[Table]:
         remarks = [*["in the file"] * mode["named"], *["likely meant"] * mode["likely"]]
         where = ("beyond limits", "-", "-")
         if mode["margin"] > 0.0:
-            at = f"({' '.join(f'{value:.3g}' for value in mode['pose'])})"
+            at = f"({' '.join(f'{q:.3g}' for q in mode['pose'])})"
             where = (f"{mode['place']} the base", at, f"{100.0 * mode['margin']:.0f} %")
         rows.append((mode["elbows"], *where, ", ".join(remarks)))
     headings = ("elbow signs", "platform", "at its best pose", "margin", "working mode")

@@ -87,7 +87,7 @@ def _table(robot: Manipulator, heading: str, fits: Iterable[CommonFit]) -> list[
         for i, fit in enumerate(islice(group, _BEST)):
             ends = tuple(map(significant, fit.span)) if fit.span else ("none", "")
             ratio = f"{significant(fit.ratio)} {_ratio_unit(robot, fit)}"
-            margins = (f"{value:.2f}" for value in _margins(fit))
+            margins = (f"{margin:.2f}" for margin in _margins(fit))
             first = "" if i else " ".join(map(str, legs))
             rows.append((first, plain(fit.motor.name), ratio, *ends, *margins))
     numbers, caption = ("leg", *_NUMBERS), _CAPTIONS[heading]

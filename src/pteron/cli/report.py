@@ -65,7 +65,7 @@ def _machine(contents: dict[str, Any]) -> Table:
     angles = [name for name in contents["coordinates"] if coordinate(name).unit == "rad"]
     cells = {
         "home pose": f"{' '.join(contents['coordinates'])} = "
-        + " ".join(f"{round(value, 6) + 0.0:.4g}" for value in home["pose"]),
+        + " ".join(f"{round(q, 6) + 0.0:.4g}" for q in home["pose"]),
         "margin at home (0 % at a joint limit or singularity)": f"{100.0 * home['reserve']:.0f} %",
         "condition number at home (1 is best)": significant(home["condition_number"]),
     }

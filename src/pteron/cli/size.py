@@ -253,8 +253,8 @@ def _energy(sizing: Sizing, share: float) -> list[str]:
     """Return lines on the energy of all drives over a cycle, and on assumed friction."""
     total = sizing.power.sum(axis=-1)
     net = sizing.net_energy
-    given = significant(float(sizing.given_energy.sum()))
-    without = "" if net else f" ({given} J supplied and braked: there is no friction)"
+    supplied = significant(float(sizing.given_energy.sum()))
+    without = "" if net else f" ({supplied} J supplied and braked: there is no friction)"
     mean, peak = significant(net / sizing.duration), significant(float(total.max()))
     lines = [
         f"All drives together: net energy {significant(net)} J per cycle{without}, "
@@ -304,7 +304,7 @@ def _places(sizing: Sizing) -> list[rich.table.Table]:
     """Return a table of the places where each leg's force and speed are greatest."""
     rows = []
     for worst in _worst(sizing):
-        pose = " ".join(f"{round(value, 4) + 0.0:.3g}" for value in worst["pose"])
+        pose = " ".join(f"{round(q, 4) + 0.0:.3g}" for q in worst["pose"])
         quantity = _NAMED[worst["quantity"]].format(sizing.robot.legs[worst["leg"] - 1].joint.force)
         leg = str(worst["leg"]) if worst["quantity"] == "peak_force" else ""
         rows.append((leg, quantity, pose, f"{math.degrees(worst['turn']) % 360:.3g} deg"))
@@ -335,7 +335,7 @@ def _powers(sizing: Sizing) -> rich.table.Table:
     )
     powers = (sizing.peak_power, sizing.mean_power, sizing.peak_braking)
     columns = zip(*powers, sizing.given_energy, sizing.braked_energy, strict=True)
-    rows = ((str(i), *map(significant, values)) for i, values in enumerate(columns, start=1))
+    rows = ((str(i), *map(significant, row)) for i, row in enumerate(columns, start=1))
     return table(*names, rows=rows, numbers=names)
 
 

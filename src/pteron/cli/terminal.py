@@ -146,7 +146,7 @@ def percent(share: float) -> str:
     return "under 0.1 %" if 0.0 < share < 1e-3 else f"{100.0 * share:.3g} %"
 
 
-def significant(value: float, digits: int = 3) -> str:
+def significant(number: float, digits: int = 3) -> str:
     """Return a number with significant digits, without an exponent below a million.
 
     Examples
@@ -154,8 +154,8 @@ def significant(value: float, digits: int = 3) -> str:
     >>> significant(5526.8), significant(0.31437)
     ('5527', '0.314')
     """
-    text = f"{value:.{digits}g}"
-    return f"{value:.0f}" if "e+" in text and abs(value) < 1e6 else text
+    text = f"{number:.{digits}g}"
+    return f"{number:.0f}" if "e+" in text and abs(number) < 1e6 else text
 
 
 def ascii_number(text: str) -> str:

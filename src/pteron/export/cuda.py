@@ -79,20 +79,22 @@ def export_cuda(
         robot, functions, specialised=specialised, wrench=wrench, output=output, base=base
     )
     prefix, single = prefix_of(robot), real == "float"
-    values = {
+    variables = {
         "banner": banner(robot, "CUDA"),
         "prefix": prefix,
         "upper": prefix.upper(),
         "real": real,
         "f": "f" if single else "",
         "printer": CPrinter(prefix, real, device=True),
-        "tables": {table.name: table for item in exported for table in item.tables}.values(),
+        "tables": {t.name: t for function in exported for t in function.tables}.values(),
         "functions": exported,
         "largest": 3.4028234e38 if single else 1.7976931348623157e308,
         **arithmetic(),
     }
     files = {f"{prefix}.cuh": "device.cuh.j2", f"{prefix}.cu": "kernels.cu.j2"}
     files[f"{prefix}_cuda.py"] = "cuda.py.j2"
-    texts = {file: render_template("pteron.export", name, **values) for file, name in files.items()}
+    texts = {
+        file: render_template("pteron.export", name, **variables) for file, name in files.items()
+    }
     texts[f"{prefix}.cuh"] = _MACROS.sub(f"{prefix}_is", texts[f"{prefix}.cuh"])
     return write_texts(folder, texts)

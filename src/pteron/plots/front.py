@@ -143,10 +143,8 @@ def fronts_figure(
     styles = zip(fronts.items(), cycle(LEG_COLORS), cycle(_MARKS), strict=False)
     for (name, front), color, mark in styles:
         rows = np.array(front)[np.argsort(np.array(front)[:, 1])]
-        axes.plot(
-            *(rows[:, 1], rows[:, 0]), color=color, marker=mark, markersize=4.5, linewidth=0.8
-        )
-        axes.lines[-1].set_label(name)
+        (line,) = axes.plot(rows[:, 1], rows[:, 0], color=color, marker=mark)
+        line.set(label=name, markersize=4.5, linewidth=0.8)
     axes.margins(0.08)
     legend(figure, 4)
     return real_figure(figure)

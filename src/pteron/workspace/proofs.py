@@ -100,8 +100,8 @@ class Proof(Result):
             if joint is not None:
                 text += f" ({joint.value:.4g} {joint.unit} of {joint.limits_text('{:g}'.format)})"
             elif condition.floor:
-                value = excess + condition.floor
-                text += f" ({value:.4g}, at least {condition.floor:.4g} required)"
+                measure = excess + condition.floor
+                text += f" ({measure:.4g}, at least {condition.floor:.4g} required)"
             elif condition.leg and margins[condition.leg - 1] < 0.0:
                 text += f" (it misses the pose by {-margins[condition.leg - 1]:.3g} m)"
             texts.append(text)

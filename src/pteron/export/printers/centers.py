@@ -66,8 +66,8 @@ class Center:
         return None
 
 
-def common_value(robot: Manipulator, numbers: Sequence[float], reason: str, taker: str) -> float:
-    """Return the common value of all legs, m; `reason` and `taker` are for the error's message.
+def common_value(robot: Manipulator, numbers: Sequence[float], reason: str, firmware: str) -> float:
+    """Return the common value of all legs, m; `reason` and `firmware` are for the error's message.
 
     Raises
     ------
@@ -78,7 +78,7 @@ def common_value(robot: Manipulator, numbers: Sequence[float], reason: str, take
         if abs(number - numbers[0]) > SAME:
             first_value, second_value = (round(1000.0 * v, 6) + 0.0 for v in (number, numbers[0]))
             text = f"{reason.format(first_value)}, leg 1 {second_value:.6g} mm"
-            raise unfit_error(robot, i, text, taker)
+            raise unfit_error(robot, i, text, firmware)
     return float(np.mean(numbers))
 
 

@@ -103,11 +103,13 @@ class LinearDelta:
         return cls.from_centers(robot, sliding_centers, "M665")
 
     @classmethod
-    def from_centers(cls, robot: Manipulator, centers: Sequence[Center], taker: str) -> LinearDelta:
-        """Return the numbers from the spheres on which P moves; errors name `taker`."""
+    def from_centers(
+        cls, robot: Manipulator, centers: Sequence[Center], firmware: str
+    ) -> LinearDelta:
+        """Return the numbers from the spheres on which P moves; errors name `firmware`."""
         for i, center in enumerate(centers, start=1):
             if np.hypot(*center.along[:2]) > _LEAN:
-                raise unfit_error(robot, i, "its guide is not vertical, along z", taker)
+                raise unfit_error(robot, i, "its guide is not vertical, along z", firmware)
         rises = np.array([np.sign(center.along[2]) for center in centers])
         limits = [leg.limits for leg in robot.legs]
         known = all(pair is not None for pair in limits)
@@ -115,7 +117,7 @@ class LinearDelta:
         lowest, highest = travels.min(axis=1), travels.max(axis=1)
         feet = np.array([center.origin for center in centers])
         leans = np.array([center.along for center in centers]) * rises[:, None]
-        _refuse_sliders_below(robot, centers, taker)
+        _refuse_sliders_below(robot, centers, firmware)
         # Towers as they stand where the carriages are on their way.
         towers = feet + (0.5 * (lowest + highest))[:, None] * leans
         radii, arms = np.hypot(*towers[:, :2].T), np.array([center.radius for center in centers])
@@ -124,7 +126,7 @@ class LinearDelta:
                 reason = (
                     f"its rod of {mm(arm)} mm is shorter than the radius, {mm(radii.mean())} mm"
                 )
-                raise unfit_error(robot, i, reason, taker)
+                raise unfit_error(robot, i, reason, firmware)
         radius = float(radii.mean())
         below = np.sqrt(arms**2 - radius**2)
         most = min(radius, float(arms.min()) - radius)
@@ -142,7 +144,7 @@ class LinearDelta:
             reason = (
                 f"is {mm(round(radii[i - 1], 9))} mm from the z axis or leans, unlike the others"
             )
-            raise unfit_error(robot, i, reason, taker)
+            raise unfit_error(robot, i, reason, firmware)
         radius, angles, arms = solution[0], solution[1:4], solution[4:7]
         ends = solution[7:] - np.sqrt(arms**2 - radius**2)
         zeros = solution[7:] - highest
@@ -173,7 +175,7 @@ def _fit_numbers(
     return fit.x, float(np.linalg.norm(fit.fun.reshape(-1, 3), axis=1).max())
 
 
-def _refuse_sliders_below(robot: Manipulator, centers: Sequence[Center], taker: str) -> None:
+def _refuse_sliders_below(robot: Manipulator, centers: Sequence[Center], firmware: str) -> None:
     """Raise ModelError if a machine's sliders are below its platform."""
     poses = random_poses(robot, 50, seed=1, type_i=0.02, type_ii=0.0, limits=False)
     joints = inverse_kinematics(robot, poses)
@@ -183,7 +185,7 @@ def _refuse_sliders_below(robot: Manipulator, centers: Sequence[Center], taker: 
             reason = (
                 "its slider is below the platform, and firmware has it above: turn the model over"
             )
-            raise unfit_error(robot, i + 1, reason, taker)
+            raise unfit_error(robot, i + 1, reason, firmware)
 
 
 def _errors(

@@ -24,7 +24,7 @@ from pteron.kinematics import inverse_kinematics, random_poses
 from pteron.legs import Reading
 from pteron.manipulator import Manipulator
 
-_TAKER = "Klipper's rotary_delta"
+_FIRMWARE = "Klipper's rotary_delta"
 
 
 class _Arm(NamedTuple):
@@ -51,10 +51,10 @@ class _Arm(NamedTuple):
         axis /= np.linalg.norm(axis)
         i, aside = center.leg + 1, 1000.0 * float(center.origin @ axis)
         if abs(axis[2]) > SAME:
-            raise unfit_error(robot, i, "its crank's axis is not horizontal", _TAKER)
+            raise unfit_error(robot, i, "its crank's axis is not horizontal", _FIRMWARE)
         if abs(aside) > 1000.0 * SAME:
             reason = f"its crank's plane passes the z axis at {abs(aside):.6g} mm, not through it"
-            raise unfit_error(robot, i, reason, _TAKER)
+            raise unfit_error(robot, i, reason, _FIRMWARE)
         lift = float(np.sign(np.cross(out, [0.0, 0.0, 1.0]) @ axis))
         zero, upper = math.atan2(center.along[2], center.along @ out), np.linalg.norm(center.along)
         limits = robot.legs[center.leg].limits
@@ -75,9 +75,9 @@ def rotary(robot: Manipulator, centers: Sequence[Center]) -> dict[str, Any]:
     """Return the template's values for Klipper's `rotary_delta`: arms in planes through z."""
     arms = [_Arm.from_center(robot, center) for center in centers]
     radii = [float(np.hypot(*arm.shoulder[:2])) for arm in arms]
-    radius = common_value(robot, radii, "has its shoulder {:.6g} mm from the z axis", _TAKER)
+    radius = common_value(robot, radii, "has its shoulder {:.6g} mm from the z axis", _FIRMWARE)
     heights = [float(arm.shoulder[2]) for arm in arms]
-    height = common_value(robot, heights, "has its shoulder at z = {:.6g} mm", _TAKER)
+    height = common_value(robot, heights, "has its shoulder at z = {:.6g} mm", _FIRMWARE)
     _refuse_elbows_inside(robot, arms, height)
     tops = [arm.top(radius) for arm in arms]
     highest = min((top for top in tops if top is not None), default=0.0)
@@ -130,7 +130,7 @@ def _refuse_elbows_inside(robot: Manipulator, arms: Sequence[_Arm], height: floa
                 "its elbow is inside while the platform is below, and Klipper has it outside; turn "
                 "a model over whose platform is above"
             )
-            raise unfit_error(robot, arm.number, reason, _TAKER)
+            raise unfit_error(robot, arm.number, reason, _FIRMWARE)
 
 
 def _bed(
@@ -139,7 +139,7 @@ def _bed(
     """Return P's z at Klipper's bed, m, and comments on it."""
     for arm in arms:
         if arm.upper + arm.lower <= radius:
-            raise unfit_error(robot, arm.number, "its arms do not reach the z axis", _TAKER)
+            raise unfit_error(robot, arm.number, "its arms do not reach the z axis", _FIRMWARE)
     reach = math.sqrt(min(arm.upper + arm.lower for arm in arms) ** 2 - radius**2)
     # Klipper lets the tool go so far from the axis, whatever the legs reach.
     most = min(radius + min(arm.upper for arm in arms), min(arm.lower for arm in arms) - radius)

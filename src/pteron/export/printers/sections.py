@@ -12,9 +12,9 @@ INSTEAD = "use --linuxcnc, or --c for a controller of your own"
 """Advice at the end of error messages."""
 
 
-def unfit_error(robot: Manipulator, leg: int, reason: str, taker: str) -> ModelError:
-    """Return the ModelError that the firmware `taker` cannot move a machine because of a leg."""
-    return ModelError(f"{robot.name}: {taker} does not fit leg {leg}: {reason}; {INSTEAD}")
+def unfit_error(robot: Manipulator, leg: int, reason: str, firmware: str) -> ModelError:
+    """Return the ModelError that a machine, because of a leg, does not fit the firmware."""
+    return ModelError(f"{robot.name}: {firmware} does not fit leg {leg}: {reason}; {INSTEAD}")
 
 
 def mm(metres: float) -> str:
