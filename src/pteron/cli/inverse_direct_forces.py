@@ -124,8 +124,7 @@ def direct(
     result = _modes(rows.table, poses, machine.coordinates)
     shown = added[1:] if rows.single else added
     caption = (
-        f"[bold]{plain(machine.name)}[/bold]: all poses with these joint coordinates, one for each "
-        "assembly mode"
+        f"[bold]{plain(machine.name)}[/bold]: poses of these joint coordinates, all assembly modes"
     )
     deliver(machine, result, shown, out=out, as_json=json, caption=caption)
 
@@ -256,12 +255,10 @@ def forces(
     for text in overloads(machine, served[:, n : 2 * n], served[:, 2 * n :]) if limited else ():
         note(f"Note: {text}")
     result = rows.table.with_columns(dict(zip(added, delivered.T, strict=True)))
-    terms = (
-        "drives, with friction and the motors' inertia"
-        if drives
-        else "actuated joints for the bodies alone; --drives adds friction and the motors' inertia"
-    )
-    caption = f"[bold]{plain(machine.name)}[/bold]: forces of the {terms}"
+    terms = "with friction and motor inertia"
+    if not drives:
+        terms = "without friction and motor inertia (--drives adds them)"
+    caption = f"[bold]{plain(machine.name)}[/bold]: drive forces {terms}"
     deliver(machine, result, added, out=out, as_json=json, caption=caption, single=rows.single)
 
 
