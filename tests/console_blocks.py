@@ -446,7 +446,7 @@ TOLERANCES: dict[str, tuple[Tolerance, ...]] = {
         Tolerance(0.1, "shares of the boxes that are left when the paving stops", "%"),
     ),
     r"pteron identify simulated\.csv .*": (
-        Tolerance(0.2, "the search for the motion is ended by the clock", "held-out error"),
+        Tolerance(0.2, "the search for the motion is ended by the clock", "held-out data"),
     ),
     r"pteron identify without\.csv .*": (
         Tolerance(0.2, "what the model misses where forces are held for a sample", "held-out"),

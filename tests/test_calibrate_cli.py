@@ -42,7 +42,7 @@ def test_the_files_agree_with_the_terminal():
     for line in (*data["verdict"]["reasons"], *data["notes"]):
         assert f"{line}\n" in text
     for line in data["unseen"]:
-        assert f"Cannot be seen, as drawn: {line}\n" in text
+        assert f"Not determined, kept as drawn: {line}\n" in text
     for name in names:
         assert f"Written: {folder / name}\n" in text
     errors = data["held_out"]

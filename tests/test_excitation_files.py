@@ -468,8 +468,8 @@ def test_a_safe_distance_from_the_joints_limits_is_kept_unasked(tmp_path: Path, 
     # 2 % of 0.6 rad; the limits bind in both, so that a smaller distance is used.
     assert 0.012 <= nearest[""] < 0.02
     assert 0.005 <= nearest[" --keep-off 0"] < 0.012
-    assert "where 0.012 was to be kept (--keep-off, --clearance)" in said[""]
-    assert "where 0.005 was to be kept" in said[" --keep-off 0"]
+    assert "at least 0.012 required (--keep-off, --clearance)" in said[""]
+    assert "at least 0.005 required" in said[" --keep-off 0"]
 
 
 def test_a_share_of_the_range_leaves_half_of_what_the_home_pose_has():

@@ -274,7 +274,7 @@ def test_a_fault_shows_in_a_log_with_two_phases_too_long_to_be_looked_at_whole()
     )
     result = found(robot, late, terms=Terms(payload=True))
     assert result.fault_isolation.tried
-    assert "late for the positions; that is taken out" in result.causes[0]
+    assert "late for the positions; this is corrected" in result.causes[0]
     assert result.preprocessing[0].delay == pytest.approx(6e-3, abs=5e-4)
     mended = found(robot, late, terms=Terms(payload=True), processing=Processing(delay="auto"))
     assert mended.preprocessing[0].delay == pytest.approx(6e-3, abs=5e-4)

@@ -146,7 +146,7 @@ def test_a_table_on_a_narrow_screen_keeps_its_numbers():
         "m",
         "rad/s",
         "W",
-        "-",
+        "unlimited",
     ]
 
 

@@ -653,9 +653,9 @@ FAULTS: dict[str, tuple[Callable[[Case], None], str]] = {
     "guide point": (guide_off, "geometry|[Pp]oints|[Ll]engths"),
     "length": (length_off, "geometry|[Pp]oints|[Ll]engths"),
     "passive friction": (passive, "[Pp]assive"),
-    "load friction": (load_friction, "with the load"),
-    "flexible": (flexible, "drives (that )?give|flexib"),
-    "payload": (payload, "as a payload"),
+    "load friction": (load_friction, "with the load|load-dependent"),
+    "flexible": (flexible, "elastic"),
+    "payload": (payload, "undeclared payload"),
     "quantised": (quantised, "quanti|steps"),
 }
 """Each with the words that name its cause."""

@@ -124,8 +124,7 @@ def direct(
     with_poses = _modes(rows.table, poses, machine.coordinates)
     shown = added[1:] if rows.single else added
     caption = (
-        f"[bold]{plain(machine.name)}[/bold]: all poses with these joint coordinates, one for each "
-        "assembly mode"
+        f"[bold]{plain(machine.name)}[/bold]: poses of these joint coordinates, all assembly modes"
     )
     deliver(machine, with_poses, shown, out=out, as_json=json, caption=caption)
 
@@ -261,11 +260,11 @@ def forces(
 
 
 def _forces_caption(robot: Manipulator, *, drives: bool) -> str:
-    """Return the caption of a table of forces: of the drives, or for the bodies alone."""
-    terms = "actuated joints for the bodies alone; --drives adds friction and the motors' inertia"
-    if drives:
-        terms = "drives, with friction and the motors' inertia"
-    return f"[bold]{plain(robot.name)}[/bold]: forces of the {terms}"
+    """Return the caption of a table of drive forces, with friction or without."""
+    terms = "with friction and motor inertia"
+    if not drives:
+        terms = "without friction and motor inertia (--drives adds them)"
+    return f"[bold]{plain(robot.name)}[/bold]: drive forces {terms}"
 
 
 def _typed_row(typed: list[str | None], motion: list[str], loads: tuple[str, ...]) -> TableRows:

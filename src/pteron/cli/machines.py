@@ -71,7 +71,7 @@ def _legs_text(legs: Sequence[LegKind]) -> str:
         types = actuated.setdefault("P" if leg.joint.unit == "m" else "first R", [])
         types += [leg.type] * (leg.type not in types)
     texts = (f"the {joint} of {', '.join(types)}" for joint, types in actuated.items())
-    return f"Legs: joints from base to platform: {joints}. Actuated: {'; '.join(texts)}."
+    return f"Joints from base to platform: {joints}; actuated: {'; '.join(texts)}."
 
 
 def new(
@@ -356,7 +356,6 @@ def _home_table(robot: Manipulator, findings: dict[str, Any]) -> Table:
         HOLDING_FORCE_NEAR,
         INACCURATE,
         LEAST_SINGULAR_VALUE,
-        NEARBY,
     )
     from pteron.workspace.margins import least_margin_text
 
@@ -368,27 +367,25 @@ def _home_table(robot: Manipulator, findings: dict[str, Any]) -> Table:
     rows = [
         (f"smallest margin: to {cause}", margin, "above 0 %"),
         (
-            f"largest leg force over load, in the worst direction{moments}",
+            f"largest leg force over load{moments}",
             *(f"{least:.2g}", f"at most {1.0 / LEAST_SINGULAR_VALUE:g}"),
         ),
         (
-            "geometric error (of every coordinate) that makes home singular",
+            "geometric error that makes it singular",
             *(distance, f"above {1e3 * INACCURATE * hold['rounding']:.2g} mm"),
         ),
     ]
     if hold["weight"] > 0.0:
-        share, angle = NEARBY
-        turn = f" and {angle:g} rad" * bool(robot.platform.angles)
         weight = f"largest leg force over weight of bodies ({hold['weight']:.3g} N)"
         rows += [
             (weight, f"{hold['force']:.2g}", f"at most {HOLDING_FORCE:g}"),
             (
-                f"the same up to {100 * share:g} % of a leg's length{turn} from home",
+                "the same, at poses near home",
                 f"{hold['force_near']:.2g}",
                 f"at most {HOLDING_FORCE_NEAR:g}",
             ),
         ]
-    return table("at home", "value", "good if", rows=rows, numbers=("value", "good if"))
+    return table("at the home pose", "value", "good if", rows=rows, numbers=("value", "good if"))
 
 
 def _drives(robot: Manipulator) -> list[Table]:

@@ -66,21 +66,21 @@ def _machine(contents: dict[str, Any]) -> Table:
     cells = {
         "home pose": f"{' '.join(contents['coordinates'])} = "
         + " ".join(f"{round(q, 6) + 0.0:.4g}" for q in home["pose"]),
-        "margin at home (0 % at a joint limit or singularity)": f"{100.0 * home['reserve']:.0f} %",
-        "condition number at home (1 is best)": significant(home["condition_number"]),
+        "margin there to limits and singularities": f"{100.0 * home['reserve']:.0f} %",
+        "condition number there (1 is best)": significant(home["condition_number"]),
     }
     if len(angles) == 1:
-        cells[f"singular {angles[0]} at home"] = f"{singular} deg" if singular else "none"
+        cells[f"singular {angles[0]} there"] = f"{singular} deg" if singular else "none"
     if reach is not None:
         noun = "volume" if reach["unit"] == "m^3" else "area"
         cells[f"workspace {noun}"] = f"{reach['volume']:.3g} {reach['unit']}"
     if contents["largest_tilt"] is not None:
         tilt = f"{math.degrees(contents['largest_tilt']):.1f} deg"
-        cells["largest tilt possible in all directions"] = tilt
+        cells["largest tilt in all directions"] = tilt
     noun = "standard pick-and-place cycle" if contents["cycle"]["standard"] else "motion"
     cells |= {
-        f"duration of the {noun}": f"{contents['cycle']['duration']:.3g} s",
-        "base inertial parameters": f"{base['rank']}, from {base['of']} inertial parameters",
+        noun: f"{contents['cycle']['duration']:.3g} s",
+        "base parameters": f"{base['rank']} (of {base['of']} inertial parameters)",
     }
     return table(plain(contents["robot"]), "", rows=cells.items())
 

@@ -237,7 +237,7 @@ def _show(simulation: Simulation, record: dict[str, Any], carried: Carried) -> N
         units = {"peak_force": force, "rms_force": force, "peak_speed": speed, "peak_power": "W"}
         sizes = (f"{significant(row[key])} {unit}" for key, unit in units.items())
         limited = leg.drive and leg.drive.max_force
-        share = percent(row["at_its_limit"]) if limited else "no limit"
+        share = percent(row["at_its_limit"]) if limited else "unlimited"
         drives.append((str(row["leg"]), *sizes, share))
     word = force_word(robot)
     saturated = f"time at {word} limit"

@@ -157,7 +157,7 @@ def _show(tuning: Tuning, controller: str, tried: pl.DataFrame) -> None:
     headings = [f"{n} ({unit})" if unit else n for n, unit in zip(gains, units, strict=True)]
     unit = "urad" if robot.platform.angular.all() else "um"
     joint_unit = "/".join(dict.fromkeys(leg.joint.unit for leg in robot.legs))
-    tries = []
+    tries, changed = [], ""
     for row in tried.to_dicts():
         name, factor = _TRIED[row["changed"]]
         figures = (
@@ -170,7 +170,9 @@ def _show(tuning: Tuning, controller: str, tried: pl.DataFrame) -> None:
                 f"{significant(row['energy'])} J",
             )
         )
-        tries.append((name.format(unit=joint_unit), f"{factor * row['value']:.3g}", *figures))
+        first = "" if row["changed"] == changed else name.format(unit=joint_unit)
+        changed = row["changed"]
+        tries.append((first, f"{factor * row['value']:.3g}", *figures))
     force = f"peak force ({' or '.join(force_units(robot))})".replace("(share)", "/limit")
     names = ("simulated with", "value", "largest error", "settling time", force, "energy")
     rate, required = tuning.controller.bandwidth, tuning.required

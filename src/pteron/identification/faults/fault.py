@@ -95,7 +95,7 @@ IN_WORDS: dict[FaultName, str] = {
     "scale": "a scale error of one force",
     "ratio": "a wrong gear ratio",
     "zero": "a wrong joint zero",
-    "gain": "a scale error of all forces",
+    "gain": "a wrong gain of all forces",
     "gravity": "a wrong direction of gravity",
     "clock": "a wrong clock",
     "geometry": "a wrong length or point of the geometry",
