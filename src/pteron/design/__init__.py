@@ -1,6 +1,6 @@
 """Searches for the best dimensions of a machine, or the best machine, with proofs.
 
-`search` and `survey` vary one machine according to a `Spec`; `choose_machine` varies the machines of
+`search` and `survey` vary one machine as a `Spec` states; `choose_machine` varies the machines of
 the catalog for a `Job`. The files of the package, each used by those below it:
 
 - requirements: load_tables, workspace_tables, requirement_tables; `spec` with user_quantities and
