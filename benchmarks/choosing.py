@@ -69,7 +69,7 @@ def show(choice: Choice) -> None:
             print(f"{one.kind}: {told(choice, one)}", end="; ", flush=True)
             print(checked(choice.job, one), flush=True)
         else:
-            print(f"{one.kind} falls out: {'; '.join(one.why)}", flush=True)
+            print(f"{one.kind} is infeasible: {'; '.join(one.why)}", flush=True)
 
 
 def turning(job: Job) -> Job:

@@ -25,7 +25,7 @@ from pteron.equations import regressor
 from pteron.equations.machine import Machine
 from pteron.kernels import TARGETS, Kernel, Port
 from pteron.reduction import BaseParameters, model_forms
-from pteron.report.costs import dense_operations, fewer
+from pteron.report.costs import dense_operations, saving_text
 
 _STATES = 1024
 ORIGINALS = ("Eq. (13)", "Eq. (15)")
@@ -64,8 +64,8 @@ def print_readings(name: str, base: BaseParameters) -> None:
             verdict = ""
             if key != REDUCED:
                 verdict = (
-                    f"{fewer(less, run.operations)} operations, "
-                    f"{fewer(us[REDUCED], us[key], 'less')} time "
+                    f"{saving_text(less, run.operations)} operations, "
+                    f"{saving_text(us[REDUCED], us[key], 'less')} time "
                     f"({100.0 * (us[key] / us[REDUCED] - 1.0):+.0f} % faster)"
                 )
             print(f"{evaluation:<22}{key:<10}{run.operations:>11}{us[key]:>8.3f}   {verdict}")

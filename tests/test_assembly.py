@@ -194,18 +194,22 @@ def test_two_modes_meet_and_vanish_together():
     start = pteron.inverse_kinematics(robot, home)
     way = np.array([1.0, -0.6, 0.3])
     inside, beyond = 0.0, 1.0
-    number = int(counts(pteron.direct_kinematics(robot, start, all_branches=True)))
+    number = int(
+        counts(pteron.direct_kinematics(robot, start, all_branches=True, on_failure="nan"))
+    )
     for _ in range(60):
         middle = 0.5 * (inside + beyond)
-        poses = pteron.direct_kinematics(robot, start + middle * way, all_branches=True)
+        poses = pteron.direct_kinematics(
+            robot, start + middle * way, all_branches=True, on_failure="nan"
+        )
         inside, beyond = (middle, beyond) if counts(poses) >= number else (inside, middle)
     steps = 10.0 ** np.arange(-11.0, -2.0)
     for side, most in ((-1, number), (1, number - 2)):
         joints = start + (inside + side * steps)[:, None] * way
-        found = pteron.direct_kinematics(robot, joints, all_branches=True)
+        found = pteron.direct_kinematics(robot, joints, all_branches=True, on_failure="nan")
         assert (counts(found) == most).all()
     joints = start + (inside + np.linspace(-1e-13, 1e-13, 21))[:, None] * way
-    found = pteron.direct_kinematics(robot, joints, all_branches=True)
+    found = pteron.direct_kinematics(robot, joints, all_branches=True, on_failure="nan")
     assert set(counts(found)) <= {number - 2, number - 1, number}
 
 
@@ -216,13 +220,15 @@ def test_modes_that_all_but_meet_are_told_apart():
     inside, beyond = 0.0, 1.0
     for _ in range(60):
         middle = 0.5 * (inside + beyond)
-        poses = pteron.direct_kinematics(robot, start + middle * way, all_branches=True)
+        poses = pteron.direct_kinematics(
+            robot, start + middle * way, all_branches=True, on_failure="nan"
+        )
         inside, beyond = (middle, beyond) if counts(poses) == 2 else (inside, middle)
     mpmath.mp.dps = 40
     apart = []
     for short in (1e-15, 1e-14, 1e-13, 1e-12):
         joints = start + (inside - short) * way
-        found = pteron.direct_kinematics(robot, joints, all_branches=True)
+        found = pteron.direct_kinematics(robot, joints, all_branches=True, on_failure="nan")
         found = found[~np.isnan(found[:, 0])]
         assert len(found) == 2
         exact = [exact_pose(robot, joints, pose) for pose in found]
@@ -267,7 +273,7 @@ def test_what_is_no_number_has_no_pose():
         if name == "3-prr":
             wrong.append([1e6, 0.0, 0.0])
         with pytest.warns(pteron.UnlikelyValue, match="are these"):
-            assert np.isnan(pteron.direct_kinematics(robot, wrong)).all()
+            assert np.isnan(pteron.direct_kinematics(robot, wrong, on_failure="nan")).all()
         assert pteron.direct_kinematics(robot, np.zeros((2, 0, n))).shape[:2] == (2, 0)
 
 
@@ -438,7 +444,7 @@ def test_a_motion_ends_where_a_leg_does_not_reach(name):
     along_x = pteron.jacobian(robot, start)[:, 0]
     joints = pteron.inverse_kinematics(robot, start) + np.linspace(0, 0.4, 41)[:, None] * along_x
     found = pteron.follow(robot, joints, start, on_failure="nan")
-    lost = np.isnan(pteron.direct_kinematics(robot, joints)[:, 0, 0])
+    lost = np.isnan(pteron.direct_kinematics(robot, joints, on_failure="nan")[:, 0, 0])
     np.testing.assert_array_equal(np.isnan(found[:, 0]), lost)
     assert 0 < lost.sum() < 41
     with pytest.raises(UnreachablePose, match="the platform does not follow"):

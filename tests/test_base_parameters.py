@@ -623,7 +623,7 @@ def test_a_relation_that_exactness_loses_is_seen_in_floating_point():
         legs.append(replace(leg, slider_direction=tuple(e / np.linalg.norm(e))))
     certificate = pteron.base_parameters(replace(robot, legs=tuple(legs))).certificate
     assert (certificate.rank, certificate.numerical_rank) == (19, 18)
-    assert "IN FLOATING POINT that of the machine itself is 18" in certificate.summary()
+    assert "IN FLOATING POINT the rank of the machine is 18" in certificate.summary()
 
 
 @pytest.mark.parametrize(
@@ -656,9 +656,9 @@ def test_floats_are_not_said_to_agree_where_what_they_drop_is_no_rounding(
     assert 1e-13 < numerical.largest_dropped < 1e-10
     assert "WHAT WAS DROPPED IS MORE THAN ROUNDING (1e-13)" in svd.summary()
     if numerical_rank == rank:
-        assert "WHAT WAS DROPPED IS MORE THAN ROUNDING (1e-13), so that floats do not" in summary
+        assert "WHAT WAS DROPPED IS MORE THAN ROUNDING (1e-13), so that floating point" in summary
     else:
-        assert f"IN FLOATING POINT that of the machine itself is {numerical}" in summary
+        assert f"IN FLOATING POINT the rank of the machine is {numerical}" in summary
 
 
 @pytest.mark.parametrize("case", gated([*FEW[:3], *FAMILY], ["delta-4"]))

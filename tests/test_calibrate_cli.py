@@ -90,7 +90,7 @@ def test_planned_poses_are_a_table_that_the_machine_runs():
     assert set(poses[:, 2]) == {0.0}
     assert np.hypot(*poses[:, :2].T).max() > 0.085
     assert "over the plane z = 0 mm, in a disc of radius 87 mm" in " ".join(text.split())
-    assert "every pose of it is proved to serve" in " ".join(text.split())
+    assert "every pose in it is proved to be in reach" in " ".join(text.split())
     assert "From 54 poses on, some are held out" in " ".join(text.split())
 
 
@@ -119,7 +119,7 @@ def test_a_mistake_of_the_whole_log_is_the_first_sentence_and_undone_on_the_page
     assert "(--anyway writes it)" in text
     assert not Path("found/robot.toml").exists()
     text = done("calibrate swapped.csv --robot linear-delta --out found --anyway")
-    assert "belongs to the log with its mistake undone: mend the log" in text
+    assert "belongs to the log with its mistake undone: correct the log" in text
     found, sound = pteron.load("found/robot.toml"), Path("sound/robot.toml")
     done("calibrate log.csv --robot linear-delta --out sound")
     poses = log().select("x", "y", "z").to_numpy()

@@ -153,7 +153,7 @@ def test_a_printer_gets_its_firmwares_values_first(tmp_path: Path):
     changes = [float(row.change.replace("\u2212", "-")) for row in firmware.rows]
     assert changes == pytest.approx([0.0, 0.0, 0.0, -0.3, 0.2, -0.1], abs=0.06)
     assert result.held_out is None
-    assert "at 8 rows that were not fitted, the height error is 0.0" in firmware.sentence
+    assert "at 8 rows held out of the fit, the height error is 0.0" in firmware.sentence
     files = write_calibration(result, tmp_path, firmware=firmware)
     page = Reader(files.page.read_text("utf-8"))
     assert page.faults == page.open == []

@@ -335,7 +335,7 @@ def test_a_region_is_proved_or_a_pose_is_shown():
     most = abs(numeric(QUADRUPTERON, "type_ii")(np.zeros(4))[0])
     good = prove(QUADRUPTERON, cube, type_i=0.5, type_ii=most * np.cos(0.41))
     assert good.holds
-    assert str(good).startswith("proved: every pose keeps ")
+    assert str(good).startswith("proved: every pose meets ")
     bad = prove(QUADRUPTERON, cube, type_ii=most * np.cos(0.39))
     assert bad.holds is False
     assert abs(bad.counterexample[3]) > 0.39
@@ -356,7 +356,7 @@ def test_a_region_that_touches_the_boundary_is_not_decided():
     assert found.holds is None
     assert found.undecided[1, 0] == 0.1
     assert [str(c) for c in found.causes] == ["leg 1: slider at its most"]
-    assert "the region may touch that edge" in str(found)
+    assert "the region may touch the boundary" in str(found)
 
 
 @CLIENTS

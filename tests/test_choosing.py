@@ -77,7 +77,7 @@ def test_a_choice_has_a_summary_a_table_and_shows_in_a_notebook(chosen):
     assert choice.summary().splitlines()[0].startswith(f"{choice.best.kind}: ")
     assert f"<b>Kinds of machines</b> {choice.best.kind} is best" in choice._repr_html_()
     nowhere = replace(choice.best, serves=False, why=("no reach",))
-    assert nowhere.summary().endswith("falls out: the nearest design has no reach")
+    assert nowhere.summary().endswith("infeasible: the nearest design has no reach")
 
 
 def test_a_chosen_machine_keeps_what_was_asked(chosen):
@@ -129,7 +129,7 @@ def test_what_is_tried_is_told_first_and_the_page_says_it_well(chosen, tmp_path)
     assert first == (
         "One kind with 12 designs to rate, the best of them to be proved: linear-delta"
     )
-    assert re.fullmatch(r"1 of 1: linear-delta: (falls out; )?\d+ of 12 designs keep all .*", kind)
+    assert re.fullmatch(r"1 of 1: linear-delta: (infeasible; )?\d+ of 12 designs meet all .*", kind)
     file.write_text(tomlkit.dumps(JOB))
     found = run(f"choose {file} --out {folder}")
     assert found.stderr == f"Gone on in {folder}: linear-delta finished before\n"
@@ -257,7 +257,7 @@ def test_a_cycle_between_the_poses_of_a_list_keeps_the_limits():
     joints = inverse_kinematics(kept.robot, kept.middle + line)
     assert (joints >= low).all()
     assert (joints <= high).all()
-    assert "so do the cycles between them" in proof_sentence(evaluator, [])
+    assert "so are the cycles between them" in proof_sentence(evaluator, [])
 
 
 def test_margins_are_those_between_the_directions_of_a_cycle_too(chosen):

@@ -105,7 +105,7 @@ def test_functions_of_a_user_are_objectives_and_requirements(tmp_path):
         assert front.objectives[k, 0] == crank_area(front.robot(k)) <= 0.6
     assert (front.objectives[:, 2] > 0.0).all()
     page = FrontReport(front).page()
-    assert "crank_area as small as can be" in page
+    assert "crank_area as small as possible" in page
     assert "crank_area at most 0.6" in page
     # The folder is of these functions: it is gone on with them, and refused with others.
     assert search(functions_spec(), folder=tmp_path).designs.equals(front.designs)
@@ -391,7 +391,7 @@ def test_what_changed_is_told_in_words(found):
     summary = FrontReport(found[0])
     page = summary.page()
     assert "| cube | 167.2 mm |" in page
-    assert "cube proved: every position of the cube with edge" in page
+    assert "cube proved: every position in the cube with edge" in page
     assert "slider of leg 1:" in page
     best = summary.selection[0]
     lengths = [c for c in best.changes if c.what.startswith("upper length")]

@@ -380,15 +380,21 @@ def test_a_leg_that_does_not_say_what_its_joints_carry_is_refused(monkeypatch):
         tree(robot)
 
 
-def test_a_leg_of_ones_own_is_exported():
-    """The kind of leg in examples/new_leg.py, of which nothing here has heard."""
+EXAMPLES = {
+    "new_leg.linear_delta()": "pteron.random_poses(robot, 5, type_i=0.5, type_ii=0.3)",
+    "new_platform.five_ups()": "[0.0, 0.0, 0.7, 0.1, 0.1] + rng.uniform(-0.05, 0.05, (5, 5))",
+}
+
+
+@pytest.mark.parametrize(("machine", "poses"), EXAMPLES.items())
+def test_a_kind_of_leg_and_of_platform_from_examples_is_exported(machine, poses):
     pytest.importorskip("mujoco")
     code = (
         "import sys; sys.path[:0] = ['examples', 'tests']\n"
-        "import new_leg, trees, numpy as np, pteron\n"
-        "robot = new_leg.linear_delta()\n"
-        "pose = pteron.random_poses(robot, 5, type_i=0.5, type_ii=0.3)\n"
-        "motion = pose, *np.random.default_rng(0).normal(size=(2, 5, 3))\n"
+        "import new_leg, new_platform, trees, numpy as np, pteron\n"
+        f"robot, rng = {machine}, np.random.default_rng(0)\n"
+        f"pose = {poses}\n"
+        "motion = pose, *np.random.default_rng(0).normal(size=(2, *pose.shape))\n"
         "forces, _, gap = trees.projected(robot, trees.MuJoCo(robot), *motion)\n"
         "error = np.abs(forces - pteron.inverse_dynamics(robot, *motion)).max()\n"
         "print(gap < 1e-13 and error < 1e-8 * np.abs(forces).max())\n"

@@ -391,7 +391,7 @@ def test_a_jacobian_of_constant_rows_is_given_out_of_reach_and_at_singularities(
     assert np.isfinite(lost[1]).all()
 
 
-# Direct kinematics: a mode that is not real is NaN, by default.
+# Direct kinematics: joints without a pose raise, or are NaN.
 
 
 def impossible():
@@ -399,24 +399,25 @@ def impossible():
     return pteron.inverse_kinematics(ROBOT, np.zeros(4)) + np.array([0, 0.5, 0, -0.5])
 
 
-def test_direct_kinematics_gives_nan_by_default():
+def test_direct_kinematics_gives_nan_on_request():
     with np.errstate(all="raise"):
-        assert np.isnan(pteron.direct_kinematics(ROBOT, impossible())).all()
-        found = pteron.direct_kinematics(ROBOT, [impossible(), np.zeros(4), [np.nan, 0, 0, np.inf]])
+        assert np.isnan(pteron.direct_kinematics(ROBOT, impossible(), on_failure="nan")).all()
+        rows = [impossible(), np.zeros(4), [np.nan, 0, 0, np.inf]]
+        found = pteron.direct_kinematics(ROBOT, rows, on_failure="nan")
     assert np.isfinite(found[1]).any()
     assert np.isnan(found[[0, 2]]).all()
 
 
-def test_direct_kinematics_raises_where_asked():
+def test_direct_kinematics_raises_by_default():
     joints = pteron.inverse_kinematics(ROBOT, states(ROBOT, 20)[0])
     joints[17] = impossible()
     with pytest.raises(UnreachablePose, match=r"^joints\[17\]: no pose has these") as caught:
-        pteron.direct_kinematics(ROBOT, joints, on_failure="raise")
+        pteron.direct_kinematics(ROBOT, joints)
     assert caught.value.index == (17,)
     with pytest.raises(UnreachablePose, match=r"^joints: no pose has these") as caught:
-        pteron.direct_kinematics(ROBOT, impossible(), on_failure="raise")
+        pteron.direct_kinematics(ROBOT, impossible())
     assert caught.value.index == ()
     with pytest.raises(DataError, match=r"^joints\[1\]: nan given, a finite number expected"):
-        pteron.direct_kinematics(ROBOT, [0, np.nan, 0, 0], on_failure="raise")
+        pteron.direct_kinematics(ROBOT, [0, np.nan, 0, 0])
     with pytest.raises(DataError, match=r"^joints: shape \(3,\) given, \(..., 4\) expected"):
         pteron.direct_kinematics(ROBOT, np.zeros(3))

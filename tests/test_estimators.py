@@ -360,7 +360,8 @@ def test_the_noise_of_a_sum_is_that_of_its_dense_covariance():
     covariance = dense(NOISE, 40)
     flat = matrix.reshape(-1, P)
     assert NOISE.sum_covariance(matrix) == pytest.approx(flat.T @ covariance @ flat, rel=1e-10)
-    assert NOISE.times(matrix).reshape(-1, P) == pytest.approx(covariance @ flat, rel=1e-10)
+    product = NOISE.multiply_covariance(matrix).reshape(-1, P)
+    assert product == pytest.approx(covariance @ flat, rel=1e-10)
     # Whatever the blocks.
     long = regressor(9000)
     ends = NOISE.sum_covariance(long[:40]), NOISE.sum_covariance(np.r_[long[:40], 0.0 * long[40:]])

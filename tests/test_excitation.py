@@ -33,7 +33,7 @@ from pteron.identification.excitation import (
     scaled_condition,
     stacked_regressor,
 )
-from pteron.identification.excitation.conditioning import condition_of_long
+from pteron.identification.excitation.conditioning import condition_with_penalty
 from pteron.identification.excitation.limits import UNITS
 from pteron.identification.excitation.random_motions import shrink_into_limits
 from pteron.identification.excitation.search_program import measure
@@ -370,9 +370,9 @@ def test_the_scaled_condition_number_does_not_depend_on_units():
 
 def test_a_column_that_is_short_beside_others_counts_as_so_much_worse():
     root = np.linalg.qr(np.random.default_rng(0).normal(size=(40, 5)), mode="r")
-    assert condition_of_long(root, np.zeros(5)) == pytest.approx(scaled_condition(root))
+    assert condition_with_penalty(root, np.zeros(5)) == pytest.approx(scaled_condition(root))
     root /= np.linalg.norm(root, axis=0)
-    found = condition_of_long(root * [1.0, 1.0, 1e-3, 1.0, 1.0], np.full(5, 0.1))
+    found = condition_with_penalty(root * [1.0, 1.0, 1e-3, 1.0, 1.0], np.full(5, 0.1))
     expected = scaled_condition(root) * 1.01**2 * np.sqrt(1.0 + 1e4)
     assert found == pytest.approx(expected)
 
@@ -574,7 +574,7 @@ def test_a_motion_that_would_not_identify_the_machine_is_said_to():
         CATALOG["tripteron"], harmonics=1, starts=1, draws=10, workers=1, seconds=1.0
     )
     bad = replace(found, conditioning=replace(found.conditioning, scaled=6165.0))
-    assert "leaves some base parameters open" in bad.progress_text
+    assert "does not identify all base parameters" in bad.progress_text
     assert "--shared" in bad.progress_text
     good = replace(found, conditioning=replace(found.conditioning, scaled=50.0))
     assert "leaves" not in good.progress_text
@@ -653,7 +653,7 @@ def test_the_command_writes_both_files_and_a_table(tmp_path: Path, monkeypatch):
     assert (result.exit_code, result.stderr) == (0, "")
     for words in (
         "best of 4 random",
-        "of length 1",
+        "scaled to length 1",
         "type-I measure",
         "speed (m/s)",
         "motion.toml",

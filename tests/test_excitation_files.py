@@ -395,7 +395,8 @@ def test_the_command_writes_in_the_units_and_names_asked_for(tmp_path: Path, mon
     assert lines[0] == "t;Axis1;Axis2;Axis3"
     assert lines[2].startswith("10,0;")
     assert len(lines) == 802
-    for words in ("held out", "From rest to rest in 8 s: periodic from 2 to 6 s", "To hold out: "):
+    motion = "from rest to rest in 8 s: lead-in to 2 s, periodic to 6 s, lead-out."
+    for words in ("held-out motion", motion, "Held-out motion, to validate the model: "):
         assert words in result.stdout
     about = tomllib.loads(Path("motion.toml").read_text())
     assert about["joints"] == {"columns": ["Axis1", "Axis2", "Axis3"], "unit": "deg"}

@@ -12,12 +12,18 @@ from commands import refused, run
 import pteron
 from pteron.export import export_named, export_names
 from pteron.indices import INDICES, Index, evaluate
+from pteron.manipulator import dumps, loads
 from pteron.maps import load_map, map_index, pose_grid, save_map
+from pteron.platforms.kinds import KINDS
 from pteron.plots import map_figure
 
 PACKAGE = """
 import json
 from pteron.indices import Index
+from pteron.platforms.translating import Translating
+
+class Gantry(Translating):
+    motion_name = "gantry"
 
 def heights(robot, poses):
     return poses[:, 2]
@@ -43,6 +49,10 @@ acme = acme_pteron:write
 silent = acme_pteron:silent
 number = acme_pteron:__name__
 gone = acme_nowhere:write
+[pteron.platforms]
+gantry = acme_pteron:Gantry
+other = acme_pteron:Gantry
+absent = acme_nowhere:Gantry
 """
 
 
@@ -69,13 +79,13 @@ def test_an_own_index_is_evaluated_where_the_machine_reaches():
         return poses[:, 2]
 
     height = Index("height", "height", unit="m", function=heights)
-    values = evaluate("tripteron", height, POSES)
+    values = evaluate("tripteron", height, POSES, on_failure="nan")
     np.testing.assert_array_equal(values, [0.02, np.nan, -0.01])
     assert [poses.shape for poses in seen] == [(2, 3)]
     assert evaluate("tripteron", height, POSES[0]) == 0.02
-    assert evaluate("tripteron", height, POSES.reshape(3, 1, 3)).shape == (3, 1)
+    assert evaluate("tripteron", height, POSES.reshape(3, 1, 3), on_failure="nan").shape == (3, 1)
     with pytest.raises(pteron.UnreachablePose):
-        evaluate("tripteron", height, POSES, on_failure="raise")
+        evaluate("tripteron", height, POSES)
 
 
 @pytest.mark.parametrize(
@@ -92,11 +102,12 @@ def test_an_own_index_is_evaluated_where_the_machine_reaches():
 )
 def test_an_own_index_that_is_none_is_refused(index, words):
     with pytest.raises(pteron.DataError, match=re.escape(words)):
-        evaluate("tripteron", index, POSES)
+        evaluate("tripteron", index, POSES, on_failure="nan")
 
 
 def test_an_index_of_an_installed_package_is_known(installed):
-    np.testing.assert_array_equal(evaluate("tripteron", "height", POSES), [0.02, np.nan, -0.01])
+    values = evaluate("tripteron", "height", POSES, on_failure="nan")
+    np.testing.assert_array_equal(values, [0.02, np.nan, -0.01])
     with pytest.raises(pteron.ModelError, match=r"acme_pteron:unnamed is no .*Index 'wrong'"):
         evaluate("tripteron", "wrong", POSES)
     assert "height" not in INDICES
@@ -123,6 +134,37 @@ def test_an_export_of_an_installed_package_writes_its_files(installed, tmp_path)
 )
 def test_an_export_that_is_none_is_refused(installed, target, words):
     assert words in refused(f"export tripteron --target {target}")
+
+
+def machine_with_motion(motion, folder):
+    """Write the catalog's Tripteron with another motion, and return the file's path."""
+    path = folder / f"{motion}.toml"
+    path.write_text(dumps("tripteron").replace('"3T"', f'"{motion}"'))
+    return path
+
+
+def test_a_platform_of_an_installed_package_is_one_of_pteron(installed, tmp_path, monkeypatch):
+    monkeypatch.setattr("pteron.platforms.kinds.KINDS", dict(KINDS))
+    robot = pteron.load(machine_with_motion("gantry", tmp_path))
+    assert robot.platform.kind.motion_name == "gantry"
+    motion = POSES[0], [0.1, 0.2, 0.3], [1.0, 2.0, 3.0]
+    forces = pteron.inverse_dynamics("tripteron", *motion)
+    np.testing.assert_array_equal(pteron.inverse_dynamics(robot, *motion), forces)
+    assert loads(dumps(robot)) == robot
+    assert "3 legs" in run(f"check {tmp_path / 'gantry.toml'}").stdout
+
+
+@pytest.mark.parametrize(
+    ("motion", "words"),
+    [
+        ("other", "acme_pteron:Gantry is no kind of platform with motion_name 'other'"),
+        ("absent", "acme_nowhere:Gantry: ModuleNotFoundError"),
+        ("4T", "platform.motion: '4T' given, '3T', '3T1R'"),
+        ("4T", "'1T2R', 'absent', 'gantry' or 'other' expected"),
+    ],
+)
+def test_a_platform_that_is_none_is_refused(installed, motion, words, tmp_path):
+    assert words in refused(f"check {machine_with_motion(motion, tmp_path)}")
 
 
 # Maps of own indices.

@@ -160,7 +160,7 @@ def test_the_command_films_the_standard_cycle_and_a_table():
     assert sum(unpacked("cycle.gif")[1]) == pytest.approx(told["frames"] / told["fps"])
     run("cycle five-bar --duration 1 --rate 50 --out motion.csv")
     text = done(f"film five-bar --cycle motion.csv -o motion.mp4 --forces {short}")
-    assert "1 s of five-bar at 0.5 times its speed: 2.25 s, 9 frames of 240x180" in text
+    assert "1 s of motion at 0.5 times real speed; the film has 2.25 s, 9 frames of 240x180" in text
     assert len(decoded("motion.mp4")[1]) == 9
     refused("film five-bar -o a.gif --turns 1", "five-bar is planar")
     refused("film tripteron -o a.gif --size big", "--size: 'big' given", "960x720")

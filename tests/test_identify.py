@@ -236,7 +236,7 @@ def test_the_flipped_sign_of_a_slider_is_found(slider):
 
 def test_without_other_logs_the_end_is_held_out_and_said():
     found = identify(QUADRUPTERON, noisy(QUADRUPTERON, 1))
-    assert any("repeats the motion" in reason for reason in found.verdict.reasons)
+    assert any("repeat the motion" in reason for reason in found.verdict.reasons)
     assert any("Record another motion" in step for step in found.verdict.next_steps)
 
 
@@ -265,7 +265,7 @@ def test_an_estimate_that_has_not_settled_is_noted():
     hasty = partial(huber, iterations=2)
     found = identify(CATALOG["tripteron"], noisy(CATALOG["tripteron"]), estimator=hasty)
     assert not found.estimate.converged
-    assert "huber has not settled in 2 iterations" in found.notes[0]
+    assert "huber has not converged in 2 iterations" in found.notes[0]
     assert found.as_dict()["estimate"]["converged"] is False
 
 
@@ -409,7 +409,7 @@ def test_what_too_little_motion_does_not_show_stays_near_the_drawing():
     found = identify(QUADRUPTERON, log)
     base = found.model.base
     assert "mgx_u2" in found.unseen
-    steps = [step for step in found.verdict.next_steps if step.startswith("Not shown by this")]
+    steps = [step for step in found.verdict.next_steps if step.startswith("Not determined by")]
     assert len(steps) == 1
     assert "mgx_u2" in steps[0]
     # Of usual size, not a thousand times as large, and its interval says that it is not known.
@@ -555,7 +555,7 @@ def test_a_trusted_error_above_the_noise_is_told_beside_it():
         " ".join(verdict_of([prediction((0.04, 0.01), noise)], repeats=False).reasons)
         for noise in ((0.02, 0.01), (0.03, 0.01))
     )
-    expected = "misses 3.5 % of the force of actuator 1 beyond the noise (its error is 2 times the"
+    expected = "misses 3.5 % of the force of actuator 1; up to 5 % is trustworthy (the error is 2 "
     assert expected in told
     assert "times the noise" not in quiet
 
@@ -576,7 +576,7 @@ def test_what_is_left_open_of_a_cycle_counts(uncertain, spoiled, grade):
     verdict = verdict_of([good], FaultIsolation(("delay",), (), *shares), repeats=False)
     assert verdict.grade == grade
     steps = " ".join(verdict.next_steps)
-    assert ("leaves such a cycle's forces open" in steps) == (uncertain == 4.0)
+    assert ("does not determine the forces of such a cycle" in steps) == (uncertain == 4.0)
 
 
 def test_the_worst_recording_decides():

@@ -61,7 +61,8 @@ def test_the_files_agree_with_each_other_and_with_the_terminal():
     assert sorted(file.name for file in folder.iterdir()) == [*FILES, f"{robot}.toml"]
     data = strict((folder / "identification.json").read_text(encoding="utf-8"))
     grade = data["verdict"]["grade"]
-    assert text.startswith(f"{robot}: {grade}, held-out error up to ")
+    error = "error of the forces predicted in held-out data: up to "
+    assert text.startswith(f"{robot}: {grade}; {error}")
     assert "\x1b" not in text
     for name in data["estimate"]["names"]:
         assert f"\n {name} " in text

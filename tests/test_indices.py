@@ -149,15 +149,18 @@ def test_bad_poses_and_bad_words():
     poses = np.array([[0.0, 0.0, 0.0, 0.1], [9.0, 0.0, 0.0, 0.0], [0.01, 0.0, 0.0, np.pi / 2]])
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        found = {name: evaluate("quadrupteron", name, poses) for name in ("condition", "error")}
+        found = {
+            name: evaluate("quadrupteron", name, poses, on_failure="nan")
+            for name in ("condition", "error")
+        }
     assert np.isnan(found["condition"]).tolist() == [False, True, False]
     assert np.isnan(found["error"]).tolist() == [False, True, True]
     assert found["condition"][2] > 1e14
     assert found["error"][0] == evaluate("quadrupteron", "error", poses[0])
     with pytest.raises(UnreachablePose, match=r"pose\[1\]"):
-        evaluate("quadrupteron", "condition", poses, on_failure="raise")
+        evaluate("quadrupteron", "condition", poses)
     with pytest.raises(SingularPose, match="type II"):
-        evaluate("quadrupteron", "error", poses[2], on_failure="raise")
+        evaluate("quadrupteron", "error", poses[2])
     with pytest.raises(DataError, match="index: 'speed' is not known; choose from condition, "):
         evaluate("tripteron", "speed", np.zeros(3))
     with pytest.raises(ModelError, match="'turning_error' is about turning, but this 3T platform"):

@@ -244,7 +244,7 @@ def test_direct_kinematics_is_nan_where_no_pose_is(name):
     else:
         # Out of the others' reach, or at an angle with which other joints are unlike these.
         far[:, 0] += 5.0 if robot.legs[0].joint.unit == "m" else 3.0
-    found = pteron.direct_kinematics(robot, far)
+    found = pteron.direct_kinematics(robot, far, on_failure="nan")
     if robot.legs[0].joint.unit == "m":
         assert np.isnan(found).all()
     back = pteron.inverse_kinematics(robot, found, on_failure="nan")

@@ -842,8 +842,14 @@ def test_linuxcncs_own_modules_keep_their_names(tmp_path, name, stem):
         ("", "none given; say what to write, such as --c controller"),
         ("--fmu a --casadi b", "--casadi, --fmu: give one at a time"),
         ("--fmu a --c b", "--c, --fmu: give one at a time"),
-        ("--klipper a --float --wrench", "--float, --wrench: goes with --c and --st, not with"),
-        ("--linuxcnc a --base b.json", "--base: goes with --c and --st, not with --linuxcnc"),
+        (
+            "--klipper a --float --wrench",
+            "--float, --wrench: goes with --c, --st and --cuda, not",
+        ),
+        (
+            "--linuxcnc a --base b.json",
+            "--base: goes with --c, --st and --cuda, not",
+        ),
         ("--st a --float", "--float: goes with --c"),
         ("--klipper a", "Klipper moves x, y and z alone"),
     ],

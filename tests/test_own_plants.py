@@ -115,7 +115,7 @@ def test_a_working_mode_is_no_gear_ratio():
 def test_a_refused_log_names_the_payload():
     seen = answer("ball-table", "payload", 113, **SMALL)
     assert seen.grade == "refused"
-    assert "as a payload that nobody declared" in seen.first
+    assert "as an undeclared payload" in seen.first
 
 
 def test_orders_of_a_hexapods_legs_that_symmetry_hides_are_said():

@@ -70,7 +70,8 @@ def test_a_program_gets_all_numbers_and_a_pipe_what_a_person_sees(driven: str):
     assert len(data["worst"]) == 6
     least = min(data["margins"], key=lambda one: one["margin"])
     text = done(f"size {driven}")
-    assert f"Enough: the drives in the file have a margin of {least['margin']:.3g}, 1 asked" in text
+    enough = f"Enough: the drives in the file have {least['margin']:.3g} times what the cycle needs"
+    assert f"{enough} (1 required)" in text
     assert read(f"size {driven}").split() == text.split()
 
 
@@ -83,16 +84,16 @@ def test_payload_dwell_and_duration_count(driven: str):
     found = size(with_payload(robot, 0.4), cycle, dwell=0.2)
     assert data["duration"] == pytest.approx(0.7)
     assert [row["rms_force"] for row in data["drives"]] == pytest.approx(found.rms_forces, 1e-3)
-    assert "places and turns of the cycle, within the workspace" in done(f"size {driven} {asked}")
+    assert "orientations of the cycle in the workspace" in done(f"size {driven} {asked}")
 
 
 def test_friction_is_assumed_and_said_and_its_absence_too():
     line = "size five-bar --within here"
     text = done(line)
-    assert "Friction is assumed where the file has none: dry, leg by leg 0.0111 N m, 0.0111" in text
+    assert "dry friction of 10 % of the drive's peak is assumed, leg by leg: 0.0111 N m, 0." in text
     free = done(f"{line} --friction 0")
-    assert "All drives: 0 J a cycle (" in free
-    assert "J given and taken back: there is no friction)" in free
+    assert "All drives together: net energy 0 J per cycle (" in free
+    assert "J supplied and braked: there is no friction)" in free
     assert "assumed" not in free
 
 
@@ -104,10 +105,10 @@ def test_a_margin_that_is_asked_for_and_missed_is_not_enough(driven: str):
     best = max(min(m["rated_margin"], m["peak_margin"]) for m in data["motors"])
     result = run(f"{line} --margin {3.0 * max(margin, best):.6g}")
     assert result.exit_code == 1
-    for words in ("leg 1: not enough: max_force allow", "and a margin of", "is asked for"):
+    for words in ("leg 1: not enough: max_force of the file: ", "--margin requires "):
         assert words in result.stderr
-    assert "Not enough: the drives in the file have a margin of" in result.stdout
-    assert "leg 1: not enough: no motor of the list serves; " in result.stderr
+    assert "Not enough: the drives in the file have " in result.stdout
+    assert "leg 1: not enough: no motor of the list is strong enough; " in result.stderr
     assert "Not enough: the first motor listed" in result.stdout
 
 
@@ -116,9 +117,9 @@ def test_what_the_drives_cannot_do_is_told_and_ends_with_1(driven: str):
     assert result.exit_code == 1
     assert "Warning: leg 1: the motion takes up to " in result.stderr
     assert "but its drive gives 30 N m (max_force)" in result.stderr
-    assert "but the motor gives 12.8 N m all the time (rated_torque and ratio)" in result.stderr
+    assert "but the motor gives 12.8 N m continuously (rated_torque and ratio)" in result.stderr
     assert "N m about [" in result.stderr
-    assert "Not enough: the drives in the file have a margin of 0." in result.stdout
+    assert "Not enough: the drives in the file have 0." in result.stdout
 
 
 @CLIENTS
@@ -134,7 +135,7 @@ def test_motors_of_a_list_are_fitted_to_each_joint(driven: str):
     result = run(f"size {driven} --motors motors.csv --payload 500 --duration 0.2")
     assert result.exit_code == 1
     assert (
-        "leg 1: not enough: no motor of the list serves; 400 W, the nearest, has 0."
+        "leg 1: not enough: no motor of the list is strong enough; the nearest, 400 W, has 0."
         in result.stderr
     )
     assert "is it in grams?" in result.stderr
@@ -166,7 +167,7 @@ def test_a_person_sees_tables_within_80_columns(driven: str):
     Path("motors.csv").write_text(MOTORS, encoding="utf-8")
     text = read(f"size {driven} --motors motors.csv --payload 0.2", COLUMNS="80")
     assert max(map(len, text.splitlines())) <= 80
-    for words in ("with 0.2 kg", "RMS torque", "takes back (J)", "J a cycle", "400 W"):
+    for words in ("with 0.2 kg", "RMS torque", "energy", "braked", "J per cycle", "400 W"):
         assert words in text
     # A table that is too wide breaks its headings; no cell loses its unit.
     rotors = text[text.index("load/rotor") :].splitlines()
@@ -207,7 +208,7 @@ def test_the_common_motor_is_told_and_torques_are_called_so(driven: str):
     assert (first["legs"], first["motor"], second["motor"]) == ([1, 2], "100 W", "400 W")
     assert first["least_ratio"] <= first["ratio"] <= first["greatest_ratio"]
     text = done(line)
-    assert "Legs that are alike, with one motor" in text
+    assert "One motor and one ratio for equal legs" in text
     assert "peak torque  RMS torque" in text
     assert "force (" not in run(f"cycle {driven}").stdout
     assert "torque (N m)" in run(f"cycle {driven}").stdout

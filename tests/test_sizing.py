@@ -398,8 +398,8 @@ def test_what_is_more_than_the_drives_can_do_is_told_by_leg_and_amount():
     told = found.overloads
     assert len(told) == 6
     assert [text[:6] for text in told] == ["leg 1:"] * 2 + ["leg 2:"] * 2 + ["leg 1:", "leg 2:"]
-    assert f"{found.rms_forces[0]:.4g} N m root mean square" in told[4]
-    assert "0.02 N m all the time" in told[4]
+    assert f"{found.rms_forces[0]:.4g} N m RMS" in told[4]
+    assert "0.02 N m continuously" in told[4]
     assert sized("five-bar").overloads == ()
 
 

@@ -64,7 +64,7 @@ def test_drawn_points_are_those_of_a_platform_turned_by_its_pose(kinds):
     assert len(corners) == len(robot.legs)
     assert apart.max() < 1e-14
     colors = {line.get_color() for line in draw(robot, pose).axes[0].lines}
-    assert len(colors & set(pteron.plots.canvas.LEG_COLORS)) == len(robot.legs)
+    assert len(colors & set(pteron.plots.LEG_COLORS)) == len(robot.legs)
 
 
 @CLIENTS

@@ -95,7 +95,7 @@ def test_the_command_carries_what_python_does(tmp_path):
         "gripper",
     )
     said = done(f"size {path} --tool gripper --payload 0.4@0,0,-0.03 --within here")
-    assert "with tool gripper and 0.4 kg at (0, 0, -0.03) m, cycle adept" in said
+    assert "with tool gripper and 0.4 kg at (0, 0, -0.03) m, standard pick-and-place cycle" in said
 
 
 def test_a_simulation_carries_a_payload_at_its_centre(tmp_path):

@@ -733,7 +733,7 @@ def test_the_command_goes_lines_joints_and_tables(tmp_path):
         f"tripteron --via {via} --corner 0.01 --back --duration 1 --out {out}"
     )
     assert (code, warned) == (0, "")
-    assert "1 s, 1001 samples" in told
+    assert "1 s (1001 samples)" in told
     ends = pl.read_csv(out)[[0, 500, -1]].select("x", "y", "z").to_numpy()
     np.testing.assert_allclose(ends, [[0, 0, 0], [0.05, 0.05, 0], [0, 0, 0]], atol=1e-12)
     code, told, _ = cycle(f"tripteron --table {out} --payload 1 --json")

@@ -40,11 +40,12 @@ def test_joints_in_degrees_or_millimetres_are_told_beside_the_missing_pose():
     with pytest.warns(
         pteron.UnlikelyValue, match="^theta1, theta2, theta3 up to 30: are these deg"
     ):
-        assert np.isnan(pteron.direct_kinematics("delta", [10.0, 20.0, 30.0])).all()
+        poses = pteron.direct_kinematics("delta", [10.0, 20.0, 30.0], on_failure="nan")
+    assert np.isnan(poses).all()
     with pytest.warns(pteron.UnlikelyValue, match="rho4 up to 80: are these mm"):
-        pteron.direct_kinematics("quadrupteron", np.array([30.0, 10.0, 20.0, 80.0]))
+        pteron.direct_kinematics("quadrupteron", [30.0, 10.0, 20.0, 80.0], on_failure="nan")
     with pytest.raises(pteron.UnreachablePose, match=r"30\.0\]; theta1, .* are these degrees"):
-        pteron.direct_kinematics("delta", [10.0, 20.0, 30.0], on_failure="raise")
+        pteron.direct_kinematics("delta", [10.0, 20.0, 30.0])
 
 
 def test_what_the_command_line_hints_at_is_warned_of_in_python():

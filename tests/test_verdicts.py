@@ -461,7 +461,7 @@ def test_the_page_of_verdicts_has_the_thresholds_as_they_are():
             "ten times the previous threshold",
             INACCURATE == 10.0,
         ),
-        "least singular value": ("0.02", LEAST_SINGULAR_VALUE == 0.02),
+        "leg forces are up to": ("0.02", LEAST_SINGULAR_VALUE == 0.02),
         "to hold the weight": ("10", HOLDING_FORCE == 10.0),
         "near it a leg": ("100", HOLDING_FORCE_NEAR == 100.0),
         "their links cross": ("2 %", CROSSING == 0.02),

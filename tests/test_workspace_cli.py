@@ -45,10 +45,11 @@ def test_a_person_reads_the_reach_what_ends_it_and_each_index():
     text = read(f"workspace five-bar --index condition {SLICE}")
     assert max(map(len, text.splitlines())) <= 60
     words = " ".join(text.split())
-    for part in ("Reach: x ", "area ", "Map: x -0.1 to 0.1 m, y 0.05 to 0.17 m: 81 poses", "best"):
+    grid = "Map: x -0.1 to 0.1 m, y 0.05 to 0.17 m: 81 poses"
+    for part in ("Workspace: x ", "area ", grid, "best"):
         assert part in words
     assert "% out of reach of leg" in words
-    assert "Where: x y, m" in words
+    assert "at x y (m)" in words
 
 
 @pytest.mark.parametrize("ending", gated(["png", "svg", "csv", "npz", "zarr"], ["svg", "zarr"]))
@@ -97,7 +98,7 @@ def test_certify_tells_what_is_proved_of_the_workspace():
 
 def test_prove_ends_with_0_only_if_it_is_proved():
     proved = done("workspace five-bar --prove x=-0.01:0.01,y=0.14:0.15 --type-ii 0.1")
-    assert "proved: every pose keeps all 9 conditions" in proved
+    assert "proved: every pose meets all 9 conditions" in proved
     result = run("workspace five-bar --prove x=-0.01:0.01,y=0.14:0.25 --json")
     data = json.loads(result.stdout)
     assert (result.exit_code, data["proved"]) == (1, False)

@@ -244,7 +244,7 @@ def _kind(hint: Any) -> _Kind | None:
     if origin is typing.Literal:
         choices = tuple({type(choice) for choice in inner})
         return _Kind(
-            _join_words(
+            join_words(
                 [f'"{choice}"' if isinstance(choice, str) else repr(choice) for choice in inner]
             ),
             lambda argument: isinstance(argument, choices),
@@ -296,12 +296,12 @@ def _either(kinds: list[_Kind | None]) -> _Kind | None:
     if len(known) < len(kinds):
         return None
     words = [kind.words for kind in known if kind.words != "None"]
-    return _Kind(_join_words(words), lambda argument: any(kind.holds(argument) for kind in known))
+    return _Kind(join_words(words), lambda argument: any(kind.holds(argument) for kind in known))
 
 
-def _join_words(words: list[str]) -> str:
-    """Return words joined by commas, and by "or" before the last."""
-    return " or ".join([", ".join(words[:-1]), words[-1]] if words[:-1] else words)
+def join_words(words: Sequence[str], last: str = "or") -> str:
+    """Return words joined by commas, and by "or", or another word, before the last."""
+    return f" {last} ".join([", ".join(words[:-1]), words[-1]] if words[:-1] else words)
 
 
 def _with_bounds(kind: _Kind | None, bounds: Between) -> _Kind | None:

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
 EXTENSION_GROUPS = {
     "pteron.legs": "a kind of leg",
+    "pteron.platforms": "a kind of platform",
     "pteron.indices": "an index of performance",
     "pteron.export": "an export",
     "pteron.design": "a quantity of designs",

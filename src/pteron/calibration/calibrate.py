@@ -9,12 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pteron.arguments import expect
-from pteron.calibration.fit import CalibrationFit, Fitter
+from pteron.calibration.calibration_fit import CalibrationFit
+from pteron.calibration.fault_trials import hidden_tilt
+from pteron.calibration.fit import Fitter
 from pteron.calibration.guess import Guess, UnknownBlock, tolerances_of
 from pteron.calibration.measurements import Measurements, spread_rows
 from pteron.calibration.observability import observability_of
 from pteron.calibration.raw_faults import describe_mistake, hidden_order, raw_mistake
-from pteron.calibration.residual_faults import hidden_tilt, residual_faults, zero_faults
+from pteron.calibration.residual_faults import residual_faults, zero_faults
 from pteron.calibration.result import (
     Calibration,
     CalibrationFinding,
@@ -136,7 +138,7 @@ def _undo_mistakes(
     run_calibration: Callable[..., Calibration],
     held_out: Measurements | None,
 ) -> Calibration:
-    """Return the calibration of a log after correction of a mistake that explains it."""
+    """Return the calibration of a log, with a mistake in it undone if one explains its errors."""
     mistake = raw_mistake(measurements, blocks, start)
     if mistake is None:
         calibration = run_calibration(measurements, blocks, held_out)
@@ -165,7 +167,7 @@ def _calibrate(
     steps: Steps,
     mistakes: Sequence[CalibrationFinding] = (),
 ) -> Calibration:
-    """Return the calibration of a log that has no mistakes, or with `mistakes` undone."""
+    """Return the calibration of a log without mistakes; `mistakes` are findings on those undone."""
     steps.report("Starting")
     start = Guess.drawn(robot, measurements)
     poses = starting_poses(start, measurements)
@@ -222,7 +224,7 @@ def _partial_fit(
     blocks: tuple[UnknownBlock, ...],
     fitted_rows: NDArray[np.bool_],
 ) -> CalibrationFit:
-    """Return a fit of at most `_TRIED_ROWS` of the fitted rows, to predict held-out rows."""
+    """Return a fit to at most `_TRIED_ROWS` of the fitted rows, which predicts held-out rows."""
     sampled_rows = np.zeros_like(fitted_rows)
     sampled_rows[np.flatnonzero(fitted_rows)[:: -(-int(fitted_rows.sum()) // _TRIED_ROWS)]] = True
     rows = measurements.rows(sampled_rows)
@@ -243,7 +245,7 @@ def _exceeds_ordinary_error(fit: CalibrationFit, measurements: Measurements) -> 
 def _select_fitting_rows(
     measurements: Measurements, fit: CalibrationFit, chosen: NDArray[np.bool_]
 ) -> Measurements:
-    """Return the chosen rows, without outliers of the fit of all rows if there are few of these."""
+    """Return the chosen rows of measurements, without the fit's outliers if these are few."""
     few = (~fit.kept).sum() <= FEW_LEFT_OUT * len(fit.kept)
     some = chosen & fit.kept if few else chosen
     return measurements.rows(some if some.any() else chosen)

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pteron.calibration.measurements import Measurements
 from pteron.errors import DataError, shorten, warn_unlikely
@@ -52,7 +53,7 @@ class _Touch(NamedTuple):
     """A touch of the probe, as a controller logs it."""
 
     place: str
-    at: dict[str, float]
+    coordinates: dict[str, float]
     """By the letters of its axes, X to C, in mm and degrees."""
     height: float
     """Height of the tool over the plane, mm."""
@@ -113,24 +114,13 @@ def _read_stable_positions(robot: Manipulator, text: str, source: str) -> Measur
             f"{', '.join(lacking)} without rotation_distance and microsteps, or step_distance: "
             "stable positions are steps; give the whole printer.cfg"
         )
-    ends, downwards = [], []
-    for i, leg in enumerate(robot.legs, start=1):
-        axis = leg.joint_axis
-        if len(robot.legs) != 3 or leg.limits is None or not axis:
-            raise DataError(
-                f"stable positions count from three end stops, and leg {i} of {robot.name} is no "
-                "slider or crank with limits; give them: the upper is the end stop"
-            )
-        # A crank lifts about an axis across the way out.
-        out = np.cross([*leg.guide_point[:2], 0.0], [0.0, 0.0, 1.0])
-        up = (axis[2] if leg.joint.unit == "m" else out @ np.array(axis)) > 0.0
-        ends.append(leg.limits[1 if up else 0])
-        downwards.append((-1.0 if up else 1.0) * (1e-3 if leg.joint.unit == "m" else 1.0))
-    away = np.array(downwards) * np.array([step or 0.0 for step in steps])
+    ends, downwards = _end_stops(robot)
+    away = downwards * np.array([step or 0.0 for step in steps])
     faults: list[str] = []
     rows: list[tuple[str, list[float], float, float, int]] = []
 
     def position(key: str) -> list[float]:
+        """Return a key's three step counts; without them append a fault and return zeros."""
         words = config.get("delta_calibrate", key, fallback=None)
         cells = [] if words is None else words.split(",")
         try:
@@ -157,13 +147,31 @@ def _read_stable_positions(robot: Manipulator, text: str, source: str) -> Measur
     if faults:
         raise DataError(joined_faults(faults))
     keys, counts, heights, distances, origins = zip(*rows, strict=True)
-    readings = to_readings(robot, np.array(ends) + away * np.array(counts))
+    readings = to_readings(robot, ends + away * np.array(counts))
     return replace(
         Measurements.from_readings(robot, readings, heights=1e-3 * np.array(heights)),
         distances=1e-3 * np.array(distances),
         origins=np.array(origins),
         places=tuple(f"{source}, {key}" for key in keys),
     )
+
+
+def _end_stops(robot: Manipulator) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return joint coordinates (3,) at the end stops, and a downward mm, or rad, in SI (3,)."""
+    ends, downwards = [], []
+    for i, leg in enumerate(robot.legs, start=1):
+        axis = leg.joint_axis
+        if len(robot.legs) != 3 or leg.limits is None or not axis:
+            raise DataError(
+                f"stable positions count from three end stops, and leg {i} of {robot.name} is no "
+                "slider or crank with limits; give them: the upper is the end stop"
+            )
+        # A crank lifts about an axis across the way out.
+        out = np.cross([*leg.guide_point[:2], 0.0], [0.0, 0.0, 1.0])
+        up = (axis[2] if leg.joint.unit == "m" else out @ np.array(axis)) > 0.0
+        ends.append(leg.limits[1 if up else 0])
+        downwards.append((-1.0 if up else 1.0) * (1e-3 if leg.joint.unit == "m" else 1.0))
+    return np.array(ends), np.array(downwards)
 
 
 def _read_height_map(text: str, source: str) -> Iterator[_Touch]:
@@ -291,7 +299,7 @@ _READERS = (_read_height_map, _read_g30, _read_klipper_log, _read_marlin)
 
 
 def _xyz(x: float, y: float, z: float) -> dict[str, float]:
-    """Return coordinates by axis letter."""
+    """Return coordinates, mm, by the letter of their axis."""
     return {"X": x, "Y": y, "Z": z}
 
 
@@ -303,9 +311,8 @@ def _match_place(text: str, match: re.Match[str], source: str) -> str:
 def _touched_heights(robot: Manipulator, touched: Sequence[_Touch]) -> Measurements:
     """Return touched heights as measurements, with readings by the drawn machine's kinematics."""
     platform, axes = robot.platform, linuxcnc_axes(robot)
-    poses = np.array(
-        [[touch.at.get(axis.letter, 0.0) / axis.scale for axis in axes] for touch in touched]
-    )
+    places = [[touch.coordinates.get(axis.letter, 0.0) for axis in axes] for touch in touched]
+    poses = np.array(places) / [axis.scale for axis in axes]
     tool = np.einsum("i,nij->nj", np.array(platform.tool), platform.placement(poses)[1])
     poses[:, ~platform.angular] -= tool @ platform.directions.T
     joints = inverse_kinematics(robot, poses, on_failure="nan")
@@ -313,9 +320,9 @@ def _touched_heights(robot: Manipulator, touched: Sequence[_Touch]) -> Measureme
     if lost.any():
         faults = [
             f"{touch.place}: the machine as drawn does not reach "
-            f"{' '.join(f'{a.letter}{touch.at.get(a.letter, 0.0):g}' for a in axes)}; is z = 0 the "
-            "bed in its file?"
-            for touch, bad in zip(touched, lost, strict=True)
+            f"{' '.join(f'{a.letter}{x:g}' for a, x in zip(axes, place, strict=True))}; "
+            "is z = 0 the bed in its file?"
+            for touch, place, bad in zip(touched, places, lost, strict=True)
             if bad
         ]
         if 2 * lost.sum() > len(lost):

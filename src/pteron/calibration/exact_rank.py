@@ -79,7 +79,7 @@ def exact_rank(
 
 
 def _row_kinds(measurements: Measurements) -> dict[int, float | None]:
-    """Return a row of each kind, with the height that such rows have, if constant."""
+    """Return a row of each kind of measurement, with its height if constant, else None."""
     measured = ~np.isnan(np.column_stack([*measurements.parts.values()]))
     over, origins, planes = measured[:, -2], measurements.origins, np.array(measurements.planes)
     kinds = {
@@ -101,7 +101,7 @@ def _row_kinds(measurements: Measurements) -> dict[int, float | None]:
 
 
 class _ModularSlopes(MachineSlopes):
-    """Slopes at random poses, in integers modulo a prime, in the machine's own frame."""
+    """Slopes at random poses in integers modulo a prime, in the machine's own frame."""
 
     def __init__(
         self,
@@ -117,7 +117,7 @@ class _ModularSlopes(MachineSlopes):
         self.start = replace(start, turn=np.eye(3), shift=np.zeros(3))
         self.prime, self.rng, self.field = prime, rng, PrimeField(prime)
         geometry = exact_geometry(robot)
-        self.own, self.vector = geometry.frame, geometry.field_elements(self.field)
+        self.frame, self.vector = geometry.frame, geometry.field_elements(self.field)
         deltas = general_program(geometry_only(robot), "discriminants").function
         self.deltas = Evaluation(deltas, self.field, [self.vector])
         self.turning_joints = [leg.joint.unit == "rad" for leg in robot.legs]
@@ -202,7 +202,7 @@ class _ModularSlopes(MachineSlopes):
         size = np.linalg.norm(outward)
         u, k = (
             np.array(
-                [n.field_element(self.field) for n in rational_unit(self.own @ v)], dtype=object
+                [n.field_element(self.field) for n in rational_unit(self.frame @ v)], dtype=object
             )
             for v in (outward / size if size > 0.0 else np.eye(3)[0], axis)
         )
@@ -224,12 +224,12 @@ class _ModularSlopes(MachineSlopes):
 
     def _base_vectors(self, vectors: Array) -> Residues:
         """Return vectors (..., 3) of the base frame as residues in the machine's frame."""
-        return self._numbers(vectors @ self.own.T)
+        return self._numbers(vectors @ self.frame.T)
 
-    def _numbers(self, values: Array) -> Residues:
+    def _numbers(self, array: Array) -> Residues:
         """Return numbers as residues modulo the prime, by rational approximations."""
-        residues = [self.field.number(Fraction(v).limit_denominator(_FINE)) for v in values.flat]
-        return np.array(residues, dtype=object).reshape(values.shape)
+        residues = [self.field.number(Fraction(v).limit_denominator(_FINE)) for v in array.flat]
+        return np.array(residues, dtype=object).reshape(array.shape)
 
     def _unit(self, vectors: Residues) -> Residues:
         """Return the vectors unchanged, as a row's length does not affect the rank."""

@@ -6,14 +6,14 @@ Noise that is not given is found from the residuals, by kind of measurement.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import scipy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
+from pteron.calibration.calibration_fit import CalibrationFit
 from pteron.calibration.guess import Guess, UnknownBlock, tolerances_of
 from pteron.calibration.measurements import KINDS, Measurements, spread_rows
 from pteron.calibration.residuals import MachineSlopes, ResidualRows
@@ -36,10 +36,10 @@ _SETTLED = 1e-4
 """A step smaller than this share of every unknown's interval ends the search."""
 
 _DOUBTED = 0.99
-"""Quantile of a row's squared residuals beyond which it counts less."""
+"""Quantile of a row's squared residuals above which its weight is reduced."""
 
 _LOST = 30.0
-"""Cost of a row whose readings lead to no pose, in variances, as if it hardly fitted."""
+"""Cost of a row whose readings lead to no pose, in variances: that of a row that hardly fits."""
 
 BEYOND = 1e3
 """Distance that marks such a row, so that it is left out in the end; no residual has just this."""
@@ -55,76 +55,6 @@ _OUTLYING = 1e-5
 
 _ROUNDS = 12
 """Most alternations of fit and search for noise and outliers; two or three usually do."""
-
-
-@dataclass(frozen=True)
-class CalibrationFit:
-    """Values, the rows' residuals there, and the normal equations; at best the most probable ones.
-
-    Attributes
-    ----------
-    guess : Guess
-        The values.
-    total : array, shape (p,)
-        All steps from the drawing.
-    noise : dict
-        Standard deviation by kind of measurement.
-    kept : array of bool, shape (N,)
-        The rows that are no outliers.
-    poses : array, shape (N, m)
-        Of all rows.
-    prior : array, shape (p,)
-        What tolerances say: one over their squares.
-    residuals, measured : array, shape (N, K)
-        Of all rows, computed minus measured, m and rad; and which of them count.
-    distances : array, shape (N,)
-        Of each row's residuals from zero, in standard deviations (Mahalanobis).
-    information, gradient : array, shapes (p, p) and (p,)
-        What the data alone say: J' W J and J' W r.
-    cost : float
-        Squared residuals, in variances, and tolerances.
-    steps : int
-        Gauss and Newton's steps in all.
-    shared : array, shape (p, p), or 0
-        By how much `information` is too great where several distances share a row's readings: each
-        row is weighted as if its noise were its own alone.
-    settled : bool
-        Whether the search has ended where nothing is more probable nearby.
-    """
-
-    guess: Guess
-    total: Array
-    noise: dict[str, float]
-    kept: NDArray[np.bool_]
-    poses: Array
-    prior: Array
-    residuals: Array
-    measured: NDArray[np.bool_]
-    distances: Array
-    information: Array
-    gradient: Array
-    cost: float = np.inf
-    steps: int = 0
-    shared: Array | float = 0.0
-    settled: bool = True
-
-    @cached_property
-    def covariance(self) -> Array:
-        """The covariance of all unknowns (p, p), from data and tolerances."""
-        matrix = self.information + np.diag(self.prior)
-        size = np.sqrt(np.diag(matrix))
-        size[size == 0.0] = 1.0
-        try:
-            factor = scipy.linalg.cho_factor(matrix / np.outer(size, size))
-        except np.linalg.LinAlgError:
-            raise DataError(
-                "the measurements leave open what has no tolerance: free less, or give `prior` "
-                "finite standard deviations"
-            ) from None
-        inverse = scipy.linalg.cho_solve(factor, np.eye(len(size))) / np.outer(size, size)
-        return np.asarray(
-            inverse if np.ndim(self.shared) == 0 else inverse + inverse @ self.shared @ inverse
-        )
 
 
 class Fitter:
@@ -233,7 +163,9 @@ class Fitter:
         if not len(lost):
             return at
         joints, poses = at.guess.joints(self.measurements.readings)[lost], at.poses.copy()
-        for i, modes in zip(lost, direct_kinematics(at.guess.robot, joints), strict=True):
+        for i, modes in zip(
+            lost, direct_kinematics(at.guess.robot, joints, on_failure="nan"), strict=True
+        ):
             off = np.abs(modes - self.begin_poses[i]).max(axis=-1)
             if np.isfinite(off).any():
                 poses[i] = modes[np.nanargmin(off)]
@@ -276,7 +208,7 @@ class Fitter:
     def _find_strays(
         self, old_fit: CalibrationFit, new_fit: CalibrationFit, fitted_rows: NDArray[np.bool_]
     ) -> NDArray[np.bool_] | None:
-        """Return the few rows (N,) without which a step lowers the cost tenfold; None for none.
+        """Return the few rows (N,) without which a step lowers the cost tenfold, or None.
 
         The pose of a row next to a singularity jumps where the geometry moves by little.
         """
@@ -288,16 +220,19 @@ class Fitter:
         return strays if squares[1] < 0.1 * squares[0] else None
 
     def cost(self, guess: Guess, total: Array, fit: CalibrationFit) -> float:
-        """Return the cost of a guess: squared residuals and tolerances, in variances; inf: lost."""
+        """Return the cost of a guess: squared residuals and tolerances, in variances.
+
+        Infinite where the guess leads to no poses.
+        """
         try:
             return self._evaluate(fit, guess=guess, total=total).cost
         except ValueError:
             return float(np.inf)
 
     def _evaluate(self, fit: CalibrationFit, **changed: Any) -> CalibrationFit:
-        """Return a fit with changed values, its residuals and normal equations evaluated there.
+        """Return a fit with changed fields, its residuals and normal equations evaluated anew.
 
-        ValueError where they have no poses.
+        Raise ValueError where the changed values have no poses.
         """
         fit = replace(fit, **changed)
         guess, fitted_rows, poses = fit.guess, fit.kept, fit.poses
@@ -348,9 +283,9 @@ class Fitter:
     def whiten_rows(
         self, at: ResidualRows, guess: Guess, noise: dict[str, float]
     ) -> tuple[Array, Array, Array]:
-        """Return residuals and slopes in standard deviations, independent within a row.
+        """Return residuals (N, K) and slopes in standard deviations, independent within a row.
 
-        And what a standard deviation of the readings, of two rows, makes of the residuals.
+        Third come the residuals' changes (N, K, 2 n) by one standard deviation of each reading.
         """
         sizes = np.array([noise[kind] for kind in self.kind_of])
         pushed = at.by_reading * (self.readings_noise * np.tile(guess.scales, 2))

@@ -71,7 +71,7 @@ class Guess:
 
     @classmethod
     def drawn(cls, robot: Manipulator, measured: Measurements) -> Guess:
-        """Return the machine as drawn, and its surroundings as described."""
+        """Return the guess before a fit: the machine as drawn, its surroundings as described."""
         setup = measured.setup
         marks = {TOOL: Place(robot.platform.tool or (0.0, 0.0, 0.0))} | dict(setup.marks)
         planes = {TOOL: ReferencePlane()} | dict(setup.planes)
@@ -143,7 +143,7 @@ class UnknownBlock:
         return replace(guess, turn=turn, shift=guess.shift + step[:3])
 
     def values(self, guess: Guess) -> Array:
-        """Return a guess's values of this block; of a direction, which turns, 0."""
+        """Return the block's values (k,) in a guess; 0 for a direction, which is turned."""
         if self.kind in ("zeros", "scales"):
             return np.asarray(getattr(guess, self.kind)[list(self.legs)])
         if self.kind in ("mark", "anchor"):

@@ -90,8 +90,13 @@ class Setup:
     frame_known: bool = True
 
 
+def error_unit(kind: str) -> str:
+    """Return the unit in which errors of a kind of measurement are shown: mrad or mm."""
+    return "mrad" if kind == "angle" else "mm"
+
+
 def spread_rows(count: int, most: int) -> NDArray[np.int64]:
-    """Return the numbers of at most `most` of `count` rows, evenly spread."""
+    """Return the indices of at most `most` of `count` rows, evenly spread."""
     return np.unique(np.linspace(0, count - 1, min(count, most)).astype(int))
 
 
@@ -106,16 +111,16 @@ def position_axes(robot: Manipulator) -> Array:
     return np.eye(3) if cartesian else np.array(robot.platform.frame)
 
 
-def _rows_of(values: PoseLike | None, name: str, rows: int, columns: Sequence[str] = ()) -> Array:
+def _rows_of(measured: PoseLike | None, name: str, rows: int, columns: Sequence[str] = ()) -> Array:
     """Return measured values as an array (rows, len(columns)), or (rows,) without columns.
 
-    All are NaN if `values` is None. From a table, the `columns` are selected by their names. The
+    All are NaN if `measured` is None. From a table, the `columns` are selected by their names. The
     `name` of the argument begins the message of an error.
     """
     shape = (rows, *([len(columns)] if columns else []))
-    if values is None:
+    if measured is None:
         return np.full(shape, np.nan)
-    numbers = as_array(values, name, shape[1:], columns=columns)
+    numbers = as_array(measured, name, shape[1:], columns=columns)
     if numbers.shape != shape:
         raise DataError(
             f"{name}: shape {numbers.shape} given, {shape} expected: a row for each of the readings"
@@ -229,13 +234,13 @@ class Measurements:
 
     @property
     def parts(self) -> dict[str, Array]:
-        """All that was measured, (N, K) in all, by kind; NaN where not."""
+        """The measured numbers by kind, (N, k) each; NaN where nothing was measured."""
         arrays = self.positions, self.angles, self.heights[:, None], self.distances[:, None]
         return dict(zip(KINDS, arrays, strict=True))
 
     @property
     def kinds(self) -> list[str]:
-        """The kinds of measurements that there are."""
+        """The kinds of measurements of which there is at least one."""
         return [kind for kind, array in self.parts.items() if not np.isnan(array).all()]
 
     @property

@@ -70,8 +70,8 @@ class Observability(Result):
         """Return the reasons for the rank in a few sentences."""
         exact = (
             f"Exact rank {self.rank} of {self.columns} values: a minor of that size at "
-            f"{self.rows} random rows is not zero modulo "
-            f"{' nor modulo '.join(map(str, self.primes))}, and no greater one was found."
+            f"{self.rows} random rows is not zero modulo {len(self.primes)} primes of "
+            f"{max(self.primes, default=0).bit_length()} bits, and no greater one was found."
         )
         here = (
             f"At the measured poses {self.at_poses} (smallest singular value kept "
@@ -91,7 +91,7 @@ def observability_of(
     slopes: Array,
     seed: int = 0,
 ) -> Observability:
-    """Return the combinations of values that measurements show.
+    """Return which combinations of values measurements show, exactly and by singular values.
 
     Parameters
     ----------
@@ -116,8 +116,8 @@ def observability_of(
     tolerances[~np.isfinite(tolerances)] = 1.0
     names = [unknown.name for block in blocks for unknown in block.unknowns]
     weak = [
-        f"{combination_text(axes[k] * tolerances, names)} (the tolerance says "
-        f"{1.0 / sizes[k]:.2g} times more)"
+        f"{combination_text(axes[k] * tolerances, names)} (the tolerance is "
+        f"{_ratio_text(1.0 / sizes[k])} times as narrow as the measurements' interval)"
         for k in reversed(range(here))
         if sizes[k] < 1.0
     ]
@@ -126,6 +126,11 @@ def observability_of(
     unseen = unseen_combinations(start, blocks, axes[here:], tolerances)
     sizes_beside = here, float(last_shown), float(first_dropped)
     return Observability(*exact, *sizes_beside, unseen, tuple(weak[:_NAMED]))
+
+
+def _ratio_text(ratio: float) -> str:
+    """Return a ratio of 1 or more with two digits."""
+    return f"{ratio:.0f}" if ratio >= 10.0 else f"{ratio:.2g}"
 
 
 def _spectrum(slopes: Array, count: int) -> tuple[Array, Array]:

@@ -16,17 +16,16 @@ from numpy.typing import NDArray
 from pteron.arguments import expect, expect_one_of
 from pteron.calibration.guess import Guess, tolerances_of, variances
 from pteron.calibration.measurements import KINDS, TOOL, Measurements, Place, ReferencePlane, Setup
+from pteron.calibration.plan_region import proved_box, proved_level, upright_index
 from pteron.calibration.residuals import MachineSlopes
 from pteron.calibration.unknowns import blocks_of
 from pteron.calibration.verdict import rows_for_check
 from pteron.errors import DataError, ModelError
-from pteron.kernels import numeric
-from pteron.kinematics import random_poses
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.result import Result
 from pteron.shapes import Seed
 from pteron.tolerances import EXACT
-from pteron.workspace import Box, Cylinder, home_pose, prove
+from pteron.workspace import Box, Cylinder, home_pose
 
 Array = NDArray[np.float64]
 
@@ -45,24 +44,10 @@ _TO_THE_EDGE = 1.0 / 3.0
 _TO_THE_RIM = 0.5 * _TO_THE_EDGE
 """The same of a disc's radius, whose area grows with its square."""
 
-_SHARE = 0.3
-"""Least measures that are proved in the box, over those at its centre: nearer to a singularity the
-tolerances of a machine that is not quite as drawn lead far away, or across."""
-
-_MOST = 20_000
-"""Undecided boxes at which a proof is given up."""
-
-_HALVINGS = 6
-"""Bisections in the search for the size of the box."""
-
-_WIDENINGS = 4
-"""Times that each of its sides may then grow by half."""
 
 _RISES = 1e-6
 """Least part of a coordinate along z with which heights vary."""
 
-_ABOVE = 0.005
-"""Height above a plane to which a probe is lifted between two places, m."""
 
 _NOISE = dict.fromkeys(KINDS, 2e-5)
 """Noise that is expected where nobody says it, m and rad."""
@@ -176,7 +161,7 @@ def plan(
         region = proved_box(robot, home)
     poses = _candidates(robot, region, np.random.default_rng(seed))
     if measure == "heights":
-        poses[:, _upright(robot)] = home[_upright(robot)]
+        poses[:, upright_index(robot)] = home[upright_index(robot)]
         poses[:, robot.platform.angular] = home[robot.platform.angular]
     if measure == "distances" and not setup.anchors:
         place = robot.platform.placement(home[None])[0][0] - [0.0, 0.0, robot.legs[0].size]
@@ -222,109 +207,6 @@ def _candidates(robot: Manipulator, region: Box | Cylinder, rng: np.random.Gener
     return np.asarray(0.5 * (low + high) + 0.5 * (high - low) * sides)
 
 
-def proved_box(robot: Manipulator, center: Array, flat: bool = False) -> Box:
-    """Return a box of poses around one that is proved to serve, with margins to singularities.
-
-    Its sides are as those of the least box that holds random poses; `flat` keeps it within 5 mm
-    above the centre, level: the ways of a probe.
-
-    Raises
-    ------
-    ModelError
-        If there is none.
-    """
-    floors = _floors(robot, center)
-    drawn = random_poses(robot, 400)
-    sides = np.maximum(np.abs(drawn - center).max(axis=0), 1e-9)
-    thin = np.zeros(robot.freedom)
-    if flat:
-        sides[_upright(robot)] = 0.0
-        sides[robot.platform.angular] = 0.0
-        thin[_upright(robot)] = _ABOVE
-    least, most = 0.0, 1.0
-    proved: Box | None = None
-    for _ in range(_HALVINGS):
-        share = 0.5 * (least + most)
-        box = Box(tuple(center - share * sides), tuple(center + share * sides + thin))
-        if prove(robot, box, type_i=floors[0], type_ii=floors[1], most=_MOST).holds:
-            least, proved = share, box
-        else:
-            most = share
-    if proved is None:
-        raise _no_region(robot, center)
-    return _widen_box(robot, proved, sides, floors)
-
-
-def _floors(robot: Manipulator, center: Array) -> tuple[float, float]:
-    """Return the least type-I and type-II measures that a region about a pose must keep."""
-    type_i, type_ii = numeric(robot, "reach")(center)[1], numeric(robot, "type_ii")(center)[0]
-    floors = _SHARE * float(type_i.min()), _SHARE * abs(float(type_ii))
-    if not np.isfinite(floors).all():
-        raise _no_region(robot, center)
-    return floors
-
-
-def _no_region(robot: Manipulator, center: Array) -> ModelError:
-    """Return the error that no box of poses around a centre is proved to be usable."""
-    return ModelError(
-        f"no box of poses around {np.round(center, 4).tolist()} is proved to be in reach, "
-        "within limits and away from singularities; move the plane, or the machine's limits",
-        subject=robot.name,
-    )
-
-
-def _proved_level(robot: Manipulator, center: Array) -> Box | Cylinder:
-    """Return the larger of a proved box and a proved disc on a level, both `_ABOVE` high.
-
-    Raises
-    ------
-    ModelError
-        If there is none.
-    """
-    box = proved_box(robot, center, flat=True)
-    if robot.coordinates[:3] != ("x", "y", "z"):
-        return box
-    floors = _floors(robot, center)
-    middle = center.copy()
-    middle[2] += 0.5 * _ABOVE
-    height = 2.0 * (middle[2] - center[2])
-    sides = (box.box[1] - box.box[0])[:2]
-    # Corners of the box are in reach: the disc through them is the greatest that may be.
-    least, most = 0.0, float(np.linalg.norm(sides))
-    for _ in range(_HALVINGS):
-        radius = 0.5 * (least + most)
-        disc = Cylinder(tuple(middle), radius, height)
-        if prove(robot, disc, type_i=floors[0], type_ii=floors[1], most=_MOST).holds:
-            least = radius
-        else:
-            most = radius
-    larger = np.pi * least**2 > sides.prod()
-    return Cylinder(tuple(middle), least, height) if larger else box
-
-
-def _widen_box(robot: Manipulator, box: Box, sides: Array, floors: tuple[float, float]) -> Box:
-    """Return a proved box, each side in turn widened while the box stays proved."""
-    for k in np.flatnonzero(sides):
-        for _ in range(_WIDENINGS):
-            low, high = box.box
-            growth = 0.5 * (high[k] - low[k])
-            if high[k] - low[k] >= 2.0 * sides[k]:
-                break
-            low[k], high[k] = low[k] - 0.5 * growth, high[k] + 0.5 * growth
-            wider = Box(tuple(low), tuple(high))
-            type_i, type_ii = floors
-            if not prove(robot, wider, type_i=type_i, type_ii=type_ii, most=_MOST // 4).holds:
-                break
-            box = wider
-    return box
-
-
-def _upright(robot: Manipulator) -> int:
-    """Return the index of the coordinate that is nearest to vertical."""
-    lengths = np.flatnonzero(~robot.platform.angular)
-    return int(lengths[np.abs(robot.platform.directions[:, 2]).argmax()])
-
-
 def _lower_onto_plane(
     drawn: Guess, home: Array, setup: Setup
 ) -> tuple[Array, Setup, Box | Cylinder]:
@@ -335,23 +217,23 @@ def _lower_onto_plane(
     robot = drawn.robot
     if not np.abs(robot.platform.directions[:, 2]).max(initial=0.0) > _RISES:
         raise DataError(f"measure: the heights of a {robot.platform.motion} platform do not vary")
-    at = _upright(robot)
+    at = upright_index(robot)
     point = drawn.points([TOOL], home[None])[0]
     if setup.planes:
         moved = _lower_home(home, at, point, next(iter(setup.planes.values())))
-        return moved, setup, _proved_level(robot, moved)
+        return moved, setup, proved_level(robot, moved)
     if point[2] > 0.0:
         bed = ReferencePlane()
         moved = _lower_home(home, at, point, bed)
         try:
-            return moved, replace(setup, planes={TOOL: bed}), _proved_level(robot, moved)
+            return moved, replace(setup, planes={TOOL: bed}), proved_level(robot, moved)
         except ModelError:
             pass  # There is no bed at z = 0.
     moved = home.copy()
     below = proved_box(robot, home).box[0, at] - home[at]
     moved[at] += below
     plane = ReferencePlane(offset=float(point[2] + below), known=False)
-    return moved, replace(setup, planes={TOOL: plane}), _proved_level(robot, moved)
+    return moved, replace(setup, planes={TOOL: plane}), proved_level(robot, moved)
 
 
 def _lower_home(home: Array, at: int, point: Array, plane: ReferencePlane) -> Array:

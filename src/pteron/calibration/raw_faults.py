@@ -13,16 +13,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pteron.calibration.fit import CalibrationFit, Fitter
+from pteron.calibration.calibration_fit import CalibrationFit
+from pteron.calibration.fit import Fitter
 from pteron.calibration.guess import Guess, UnknownBlock, tolerances_of
 from pteron.calibration.measurements import Measurements
-from pteron.calibration.mistakes import (
-    QUICK_MODES,
-    Mistake,
-    leg_orders,
-    likely_mistakes,
-    reorder_readings,
-)
+from pteron.calibration.mistake import Mistake, leg_orders, reorder_readings
+from pteron.calibration.mistakes import likely_mistakes
+from pteron.calibration.reading_mistakes import QUICK_MODES
 from pteron.calibration.residuals import MachineSlopes
 from pteron.calibration.result import CalibrationFinding, HiddenOrder
 from pteron.calibration.start import place_surroundings, starting_poses
@@ -35,7 +32,7 @@ _FAR = 25.0
 mistakes are tried."""
 
 _NEAR = 9.0
-"""The same below which a mistake, undone, explains the residuals."""
+"""Median of the same below which a mistake, undone, explains the residuals."""
 
 _FALLEN = 0.1
 """Share of the misfit that a mistake, undone, leaves at most."""
@@ -44,7 +41,7 @@ _CLEAR = 2.0
 """Misfit that leaves no doubt: its expected value is below 1 where nothing is wrong."""
 
 _FINALISTS = 12
-"""Mistakes, those that leave least of rows one by one, of which all rows together decide."""
+"""Number of mistakes of least misfit row by row, between which all rows together decide."""
 
 _ALIKE = 20.0
 """Excess of the squared residuals of all rows, in variances, up to which the mistake that is more
@@ -58,7 +55,7 @@ _LEFT_TOGETHER = 0.1
 Chosen: what leaves more is part of another cause, such as a zero that slipped."""
 
 _MOST_OF_ROW = 1000.0
-"""Most that a row counts there, in variances: a few rows may have faults of their own."""
+"""Greatest contribution of one row there, in variances: a few rows may have faults of their own."""
 
 _ROWS = 16
 """Rows that are examined, drawn at random."""
@@ -70,7 +67,7 @@ _CHUNK = 4096
 """Rows that are evaluated at a time."""
 
 _FIRST = 5
-"""Rows that are examined first of a mistake."""
+"""Rows that are evaluated first for each mistake."""
 
 _NOISE = 1e-4
 """Assumed noise, m and rad: small beside the effect of tolerances."""
@@ -248,9 +245,7 @@ def _cost_together(
     inf where the rows have no poses.
     """
     chosen = np.random.default_rng(0).permutation(len(measurements)) < _ROWS_TOGETHER
-    noise = {
-        kind: max(measurements.setup.noise.get(kind, 0.0), _NOISE) for kind in measurements.kinds
-    }
+    noise = {k: max(measurements.setup.noise.get(k, 0.0), _NOISE) for k in measurements.kinds}
     rows = replace(measurements.rows(chosen), setup=replace(measurements.setup, noise=noise))
     try:
         poses = _trial_poses(guess, rows)

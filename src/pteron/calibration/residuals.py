@@ -80,7 +80,7 @@ class MachineSlopes:
         for _ in range(_STEPS):
             joints_at, jacobian, *_ = self._kernel(geometry, poses[open_rows])
             residuals = self._wrap_angles(joints[open_rows] - joints_at)
-            step = _solve_stack(jacobian, residuals[..., None])[..., 0]
+            step = self._solve_stack(jacobian, residuals[..., None])[..., 0]
             poses[open_rows] += step
             unconverged = np.abs(step).max(axis=-1, initial=0.0) > _CLOSED * max(self.size, 1.0)
             open_rows = open_rows[unconverged | np.isnan(step).any(axis=-1)]
@@ -114,7 +114,7 @@ class MachineSlopes:
     def rows(
         self, guess: Guess, measurements: Measurements, poses: Array, chosen: Numbers
     ) -> ResidualRows:
-        """Return the residuals of chosen rows (by number) at their poses (N, m), of all rows."""
+        """Return the residuals of the `chosen` rows (indices), at all rows' poses (N, m)."""
         measured = ~np.isnan(np.hstack([part[chosen] for part in measurements.parts.values()]))
         point, separations, slopes = self.slopes(guess, measurements, poses, chosen, measured)
         residuals = np.zeros(measured.shape)
@@ -286,9 +286,9 @@ class MachineSlopes:
         """Return vectors of the base frame (..., 3)."""
         return vectors
 
-    def _numbers(self, values: Array) -> Array:
+    def _numbers(self, array: Array) -> Array:
         """Return numbers in this class's arithmetic: floating point."""
-        return values
+        return array
 
     def _unit(self, vectors: Array) -> Array:
         """Return vectors (N, 3) divided by their lengths; zero vectors unchanged."""
@@ -297,14 +297,9 @@ class MachineSlopes:
 
     def _solve_stack(self, matrix: Array, right: Array) -> Array:
         """Return matrix^-1 right of a stack; NaN where a matrix is singular."""
-        return _solve_stack(matrix, right)
-
-
-def _solve_stack(matrix: Array, right: Array) -> Array:
-    """Return matrix^-1 right of a stack; NaN where a matrix is singular."""
-    with np.errstate(invalid="ignore"):  # of poses that are lost
-        singular = np.linalg.det(matrix) == 0.0
-    return np.asarray(np.linalg.solve(np.where(singular[:, None, None], np.nan, matrix), right))
+        with np.errstate(invalid="ignore"):  # of poses that are lost
+            singular = np.linalg.det(matrix) == 0.0
+        return np.asarray(np.linalg.solve(np.where(singular[:, None, None], np.nan, matrix), right))
 
 
 def _skew(v: Array) -> Array:

@@ -10,7 +10,7 @@ import numpy as np
 import scipy  # type: ignore[import-untyped]
 from numpy.typing import ArrayLike, NDArray
 
-from pteron.calibration.fit import CalibrationFit
+from pteron.calibration.calibration_fit import CalibrationFit
 from pteron.calibration.guess import Guess, Unknown, UnknownBlock, tolerances_of, variances
 from pteron.calibration.measurements import (
     TOOL,
@@ -311,7 +311,7 @@ def _contradicted_covariance(fit: CalibrationFit, blocks: Sequence[UnknownBlock]
 def values_of(
     start: Guess, fit: CalibrationFit, blocks: Sequence[UnknownBlock]
 ) -> tuple[Value, ...]:
-    """Return all values of a fit."""
+    """Return each unknown of a fit as a `Value`: name, unit, drawn and fitted number, origin."""
     drawn = np.concatenate([block.values(start) for block in blocks])
     deviations = np.sqrt(np.diag(fit.covariance))
     shares = deviations / tolerances_of(blocks)
@@ -331,7 +331,7 @@ def _origin(share: float, unknown: Unknown) -> Origin:
 
 
 def calibrated_robot(guess: Guess) -> Manipulator:
-    """Return the machine of a guess, with zeros of readings moved into the geometry if possible."""
+    """Return the machine of a guess, with the zeros of readings in its geometry if possible."""
     legs = []
     each = zip(guess.robot.legs, guess.zeros.tolist(), guess.scales.tolist(), strict=True)
     for leg, zero, scale in each:

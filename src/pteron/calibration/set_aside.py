@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from pteron.calibration import thresholds
 from pteron.calibration.guess import Guess, UnknownBlock
 from pteron.calibration.measurements import Measurements
+from pteron.calibration.mistake import travel_ends
 from pteron.calibration.raw_faults import row_misfits
 from pteron.calibration.residuals import MachineSlopes
 
@@ -41,7 +42,7 @@ _PUT_BACK = 0.1
 
 
 _TELLING = 2
-"""Least measured numbers of a row: with one, some factor of many fits by chance."""
+"""Least number of measured values in a row: with one, some factor of many fits by chance."""
 
 
 class SetAside(NamedTuple):
@@ -55,7 +56,7 @@ class SetAside(NamedTuple):
 def rows_set_aside(
     start: Guess, measurements: Measurements, blocks: Sequence[UnknownBlock], poses: Array
 ) -> SetAside:
-    """Return the rows that the drawn machine does not reach, that lie beyond limits, or far off."""
+    """Return the rows out of reach, beyond limits or far off on the drawn machine, with reasons."""
     reasons: dict[int, str] = {}
     lost: Mask = np.asarray(np.isnan(poses).any(axis=1))
     depths = _depths_under_planes(start, measurements, poses)
@@ -140,13 +141,8 @@ class _Factors:
     def factor_clause(self, row: int) -> str:
         """Return a clause naming the factor of readings that explains a row; "" for none."""
         joints = self.start.joints(self.measurements.readings[row])
-        legs = self.start.robot.legs
-        ends = [("", np.zeros(len(joints)))]
-        if all(leg.limits is not None for leg in legs):
-            limits = np.array([leg.limits for leg in legs])
-            ends += [(" from the upper end", limits[:, 1]), (" from the lower end", limits[:, 0])]
         candidates = []
-        for origin, end in ends:
+        for origin, end in travel_ends(self.start.robot):
             for factor, words in _FACTORS.items():
                 tried = end + factor * (joints - end)
                 pose = self.slopes.poses(self.start, tried[None], self.middle[None])

@@ -63,7 +63,9 @@ def starting_poses(guess: Guess, measurements: Measurements, *, modes: bool = Tr
     if not modes:
         poses[other] = np.nan
     sought = np.flatnonzero(other if modes else np.zeros_like(other))
-    for i, assembly_modes in zip(sought, direct_kinematics(robot, joints[sought]), strict=True):
+    for i, assembly_modes in zip(
+        sought, direct_kinematics(robot, joints[sought], on_failure="nan"), strict=True
+    ):
         several = assembly_modes[~np.isnan(assembly_modes).any(axis=-1)]
         if not len(several):
             poses[i] = np.nan
@@ -89,7 +91,7 @@ def starting_poses(guess: Guess, measurements: Measurements, *, modes: bool = Tr
 def _measured_poses(
     guess: Guess, measurements: Measurements, home: Array
 ) -> tuple[Array, NDArray[np.bool_]]:
-    """Return the measured poses (N, m), home where not measured, and the mask of complete rows."""
+    """Return measured poses (N, m), home where none, and the mask (N,) of fully measured rows."""
     robot = guess.robot
     begin = np.tile(home, (len(measurements), 1))
     seen = ~np.isnan(measurements.angles)

@@ -66,8 +66,8 @@ def unseen_combinations(
     sentences = []
     for text, all_of in lines.items():
         owners = list(dict.fromkeys(filter(None, all_of)))
-        of = f", of {', '.join(owners)}" if owners else ""
-        sentences.append(f"{text}{of} ({len(all_of)})")
+        of = f": {', '.join(owners)}" if owners else ""
+        sentences.append(f"{text}{of} ({len(all_of)} combination{'s' * (len(all_of) > 1)})")
     names = [unknown.name for block in blocks for unknown in block.unknowns]
     others = [combination_text(row * tolerances, names) for row in _sparsify_rows(remaining)]
     excess = len(others) - _NAMED
@@ -108,7 +108,7 @@ def _named_combinations(
         return combination
 
     for name, k in place.items():
-        yield "never shows", name, np.eye(len(names))[k]
+        yield "no effect on the measurements", name, np.eye(len(names))[k]
     frame = np.array(robot.platform.frame)
     for i, leg in enumerate(robot.legs, start=1):
         base, platform = f"legs[{i}].guide_point", f"legs[{i}].platform_point"
@@ -120,7 +120,7 @@ def _named_combinations(
                 f"{platform}.{a}": float(v) for a, v in zip("xyz", frame[:, axis], strict=True)
             }
             yield (
-                "guide_point and platform_point show as their difference only",
+                "only the difference of guide_point and platform_point has an effect",
                 f"leg {i}",
                 vector(**parts),
             )
@@ -128,34 +128,30 @@ def _named_combinations(
         if leg.joint.unit == "m" and leg.joint_axis is not None and zero in place:
             parts = {f"{base}.{a}": -v for a, v in zip("xyz", leg.joint_axis, strict=True)}
             yield (
-                "a zero and the guide point's place along its slider are one",
+                "a joint's zero and a shift of its guide point along the slider are the same",
                 f"leg {i}",
                 vector(**parts, **{zero: 1.0}),
             )
     for letter in "xyz":
         parts = {f"legs[{i + 1}].platform_point.{letter}": 1.0 for i in range(len(robot.legs))}
         parts |= {
-            name: 1.0 for name in place if name.endswith(f".{letter}") and _is_on_platform(name)
+            n: 1.0 for n in place if n.endswith(f".{letter}") and n.startswith(("tool.", "marks."))
         }
         if all(name in place for name in parts):
-            text = "tool and platform points show against each other only, as P is none of them"
+            text = "only the tool's position relative to the platform points has an effect"
             yield text, "", vector(**parts)
     for block in blocks:
         if block.kind == "frame":
             yield from _rigid_motions(start, blocks, names)
-    yield "the size of all: a measured length gives it", "", _uniform_growth(start, blocks)
-
-
-def _is_on_platform(name: str) -> bool:
-    """Return whether an unknown is a coordinate of a point on the platform."""
-    return name.startswith(("tool.", "marks."))
+    text = "the scale of the whole machine, which a measured length determines"
+    yield text, "", _uniform_growth(start, blocks)
 
 
 def _rigid_motions(
     start: Guess, blocks: Sequence[UnknownBlock], names: Sequence[str]
 ) -> Iterator[tuple[str, str, Array]]:
     """Yield motions of the whole machine against an instrument whose frame is not known."""
-    text = "where the machine's own frame stands in the base"
+    text = "position and orientation of the machine's own frame in the base"
     for turn, axis in ((turn, axis) for turn in (False, True) for axis in range(3)):
         direction = np.eye(3)[axis]
         combination = np.zeros(len(names))

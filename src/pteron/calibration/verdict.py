@@ -8,19 +8,21 @@ from typing import NamedTuple
 import numpy as np
 import scipy  # type: ignore[import-untyped]
 
+from pteron.arguments import join_words
 from pteron.calibration import thresholds
-from pteron.calibration.fit import BEYOND, CalibrationFit
+from pteron.calibration.calibration_fit import CalibrationFit
+from pteron.calibration.fit import BEYOND
 from pteron.calibration.guess import UnknownBlock
-from pteron.calibration.measurements import Measurements
+from pteron.calibration.measurements import Measurements, error_unit
 from pteron.calibration.observability import Observability
 from pteron.calibration.result import CalibrationFinding, HeldOut, HiddenOrder
 from pteron.verdict import Grade, Opinion, Verdict
 
 EVERY = 5
-"""One row in so many is held out of the fit for a check."""
+"""One row in so many is held out of the fit as a check."""
 
 _PER_VALUE = {True: 1.0, False: 1.5}
-"""Measured numbers for each unknown below which none is, where their noise is given or is not."""
+"""Least measured numbers per unknown to hold rows out, by whether their noise is given."""
 
 _FAR = 2.0
 """Held-out error, over the one expected, above which a fit that gained nothing is not trusted."""
@@ -32,11 +34,11 @@ _UNEXPLAINED = (
 
 
 _GREAT_TILT = 0.1
-"""Tilt, rad, from which its size says no more than that nothing shows it."""
+"""Tilt, rad, above which its size is not stated: it means only that nothing shows it."""
 
 _ROD_ADVICE = (
-    "Measure both rods of each pair: rods that differ tilt the platform, and where positions are "
-    "not measured a fit takes that for geometry."
+    "Measure both rods of each pair: unequal rods tilt the platform, and without measured "
+    "positions a fit attributes that to the geometry."
 )
 
 
@@ -59,6 +61,8 @@ class Evidence(NamedTuple):
 
 
 class _Reason(NamedTuple):
+    """A reason of the verdict: its text, advice on what to do next, and the grade it allows."""
+
     text: str
     step: str = ""
     grade: Grade = "trustworthy"
@@ -122,20 +126,20 @@ def _error_reasons(evidence: Evidence) -> Iterator[_Reason]:
         for kind, error in fitted_errors(evidence.fit, evidence.measurements).items():
             if error > thresholds.ordinary_error(kind, stated.get(kind)):
                 size = _size_text(error, kind)
-                text = f"Even at the rows that were fitted the {kind} error is {size}"
+                text = f"Even at the fitted rows the {kind} error is {size}"
                 yield _Reason(f"{text}, more than ordinary tolerances.", "", "not trustworthy")
         return
     for kind, fitted in held_out.after.items():
         expected, drawn = held_out.expected[kind], held_out.before[kind]
         text = (
-            f"At {held_out.rows} rows that the fit did not see the {kind} error is "
-            f"{_size_text(fitted, kind)}, {_size_text(drawn, kind)[: -len(_unit(kind)) - 1]} before"
+            f"At {held_out.rows} rows held out of the fit the {kind} error is "
+            f"{_size_text(fitted, kind)}, {_size_text(drawn, kind)} before the calibration"
         )
         most = thresholds.ordinary_error(kind, stated.get(kind))
         fine = fitted <= thresholds.FINE_SHARE * most
         if fitted > most:
             yield _Reason(
-                f"{text}: more than {_size_text(most, kind)}, which ordinary tolerances leave.",
+                f"{text}: more than the {_size_text(most, kind)} of ordinary tolerances.",
                 "",
                 "not trustworthy",
             )
@@ -148,11 +152,11 @@ def _error_reasons(evidence: Evidence) -> Iterator[_Reason]:
         ratio = fitted / expected
         if ratio <= max(thresholds.AT_THE_NOISE, chance):
             grade: Grade = "trustworthy" if fine else "usable with care"
-            yield _Reason(f"{text}: as noise and intervals expect.", "", grade)
+            yield _Reason(f"{text}: as expected from noise and intervals.", "", grade)
             continue
         lost = ratio > _FAR and fitted > thresholds.FALLEN_SHARE * drawn
         yield _Reason(
-            f"{text}: {ratio:.2g} times what noise and intervals expect.",
+            f"{text}: {ratio:.2g} times as much as expected from noise and intervals.",
             "",
             "not trustworthy" if lost else "usable with care",
         )
@@ -182,6 +186,7 @@ def _open_error_reasons(evidence: Evidence) -> Iterator[_Reason]:
         far = [name for name in names if evidence.open_errors[name] > least]
         if far:
             most = max(evidence.open_errors[name] for name in far)
+            coordinates = join_words(far, "and")
             measured = " and ".join(f"{name}s" for name in kinds)
             where = "" if measurements.setup.frame_known else " in an unknown frame"
             them = "it" if len(far) == 1 else "them"
@@ -189,17 +194,18 @@ def _open_error_reasons(evidence: Evidence) -> Iterator[_Reason]:
             hidden = evidence.hidden_order
             if hidden and kind == "position":
                 size = _size_text(hidden.error, "position")
+                legs = join_words([*map(str, hidden.legs)], "and")
                 order = (
-                    f", nor the order of the legs {_join([*map(str, hidden.legs)])}: if it is "
-                    f"another, {_join(far)} may be off by {size} more"
+                    f", nor the order of the legs {legs}: if it is another, {coordinates} may be "
+                    f"off by {size} more"
                 )
             rods = ""
             if kind == "position" and "position" not in kinds and _hides_rod_tilt(evidence):
                 rods = f", nor rods of one pair that differ and {_tilt_text(evidence)}"
             yield _Reason(
-                f"{_join(far)} may be off by {_size_text(most, kind)} (95 %): "
+                f"{coordinates} may be off by {_size_text(most, kind)} (95 %): "
                 f"{measured}{where} do not show {them}{rods}{order}.",
-                f"Measure {_join(far)} too: positions, or distances across the work space.",
+                f"Measure {coordinates} too: positions, or distances across the work space.",
             )
 
 
@@ -238,7 +244,7 @@ def _far_value_reasons(evidence: Evidence) -> Iterator[_Reason]:
         several = f"{', '.join(far[:4])}{' ...' if len(far) > 4 else ''}"
         yield _Reason(
             f"More than {thresholds.OFF_TOLERANCES:g} tolerances from the drawing: {several}.",
-            "Check the robot's file at these values, or say by `prior` how far off they may be.",
+            "Check these values in the robot's file, or state their tolerances with --prior.",
             "usable with care",
         )
 
@@ -260,24 +266,16 @@ def _unseen_reasons(shown: Observability) -> Iterator[_Reason]:
     open_values = shown.columns - shown.determined_count
     if open_values:
         potential = (
-            f"; at more poses {shown.rank} would" if shown.rank > shown.determined_count else ""
+            f"; more poses would determine {shown.rank}"
+            if shown.rank > shown.determined_count
+            else ""
         )
         yield _Reason(
-            f"{shown.determined_count} of {shown.columns} combinations show in these measurements, "
-            f"the other {open_values} are kept at the drawing{potential}."
+            f"These measurements determine {shown.determined_count} of {shown.columns} "
+            f"combinations of values; the other {open_values} keep their drawn values{potential}."
         )
-
-
-def _unit(kind: str) -> str:
-    """Return the unit of residuals of a kind: mrad or mm."""
-    return "mrad" if kind == "angle" else "mm"
 
 
 def _size_text(error: float, kind: str) -> str:
     """Return an error as text in mrad or mm."""
-    return f"{1e3 * error:.3g} {_unit(kind)}"
-
-
-def _join(names: Sequence[str]) -> str:
-    """Return names joined by commas and "and"."""
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+    return f"{1e3 * error:.3g} {error_unit(kind)}"

@@ -122,21 +122,21 @@ def _numeric(word: str) -> bool:
 def parsed_numbers(words: Sequence[str], names: Sequence[str], what: str) -> list[float]:
     """Return the finite numbers in words separated by blanks or commas, one for each name."""
     parts = " ".join(words).replace(",", " ").split()
-    values = []
+    numbers = []
     for part in parts:
         try:
-            value = float(part)
+            number = float(part)
         except ValueError:
             raise DataError(f"{what}: {part!r} is not a number; give {' '.join(names)}") from None
-        if not math.isfinite(value):
+        if not math.isfinite(number):
             raise DataError(f"{what}: {part!r} is not a finite number; give {' '.join(names)}")
-        values.append(value)
-    if len(values) != len(names):
-        noun = "value" if len(values) == 1 else "values"
+        numbers.append(number)
+    if len(numbers) != len(names):
+        noun = "value" if len(numbers) == 1 else "values"
         raise DataError(
-            f"{what}: {len(values)} {noun} given, {len(names)} expected: {' '.join(names)}"
+            f"{what}: {len(numbers)} {noun} given, {len(names)} expected: {' '.join(names)}"
         )
-    return values
+    return numbers
 
 
 def parsed_list(text: str | None, what: str) -> list[float] | None:
@@ -183,17 +183,19 @@ def load_robot(name_or_path: str, elbows: str | None = None, *, quiet: bool = Fa
     if set(elbows) - set("+-") or len(elbows) != len(robot.legs):
         raise DataError(
             f"--elbows: {elbows!r} given, {len(robot.legs)} signs + or - expected, one for each "
-            f"leg of {robot.name}, such as {signs(robot)}"
+            f"leg of {robot.name}, such as {elbows_text(robot)}"
         )
     return with_elbows(robot, [int(f"{sign}1") for sign in elbows])
 
 
 def check_rate(rate: float) -> None:
-    """Refuse a sampling rate that is not a number above 0."""
+    """Raise DataError unless a sampling rate is a number above 0."""
     if not 0.0 < rate < math.inf:
         raise DataError(f"--rate: {rate:g} given, samples a second above 0 expected")
 
 
-def signs(robot: Manipulator) -> str:
+def elbows_text(robot: Manipulator) -> str:
     """Return a machine's working mode as text: + or - for each leg."""
-    return "".join("+" if leg.elbow > 0 else "-" for leg in robot.legs)
+    from pteron.manipulator.variants import elbow_signs
+
+    return elbow_signs(leg.elbow for leg in robot.legs)

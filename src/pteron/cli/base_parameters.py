@@ -37,16 +37,16 @@ def base(
 ) -> CommandResult:
     """Find the base inertial parameters: the sums of parameters that act on the forces.
 
-    The format latex prints lines of mathematics, booktabs a table with values for a paper.
+    The format latex prints formulas, booktabs a LaTeX table with values.
 
     Options
     -------
-    --method: Exact arithmetic with a proof, or a numerical rank.
-    --keep NAMES: Parameters to keep before others: I_l1,m_l4.
-    --shared: All legs share one set of inertial parameters.
-    --format: The form in which they are printed.
+    --method: Exact arithmetic with a proof, or a numerical rank by SVD or QR.
+    --keep NAMES: Parameters by which sums are named in preference to others: I_l1,m_l4.
+    --shared: All legs have the same inertial parameters.
+    --format: Format of the output.
     --symbols: Write the coefficients in symbols of the geometry.
-    --leg-symbols: The same, with symbols of each leg: equal lengths share none.
+    --leg-symbols: The same, but equal lengths of different legs have different symbols.
 
     Examples
     --------
@@ -59,16 +59,16 @@ def base(
 
         names = None if keep is None else [name.strip() for name in keep.split(",")]
         parameters = base_parameters(machine, method, names, shared=shared)
-    data = parameters.as_dict()
+    record = parameters.as_dict()
     if written:
-        data["symbolic"] = list(parameters.expressions(symbols=written))
-        data["geometry"] = _geometry(parameters, written)
-        data["shared_symbols"] = {} if written == "leg" else parameters.shared_symbols
+        record["symbolic"] = list(parameters.expressions(symbols=written))
+        record["geometry"] = _geometry(parameters, written)
+        record["shared_symbols"] = {} if written == "leg" else parameters.shared_symbols
     if format_ == "json":
-        return CommandResult(data, partial(show_json, data))
+        return CommandResult(record, partial(show_json, record))
     if format_ == "text":
-        return CommandResult(data, partial(_show, parameters, written))
-    return CommandResult(data, partial(_write, parameters, written, format_))
+        return CommandResult(record, partial(_show, parameters, written))
+    return CommandResult(record, partial(_write, parameters, written, format_))
 
 
 def _write(
@@ -94,11 +94,19 @@ def _show(parameters: BaseParameters, symbols: Symbols) -> None:
     columns = zip(expressions, parameters.values(), units, strict=True)
     rows = ((str(i), plain(e), f"{v:.5g}", u) for i, (e, v, u) in enumerate(columns, start=1))
     show(
-        f"[bold]{plain(parameters.robot.name)}[/bold]: {parameters.rank} base parameters of "
-        f"{len(parameters.columns)} inertial parameters",
+        f"[bold]{plain(parameters.robot.name)}[/bold]: {parameters.rank} base parameters, sums of "
+        f"{len(parameters.columns)} inertial parameters; only these sums act on the drive forces.",
         table("", "base parameter", "value", "unit", rows=rows, numbers=("", "value")),
+        SYMBOLS,
         *closing,
     )
+
+
+SYMBOLS = (
+    "Symbols: m mass, mgx mgy mgz first moment (mass times centre of mass), I inertia; of the "
+    "bodies p slider, u upper link, l lower link with the leg's number, e platform."
+)
+"""The legend of inertial parameters."""
 
 
 def _geometry(parameters: BaseParameters, symbols: Symbols) -> dict[str, float]:
@@ -112,15 +120,13 @@ def _closing_lines(parameters: BaseParameters, symbols: Symbols) -> list[str]:
     if symbols:
         geometry = _geometry(parameters, symbols)
         lengths = ", ".join(f"{name} = {v:g}" for name, v in geometry.items())
-        lines.append(f"In metres: {lengths}.")
+        lines.append(f"Geometry in metres: {lengths}.")
         shared = parameters.shared_symbols.items()
         if shared and symbols == "leg":
             text = "; ".join(", ".join((symbol, *others)) for symbol, others in shared)
             lines.append(f"Equal but for their sign, each with its symbol: {text}.")
         elif shared:
-            text = "; ".join(
-                f"{symbol} stands for {', '.join(others)} too" for symbol, others in shared
-            )
+            text = "; ".join(f"{s} stands for {', '.join(others)} too" for s, others in shared)
             lines.append(
                 f"Values that are equal but for their sign share a symbol: {text}. With "
                 "--leg-symbols each leg has its own."
@@ -140,7 +146,7 @@ def table1() -> CommandResult:
 
         computed_rows = computed()
     wrong = sum(not row.agrees for row in computed_rows)
-    data = [
+    record = [
         json_fields(
             parameter=r.parameter,
             kept=r.kept,
@@ -157,11 +163,15 @@ def table1() -> CommandResult:
         for r in computed_rows
     )
     restored = [r.parameter for r in computed_rows if r.restored]
-    agree = f"{len(computed_rows) - wrong} of {len(computed_rows)} rows agree."
+    agree = (
+        f"{len(computed_rows) - wrong} of {len(computed_rows)} base parameters of the paper's "
+        "Table 1 agree with those computed here."
+    )
     if restored:
         agree += (
             f" Cells of {', '.join(restored)} (*) are damaged in our text of the paper and "
             "restored from its other rows."
         )
-    lines = [table("", "printed", "computed", "agrees", rows=rows), agree]
-    return CommandResult(data, lines, code=1 if wrong else 0)
+    headings = ("", "printed", "computed", "agrees")
+    lines = [agree, table(*headings, rows=rows), SYMBOLS]
+    return CommandResult(record, lines, code=1 if wrong else 0)

@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 _MOST = 12
 """Values that the terminal shows, those that changed most; the page has them all."""
 
+_WEAK = 2
+"""Weakly determined combinations that are shown; the page has all of them."""
+
 Measure = Literal["positions", "heights", "poses", "distances"]
 """Quantities that may be measured at planned poses."""
 
@@ -41,13 +44,13 @@ def calibrate(
     plane: str | None = None,
     anyway: bool = False,
 ) -> CommandResult:
-    """Find a machine's true geometry from measurements, and say what they cannot show.
+    """Find a machine's true geometry from measurements, and what they leave undetermined.
 
-    The folder gets calibration.html to read, calibration.json with all numbers, and the machine as
-    it was found, robot.toml, unless that is not trustworthy. The exit code is 0 whatever the
-    verdict.
+    The folder gets the report calibration.html, calibration.json with all numbers, and the
+    calibrated machine, robot.toml, unless the result is not trustworthy. The exit code is 0
+    whatever the verdict.
 
-    With --plan, poses that show the geometry best are written as a table of joints and poses.
+    With --plan, poses that determine the geometry best are written as a table of joints and poses.
 
     Arguments
     ---------
@@ -55,18 +58,18 @@ def calibrate(
 
     Options
     -------
-    --robot ROBOT: The machine as it is drawn.
-    --out DIR|FILE: The folder to write it to; with --plan the table.
-    --held-out LOG: What to judge by; once for each. By default every fifth row, if there are
-        enough.
-    --free GROUP: Seek only this; once for each: zeros, scales, lengths, points, directions, tool,
-        radius, angles, or a value by its name in calibration.json.
-    --prior TOML: Standard deviations by group or value, m and rad.
-    --plan N: Choose so many poses to measure, in place of a LOG.
-    --measure: What will be measured at the planned poses.
-    --plane z=HEIGHT: The level that a planned probe touches, m. [default: z=0 where the tool works
-        down to it, as on a printer's bed; else the bottom of the proved poses]
-    --anyway: Write robot.toml even where it is not trustworthy.
+    --robot ROBOT: The machine as drawn: a machine of the catalog or a TOML file.
+    --out DIR|FILE: Folder for the results; with --plan the file of the table.
+    --held-out LOG: Log that validates the result; repeat for several. [default: every fifth row, if
+        there are enough]
+    --free GROUP: Fit these values alone; repeat for several: zeros, scales, lengths, points,
+        directions, tool, radius, angles, or a value by its name in calibration.json.
+    --prior TOML: File of tolerances: standard deviations by group or value, m and rad.
+    --plan N: Choose this number of poses to measure, instead of reading a LOG.
+    --measure: Quantity to be measured at the planned poses.
+    --plane z=HEIGHT: Height of the plane that a planned probe touches, m. [default: z=0 if the tool
+        reaches down to it, as on a printer's bed; else the bottom of the proved poses]
+    --anyway: Write robot.toml even if it is not trustworthy.
 
     Examples
     --------
@@ -96,12 +99,14 @@ def calibrate(
         measurements = read_measurements(machine, *(log or ()))
         check = read_measurements(machine, *held_out) if held_out else None
     with spinner(f"Calibrating {machine.name} from {len(measurements)} rows"):
-        result = calibrated(machine, measurements, free=free, prior=tolerances, held_out=check)
+        calibration = calibrated(machine, measurements, free=free, prior=tolerances, held_out=check)
     with spinner("Drawing the report"):
-        firmware = firmware_fit(result)
-        files = write_calibration(result, out, sources=sources, anyway=anyway, firmware=firmware)
-    data = {"files": [str(path) for path in files.paths], **numbers(result, firmware)}
-    return CommandResult(data, partial(_show, result, firmware, files.left_out), files.paths)
+        firmware = firmware_fit(calibration)
+        files = write_calibration(
+            calibration, out, sources=sources, anyway=anyway, firmware=firmware
+        )
+    record = {"files": [str(path) for path in files.paths], **numbers(calibration, firmware)}
+    return CommandResult(record, partial(_show, calibration, firmware, files.left_out), files.paths)
 
 
 def _prior(path: str) -> dict[str, float]:
@@ -109,13 +114,14 @@ def _prior(path: str) -> dict[str, float]:
     from pteron.toml import read_toml
 
     tolerances: dict[str, float] = {}
-    for name, value in read_toml(path, DataError, f"{path}: there is no such file").items():
-        if isinstance(value, bool) or not isinstance(value, int | float):
+    for name, tolerance in read_toml(path, DataError, f"{path}: there is no such file").items():
+        if isinstance(tolerance, bool) or not isinstance(tolerance, int | float):
             raise DataError(
-                f"{path}: {name} = {value!r}: a standard deviation in m or rad expected; a value's "
+                f"{path}: {name} = {tolerance!r}: a standard deviation in m or rad expected; a "
+                "value's "
                 'name stands in quotes, as in "zeros[2]" = 0.0001'
             )
-        tolerances[name] = float(value)
+        tolerances[name] = float(tolerance)
     return tolerances
 
 
@@ -142,17 +148,16 @@ def _plan(
         path = write_table(pl.DataFrame(poses.columns()), out)
     box = {name: list(side) for name, side in zip(("low", "high"), poses.region.box, strict=True)}
     expected = {"before": poses.before, "after": poses.after}
-    what, unit = ("tool's place", "mm") if machine.platform.lengths else ("angles", "mrad")
-    off = "is" if unit == "mm" else "are"
+    what, unit = ("tool's position", "mm") if machine.platform.lengths else ("angles", "mrad")
     few = (
-        f"From {poses.checked} poses on, some are held out to check the calibration by; with "
-        "fewer give a second log (--held-out)."
+        f"From {poses.checked} poses on, some are held out to check the calibration; with fewer, "
+        "give a second log (--held-out)."
     )
     lines = [
         f"{plain(machine.name)}: {count} poses at which to measure {measure}{_plane_text(poses)}, "
-        f"in a {_region(poses)}; every pose of it is proved to serve",
-        f"The {what} {off} off by up to {1e3 * poses.before:.3g} {unit} as drawn (one standard "
-        f"deviation of the tolerances); {1e3 * poses.after:.3g} {unit} are expected to be left.",
+        f"in a {_region(poses)}; every pose in it is proved to be in reach",
+        f"Expected error of the {what} (one standard deviation): up to {1e3 * poses.before:.3g} "
+        f"{unit} as drawn, from the tolerances; {1e3 * poses.after:.3g} {unit} once calibrated.",
         *([few] if count < poses.checked else []),
     ]
     return CommandResult({"file": str(path), "expected": expected, "region": box}, lines, [path])
@@ -170,11 +175,11 @@ def _level(text: str) -> Setup:
 
 
 def _plane_text(planned: Plan) -> str:
-    """Return over which plane heights are measured."""
+    """Return text that names the plane over which heights are measured."""
     plane = planned.plane
     if plane is None:
         return ""
-    known = "" if plane.known else ", which is found with the geometry"
+    known = "" if plane.known else ", which is fitted with the geometry"
     return f" over the plane z = {1e3 * plane.offset + 0.0:.4g} mm{known}"
 
 
@@ -190,52 +195,57 @@ def _region(planned: Plan) -> str:
         )
     ]
     if isinstance(region, Cylinder):
-        x, y = (f"{1e3 * value + 0.0:.4g}" for value in region.center[:2])
+        x, y = (f"{1e3 * coordinate + 0.0:.4g}" for coordinate in region.center[:2])
         disc = f"disc of radius {1e3 * region.radius:.0f} mm about x {x} mm, y {y} mm"
         return ", ".join([disc, *sides[2:]])
     return f"box, {', '.join(sides)}"
 
 
-def _show(result: Calibration, firmware: FirmwareFit | None, left_out: str) -> None:
+def _show(calibration: Calibration, firmware: FirmwareFit | None, left_out: str) -> None:
     """Print a verdict, what changed, what shows and what does not."""
     from pteron.report.calibration.values import notes
 
-    verdict, shown = result.verdict, result.observability
-    color = GRADE_COLORS[verdict.grade]
+    verdict, shown = calibration.verdict, calibration.observability
+    color, more = GRADE_COLORS[verdict.grade], len(shown.weak) - _WEAK
     lines: list[str | Table] = [plain(verdict.reasons[0])]
     if firmware:
         lines += [_table(firmware.rows), plain(firmware.sentence)]
     show(
-        f"[bold {color}]{plain(result.drawn.name)}: {verdict.grade}[/bold {color}], "
-        f"{shown.determined_count} of {shown.columns} combinations shown",
+        f"[bold {color}]{plain(calibration.drawn.name)}: {verdict.grade}[/bold {color}], "
+        f"{shown.determined_count} of {shown.columns} combinations of errors determined",
         *lines,
-        _values(result),
-        *_errors(result),
-        *map(plain, (*verdict.reasons[1:], *verdict.next_steps)),
-        *(f"Cannot be seen, as drawn: {plain(line)}" for line in shown.unseen),
-        *(f"[yellow]Weak:[/yellow] {plain(line)}" for line in shown.weak),
-        *map(plain, notes(result)),
+        _values(calibration),
+        *_errors(calibration),
+        *map(plain, verdict.reasons[1:]),
+        *(f"Not determined, kept as drawn: {plain(line)}" for line in shown.unseen),
+        *(f"[yellow]Weakly determined:[/yellow] {plain(line)}" for line in shown.weak[:_WEAK]),
+        *([f"{more} more weakly determined combinations are on the page."] if more > 0 else []),
+        *map(plain, notes(calibration)),
+        *(f"Next: {plain(step)}" for step in verdict.next_steps),
         *([f"[red]{plain(left_out)}[/red]"] if left_out else []),
     )
 
 
-def _values(result: Calibration) -> Table:
+def _values(calibration: Calibration) -> Table:
     """Return the table of the values that changed most, with a caption that counts the others."""
     from pteron.report.calibration import value_rows
 
-    rows = value_rows(result)
+    rows = value_rows(calibration)
     omitted = len(rows) - _MOST
     return _table(
         rows[:_MOST],
-        f"{omitted} more, which changed less, are on the page." if omitted > 0 else None,
+        f"{omitted} more, which changed less, are on the page. Determined by: measurements (data), "
+        "tolerances of the drawing, or both."
+        if omitted > 0
+        else None,
     )
 
 
 def _table(rows: Sequence[CalibrationRow], caption: str | None = None) -> Table:
     """Return a table of fitted values: drawn, change, 95 % half-width, unit and origin."""
-    numbers = ("drawn", "change", "+- 95 %")
+    numbers = ("drawn", "change", "+- (95 %)")
     return table(
-        *("value", *numbers, "unit", "made by"),
+        *("value", *numbers, "unit", "determined by"),
         rows=[
             (
                 plain(row.name),
@@ -251,18 +261,19 @@ def _table(rows: Sequence[CalibrationRow], caption: str | None = None) -> Table:
     )
 
 
-def _errors(result: Calibration) -> list[Table]:
+def _errors(calibration: Calibration) -> list[Table]:
     """Return a table of errors (mm, mrad) of rows outside the fit, before and after; else none."""
-    held_out = result.held_out
+    held_out = calibration.held_out
     if held_out is None:
         return []
+    from pteron.calibration.measurements import error_unit
     from pteron.report.typeset import significant
 
     numbers = ("before", "after", "expected")
     rows = []
     for kind in held_out.after:
-        values = (held_out.before[kind], held_out.after[kind], held_out.expected[kind])
-        unit = "mrad" if kind == "angle" else "mm"
-        rows.append((kind, *(ascii_number(significant(1e3 * value)) for value in values), unit))
-    caption = f"Errors at {held_out.rows} rows that were not fitted."
-    return [table("held out", *numbers, "unit", rows=rows, numbers=numbers, caption=caption)]
+        errors = (held_out.before[kind], held_out.after[kind], held_out.expected[kind])
+        texts = (ascii_number(significant(1e3 * error)) for error in errors)
+        rows.append((kind, *texts, error_unit(kind)))
+    caption = f"At {held_out.rows} rows held out of the fit; expected from noise and intervals."
+    return [table("error", *numbers, "unit", rows=rows, numbers=numbers, caption=caption)]

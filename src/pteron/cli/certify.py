@@ -30,7 +30,8 @@ _SHAPES = {1: ("length", "interval"), 2: ("area", "square"), 3: ("volume", "cube
 """Nouns for the size of a workspace and the shape inscribed in it, by its number of lengths."""
 
 _MAY_BE_SINGULAR = (
-    "Reach and limits count; poses may be singular. --type-ii FLOOR leaves out those that are near."
+    "Reach and joint limits are proved; poses may be singular. --type-ii FLOOR excludes poses near "
+    "type-II singularities."
 )
 """A note under proofs without a least type-II measure."""
 
@@ -58,7 +59,7 @@ class RequestedProofs:
     type_ii: float | None
 
     @property
-    def any_requested(self) -> bool:
+    def has_requests(self) -> bool:
         """Whether there is anything to prove."""
         return self.certify or self.prove is not None
 
@@ -68,7 +69,7 @@ class RequestedProofs:
         return {"type_i": self.type_i or 0.0, "type_ii": self.type_ii or 0.0}
 
     def check(self, maps: Mapping[str, object], slice_: str | None) -> None:
-        """Refuse options that have no effect together, and numbers out of range."""
+        """Raise DataError on options that have no effect together, or numbers out of range."""
         numbers = {"tolerance": self.tolerance, "type-i": self.type_i, "type-ii": self.type_ii}
         if self.prove is not None:
             _expect_none({**maps, "slice": slice_, "certify": self.certify or None}, "--prove")
@@ -77,10 +78,10 @@ class RequestedProofs:
             _expect_none(maps, "--certify")
         else:
             _expect_none(numbers, "a map, but with --certify or --prove")
-        for name, value in numbers.items():
+        for name, number in numbers.items():
             least = "above 0" if name == "tolerance" else "of 0 or more"
-            if value is not None and not (value > 0.0 or (value == 0.0 and name != "tolerance")):
-                raise DataError(f"--{name}: {value:g} given, a number {least} expected")
+            if number is not None and not (number > 0.0 or (number == 0.0 and name != "tolerance")):
+                raise DataError(f"--{name}: {number:g} given, a number {least} expected")
 
     def result(self, robot: Manipulator, slice_: str | None, warnings: list[str]) -> CommandResult:
         """Run the proof and return its result; the exit code is 1 if a box is not proved."""
@@ -97,8 +98,8 @@ class RequestedProofs:
             proof = prove(robot, region, type_i=type_i, type_ii=type_ii, progress=bar)
         lines = [f"[bold]{plain(robot.name)}[/bold]: {_spans(robot, region)}", plain(str(proof))]
         lines += self._unsure if proof.holds else []
-        data = _proof(proof, self.floors) | {"warnings": warnings}
-        return CommandResult(data, lines, code=0 if proof.holds else _NOT_PROVED)
+        record = _proof(proof, self.floors) | {"warnings": warnings}
+        return CommandResult(record, lines, code=0 if proof.holds else _NOT_PROVED)
 
     @property
     def _unsure(self) -> list[str]:
@@ -113,12 +114,13 @@ class RequestedProofs:
         required = conditions(robot, **self.floors)
         with progress_bar(f"Proving how far {robot.name} leans") as bar:
             leans = largest_tilt(robot, pose, given=required, progress=bar)
-        data = {"robot": robot.name, "floors": self.floors, "tilt": leans.tilt}
+        record = {"robot": robot.name, "floors": self.floors, "tilt": leans.tilt}
         lines = [
             _heading(robot, dict(list(_angles(robot, pose).items())[2:]), self.floors),
-            f"It leans by {math.degrees(leans.tilt):.4g} deg to every side: proved.",
+            f"Proved: the platform can tilt by {math.degrees(leans.tilt):.4g} deg in all "
+            "directions.",
         ]
-        return CommandResult(data | {"proved": True, "warnings": warnings}, lines + self._unsure)
+        return CommandResult(record | {"proved": True, "warnings": warnings}, lines + self._unsure)
 
     def _certify(self, robot: Manipulator, pose: Array, warnings: list[str]) -> CommandResult:
         """Prove bounds of the workspace's volume at a pose's angles, and its largest cube."""
@@ -135,7 +137,7 @@ class RequestedProofs:
             except ModelError:
                 cube = None
         if not paved.complete:
-            note(f"Warning: the gap is not {percent(tolerance)}: there were too many boxes")
+            note(f"Warning: too many boxes: the gap is still above {percent(tolerance)}")
         contents = paved, pose, self.floors, cube
         return CommandResult(
             _paving_data(*contents) | {"warnings": warnings}, partial(_show, *contents)
@@ -143,9 +145,9 @@ class RequestedProofs:
 
 
 def _expect_none(options: Mapping[str, object], what: str) -> None:
-    """Refuse options that have no effect beside `what`."""
-    for name, value in options.items():
-        if value is not None and value != []:
+    """Raise DataError on options that have no effect beside `what`."""
+    for name, option in options.items():
+        if option is not None and option != []:
             raise DataError(f"--{name}: does not go with {what}")
 
 
@@ -216,26 +218,26 @@ def _show(paved: Paving, pose: Array, floors: dict[str, float], cube: Inscribed 
     robot, shares, (noun, shape) = paved.robot, paved.boundary_shares, _SHAPES[len(paved.axes)]
     show(_heading(robot, _angles(robot, pose), floors))
     if not paved.outer_volume:
-        show("Proved: no position serves.")
+        show("Proved: no position is reachable under these conditions.")
         return
     show(
-        f"Proved {noun}: {paved.inner_volume:.5g} to {paved.outer_volume:.5g} {paved.unit}, "
-        f"gap {percent(paved.gap)} ({len(paved.inner)} boxes inside, "
-        f"{len(paved.boundary)} undecided)"
+        f"Proved {noun} of the workspace: between {paved.inner_volume:.5g} and "
+        f"{paved.outer_volume:.5g} {paved.unit}, gap {percent(paved.gap)} "
+        f"({len(paved.inner)} boxes inside, {len(paved.boundary)} undecided)"
     )
     if cube is None:
-        show(f"No {shape} of any size was found in it.")
+        show(f"No {shape} inside the workspace was found.")
     else:
         center = zip(robot.coordinates, cube.center.round(6).tolist(), strict=True)
         lengths = robot.platform.lengths
         coordinates = ", ".join(pose_text(name, value) for name, value in center if name in lengths)
-        show(f"Largest {shape} that was found, proved: edge {cube.edge:.4g} m about {coordinates}")
+        show(f"Largest {shape} found, proved inside: edge {cube.edge:.4g} m, centre {coordinates}")
     undistinguished = 1.0 - sum(shares.values())
     causes = {plain(cause): share for cause, share in shares.items()}
-    causes |= {"several, not told apart": undistinguished} if undistinguished > 0.0 else {}
+    causes |= {"several of these": undistinguished} if undistinguished > 0.0 else {}
     rows = ((cause, percent(share)) for cause, share in causes.items())
     number = "share of the boundary"
-    show(table("what ends it", number, rows=rows, numbers=(number,)))
+    show(table("what limits the workspace", number, rows=rows, numbers=(number,)))
     if not floors["type_ii"]:
         show(_MAY_BE_SINGULAR)
 
@@ -243,15 +245,15 @@ def _show(paved: Paving, pose: Array, floors: dict[str, float], cube: Inscribed 
 def _heading(robot: Manipulator, angles: Mapping[str, float], floors: dict[str, float]) -> str:
     """Return the first line of a printout: the machine, the fixed angles, the nonzero floors."""
     where = ", ".join(pose_text(name, angle) for name, angle in angles.items())
-    minimums = ", ".join(f"{name} {value:g}" for name, value in floors.items() if value)
+    minimums = ", ".join(f"{name} {floor:g}" for name, floor in floors.items() if floor)
     text = f"[bold]{plain(robot.name)}[/bold]{f' at {where}' if where else ''}"
-    return f"{text}, with floors {minimums}" if minimums else text
+    return f"{text}, poses with at least {minimums}" if minimums else text
 
 
 def _angles(robot: Manipulator, pose: Array) -> dict[str, float]:
     """Return the angles (rad) of a pose by coordinate."""
     pairs = zip(robot.coordinates, pose.tolist(), strict=True)
-    return {name: value for name, value in pairs if name in robot.platform.angles}
+    return {name: angle for name, angle in pairs if name in robot.platform.angles}
 
 
 def _spans(robot: Manipulator, region: Box) -> str:

@@ -19,33 +19,28 @@ _NONE = 1
 """Exit code where no machine does the job."""
 
 
-def choose(
-    job: str,
-    *,
-    out: str | None = None,
-    workers: int = 1,
-) -> CommandResult:
+def choose(job: str, *, out: str | None = None, workers: int = 1) -> CommandResult:
     """Choose a machine for a job: which kind, which dimensions, which motors.
 
-    The file says what the machine must do: workspace, payload, cycles, accuracy, stiffness, room,
-    motors to choose from, and what is to be small. All kinds of the catalog that can do the motion
-    are searched; the best design of each is proved over the workspace, and its drives are told
-    with their margins at the worst place and in the worst direction.
+    The file states the requirements: workspace, payload, cycles, accuracy, stiffness, room, motors
+    to choose from, and the objectives to minimise. All kinds of the catalog that have the degrees
+    of freedom are searched; the best design of each is proved over the workspace, and its drives
+    are listed with their margins at the worst place and in the worst direction.
 
-    What is tried is told at the start, and each kind when it is finished, on standard error.
+    Notes on standard error report the kinds at the start, and each kind when it is finished.
 
-    A folder gets choose.html, choose.json and a TOML file for each machine, with its drives. Kinds
-    that are finished are kept there, so that the same command goes on where it was ended. The exit
-    code is 1 if no machine does the job.
+    A folder gets choose.html, choose.json and a TOML file for each machine, with its drives.
+    Finished kinds are kept there, so that the same command resumes after an interruption. The exit
+    code is 1 if no machine meets all requirements.
 
     Arguments
     ---------
-    JOB: What the machine must do, a TOML file.
+    JOB: Requirements, a TOML file.
 
     Options
     -------
-    --out FOLDER: Write the results to a folder, and go on there if ended.
-    --workers: Processes that do the work.
+    --out FOLDER: Folder for the results, and to resume from.
+    --workers: Number of processes.
 
     Examples
     --------
@@ -74,15 +69,15 @@ def choose(
             )
     except KeyboardInterrupt:
         if out is not None:
-            note(f"What is finished is kept in {out}; the same command goes on there")
+            note(f"Finished kinds are kept in {out}; the same command resumes there")
         raise
     files = []
     if out is not None:
         from pteron.report.design.choice import write_choice
 
         files = write_choice(choice, out)
-    data = choice.as_dict() | ({"files": [str(file) for file in files]} if files else {})
-    return CommandResult(data, partial(_show, choice), files, _NONE if choice.best is None else 0)
+    record = choice.as_dict() | ({"files": [str(file) for file in files]} if files else {})
+    return CommandResult(record, partial(_show, choice), files, _NONE if choice.best is None else 0)
 
 
 class _Log:
@@ -96,45 +91,47 @@ class _Log:
         """Print the kinds to search, and those that are already finished in the folder."""
         self._count = len(kinds)
         if resumed:
-            note(f"Gone on in {self._out}: {', '.join(resumed)} finished before")
+            note(f"Resumed from {self._out}: {', '.join(resumed)} finished before")
         if kinds:
             many = f"{len(kinds)} kinds" if len(kinds) > 1 else "One kind"
             each = " each" if len(kinds) > 1 else ""
             note(
-                f"{many} with {self._evaluations} designs{each} to rate, the best of them to be "
-                f"proved: {', '.join(kinds)}"
+                f"{many} with {self._evaluations} designs{each} to evaluate, the best of them to "
+                f"be proved: {', '.join(kinds)}"
             )
 
     def finish(self, candidate: Candidate) -> None:
         """Print how many of a kind's designs are feasible."""
         self._done += 1
-        feasible = f"{candidate.kept} of {candidate.evaluated} designs keep all that is asked"
-        verdict = feasible if candidate.serves else f"falls out; {feasible}"
-        note(f"{self._done} of {self._count}: {candidate.kind}: {verdict}")
+        verdict = "" if candidate.serves else "infeasible; "
+        note(f"{self._done} of {self._count}: {candidate.kind}: {verdict}{candidate.count_text}")
 
 
 def _show(choice: Choice) -> None:
     """Print the requirements, a table of the feasible kinds, and why others are infeasible."""
-    show("[bold]Asked[/bold]: " + plain("; ".join(choice.job.requirement_lines())))
     serving = [candidate for candidate in choice.candidates if candidate.serves]
+    objective = choice.job.objectives[0].replace("_", " ")
+    best = f"[bold]{choice.best.kind}[/bold] is best by {objective}; " if choice.best else ""
+    counts = f"{len(serving)} of {len(choice.candidates)} kinds of machines"
+    show(
+        f"{best}{counts} can meet all requirements.",
+        f"Requirements: {plain('; '.join(choice.job.requirement_lines()))}",
+    )
     rows = {candidate.kind: candidate.figure_texts for candidate in serving}
     shown = list(dict.fromkeys(key for row in rows.values() for key in row))
     if serving:
-        table_rows = (
-            (kind, *(plain(row.get(n, "-")) for n in shown)) for kind, row in rows.items()
-        )
+        table_rows = ((k, *(plain(row.get(n, "-")) for n in shown)) for k, row in rows.items())
         show(table("kind", *shown, rows=table_rows, numbers=tuple(shown), names=("kind",)))
     for candidate in serving:
         show(
             f"[bold]{candidate.kind}[/bold]: {plain(candidate.drive_text)}",
-            f"  mm: {candidate.dimension_text}",
+            f"  dimensions (mm): {candidate.dimension_text}",
             f"  {plain(candidate.proved)}",
             f"  {plain(candidate.clear)}",
-            f"  margins: {plain(candidate.margin_text)}",
+            f"  drive margins, available over needed: {plain(candidate.margin_text)}",
         )
     for candidate in choice.candidates:
         if not candidate.serves:
-            verdict = candidate.summary().removeprefix(candidate.kind)
-            show(f"[bold]{candidate.kind}[/bold]{plain(verdict)}")
+            show(f"[bold]{candidate.kind}[/bold]: {plain(candidate.verdict)}")
     if serving:
-        show(*(f"[dim]{plain(line)}[/dim]" for line in choice.assumption_lines()))
+        show(*(f"[dim]Assumed: {plain(line)}[/dim]" for line in choice.assumption_lines()))

@@ -10,7 +10,7 @@ from pteron.cli.arguments import MachineArgument
 from pteron.cli.motion_table import motion_frame, peaks_table
 from pteron.cli.progress import spinner
 from pteron.cli.result import CommandResult
-from pteron.cli.terminal import note
+from pteron.cli.terminal import note, percent, plain
 from pteron.errors import DataError
 
 if TYPE_CHECKING:
@@ -36,9 +36,9 @@ def cue(
     """Show a vehicle's accelerations and turns with a simulator's platform: a classical washout.
 
     The file holds t (s), accelerations ax ay az without gravity (m/s^2) and angular rates wx wy wz
-    (rad/s) in the vehicle's axes: x ahead, y to the left, z up. What is quick is moved, what lasts
-    is tilted into, and the platform comes back to the middle. It never leaves a box of poses that
-    is proved to lie in the workspace: amplitudes are reduced where they are too large for it.
+    (rad/s) in the vehicle's axes: x ahead, y to the left, z up. Quick accelerations are shown by
+    translation, lasting ones by tilt, and the platform returns to the middle. It never leaves a box
+    of poses that is proved to lie in the workspace: amplitudes too large for it are reduced.
 
     Arguments
     ---------
@@ -49,17 +49,18 @@ def cue(
     --robot FILE: A machine whose platform moves and turns freely.
     --out FILE: Write poses and joints to a .csv or .parquet file.
     --page FILE: Write a page that shows the motion, a .html file.
-    --type-ii: Least type-II measure of the poses that it keeps within.
+    --type-ii: Least type-II measure of the poses used: 0 where the drives cannot hold the platform.
 
     Filters
     -------
-    --scale NUMBER: Share of accelerations and rates that is shown: 0.5.
-    --translation NUMBER: What is quicker is moved: 2.5 rad/s.
-    --return-speed NUMBER: It comes back to the middle with: 0.25 rad/s.
-    --tilting NUMBER: What lasts longer is tilted into: 2 rad/s.
-    --tilt-rate NUMBER: Greatest rate of that tilt: 0.05 rad/s.
-    --rotation NUMBER: Turns that are quicker are turned: 0.7 rad/s.
-    --smoothing NUMBER: Nothing quicker is shown: 30 rad/s.
+    --scale NUMBER: Factor on accelerations and rates. [default: 0.5]
+    --translation NUMBER: Corner frequency of the high-pass filter on translation, rad/s. [default:
+        2.5]
+    --return-speed NUMBER: Corner frequency of the return to the middle, rad/s. [default: 0.25]
+    --tilting NUMBER: Corner frequency of the low-pass filter on tilt, rad/s. [default: 2]
+    --tilt-rate NUMBER: Largest rate of that tilt, rad/s. [default: 0.05]
+    --rotation NUMBER: Corner frequency of the high-pass filter on rotation, rad/s. [default: 0.7]
+    --smoothing NUMBER: Corner frequency of the low-pass filter on the input, rad/s. [default: 30]
 
     Examples
     --------
@@ -81,7 +82,7 @@ def cue(
         checked_page(page)
     options = scale, translation, return_speed, tilting, tilt_rate, rotation, smoothing
     named = zip((field.name for field in fields(Washout)), options, strict=True)
-    washout = Washout(**{name: value for name, value in named if value is not None})
+    washout = Washout(**{name: setting for name, setting in named if setting is not None})
     with spinner(f"Showing {motion} with {machine.name}"):
         cued = shown(machine, motion, washout=washout, type_ii=type_ii)
         largest = peaks(machine, cued.pose, cued.velocity, cued.acceleration, limits_of(machine))
@@ -91,7 +92,7 @@ def cue(
             note(f"Note: {peak.phrase()}; a smaller --scale asks less")
     low, high = cued.region.box
     box = np.stack([low, high], axis=-1).tolist()
-    data = {
+    record = {
         "robot": machine.name,
         "duration": cued.duration,
         "samples": len(cued.time),
@@ -101,12 +102,13 @@ def cue(
         "files": files,
     }
     lines = [
-        f"{cued.duration:.4g} s, {len(cued.time)} samples, within a box that is proved: "
-        f"{_box_text(machine, cued)}",
-        f"amplitudes reduced by at most {cued.pressed:.0%}, so that the motion stays in the box",
+        f"[bold]{plain(machine.name)}[/bold], motion of {plain(motion)}: {cued.duration:.4g} s "
+        f"({len(cued.time)} samples), in a box of poses proved to be in reach and within limits: "
+        f"{_box_text(machine, cued)}.",
+        f"Amplitudes are reduced by {percent(cued.pressed)} at most to keep the motion in the box.",
         peaks_table(largest),
     ]
-    return CommandResult(data, lines, files)
+    return CommandResult(record, lines, files)
 
 
 def _write(machine: Manipulator, cued: Cue, out: str | None, page: str | None) -> list[str]:

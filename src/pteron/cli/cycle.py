@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Literal
 
 from pteron.cli.arguments import MachineArgument, check_rate, parsed_list
 from pteron.cli.motion_argument import Carried, given_pose, read_motion
-from pteron.cli.motion_table import motion_frame, peaks_table
+from pteron.cli.motion_table import motion_frame, peaks_table, travel_text
 from pteron.cli.planned_motions import joint_motion, line_motion, standard_motion
 from pteron.cli.progress import spinner
 from pteron.cli.result import CommandResult
-from pteron.cli.terminal import note, show
+from pteron.cli.terminal import note, plain, show
 from pteron.errors import DataError
 from pteron.json_values import json_fields
 from pteron.tolerances import SAME
@@ -41,6 +41,14 @@ _KINDS_OF: dict[str, tuple[Kind, ...]] = {
     "jerk": ("joints",),
 }
 """Kinds of motion that an option belongs to."""
+
+_NOUNS = {
+    "adept": "standard pick-and-place cycle",
+    "line": "straight lines",
+    "joints": "motion straight in the joint coordinates",
+    "replay": "motion of the table",
+}
+"""The kinds of motion in words."""
 
 _DENSE = 10
 """Moments per sample at which a motion's peaks are sought."""
@@ -71,49 +79,51 @@ def cycle(
     carried: Carried,
     out: str | None = None,
 ) -> CommandResult:
-    """Make a motion, within the limits, and see what it asks of the drives.
+    """Plan a motion within limits, and compute the speeds and forces that it needs of the drives.
 
-    The standard pick-and-place cycle, 25 mm up, 305 mm across, 25 mm down and back; straight lines
-    to a pose or through a table's poses; the joints' way to a pose with limited jerk; or a motion
-    from a table. Without --duration it takes the shortest time within the limits: those given, and
-    those of the machine's drives. With --optimal it is as fast as they allow at every place.
+    The motion is the standard pick-and-place cycle (25 mm up, 305 mm across, 25 mm down, and back),
+    straight lines to a pose or through the poses of a table, a motion of the joints to a pose with
+    limited jerk, or one read from a table. Without --duration it takes the shortest time within the
+    limits of the options and of the machine's drives; the whole motion is slowed alike. With
+    --optimal it is as fast as the limits allow at every point of the path.
 
     The file's columns are t x y z phi dx ... ddx ... of the pose, rho1 ... drho1 ... ddrho1 ... of
     the joints (theta1 of cranks), and force1 ... (torque1) of the drives: pteron forces --table
     reads it. --speed, --acceleration, --force and --jerk take one number, or one for each joint.
 
-    Way
-    ---
-    --kind: The pick-and-place cycle, straight lines, the joints' own way, or a table's motion.
-        [default: adept, or what --to, --via or --table says]
-    --from POSE: Where it begins; the home pose if left out.
-    --to POSE: Where it ends.
-    --via FILE: Poses to pass, a .csv or .parquet file.
-    --corner: Metres before a pose at which its corner is rounded; 0 stops there.
-    --back: And the same way back.
-    --around POSE: The middle of adept; the home pose if left out.
-    --scale: Of adept, 25 x 305 mm at 1. [default: the largest that fits]
-    --table FILE: A motion to replay: t and poses, or joints.
+    Path
+    ----
+    --kind: Kind of motion: pick-and-place cycle (adept), straight lines of the platform, joints
+        moved straight in joint space, or replay of a table. [default: adept, or the kind that --to,
+        --via or --table implies]
+    --from POSE: Start pose. [default: the home pose]
+    --to POSE: End pose.
+    --via FILE: Table of poses to pass, a .csv or .parquet file.
+    --corner: Distance from a corner, m, at which the path is rounded; 0 stops at the corner.
+    --back: Return to the start by the same path.
+    --around POSE: Centre of the pick-and-place cycle. [default: the home pose]
+    --scale: Size of the pick-and-place cycle; 1 is 25 mm x 305 mm. [default: the largest that fits]
+    --table FILE: Table of the motion to replay: t and poses, or t and joints.
 
     Time
     ----
-    --duration: Of all of it, s. [default: the shortest within the limits]
-    --optimal: As fast as the limits allow.
-    --law: Of a line, by the polynomial's degree.
-    --rate: Samples a second.
+    --duration: Duration of the whole motion, s. [default: the shortest within the limits]
+    --optimal: Minimise the time along the path: at each point a limit is reached.
+    --law: Time law of a line: polynomial of degree five or seven.
+    --rate: Samples per second.
 
     Limits
     ------
-    --speed NUMBERS: Of the joints, m/s or rad/s. [default: the drives']
-    --acceleration NUMBERS: Of the joints, the same per s.
-    --force NUMBERS: Of the drives, N or N m. [default: the drives']
-    --jerk NUMBERS: Of joints, with --kind joints.
-    --tool-speed: Of the tool, m/s.
-    --tool-acceleration: Of the tool, m/s^2.
+    --speed NUMBERS: Joint speed, m/s or rad/s. [default: max_speed of the drives]
+    --acceleration NUMBERS: Joint acceleration, m/s^2 or rad/s^2.
+    --force NUMBERS: Drive force, N or N m. [default: max_force of the drives]
+    --jerk NUMBERS: Joint jerk, m/s^3 or rad/s^3, with --kind joints.
+    --tool-speed: Tool speed, m/s.
+    --tool-acceleration: Tool acceleration, m/s^2.
 
     Options
     -------
-    --out FILE: Write its samples to a .csv or .parquet file.
+    --out FILE: Write the samples to a .csv or .parquet file.
 
     Examples
     --------
@@ -157,11 +167,11 @@ def cycle(
 
 
 def _expect_fitting(way: str, options: Mapping[str, object]) -> None:
-    """Refuse options of another kind of motion, and two that set its duration."""
+    """Raise DataError on options of another kind of motion, or two that set its duration."""
     if options["optimal"] and options["duration"] is not None:
         raise DataError("--duration and --optimal given; give one of them")
-    for name, value in options.items():
-        if value not in (None, False, 0.0) and way not in _KINDS_OF[name]:
+    for name, option in options.items():
+        if option not in (None, False, 0.0) and way not in _KINDS_OF[name]:
             raise DataError(
                 f"--{name}: has no use in a motion of kind {way}; leave it out, or give --kind "
                 f"{' or '.join(_KINDS_OF[name])}"
@@ -195,7 +205,7 @@ def _result(
 
         write_table(motion_frame(machine, motion), out)
     bound = getattr(motion, "polynomial", None)
-    data = {
+    record = {
         "robot": machine.name,
         "kind": way,
         **asdict(carried),
@@ -214,11 +224,15 @@ def _result(
         ],
         "file": out,
     }
-    text = f"{motion.duration:.4g} s, {len(motion.time)} samples"
+    text = (
+        f"[bold]{plain(machine.name)}[/bold]{plain(str(carried))}, {_NOUNS[way]}: "
+        f"{motion.duration:.4g} s ({len(motion.time)} samples)"
+    )
     if bound is not None:
-        text += f"; a polynomial in time along the same path takes {bound:.4g} s"
+        text += f"; without --optimal the same path takes {bound:.4g} s"
+    text += f". Travel: {travel_text(machine, motion)}."
     return CommandResult(
-        data, partial(_show, [text, peaks_table(largest)], out), [out] if out else []
+        record, partial(_show, [text, peaks_table(largest)], out), [out] if out else []
     )
 
 
@@ -226,4 +240,4 @@ def _show(lines: list[str | Table], out: str | None) -> None:
     """Print the lines and tables, and a hint to `--out` where no file was written."""
     show(*lines)
     if out is None:
-        note("Note: no file is written; to have the motion, add --out FILE.csv")
+        note("Note: no file is written; --out FILE.csv saves the motion")

@@ -34,28 +34,28 @@ def design(
     workers: int | None = None,
     scheduler: str | None = None,
 ) -> CommandResult:
-    """Search for the dimensions of a machine that are best for what is asked of it.
+    """Search for the best dimensions of a machine under requirements.
 
-    The file names the machine to begin with, the numbers that may change, what must be kept
-    (a workspace, which may float, floors and limits) and what is bounded, large or small: the
-    largest cube, the links' length, an index, accuracy, stiffness, or what motors from a list
-    must give to drive cycles with a payload. A search of several objectives ends in a front: the
-    designs that no other beats in everything.
+    The file names the initial machine, the numbers that may change, the constraints (a workspace,
+    whose place may be free, floors and limits) and the quantities to bound, maximise or minimise:
+    the largest cube, the links' length, an index, accuracy, stiffness, or what motors from a list
+    must give to drive cycles with a payload. A search with several objectives ends in a Pareto
+    front: the designs that no other design betters in every objective.
 
     With --out a folder gets front.csv, front.parquet, front.png, report.md with what changed and
-    what is proved, design.json, and the best machines as TOML files. What is evaluated is kept
-    there, so that the same command goes on where it was ended, and ends in the same front.
+    what is proved, design.json, and the best machines as TOML files. Evaluated designs are kept
+    there, so that the same command resumes after an interruption, and ends in the same front.
 
     Arguments
     ---------
-    SPEC: What is asked, a TOML file.
+    SPEC: Requirements, a TOML file.
 
     Options
     -------
-    --out FOLDER: Write the results to a folder, and go on there if ended.
+    --out FOLDER: Folder for the results, and to resume from.
     --seed: Seed of the random numbers. [default: the file's]
-    --sweep: Evaluate so many designs spread evenly, in whole files of 256, instead of a search.
-    --workers: Processes that do the work. [default: of a search one a core, up to 8]
+    --sweep: Evaluate this number of evenly spread designs (in whole files of 256), without search.
+    --workers: Number of processes. [default: of a search one per core, up to 8]
 
     Examples
     --------
@@ -85,8 +85,8 @@ def design(
         from pteron.report.design.front import write_front
 
         files = write_front(summary, out)
-    data = summary.as_dict() | ({"files": [str(file) for file in files]} if files else {})
-    return CommandResult(data, partial(_show, summary), files)
+    record = summary.as_dict() | ({"files": [str(file) for file in files]} if files else {})
+    return CommandResult(record, partial(_show, summary), files)
 
 
 def _tell_resumed(folder: Path) -> None:
@@ -94,7 +94,7 @@ def _tell_resumed(folder: Path) -> None:
     for name, word in ((_GENERATIONS, "generations"), (_SURVEY, "blocks")):
         count = len([*(folder / name).glob("[0-9]*")])
         if count:
-            note(f"Note: {folder / name}: going on; an earlier run has begun {count} {word}")
+            note(f"Note: {folder / name}: resumed; an earlier run has begun {count} {word}")
 
 
 def _search_front(
@@ -121,15 +121,15 @@ def _show(summary: FrontReport) -> None:
     front = summary.front
     name, _, counts = front.summary().partition(": ")
     show(f"[bold]{plain(name)}[/bold]: {counts}")
-    show(*(f"Asked for: {plain(line)}" for line in front.task.spec.requirement_lines()))
+    show(*(f"Required: {plain(line)}" for line in front.task.spec.requirement_lines()))
     lines = (*summary.start.proofs, *summary.start.missing_quantities)
-    show(*(f"To begin with: {plain(line)}" for line in lines))
-    numbers = ("to begin with", "now", "change")
+    show(*(f"Initial machine: {plain(line)}" for line in lines))
+    numbers = ("initial", "design", "change")
     for reported in summary.selection:
         rows = (map(plain, change.cells) for change in reported.changes)
         show(
             "",
-            f"[bold]{plain(reported.name.replace('-', ' '))}[/bold]",
-            table("what", *numbers, rows=rows, numbers=numbers),
+            f"[bold]{plain(reported.name.replace('-', ' ').capitalize())}[/bold]",
+            table("quantity", *numbers, rows=rows, numbers=numbers),
             *(plain(line) for line in (*reported.proofs, *reported.covers)),
         )

@@ -50,14 +50,14 @@ class Destination:
     def deliver(
         self,
         table: pl.DataFrame,
-        data: dict[str, Any],
+        record: dict[str, Any],
         further_files: Callable[[], dict[str, str]],
         person: Callable[[], None],
         code: int = 0,
     ) -> CommandResult:
         """Write the files if requested, and return the command's result.
 
-        `data` are the figures, `more` makes the other files of a folder, by name, and `person`
+        `record` are the figures, `more` makes the other files of a folder, by name, and `person`
         prints what a person reads.
         """
         files: list[Path] = []
@@ -69,7 +69,8 @@ class Destination:
             from pteron.atomic import write_texts
             from pteron.json_values import json_text
 
-            texts = {f"{self.name}.csv": table.write_csv(), f"{self.name}.json": json_text(data)}
+            printed = {"csv": table.write_csv(), "json": json_text(record)}
+            texts = {f"{self.name}.{format_}": text for format_, text in printed.items()}
             files = write_texts(self.out, texts | further_files())
         written = {"files": [str(file) for file in files]} if files else {}
-        return CommandResult(data | written, person, files, code)
+        return CommandResult(record | written, person, files, code)

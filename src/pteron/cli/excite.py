@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Literal
 from pteron.cli.arguments import MachineArgument
 from pteron.cli.progress import progress_bar
 from pteron.cli.result import CommandResult
-from pteron.cli.terminal import note, table
+from pteron.cli.terminal import note, significant, table
 from pteron.errors import ModelError
 
 if TYPE_CHECKING:
@@ -30,16 +30,17 @@ _CLEARANCE = "joint_clearance"
 """The limit of the joints' distance from their limits."""
 
 _MEASURES = {
-    "type_i": "type-I measure",
-    "type_ii": "type-II measure",
-    "passive_clearance": "passive clearance (of half the range)",
+    "type_i": "stretched or folded leg (type-I measure)",
+    "type_ii": "platform not held (type-II measure)",
+    "joint_clearance": "joint limits",
+    "passive_clearance": "passive joint limits (over half the range)",
 }
 """Names of limits in the output, where they are not those of the code."""
 
 
 @dataclass(frozen=True)
 class _SeriesOptions:
-    """Of the Fourier series and its repetition."""
+    """The Fourier series and its repetition."""
 
     space: Literal["platform", "joints"] = "platform"
     harmonics: int = 5
@@ -50,7 +51,7 @@ class _SeriesOptions:
 
 @dataclass(frozen=True)
 class _LimitOptions:
-    """Of the limits that the motion keeps."""
+    """The limits that the motion keeps."""
 
     speed: float | None = None
     acceleration: float = 10.0
@@ -80,7 +81,7 @@ class _LimitOptions:
 
 @dataclass(frozen=True)
 class _FileOptions:
-    """Of the table's columns and form."""
+    """The columns, units and form of the table."""
 
     rate: float = 1000.0
     contents: Literal["all", "joints", "poses"] = "all"
@@ -104,7 +105,7 @@ class _FileOptions:
 
 @dataclass(frozen=True)
 class _SearchOptions:
-    """Of the search for the best motion."""
+    """The search for the best motion."""
 
     criterion: Literal["condition", "logdet"] = "condition"
     starts: int = 12
@@ -124,64 +125,65 @@ def excite(
     search: _SearchOptions,
     json: bool = False,
 ) -> CommandResult:
-    """Find a periodic trajectory from whose forces the base parameters are seen best.
+    """Find a periodic trajectory whose forces determine the base parameters best.
 
-    The file leads in from rest, repeats the trajectory, and leads out to rest in the pose where it
-    began, all on the trajectory's own way: take the machine to the first row, and play it. Every
-    limit is kept, at ten times as many samples too. Beside motion.csv, motion-held-out.csv has
-    pick-and-place cycles within the same limits, to judge the identified model by; and, with
-    --stribeck, motion-slow.csv the same way slowly from rest to rest, which shows how friction
-    falls with speed: record all, and pteron identify log.csv slow.csv --stribeck auto.
+    The motion leads in from rest, repeats the trajectory, and leads out to rest in the pose where
+    it began, all on the same path: move the machine to the first row, and play the file. All limits
+    are kept, also between the samples. Beside motion.csv, motion-held-out.csv has pick-and-place
+    cycles within the same limits, to validate the identified model; with --stribeck,
+    motion-slow.csv has the same path slowly from rest to rest, which shows how friction falls with
+    speed: record all of them, then pteron identify log.csv slow.csv --stribeck auto.
 
     The columns are t rho1 ... x y z phi and their rates (d..., dd..., per s), and force1 ... by the
     machine's nominal inertia and its drives' friction; theta1 ... and torque1 ... of cranks. The
-    TOML file beside each motion tells units, columns, period and assembly mode. Copy it beside the
+    TOML file beside each motion has units, columns, period and assembly mode. Copy it beside the
     log, log.toml beside log.csv, and pteron identify reads a log in the same layout.
 
-    The search takes about a minute: --seconds. Ctrl-C ends it and keeps the best until then.
+    The search takes about a minute (--seconds). Ctrl-C ends it and keeps the best motion so far.
 
     Options
     -------
-    --out FILE: Write it to a .csv or .parquet file, with others beside it.
+    --out FILE: Write the motion to a .csv or .parquet file, with the others beside it.
 
     Motion
     ------
-    --space: Whose coordinates the Fourier series are of.
-    --harmonics: How many.
-    --period: In s.
-    --periods: Between lead-in and lead-out.
-    --stribeck: Slow passages too, for friction that falls with speed.
+    --space: Coordinates that are Fourier series of time: the platform's or the joints'.
+    --harmonics: Number of harmonics.
+    --period: Period, s.
+    --periods: Number of periods between lead-in and lead-out.
+    --stribeck: Add slow passages, for friction that falls with speed.
 
     Limits
     ------
-    --speed: Of the joints, m/s or rad/s. [default: the drives', else 1]
-    --acceleration: The same per s.
-    --force: Of the drives, N or N m. [default: the drives', else none]
-    --type-i: Least type-I measure of every leg.
-    --type-ii: Least type-II measure.
-    --clearance: Of the joints from their limits, m or rad.
-    --keep-off: The same, share of each joint's range; the larger of the two is kept.
-    --passive-clearance: Of passive joints and the platform's angles, share of half their range.
+    --speed: Joint speed, m/s or rad/s. [default: max_speed of the drives, else 1]
+    --acceleration: Joint acceleration, m/s^2 or rad/s^2.
+    --force: Drive force, N or N m. [default: max_force of the drives, else none]
+    --type-i: Least type-I measure of every leg: 0 stretched or folded, 1 at best.
+    --type-ii: Least type-II measure: 0 where the drives cannot hold the platform.
+    --clearance: Least distance of the joints from their limits, m or rad.
+    --keep-off: The same as a share of each joint's range; the larger of the two applies.
+    --passive-clearance: Least distance of passive joints and platform angles from their limits, as
+        a share of half their range.
 
     File
     ----
-    --rate: Samples a second.
-    --contents: All columns, or t with the joints or the poses only.
+    --rate: Samples per second.
+    --contents: Write all columns, or t with the joints or the poses only.
     --columns NAMES: Names of the joints' columns, such as A1,A2.
-    --length-unit: Of sliders and poses.
-    --angle-unit: Of cranks and the pose's angles.
-    --time-unit: Of t.
-    --separator: Of the cells. [default: , or ; with a decimal comma]
-    --decimal: The decimal sign.
+    --length-unit: Unit of sliders and positions.
+    --angle-unit: Unit of cranks and the pose's angles.
+    --time-unit: Unit of t.
+    --separator: Separator of the cells. [default: , or ; with a decimal comma]
+    --decimal: Decimal sign.
 
     Search
     ------
-    --criterion: What is made small.
-    --starts: Random motions improved.
-    --draws: Random motions drawn.
-    --seconds: Time for the search; three times as long where it would not identify the machine.
-    --seed: Of the random motions.
-    --workers: Processes at a time. [default: one a core, up to 4]
+    --criterion: Quantity to minimise: the condition number, or minus the log determinant.
+    --starts: Number of random motions that are optimised.
+    --draws: Number of random motions that are drawn.
+    --seconds: Time of the search, s; three times as long if the motion does not identify all yet.
+    --seed: Seed of the random motions.
+    --workers: Number of processes. [default: one per core, up to 4]
 
     Examples
     --------
@@ -197,7 +199,7 @@ def excite(
         motion_paths(out, file.layout)
     limits = limited.limits(machine)
     if out is None and not json:
-        note("Note: no file will be written; to have the trajectory, add --out FILE.csv")
+        note("Note: no file will be written; --out FILE.csv saves the motion")
     with progress_bar(f"Exciting {machine.name}") as progress:
         excitation = optimal_excitation(
             machine,
@@ -209,7 +211,7 @@ def excite(
             **vars(search),
         )
     if excitation.interrupted:
-        note("Note: interrupted; this is the best until then")
+        note("Note: interrupted; this is the best motion found until then")
     return _result(machine, excitation, limits, series, file, out)
 
 
@@ -242,7 +244,7 @@ def _result(
     files: list[Path] = []
     if out is not None:
         files = excitation.write(out, rate, series.periods, file.layout, cycles, slow)
-    data = {
+    record = {
         **excitation.as_dict(),
         "start": led.start,
         "end": led.end,
@@ -252,20 +254,22 @@ def _result(
         "files": [str(path) for path in files],
     }
     lines: list[str | Table] = [
-        *(_quality(excitation), excitation.progress_text, _margins(margins)),
+        *(excitation.progress_text, _quality(excitation), _margins(margins)),
         *_clearance_sentence(machine, limits, margins),
-        f"From rest to rest in {led.duration:g} s: periodic from {led.start:g} to {led.end:g} s, "
-        "lead-in before, lead-out behind.",
+        f"Motion: from rest to rest in {led.duration:g} s: lead-in to {led.start:g} s, periodic to "
+        f"{led.end:g} s, lead-out.",
     ]
     if cycles is not None:
         lines.append(
-            f"To hold out: {cycles.count} pick-and-place cycles of {cycles.length:.4g} s, "
-            f"{cycles.cycle.scale:.0%} of the standard size."
+            f"Held-out motion, to validate the model: {cycles.count} pick-and-place cycles of "
+            f"{cycles.length:.3g} s, {100.0 * cycles.cycle.scale:.0f} % of the standard size."
         )
     if slow is not None:
-        slowly = f"the same way in {slow.duration:g} s, for friction that falls with speed."
-        lines.append(f"Slowly: {slowly}")
-    return CommandResult(data, lines, files)
+        lines.append(
+            f"Slow motion: the same path in {slow.duration:g} s, for friction that falls with "
+            "speed."
+        )
+    return CommandResult(record, lines, files)
 
 
 def _held_out_cycles(excitation: Excitation, rate: float) -> RepeatedCycle | None:
@@ -279,24 +283,24 @@ def _held_out_cycles(excitation: Excitation, rate: float) -> RepeatedCycle | Non
 
 def _quality(excitation: Excitation) -> Table:
     """Return a table of condition numbers: optimised motion, best random motion, ratio."""
-    headings = ("optimised", f"best of {excitation.draws} random", "ratio")
+    headings = ("this motion", f"best of {excitation.draws} random", "improvement")
     best, random = excitation.conditioning, excitation.random
     caption = None
     if not math.isfinite(best.nominal):
-        caption = "-: no number, as a base parameter's nominal value is 0"
+        caption = "-: undefined, because a base parameter's nominal value is 0"
     numbers = (
-        ("of length 1", best.scaled, random.scaled),
+        ("scaled to length 1", best.scaled, random.scaled),
         ("times nominal values", best.nominal, random.nominal),
-        ("in SI units", best.unscaled, random.unscaled),
+        ("unscaled, in SI units", best.unscaled, random.unscaled),
     )
-    rows = ((n, _number(a, 4), _number(b, 4), _number(b / a, 3)) for n, a, b in numbers)
-    title = "condition number, columns"
+    rows = ((n, _number(a, 3), _number(b, 3), _number(b / a, 3)) for n, a, b in numbers)
+    title = "condition number, regressor columns"
     return table(title, *headings, rows=rows, numbers=headings, caption=caption)
 
 
-def _number(value: float, digits: int) -> str:
+def _number(number: float, digits: int) -> str:
     """Return a number with significant digits, or `-` where it is not finite."""
-    return f"{value:.{digits}g}" if math.isfinite(value) else "-"
+    return significant(number, digits) if math.isfinite(number) else "-"
 
 
 def _clearance_sentence(
@@ -319,23 +323,24 @@ def _clearance_sentence(
     least = min(tightest, key=lambda margin: margin.least)
     clearance = float(joint_clearances(limits, machine)[(least.leg or 1) - 1])
     return [
-        f"Leg {least.leg} comes nearest to its joint's limits: {clearance + least.least:.3g} "
-        f"{least.unit}, where {clearance:.3g} was to be kept (--keep-off, --clearance)."
+        f"Smallest distance to a joint limit: {clearance + least.least:.3g} {least.unit} (leg "
+        f"{least.leg}); at least {clearance:.3g} required (--keep-off, --clearance)."
     ]
 
 
 def _margins(margins_by_motion: dict[str, Margins]) -> Table:
     """Return a table of each limit's least margin, its leg and time, and those of other motions."""
-    headings = ("least margin", "leg", "at (s)")
+    headings = ("margin to it", "leg", "at (s)")
     others = list(margins_by_motion)[1:]
-    margin_table = table("limit", *headings, *others, numbers=(*headings, *others))
+    names = [f"margin, {other.replace(' ', '-')} motion" for other in others]
+    margin_table = table("limit", *headings, *names, numbers=(*headings, *names))
     for margin in margins_by_motion["motion"]:
         name = _MEASURES.get(margin.limit, margin.limit.replace("_", " "))
         margin_table.add_row(
             f"{name} ({margin.unit})" if margin.unit else name,
-            f"{margin.least:.4g}",
+            significant(margin.least),
             "-" if margin.leg is None else str(margin.leg),
-            f"{margin.time:.3f}",
-            *(f"{margins_by_motion[other][margin.limit].least:.4g}" for other in others),
+            f"{margin.time:.2f}",
+            *(significant(margins_by_motion[other][margin.limit].least) for other in others),
         )
     return margin_table

@@ -23,10 +23,13 @@ Output = Literal["force", "torque", "percent"]
 """A copy of `pteron.export.command_units.Output`: importing that would slow the command line."""
 
 _TARGETS = (
-    *("c", "st", "mjcf", "sdf", "urdf", "pinocchio", "casadi", "fmu"),
+    *("c", "st", "cuda", "mjcf", "sdf", "urdf", "pinocchio", "casadi", "fmu"),
     *("klipper", "marlin", "reprap", "linuxcnc"),
 )
 """The options that name a folder to write to; `pteron.export.export_NAME` writes it."""
+
+_CODE = ("c", "st", "cuda")
+"""Those that take the options of functions, and may be given together."""
 
 
 def export(
@@ -34,6 +37,7 @@ def export(
     *,
     c: str | None = None,
     st: str | None = None,
+    cuda: str | None = None,
     mjcf: str | None = None,
     sdf: str | None = None,
     urdf: str | None = None,
@@ -54,21 +58,22 @@ def export(
     tool: str | None = None,
     gains: str | None = None,
 ) -> CommandResult:
-    """Write code for a controller, or the machine as another engine or tool wants it.
+    """Write code for a controller, or the machine in the format of another engine or tool.
 
-    With --c or --st: kinematics, Jacobian, dynamics and regressor, in functions that return a
-    status, without allocation or state; with a test program and a CMakeLists.txt. Function blocks
-    for a PLC are inverse kinematics and inverse dynamics unless others are named. A machine with
-    drives has `feed_forward` as well: what the drives must give, with friction, and
-    `joint_feed_forward`, the same from the motion of the joints. With --base they take what `pteron
-    identify` found, as it lists it, and are called `feed_forward_base` and
-    `joint_feed_forward_base`. The others write one thing each, with no options but --tool,
-    --elbows and --json.
+    With --c, --st or --cuda: kinematics, Jacobian, dynamics and regressor, in functions that return
+    a status, without allocation or state; C has a test program and a CMakeLists.txt. Function
+    blocks for a PLC are inverse kinematics and inverse dynamics unless others are named. A machine
+    with drives has `feed_forward` as well, the drives' forces with friction, and
+    `joint_feed_forward`, the same from the motion of the joints. With --base they take the base
+    parameters that `pteron identify` found, in its order, and are called `feed_forward_base` and
+    `joint_feed_forward_base`. The other formats are written one at a time, with no options but
+    --tool, --elbows and --json.
 
     Options
     -------
     --c DIR: Write C99 to this folder.
     --st DIR: Write Structured Text to this folder.
+    --cuda DIR: Write CUDA, for many states at once on an NVIDIA GPU, and a module for CuPy.
     --mjcf DIR: Write MuJoCo's MJCF.
     --sdf DIR: Write SDF, for Gazebo.
     --urdf DIR: Write URDF of the tree, and its closures.
@@ -80,15 +85,15 @@ def export(
     --reprap DIR: Write M665 and M666 of a linear Delta for RepRapFirmware.
     --linuxcnc DIR: Write kinematics for LinuxCNC.
     --target NAME=DIR: Write with the export NAME of an installed package.
-    --float: C: float instead of double.
-    --specialised: C: fold the inertial parameters in.
-    --wrench: Dynamics take a wrench on the platform too.
-    --output UNIT: What drives are told: force at the joints, torque of the motors, or percent of
-        what they are rated for.
-    --base FILE: The identification.json of pteron identify: its values go into the code.
-    --tool NAME: Mount a tool of the machine's file: its body is in the parameters and models that
-        are written, its centre point is the tool's.
-    --gains FILE: The gains.toml of pteron tune: its controller, with these gains, beside what
+    --float: C, CUDA: float instead of double.
+    --specialised: C, CUDA: insert the inertial parameters as constants.
+    --wrench: Dynamics take an external wrench on the platform as input.
+    --output UNIT: Output to the drives: force at the joints, torque of the motors, or percent of
+        the motors' rated torque.
+    --base FILE: The identification.json of pteron identify, whose values go into the code.
+    --tool NAME: Mount a tool that the machine's file lists under tools: the code has its body and
+        its centre point.
+    --gains FILE: The gains.toml of pteron tune: its controller is written too, beside what
         --function names.
 
     Examples
@@ -96,12 +101,14 @@ def export(
     pteron export quadrupteron --c controller
     pteron export my-robot.toml --c controller --float --function inverse_kinematics
     pteron export quadrupteron --st plc
+    pteron export quadrupteron --cuda gpu
     pteron export quadrupteron --fmu models
     pteron export linear-delta --klipper printer
     pteron export robot.toml --base result/identification.json --c controller
     pteron export robot.toml --tool gripper --c controller
     """
-    folders = (c, st, mjcf, sdf, urdf, pinocchio, casadi, fmu, klipper, marlin, reprap, linuxcnc)
+    models = mjcf, sdf, urdf, pinocchio, casadi, fmu
+    folders = (c, st, cuda, *models, klipper, marlin, reprap, linuxcnc)
     targets = {name: folder for name, folder in zip(_TARGETS, folders, strict=True) if folder}
     if target is not None:
         targets["target"] = target
@@ -113,22 +120,22 @@ def export(
     files = []
     with spinner(f"Writing code for {machine.name}"):
         from pteron.controllers import Controller, read_gains
-        from pteron.export import Real, export_c, export_st
+        from pteron.export import Real, export_c, export_cuda, export_st
         from pteron.export.identified_parameters import read_identified
 
         grade = read_identified(machine, base).grade if base is not None else _TRUSTED
         asked_for: list[str | Controller] | None = [*function] if function else None
         if gains is not None:
             asked_for = [*(function or []), read_gains(machine, gains)]
-        if c is not None:
-            real: Real = "float" if float_ else "double"
-            look: dict[str, Any] = {"real": real, "specialised": specialised}
-            files += export_c(
-                machine, asked_for, c, **look, wrench=wrench, output=output, base=base
-            )
+        dynamics: dict[str, Any] = {"wrench": wrench, "output": output, "base": base}
+        real: Real = "float" if float_ else "double"
+        for place, write in ((c, export_c), (cuda, export_cuda)):
+            if place is not None:
+                form: dict[str, Any] = {"real": real, "specialised": specialised}
+                files += write(machine, asked_for, place, **form, **dynamics)
         if st is not None:
-            files += export_st(machine, asked_for, st, wrench=wrench, output=output, base=base)
-        for name in targets.keys() - {"c", "st"}:
+            files += export_st(machine, asked_for, st, **dynamics)
+        for name in targets.keys() - {*_CODE}:
             files += _export_target(machine, name, targets[name])
     if grade != _TRUSTED:
         note(f"Warning: {base}: the verdict on these values is: {grade}")
@@ -153,19 +160,19 @@ def _export_target(machine: Manipulator, target: str, folder: str) -> list[Path]
 
 
 def _check(targets: dict[str, str], options: list[str], tool: str | None) -> None:
-    """Refuse no target, or several (but C with Structured Text), and options of another target."""
+    """Raise DataError on no target, several (but C with Structured Text), or others' options."""
     if not targets:
         names = ", ".join(f"--{name}" for name in (*_TARGETS, "target"))
         raise DataError(f"{names}: none given; say what to write, such as --c controller")
-    others = [name for name in targets if name not in ("c", "st")]
+    others = [name for name in targets if name not in _CODE]
     if others and len(targets) > 1:
         names = ", ".join(f"--{name}" for name in targets)
-        raise DataError(f"{names}: give one at a time; only --c and --st go together")
+        raise DataError(f"{names}: give one at a time; only --c, --st and --cuda go together")
     if others and options:
         names = ", ".join(f"--{name}" for name in options)
-        raise DataError(f"{names}: goes with --c and --st, not with --{others[0]}; leave it out")
-    if "float" in options and "c" not in targets:
-        raise DataError("--float: goes with --c; Structured Text has LREAL alone")
+        raise DataError(f"{names}: goes with --c, --st and --cuda, not --{others[0]}; leave it out")
+    if "float" in options and not {"c", "cuda"} & {*targets}:
+        raise DataError("--float: goes with --c and --cuda; Structured Text has LREAL alone")
     if tool is not None and "base" in options:
         raise DataError(
             f"--tool {tool}: not with --base, whose values are of the machine without it; leave it "

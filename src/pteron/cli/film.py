@@ -37,8 +37,8 @@ def film(
     -------
     --out, -o FILE: The film: .mp4 (H.264) or .gif.
     --speed: Speed of the film: 1 is real time, 0.4 slow motion. [default: the largest of 1, 0.5,
-        0.2, 0.1 ... that takes 2 s]
-    --fps: Frames a second.
+        0.2, 0.1 ... with which the film takes 2 s or more]
+    --fps: Frames per second.
     --size WIDTHxHEIGHT: Width and height, pixels, both even.
     --turns: Turns of the view round the machine over the film; not for planar machines.
     --forces: Draw the drives' forces below the machine.
@@ -63,7 +63,7 @@ def film(
     look: dict[str, Any] = {"fps": fps, "speed": speed, "size": sides, "turns": turns}
     with progress_bar(f"Filming {machine.name}") as tell:
         written = filmed(machine, motion, out, **look, forces=drawn, progress=tell)
-    data = {
+    record = {
         "robot": machine.name,
         "cycle": cycle,
         **json_fields(
@@ -75,12 +75,12 @@ def film(
         ),
         "file": str(written.path),
     }
-    pace = "in real time" if written.speed == 1.0 else f"at {written.speed:.3g} times its speed"
+    pace = "in real time" if written.speed == 1.0 else f"at {written.speed:.3g} times real speed"
     summary = (
-        f"{motion.duration:.4g} s of {plain(machine.name)} {pace}: {written.duration:.3g} s, "
-        f"{written.frames} frames of {written.size[0]}x{written.size[1]}"
+        f"{plain(machine.name)}: {motion.duration:.4g} s of motion {pace}; the film has "
+        f"{written.duration:.3g} s, {written.frames} frames of {written.size[0]}x{written.size[1]}"
     )
-    return CommandResult(data, [summary], [written.path])
+    return CommandResult(record, [summary], [written.path])
 
 
 def _expect_ffmpeg(options: dict[str, Any]) -> None:

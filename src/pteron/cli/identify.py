@@ -8,6 +8,7 @@ from shutil import get_terminal_size
 from typing import TYPE_CHECKING, Any, Literal
 
 from pteron.cli.arguments import MachineArgument, load_robot, split_numbers
+from pteron.cli.base_parameters import SYMBOLS
 from pteron.cli.progress import Times, progress_bar, spinner
 from pteron.cli.result import CommandResult
 from pteron.cli.terminal import (
@@ -17,6 +18,7 @@ from pteron.cli.terminal import (
     note,
     plain,
     show,
+    significant,
     table,
 )
 from pteron.errors import DataError
@@ -68,14 +70,15 @@ def identify(
     cad: str = "robot",
     box: list[str] | None = None,
 ) -> CommandResult:
-    """Identify a machine from recorded motions, and say whether the result can be trusted.
+    """Identify inertia and friction from recorded motions, with a verdict on the result.
 
-    With --payload, the inertia of a payload is found from the motion recorded with it and without:
-    in one log whose column payload is 0, then 1, or in two logs, without.csv and with.csv, each
-    with that column, 0 throughout or 1. It is printed as the call set_payload of exported C.
+    With --payload, the inertia of a payload is identified from a motion recorded with and without
+    it: in one log whose column payload is 0, then 1, or in two logs, without.csv and with.csv, each
+    with that column, 0 or 1 throughout. It is printed as the call set_payload of exported C.
 
-    The folder gets identification.html to read, identification.json with all numbers, and the
-    machine with real bodies as NAME.toml. The exit code is 0 whatever the verdict.
+    The folder gets the report identification.html, identification.json with all numbers, and the
+    identified machine with physically consistent bodies as NAME.toml. The exit code is 0 whatever
+    the verdict.
 
     Arguments
     ---------
@@ -83,25 +86,28 @@ def identify(
 
     Options
     -------
-    --robot ROBOT: The machine as it is drawn.
-    --out DIR: The folder to write it to.
-    --held-out LOG: A log to judge by; once for each. By default the last 30 % of every log.
+    --robot ROBOT: The machine as drawn: a machine of the catalog or a TOML file.
+    --out DIR: Folder for the results.
+    --held-out LOG: Log that validates the model; repeat for several. [default: the last 30 % of
+        every log]
     --description TOML: Description of all logs. [default: the one beside each, or logs.toml]
-    --estimator: How the equations are solved.
-    --without TERMS: Leave out: coulomb,viscous,offset.
-    --joints: Viscous friction in the passive joints.
-    --stribeck SPEED,...|auto: Friction falls with this speed, m/s or rad/s.
-    --delay S|auto: How late forces are for positions, s; by default it is found where the
-        forces show one. 0 leaves it in.
-    --rotors: With the inertia of the motors.
-    --payload: A payload too: logs with it and without, column payload 1 and 0.
-    --shared: All legs share one set of inertial parameters.
-    --derivatives: How positions are differentiated; the data decide.
-    --cutoff HZ: Cut-off of the positions' filter.
-    --band HZ: Cut-off of the parallel filter, on forces and regressor.
-    --period S: Time after which the motion repeats.
-    --cad WHICH: Bodies are sought near those of: robot, none, or a machine's file.
-    --box BODY=X0,X1,Y0,Y1: Box, m, that holds all mass of u1, l3, e, u, ...
+    --estimator: Estimator that solves the equations.
+    --without TERMS: Terms to leave out of the model: coulomb,viscous,offset.
+    --joints: Viscous friction in the passive joints: none, one value for all, or one each.
+    --stribeck SPEED,...|auto: Friction that falls with speed, with these Stribeck speeds, m/s or
+        rad/s, or identified ones.
+    --delay S|auto: Delay of the forces behind the positions, s; 0 assumes none. [default:
+        identified, if the forces show one]
+    --rotors: Include the inertia of the motors.
+    --payload: Identify a payload: logs with and without it, column payload 1 and 0.
+    --shared: All legs have the same inertial parameters.
+    --derivatives: Method by which positions are differentiated. [default: chosen by the data]
+    --cutoff HZ: Cut-off of the filter on positions. [default: chosen by the data]
+    --band HZ: Cut-off of the filter on forces and regressor. [default: chosen by the data]
+    --period S: Period of the motion. [default: the description's]
+    --cad WHICH: Choose the bodies as near as possible to those of: robot, none, or a machine's
+        file.
+    --box BODY=X0,X1,Y0,Y1: Box, m, that contains all mass of the body u1, l3, e, u, ...
 
     Examples
     --------
@@ -131,14 +137,14 @@ def identify(
         times = Times(tell)
         model: dict[str, Any] = {"terms": terms, "shared": shared, "cad": drawn, "bounds": bounds}
         how: dict[str, Any] = {"estimator": estimator, "processing": processing}
-        result = identified(machine, fit, held_out=check, **model, **how, progress=times)
+        identification = identified(machine, fit, held_out=check, **model, **how, progress=times)
     with spinner("Drawing the report"):
         times.begin("Drawing the report")
-        files = write_identification(result, folder, sources=sources)
+        files = write_identification(identification, folder, sources=sources)
     if is_terminal():
         note(times.summary())
-    data = {"files": [str(path) for path in files.paths], **numbers(result)}
-    return CommandResult(data, partial(_show, result), files.paths)
+    record = {"files": [str(path) for path in files.paths], **numbers(identification)}
+    return CommandResult(record, partial(_show, identification), files.paths)
 
 
 def _speeds(text: str | None) -> tuple[float, ...] | Literal["auto"] | None:
@@ -200,73 +206,79 @@ def _box(text: str) -> tuple[str, Box]:
     return body.strip(), ((x0, x1), (y0, y1))
 
 
-def _show(result: Identification) -> None:
+def _show(fit: Identification) -> None:
     """Print the verdict, the errors, the values, the findings in the logs, and the files."""
-    verdict = result.verdict
-    worst = max(float(prediction.nrms.max()) for prediction in result.held_out)
+    verdict = fit.verdict
+    worst = max(float(prediction.nrms.max()) for prediction in fit.held_out)
     color = GRADE_COLORS[verdict.grade]
     show(
-        f"[bold {color}]{plain(result.robot.name)}: {verdict.grade}[/bold {color}], "
-        f"held-out error up to {worst:.3g} %",
-        _errors(result),
-        _values(result),
-        *(plain(text) for text in (*verdict.reasons, *verdict.next_steps, *_bodies(result))),
-        *_payload(result),
-        *(f"[yellow]Note:[/yellow] {plain(finding.message)}" for finding in result.findings),
+        f"[bold {color}]{plain(fit.robot.name)}: {verdict.grade}[/bold {color}]; error of the "
+        f"forces predicted in held-out data: up to {worst:.3g} % (NRMS)",
+        _errors(fit),
+        *map(plain, verdict.reasons),
+        _values(fit),
+        f"{SYMBOLS} Fc is dry and Fv viscous friction of a drive.",
+        *map(plain, _bodies(fit)),
+        *_payload(fit),
+        *(f"Next: {plain(step)}" for step in verdict.next_steps),
+        *(f"[yellow]Note:[/yellow] {plain(finding.message)}" for finding in fit.findings),
     )
 
 
-def _errors(result: Identification) -> Table:
+def _errors(fit: Identification) -> Table:
     """Return a table of each actuator's NRMS of prediction (%), its noise, and no friction."""
-    from pteron.report.typeset import significant
-
-    headings = ("held-out NRMS (%)", "noise", "no friction")[: 2 if _narrow() else 3]
+    columns = ("error (%)", "noise alone (%)", "without friction terms (%)")
+    headings = columns[: 2 if _narrow() else 3]
     rows = []
-    for prediction in result.held_out:
-        where = f" in {prediction.source}" if len(result.held_out) > 1 else ""
-        columns = prediction.nrms, prediction.floor, prediction.nrms_without_friction
-        for i, values in enumerate(zip(*columns[: len(headings)], strict=True), start=1):
-            rows.append((plain(f"{i}{where}"), *map(significant, values)))
-    return table("actuator", *headings, rows=rows, numbers=headings)
+    for prediction in fit.held_out:
+        where = f" in {prediction.source}" if len(fit.held_out) > 1 else ""
+        errors = prediction.nrms, prediction.floor, prediction.nrms_without_friction
+        for i, values in enumerate(zip(*errors[: len(headings)], strict=True), start=1):
+            cells = (significant(v) if v >= 0.01 else "< 0.01" for v in values)
+            rows.append((plain(f"{i}{where}"), *cells))
+    caption = "RMS error of the predicted forces over their standard deviation (NRMS)."
+    return table("actuator", *headings, rows=rows, numbers=headings, caption=caption)
 
 
-def _values(result: Identification) -> Table:
+def _values(fit: Identification) -> Table:
     """Return a table of base parameters with 95 % half-widths (absolute, and relative in %)."""
     from pteron.report.identification import parameter_rows, value_with_uncertainty
-    from pteron.report.typeset import significant
 
-    short = result.has_understated_errors
-    headings = ("value", "+- 95 % (!)" if short else "+- 95 %", "rel. (%)")
+    short = fit.has_understated_errors
+    headings = ("value", "+- (95 %, too short)" if short else "+- (95 %)", "+- in %")
     numbers = headings[: 2 if _narrow() else 3]
     columns = ["parameter", *numbers, *(() if _narrow() else ("unit",)), ""]
-    caption = "Base parameters are sums, named by one term; the page has them in full."
-    negative = [row.name for row in parameter_rows(result) if row.unit == "kg" and row.value < 0.0]
+    caption = "Base parameters are sums, named by their first term; the page has them in full."
+    negative = [row.name for row in parameter_rows(fit) if row.unit == "kg" and row.value < 0.0]
     if negative:
-        caption += f" A sum may be below zero, as {negative[0]}: in it masses are subtracted."
+        caption += f" A sum that subtracts masses may be negative, such as {negative[0]}."
     if short:
-        caption += " (!) Too short: they do not allow for the faults that are named."
+        caption += " Too short: the intervals do not allow for the faults named above."
+    if fit.essential.dropped:
+        caption += " Weak: not significantly different from 0."
     value_table = table(*columns, numbers=numbers, caption=caption)
     marks = {"essential": "", "dropped": "[yellow]weak[/]", "unseen": "[yellow]unseen[/]"}
-    for row in parameter_rows(result):
-        value, half = map(ascii_number, value_with_uncertainty(row.value, row.half))
-        relative = (
-            ">999" if row.relative >= 9.995 else ascii_number(significant(100.0 * row.relative, 2))
-        )
+    for row in parameter_rows(fit):
+        estimate, half = map(ascii_number, value_with_uncertainty(row.value, row.half))
+        relative = "> 999" if row.relative >= 9.995 else significant(100.0 * row.relative, 2)
         further_cells = () if _narrow() else (relative, row.unit)
-        value_table.add_row(plain(row.name), value, half, *further_cells, marks[row.status])
+        value_table.add_row(plain(row.name), estimate, half, *further_cells, marks[row.status])
     return value_table
 
 
-def _payload(result: Identification) -> list[str]:
+def _payload(fit: Identification) -> list[str]:
     """Return lines with the payload as arguments of a controller and of other commands."""
     from pteron.identification.payload import payload_in
 
-    payload = payload_in(result)
+    payload = payload_in(fit)
     if payload is None:
         return []
     if not (payload.real and payload.is_significant):
-        return ["The payload is no real body's, or is not felt: record it longer, or faster."]
-    return [plain(f"The payload: {payload.call(result.robot)}")]
+        return [
+            "No real body has this payload, or it does not act on the forces: record longer, or "
+            "faster."
+        ]
+    return [plain(f"The payload: {payload.call(fit.robot)}")]
 
 
 def _narrow() -> bool:
@@ -274,16 +286,18 @@ def _narrow() -> bool:
     return get_terminal_size().columns < _NARROW
 
 
-def _bodies(result: Identification) -> tuple[str, ...]:
+def _bodies(fit: Identification) -> tuple[str, ...]:
     """Return sentences: whether real bodies have these parameters, the CAD model, and notes."""
-    consistency = result.consistency
+    consistency = fit.consistency
     if consistency is None:
-        return result.notes
-    border = f"; at the border: {', '.join(consistency.at_border)}" if consistency.at_border else ""
-    lines = [f"Real bodies have exactly these base parameters{border}."]
+        return fit.notes
+    at_border = ", ".join(consistency.at_border)
+    border = f"; at the limit of consistency: {at_border}" if at_border else ""
+    lines = [f"Physically consistent: real bodies can have exactly these base parameters{border}."]
     if not consistency.feasible:
         away = f"the nearest are {consistency.distance:.2g} standard deviations away{border}."
-        lines = [f"No real bodies have exactly these base parameters; {away}"]
+        lines = [f"Not physically consistent: no real bodies have these base parameters; {away}"]
     if not consistency.cad_feasible:
-        lines.append(f"The CAD model itself is not real: {'; '.join(consistency.cad_violations)}.")
-    return (*lines, *result.notes)
+        violations = "; ".join(consistency.cad_violations)
+        lines.append(f"The CAD model itself is physically inconsistent: {violations}.")
+    return (*lines, *fit.notes)

@@ -26,7 +26,7 @@ _WAITS = 10
 
 @contextmanager
 def insistent_interrupts() -> Iterator[None]:
-    """Raise an interrupt from the keyboard again if it was raised where errors are discarded.
+    """Raise KeyboardInterrupt again, in a block, where Python or a library discarded it.
 
     Python runs the handler of a signal between any two steps of the main thread, also in a callback
     of the garbage collector or of a weak reference. An exception there is printed and dropped: the
@@ -89,7 +89,7 @@ def insistent_interrupts() -> Iterator[None]:
 
 @contextmanager
 def ended_with_compilers() -> Iterator[None]:
-    """End, where the process is asked to (SIGTERM), first the compilers that it started."""
+    """On SIGTERM, end the compilers that the process started, then the process itself."""
     ours = (
         signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
         and threading.current_thread() is threading.main_thread()

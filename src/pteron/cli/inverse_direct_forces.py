@@ -13,7 +13,7 @@ from pteron.cli.table_rows import (
     rows_of_table,
     single_row,
 )
-from pteron.cli.terminal import note
+from pteron.cli.terminal import note, plain
 from pteron.errors import DataError
 from pteron.tolerances import ROUNDING
 
@@ -37,14 +37,14 @@ def inverse(
     """Compute the joint coordinates at poses.
 
     A table has the columns x y z phi or x y z roll pitch yaw, those that the machine has, in m and
-    rad, or in units that their names say: x (mm), roll (deg). The result has its columns, in SI
+    rad, or in units that their names state: x (mm), roll (deg). The result has its columns, in SI
     units, and rho1, rho2, ... of sliders, m, or theta1, theta2, ... of cranks, rad, as the drives
-    count them where a leg has a `reading`. A crank is at 0 along its zero_direction and counts by
-    the right hand about its axis, `direction`; pteron check tells it of each joint.
+    count them if a leg has a `reading`. A crank is at 0 along its zero_direction, positive by the
+    right-hand rule about its axis, `direction`; pteron check describes each joint.
 
     Arguments
     ---------
-    POSE: x y z phi, x y z roll pitch yaw, or those that the machine has; m and rad.
+    POSE: The pose x y z phi, x y z roll pitch yaw, or what the machine has; m and rad.
 
     Examples
     --------
@@ -67,8 +67,12 @@ def inverse(
         on_failure,
     )
     _note_limits(machine, from_readings(machine, joints))
-    result = rows.table.with_columns(dict(zip(added, joints.T, strict=True)))
-    deliver(machine, result, added, out=out, as_json=json, single=rows.single)
+    with_joints = rows.table.with_columns(dict(zip(added, joints.T, strict=True)))
+    name = plain(machine.name)
+    joints_text = dict.fromkeys(f"{leg.joint.noun} {leg.joint.coordinate}" for leg in machine.legs)
+    nouns = ", ".join(joints_text)
+    caption = f"[bold]{name}[/bold]: coordinates of the actuated joints ({nouns})"
+    deliver(machine, with_joints, added, out=out, as_json=json, caption=caption, single=rows.single)
 
 
 def direct(
@@ -84,16 +88,16 @@ def direct(
 
     A table has the columns rho1, theta2, ... as the machine's joints are; the result has one row
     for each real pose, with the table's row (from 1) and its columns, the assembly mode (from 1)
-    and x y z phi, those that the machine has. Where there is no real pose, these are empty.
+    and x y z phi, those that the machine has. Without a real pose, these are empty.
 
     Arguments
     ---------
-    JOINTS: One a leg: rho of a slider, m; theta of a crank, rad.
+    JOINTS: Joint coordinates, one a leg: rho of a slider, m; theta of a crank, rad.
 
     Options
     -------
-    --on-failure: Stop where no pose has the joint coordinates, or leave the row empty; raise for
-        those typed here, nan for a table.
+    --on-failure: If no pose has the joint coordinates, stop (raise) or leave the row empty (nan).
+        [default: raise for coordinates typed here, nan for a table]
 
     Examples
     --------
@@ -110,16 +114,20 @@ def direct(
     check_destination(out, table, rows.table, added)
     poses = rows.evaluate(
         machine,
-        lambda values: direct_kinematics(
-            machine, from_readings(machine, values), on_failure=failure
+        lambda joint_rows: direct_kinematics(
+            machine, from_readings(machine, joint_rows), on_failure=failure
         ),
         columns,
         failure,
     )
     _note_limits(machine, from_readings(machine, rows.table.numbers(columns, failure)))
-    result = _modes(rows.table, poses, machine.coordinates)
+    with_poses = _modes(rows.table, poses, machine.coordinates)
     shown = added[1:] if rows.single else added
-    deliver(machine, result, shown, out=out, as_json=json)
+    caption = (
+        f"[bold]{plain(machine.name)}[/bold]: all poses with these joint coordinates, one for each "
+        "assembly mode"
+    )
+    deliver(machine, with_poses, shown, out=out, as_json=json, caption=caption)
 
 
 def _note_limits(machine: Manipulator, joints: NDArray[Any]) -> None:
@@ -136,8 +144,8 @@ def _note_limits(machine: Manipulator, joints: NDArray[Any]) -> None:
                 if len(coordinates) > 1
                 else ""
             )
-            limits = f"{low:g} to {high:g} {leg.joint.unit}"
-            violations.append(f"{name} ({rows}{coordinates[beyond.argmax()]:.4g} for {limits})")
+            limits = f"limits {low:g} to {high:g} {leg.joint.unit}"
+            violations.append(f"{name} ({rows}{coordinates[beyond.argmax()]:.4g}, {limits})")
     if violations:
         note(f"Note: beyond the joints' limits: {', '.join(violations)}")
 
@@ -187,17 +195,18 @@ def forces(
     A table has the columns x y z phi dx dy dz dphi ddx ddy ddz ddphi and, if a wrench acts on the
     platform, fx fy fz mk: of each four those that the machine's pose has, or roll, pitch and yaw in
     place of phi; a platform that tilts has fx fy fz mx my mz. The result has its columns and
-    force1, force2, ... of sliders, N, or torque1, torque2, ... of cranks, N m. They are those of
-    the bodies or, with --drives, those of the drives. Where these are more than a drive's limits in
-    the machine's file, a note says so.
+    force1, force2, ... of sliders, N, or torque1, torque2, ... of cranks, N m. These forces move
+    the bodies; with --drives they include friction and the motors' inertia. A note says if they
+    exceed a drive's limits in the machine's file.
 
     Options
     -------
-    --pose NUMBERS: x y z phi, or those it has; m and rad.
-    --velocity NUMBERS: Its rate; at rest if left out.
-    --acceleration NUMBERS: The rate of that; zero if left out.
-    --wrench NUMBERS: fx fy fz mk, or fx fy fz mx my mz where it tilts, at P; N and N m.
-    --drives: What the drives must give: with friction and the motors' inertia.
+    --pose NUMBERS: Pose x y z phi, or what the machine has; m and rad.
+    --velocity NUMBERS: Time derivative of the pose. [default: 0]
+    --acceleration NUMBERS: Second time derivative of the pose. [default: 0]
+    --wrench NUMBERS: External wrench on the platform at its point P: fx fy fz mk, or fx fy fz mx my
+        mz of a platform that tilts; N and N m.
+    --drives: Forces of the drives: with friction and the motors' inertia.
 
     Examples
     --------
@@ -229,10 +238,10 @@ def forces(
     limiting = ("max_force", "max_speed", "curve", "winding")
     limited = any(getattr(leg.drive, key, None) for leg in machine.legs for key in limiting)
 
-    def serve(values: NDArray[Any]) -> NDArray[Any]:
+    def serve(states: NDArray[Any]) -> NDArray[Any]:
         """Return forces to deliver, and forces and rates to hold against the drives' limits."""
         # A wrench has six components where the platform tilts.
-        parts = np.split(values, [k for k in (m, 2 * m, 3 * m) if k < len(columns)], axis=-1)
+        parts = np.split(states, [k for k in (m, 2 * m, 3 * m) if k < len(columns)], axis=-1)
         if not (drives or limited):
             return inverse_dynamics(machine, *parts, on_failure=on_failure)
         driven = drive_forces(machine, *parts, on_failure=on_failure)
@@ -246,8 +255,14 @@ def forces(
     _note_limits(machine, inverse_kinematics(machine, poses, on_failure="nan"))
     for text in overloads(machine, served[:, n : 2 * n], served[:, 2 * n :]) if limited else ():
         note(f"Note: {text}")
-    result = rows.table.with_columns(dict(zip(added, delivered.T, strict=True)))
-    deliver(machine, result, added, out=out, as_json=json, single=rows.single)
+    with_forces = rows.table.with_columns(dict(zip(added, delivered.T, strict=True)))
+    terms = (
+        "drives, with friction and the motors' inertia"
+        if drives
+        else "actuated joints for the bodies alone; --drives adds friction and the motors' inertia"
+    )
+    caption = f"[bold]{plain(machine.name)}[/bold]: forces of the {terms}"
+    deliver(machine, with_forces, added, out=out, as_json=json, caption=caption, single=rows.single)
 
 
 def _typed_row(typed: list[str | None], motion: list[str], loads: tuple[str, ...]) -> TableRows:
@@ -256,11 +271,11 @@ def _typed_row(typed: list[str | None], motion: list[str], loads: tuple[str, ...
     if typed[0] is None:
         raise DataError(f"no pose given; give --pose with {' '.join(motion[:m])}, or --table FILE")
     names: list[str] = []
-    values: list[float] = []
+    numbers: list[float] = []
     parts = (motion[:m], motion[m : 2 * m], motion[2 * m :], loads)
     for name, text, part in zip(MOTION, typed, parts, strict=True):
         if text is None and name == "--wrench":
             continue
         names += part
-        values += [0.0] * len(part) if text is None else parsed_numbers([text], part, name)
-    return single_row(names, values)
+        numbers += [0.0] * len(part) if text is None else parsed_numbers([text], part, name)
+    return single_row(names, numbers)

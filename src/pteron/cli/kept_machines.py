@@ -22,10 +22,10 @@ def kept_machine(name_or_path: str) -> tuple[Manipulator, tuple[str, ...]]:
     from pteron.kernels.program_cache import cached_result, name_of
     from pteron.manipulator.files import contents, read_machine
 
-    data, source = contents(name_or_path)
+    content, source = contents(name_or_path)
     return cached_result(
-        ("machine", data.decode("latin-1"), source, name_or_path, VERSION),
+        ("machine", content.decode("latin-1"), source, name_or_path, VERSION),
         _READING,
-        lambda: read_machine(data, source, name_or_path),
+        lambda: read_machine(content, source, name_or_path),
         keeps=lambda machine: name_of(machine[0]) is not None,
     )

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import re
+from collections.abc import Sequence
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
@@ -10,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from typer import Exit
 
-from pteron.cli.arguments import load_robot, signs, split_numbers
+from pteron.cli.arguments import elbows_text, load_robot, split_numbers
 from pteron.cli.progress import spinner
 from pteron.cli.result import CommandResult
 from pteron.cli.terminal import complain, plain, show, table, warn, write
@@ -28,6 +30,9 @@ _LIMITS = "LOW:HIGH expected, such as -0.3:0.3"
 
 _FAULTY = 2
 """Exit code for a faulty file."""
+
+_JOINTS = {"P": "prismatic", "R": "revolute", "S": "spherical", "U": "universal"}
+"""The joints that the letters of a leg's type stand for."""
 
 
 def catalog() -> CommandResult:
@@ -48,7 +53,25 @@ def catalog() -> CommandResult:
     cells = ((machine[key] for key in keys) for machine in machines)
     rows = (tuple(c if isinstance(c, str) else " ".join(c) for c in row) for row in cells)
     machine_table = table("name", "motion", "legs", "machine", rows=rows, names=("name",))
-    return CommandResult(machines, [machine_table])
+    legs = [leg for name in descriptions() for leg in kept_machine(name)[0].legs]
+    lines = (
+        "Motion: degrees of freedom of the platform, such as 3T1R: 3 translations, 1 rotation.",
+        _legs_text(legs),
+        "Next: pteron view NAME, or pteron new NAME --out robot.toml for a machine of your own.",
+    )
+    return CommandResult(machines, [machine_table, *lines])
+
+
+def _legs_text(legs: Sequence[LegKind]) -> str:
+    """Return sentences on the letters of the legs' types, and which of their joints is actuated."""
+    letters = [letter for letter in _JOINTS if any(letter in leg.type for leg in legs)]
+    joints = ", ".join(f"{letter} {_JOINTS[letter]}" for letter in letters)
+    actuated: dict[str, list[str]] = {}
+    for leg in legs:
+        types = actuated.setdefault("P" if leg.joint.unit == "m" else "first R", [])
+        types += [leg.type] * (leg.type not in types)
+    texts = (f"the {joint} of {', '.join(types)}" for joint, types in actuated.items())
+    return f"Legs: joints from base to platform: {joints}. Actuated: {'; '.join(texts)}."
 
 
 def new(
@@ -64,10 +87,10 @@ def new(
     out: str | None = None,
     overwrite: bool = False,
 ) -> CommandResult:
-    """Write a file for a machine of your own, which says what every key is.
+    """Write a file for a machine of your own, with a comment that explains every key.
 
-    It is a machine like KIND, to put your numbers into; without KIND the kinds are listed. The
-    dimensions that are given hold for all legs, and the file says what follows from them.
+    The file describes a machine like KIND, for you to edit; without KIND the kinds are listed. The
+    dimensions of the options apply to all legs; comments in the file say what follows from them.
 
     Arguments
     ---------
@@ -79,12 +102,12 @@ def new(
     --platform-radius: Greatest distance of a platform point from the platform's axis, m.
     --crank: Length of the cranks or upper links, m.
     --rod: Length of the rods or lower links, m.
-    --limits LOW:HIGH: Of the joints, m or rad; of rams their length.
-    --mass-from STOCK: Masses and inertias of links as cut from aluminium-tube:30x2 or steel-rod:8,
-        mm; again, with upper= or lower= before it, for one of the two.
-    --platform-mass: Of the platform with its bars, kg; its inertia is in proportion.
-    --out FILE: Write it to this TOML file.
-    --overwrite: Replace the file if it is there.
+    --limits LOW:HIGH: Limits of the actuated joints, m or rad; of rams the lengths.
+    --mass-from STOCK: Compute masses and inertias of links as if cut from aluminium-tube:30x2 or
+        steel-rod:8 (mm); with upper= or lower= before it, of these links alone (repeat it).
+    --platform-mass: Mass of the platform with its bars, kg; its inertia is scaled with it.
+    --out FILE: The TOML file to write. [default: the screen]
+    --overwrite: Replace an existing file.
 
     Examples
     --------
@@ -107,18 +130,18 @@ def new(
         "stock": _stocks(mass_from),
         "platform_mass": platform_mass,
     }
-    dimensions = {key: value for key, value in dimensions.items() if value not in (None, {})}
+    dimensions = {key: size for key, size in dimensions.items() if size not in (None, {})}
     if out is not None and Path(out).exists() and not overwrite:
         raise OutputError(f"{out}: is there already; name another file, or say --overwrite")
     text = commented_text(kind, dimensions)
     if out is not None:
         write_text(out, text)
-    data = {"kind": kind, "file": out, "text": text}
+    record = {"kind": kind, "file": out, "text": text}
     if out is None:
-        return CommandResult(data, partial(write, text))
+        return CommandResult(record, partial(write, text))
     written = f"Written: {plain(out)}. Put in your numbers, then: pteron check {plain(out)}"
     return CommandResult(
-        data, [written, *map(plain, kept_numbers_sentence(load(kind), dimensions))]
+        record, [written, *map(plain, kept_numbers_sentence(load(kind), dimensions))]
     )
 
 
@@ -138,21 +161,22 @@ def _machine(robot: Manipulator) -> dict[str, Any]:
         "motion": robot.platform.motion,
         "coordinates": list(robot.coordinates),
         "types": list(dict.fromkeys(leg.type for leg in robot.legs)),
-        "working_mode": signs(robot),
+        "working_mode": elbows_text(robot),
     }
 
 
 def check(file: str, *, elbows: str | None = None) -> CommandResult:
-    """Check a machine's file and say what the machine is.
+    """Check a machine's file and describe the machine.
 
-    It fails if the file is not valid, telling all its faults, if the machine is singular at every
-    pose, or within what files are rounded to of one that is, or if no pose is in reach of all its
-    legs. It says where the platform is in each working mode, above its base, below or inside, which
-    is the file's and which is likely meant; of more than eight modes the file's, its opposite, and
-    those with all elbows alike. What is possible but unlikely, such as a length in millimetres, a
-    centre of mass beyond its link, or legs that look swapped, is told as a warning. How well drives
-    hold the platform at home is measured in absolute terms: docs/verdicts.md has the measures and
-    their thresholds. The exit code is 2 where it fails, and 0 where not, warnings or none.
+    The check fails, with exit code 2, if the file is not valid (all faults are reported), if the
+    machine is singular at every pose within the rounding of the file, or if no pose is in reach of
+    all legs. Otherwise the exit code is 0, and what is possible but unlikely is a warning, such as
+    a length in millimetres, a centre of mass beyond its link, or legs that look swapped.
+
+    The output shows the legs, the home pose, how well the drives hold the platform there, beside
+    the thresholds (docs/verdicts.md explains them), and where the platform is in each working mode:
+    above the base, below or inside. Of more than eight modes it shows the file's, its opposite, and
+    those with all elbow signs equal.
 
     Arguments
     ---------
@@ -178,7 +202,9 @@ def check(file: str, *, elbows: str | None = None) -> CommandResult:
         warn(findings["doubts"][len(unlikely) :], f"{file}: ")
     except PteronError as error:
         raise ModelError(error.message, subject=file) from None
-    return CommandResult(findings, partial(_show, robot, findings))
+    place = plain(file)
+    further = f"Next: pteron cycle {place}, pteron size {place}, pteron report {place} --out DIR"
+    return CommandResult(findings, partial(_show, robot, findings, further))
 
 
 def _findings(robot: Manipulator) -> dict[str, Any]:
@@ -243,77 +269,126 @@ def _leg(leg: LegKind) -> dict[str, Any]:
     }
 
 
-def _show(robot: Manipulator, findings: dict[str, Any]) -> None:
-    """Print the results of a machine's examination: a table of its legs, and sentences."""
+def _show(robot: Manipulator, findings: dict[str, Any], further: str) -> None:
+    """Print the results of a machine's examination: verdict, tables, sentences, what is next."""
     from pteron.manipulator.commented_file import crank_direction_text
 
+    joints = dict.fromkeys(leg.joint for leg in robot.legs)
+    counts = re.findall(r"(\d)([TR])", robot.platform.motion)
+    nouns = {"T": "translation", "R": "rotation"}
+    bends = any(len(leg.branches) > 1 for leg in robot.legs)
+    elbows = f", elbow signs {elbows_text(robot)} (side to which each leg bends)" * bends
+    freedoms = " and ".join(f"{n} {nouns[letter]}{'s' * (n != '1')}" for n, letter in counts)
+    show(
+        f"[bold]{plain(robot.name)}[/bold]: {_verdict(findings)}",
+        f"Platform: {robot.platform.motion} ({freedoms}), pose {' '.join(robot.coordinates)}. "
+        f"{len(robot.legs)} legs{elbows}.",
+        _legs_table(findings["legs"]),
+        _legs_text(robot.legs),
+        *(f"Coordinate of a {joint.noun}: {joint.zero}." for joint in joints if joint.zero),
+        *([f"Cranks at 0: {zero}."] if (zero := crank_direction_text(robot)) else []),
+        *_drives(robot),
+        *_pose_lines(robot, findings),
+        _home_table(robot, findings),
+        *_modes(findings["working_modes"]),
+        *_passive(findings["limited_joints"]),
+        *([f"Note: {text}"] if (text := findings["template_masses"]) else []),
+        *(
+            f"The platform can move with its rams locked {text}"
+            for text in findings["self_motions"]
+        ),
+        further,
+    )
+
+
+def _verdict(findings: dict[str, Any]) -> str:
+    """Return whether the machine can work, and what to do."""
+    if not (doubts := len(findings["doubts"])):
+        return "[green]the file is valid; this machine can work.[/green]"
+    warnings = "the warning" if doubts == 1 else f"the {doubts} warnings"
+    return f"[yellow]the file is valid; this machine can work. Check {warnings} above.[/yellow]"
+
+
+def _legs_table(legs: list[dict[str, Any]]) -> Table:
+    """Return a table of the legs: type, axis of the actuated joint, lengths, limits, coordinate."""
     rows = (
         (
             *(str(i), leg["type"], _vector(leg["axis"], 2) if leg["axis"] else "along the leg"),
             ", ".join(f"{length:g}" for length in leg["lengths"].values()) or "-",
-            "{:g} to {:g} {}".format(*leg["limits"], leg["unit"]) if leg["limits"] else "none",
-            f"{leg['at_home']:.4g} {leg['unit']}",
+            "{:.4g} to {:.4g} {}".format(*leg["limits"], leg["unit"]) if leg["limits"] else "none",
+            f"{round(leg['at_home'], 4) + 0.0:g} {leg['unit']}",
         )
-        for i, leg in enumerate(findings["legs"], start=1)
+        for i, leg in enumerate(legs, start=1)
     )
-    headings = ("leg", "type", "joint's axis", "lengths (m)", "limits", "at home")
-    angles = ", ".join(f"{math.degrees(angle):.4g}" for angle in findings["singular_orientations"])
-    where = "" if findings["singular_at_every_position"] or not angles else " at the home position"
-    singular = [f"Singular orientations{where}: {f'{angles} deg' if angles else 'none'}"]
-    singular = singular if robot.platform.axis_angle else []
-    tool = [f"Tool: {_vector(findings['tool'])} m from P, in the platform frame"]
-    tool = tool if any(findings["tool"]) else []
-    work = "[green]Fine: the file is valid. This machine can work.[/green]"
-    if doubts := len(findings["doubts"]):
-        warnings = "the warning" if doubts == 1 else f"the {doubts} warnings"
-        work = f"[yellow]This machine can work, if {warnings} above can be left as is.[/yellow]"
-    joints = dict.fromkeys(leg.joint for leg in robot.legs)
-    show(
-        f"[bold]{plain(robot.name)}[/bold]: a {robot.platform.motion} machine with "
-        f"{len(robot.legs)} legs, pose {' '.join(robot.coordinates)}, "
-        f"working mode {signs(robot)}",
-        table(*headings, rows=rows, numbers=("leg",)),
-        *(f"A {joint.noun} {joint.zero}." for joint in joints if joint.zero),
-        *([f"At 0 cranks point {zero}."] if (zero := crank_direction_text(robot)) else []),
-        *_drives(robot),
-        *singular,
-        *_home_lines(robot, findings),
-        *_modes(findings["working_modes"]),
-        *_passive(findings["limited_joints"]),
-        *tool,
-        *([f"Note: {text}"] if (text := findings["template_masses"]) else []),
-        *(f"The platform can move with its rams held {text}" for text in findings["self_motions"]),
-        work,
-    )
+    headings = ("leg", "joints", "actuated axis", "links (m)", "joint limits", "at home")
+    return table(*headings, rows=rows, numbers=("leg",))
 
 
-def _home_lines(robot: Manipulator, findings: dict[str, Any]) -> list[str]:
-    """Return lines on the home pose, its mirror image, and how the drives hold the platform."""
-    import numpy as np
-
-    from pteron.workspace.margins import least_margin_text
-
-    margin = least_margin_text(robot, np.array(findings["home_pose"]))
+def _pose_lines(robot: Manipulator, findings: dict[str, Any]) -> list[str]:
+    """Return lines on singular orientations, the tool, and the home pose and its mirror image."""
+    lines = []
+    if robot.platform.axis_angle:
+        angles = ", ".join(f"{math.degrees(a):.4g}" for a in findings["singular_orientations"])
+        everywhere = findings["singular_at_every_position"]
+        where = "" if everywhere or not angles else " at the home position"
+        reason = " (type II: the drives cannot hold the platform there)" if angles else ""
+        angles = f"phi = {angles} deg" if angles else "none"
+        lines.append(f"Singular orientations{where}: {angles}{reason}")
+    if any(findings["tool"]):
+        lines.append(f"Tool: {_vector(findings['tool'])} m from P, in the platform frame")
     source = ", from the file" if findings["home_named"] else ""
-    lines = [f"Home pose: {_vector(findings['home_pose'])}{source}; least margin {margin}"]
+    units = " and ".join(dict.fromkeys(robot.units))
+    lines.append(f"Home pose: {_vector(findings['home_pose'])} {units}{source}")
     if findings["mirror_pose"] is not None:
         lines.append(
             f"Its mirror image on the other side of the base: {_vector(findings['mirror_pose'])}; "
-            "home is the one along the platform's axis. \\[home] pose in the file names another"
-        )
-    hold = findings["holding"]
-    distance = "none" if hold["distance"] == math.inf else f"{1e3 * hold['distance']:.3g} mm"
-    moments = f" (moments over {hold['length']:.3g} m)" if robot.platform.angles else ""
-    lines.append(
-        f"At home: least singular value {hold['least_singular_value']:.2g} of unit rows{moments}; "
-        f"coordinates off by {distance} make it singular"
-    )
-    if hold["weight"] > 0.0:
-        lines.append(
-            f"Weight of all bodies: {hold['weight']:.3g} N; a leg holds at most "
-            f"{hold['force']:.2g} times as much at home, {hold['force_near']:.2g} about it"
+            "home is the one along the platform's axis. \\[home] pose in the file chooses another"
         )
     return lines
+
+
+def _home_table(robot: Manipulator, findings: dict[str, Any]) -> Table:
+    """Return a table of the measures at the home pose beside their thresholds."""
+    import numpy as np
+
+    from pteron.thresholds import (
+        HOLDING_FORCE,
+        HOLDING_FORCE_NEAR,
+        INACCURATE,
+        LEAST_SINGULAR_VALUE,
+        NEARBY,
+    )
+    from pteron.workspace.margins import least_margin_text
+
+    hold = findings["holding"]
+    moments = f" (moments / {hold['length']:.3g} m)" if robot.platform.angles else ""
+    distance = "none" if hold["distance"] == math.inf else f"{1e3 * hold['distance']:.3g} mm"
+    least = 1.0 / hold["least_singular_value"] if hold["least_singular_value"] else math.inf
+    margin, cause = least_margin_text(robot, np.array(findings["home_pose"]))
+    rows = [
+        (f"smallest margin: to {cause}", margin, "above 0 %"),
+        (
+            f"largest leg force over load, in the worst direction{moments}",
+            *(f"{least:.2g}", f"at most {1.0 / LEAST_SINGULAR_VALUE:g}"),
+        ),
+        (
+            "geometric error (of every coordinate) that makes home singular",
+            *(distance, f"above {1e3 * INACCURATE * hold['rounding']:.2g} mm"),
+        ),
+    ]
+    if hold["weight"] > 0.0:
+        share, angle = NEARBY
+        turn = f" and {angle:g} rad" * bool(robot.platform.angles)
+        weight = f"largest leg force over weight of bodies ({hold['weight']:.3g} N)"
+        rows += [
+            (weight, f"{hold['force']:.2g}", f"at most {HOLDING_FORCE:g}"),
+            (
+                f"the same up to {100 * share:g} % of a leg's length{turn} from home",
+                f"{hold['force_near']:.2g}",
+                f"at most {HOLDING_FORCE_NEAR:g}",
+            ),
+        ]
+    return table("at home", "value", "good if", rows=rows, numbers=("value", "good if"))
 
 
 def _drives(robot: Manipulator) -> list[Table]:
@@ -330,29 +405,31 @@ def _modes(modes: list[dict[str, Any]]) -> list[Table]:
     """Return a table of the working modes: the platform's pose, its least margin, and remarks."""
     rows = []
     for mode in modes:
-        said = [*["the file's"] * mode["named"], *["likely"] * mode["likely"]]
+        remarks = [*["in the file"] * mode["named"], *["likely meant"] * mode["likely"]]
         where = ("beyond limits", "-", "-")
         if mode["margin"] > 0.0:
             at = f"({' '.join(f'{value:.3g}' for value in mode['pose'])})"
-            where = (f"{mode['place']} the base", at, f"{mode['margin']:.2f}")
-        rows.append((mode["elbows"], *where, ", ".join(said)))
-    headings = ("elbows", "platform", "pose", "least margin", "which")
+            where = (f"{mode['place']} the base", at, f"{100.0 * mode['margin']:.0f} %")
+        rows.append((mode["elbows"], *where, ", ".join(remarks)))
+    headings = ("elbow signs", "platform", "at its best pose", "margin", "working mode")
     return [table(*headings, rows=rows, numbers=headings[:4])] if rows else []
 
 
 def _passive(joints: list[dict[str, Any]]) -> list[Table]:
-    """Return the passive joints with limits, in the home pose."""
+    """Return a table of the passive joints with limits at home, equal joints in one row."""
     from pteron.workspace import LimitedJoint
 
-    rows = []
+    rows: dict[tuple[str, str, str], list[str]] = {}
     for joint in (joint for joint in joints if not joint["actuated"]):
-        limits = LimitedJoint(**joint).limits_text(lambda value, unit: f"{value:.4g}")
+        limits = LimitedJoint(**joint).limits_text(lambda coordinate, unit: f"{coordinate:.4g}")
         at, unit = f"{round(joint['value'], 4) + 0.0:g}", joint["unit"]
-        rows.append((str(joint["leg"] or ""), joint["noun"], at, f"{limits} {unit}"))
-    headings = ("leg", "passive joint", "at home", "limits")
-    return [table(*headings, rows=rows, numbers=("leg", "at home"))] if rows else []
+        legs = rows.setdefault((joint["noun"], f"{at} {unit}", f"{limits} {unit}"), [])
+        legs += [str(joint["leg"])] if joint["leg"] else []
+    headings = ("legs", "passive joint", "at home", "limits")
+    cells = ((", ".join(legs), *row) for row, legs in rows.items())
+    return [table(*headings, rows=cells, numbers=("at home",))] if rows else []
 
 
-def _vector(values: Any, places: int = 4) -> str:
+def _vector(components: Any, places: int = 4) -> str:
     """Return numbers as text in parentheses, rounded to decimal places."""
-    return f"({', '.join(f'{round(value, places) + 0.0:g}' for value in values)})"
+    return f"({', '.join(f'{round(component, places) + 0.0:g}' for component in components)})"

@@ -174,10 +174,8 @@ class Commands(Mapping[str, Any]):
     def __getitem__(self, name: str) -> Any:
         if name not in self._made:
             panel, function = self._panels[name]
-            cls, command = (
-                NumbersCommand if function in _NUMERIC else Command,
-                parsed_command(function, general=function in _GENERAL),
-            )
+            cls = NumbersCommand if function in _NUMERIC else Command
+            command = parsed_command(function, general=function in _GENERAL)
             alone = Typer(add_completion=False, **_LOOKS)
             alone.command(cls=cls, rich_help_panel=panel, **help_of(command))(command)
             self._made[name] = get_command(alone)
@@ -187,8 +185,8 @@ class Commands(Mapping[str, Any]):
 def pteron(context: Context, *, version: bool = False) -> None:
     """Kinematics, dynamics and base parameters of parallel manipulators (Quadrupteron, Delta, ...).
 
-    SI units and radians everywhere. Where the output goes into a pipe or a file, tables of poses
-    and indices are CSV, without the sentences that a screen gets; --json gives data for programs.
+    All quantities are in SI units and radians. Output to a pipe or a file has tables of poses and
+    indices as CSV, without the sentences of the screen; --json prints data for programs.
 
     Options
     -------

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from pteron.cli.pose_ranges import pose_text, span_text
-from pteron.cli.terminal import percent, plain, show, table
+from pteron.cli.terminal import percent, plain, show, significant, table
 from pteron.errors import DataError
 from pteron.json_values import fields_as_json, json_fields
 from pteron.tolerances import ROUNDING
@@ -66,24 +66,25 @@ def _index_data(index_map: Map, name: str) -> dict[str, Any]:
     return about | fields_as_json(summary, _SUMMARY, "poses=count undetermined=infinite")
 
 
-def map_rows(data: Mapping[str, Any]) -> Any:
-    """Return a table of the indices, a row each."""
+def map_rows(record: Mapping[str, Any]) -> Any:
+    """Return the JSON data of a map as a table with a row for each index."""
     import polars as pl
 
     from pteron.platforms.coordinates import COORDINATES
 
-    names = sorted([*data["held"], *(a["name"] for a in data["varies"])], key=[*COORDINATES].index)
+    varied = (axis["name"] for axis in record["varies"])
+    names = sorted([*record["held"], *varied], key=[*COORDINATES].index)
     rows = []
-    for index in data["indices"]:
+    for index in record["indices"]:
         row = {key: index[key] for key in ("index", "unit", "best", "worst", "mean", "median")}
         for side in ("best", "worst"):
             pose = index[f"{side}_pose"] or [None] * len(names)
-            row |= {f"{side}_{name}": value for name, value in zip(names, pose, strict=True)}
+            row |= {f"{side}_{name}": q for name, q in zip(names, pose, strict=True)}
         rows.append(row)
     return pl.DataFrame(rows, infer_schema_length=None)
 
 
-def show_map(index_map: Map, volume: ReachVolume | None, data: Mapping[str, Any]) -> None:
+def show_map(index_map: Map, volume: ReachVolume | None, record: Mapping[str, Any]) -> None:
     """Print for a person: the reach, what ends it, and each index."""
     from pteron.platforms.coordinates import are_angles, coordinate
 
@@ -99,10 +100,10 @@ def show_map(index_map: Map, volume: ReachVolume | None, data: Mapping[str, Any]
         noun = "area" if volume.unit == "m^2" else "volume"
         angles = {n: angle for n, angle in fixed.items() if n not in names}
         at = ", ".join(pose_text(name, angle) for name, angle in angles.items())
-        size = f"{noun} {volume.volume:.4g} {volume.unit}"
+        size = f"{noun} {volume.volume:.3g} {volume.unit}"
         lines.append(
-            f"Reach{f' at {at}' if at else ''}: {spans}; {size} "
-            f"(standard error {volume.standard_error:.1g})"
+            f"Workspace{f' at {at}' if at else ''}: {spans}; {size} "
+            f"(standard error {volume.standard_error:.1g} {volume.unit})"
         )
     varying = ", ".join(span_text(a.name, a.least, a.greatest) for a in index_map.grid.axes)
     lines.append(
@@ -110,28 +111,30 @@ def show_map(index_map: Map, volume: ReachVolume | None, data: Mapping[str, Any]
     )
     if index_map.causes:
         causes = sorted(index_map.causes.items(), key=lambda pair: -pair[1])
-        lines.append("; ".join(f"{percent(share)} {text}" for text, share in causes))
-    index_table = table("index", "", "value", "where", numbers=("value",))
-    for index in data["indices"]:
+        text = ", ".join(f"{percent(share)} {text}" for text, share in causes)
+        lines.append(f"The other poses: {text}")
+    coordinates = index_map.grid.coordinates
+    units = "m and rad" if are_angles(coordinates).any() else "m"
+    where = f"at {' '.join(coordinates)} ({units})"
+    index_table = table("index", "", "value", where, numbers=("value",))
+    for index in record["indices"]:
         unit = f" ({index['unit']})" if index["unit"] else ""
         named = plain(f"{index['index']}{unit}")
         if index["best"] is None:
-            index_table.add_row(named, "", "-", "determined at no pose in reach")
+            index_table.add_row(named, "", "-", "no pose in reach has a value")
             continue
         if abs(index["best"] - index["worst"]) <= ROUNDING * abs(index["best"]):
-            index_table.add_row(named, "", f"{index['best']:.4g}", "everywhere in reach")
+            index_table.add_row(named, "", significant(index["best"]), "every pose in reach")
         else:
             for side in ("best", "worst"):
-                pose = " ".join(f"{value + 0.0:.4g}" for value in index[f"{side}_pose"])
-                index_table.add_row(
-                    named if side == "best" else "", side, f"{index[side]:.4g}", pose
-                )
+                pose = " ".join(f"{round(v, 4) + 0.0:.3g}" for v in index[f"{side}_pose"])
+                first = named if side == "best" else ""
+                index_table.add_row(first, side, significant(index[side]), pose)
             for side in ("mean", "median"):
-                index_table.add_row("", side, f"{index[side]:.4g}", "")
+                index_table.add_row("", side, significant(index[side]), "")
         if index["undetermined"]:
             share = index["undetermined"] / index_map.grid.size
             index_table.add_row("", "singular", "-", f"{percent(share)} of the poses")
-    index_table.caption = f"Where: {' '.join(index_map.grid.coordinates)}, m" + (
-        " and rad" if are_angles(index_map.grid.coordinates).any() else ""
-    )
-    show(*lines, index_table)
+    better = {"less": "smaller is better", "more": "larger is better"}
+    legend = (f"{i['index']}: {i['title']}, {better[i['better']]}" for i in record["indices"])
+    show(*lines, index_table, *map(plain, legend))

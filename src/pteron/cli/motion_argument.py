@@ -23,6 +23,11 @@ _UNLIKE = 3.0
 """Greatest ratio of a motion's length by its velocities to that by its poses, or inverse of it."""
 
 
+def cycle_text(cycle: str) -> str:
+    """Return the noun for a cycle: the standard one's name, or the table of a motion."""
+    return "standard pick-and-place cycle" if cycle == STANDARD else f"motion of {cycle}"
+
+
 def cycle_of(robot: Manipulator, cycle: str, duration: float | None) -> Motion:
     """Return a cycle by its name, or from a table: of poses, or of joints, from the home pose."""
     if cycle == STANDARD:
@@ -63,11 +68,11 @@ def _playback_of_table(robot: Manipulator, rows: Table, start: PoseLike | None =
     file = rows.source
     _check_rates(robot, rows)
     names = [n for n in (*robot.coordinates, *robot.joint_names) if n in rows.columns]
-    values = rows.numbers(names)
+    table_columns = rows.numbers(names)
     try:
         return playback_of_table(robot, rows, start)
     except (UnreachablePose, SingularPose) as error:
-        unlikely = "; ".join(unlikely_values(robot, names, values))
+        unlikely = "; ".join(unlikely_values(robot, names, table_columns))
         if not unlikely or (isinstance(error, UnreachablePose) and error.millimetres):
             raise
         raise PteronError(f"{error}; {file}: {unlikely}") from None
@@ -81,9 +86,9 @@ def given_pose(machine: Manipulator, text: str | None, name: str) -> NDArray[Any
 
     if text is None:
         return home_pose(machine)
-    values = np.array(parsed_numbers([text], machine.coordinates, name))
-    note_unlikely(machine, machine.coordinates, values, name)
-    return values
+    pose = np.array(parsed_numbers([text], machine.coordinates, name))
+    note_unlikely(machine, machine.coordinates, pose, name)
+    return pose
 
 
 @dataclass(frozen=True)
@@ -117,7 +122,8 @@ class Carried:
     def __str__(self) -> str:
         """Return the load in words that follow a machine's name; empty without a load."""
         tool = [] if self.tool is None else [f"tool {self.tool}"]
-        at = "" if self.payload_center is None else f" at {_vector_text(self.payload_center)} m"
+        center = [f"{component:g}" for component in self.payload_center or ()]
+        at = f" at ({', '.join(center)}) m" if center else ""
         words = [*tool, *([f"{self.payload:g} kg{at}"] if self.payload else [])]
         return f" with {' and '.join(words)}" if words else ""
 
@@ -137,35 +143,30 @@ class Carried:
 
 
 def note_unlikely(
-    robot: Manipulator, columns: Sequence[str], values: NDArray[Any], source: str
+    robot: Manipulator, columns: Sequence[str], numbers: NDArray[Any], source: str
 ) -> None:
     """Note values that are possible but unlikely."""
     from pteron.kinematics.unlikely_values import unlikely_values
 
-    for text in unlikely_values(robot, columns, values):
+    for text in unlikely_values(robot, columns, numbers):
         note(f"Note: {source}: {text}")
 
 
 def _check_rates(robot: Manipulator, rows: Table) -> None:
-    """Refuse a table whose velocities, where it has them, are not those of its poses and times."""
+    """Raise DataError if a table has velocities that are not those of its poses and times."""
     import numpy as np
 
     names = robot.coordinates
     columns = ["t", *names, *(f"d{name}" for name in names)]
     if len(rows) < 2 or not set(columns) <= set(rows.columns):
         return
-    values = rows.numbers(columns)
-    poses, rates = values[:, 1 : 1 + len(names)], values[:, 1 + len(names) :]
+    given_rates = rows.numbers(columns)
+    poses, rates = given_rates[:, 1 : 1 + len(names)], given_rates[:, 1 + len(names) :]
     means = np.abs(rates[1:] + rates[:-1]) / 2.0
-    far, meant = np.abs(np.diff(poses, axis=0)).sum(), (np.diff(values[:, 0]) @ means).sum()
+    far, meant = np.abs(np.diff(poses, axis=0)).sum(), (np.diff(given_rates[:, 0]) @ means).sum()
     # A time that does not ascend has a message of its own.
     if meant > 0.0 and not _UNLIKE * far >= meant >= far / _UNLIKE:
         raise DataError(
             f"{rows.source}: its poses go {far:.3g} m or rad, its velocities {meant:.3g} in the "
             "same time; t must be in s, and velocities per s"
         )
-
-
-def _vector_text(values: Sequence[float]) -> str:
-    """Return numbers as text in parentheses."""
-    return f"({', '.join(f'{value:g}' for value in values)})"

@@ -6,7 +6,8 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from pteron.cli.terminal import table
+from pteron.cli.terminal import significant, table
+from pteron.tolerances import ROUNDING
 
 if TYPE_CHECKING:
     import polars as pl
@@ -16,21 +17,38 @@ if TYPE_CHECKING:
     from pteron.motion import Motion, Peak
 
 _BINDS = 0.98
-"""Share of a limit from which it is said to bind."""
+"""Share of a limit from which it counts as reached."""
 
 
 def peaks_table(largest: Sequence[Peak]) -> Table:
-    """Return a table of the largest sizes in a motion, beside their limits."""
-    numbers = ("leg", "size", "limit", "share")
+    """Return a table of the peak values of a motion, beside their limits."""
+    numbers = ("leg", "value", "limit", "value/limit")
     rows = (
         (
-            f"{_word(peak)} ({peak.unit})" + " (binds)" * (peak.share >= _BINDS),
-            *(str(peak.leg or ""), f"{peak.size:.4g}"),
-            *((f"{peak.limit:.4g}", f"{peak.share:.0%}") if math.isfinite(peak.limit) else "--"),
+            f"{_word(peak)} ({peak.unit})" + ", at its limit" * (peak.share >= _BINDS),
+            *(str(peak.leg or ""), significant(peak.size)),
+            *(
+                (significant(peak.limit, 4), f"{100.0 * peak.share:.0f} %")
+                if math.isfinite(peak.limit)
+                else ("none", "-")
+            ),
         )
         for peak in largest
     )
-    return table("largest", *numbers, rows=rows, numbers=numbers)
+    return table("peak", *numbers, rows=rows, numbers=numbers)
+
+
+def travel_text(machine: Manipulator, motion: Motion) -> str:
+    """Return the travel of each coordinate that a motion moves, in mm and degrees."""
+    import numpy as np
+
+    travels = zip(machine.coordinates, machine.units, np.ptp(motion.pose, axis=0), strict=True)
+    parts = [
+        f"{name} {1e3 * travel:.3g} mm" if unit == "m" else f"{name} {np.degrees(travel):.3g} deg"
+        for name, unit, travel in travels
+        if travel > ROUNDING
+    ]
+    return ", ".join(parts) or "none"
 
 
 def _word(peak: Peak) -> str:
@@ -63,8 +81,8 @@ def motion_frame(machine: Manipulator, motion: Motion) -> pl.DataFrame:
     )
     for names, parts in ((machine.coordinates, path), (machine.joint_names, joints)):
         for order, part in zip(("", "d", "dd"), parts, strict=True):
-            for name, values in zip(names, part.T, strict=True):
-                columns[f"{order}{name}"] = np.asarray(values + 0.0)
+            for name, column in zip(names, part.T, strict=True):
+                columns[f"{order}{name}"] = np.asarray(column + 0.0)
     forces = drive_forces(machine, *path) * scales
     columns.update(zip(machine.force_names, forces.T, strict=True))
     return pl.DataFrame(columns)

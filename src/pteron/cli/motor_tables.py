@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from itertools import groupby, islice
 from typing import TYPE_CHECKING, Any
 
-from pteron.cli.terminal import plain, table
+from pteron.cli.terminal import plain, significant, table
 
 if TYPE_CHECKING:
     import polars as pl
@@ -18,16 +18,17 @@ if TYPE_CHECKING:
 _BEST = 3
 """Motors shown for each joint, the best ones."""
 
-_NUMBERS = ("ratio", "from", "to", "rated", "peak", "speed")
+_NUMBERS = ("best ratio", "from", "to", "rated torque", "peak torque", "speed")
 """Headings of a motor's ratios and margins."""
 
 _MARGINS = ("rated_margin", "peak_margin", "speed_margin")
 
 _CAPTIONS = {
-    "leg": "Ratios that serve, the best first; then margins at it: rated, peak torque, speed.",
-    "legs": (
-        "Legs that are alike, with one motor and one ratio for all of them; margins are the least."
+    "leg": (
+        "Gear ratios: best, and range in which the motor is strong enough. Then, at the best "
+        "ratio, what the motor has over what the cycle needs: torques and speed."
     ),
+    "legs": "One motor and one ratio for equal legs; torques and speed of the most loaded leg.",
 }
 """Captions of the tables, by the heading of their first column."""
 
@@ -59,7 +60,7 @@ def common_table(robot: Manipulator, fits: Sequence[CommonFit]) -> list[rich.tab
 
 
 def _alone(fit: MotorFit) -> CommonFit:
-    """Return a leg's fit of a motor as the common fit of this leg alone."""
+    """Return one leg's fit of a motor as a common fit of that leg alone."""
     from pteron.motion import CommonFit
 
     return CommonFit((fit.leg,), fit.motor, fit.span, fit.ratio, (fit,))
@@ -84,8 +85,8 @@ def _table(robot: Manipulator, heading: str, fits: Iterable[CommonFit]) -> list[
     rows = []
     for legs, group in groupby(fits, key=lambda fit: fit.legs):
         for i, fit in enumerate(islice(group, _BEST)):
-            ends = tuple(f"{end:.4g}" for end in fit.span) if fit.span else ("none", "")
-            ratio = f"{fit.ratio:.4g} {_ratio_unit(robot, fit)}"
+            ends = tuple(map(significant, fit.span)) if fit.span else ("none", "")
+            ratio = f"{significant(fit.ratio)} {_ratio_unit(robot, fit)}"
             margins = (f"{value:.2f}" for value in _margins(fit))
             first = "" if i else " ".join(map(str, legs))
             rows.append((first, plain(fit.motor.name), ratio, *ends, *margins))

@@ -35,19 +35,21 @@ _OPTIONS = ("Arguments", "Options")
 
 _SHARED = f"""\
 ROBOT: A machine of the catalog (see pteron catalog) or a TOML file.
---table FILE: Take a .csv or .parquet file's rows; - is CSV on standard input.
+--table FILE: Read the rows of a .csv or .parquet file; - reads CSV from standard input.
 --out FILE: Write the result to a .csv or .parquet file.
---elbows SIGNS: The working mode, one sign a leg, such as ++-+.
---on-failure: Stop at a row that fails, or leave its results empty.
---payload MASS@X,Y,Z: What the platform carries, kg, such as 0.5, which is at the tool's centre
-    point; 0.5@0,0,-0.03 has its centre of mass there in the platform's frame, m, and
-    0.5@0,0,-0.03@2e-4 its inertia about that, kg m^2. [default: none]
---tool NAME: Mount a tool of the machine's file, one of its table tools.
---cycle CYCLE: adept, the standard pick-and-place cycle, or a table of a motion.
---duration: Of the standard cycle, s. [default: 10 m/s^2 at the tool]
---scheduler ADDRESS: A Dask cluster that does the work, tcp://host:8786; it has no lock of its own.
---function NAME: What to write; again for more: {", ".join(FUNCTIONS)}.
---json: Print data for a program, as JSON.
+--elbows SIGNS: Working mode: the side to which each leg bends, one sign a leg, such as ++-+.
+    [default: the file's]
+--on-failure: Stop at a row that fails (raise), or leave its results empty (nan).
+--payload MASS@X,Y,Z: Payload of the platform: its mass, kg, such as 0.5, at the tool's centre
+    point; its centre of mass in the platform's frame, m, as in 0.5@0,0,-0.03; and its moment of
+    inertia about that, kg m^2, as in 0.5@0,0,-0.03@2e-4. [default: none]
+--tool NAME: Mount a tool that the machine's file lists under tools.
+--cycle CYCLE: adept, the standard pick-and-place cycle, or the table of a motion.
+--duration: Duration of the standard cycle, s. [default: tool acceleration up to 10 m/s^2]
+--scheduler ADDRESS: Address of a Dask cluster that does the work, tcp://host:8786; it does not
+    authenticate its clients.
+--function NAME: Function to write; repeat for several: {", ".join(FUNCTIONS)}.
+--json: Print the result as JSON, for programs.
 """
 """Options that several subcommands share, and those whose help is more than text."""
 
@@ -90,22 +92,22 @@ def parsed_command(
     options.setdefault("json", _option("json", bool, default=False))
 
     @wraps(command)
-    def run(**values: Any) -> None:
+    def run(**chosen: Any) -> None:
         """Run the command with the values of its options and the machine of its file, if any."""
-        passed = {name: value for name, value in values.items() if name in arguments}
+        passed = {name: argument for name, argument in chosen.items() if name in arguments}
         if "before" in vars(command):  # a missing extra is told before a machine is read
             vars(command)["before"](passed)
         if "carried" in arguments:
-            passed["carried"] = Carried.from_options(values["payload"], values["tool"])
+            passed["carried"] = Carried.from_options(chosen["payload"], chosen["tool"])
         for name, group in groups.items():
-            passed[name] = group(**{field.name: values[field.name] for field in fields(group)})
+            passed[name] = group(**{field.name: chosen[field.name] for field in fields(group)})
         if "machine" in arguments:
             quiet = "warns" in vars(command)  # the command tells the file's warnings itself
-            passed["machine"] = load_robot(values["robot"], values["elbows"], quiet=quiet)
+            passed["machine"] = load_robot(chosen["robot"], chosen["elbows"], quiet=quiet)
         with _share_programs() if general else nullcontext():
             outcome = command(**passed)
             if outcome is not None:
-                outcome.tell(as_json=values["json"])
+                outcome.tell(as_json=chosen["json"])
 
     run.__dict__["__signature__"] = Signature(list(options.values()))
     run.__annotations__ = {name: option.annotation for name, option in options.items()}

@@ -40,8 +40,8 @@ def standard_motion(
         tilts = machine.platform.tilts
         beside = f", and of a point {1e3 * farthest_point(machine):.0f} mm from P as it turns,"
         note(
-            "Note: no limits given, and the machine's drives have none: the tool's acceleration"
-            f"{beside if tilts else ''} is {PEAK_ACCELERATION:g} m/s^2 at most"
+            "Note: neither options nor the drives in the file state limits: the acceleration of "
+            f"the tool{beside if tilts else ''} is limited to {PEAK_ACCELERATION:g} m/s^2"
         )
         if tilts:
             duration = standard.duration

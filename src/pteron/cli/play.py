@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pteron.cli.arguments import STANDARD, MachineArgument
-from pteron.cli.motion_argument import Carried, read_playback
+from pteron.cli.motion_argument import Carried, cycle_text, read_playback
 from pteron.cli.progress import spinner
 from pteron.cli.result import CommandResult
 from pteron.cli.terminal import plain
@@ -25,13 +25,13 @@ def play(
     cycle: str | None = None,
     carried: Carried,
 ) -> CommandResult:
-    """Show a motion in 3-D: one page that needs no other file or network.
+    """Show a motion in 3-D: one HTML page that needs no other file or network.
 
-    The page has the machine as it moves, in real time or slower, with its forces, joints and pose
-    at each moment, and what joints and drives do over time. The motion is what pteron cycle,
-    simulate or excite write, a table of your own (t and x y z phi, or t and rho1 theta2 ...), or a
-    log with the TOML file that describes it. Forces are those of the file, where it has them;
-    else what the drives must give. Without a file the page shows the standard cycle.
+    The page shows the moving machine, in real time or slower, with its forces, joints and pose at
+    each moment, and joints and drives over time. The motion is a file of pteron cycle, simulate or
+    excite, a table of your own (t and x y z phi, or t and rho1 theta2 ...), or a log with the TOML
+    file that describes it. Forces are those of the file if it has them; else those computed for the
+    drives. Without a file the page shows the standard cycle.
 
     Arguments
     ---------
@@ -58,7 +58,7 @@ def play(
         playback = _playback(machine, motion or cycle or STANDARD)
         page = write_motion_page(machine, playback, out)
     samples, size = len(playback.motion.time), page.stat().st_size
-    data = {
+    record = {
         "robot": machine.name,
         "page": str(page),
         "bytes": size,
@@ -67,8 +67,11 @@ def play(
         "duration": playback.motion.duration,
         "samples": samples,
     }
-    summary = f"{plain(machine.name)}: {playback.motion.duration:.4g} s, {samples} samples"
-    return CommandResult(data, [summary, f"Written: {plain(str(page))}, {size / 1e6:.1f} MB"])
+    shown = plain(cycle_text(motion or cycle or STANDARD))
+    duration = playback.motion.duration
+    summary = f"{plain(machine.name)}, {shown}: {duration:.4g} s, {samples} samples"
+    written = f"Written: {plain(str(page))}, {size / 1e6:.1f} MB (open it in a browser)"
+    return CommandResult(record, [summary, written])
 
 
 def _playback(machine: Manipulator, motion: str) -> Playback:

@@ -25,8 +25,8 @@ def pose_ranges(
     constants: dict[str, float] = {}
     ranges: dict[str, tuple[float, ...]] = {}
     for part in text.replace(" ", "").split(",") if text is not None else []:
-        name, equals, values = part.partition("=")
-        numbers = values.split(":")
+        name, equals, limits = part.partition("=")
+        numbers = limits.split(":")
         try:
             span = tuple(float(number) for number in numbers)
         except ValueError:
@@ -58,7 +58,7 @@ def pose_spans(
     expect_coordinates(robot, constants, ranges)
     if any(len(span) > 2 for span in ranges.values()):
         raise DataError(f"{option}: NAME=LEAST:GREATEST expected{use}")
-    return ranges | {name: (value, value) for name, value in constants.items()}
+    return ranges | {name: (constant, constant) for name, constant in constants.items()}
 
 
 def box_of(spans: Iterable[tuple[float, ...]]) -> Box:
@@ -68,9 +68,9 @@ def box_of(spans: Iterable[tuple[float, ...]]) -> Box:
     return Box(*zip(*spans, strict=True))
 
 
-def pose_text(name: str, value: float) -> str:
+def pose_text(name: str, coordinate: float) -> str:
     """Return a coordinate's value with its name and unit."""
-    return f"{name} = {value + 0.0:.4g} {_unit(name)}"
+    return f"{name} = {coordinate + 0.0:.4g} {_unit(name)}"
 
 
 def span_text(name: str, low: float, high: float) -> str:

@@ -19,13 +19,13 @@ _SHORT = 0.05
 """Time below which a stage is not listed, s."""
 
 _APART = 1.0
-"""Time between the shares that a rate is taken from, s."""
+"""Least time between the progress reports from which a rate of work is computed, s."""
 
 _UNKNOWN, _LITTLE = 5.0, 0.02
 """Time, s, and share of the work, before which the time that is left is not known."""
 
 _RECENT = 60.0
-"""Time that a rate is taken over at least, s."""
+"""Least time over which a rate of work is computed, s."""
 
 
 @contextmanager
@@ -74,7 +74,7 @@ class TimeLeft:
 
     def __init__(self, clock: Callable[[], float] = perf_counter) -> None:
         self._clock = clock
-        self._told: deque[tuple[float, float]] = deque()
+        self._reported: deque[tuple[float, float]] = deque()
         self._first: tuple[float, float] | None = None
         self._share = 0.0
 
@@ -84,19 +84,19 @@ class TimeLeft:
         self._share = share
         if self._first is None:
             self._first = now, share
-        if not self._told or now - self._told[-1][0] >= _APART:
-            self._told.append((now, share))
+        if not self._reported or now - self._reported[-1][0] >= _APART:
+            self._reported.append((now, share))
         # The rate counts over half of the time, or all of a short one.
         since = now - max(_RECENT, 0.5 * (now - self._first[0]))
-        while len(self._told) > 1 and self._told[1][0] <= since:
-            self._told.popleft()
+        while len(self._reported) > 1 and self._reported[1][0] <= since:
+            self._reported.popleft()
 
     def seconds(self) -> float | None:
         """Return the estimated time remaining, s; None while it is unknown."""
         if self._first is None:
             return None
         now, (began, base) = self._clock(), self._first
-        (start, earlier_share), share = self._told[0], self._share
+        (start, earlier_share), share = self._reported[0], self._share
         if (
             now - began < _UNKNOWN
             or share - base < _LITTLE * (1.0 - base)

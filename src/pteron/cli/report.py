@@ -11,7 +11,7 @@ from pteron.cli.arguments import MachineArgument
 from pteron.cli.motion_argument import Carried, read_playback
 from pteron.cli.progress import spinner
 from pteron.cli.result import CommandResult
-from pteron.cli.terminal import plain, table, warn
+from pteron.cli.terminal import plain, significant, table, warn
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -21,21 +21,17 @@ _SERIES = ("time", "pose", "velocity", "acceleration", "forces")
 
 
 def report(
-    machine: MachineArgument,
-    *,
-    out: str,
-    motion: str | None = None,
-    carried: Carried,
+    machine: MachineArgument, *, out: str, motion: str | None = None, carried: Carried
 ) -> CommandResult:
-    """Write a report on a machine: one page with pictures, and its numbers.
+    """Write a report on a machine: one HTML page with figures, and its numbers.
 
     The page is report.html, the numbers are in report.json beside it. Forces are computed for the
-    machine with its payload; if the motion's file has forces too, the page says where they differ.
+    machine with its payload; if the motion's file has forces too, the page shows where they differ.
 
     Options
     -------
-    --out DIR: The folder to write it to.
-    --motion FILE: Show this motion in place of the standard cycle: a table of it, or a log.
+    --out DIR: Folder for report.html and report.json.
+    --motion FILE: Show this motion in place of the standard cycle: a table of a motion, or a log.
 
     Examples
     --------
@@ -51,9 +47,9 @@ def report(
         page = write_report(machine, out, motion=shown)
     contents = json.loads((page.parent / "report.json").read_text(encoding="utf-8"))
     warn([*contents["doubts"], *contents["cycle"]["overloads"]])
-    cycle = {key: value for key, value in contents["cycle"].items() if key not in _SERIES}
+    cycle = {key: series for key, series in contents["cycle"].items() if key not in _SERIES}
     tables = _machine(contents), _legs(contents["cycle"], contents["joints"])
-    lines = [*tables, f"Written to {plain(str(page))}"]
+    lines = [*tables, f"Written: {plain(str(page))} (open it in a browser)"]
     return CommandResult({"page": str(page), **contents, **asdict(carried), "cycle": cycle}, lines)
 
 
@@ -68,22 +64,23 @@ def _machine(contents: dict[str, Any]) -> Table:
     singular = ", ".join(f"{math.degrees(a):.4g}" for a in contents["singular_orientations"] or ())
     angles = [name for name in contents["coordinates"] if coordinate(name).unit == "rad"]
     cells = {
-        "home pose": " ".join(f"{value:.4g}" for value in home["pose"]),
-        "margin there": f"{home['reserve']:.3f} of 1",
-        "condition number there": f"{home['condition_number']:.4g}",
+        "home pose": f"{' '.join(contents['coordinates'])} = "
+        + " ".join(f"{round(value, 6) + 0.0:.4g}" for value in home["pose"]),
+        "margin at home (0 % at a joint limit or singularity)": f"{100.0 * home['reserve']:.0f} %",
+        "condition number at home (1 is best)": significant(home["condition_number"]),
     }
     if len(angles) == 1:
-        cells[f"singular {angles[0]} there"] = f"{singular} deg" if singular else "none"
+        cells[f"singular {angles[0]} at home"] = f"{singular} deg" if singular else "none"
     if reach is not None:
-        factor, unit = (1e3, "litres") if reach["unit"] == "m^3" else (1e2, "dm^2")
-        cells["reach"] = f"{factor * reach['volume']:.4g} {unit}"
+        noun = "volume" if reach["unit"] == "m^3" else "area"
+        cells[f"workspace {noun}"] = f"{reach['volume']:.3g} {reach['unit']}"
     if contents["largest_tilt"] is not None:
-        cells["leans to every side by"] = f"{math.degrees(contents['largest_tilt']):.1f} deg"
+        tilt = f"{math.degrees(contents['largest_tilt']):.1f} deg"
+        cells["largest tilt possible in all directions"] = tilt
+    noun = "standard pick-and-place cycle" if contents["cycle"]["standard"] else "motion"
     cells |= {
-        "cycle"
-        if contents["cycle"]["standard"]
-        else "motion": f"{contents['cycle']['duration']:.3g} s",
-        "base parameters": f"{base['rank']} of {base['of']}",
+        f"duration of the {noun}": f"{contents['cycle']['duration']:.3g} s",
+        "base inertial parameters": f"{base['rank']}, from {base['of']} inertial parameters",
     }
     return table(plain(contents["robot"]), "", rows=cells.items())
 
@@ -92,10 +89,13 @@ def _legs(cycle: dict[str, Any], joints: list[dict[str, str]]) -> Table:
     """Return a table of each leg's peak and RMS force and peak speed over the cycle."""
     force = " or ".join(sorted({joint["force"] for joint in joints}))
     headings = ("leg", f"peak {force}", f"RMS {force}", "peak speed")
-    of = "Of the drives, with friction." if cycle["with_drives"] else "Of the bodies, no friction."
+    noun = "the cycle" if cycle["standard"] else "the motion"
+    drives = "with friction and rotors" if cycle["with_drives"] else "without friction and rotors"
+    caption = f"Over {noun}, {drives}."
     rows = []
     columns = (cycle[key] for key in ("peak_forces", "rms_forces", "peak_speeds"))
     for i, (peak, rms, speed) in enumerate(zip(*columns, strict=True), start=1):
         unit, rate = joints[i - 1]["force_unit"], f"{joints[i - 1]['unit']}/s"
-        rows.append((str(i), f"{peak:.3f} {unit}", f"{rms:.3f} {unit}", f"{speed:.3f} {rate}"))
-    return table(*headings, rows=rows, numbers=headings, caption=of)
+        units = zip((peak, rms, speed), (unit, unit, rate), strict=True)
+        rows.append((str(i), *(f"{significant(size)} {of}" for size, of in units)))
+    return table(*headings, rows=rows, numbers=headings, caption=caption)

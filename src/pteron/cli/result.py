@@ -19,16 +19,16 @@ class CommandResult:
     ----------
     data : object
         For a program.
-    told : callable or sequence of str and Table
+    printout : callable or sequence of str and Table
         For a person: lines and tables, or what prints them.
     files : sequence
-        The files that were written, told after the rest.
+        The files that were written, printed after the rest.
     code : int
         The exit code.
     """
 
     data: Any
-    told: Callable[[], None] | Sequence[Any] = ()
+    printout: Callable[[], None] | Sequence[Any] = ()
     files: Sequence[object] = ()
     code: int = 0
 
@@ -36,10 +36,10 @@ class CommandResult:
         """Print the result for a program or for a person, and exit with its exit code."""
         if as_json:
             show_json(self.data)
-        elif callable(self.told):
-            self.told()
+        elif callable(self.printout):
+            self.printout()
             show(*file_lines(*self.files))
         else:
-            show(*self.told, *file_lines(*self.files))
+            show(*self.printout, *file_lines(*self.files))
         if self.code:
             raise Exit(self.code)

@@ -9,11 +9,21 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from pteron.cli.arguments import STANDARD, MachineArgument, check_rate, load_robot
 from pteron.cli.destination import Destination
-from pteron.cli.motion_argument import Carried, cycle_of
+from pteron.cli.motion_argument import Carried, cycle_of, cycle_text
 from pteron.cli.motion_table import force_word
 from pteron.cli.progress import spinner
 from pteron.cli.result import CommandResult
-from pteron.cli.terminal import is_terminal, note, plain, show, table, warn, write
+from pteron.cli.terminal import (
+    is_terminal,
+    note,
+    percent,
+    plain,
+    show,
+    significant,
+    table,
+    warn,
+    write,
+)
 from pteron.errors import DataError
 
 if TYPE_CHECKING:
@@ -50,30 +60,29 @@ def simulate(
 ) -> CommandResult:
     """Simulate a machine with its drives under a controller.
 
-    The rigid bodies with the payload, the drives' friction and rotors move under what the
-    controller asks for, held from sample to sample; no drive gives more than its max_force. A
-    cycle that is more than the drives can do is refused, with the leg and by how much.
+    The rigid bodies with the payload, and the drives with friction and rotors, move under the
+    forces that the controller commands, held from sample to sample; no drive exceeds its max_force.
+    A cycle beyond what the drives can do is refused, with the leg and by how much.
 
-    The table has a row for each sample: t, the pose x y z phi, its rates and accelerations, what
-    it was to be (xref ...), the joints and their rates, forces, and what the machine carries. A
-    folder gets simulation.csv, simulation.json, tracking.svg and forces.svg. The exit code is 1 if
-    the machine does not come to the end; why is said.
+    The table has a row for each sample: t, the pose x y z phi, its rates and accelerations, the
+    reference (xref ...), the joints and their rates, forces, and the payload. A folder gets
+    simulation.csv, simulation.json, tracking.svg and forces.svg. The exit code is 1 if the
+    simulation stops before the end of the cycle, and a note says why.
 
     Options
     -------
-    --controller: What makes the machine follow the cycle; see docs/controllers.md.
-    --cycles: How many, one after the other.
-    --rate: Samples of the controller a second.
-    --bandwidth: Of the controller, rad/s. [default: a tenth of the rate]
-    --gains FILE: The controller of pteron tune's gains.toml, its law and rate too.
-    --model ROBOT: What the controller takes the machine for; by default what it is, payload and
-        all.
-    --encoder: Step of the encoders at the joints, m or rad; 0 is exact.
-    --delay: From a sample to the drives' force, s.
-    --step: Of the integration, s.
-    --method: Fixed steps, compiled, or SciPy's DOP853.
-    --anyway: Simulate a cycle that is more than the drives can do, too.
-    --out DIR|FILE: Write a table and pictures to a folder, or the table to a file.
+    --controller: Control law; see docs/controllers.md.
+    --cycles: Number of cycles, one after the other.
+    --rate: Sample rate of the controller, Hz.
+    --bandwidth: Bandwidth of the controller, rad/s. [default: a tenth of the rate]
+    --gains FILE: Use the controller in pteron tune's gains.toml, with its law, gains and rate.
+    --model ROBOT: Model of the machine in the controller. [default: the machine, with its payload]
+    --encoder: Resolution of the joints' encoders, m or rad; 0 is exact.
+    --delay: Delay from a sample to the drives' force, s.
+    --step: Step of the integration, s.
+    --method: Integrator: compiled Runge-Kutta of fixed step (rk4), or SciPy's DOP853.
+    --anyway: Simulate even a cycle beyond what the drives can do.
+    --out DIR|FILE: Write a table and figures to a folder, or the table to a file.
 
     Examples
     --------
@@ -115,11 +124,11 @@ def simulate(
     warn(overloads)
     if simulation.stopped:
         note(f"Stopped {simulation.stopped}")
-    data = _data(simulation, law_name, cycle, carried)
-    person = partial(_tell, simulation, data, carried, out)
+    record = _data(simulation, law_name, cycle, carried)
+    person = partial(_tell, simulation, record, carried, out)
     code = _ENDED if simulation.stopped else 0
     return destination.deliver(
-        simulation.table(), data, partial(_pictures, simulation), person, code
+        simulation.table(), record, partial(_pictures, simulation), person, code
     )
 
 
@@ -199,34 +208,45 @@ def _pictures(simulation: Simulation) -> dict[str, str]:
     return {"tracking.svg": svg_file(tracking), "forces.svg": svg_file(forces)}
 
 
-def _tell(simulation: Simulation, data: dict[str, Any], carried: Carried, out: str | None) -> None:
+def _tell(
+    simulation: Simulation, record: dict[str, Any], carried: Carried, out: str | None
+) -> None:
     """Print for a person; without --out a pipe gets the table."""
     if is_terminal() or out is not None:
-        _show(simulation, data, carried)
+        _show(simulation, record, carried)
     else:
         write(simulation.table().write_csv())
 
 
-def _show(simulation: Simulation, data: dict[str, Any], carried: Carried) -> None:
+def _micro_text(error: float, unit: str) -> str:
+    """Return an error in millionths of its unit, below a thousandth of that as such."""
+    return f"{significant(1e6 * error)} u{unit}" if error >= 1e-9 else f"< 0.001 u{unit}"
+
+
+def _show(simulation: Simulation, record: dict[str, Any], carried: Carried) -> None:
     """Print tables of the tracking errors and of the drives' loads."""
     robot = simulation.robot
-    steps = "DOP853" if data["step"] is None else f"steps of {data['step'] * 1e3:.3g} ms"
+    steps = "DOP853" if record["step"] is None else f"steps of {record['step'] * 1e3:.3g} ms"
     errors = (
-        (row["coordinate"], *(f"{1e6 * row[key]:.3g} u{unit}" for key in ("largest", "rms")))
-        for row, unit in zip(data["tracking"], robot.units, strict=True)
+        (row["coordinate"], *(_micro_text(row[key], unit) for key in ("largest", "rms")))
+        for row, unit in zip(record["tracking"], robot.units, strict=True)
     )
     drives = []
-    for leg, row in zip(robot.legs, data["drives"], strict=True):
+    for leg, row in zip(robot.legs, record["drives"], strict=True):
         force, speed = leg.joint.force_unit, f"{leg.joint.unit}/s"
         units = {"peak_force": force, "rms_force": force, "peak_speed": speed, "peak_power": "W"}
-        sizes = (f"{row[key]:.4g} {unit}" for key, unit in units.items())
+        sizes = (f"{significant(row[key])} {unit}" for key, unit in units.items())
         limited = leg.drive and leg.drive.max_force
-        drives.append((str(row["leg"]), *sizes, f"{row['at_its_limit']:.1%}" if limited else "-"))
+        share = percent(row["at_its_limit"]) if limited else "no limit"
+        drives.append((str(row["leg"]), *sizes, share))
     word = force_word(robot)
-    names = ("leg", f"peak {word}", f"RMS {word}", "peak speed", "peak power", "at its limit")
+    saturated = f"time at {word} limit"
+    names = ("leg", f"peak {word}", f"RMS {word}", "peak speed", "peak power", saturated)
+    end = "stopped early" if simulation.stopped else "completed"
     show(
-        f"[bold]{plain(robot.name)}[/bold]{plain(str(carried))}, cycle {plain(data['cycle'])}, "
-        f"{plain(data['controller'])}: {data['duration']:.4g} s in {steps}",
-        table("error", "largest", "RMS", rows=errors, numbers=("largest", "RMS")),
+        f"[bold]{plain(robot.name)}[/bold]{plain(str(carried))}, "
+        f"{plain(cycle_text(record['cycle']))} {end}: {record['duration']:.4g} s in {steps}, "
+        f"controller {plain(record['controller'])}",
+        table("tracking error", "largest", "RMS", rows=errors, numbers=("largest", "RMS")),
         table(*names, rows=drives, numbers=names),
     )

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any
 
 from pteron.cli.arguments import STANDARD, MachineArgument
 from pteron.cli.destination import Destination
-from pteron.cli.motion_argument import Carried, cycle_of
+from pteron.cli.motion_argument import Carried, cycle_of, cycle_text
 from pteron.cli.motion_table import force_word
 from pteron.cli.motor_tables import common_rows, common_table, fits_frame, motors_table
 from pteron.cli.pose_ranges import box_of, pose_spans
 from pteron.cli.progress import spinner
 from pteron.cli.result import CommandResult
-from pteron.cli.terminal import plain, show, table, warn
+from pteron.cli.terminal import percent, plain, show, significant, table, warn
 from pteron.errors import UnlikelyValue
 from pteron.tolerances import ROUNDING
 
@@ -31,8 +31,8 @@ if TYPE_CHECKING:
 _OVERLOADED = 1
 """Exit code where a drive is overloaded."""
 
-_NAMED = {"peak_force": "peak {}", "rms_force": "RMS {}", "peak_speed": "speed"}
-"""Quantities whose worst places are told."""
+_NAMED = {"peak_force": "peak {}", "rms_force": "RMS {}", "peak_speed": "peak speed"}
+"""Quantities whose worst places are shown."""
 
 
 def size(
@@ -50,35 +50,36 @@ def size(
 ) -> CommandResult:
     """Size the motors: peak and RMS force, speed, power and energy of each drive over a cycle.
 
-    The standard cycle is done at all places of the workspace and at all turns about the vertical,
-    the platform turned with it or not, and the worst of them counts and is named; a motion from a
-    table is done as it stands. Several cycles are done one after the other, each with its rest.
+    The standard cycle is placed everywhere in the workspace and turned in all directions about the
+    vertical, the platform turned with it or not; the largest value of each quantity counts, with
+    its place. A motion from a table is taken as it is. Several cycles follow one another, each with
+    its dwell.
 
-    Forces are those of the drives: the bodies with the payload, friction and the rotors, as the
-    machine's file has them. What is not enough is told by leg and amount, of the drives in the file
-    as of a list of motors, and the exit code is 1.
+    Forces are those of the drives: the bodies with the payload, friction and the rotors, as in the
+    machine's file. If the drives in the file, or all motors of a list, are too weak, a warning says
+    for which leg and by how much, and the exit code is 1.
 
     A list of motors has the columns name, rotor_inertia (kg m^2), rated_torque and peak_torque
-    (N m), max_speed (rad/s). For each joint it is told which serve, the smallest first, from what
-    ratio to what ratio, and which ratio is best: least RMS torque. For legs that are alike the one
-    motor and ratio for all of them is told, too.
+    (N m), max_speed (rad/s). For each joint the output lists the motors that are strong enough, the
+    smallest first, with their range of gear ratios and the best one, of least RMS torque; for equal
+    legs also the one motor and ratio for all of them.
 
-    A folder gets sizing.csv, sizing.json, power.svg, force-speed.svg and motors.csv; the pictures
-    are of the place where the most power is needed.
+    A folder gets sizing.csv, sizing.json, power.svg, force-speed.svg and motors.csv; the figures
+    are for the place where the most power is needed.
 
     Options
     -------
-    --cycle CYCLE: adept, the standard pick-and-place cycle, or a table of a motion; again for more.
-        [default: adept]
-    --dwell: Rest after each cycle, s; again for that after each of several.
-    --within REGION: Where the cycle is done: workspace, here (as it stands), or a box of poses such
-        as x=-0.1:0.1,y=-0.1:0.1; along what it leaves out the cycle has the room that it takes as
-        it stands. [default: workspace; here of a table]
-    --friction SHARE: Dry friction of a drive that has none in the file, over its largest force; 0
-        leaves it out.
-    --motors FILE: Choose from the motors in this CSV or TOML file.
-    --margin: What drives and motors must be able to do, over what the cycle asks.
-    --out DIR|FILE: Write tables, numbers and pictures to a folder, or one table.
+    --cycle CYCLE: adept, the standard pick-and-place cycle, or the table of a motion; repeat for
+        several. [default: adept]
+    --dwell: Time at rest after each cycle, s; repeat for each of several cycles.
+    --within REGION: Where the cycle is placed: workspace, here (where it is defined), or a box of
+        poses such as x=-0.1:0.1,y=-0.1:0.1; coordinates not named keep the range of the cycle where
+        it is defined. [default: workspace; here for a table]
+    --friction SHARE: Dry friction of a drive without friction in the file, as a share of its
+        largest force; 0 assumes none.
+    --motors FILE: List of motors to choose from, a CSV or TOML file.
+    --margin: Required margin: limits of drives and motors over what the cycle needs.
+    --out DIR|FILE: Write tables, numbers and figures to a folder, or one table to a file.
 
     Examples
     --------
@@ -110,7 +111,7 @@ def size(
         common = choose_common(sizing, chosen, margin=margin)
     lacking = [*_weak(sizing, margin), *_unserved_legs(sizing, fits, margin)]
     warn(lacking)
-    request = _Asked(" and ".join(cycles), carried, where, margin)
+    request = _Request(tuple(cycles), carried, where, margin, friction)
     # A list of motors is what its choice is asked for.
     return destination.deliver(
         fits_frame(machine, fits) if fits and out is None else sizing.table(),
@@ -122,13 +123,14 @@ def size(
 
 
 @dataclass(frozen=True)
-class _Asked:
+class _Request:
     """The request, in the words of the options."""
 
-    cycle: str
+    cycles: tuple[str, ...]
     carried: Carried
     within: str
     margin: float
+    friction: float
 
 
 def _box(
@@ -150,9 +152,9 @@ def _box(
 def _weak(sizing: Sizing, margin: float) -> list[str]:
     """Return a line for each limit that a drive of the file does not meet by the margin."""
     beyond = [
-        f"leg {drive.leg}: not enough: {drive.limit} allow {drive.most:.4g} {drive.unit}, "
-        f"{drive.margin:.3g} times the {drive.needed:.4g} {drive.unit} that the cycle takes"
-        f"{sizing.place_text(drive)}, and a margin of {margin:g} is asked for"
+        f"leg {drive.leg}: not enough: {drive.limit} of the file: {drive.most:.4g} {drive.unit} is "
+        f"{drive.margin:.3g} times the {drive.needed:.4g} {drive.unit} that the cycle needs"
+        f"{sizing.place_text(drive)}; --margin requires {margin:g} times"
         for drive in sizing.margins
         if 1.0 <= drive.margin < margin * (1.0 - ROUNDING)
     ]
@@ -167,19 +169,19 @@ def _unserved_legs(sizing: Sizing, fits: tuple[MotorFit, ...], margin: float) ->
         if leg_fits and not leg_fits[0].fits:
             best = leg_fits[0]
             lines.append(
-                f"leg {leg}: not enough: no motor of the list serves; {best.motor.name}, the "
-                f"nearest, has {best.margin:.3g} times the {best.scarcest} that the cycle takes, "
-                f"and {margin:g} times is asked for"
+                f"leg {leg}: not enough: no motor of the list is strong enough; the nearest, "
+                f"{best.motor.name}, has {best.margin:.3g} times the {best.scarcest} that the "
+                f"cycle needs; --margin requires {margin:g} times"
             )
     return lines
 
 
-def _data(sizing: Sizing, fits: tuple[MotorFit, ...], request: _Asked) -> dict[str, Any]:
+def _data(sizing: Sizing, fits: tuple[MotorFit, ...], request: _Request) -> dict[str, Any]:
     """Return a sizing as JSON data: loads by drive, totals, margins, overloads and motors."""
     total = sizing.power.sum(axis=-1)
     return {
         "robot": sizing.robot.name,
-        "cycle": request.cycle,
+        "cycle": " and ".join(request.cycles),
         "within": request.within,
         "margin": request.margin,
         **asdict(request.carried),
@@ -223,46 +225,48 @@ def _further_files(sizing: Sizing, fits: tuple[MotorFit, ...]) -> dict[str, str]
 
 
 def _show(
-    sizing: Sizing, fits: tuple[MotorFit, ...], common: tuple[CommonFit, ...], request: _Asked
+    sizing: Sizing, fits: tuple[MotorFit, ...], common: tuple[CommonFit, ...], request: _Request
 ) -> None:
     """Print tables of loads, power and motors, and the choice."""
     dwell = f", {sizing.dwell:g} s of it at rest" if sizing.dwell else ""
+    cycles = " and ".join(map(cycle_text, request.cycles))
     places = (
-        f"The greatest of {len(sizing.places)} places and turns of the cycle, within "
-        f"{plain(request.within.replace('workspace', 'the workspace'))}."
+        f"All values are the largest over {len(sizing.places)} places and orientations of the "
+        f"cycle in {plain(request.within.replace('workspace', 'the workspace'))}."
     )
     show(
-        f"[bold]{plain(sizing.robot.name)}[/bold]{plain(str(request.carried))}, "
-        f"cycle {plain(request.cycle)}: "
+        f"[bold]{plain(sizing.robot.name)}[/bold]{plain(str(request.carried))}, {plain(cycles)}: "
         f"{sizing.duration:.4g} s{dwell}",
+        *_verdict(sizing, fits, request.margin),
         *([places] if sizing.places else []),
         _loads(sizing),
         *_places(sizing),
         _powers(sizing),
         *_rotors(sizing),
-        *_energy(sizing),
+        *_energy(sizing, request.friction),
         *motors_table(sizing.robot, fits),
         *common_table(sizing.robot, common),
-        *_verdict(sizing, fits, request.margin),
     )
 
 
-def _energy(sizing: Sizing) -> list[str]:
+def _energy(sizing: Sizing, share: float) -> list[str]:
     """Return lines on the energy of all drives over a cycle, and on assumed friction."""
     total = sizing.power.sum(axis=-1)
     net = sizing.net_energy
-    exchanged = f"{sizing.given_energy.sum():.4g} J given and taken back: there is no friction"
+    given = significant(float(sizing.given_energy.sum()))
+    without = "" if net else f" ({given} J supplied and braked: there is no friction)"
+    mean, peak = significant(net / sizing.duration), significant(float(total.max()))
     lines = [
-        f"All drives: {net:.4g} J a cycle{'' if net else f' ({exchanged})'}, "
-        f"{net / sizing.duration:.4g} W in the mean, {total.max():.4g} W at most"
+        f"All drives together: net energy {significant(net)} J per cycle{without}, "
+        f"mean power {mean} W, peak power {peak} W"
     ]
     if sizing.assumed_friction.any():
         units = [leg.joint.force_unit for leg in sizing.robot.legs]
         forces = zip(sizing.assumed_friction, units, strict=True)
-        values = ", ".join(f"{force:.3g} {unit}" if force else "-" for force, unit in forces)
+        texts = ", ".join(f"{force:.3g} {unit}" if force else "-" for force, unit in forces)
         lines.append(
-            f"Friction is assumed where the file has none: dry, leg by leg {values}; --friction "
-            "SHARE changes it, 0 leaves it out"
+            f"Where the file has no friction, dry friction of {percent(share)} of the drive's peak "
+            f"is assumed, leg by leg: {texts} (--friction SHARE; 0 leaves it out)"
         )
     return lines
 
@@ -274,9 +278,9 @@ def _verdict(sizing: Sizing, fits: tuple[MotorFit, ...], margin: float) -> list[
         least = min(sizing.margins, key=lambda limit: limit.margin)
         enough = "Enough" if least.margin >= margin * (1.0 - ROUNDING) else "Not enough"
         lines.append(
-            f"{enough}: the drives in the file have a margin of {least.margin:.3g}, {margin:g} "
-            f"asked; least is leg {least.leg}'s: {least.limit} allow {least.most:.4g} "
-            f"{least.unit}, the cycle takes {least.needed:.4g} {least.unit}"
+            f"{enough}: the drives in the file have {least.margin:.3g} times what the cycle needs "
+            f"({margin:g} required). The tightest limit: {least.limit} of leg {least.leg}, "
+            f"{least.most:.4g} {least.unit}; needed: {least.needed:.4g} {least.unit}"
             f"{sizing.place_text(least)}"
         )
     best = [next(f for f in fits if f.leg == leg) for leg in sorted({fit.leg for fit in fits})]
@@ -284,9 +288,14 @@ def _verdict(sizing: Sizing, fits: tuple[MotorFit, ...], margin: float) -> list[
         least_fit = min(best, key=lambda fit: (fit.fits, fit.margin))
         enough = "Enough" if all(fit.fits for fit in best) else "Not enough"
         lines.append(
-            f"{enough}: the first motor listed for each leg has a margin of {least_fit.margin:.3g} "
-            f"or more, {margin:g} asked; least is leg {least_fit.leg}'s {least_fit.scarcest} with "
-            f"{plain(least_fit.motor.name)}"
+            f"{enough}: the first motor listed for each leg has at least {least_fit.margin:.3g} "
+            f"times what the cycle needs ({margin:g} required). The tightest limit: "
+            f"{least_fit.scarcest} of {plain(least_fit.motor.name)} at leg {least_fit.leg}"
+        )
+    if not lines:
+        lines.append(
+            "The file states no limits of the drives: these are the values that they must reach. "
+            "--motors FILE selects motors from a list."
         )
     return lines
 
@@ -295,14 +304,14 @@ def _places(sizing: Sizing) -> list[rich.table.Table]:
     """Return a table of the places where each leg's force and speed are greatest."""
     rows = []
     for worst in _worst(sizing):
-        pose = " ".join(f"{round(value, 6) + 0.0:.4g}" for value in worst["pose"])
+        pose = " ".join(f"{round(value, 4) + 0.0:.3g}" for value in worst["pose"])
         quantity = _NAMED[worst["quantity"]].format(sizing.robot.legs[worst["leg"] - 1].joint.force)
         leg = str(worst["leg"]) if worst["quantity"] == "peak_force" else ""
-        rows.append((leg, quantity, pose, f"{math.degrees(worst['turn']) % 360:.4g} deg"))
+        rows.append((leg, quantity, pose, f"{math.degrees(worst['turn']) % 360:.3g} deg"))
     platform, coordinates = sizing.robot.platform, " ".join(sizing.robot.coordinates)
     units = ", ".join(["m"] * bool(platform.lengths) + ["rad"] * bool(platform.angles))
-    names = "leg", "is greatest", f"about {coordinates} ({units})", "turned"
-    return [table(*names, rows=rows, numbers=("leg", "turned"))] if rows else []
+    names = "leg", "largest", f"for a cycle centred at {coordinates} ({units})", "and turned by"
+    return [table(*names, rows=rows, numbers=("leg", names[-1]))] if rows else []
 
 
 def _loads(sizing: Sizing) -> rich.table.Table:
@@ -313,17 +322,20 @@ def _loads(sizing: Sizing) -> rich.table.Table:
     rows = []
     for i, leg in enumerate(sizing.robot.legs):
         units = [leg.joint.force_unit] * 2 + [f"{leg.joint.unit}/s"] * 2
-        cells = (f"{v[i]:.4g} {unit}" for v, unit in zip(columns, units, strict=True))
+        cells = (f"{significant(v[i])} {unit}" for v, unit in zip(columns, units, strict=True))
         rows.append((str(i + 1), *cells))
     return table(*names, rows=rows, numbers=names)
 
 
 def _powers(sizing: Sizing) -> rich.table.Table:
     """Return a table of each drive's power (W) and energy (J), motoring and braking."""
-    names = ("leg", "peak (W)", "mean (W)", "brakes (W)", "gives (J)", "takes back (J)")
+    names = (
+        *("leg", "peak power (W)", "mean power (W)", "peak braking (W)"),
+        *("energy supplied (J)", "energy braked (J)"),
+    )
     powers = (sizing.peak_power, sizing.mean_power, sizing.peak_braking)
     columns = zip(*powers, sizing.given_energy, sizing.braked_energy, strict=True)
-    rows = ((str(i), *(f"{v:.4g}" for v in values)) for i, values in enumerate(columns, start=1))
+    rows = ((str(i), *map(significant, values)) for i, values in enumerate(columns, start=1))
     return table(*names, rows=rows, numbers=names)
 
 
@@ -331,13 +343,18 @@ def _rotors(sizing: Sizing) -> list[rich.table.Table]:
     """Return a table of the motors' loads and inertia ratios; none without rotor or ratio."""
     if not any(drive.ratio or drive.rotor_inertia for drive in sizing.drives):
         return []
-    names = ("leg", "load", "rotor", "load/rotor", "ratio", "best ratio", "RMS at motor")
+    names = (
+        *("leg", "load inertia", "rotor inertia", "load/rotor", "gear ratio"),
+        *("best ratio", "RMS motor torque"),
+    )
     rows = []
     for leg, row in zip(sizing.robot.legs, sizing.table().to_dicts(), strict=True):
         inertia = " kg" if leg.joint.unit == "m" else " kg m^2"
         units = {"greatest_load_inertia": inertia, "rotor_inertia": inertia, "inertia_ratio": ""}
         units |= {"ratio": "", "best_ratio": f" rad/{leg.joint.unit}", "rms_motor_torque": " N m"}
-        cells = ("-" if row[k] is None else f"{row[k]:.3g}{unit}" for k, unit in units.items())
+        cells = (
+            "-" if row[k] is None else f"{significant(row[k])}{unit}" for k, unit in units.items()
+        )
         rows.append((str(row["leg"]), *cells))
-    caption = "Inertia at the joint, the load's greatest."
+    caption = "Inertias referred to the joint, the load's at its largest."
     return [table(*names, rows=rows, numbers=names, caption=caption)]

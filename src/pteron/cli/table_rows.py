@@ -57,48 +57,49 @@ class TableRows:
         from pteron.errors import UnlikelyValue
         from pteron.kinematics.unlikely_values import unlikely_values
 
-        values = self.table.numbers(columns, on_failure)
-        unlikely = "; ".join(unlikely_values(robot, columns, values))
+        numbers = self.table.numbers(columns, on_failure)
+        unlikely = "; ".join(unlikely_values(robot, columns, numbers))
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UnlikelyValue)  # it is told once, of the whole table
-            if len(values) <= LONG:
-                parts = list(self._chunks(serve, values, unlikely))
+            if len(numbers) <= LONG:
+                parts = list(self._chunks(serve, numbers, unlikely))
             else:
                 parts = []
                 with progress_bar(self.table.source) as tell:
-                    for part in self._chunks(serve, values, unlikely):
+                    for part in self._chunks(serve, numbers, unlikely):
                         parts.append(part)
-                        tell(min(len(parts) * CHUNK / len(values), 1.0))
+                        tell(min(len(parts) * CHUNK / len(numbers), 1.0))
         if unlikely:
             note(f"Note: {self.table.source}: {unlikely}")
         return np.concatenate(parts)
 
     def _chunks(
-        self, serve: Callable[[NDArray[Any]], NDArray[Any]], values: NDArray[Any], unlikely: str
+        self, serve: Callable[[NDArray[Any]], NDArray[Any]], numbers: NDArray[Any], unlikely: str
     ) -> Iterator[NDArray[Any]]:
         """Yield results of `serve` by chunks of rows; an error names the row that fails."""
-        for start in range(0, len(values), CHUNK):
+        for start in range(0, len(numbers), CHUNK):
             try:
-                yield serve(values[start : start + CHUNK])
+                yield serve(numbers[start : start + CHUNK])
             except (UnreachablePose, SingularPose) as error:
                 if not error.index:
                     raise
-                self._refuse(serve, values, start + error.index[0], unlikely)
+                self._refuse(serve, numbers, start + error.index[0], unlikely)
                 raise
 
     def _refuse(
         self,
         serve: Callable[[NDArray[Any]], NDArray[Any]],
-        values: NDArray[Any],
+        numbers: NDArray[Any],
         row: int,
         unlikely: str,
     ) -> None:
         """Evaluate the row that fails alone, so that the message names it."""
         try:
-            serve(values[row])
+            serve(numbers[row])
         except PteronError as error:
             is_millimetres = isinstance(error, UnreachablePose) and error.millimetres
-            doubt = f"; {unlikely}" if unlikely and not is_millimetres else ""
+            is_told = is_millimetres or unlikely in str(error)
+            doubt = f"; {unlikely}" if unlikely and not is_told else ""
             if self.single:
                 raise PteronError(f"{error}{doubt}") from None
             raise PteronError(
@@ -114,7 +115,7 @@ def given_rows(
     what: str,
     names: Sequence[str],
 ) -> TableRows:
-    """Return the rows of a table's file, or the typed row; `names` are its columns."""
+    """Return the rows of a table's file, or the single typed row, with columns `names`."""
     if not typed:
         return rows_of_table(robot, file, what, names)
     if file is not None:
@@ -122,11 +123,11 @@ def given_rows(
     return single_row(names, parsed_numbers(typed, names, what))
 
 
-def single_row(columns: Sequence[str], values: Sequence[float]) -> TableRows:
-    """Return the typed row."""
+def single_row(columns: Sequence[str], numbers: Sequence[float]) -> TableRows:
+    """Return numbers that were typed on the command line as a table of one row."""
     from pteron.cli.typed_row import TypedRow
 
-    return TableRows(TypedRow({name: [value] for name, value in zip(columns, values, strict=True)}))
+    return TableRows(TypedRow({name: [q] for name, q in zip(columns, numbers, strict=True)}))
 
 
 def rows_of_table(
@@ -146,7 +147,7 @@ def rows_of_table(
 def check_destination(
     out: str | None, source: str | None, table: Table | TypedRow, added: Sequence[str]
 ) -> None:
-    """Refuse, before the work begins, a file that cannot be written or would lose data."""
+    """Raise OutputError, before the work begins, if a file cannot be written or would lose data."""
     # The columns added replace those of the same name, in another file than the table's own.
     replaced = [name for name in added if name in table.columns]
     columns = f"{'column' if len(replaced) == 1 else 'columns'} {', '.join(replaced)}"
@@ -162,40 +163,49 @@ def check_destination(
 
 def deliver(
     robot: Manipulator,
-    result: Table | TypedRow,
+    delivered: Table | TypedRow,
     shown: Sequence[str],
     *,
     out: str | None,
     as_json: bool,
+    caption: str,
     single: bool = False,
 ) -> None:
-    """Write a result with all its columns to a file or a program, or show some to a person."""
+    """Write a result with all its columns to a file or a program, or show some to a person.
+
+    `caption` says what the shown columns are.
+    """
     # The last column shown is empty in a row that failed.
-    empty = result.empty(shown[-1])
+    empty = delivered.empty(shown[-1])
     without = f", {empty} of them without a result" if empty else ""
     if out is not None:
         from pteron.tables import write_table
 
-        write_table(result.frame, out)
+        write_table(delivered.frame, out)
         if as_json:
-            show_json({"out": out, "rows": len(result), "empty": empty})
+            show_json({"out": out, "rows": len(delivered), "empty": empty})
         else:
-            note(f"Wrote {_count(len(result))} to {out}{without}")
+            note(f"Wrote {_count(len(delivered))} to {out}{without}")
     elif as_json:
-        text = result.json()
+        text = delivered.json()
         write(text[1:-1] if single else text)
         write("\n")
     elif is_terminal():
-        _show(robot, result, shown, single=single)
+        _show(robot, delivered, shown, caption, single=single)
     else:
-        for text in result.text():
+        for text in delivered.text():
             write(text)
         if empty and not single:
-            note(f"Printed {_count(len(result))}{without}")
+            note(f"Printed {_count(len(delivered))}{without}")
 
 
 def _show(
-    robot: Manipulator, result: Table | TypedRow, shown: Sequence[str], *, single: bool
+    robot: Manipulator,
+    delivered: Table | TypedRow,
+    shown: Sequence[str],
+    caption: str,
+    *,
+    single: bool,
 ) -> None:
     """Print the first rows of a result as a table, with units in its headings."""
     known = robot.column_units
@@ -203,14 +213,15 @@ def _show(
     headings = [f"{n} ({unit})" if unit else n for n, unit in zip(shown, units, strict=True)]
     rows = [
         [str(i), *map(_text, cells, units)]
-        for i, cells in enumerate(result.rows(shown, SHOWN_ROWS), start=1)
+        for i, cells in enumerate(delivered.rows(shown, SHOWN_ROWS), start=1)
     ]
+    show(caption)
     if single or "mode" in shown:
         show(table(*headings, rows=(row[1:] for row in rows), numbers=tuple(headings)))
     else:
         show(table("row", *headings, rows=rows, numbers=("row", *headings)))
-    if len(result) > SHOWN_ROWS:
-        note(f"{SHOWN_ROWS} of {_count(len(result))} shown; --out FILE writes them all")
+    if len(delivered) > SHOWN_ROWS:
+        note(f"{SHOWN_ROWS} of {_count(len(delivered))} shown; --out FILE writes them all")
 
 
 def _text(cell: float | int | None, unit: str) -> str:

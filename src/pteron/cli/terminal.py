@@ -106,9 +106,9 @@ def write(text: str) -> None:
         sys.stdout.write(text[start : start + _PIECE])
 
 
-def show_json(data: Any) -> None:
+def show_json(record: Any) -> None:
     """Print data on standard output as JSON, with null for NaN and infinity."""
-    write(json.dumps(json_ready(data), indent=2, allow_nan=False) + "\n")
+    write(json.dumps(json_ready(record), indent=2, allow_nan=False) + "\n")
 
 
 def table(
@@ -144,6 +144,18 @@ def file_lines(*paths: object) -> list[str]:
 def percent(share: float) -> str:
     """Return a share in percent; a small one is not rounded to zero."""
     return "under 0.1 %" if 0.0 < share < 1e-3 else f"{100.0 * share:.3g} %"
+
+
+def significant(value: float, digits: int = 3) -> str:
+    """Return a number with significant digits, without an exponent below a million.
+
+    Examples
+    --------
+    >>> significant(5526.8), significant(0.31437)
+    ('5527', '0.314')
+    """
+    text = f"{value:.{digits}g}"
+    return f"{value:.0f}" if "e+" in text and abs(value) < 1e6 else text
 
 
 def ascii_number(text: str) -> str:

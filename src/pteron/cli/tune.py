@@ -11,7 +11,7 @@ from pteron.cli.motion_argument import Carried, cycle_of
 from pteron.cli.progress import spinner
 from pteron.cli.result import CommandResult
 from pteron.cli.simulate import Name, controller_of
-from pteron.cli.terminal import plain, show, table
+from pteron.cli.terminal import plain, show, significant, table
 
 if TYPE_CHECKING:
     import polars as pl
@@ -52,11 +52,11 @@ def tune(
     """Choose gains of a controller with stability margins that hold in a cycle and the workspace.
 
     The loop of machine, drives, encoders, controller and delay is linearised at moments of the
-    cycle and at poses of the workspace, with all coupling of the closed chain; from sample to
-    sample it is exact. The greatest bandwidth is chosen that has the margins everywhere, with more
-    damping where none has. Transmissions that bend and currents that lag, as the drives in the
-    robot's file say, are in it. Then the cycle is simulated with other bandwidths, delays, encoders
-    and, where transmissions bend, stiffnesses.
+    cycle and at poses of the workspace, with all coupling of the closed chain, and discretised
+    exactly. The result is the largest bandwidth that has the margins at all of them; if none has,
+    damping is increased. Elastic transmissions and lagging currents, as the drives in the robot's
+    file state them, are included. Then the cycle is simulated with other bandwidths, delays,
+    encoders and, for elastic transmissions, stiffnesses.
 
     A folder gets gains.toml, which pteron simulate, pteron export and
     pteron.controllers.read_gains take, tuning.html, tuning.csv with the margins of each pose, and
@@ -64,16 +64,16 @@ def tune(
 
     Options
     -------
-    --controller: Whose gains; see docs/controllers.md.
-    --rate: Samples of the controller a second.
-    --bandwidth: Take this one, rad/s; refused where it has not the margins.
-    --gain-margin: Factor on a drive's force, or on all, at which the loop becomes unstable.
-    --phase-margin: At each drive, degrees.
-    --delay-margin: Further delay, s, beyond --delay; 0 asks for none.
-    --encoder: Step of the encoders at the joints, m or rad; rates are then differences.
-    --cutoff: Of the filter on these rates, Hz. [default: no filter]
-    --delay: From a sample to the drives' force, s.
-    --encoders STEPS: Steps of the encoders in the trials, m or rad.
+    --controller: Control law to tune; see docs/controllers.md.
+    --rate: Sample rate of the controller, Hz.
+    --bandwidth: Use this bandwidth, rad/s; an error if it lacks the margins.
+    --gain-margin: Required factor on one drive's force, or on all, before the loop is unstable.
+    --phase-margin: Required phase margin at each drive, degrees.
+    --delay-margin: Required further delay, s, beyond --delay; 0 requires none.
+    --encoder: Resolution of the joints' encoders, m or rad; rates are then differences.
+    --cutoff: Cut-off of the filter on these rates, Hz. [default: no filter]
+    --delay: Delay from a sample to the drives' force, s.
+    --encoders STEPS: Resolutions of the encoders in the trials, m or rad.
     --out DIR|FILE: Write gains, margins and page to a folder, or the table of margins to a file.
 
     Examples
@@ -110,7 +110,7 @@ def tune(
             stiffnesses=_STIFFNESSES if bends(machine) else (),
             **how,
         )
-    data = {
+    record = {
         "robot": machine.name,
         "cycle": cycle,
         "controller": controller,
@@ -122,7 +122,7 @@ def tune(
         "trials": tried.to_dicts(),
     }
     person = partial(_show, tuning, controller, tried)
-    return destination.deliver(tuning.table(), data, partial(_files, tuning, tried), person)
+    return destination.deliver(tuning.table(), record, partial(_files, tuning, tried), person)
 
 
 def _files(tuning: Tuning, tried: pl.DataFrame) -> dict[str, str]:
@@ -136,40 +136,57 @@ def _files(tuning: Tuning, tried: pl.DataFrame) -> dict[str, str]:
     }
 
 
+_TRIED = {
+    "bandwidth": ("controller bandwidth (rad/s)", 1.0),
+    "delay": ("delay (ms)", 1e3),
+    "encoder": ("encoder step (u{unit})", 1e6),
+    "stiffness": ("transmission stiffness over the file's", 1.0),
+}
+"""What the trials change, in words with its unit, and the factor to that unit."""
+
+
 def _show(tuning: Tuning, controller: str, tried: pl.DataFrame) -> None:
-    """Print the gains, the least margins, and the trials."""
+    """Print the gains, the least margins beside the required ones, and the trials."""
     import numpy as np
 
-    least, gains = tuning.least, tuning.gains()
-    rows = zip(tuning.robot.joint_names, *gains.values(), strict=True)
-    unit = "urad" if tuning.robot.platform.angular.all() else "um"
-    tries = [
-        (
-            *(row["changed"], f"{row['value']:.4g}"),
-            *(
-                ("ended early", "", "", "")
-                if row["stopped"]
-                else (
-                    f"{1e6 * row['error']:.3g} {unit}",
-                    "does not" if np.isnan(row["settling"]) else f"{1e3 * row['settling']:.3g} ms",
-                    f"{row['peak_force']:.4g}",
-                    f"{row['energy']:.4g} J",
-                )
-            ),
+    from pteron.report.tuning_page import force_units, gain_units
+
+    robot, least, gains = tuning.robot, tuning.least, tuning.gains()
+    rows = zip(robot.joint_names, *gains.values(), strict=True)
+    units = (unit.replace("\u00b2", "^2") for unit in gain_units(tuning))
+    headings = [f"{n} ({unit})" if unit else n for n, unit in zip(gains, units, strict=True)]
+    unit = "urad" if robot.platform.angular.all() else "um"
+    joint_unit = "/".join(dict.fromkeys(leg.joint.unit for leg in robot.legs))
+    tries = []
+    for row in tried.to_dicts():
+        name, factor = _TRIED[row["changed"]]
+        figures = (
+            ("ended early", "", "", "")
+            if row["stopped"]
+            else (
+                f"{significant(1e6 * row['error'])} {unit}",
+                "never" if np.isnan(row["settling"]) else f"{1e3 * row['settling']:.3g} ms",
+                significant(row["peak_force"]),
+                f"{significant(row['energy'])} J",
+            )
         )
-        for row in tried.to_dicts()
-    ]
-    names = ("changed", "value", "greatest error", "settled after", "peak force", "energy")
-    rate = tuning.controller.bandwidth
-    chosen = "" if rate is None else f", {np.max(rate):.4g} rad/s"
+        tries.append((name.format(unit=joint_unit), f"{factor * row['value']:.3g}", *figures))
+    force = f"peak force ({' or '.join(force_units(robot))})".replace("(share)", "/limit")
+    names = ("simulated with", "value", "largest error", "settling time", force, "energy")
+    rate, required = tuning.controller.bandwidth, tuning.required
+    bandwidth = "" if rate is None else f", bandwidth {np.max(rate):.3g} rad/s"
     show(
-        f"[bold]{plain(tuning.robot.name)}[/bold], {controller}{chosen}: at {len(tuning.states)} "
-        f"poses a gain margin of {least['gain']:.3g}, {np.degrees(least['phase']):.3g} degrees, "
-        f"{1e3 * least['delay']:.3g} ms; disk margin {least['disk']:.3g}",
+        f"[bold]{plain(robot.name)}[/bold]: gains found for controller {controller}{bandwidth}. "
+        f"Smallest stability margins at {len(tuning.states)} poses (required): "
+        f"gain {least['gain']:.3g} ({required.gain:g}), "
+        f"phase {np.degrees(least['phase']):.3g} deg ({np.degrees(required.phase):.3g}), "
+        f"delay {1e3 * least['delay']:.3g} ms ({1e3 * required.delay:g}), "
+        f"disk margin {least['disk']:.3g} (errors of gain and phase in all drives; 0 is unstable).",
         table(
-            "joint",
-            *gains,
-            rows=((name, *(f"{g:.6g}" for g in joint_gains)) for name, *joint_gains in rows),
+            *("joint", *headings),
+            rows=((name, *(significant(g, 4) for g in joint_gains)) for name, *joint_gains in rows),
+            numbers=tuple(headings),
         ),
+        "The cycle simulated with these gains, one parameter changed at a time:",
         table(*names, rows=tries, numbers=names[1:]),
     )

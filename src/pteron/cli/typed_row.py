@@ -52,7 +52,7 @@ class TypedRow:
 
     def with_columns(self, results: Mapping[str, ArrayLike]) -> TypedRow:
         """Return the rows with columns of results added, as `Table.extended` does."""
-        added = {name: _column(values) for name, values in results.items()}
+        added = {name: _column(column) for name, column in results.items()}
         return replace(self, cells=self._drop_columns(results) | added)
 
     def repeat_modes(self, modes: Sequence[int | None], replaced: Collection[str]) -> TypedRow:
@@ -62,7 +62,7 @@ class TypedRow:
         """
         columns = self._drop_columns({"row", "mode", *replaced})
         count = len(modes)
-        cells = {name: [*values] * count for name, values in columns.items()}
+        cells = {name: [*column] * count for name, column in columns.items()}
         return replace(self, cells={"row": [1] * count, **cells, "mode": modes})
 
     def empty(self, column: str) -> int:
@@ -92,12 +92,12 @@ class TypedRow:
 
     def _drop_columns(self, names: Collection[str]) -> dict[str, Sequence[Cell]]:
         """Return the columns except those named."""
-        return {name: values for name, values in self.cells.items() if name not in names}
+        return {name: cells for name, cells in self.cells.items() if name not in names}
 
 
-def _column(values: ArrayLike) -> list[Cell]:
+def _column(numbers: ArrayLike) -> list[Cell]:
     """Return values as a list of cells, with None for NaN."""
-    return [None if value != value else value for value in np.asarray(values).tolist()]
+    return [None if number != number else number for number in np.asarray(numbers).tolist()]
 
 
 def _text(cell: Cell) -> str:

@@ -35,21 +35,21 @@ def view(
 ) -> None:
     """Show a machine in the browser, where it can be moved; Ctrl-C ends it.
 
-    Sliders and the mouse move the platform or the joints, or a spring pulls at it; the page tells
-    the drives' forces, the condition number and how far the machine is from singularities and
-    limits, shows slices of the workspace and plays motions, logs and simulations. docs/view.md
-    tells more.
+    Sliders and the mouse move the platform or the joints, or a spring pulls at it; the page shows
+    the drives' forces, the condition number, the distances from singularities and limits, and
+    slices of the workspace, and plays motions, logs and simulations. See docs/view.md.
 
     Options
     -------
     --motion CYCLE: Play adept, the standard pick-and-place cycle, or a file: a motion, a simulation
         or a log.
-    --compare ROBOT: Another machine with such legs, in grey in the same pose.
-    --enlarge TIMES: How often the compared machine's differences are taken. [default: well seen]
-    --beside ROBOT: A further machine, side by side with the first; as often as you like.
-    --host: The address to serve at; by default this machine alone.
-    --port: Its port, or the next one that is free; 0 is any.
-    --no-browser: Print the address, and open no browser.
+    --compare ROBOT: Another machine with legs of the same kind, in grey in the same pose.
+    --enlarge TIMES: Factor by which differences of the compared machine are enlarged. [default:
+        chosen so that they are visible]
+    --beside ROBOT: Another machine beside the first; repeat for several.
+    --host: Address of the server; the default is reachable from this computer alone.
+    --port: Port of the server, or the next free one; 0 is any.
+    --no-browser: Print the address without opening a browser.
 
     Examples
     --------

@@ -64,39 +64,39 @@ def workspace(
     type_i: float | None = None,
     type_ii: float | None = None,
 ) -> CommandResult:
-    """Map the workspace: where the machine reaches, what ends it, and how good it is there.
+    """Map the workspace: its extent, what limits it, and an index of performance in it.
 
-    An index of performance is mapped over the poses of a grid; with none, the distance to the end
-    of the reach. A machine that is singular everywhere is told so before anything else. Pictures
-    hatch what is out of reach, and bright is better; lengths are in mm, angles in degrees.
+    The index is mapped over the poses of a grid; without --index, the distance to the boundary of
+    the workspace is. A warning says if the machine is singular everywhere. Pictures hatch poses out
+    of reach, and brighter is better; lengths are in mm, angles in degrees.
 
-    Coordinates that --slice does not name vary over the reach. Surfaces are for three that vary, a
+    Coordinates that --slice does not name vary over the workspace. Surfaces need three that vary; a
     film goes through the last of three.
 
-    With --certify or --prove nothing is mapped: intervals prove, rounding and all, how large the
-    workspace is at an orientation (--slice phi=VALUE), or that every pose of a box is in reach and
-    within limits. Where that is not so, a pose and the reason are shown, and the exit code is 1.
+    With --certify or --prove nothing is mapped: interval arithmetic proves, rounding included, how
+    large the workspace is at an orientation (--slice phi=VALUE), or that every pose of a box is in
+    reach and within limits. If not, the output names a pose and the reason, and the exit code is 1.
 
-    A .zarr grows chunk by chunk: the same command after an interruption goes on with what is left.
-    A cluster's workers write to it, so they must reach it by the same path.
+    A .zarr store grows chunk by chunk: the same command resumes after an interruption. Workers of a
+    cluster write to it, so they must reach it by the same path.
 
     Options
     -------
-    --index INDEX: What to map: condition, kappa, pressure_angle, ...; may be given several times.
-        [default: the distance to the end of the reach]
-    --slice NAME=VALUE,...: What is held, and what ranges: z=0,phi=0 or z=0,phi=-1:1; m and rad. The
-        rest varies. [default: the plane through the home pose]
-    --points: Along each coordinate that varies. [default: 200 in a plane, 100 in space]
+    --index INDEX: Index to map: condition, kappa, pressure_angle, ...; repeat for several.
+        [default: the distance to the boundary of the workspace]
+    --slice NAME=VALUE,...: Fixed coordinates, and ranges of others: z=0,phi=0 or z=0,phi=-1:1; m
+        and rad. All others vary. [default: the plane through the home pose]
+    --points: Points along each coordinate that varies. [default: 200 in a plane, 100 in space]
     --out FILE: A picture (.png .svg .pdf), data (.csv .parquet .npz .zarr), surfaces (.vtk .vtu
         .ply .stl) or a film (.mp4 .gif).
-    --engine: What computes: jax takes an accelerator.
-    --workers: Processes of this computer that share the work.
-    --certify: Prove how large the workspace is, what ends it, and a cube in it.
-    --prove NAME=LEAST:GREATEST,...: Prove that all poses of a box serve: x=-0.05:0.05,y=0:0.1,z=0;
-        m and rad.
-    --tolerance SHARE: With --certify: greatest undecided share. [default: 0.05]
-    --type-i FLOOR: With a proof: least type-I measure of every leg.
-    --type-ii FLOOR: With a proof: least type-II measure.
+    --engine: Engine that computes: jax uses an accelerator.
+    --workers: Number of processes on this computer.
+    --certify: Prove the size of the workspace, what limits it, and a cube inside.
+    --prove NAME=LEAST:GREATEST,...: Prove that all poses of a box can be used:
+        x=-0.05:0.05,y=0:0.1,z=0; m and rad.
+    --tolerance SHARE: With --certify: largest undecided share of the volume. [default: 0.05]
+    --type-i FLOOR: In a proof: least type-I measure of every leg, 0 stretched or folded, 1 at best.
+    --type-ii FLOOR: In a proof: least type-II measure, 0 where the drives cannot hold the platform.
 
     Examples
     --------
@@ -112,7 +112,7 @@ def workspace(
     other = {"scheduler": scheduler, "engine": None if engine == "auto" else engine}
     proofs.check({**maps, **other}, slice_)
     warnings = _warnings(machine)
-    if proofs.any_requested:
+    if proofs.has_requests:
         return proofs.result(machine, slice_, warnings)
     from pteron.maps import map_index
 
@@ -144,18 +144,18 @@ def workspace(
         )
     if out is not None and ending in (*_PICTURES, *_FILMS):
         _draw(index_map, out, ending)
-    data = map_data(index_map, volume, [*warnings, *outside], out)
-    return CommandResult(data, partial(_show, index_map, volume, data, out))
+    record = map_data(index_map, volume, [*warnings, *outside], out)
+    return CommandResult(record, partial(_show, index_map, volume, record, out))
 
 
 def _show(
-    index_map: Map, volume: ReachVolume | None, data: dict[str, Any], out: str | None
+    index_map: Map, volume: ReachVolume | None, record: dict[str, Any], out: str | None
 ) -> None:
     """Print a map on a terminal, or write its rows as CSV to a pipe; then list the files."""
     if is_terminal():
-        show_map(index_map, volume, data)
+        show_map(index_map, volume, record)
     else:
-        write(map_rows(data).write_csv())
+        write(map_rows(record).write_csv())
     if out is not None:
         (show if is_terminal() else note)(*file_lines(out))
 
@@ -239,7 +239,7 @@ def _home(robot: Manipulator, names: Collection[str]) -> dict[str, float]:
     from pteron.workspace import home_pose
 
     pairs = zip(robot.coordinates, home_pose(robot).tolist(), strict=True)
-    return {name: value for name, value in pairs if name in names}
+    return {name: coordinate for name, coordinate in pairs if name in names}
 
 
 def _with_frames(grid: Grid) -> Grid:

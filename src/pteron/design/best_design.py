@@ -56,7 +56,7 @@ def prove_best_design(evaluator: KindEvaluator, ratings: list[Rating]) -> Candid
                 return candidate
             # Where no design keeps the whole margin between the search's places, the best serves.
             tight = tight or (None if why else candidate)
-    return tight or Candidate(evaluator.kind.name, False, (f"no proof ({why})",), *counts)
+    return tight or Candidate(evaluator.kind.name, False, (f"failed its check ({why})",), *counts)
 
 
 def _cell_violation(evaluator: KindEvaluator, rating: Rating) -> str:
@@ -69,7 +69,7 @@ def _cell_violation(evaluator: KindEvaluator, rating: Rating) -> str:
 
     sizes, misses = evaluator.machine_space.judge_extents(evaluator.worst(robot, extents, DENSE)[0])
     rating.figures |= sizes
-    return "".join(f"not so: {words}" for _, words in list(misses.values())[:1])
+    return "".join(words for _, words in list(misses.values())[:1])
 
 
 def _exceeded_limit(evaluator: KindEvaluator, candidate: Candidate) -> str:
@@ -78,11 +78,14 @@ def _exceeded_limit(evaluator: KindEvaluator, candidate: Candidate) -> str:
     bounds = {"error": job.accuracy, "deflection": job.stiffness}
     for name, limit in bounds.items():
         if limit is not None and figures[name] > limit.most:
-            return f"not so: {name} of {1e3 * figures[name]:.3g} mm, {1e3 * limit.most:g} mm asked"
+            return f"{name} of {1e3 * figures[name]:.3g} mm, {1e3 * limit.most:g} mm allowed"
     if figures["clearance"] < job.floors.clearance:
-        return f"not so: a clearance of {1e3 * figures['clearance']:.3g} mm"
+        return (
+            f"clearance of {1e3 * figures['clearance']:.3g} mm, "
+            f"{1e3 * job.floors.clearance:g} mm required"
+        )
     least = candidate.least_margin
-    return f"not so: the drives' margin is {least:.3g} at {candidate.worst}" if least < 1.0 else ""
+    return f"drive margin of {least:.3g} at {candidate.worst}" if least < 1.0 else ""
 
 
 def shown_objectives(objectives: Sequence[str]) -> list[str]:
@@ -151,8 +154,8 @@ def _clear_words(evaluator: KindEvaluator, robot: Manipulator, middle: Array) ->
     if not len(evaluator.between) and is_clear(evaluator, robot, middle):
         return f"proved: no two links, guides or the platform {distance_words}"
     return (
-        f"at {count} sample poses and about the worst of them no two links, guides or the "
-        f"platform {distance_words}: seen there, without a proof"
+        f"no two links, guides or the platform {distance_words} at {count} sampled poses and near "
+        "the worst of them (not proved)"
     )
 
 

@@ -16,12 +16,12 @@ MARGINS = {"rated": "rated torque", "peak": "peak torque", "speed": "speed"}
 _FIGURES = {
     "price": ("price (as in lists)", 1.0),
     "cycle_time": ("cycle (s)", 1.0),
-    "shortest_time": ("shortest (s)", 1.0),
-    "error": ("error (mm)", 1e3),
-    "deflection": ("gives way (mm)", 1e3),
-    "clearance": ("clear (mm)", 1e3),
-    "moving_mass": ("mass (kg)", 1.0),
-    "energy": ("energy (J)", 1.0),
+    "shortest_time": ("shortest cycle (s)", 1.0),
+    "error": ("tool error (mm)", 1e3),
+    "deflection": ("deflection (mm)", 1e3),
+    "clearance": ("clearance (mm)", 1e3),
+    "moving_mass": ("moving mass (kg)", 1.0),
+    "energy": ("energy per cycle (J)", 1.0),
 }
 """Figures of a candidate that are shown: their headings and factors."""
 
@@ -77,8 +77,19 @@ class Candidate(Result):
 
     def __repr__(self) -> str:
         """Return the candidate in a line."""
-        counts = f"{self.kept} of {self.evaluated} designs keep all that is asked"
-        return f"<Candidate of {self.kind!r}: {counts}>"
+        return f"<Candidate of {self.kind!r}: {self.count_text}>"
+
+    @property
+    def count_text(self) -> str:
+        """How many designs meet all requirements."""
+        return f"{self.kept} of {self.evaluated} designs meet all requirements"
+
+    @property
+    def verdict(self) -> str:
+        """How many designs are feasible, or the nearest design's violations, in a line."""
+        if not self.serves:
+            return f"infeasible: the nearest design has {'; '.join(self.why)}"
+        return self.count_text
 
     @property
     def least_margin(self) -> float:
@@ -87,14 +98,12 @@ class Candidate(Result):
 
     def summary(self) -> str:
         """Return in a line how many designs are feasible, or the nearest design's violations."""
-        if not self.serves:
-            return f"{self.kind} falls out: the nearest design has {'; '.join(self.why)}"
-        return f"{self.kind}: {self.kept} of {self.evaluated} designs keep all that is asked"
+        return f"{self.kind}: {self.verdict}"
 
     @property
     def figure_texts(self) -> dict[str, str]:
         """Rounded figures of a machine that serves, by the headings of a table."""
-        row = {"margin": _ratio(self.least_margin)}
+        row = {"drive margin": _ratio(self.least_margin)}
         for name, (heading, factor) in _FIGURES.items():
             if (figure := self.figures.get(name)) is not None and (name != "cycle_time" or figure):
                 row[heading] = (
@@ -114,7 +123,7 @@ class Candidate(Result):
             f"{name} {1e3 * length:.0f}" for name, length in self.dimensions.items()
         )
         extents = (f"{1e3 * self.figures[name]:.0f}" for name in ("width", "depth", "height"))
-        return f"{lengths}; it moves within {' x '.join(extents)}"
+        return f"{lengths}; space that it needs {' x '.join(extents)}"
 
     @property
     def margin_text(self) -> str:
@@ -122,7 +131,7 @@ class Candidate(Result):
         names = {f"{name}_margin": word for name, word in MARGINS.items()}
         known = {word: self.figures[name] for name, word in names.items() if name in self.figures}
         ratios = ", ".join(f"{word} {_ratio(margin)}" for word, margin in known.items())
-        return f"{ratios}; least at {self.worst}" if self.worst else ratios
+        return f"{ratios}; smallest at {self.worst}" if self.worst else ratios
 
     data = former_attribute("data", "as_dict")
 

@@ -102,20 +102,20 @@ class Choice(Result):
         stocks = ", ".join(dict.fromkeys([*links.upper, *links.lower]))
         errors = self.job.accuracy
         left_out = errors is not None and not errors.has_part_errors
-        exact = ["The tool's error is that of encoders and gearboxes: links count as exact."]
+        exact = ["The tool's error is that of encoders and gearboxes; links are taken as exact."]
         return [
             *examples,
             "A price is the sum of those in the lists of motors and gearboxes, in their currency.",
-            f"Drives are chosen for {motors.margin:g} times what is asked, with dry friction of "
-            f"{motors.friction:.0%} of their rated torque; the least margins are told as they are "
-            "between the places of the search, too.",
+            f"Drives are chosen with a margin of {motors.margin:g} to what the task needs, with "
+            f"dry friction of {100.0 * motors.friction:.0f} % of their rated torque; the margins "
+            "stated are the smallest also between the places of the search.",
             f"Links are cut from {stocks}; the platform is half of an aluminium disc "
             f"{1e3 * links.plate:g} mm thick; a carriage has {links.carriage:g} kg.",
-            f"Guides are {2e3 * links.guide:g} mm wide, cylinders of rams as cranks; a ram is "
-            "at most 1.7 times its least length; where links may meet, a pair of rods counts as "
-            "one; ball joints have no cones.",
-            "The shortest time is that of the cycle at its worst place with this margin of peak "
-            "torque and speed; again and again the rated torque may not allow it.",
+            f"Guides are {2e3 * links.guide:g} mm wide, cylinders of rams as thick as cranks; a "
+            "ram is at most 1.7 times as long as at its shortest; for collisions a pair of rods "
+            "counts as one; ball joints have no limits.",
+            "The shortest cycle is the one at its worst place with this margin of peak torque and "
+            "speed; repeated without pauses, it may exceed the rated torque.",
             *(exact if left_out else []),
         ]
 

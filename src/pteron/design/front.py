@@ -59,8 +59,8 @@ class Front(Result):
     def summary(self) -> str:
         """Return the counts of designs, for people, in a line."""
         return (
-            f"{self.task.robot.name}: {self.evaluated} designs evaluated, {self.kept} keep all "
-            f"that is asked, {len(self)} on the front"
+            f"{self.task.robot.name}: {self.evaluated} designs evaluated, {self.kept} meet all "
+            f"requirements, {len(self)} Pareto-optimal (no other is better in every objective)"
         )
 
     def as_dict(self) -> dict[str, Any]:
@@ -223,8 +223,8 @@ def _impossible(task: Task, nearest: pl.DataFrame, evaluated: int) -> ModelError
             reasons.append(f"{objective.quantity}: {_value(design, objective.quantity, row)}")
     at = ", ".join(f"{v.name} = {row[v.name]:.4g}" for v in task.variables)
     return ModelError(
-        f"none of {evaluated} designs keeps all that is asked; the nearest, {at}: "
-        f"{'; '.join(reasons)}. Ask for less, or widen the ranges of the variables",
+        f"none of {evaluated} designs meets all requirements; the nearest, {at}: "
+        f"{'; '.join(reasons)}. Relax the requirements, or widen the ranges of the variables",
         subject=task.robot.name,
     )
 

@@ -204,7 +204,7 @@ class Job(TomlTable):
         if space.turn is not None:
             lines.append(f"turn from {space.turn[0]:g} to {space.turn[1]:g} rad")
         if space.tilt is not None:
-            lines.append(f"tilt of {space.tilt:g} rad to every side")
+            lines.append(f"tilt of {space.tilt:g} rad in all directions")
         if space.directions is not None:
             lines.append(f"{len(space.directions)} directions of the platform")
         if any(self.payload.tool):
@@ -214,7 +214,7 @@ class Job(TomlTable):
         if self.payload.mass:
             lines.append(f"payload {self.payload.mass:g} kg")
         for k, cycle in enumerate(self.cycles, start=1):
-            time = "as fast as can be" if cycle.duration is None else f"in {cycle.duration:g} s"
+            time = "as fast as possible" if cycle.duration is None else f"in {cycle.duration:g} s"
             where = ", anywhere in the workspace" if cycle.anywhere else ""
             share = "" if cycle.share is None else f", {cycle.share:g} in a duty cycle"
             lines.append(f"{cycle.name or f'cycle {k}'} {time}{where}{share}")
@@ -225,13 +225,13 @@ class Job(TomlTable):
             lines.append(f"tool within {1e3 * self.accuracy.most:g} mm ({self.accuracy.counted})")
         if self.stiffness is not None:
             limit = f"{1e3 * self.stiffness.most:g} mm"
-            lines.append(f"gives way {limit} at most under {self.stiffness.force:g} N")
+            lines.append(f"deflection of at most {limit} under {self.stiffness.force:g} N")
         if self.cell.footprint is not None:
             lines.append(f"footprint {' x '.join(f'{x:g}' for x in self.cell.footprint)} m")
         lines += [f"height {self.cell.height:g} m"] if self.cell.height is not None else []
         if self.cell.low is not None and self.cell.high is not None:
             lines.append(f"cell {_box(self.cell.low, self.cell.high)} m")
-        lines += [f"kept out of {_box(box.low, box.high)} m" for box in self.keep_out]
+        lines += [f"no part of it in {_box(box.low, box.high)} m" for box in self.keep_out]
         floors = {
             "type_i": "type-I measure",
             "type_ii": "type-II measure",
@@ -241,7 +241,8 @@ class Job(TomlTable):
             lines.append(f"{floors[name]} at least {getattr(self.floors, name):g}")
         bounds = self.most.model_dump(exclude_none=True)
         lines += [f"{name.replace('_', ' ')} at most {bound:g}" for name, bound in bounds.items()]
-        return [*lines, f"least {' and '.join(name.replace('_', ' ') for name in self.objectives)}"]
+        names = " and ".join(name.replace("_", " ") for name in self.objectives)
+        return [*lines, f"smallest {names}"]
 
 
 def read_job(path: str | Path) -> Job:

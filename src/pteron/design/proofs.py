@@ -73,9 +73,9 @@ class ProvedCube(Result):
         """The statement that is proved, in a sentence."""
         boxes = sum(proof.boxes for proof in self.proofs)
         return (
-            f"proved: every position of the cube with edge {1000.0 * self.edge:.1f} mm about "
-            f"{place_words(self.center)} keeps reach, limits and floors, by intervals over {boxes} "
-            "boxes"
+            f"proved: every position in the cube with edge {1000.0 * self.edge:.1f} mm about "
+            f"{place_words(self.center)} is in reach, within limits and the singularity floors "
+            f"(interval arithmetic, {boxes} boxes)"
         )
 
 
@@ -272,17 +272,21 @@ def proof_sentence(evaluator: KindEvaluator, proofs: Sequence[Proof]) -> str:
     space, boxes = evaluator.job.workspace, sum(proof.boxes for proof in proofs)
     if not all(proof.holds for proof in proofs):
         return (
-            f"kept at {len(evaluator.poses)} sample poses; intervals over {boxes} boxes do not "
-            "decide of all"
+            f"met at {len(evaluator.poses)} sampled poses; not proved for all (interval "
+            f"arithmetic undecided after {boxes} boxes)"
         )
     if space.poses is not None:
         statement = (
-            f"every one of {len(proofs)} poses and orientations keeps reach, limits and floors"
+            f"each of {len(proofs)} poses and orientations is in reach, within limits and the "
+            "singularity floors"
         )
-        between = f"; so do the cycles between them at {len(evaluator.between)} samples"
+        between = f"; so are the cycles between them at {len(evaluator.between)} samples"
         return statement + (between if len(evaluator.between) else "")
     noun = "pose" if len(proofs) == 1 else f"position, at {len(proofs)} orientations,"
-    statement = f"every {noun} keeps reach, limits and floors, by intervals over {boxes} boxes"
+    statement = (
+        f"every {noun} is in reach, within limits and the singularity floors (interval "
+        f"arithmetic, {boxes} boxes)"
+    )
     return (
         f"proved at the sampled tilts alone: {statement}" if space.tilt else f"proved: {statement}"
     )

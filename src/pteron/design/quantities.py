@@ -25,8 +25,8 @@ Cover = Literal["machine", "proved", "lattice", "places", "fine", "directions", 
 """How far a quantity is known: see `COVERS`."""
 
 COVERS: dict[Cover, str] = {
-    "machine": "of the machine alone, exact",
-    "proved": "found, and proved",
+    "machine": "exact, from the machine's dimensions alone",
+    "proved": "found by the search, then proved",
     "lattice": "at {places} sampled poses",
     "places": "at {places} sampled poses, and about the worst of them",
     "fine": "at {places} sampled poses, and about the worst of them",

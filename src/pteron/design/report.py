@@ -72,7 +72,7 @@ class ReportedDesign(Proved):
         if not self.workspace:
             largest = f", at most at {design.scale:.3g} times its size" if design.scale else ""
             return f"workspace: it fits nowhere{largest}"
-        return f"workspace placed about {place_words(design.cube.center)}"
+        return f"workspace centred at {place_words(design.cube.center)}"
 
     @cached_property
     def _reasons(self) -> dict[str, str]:
@@ -136,8 +136,8 @@ class ReportedDesign(Proved):
 def _motor_words(fit: MotorFit) -> str:
     """Return a sentence on a motor's margin for a leg's loads."""
     return (
-        f"drive of leg {fit.leg}: {fit.motor.name} at a ratio of {fit.ratio:.4g} can do "
-        f"{fit.margin:.3g} times what it must, least in {fit.scarcest}"
+        f"drive of leg {fit.leg}: {fit.motor.name} at a ratio of {fit.ratio:.3g} has "
+        f"{fit.margin:.3g} times the {fit.scarcest} that it needs, its tightest limit"
     )
 
 
@@ -209,25 +209,26 @@ class FrontReport(Result):
         lines = [
             f"# Designs of {front.task.robot.name}",
             "",
-            f"{front.evaluated} designs were evaluated; {front.kept} keep all that is asked; "
-            f"bettered by no other in every objective: {len(front)}. A link of another "
+            f"{front.evaluated} designs were evaluated; {front.kept} meet all requirements; "
+            f"Pareto-optimal, that is bettered by no other in every objective: {len(front)}. A "
+            "link of another "
             + (
                 "length is drawn out along itself: its mass grows with the length."
                 if front.task.spec.masses == "per length"
                 else "length keeps its inertia."
             ),
             "",
-            "## Asked for",
+            "## Requirements",
             "",
             *(f"- {line}" for line in front.task.spec.requirement_lines()),
             "",
-            "## To begin with",
+            "## Initial machine",
             "",
             *(f"- {line}" for line in self.start.lines()),
         ]
         for reported in self.selection:
             lines += ["", f"## {reported.name.replace('-', ' ').capitalize()}", ""]
-            lines += ["| what | to begin with | now | change |", "| --- | ---: | ---: | ---: |"]
+            lines += ["| quantity | initial | design | change |", "| --- | ---: | ---: | ---: |"]
             lines += [f"| {' | '.join(change.cells)} |" for change in reported.changes]
             lines += ["", *(f"- {line}" for line in reported.lines())]
         return "\n".join(lines) + "\n"

@@ -280,7 +280,7 @@ class Spec(TomlTable):
     def requirement_lines(self) -> list[str]:
         """Return the objectives and requirements, a line each."""
         lines = [
-            f"{part.quantity} as {'small' if part.minimise else 'large'} as can be"
+            f"{part.quantity} as {'small' if part.minimise else 'large'} as possible"
             for part in self.objectives
         ]
         lines += [part.words for part in self.requirements]

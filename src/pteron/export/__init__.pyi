@@ -3,6 +3,7 @@ from pteron.export.casadi_functions import (
     casadi_functions as casadi_functions,
     export_casadi as export_casadi,
 )
+from pteron.export.cuda import export_cuda as export_cuda
 from pteron.export.engines import (
     Tree as Tree,
     coordinates as coordinates,

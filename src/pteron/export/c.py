@@ -131,14 +131,14 @@ def c_texts(
 ) -> dict[str, str]:
     """Return the files of `export_c` by their names: header, source, test, CMakeLists.txt."""
     prefix, single = prefix_of(robot), real == "float"
-    values = {
+    variables = {
         "banner": banner(robot, "C99"),
         "prefix": prefix,
         "upper": prefix.upper(),
         "real": real,
         "f": "f" if single else "",
         "printer": CPrinter(prefix, real),
-        "tables": {table.name: table for item in exported for table in item.tables}.values(),
+        "tables": {t.name: t for function in exported for t in function.tables}.values(),
         "functions": exported,
         "largest": 3.4028234e38 if single else 1.7976931348623157e308,
         "tolerance": _tolerance_of(float(np.finfo(np.float32 if single else np.float64).eps)),
@@ -150,7 +150,8 @@ def c_texts(
         f"test_{prefix}.c": "test.c.j2",
         "CMakeLists.txt": "CMakeLists.txt.j2",
     }
-    return {file: render_template("pteron.export", name, **values) for file, name in files.items()}
+    folder = "pteron.export"
+    return {file: render_template(folder, name, **variables) for file, name in files.items()}
 
 
 def _tolerance_of(rounding: float) -> Callable[[float], float]:
@@ -168,37 +169,49 @@ class CPrinter:
 
     prefix: str
     real: Real
+    device: bool = False
+    """Whether it is CUDA, whose functions and constants are of the file that includes them."""
 
-    def number(self, value: float) -> str:
+    @property
+    def table(self) -> str:
+        """What precedes a constant table's type."""
+        return "static __device__ " if self.device else ""
+
+    @property
+    def helper(self) -> str:
+        """What precedes the type of a function that the exported ones call."""
+        return "static __device__ " if self.device else "static "
+
+    def number(self, number: float) -> str:
         """Return a literal; `NAN` itself is a float."""
-        value = float(value)
-        if value != value:
+        number = float(number)
+        if number != number:
             return f"(({self.real})NAN)"
-        return c_constant(value, "float32" if self.real == "float" else "float64")
+        return c_constant(number, "float32" if self.real == "float" else "float64")
 
-    def rows(self, values: Array) -> str:
+    def rows(self, array: Array) -> str:
         """Return literals, four a line."""
-        texts = [self.number(value) for value in values.ravel()]
+        texts = [self.number(number) for number in array.ravel()]
         rows = [", ".join(texts[k : k + 4]) for k in range(0, len(texts), 4)]
         return ",\n    ".join(rows)
 
-    def comment(self, item: ExportedFunction) -> list[str]:
+    def comment(self, function: ExportedFunction) -> list[str]:
         """Return the lines over a function's declaration."""
-        lines = [*textwrap.wrap(item.summary, _WIDTH), ""]
-        for direction, ports in (("in", item.inputs), ("out", item.outputs)):
+        lines = [*textwrap.wrap(function.summary, _WIDTH), ""]
+        for direction, ports in (("in", function.inputs), ("out", function.outputs)):
             for port in ports:
                 shape = " x ".join(map(str, port.shape)) or "1"
                 shape += ", by rows" if len(port.shape) > 1 else ""
-                text = f"{direction:<3} {port.name} ({shape}): {item.meanings[port.name]}"
+                text = f"{direction:<3} {port.name} ({shape}): {function.meanings[port.name]}"
                 lines += textwrap.wrap(text.rstrip(": "), _WIDTH, subsequent_indent="      ")
-        return [*lines, "", f"{item.operations} arithmetic operations."]
+        return [*lines, "", f"{function.operations} arithmetic operations."]
 
-    def prototype(self, item: ExportedFunction) -> str:
+    def prototype(self, function: ExportedFunction) -> str:
         """Return a function's declaration."""
-        head = f"int {self.prefix}_{item.name}("
+        head = f"{self.table}int {self.prefix}_{function.name}("
         pointer = f"{self.real} *{self.prefix.upper()}_RESTRICT"
-        arguments = [f"const {pointer} {port.name}" for port in item.inputs]
-        arguments += [f"{pointer} {port.name}" for port in item.outputs]
+        arguments = [f"const {pointer} {port.name}" for port in function.inputs]
+        arguments += [f"{pointer} {port.name}" for port in function.outputs]
         return head + (",\n" + " " * len(head)).join(arguments) + ")"
 
     def _operations(self) -> dict[str, str]:
@@ -217,11 +230,11 @@ class CPrinter:
             "div": f"{self.prefix}_ratio({{0}}, {{1}})",
         }
 
-    def body(self, item: ExportedFunction) -> tuple[list[str], list[tuple[str, str]]]:
+    def body(self, function: ExportedFunction) -> tuple[list[str], list[tuple[str, str]]]:
         """Return the statements of a function, and its conditions with the failures they mean."""
-        graph, nodes = item.graph, item.graph.nodes
-        names = names_of(graph, lambda i, j: f"{item.inputs[i].name}[{j}]", self.number)
-        names = [item.names.get(k, name) for k, name in enumerate(names)]
+        graph, nodes = function.graph, function.graph.nodes
+        names = names_of(graph, lambda i, j: f"{function.inputs[i].name}[{j}]", self.number)
+        names = [function.names.get(k, name) for k, name in enumerate(names)]
         guarded = self._operations()
         plain = guarded | {"div": C["div"]}
         lines, radicands = [], []
@@ -231,31 +244,31 @@ class CPrinter:
             form = f"const {self.real} {{0}} = {{1}};"
             lines += statements(graph, [k], names, plain if by_number else guarded, form)
             of_number = nodes[node.arguments[0]].operation == CONSTANT
-            tests = ("sqrt",) if item.compares else ("sqrt", "less")
+            tests = ("sqrt",) if function.compares else ("sqrt", "less")
             if node.operation in tests and not (node.shared or of_number):
                 radicands.append(names[node.arguments[0]])
         finite = []
-        for port, places in zip(item.outputs, graph.outputs, strict=True):
+        for port, places in zip(function.outputs, graph.outputs, strict=True):
             for j, k in enumerate(places):
                 lines.append(f"{port.name}[{j}] = {names[k]};")
                 if nodes[k].operation != CONSTANT:
                     finite.append(f"{self.prefix}_finite({port.name}[{j}])")
         used = {i for i, _ in used_inputs(graph)}
-        placed = [i for i, port in enumerate(item.inputs) if port.name in PLACES]
+        placed = [i for i, port in enumerate(function.inputs) if port.name in PLACES]
         lines += [
             f"(void){port.name};"
-            for i, port in enumerate(item.inputs)
+            for i, port in enumerate(function.inputs)
             if i not in used and i not in placed
         ]
         # A number that no output depends on is tested too: the caller's pose is wrong.
         known = [
-            f"({self.prefix}_finite({item.inputs[i].name}[{j}]) != 0)"
+            f"({self.prefix}_finite({function.inputs[i].name}[{j}]) != 0)"
             for i in placed
-            for j in range(item.inputs[i].size)
+            for j in range(function.inputs[i].size)
         ]
         failures = [(f"!({_join_conditions(known)})", "UNREACHABLE")] if known else []
-        if item.several:
-            failures.append((self._no_pose(item), "UNREACHABLE"))
+        if function.several:
+            failures.append((self._no_pose(function), "UNREACHABLE"))
             return lines, failures
         reached = [f"(isgreaterequal({name}, {self.number(0.0)}) != 0)" for name in radicands]
         failures += [(f"!({_join_conditions(reached)})", "UNREACHABLE")] if reached else []
@@ -264,9 +277,9 @@ class CPrinter:
             failures.append((f"!({regular})", "NOT_FINITE"))
         return lines, failures
 
-    def _no_pose(self, item: ExportedFunction) -> str:
+    def _no_pose(self, function: ExportedFunction) -> str:
         """Return the condition that no row of an output is a pose of finite numbers."""
-        (port,) = item.outputs
+        (port,) = function.outputs
         rows, columns = port.shape
         tests = [f"({self.prefix}_finite({port.name}[{j}]) != 0)" for j in range(port.size)]
         poses = [tests[i * columns : (i + 1) * columns] for i in range(rows)]

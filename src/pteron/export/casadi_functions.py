@@ -83,9 +83,7 @@ def casadi_functions(robot: RobotLike) -> dict[str, ca.Function]:
     robot = as_manipulator(robot)
     refuse_readings(robot, "CasADi's functions")
     missing = "direct_step" if closure_of(robot).closed_form else "direct_kinematics"
-    functions = {
-        name: _plain(robot, name, what) for name, what in _NAMES.items() if name != missing
-    }
+    functions = {n: _plain(robot, n, what) for n, what in _NAMES.items() if n != missing}
     functions |= {function.name(): function for function in _drive_functions(robot)}
     return functions
 
@@ -97,8 +95,8 @@ def _plain(robot: Manipulator, name: str, what: str) -> ca.Function:
     )
     symbols = library.function.sx_in()
     results = [
-        result.T if len(port.shape) == 2 else ca.reshape(result, -1, 1)
-        for result, port in zip(library.function.call(symbols), library.outputs, strict=True)
+        expression.T if len(port.shape) == 2 else ca.reshape(expression, -1, 1)
+        for expression, port in zip(library.function.call(symbols), library.outputs, strict=True)
     ]
     names = [port.name for port in library.inputs], [port.name for port in library.outputs]
     return ca.Function(name, symbols, results, *names)
@@ -118,13 +116,13 @@ def _drive_functions(robot: Manipulator) -> Iterator[ca.Function]:
     rates = ca.mtimes(jacobian(machine.state(pose)), velocity)
     dry = drives.dry_friction(machine_drives, rates) * ca.tanh(rates / machine_drives.rest_speed)
     others = machine_drives._replace(coulomb=ca.SX(n, 1), stribeck=ca.SX(n, 1))
-    values = ca.SX(ca.DM(parameters(robot)))
+    inertia = ca.SX(ca.DM(parameters(robot)))
 
     rigid = _plain(robot, "rigid", "inverse_dynamics")(pose, velocity, acceleration, wrench)
     moving = drives.joint_motion(machine.state(pose, velocity, acceleration))
     needed = rigid + drives.drive_forces(others, *moving, smooth=True) + dry
     moved = drives.drive_accelerations(
-        machine, pose, velocity, forces - dry, values, wrench, others
+        machine, pose, velocity, forces - dry, inertia, wrench, others
     )
     yield _function("drive_forces", symbols, ("acceleration",), forces=needed)
     yield _function("drive_accelerations", symbols, ("forces",), acceleration=moved)
@@ -145,7 +143,7 @@ def _function(
 ) -> ca.Function:
     """Return a CasADi function of pose, velocity, `middle` and wrench, densified and simplified."""
     inputs = ["pose", "velocity", *middle, "wrench"]
-    outputs = [ca.cse(ca.densify(result)) for result in results.values()]
+    outputs = [ca.cse(ca.densify(expression)) for expression in results.values()]
     return ca.Function(name, [symbols[k] for k in inputs], outputs, inputs, list(results))
 
 
@@ -195,7 +193,7 @@ def export_casadi(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
             files[target / path.name] = path.read_bytes()
     start, end = _ends(robot)
     least, most = zip(*(leg.limits or (None, None) for leg in robot.legs), strict=True)
-    values = {
+    variables = {
         "banner": banner(robot, "CasADi functions"),
         "prefix": prefix,
         "coordinates": robot.platform.coordinates,
@@ -211,7 +209,7 @@ def export_casadi(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
         "forces": [leg.drive.max_force if leg.drive else None for leg in robot.legs],
     }
     for name in ("load", "example"):
-        text = render_template("pteron.export", f"{name}_casadi.py.j2", **values)
+        text = render_template("pteron.export", f"{name}_casadi.py.j2", **variables)
         files[target / f"{name}_{prefix}.py"] = text.encode("utf-8")
     return write_files(files)
 

@@ -30,7 +30,7 @@ _NEEDS = {"force": (), "torque": ("ratio",), "percent": ("ratio", "rated_torque"
 
 
 def factors(robot: Manipulator, output: Output) -> tuple[float, ...]:
-    """Return the factor on each joint's force.
+    """Return the factor (n,) from each joint's force to the unit of its drive's command.
 
     A motor whose angle is `ratio` times the joint's coordinate gives force / ratio: friction and
     the rotor's inertia are at the joint already.
@@ -90,11 +90,11 @@ def convert_joints(function: Program, robot: Manipulator) -> Program:
         return function
     zeros, scales = ca.DM(reading_zeros(robot)), ca.DM(reading_scales(robot))
 
-    def scale_joints(value: Expression, power: int) -> Expression:
+    def scale_joints(expression: Expression, power: int) -> Expression:
         """Return a vector by joints, or a matrix whose columns are joints, with scales in it."""
-        if value.shape[1] == len(robot.legs) and value.shape[0] > 1:
-            return ca.mtimes(value, ca.diag(scales**power))
-        return value * ca.reshape(scales**power, *value.shape)
+        if expression.shape[1] == len(robot.legs) and expression.shape[0] > 1:
+            return ca.mtimes(expression, ca.diag(scales**power))
+        return expression * ca.reshape(scales**power, *expression.shape)
 
     symbols, taken, results = function.function.sx_in(), [], []
     for port, symbol in zip(function.inputs, symbols, strict=True):
@@ -102,12 +102,12 @@ def convert_joints(function: Program, robot: Manipulator) -> Program:
         power = 1 if place else -_PER_READING.get(port.name, 0)
         zero = ca.reshape(zeros, *symbol.shape) if place else 0.0
         taken.append(zero + scale_joints(symbol, power) if power else symbol)
-    for port, result in zip(function.outputs, function.function.call(taken), strict=True):
+    for port, expression in zip(function.outputs, function.function.call(taken), strict=True):
         if port.name == "joints":
-            results.append(scale_joints(result - ca.reshape(zeros, *result.shape), -1))
+            results.append(scale_joints(expression - ca.reshape(zeros, *expression.shape), -1))
         else:
             power = _PER_READING.get(port.name, 0)
-            results.append(scale_joints(result, power) if power else result)
+            results.append(scale_joints(expression, power) if power else expression)
     ports = function.inputs, results, function.outputs
     return Program.from_expressions(function.name, symbols, *ports)
 
@@ -122,6 +122,6 @@ def command_meaning(robot: Manipulator, output: Output) -> str:
     return f"per cent of the motors' rated torques, {rated} N m, by the ratios {ratios}"
 
 
-def _join_values(values: list[float]) -> str:
+def _join_values(numbers: list[float]) -> str:
     """Return values as text: a single value if all are equal, else a list with commas."""
-    return f"{values[0]:g}" if len(set(values)) == 1 else ", ".join(f"{v:g}" for v in values)
+    return f"{numbers[0]:g}" if len(set(numbers)) == 1 else ", ".join(f"{v:g}" for v in numbers)

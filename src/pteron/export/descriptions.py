@@ -77,7 +77,7 @@ def port_meaning(robot: Manipulator, port: Port, output: Output) -> str:
 
 
 def law_meanings(what: str, meanings: Mapping[str, str]) -> dict[str, str]:
-    """Return the meanings of a control law's inputs and outputs, from those elsewhere."""
+    """Return the meanings of a control law's ports by name, with `meanings` of the quantities."""
     memory = MEMORY.get(what)
     remembered = ", ".join(TEXTS["memory"][name] for name in memory) if memory else "what it keeps"
     words = {**meanings, "what": what, "remembered": remembered}

@@ -37,7 +37,7 @@ from pteron.manipulator import Manipulator, parameter_names, parameters
 from pteron.manipulator.readings import to_readings
 
 PAYLOAD = "set_payload"
-"""The function that makes the parameters of a payload."""
+"""The function that returns the parameters with those of a payload added."""
 
 BASE = "_base"
 """Suffix of the name of a function of base parameters."""
@@ -246,10 +246,10 @@ def _meanings(
     request: ExportRequest, ports: Sequence[Port], shared: Sequence[str], taken: set[str]
 ) -> dict[str, str]:
     """Return the meanings of inputs and outputs, with their units."""
-    robot, what, output = request.robot, request.function_name, request.output
-    meanings: dict[str, str] = {port.name: port_meaning(robot, port, output) for port in ports}
+    robot, what, unit = request.robot, request.function_name, request.output
+    meanings: dict[str, str] = {port.name: port_meaning(robot, port, unit) for port in ports}
     if request.is_custom:
-        readings = {name: port_meaning(robot, Port(name, (1,)), output) for name in TEXTS["law"]}
+        readings = {name: port_meaning(robot, Port(name, (1,)), unit) for name in TEXTS["law"]}
         own_tables = {name: f"see the table {what}_{name}" for name in shared}
         meanings = {**readings, **meanings} | own_tables
     if not request.tables:
@@ -277,9 +277,9 @@ def _table(
 ) -> NumberTable:
     """Return the machine's values for a shared input, or a controller's parameters."""
     if isinstance(controller, Custom):
-        values = controller.law(robot).numbers[f"law_{name}"].ravel()
-        names = tuple(f"{name}_{k}" for k in range(1, len(values) + 1))
-        return NumberTable(f"{controller.law_name}_{name}", TEXTS["tables"]["own"], names, values)
+        numbers = controller.law(robot).numbers[f"law_{name}"].ravel()
+        names = tuple(f"{name}_{k}" for k in range(1, len(numbers) + 1))
+        return NumberTable(f"{controller.law_name}_{name}", TEXTS["tables"]["own"], names, numbers)
     comment = TEXTS["tables"][name]
     if name == "gains":
         assert controller is not None
@@ -315,24 +315,24 @@ def _states(
             [np.array(known.get(port.name, rng.normal(size=port.shape))) for port in ports]
         )
     beyond = [
-        value + 100.0 * np.arange(1, len(value) + 1) if port.name in ("pose", "joints") else value
-        for port, value in zip(ports, states[0], strict=True)
+        array + 100.0 * np.arange(1, len(array) + 1) if port.name in ("pose", "joints") else array
+        for port, array in zip(ports, states[0], strict=True)
     ]
     return [*states, beyond]
 
 
 def _example_at(function: Program, graph: Graph, inputs: list[Array]) -> Example:
     """Return a test vector: inputs, results, status (0 valid, 1 invalid), and gains of errors."""
-    values = function.function.call([np.reshape(value, (-1, 1)) for value in inputs])
-    results = tuple(np.array(value).ravel("F") for value in values)
+    outputs = function.function.call([np.reshape(array, (-1, 1)) for array in inputs])
+    results = tuple(np.array(array).ravel("F") for array in outputs)
     if function.name == "direct_kinematics":  # of several poses one will do
         poses = results[0].reshape(function.outputs[0].shape)
         status = 0 if np.isfinite(poses).all(axis=1).any() else 1
         return Example(tuple(inputs), results, status, _gains(function, inputs, results))
     # What a machine has not is NaN throughout.
     computed = [
-        value[[graph.nodes[k].operation != CONSTANT for k in nodes]]
-        for value, nodes in zip(results, graph.outputs, strict=True)
+        array[[graph.nodes[k].operation != CONSTANT for k in nodes]]
+        for array, nodes in zip(results, graph.outputs, strict=True)
     ]
     finite = np.isfinite(np.concatenate(computed)).all()
     return Example(tuple(inputs), results, 0 if finite else 1, _gains(function, inputs, results))
@@ -344,14 +344,14 @@ def _gains(function: Program, inputs: list[Array], results: tuple[Array, ...]) -
     gains = np.ones(len(results))
     for _ in range(_CHANGES):
         changed = [v * (1.0 + _CHANGE * rng.choice([-1.0, 1.0], np.shape(v))) for v in inputs]
-        values = function.function.call([np.reshape(value, (-1, 1)) for value in changed])
-        for k, (value, result) in enumerate(zip(values, results, strict=True)):
+        outputs = function.function.call([np.reshape(array, (-1, 1)) for array in changed])
+        for k, (shifted, nominal) in enumerate(zip(outputs, results, strict=True)):
             columns = (
                 -1,
                 function.outputs[k].shape[-1] if len(function.outputs[k].shape) > 1 else 1,
             )
-            size = np.abs(np.nan_to_num(result)).reshape(columns).max(axis=0, initial=0.0)
-            change = np.nan_to_num(np.array(value).ravel("F") - result).reshape(columns)
+            size = np.abs(np.nan_to_num(nominal)).reshape(columns).max(axis=0, initial=0.0)
+            change = np.nan_to_num(np.array(shifted).ravel("F") - nominal).reshape(columns)
             share = np.abs(change).max(axis=0, initial=0.0) / np.maximum(size, 1e-300)
             gains[k] = max(gains[k], float(share.max(initial=0.0)) / _CHANGE)
     return tuple(gains.tolist())

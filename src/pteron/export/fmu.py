@@ -115,16 +115,16 @@ def export_fmu(
     exported = exported_functions(
         robot, _FUNCTIONS, specialised=False, wrench=True, output="force", base=None
     )
-    tables = {table.name: table.values for item in exported for table in item.tables}
+    tables = {table.name: table.values for function in exported for table in function.tables}
     call = [_CALL[port.name] for port in exported[0].inputs]
     texts = {name: text for name, text in c_texts(robot, exported).items() if prefix in name}
     del texts[f"test_{prefix}.c"]
-    values = {
+    variables = {
         "banner": banner(robot, "FMU of FMI 3.0"),
         "name": quoteattr(robot.name),
         "description": quoteattr(" ".join([*banner(robot, "FMU")[:1], *tool_lines(robot)])),
         "tool": quoteattr(f"Pteron {version('pteron')}"),
-        "quoted": lambda value: quoteattr(str(value)),
+        "quoted": lambda attribute: quoteattr(str(attribute)),
         "prefix": prefix,
         "upper": prefix.upper(),
         "printer": CPrinter(prefix, "double"),
@@ -143,12 +143,12 @@ def export_fmu(
     }
     # The token says which modelDescription.xml goes with which binary: a digest of all of it.
     parts = {
-        name: render_template("pteron.export", f"{name}.j2", token="", **values)
+        name: render_template("pteron.export", f"{name}.j2", token="", **variables)
         for name in ("fmu.c", "modelDescription.xml")
     }
     digest = hashlib.sha256("".join([*texts.values(), *parts.values()]).encode()).hexdigest()
     for name in parts:
-        parts[name] = render_template("pteron.export", f"{name}.j2", token=digest[:32], **values)
+        parts[name] = render_template("pteron.export", f"{name}.j2", token=digest[:32], **variables)
     sources = texts | {"fmu.c": parts["fmu.c"]}
     binary, place = _compile_library(prefix, sources)
     build = render_template("pteron.export", "buildDescription.xml.j2", prefix=prefix)
@@ -206,6 +206,6 @@ def _zip_files(members: Mapping[str, bytes]) -> bytes:
     """Return a zip archive of members, names to contents, with fixed dates: reproducible."""
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, data in members.items():
-            archive.writestr(zipfile.ZipInfo(name, _DATES), data, zipfile.ZIP_DEFLATED)
+        for name, content in members.items():
+            archive.writestr(zipfile.ZipInfo(name, _DATES), content, zipfile.ZIP_DEFLATED)
     return buffer.getvalue()

@@ -99,7 +99,7 @@ class FmuVariables:
                     "derivative": self[block.rate_of][k] if block.rate_of else None,
                     "start": variable.start,
                 }
-                yield {name: value for name, value in attributes.items() if value is not None}
+                yield {name: a for name, a in attributes.items() if a is not None}
 
     @property
     def dependencies(self) -> dict[int, tuple[int, ...]]:
@@ -164,7 +164,7 @@ def _words(robot: Manipulator, pose: Array, forces: Array) -> dict[str, list[_Wo
             {
                 "i": i,
                 **vars(leg.joint),
-                "force_unit": _fmi_unit(leg.joint.force_unit),
+                "force_unit": leg.joint.force_unit.replace(" ", "."),  # as FMI writes it
                 "held": force,
             }
             for i, (leg, force) in legs
@@ -174,11 +174,6 @@ def _words(robot: Manipulator, pose: Array, forces: Array) -> dict[str, list[_Wo
         "inertia": list(_inertia(platform)),
         "drives": list(_drives(robot)),
     }
-
-
-def _fmi_unit(unit: str) -> str:
-    """Return a unit as FMI writes it, with points between its factors."""
-    return unit.replace(" ", ".")
 
 
 def _wrench(platform: Platform) -> Iterator[_Words]:
@@ -206,8 +201,8 @@ def _inertia(platform: Platform) -> Iterator[_Words]:
 
 def _drives(robot: Manipulator) -> Iterator[_Words]:
     """Yield the drives' numbers, in the order of the C code's table."""
-    values = iter(drive_numbers(robot).tolist())
+    sizes = iter(drive_numbers(robot).tolist())
     for name in Drives._fields:
         for i, leg in enumerate(robot.legs, start=1):
             row = _TABLE["drives"][name]
-            yield {"i": i, "name": name, "unit": row[leg.joint.unit], "number": next(values), **row}
+            yield {"i": i, "name": name, "unit": row[leg.joint.unit], "number": next(sizes), **row}

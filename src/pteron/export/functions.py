@@ -83,9 +83,9 @@ def exported_functions(
     identified = None if base is None else read_identified(robot, base)
     robot = identified.robot if identified else robot
     requested = [] if functions is None else choice_list(functions)
-    named = {item.law_name: item for item in requested if not isinstance(item, str)}
-    names = [item if isinstance(item, str) else item.law_name for item in requested]
-    custom = {name for name, item in named.items() if isinstance(item, Custom)}
+    named = {choice.law_name: choice for choice in requested if not isinstance(choice, str)}
+    names = [choice if isinstance(choice, str) else choice.law_name for choice in requested]
+    custom = {name for name, choice in named.items() if isinstance(choice, Custom)}
     if functions is None:
         names = _usual_names(robot, usual, identified, specialised)
     names = list(dict.fromkeys(names))
@@ -115,9 +115,7 @@ def _usual_names(
     step = {"direct_kinematics": "direct_step"}
     names = [name if closed else step.get(name, name) for name in usual]
     if identified:  # which leaves the bodies unknown
-        inputs: Mapping[str, Sequence[str]] = {
-            name: TABLE[name].inputs for name in names if name in TABLE
-        }
+        inputs: Mapping[str, Sequence[str]] = {n: TABLE[n].inputs for n in names if n in TABLE}
         names = [name for name in names if "parameters" not in inputs.get(name, ())]
         names += [name + BASE for name in (*FEED, PAYLOAD)]
     elif has_drives(robot):
@@ -128,7 +126,7 @@ def _usual_names(
 
 
 def _expect_exportable(names: Sequence[str], custom: set[str], specialised: bool) -> None:
-    """Refuse unknown names, custom names that Pteron uses, and an empty choice."""
+    """Raise ModelError on unknown names, custom names that Pteron uses, or an empty choice."""
     based = {name + BASE for name in (*REDUCIBLE, PAYLOAD)}
     allowed = sorted({*COMPILED, *based} - {"base_regressor"})
     valid = f"choose from {', '.join(allowed)}"

@@ -127,7 +127,7 @@ class Statements:
         return self.names[k]
 
     def _state(self, k: int) -> str:
-        """Add the statement of a node, and return the expression for its value."""
+        """Append the statement of a node, and return the expression for its value."""
         node = self.graph.nodes[k]
         if node.operation == "select":
             return self._select(k)
@@ -139,26 +139,26 @@ class Statements:
         if node.operation == "div":
             arguments[1] = self._divisor(node.arguments[1])
         name = self._name(k)
-        value = _PRINTED[node.operation].format(*arguments)
+        expression = _PRINTED[node.operation].format(*arguments)
         if node.operation in _GUARDS:
             test, otherwise, flag = _GUARDS[node.operation]
-            self._guard(test.format(*arguments), name, value, otherwise, flag)
+            self._guard(test.format(*arguments), name, expression, otherwise, flag)
         else:
-            self.lines.append(f"{name} := {value};")
+            self.lines.append(f"{name} := {expression};")
         return name
 
     def _select(self, k: int) -> str:
-        """Add the statement of a selection: between NaN, for a leg out of reach, and a number."""
-        test, value = self.graph.nodes[k].arguments
+        """Append the statement of a selection between NaN and a number; return its variable."""
+        test, chosen = self.graph.nodes[k].arguments
         if self.graph.nodes[test].operation != "less":
             raise ValueError("a selection without a comparison")
-        if not self.names[value]:
+        if not self.names[chosen]:
             self.flags.add("Reachable")
             self._choose(self.names[test], ["Reachable := FALSE;"])
             return _ZERO
         name = self._name(k)
         self._choose(
-            self.names[test], [f"{name} := {self.number(value)};"], [f"{name} := {_ZERO};"]
+            self.names[test], [f"{name} := {self.number(chosen)};"], [f"{name} := {_ZERO};"]
         )
         return name
 
@@ -171,7 +171,7 @@ class Statements:
         return name
 
     def _size(self, k: int) -> float:
-        """Return the power of ten that bounds a node, after adding the guards it needs."""
+        """Return the power of ten that bounds a node's value; append the guards it needs."""
         size = self._bound(k)
         while size > self._largest:
             arguments = [
@@ -219,11 +219,11 @@ class Statements:
         self.temporaries.append(self._spare.new(stem))
         return self.temporaries[-1]
 
-    def _guard(self, test: str, name: str, value: str, otherwise: str, flag: str) -> None:
-        """Add an assignment guarded by a test; if that fails, a substitute and a cleared flag."""
+    def _guard(self, test: str, name: str, expression: str, otherwise: str, flag: str) -> None:
+        """Append an assignment guarded by a test; else a substitute and a cleared flag."""
         self.flags.add(flag)
         self._choose(
-            test, [f"{name} := {value};"], [f"{name} := {otherwise};", f"{flag} := FALSE;"]
+            test, [f"{name} := {expression};"], [f"{name} := {otherwise};", f"{flag} := FALSE;"]
         )
 
     def _choose(self, test: str, then: Sequence[str], otherwise: Sequence[str] = ()) -> None:
@@ -246,16 +246,16 @@ def power(exponent: int) -> str:
     return f"1.0E{exponent:+d}"
 
 
-def _magnitude(value: float) -> float:
+def _magnitude(number: float) -> float:
     """Return the power of ten of a number; of NaN, which is never computed with, that of 0."""
-    return math.log10(abs(value)) if abs(value) > 0.0 else -math.inf
+    return math.log10(abs(number)) if abs(number) > 0.0 else -math.inf
 
 
-def _literal(value: float) -> str:
+def _literal(number: float) -> str:
     """Return an LREAL literal, in brackets if it has a sign; for NaN there is none."""
-    if math.isnan(value):
+    if math.isnan(number):
         return ""
-    digits, _, exponent = repr(float(value)).partition("e")
+    digits, _, exponent = repr(float(number)).partition("e")
     text = digits if "." in digits else f"{digits}.0"
     text += f"E{int(exponent)}" if exponent else ""
     return f"({text})" if text.startswith("-") else text

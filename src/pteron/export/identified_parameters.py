@@ -67,23 +67,23 @@ def read_identified(robot: Manipulator, path: str | Path) -> Identified:
         If the file cannot be read, is none of `pteron identify`, belongs to another machine, or has
         values that exported code has no place for.
     """
-    data = _object(path)
+    document = _object(path)
     try:
-        known, drives, kinds = data[_NAME], data["drives"], data["kinds"]
+        known, drives, kinds = document[_NAME], document["drives"], document["kinds"]
         names, expressions = known["names"], known["expressions"]
-        values = np.array(known["values"], dtype=float)
-        legs = [_with_friction(leg, entry) for leg, entry in zip(robot.legs, drives, strict=False)]
-        all_names, texts = data["estimate"]["names"], [str(entry) for entry in data["expressions"]]
-        if not (np.isfinite(values).all() and len(texts) >= len(values)):
+        base_values = np.array(known["values"], dtype=float)
+        legs = [_with_friction(leg, drive) for leg, drive in zip(robot.legs, drives, strict=False)]
+        all_names, texts = document["estimate"]["names"], [*map(str, document["expressions"])]
+        if not (np.isfinite(base_values).all() and len(texts) >= len(base_values)):
             raise ValueError("values are missing")
         groups = [tuple(group) for group in known["shared"]]
-        grade = re.sub(r"[^a-z ]", "?", str(data["verdict"]["grade"])[:40])
+        grade = re.sub(r"[^a-z ]", "?", str(document["verdict"]["grade"])[:40])
     except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise DataError(
             f"{path}: not an identification.json of this version of pteron identify "
             f"({type(error).__name__}: {error}); run it again"
         ) from None
-    expect_machine(data.get("machine"), robot, path)
+    expect_machine(document.get("machine"), robot, path)
     if passive := [n for n, kind in zip(all_names, kinds, strict=False) if kind == "passive"]:
         raise DataError(
             f"{path}: {', '.join(passive)}: friction of passive joints, which exported code has no "
@@ -92,31 +92,31 @@ def read_identified(robot: Manipulator, path: str | Path) -> Identified:
     try:
         base = base_parameters(robot, shared=groups or False)
         # A record has been compared: dimensions may differ a little, as a calibrated machine's do.
-        alike = "machine" in data or list(base.expressions(digits=12)) == expressions
+        alike = "machine" in document or list(base.expressions(digits=12)) == expressions
         same = list(base.names) == names and alike
     except ModelError:
         same = False
-    if not same or len(drives) != robot.joint_count or values.shape != (base.rank,):
+    if not same or len(drives) != robot.joint_count or base_values.shape != (base.rank,):
         raise DataError(
-            f"{path}: base parameters of another machine ({str(data.get('robot'))[:60]!r}), not of "
-            f"{robot.name!r}: names or groupings differ; give the robot that was identified"
+            f"{path}: base parameters of another machine ({str(document.get('robot'))[:60]!r}), "
+            f"not of {robot.name!r}: names or groupings differ; give the robot that was identified"
         )
     driven = replace(robot, legs=tuple(legs))
-    return Identified(driven, base, values, _comments(base, texts), grade)
+    return Identified(driven, base, base_values, _comments(base, texts), grade)
 
 
 def _object(path: str | Path) -> dict[str, Any]:
     """Return the object in a JSON file; empty if the file holds another kind of value."""
     try:
         expect_regular(Path(path))
-        data = json.loads(Path(path).read_text(encoding="utf-8"))
+        document = json.loads(Path(path).read_text(encoding="utf-8"))
     except OSError as error:
         raise DataError(f"{path}: {error.strerror or error}") from None
     except (ValueError, RecursionError):
         raise DataError(
             f"{path}: no JSON; give the identification.json that pteron identify writes"
         ) from None
-    return data if isinstance(data, dict) else {}
+    return document if isinstance(document, dict) else {}
 
 
 def _with_friction(leg: LegKind, friction: dict[str, Any]) -> LegKind:
@@ -176,10 +176,8 @@ def _payload_program(robot: Manipulator, base: BaseParameters) -> Program:
     base_symbols = ca.SX.sym(_NAME, base.rank)
     grouping = ca.sparsify(ca.SX(ca.DM(base.grouping)))
     ports = (*load.inputs[:3], Port(_NAME, (base.rank,), shared=True))
-    loaded, loaded_values = (
-        Port(f"loaded_{_NAME}", (base.rank,)),
-        base_symbols + ca.mtimes(grouping, load_parameters.T),
-    )
+    loaded = Port(f"loaded_{_NAME}", (base.rank,))
+    loaded_values = base_symbols + ca.mtimes(grouping, load_parameters.T)
     return Program.from_expressions(
         load.name, [mass, center, inertia, base_symbols], ports, [loaded_values], [loaded]
     ).optimise()

@@ -65,6 +65,8 @@ class LinuxCncAxis:
 
 @dataclass(frozen=True)
 class _Joint:
+    """A joint of the INI and HAL files, in mm or degrees."""
+
     name: str
     angular: bool
     scale: float
@@ -194,7 +196,7 @@ def export_linuxcnc(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
     tilted = _TurnedArm.from_platform(platform, home) if platform.tilts else None
     arm = None if tilted else _Arm.from_platform(platform)
     places = {a.letter: f"{a.scale * at:.6f}" for a, at in zip(axes, seen, strict=True)}
-    values = {
+    variables = {
         "banner": [line for line in banner(robot, "LinuxCNC") if "SI units" not in line],
         "prefix": prefix,
         "upper": prefix.upper(),
@@ -218,16 +220,16 @@ def export_linuxcnc(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
         "number": repr,
     }
     files = {
-        f"{_component(prefix)}.comp": render_template("pteron.export", "kins.comp.j2", **values),
-        f"{prefix}.ini": render_template("pteron.export", "linuxcnc.ini.j2", **values),
-        f"{prefix}.hal": render_template("pteron.export", "linuxcnc.hal.j2", **values),
+        f"{_component(prefix)}.comp": render_template("pteron.export", "kins.comp.j2", **variables),
+        f"{prefix}.ini": render_template("pteron.export", "linuxcnc.ini.j2", **variables),
+        f"{prefix}.hal": render_template("pteron.export", "linuxcnc.hal.j2", **variables),
     }
     if arm is not None and _linear(robot):
         rows = np.asarray(jacobian(robot, np.zeros(3)))
         zero = np.asarray(evaluate_unchecked(robot, "joint_coordinates", np.zeros(3)))
         offsets = _MILLIMETRES * (zero - rows @ arm.still)
         files[f"{prefix}_matrixkins.hal"] = render_template(
-            "pteron.export", "matrixkins.hal.j2", rows=rows.tolist(), offsets=offsets, **values
+            "pteron.export", "matrixkins.hal.j2", rows=rows.tolist(), offsets=offsets, **variables
         )
     # halcompile reads what the locale says: nothing but ASCII.
     plain = {name: text.encode("ascii", "replace").decode() for name, text in files.items()}

@@ -39,10 +39,10 @@ def node_names(
     symbols = function.function.sx_in()
     inputs = {port.name: symbol for port, symbol in zip(function.inputs, symbols, strict=True)}
     results = zip(function.outputs, function.function.call(symbols), strict=True)
-    inputs |= {port.name: result.T for port, result in results if port.name == "found"}
+    inputs |= {port.name: array.T for port, array in results if port.name == "found"}
     names, legs, scalars = [], [], []
-    for name, leg, value in _quantities(machine, inputs):
-        parts = ca.vertsplit(ca.densify(value))
+    for name, leg, quantity in _quantities(machine, inputs):
+        parts = ca.vertsplit(ca.densify(quantity))
         names += [name + axis for axis in _AXES[len(parts)]]
         legs += [leg] * len(parts)
         scalars += parts
@@ -50,8 +50,8 @@ def node_names(
     nodes = graph.values(lambda i, j: elements[i][j], expression)
     both = ca.Function("both", symbols, [ca.vertcat(*nodes), ca.vertcat(*scalars)])
     computed = [[np.array(part) for part in both(*state)] for state in states]
-    values, quantities = (np.hstack(parts) for parts in zip(*computed, strict=True))
-    return _name_nodes(graph, _matches(values, quantities), names, legs)
+    node_values, quantities = (np.hstack(parts) for parts in zip(*computed, strict=True))
+    return _name_nodes(graph, _matches(node_values, quantities), names, legs)
 
 
 def _quantities(machine: Machine, inputs: dict[str, Expression]) -> Iterator[NamedQuantity]:
@@ -68,11 +68,11 @@ def _quantities(machine: Machine, inputs: dict[str, Expression]) -> Iterator[Nam
     elif "joints" in inputs:
         joints = inputs["joints"]
         for i, (leg, q) in enumerate(zip(machine.legs, ca.vertsplit(joints), strict=True), 1):
-            for name, value in leg.locus(q)._asdict().items():
-                yield f"leg{i}_{name}", i, ca.SX(value)
+            for name, quantity in leg.locus(q)._asdict().items():
+                yield f"leg{i}_{name}", i, ca.SX(quantity)
         for k, pose in enumerate(ca.horzsplit(machine.closure.poses(joints)), start=1):
-            for name, _, value in _motion(machine, pose):
-                yield f"pose{k}_{name}", 0, value  # of no single leg: the pose depends on all
+            for name, _, quantity in _motion(machine, pose):
+                yield f"pose{k}_{name}", 0, quantity  # of no single leg: the pose depends on all
 
 
 def _motion(machine: Machine, pose: Expression, *rates: Expression) -> Iterator[NamedQuantity]:
@@ -95,20 +95,20 @@ def _motion(machine: Machine, pose: Expression, *rates: Expression) -> Iterator[
             "joint_acceleration": leg.acceleration,
             "divisor": leg.divisor,
         }
-        for name, value in quantities.items():
-            if value is not None:
-                yield f"leg{i}_{name}", i, value
+        for name, quantity in quantities.items():
+            if quantity is not None:
+                yield f"leg{i}_{name}", i, quantity
         # A platform point's coordinates may serve several legs.
-        for name, value in zip(("c", "dc", "ddc"), point, strict=True):
-            yield f"{name}{i}", 0, value
+        for name, quantity in zip(("c", "dc", "ddc"), point, strict=True):
+            yield f"{name}{i}", 0, quantity
 
 
-def _matches(values: Array, quantities: Array) -> dict[int, int]:
-    """Return, by the first node with an equal value, the index of each wanted quantity."""
+def _matches(node_values: Array, quantities: Array) -> dict[int, int]:
+    """Return, by the first node that has its value, the index of each named quantity."""
     places: dict[int, int] = {}
     for place, row in enumerate(quantities):
         if np.isfinite(row).all() and np.ptp(row) > 0.0:  # constants may be equal by chance
-            same = (np.abs(values - row) <= EXACT * np.abs(row)).all(axis=1)
+            same = (np.abs(node_values - row) <= EXACT * np.abs(row)).all(axis=1)
             for k in np.flatnonzero(same):
                 places.setdefault(int(k), place)
                 break

@@ -59,7 +59,7 @@ def good_poses(robot: Manipulator) -> Array:
 
 
 def measures_of(robot: Manipulator, poses: Array) -> Array:
-    """Return how far poses (..., m) are from singular: the worst type-I or twice the type-II.
+    """Return poses' distance (...) from singularities: least of type-I and twice type-II measures.
 
     It is NaN where a leg does not reach, or a joint is beyond its limits.
     """

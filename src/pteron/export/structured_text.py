@@ -124,27 +124,25 @@ def export_st(
         base=base,
         tables=False,
     )
-    prefix = _camel(prefix_of(robot))
-    blocks = {f"{prefix}_{_camel(item.name)}": item for item in exported}
-    return write_texts(
-        folder, {f"{name}.st": _block(robot, name, item) for name, item in blocks.items()}
-    )
+    prefix = _pascal_case(prefix_of(robot))
+    blocks = {f"{prefix}_{_pascal_case(f.name)}": f for f in exported}
+    return write_texts(folder, {f"{name}.st": _block(robot, name, f) for name, f in blocks.items()})
 
 
-def _block(robot: Manipulator, name: str, item: ExportedFunction) -> str:
+def _block(robot: Manipulator, name: str, code: ExportedFunction) -> str:
     """Return the Structured Text of a function block, with its comments."""
-    comments = [*banner(robot, "Structured Text"), "", item.summary]
-    comments.append(f"{item.operations} arithmetic operations.")
-    if item.name.startswith("set_payload"):
+    comments = [*banner(robot, "Structured Text"), "", code.summary]
+    comments.append(f"{code.operations} arithmetic operations.")
+    if code.name.startswith("set_payload"):
         comments += tool_lines(robot)
-    if any(node.operation == "atan2" for node in item.graph.nodes):
+    if any(node.operation == "atan2" for node in code.graph.nodes):
         comments.append("It calls ATAN2(y, x), which some controllers have in a library only.")
     return function_block(
-        name, item.graph, item.inputs, item.outputs, comments, item.meanings, item.names
+        name, code.graph, code.inputs, code.outputs, comments, code.meanings, code.names
     )
 
 
-def _camel(name: str) -> str:
+def _pascal_case(name: str) -> str:
     """Return a snake_case name in PascalCase."""
     return "".join(part.capitalize() for part in name.split("_"))
 

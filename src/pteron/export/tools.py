@@ -24,11 +24,11 @@ def tool_tables(robot: Manipulator) -> Iterator[tuple[str, str, tuple[str, ...],
         stem = f"tool_{safe_name(tool.name, '_')}"
         stem = add_checksum(stem, tool.name, len(stem) + 7) if stem in taken else stem
         taken.add(stem)
-        for name, values in _arguments(robot, tool).items():
+        for name, numbers in _arguments(robot, tool).items():
             units = {"mass": ("kg",), "center": ("x, m", "y, m", "z, m")}.get(name)
-            kinds = _TENSOR.split() if len(values) > 1 else ["I"]
+            kinds = _TENSOR.split() if len(numbers) > 1 else ["I"]
             units = units or tuple(f"{kind}, kg m^2" for kind in kinds)
-            yield f"{stem}_{name}", f"{_tool_text(tool)}: {name} of set_payload.", units, values
+            yield f"{stem}_{name}", f"{_tool_text(tool)}: {name} of set_payload.", units, numbers
 
 
 def tool_lines(robot: Manipulator) -> list[str]:
@@ -36,8 +36,8 @@ def tool_lines(robot: Manipulator) -> list[str]:
     lines = []
     for tool in robot.tools:
         arguments = (
-            f"{name} := [{', '.join(map(repr, values.tolist()))}]"
-            for name, values in _arguments(robot, tool).items()
+            f"{name} := [{', '.join(map(repr, numbers.tolist()))}]"
+            for name, numbers in _arguments(robot, tool).items()
         )
         lines.append(f"{_tool_text(tool)}: {', '.join(arguments)}.")
     return lines

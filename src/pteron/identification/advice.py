@@ -28,34 +28,34 @@ _EQUAL = 1e-3
 def advice_on_hidden_values(
     base: BaseParameters, hidden: Sequence[str], *, clean: bool
 ) -> list[str]:
-    """Return advice on values that a motion does not show: shared legs, or more motion.
+    """Return advice on base parameters that a motion does not show: shared legs, or more motion.
 
-    Fewer values leave less room for a fault: legs are to be shared in a log that is `clean`.
+    Sharing is advised only for a log that is `clean`: fewer parameters absorb less of a fault.
     """
     robot, advice = base.robot, []
     if clean and not any(len(p.legs) > 1 for p in base.parameters) and _has_equal_legs(robot):
         advice.append(
-            "The legs are drawn alike: --shared identifies one set of parameters for all of them, "
-            "which the same motion shows better."
+            "The legs are equal in the file: --shared identifies one set of parameters for all of "
+            "them, which the same motion determines better."
         )
     return [
         *advice,
-        f"Not shown by this motion and left near the drawing: {', '.join(hidden)}. pteron excite "
-        "ROBOT --out motion.csv writes a motion that shows more; faster still with --speed and "
-        "--acceleration.",
+        f"Not determined by this motion and left near the drawing: {', '.join(hidden)}. pteron "
+        "excite ROBOT --out motion.csv writes a motion that determines more; --speed and "
+        "--acceleration make it faster.",
     ]
 
 
 def _has_equal_legs(robot: Manipulator) -> bool:
     """Return whether all legs have the same kind and the same inertial parameters as drawn."""
     groups: dict[tuple[str, str], list[float]] = {}
-    for parameter, value in zip(parameter_data(robot), parameters(robot).tolist(), strict=True):
+    for parameter, size in zip(parameter_data(robot), parameters(robot).tolist(), strict=True):
         if parameter.legs:
-            groups.setdefault((parameter.kind, parameter.body), []).append(value)
+            groups.setdefault((parameter.kind, parameter.body), []).append(size)
     legs = len(robot.legs)
     return all(
-        len(values) == legs and np.ptp(values) <= _EQUAL * np.max(np.abs(values))
-        for values in groups.values()
+        len(group) == legs and np.ptp(group) <= _EQUAL * np.max(np.abs(group))
+        for group in groups.values()
     )
 
 
@@ -67,12 +67,11 @@ def advice_on_weak_values(model: Model, weak: Sequence[str]) -> list[str]:
     advice = []
     if others:
         advice.append(
-            f"Weak with this motion: {', '.join(others)}. pteron excite ROBOT --out motion.csv "
-            "writes a motion that shows more of them; the faster (--speed, --acceleration) and "
-            "longer (--periods), the more."
+            f"To determine {', '.join(others)} better, record a motion of pteron excite ROBOT "
+            "--out motion.csv, faster (--speed, --acceleration) and longer (--periods)."
         )
     if falling:
-        advice.append(f"Weak with this motion: {', '.join(falling)}. {_SLOWLY}")
+        advice.append(f"This motion hardly determines {', '.join(falling)}. {_SLOWLY}")
     return advice
 
 
@@ -81,15 +80,16 @@ def notes_on_fit(model: Model, estimate: Estimate, rotors: dict[str, float]) -> 
     notes, units = [], {term.name: term.unit for term in model.all_terms}
     if not estimate.converged:
         notes.append(
-            f"The estimator {estimate.method} has not settled in {estimate.iterations} iterations: "
-            "values and intervals may be off; choose another estimator, or record longer."
+            f"The estimator {estimate.method} has not converged in {estimate.iterations} "
+            "iterations: values and intervals may be wrong; choose another estimator, or record "
+            "longer."
         )
     notes += [
-        f"{name} = {mass:.6g} {units[name]} is known, and no part of the real bodies."
+        f"{name} = {mass:.6g} {units[name]} is known from the file, and not part of the bodies."
         for name, mass in rotors.items()
     ]
     for name, shares in model.joins.items():
-        notes.append(f"{name} joins {' and '.join(shares) or 'nothing: it does not act'}.")
+        notes.append(f"{name} is contained in {' and '.join(shares) or 'no value: no effect'}.")
     return notes
 
 
@@ -102,12 +102,12 @@ def notes_on_unknowns(unknowns: Unknowns, model: Model, *, default: bool, half: 
     notes = []
     if default and half:
         notes.append(
-            f"{describe_held_forces(unknowns.delay)}; that is taken out (--delay 0 leaves it in)."
+            f"{describe_held_forces(unknowns.delay)}; this is corrected (--delay 0 leaves it in)."
         )
     elif unknowns.delay_deviation and not default:
         notes.append(
             f"The forces are {1e3 * unknowns.delay:.3g} ms "
-            f"(+- {2e3 * unknowns.delay_deviation:.1g}) late for the positions; that is taken out."
+            f"(+- {2e3 * unknowns.delay_deviation:.1g}) late for the positions; this is corrected."
         )
     if unknowns.speeds is not None:
         low, high = unknowns.speed_intervals()

@@ -1,4 +1,4 @@
-"""Values of a fit where some of them are set otherwise: the others move with them."""
+"""Conditional values of a fit: some are fixed, and the others follow by the covariance."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ def conditional_shift(covariance: Array, places: Sequence[int], shift: Array) ->
 def conditional_values(
     values: Array, covariance: Array, bodies: Array, positive: Sequence[int]
 ) -> Array:
-    """Return values (p,) whose first ones are those of real `bodies` (rank,), none below zero.
+    """Return a fit's values (p,) with the first `rank` fixed to those of real `bodies`.
 
-    Those at `positive` places that would be below zero are zero, and the others follow.
+    The others follow by the covariance. Those at `positive` places that would be negative are zero.
     """
     rank = len(bodies)
     fixed, targets = list(range(rank)), bodies.tolist()

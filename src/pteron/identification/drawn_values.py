@@ -20,7 +20,7 @@ from pteron.kernels import Array
 from pteron.manipulator import parameters
 
 _LITTLE = 0.5
-"""Deviation after a fit, over that of the drawing, from which a value is called not shown."""
+"""Deviation after a fit, over that of the drawing, from which a value counts as not shown."""
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class DrawnValues:
     Attributes
     ----------
     names : tuple of str
-        The base parameters that are told to be not shown: all K, or fewer.
+        Base parameters that are reported as not shown: all K, or fewer.
     places : array of int, shape (K,)
         Their places among the values.
     values, deviations : array, shape (K,)
@@ -48,8 +48,8 @@ class DrawnValues:
         names = unseen_names(model, estimate.deviations)
         places = np.array([model.names.index(name) for name in names], dtype=np.int64)
         drawn = parameters(model.robot)
-        values = (model.base.grouping @ drawn + known[: model.base.rank])[places]
-        return cls(names, places, values, usual_sizes(model.base, drawn)[places])
+        drawn_values = (model.base.grouping @ drawn + known[: model.base.rank])[places]
+        return cls(names, places, drawn_values, usual_sizes(model.base, drawn)[places])
 
     @classmethod
     def from_model(cls, model: Model, known: Array) -> DrawnValues:
@@ -58,12 +58,12 @@ class DrawnValues:
         `known` (p,) is the rotors' part of the values.
         """
         drawn = parameters(model.robot)
-        values = model.base.grouping @ drawn + known[: model.base.rank]
+        drawn_values = model.base.grouping @ drawn + known[: model.base.rank]
         places = np.arange(model.base.rank)
-        return cls(model.base.names, places, values, usual_sizes(model.base, drawn))
+        return cls(model.base.names, places, drawn_values, usual_sizes(model.base, drawn))
 
     def name_undetermined(self, estimate: Estimate) -> DrawnValues:
-        """Return it with the names of those only that the fit hardly determines."""
+        """Return these drawn values, naming only the parameters that the fit hardly determines."""
         share = estimate.deviations[self.places] / self.deviations
         names = zip(self.names, share.tolist(), strict=True)
         return replace(self, names=tuple(name for name, s in names if s > _LITTLE))
@@ -81,21 +81,21 @@ class DrawnValues:
         reduction[:, self.places] -= gain
         # Joseph's form, which stays positive where deviations differ by many orders.
         covariance = reduction @ covariance @ reduction.T + gain @ np.diag(deviations**2) @ gain.T
-        values = estimate.values + size * shift
-        residuals = residuals_of(observations, values)
+        updated = estimate.values + size * shift
+        residuals = residuals_of(observations, updated)
         return replace(
             estimate,
-            values=values,
+            values=updated,
             covariance=0.5 * (covariance + covariance.T) * np.outer(size, size),
             residuals=residuals,
             whiteness=whiteness(residuals, observations.gain > 0.0),
         )
 
-    def rows_beside(self, observations: Observations, noise: Array) -> Observations:
-        """Return the observations followed by a row for each value known from the drawing.
+    def append_drawn_values(self, observations: Observations, noise: Array) -> Observations:
+        """Return the observations followed by an equation for each drawn value: T + K rows.
 
-        The input rows come first, unchanged: T + K of them in all, later by their times. A row has
-        the value of a single joint, scaled so that it weighs as a force with the `noise` (n,).
+        Each is an equation of the first actuator, weighted as a force with its `noise` (n,), and
+        later in time than the observations.
         """
         count = len(self.places)
         if not count:

@@ -16,7 +16,7 @@ from pteron.identification.logs import Log
 from pteron.identification.logs.description import KnownPayload
 from pteron.identification.model import Model, Terms, identification_model
 from pteron.identification.observation import Observations
-from pteron.identification.payload import observations_with_payload
+from pteron.identification.payload_phases import observations_with_payload
 from pteron.identification.signals import Processing
 from pteron.json_values import json_fields
 from pteron.kernels import Array
@@ -77,7 +77,7 @@ class DriveGains(Result):
     @property
     def note(self) -> str:
         """The line that declares the gains, for [forces] in the log's description."""
-        return f"gains = [{', '.join(f'{value:.10g}' for value in self.gains)}]"
+        return f"gains = [{', '.join(f'{gain:.10g}' for gain in self.gains)}]"
 
     def summary(self) -> str:
         """Return the gains, for people, as lines of text."""
@@ -88,7 +88,7 @@ class DriveGains(Result):
                 f"  g{i}  {gain:.6g} +- {deviation:.2g} {self.estimate.units[i - 1]} "
                 f"(total least squares {start:.6g})"
             )
-        residuals = ", ".join(f"{value:.2g}" for value in self.residual)
+        residuals = ", ".join(f"{residual:.2g}" for residual in self.residual)
         lines.append(f"Left of the currents: {residuals} {self.unit}.")
         lines.append(f"Condition number {self.condition:.3g}, gap {self.gap:.2g}.")
         lines.append("The gains are as exact as the payload's mass and inertia at best.")
@@ -162,7 +162,7 @@ def identify_drive_gains(
     """
     robot = as_manipulator(robot)
     logs = [log] if with_payload is None else [log, with_payload]
-    unit = _unit(logs)
+    unit = _current_unit(logs)
     known = payload or logs[-1].description.payload or log.description.payload
     if known is None:
         raise logs[-1].fault(
@@ -182,7 +182,7 @@ def identify_drive_gains(
     observations = observations_with_payload(model, log, with_payload, processing)
     carried = observations.matrix[..., -len(known.values) :] @ np.array(known.values)
     observations = observations.columns(range(len(plain.names)))
-    start, condition, gap = _total(observations, carried)
+    start, condition, gap = _fit_total_least_squares(observations, carried)
     units = [f"{leg.joint.force_unit}/{unit}" for leg in robot.legs]
     estimate = _fit_likelihood(observations, carried, start, units)
     n = observations.actuators
@@ -198,8 +198,8 @@ def identify_drive_gains(
     )
 
 
-def _unit(logs: list[Log]) -> str:
-    """Return the unit of the currents of all logs; raise where they differ or are newtons."""
+def _current_unit(logs: list[Log]) -> str:
+    """Return the unit of the currents in all logs; raise LogError if they differ or are newtons."""
     for log in logs:
         if log.description.force_unit == "N":
             raise log.fault(
@@ -217,8 +217,10 @@ def _unit(logs: list[Log]) -> str:
     return units.pop()
 
 
-def _total(observations: Observations, carried: Array) -> tuple[Array, float, float]:
-    """Return g and beta by total least squares, with the condition number and the gap."""
+def _fit_total_least_squares(
+    observations: Observations, carried: Array
+) -> tuple[Array, float, float]:
+    """Return (g, beta) by total least squares (n + p,), the condition number and the gap."""
     # The columns W are exact, as in the likelihood: noise is in the currents alone. Else the
     # weakest of dozens of inertial parameters would pass for the null vector.
     n, p = observations.actuators, len(observations.names)
@@ -248,21 +250,21 @@ def _total(observations: Observations, carried: Array) -> tuple[Array, float, fl
             "the payload does not tell the gains from the inertia; carry a heavier one, and move "
             "all coordinates in both phases",
         )
-    values = corrections.values / np.where(factor.scale > 0.0, factor.scale, 1.0)
-    return np.roll(values, n), float(sizes[0] / sizes[-2]), float(sizes[-1] / sizes[-2])
+    solution = corrections.values / np.where(factor.scale > 0.0, factor.scale, 1.0)
+    return np.roll(solution, n), float(sizes[0] / sizes[-2]), float(sizes[-1] / sizes[-2])
 
 
 def _fit_likelihood(
     observations: Observations, carried: Array, start: Array, units: Sequence[str]
 ) -> Estimate:
-    """Return g and beta of greatest likelihood, the noise being in the currents alone."""
+    """Return the maximum-likelihood estimate of (g, beta), with noise in the currents alone."""
     n = observations.actuators
     names = (*(f"g{i}" for i in range(1, n + 1)), *observations.names)
     named = (*units, *observations.units)
     # In 1 / g the currents are bilinear: what is left out of each step is only a product.
-    values = np.r_[1.0 / start[:n], start[n:]]
+    beta = np.r_[1.0 / start[:n], start[n:]]
     for iteration in count(1):
-        inverse, inertia = values[:n], values[n:]
+        inverse, inertia = beta[:n], beta[n:]
         force = observations.matrix @ inertia + carried
         tangent = np.concatenate(
             [force[..., None] * np.eye(n), inverse[:, None] * observations.matrix], axis=-1
@@ -270,25 +272,24 @@ def _fit_likelihood(
         # J v = current - f(v0) + J v0, and J v0 = f(v0) + (W beta) / g.
         images = observations.forces + inverse * (force - carried)
         linear = replace(observations, names=names, units=named, matrix=tangent, forces=images)
-        noise = actuator_noise(linear, values)
-        step = qr_factor(linear, 1.0 / noise).values() - values
-        values = values + step
+        noise = actuator_noise(linear, beta)
+        step = qr_factor(linear, 1.0 / noise).values() - beta
+        beta = beta + step
         change = np.linalg.norm(tangent @ step)
         residual = np.linalg.norm(observations.forces - inverse * force)
         if change <= max(_SETTLED * residual, LAST_DIGITS * np.linalg.norm(observations.forces)):
             break
         if iteration == _ITERATIONS:
             raise observations.fault(
-                "unsettled",
-                "the gains do not settle; record longer, or carry a heavier payload",
+                "unsettled", "the gains do not settle; record longer, or carry a heavier payload"
             )
     estimate = weighted_least_squares(linear)
-    values = estimate.values
-    slopes = np.r_[-1.0 / values[:n] ** 2, np.ones(len(values) - n)]
+    beta = estimate.values
+    slopes = np.r_[-1.0 / beta[:n] ** 2, np.ones(len(beta) - n)]
     return replace(
         estimate,
         method="likelihood",
-        values=np.r_[1.0 / values[:n], values[n:]],
+        values=np.r_[1.0 / beta[:n], beta[n:]],
         covariance=estimate.covariance * np.outer(slopes, slopes),
         iterations=iteration,
     )

@@ -1,4 +1,4 @@
-"""The error for a log that does not show what a function needs to see in it."""
+"""`LogError`: a log lacks what an evaluation needs."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ Reason = Literal[
 
 
 class LogError(DataError):
-    """A log does not show what is asked of it.
+    """A log lacks what an evaluation needs.
 
     Attributes
     ----------
@@ -46,18 +46,18 @@ class LogError(DataError):
         self.place = place
 
 
-class OfLog:
-    """Base class of a log, or of what is made of one; `source` is its name in messages."""
+class LogSourceMixin:
+    """Base class of a log and of what is computed from one; `source` is its name in messages."""
 
     source: str
 
     def fault(self, reason: Reason, message: str) -> LogError:
-        """Return the error that the log lacks what the evaluation needs."""
+        """Return the LogError that this log lacks what an evaluation needs."""
         return LogError(reason, self.source, message)
 
 
 def name_cause(error: DataError | ModelError, causes: Sequence[str]) -> None:
-    """Put the first cause at the beginning of an error's message, if there is a cause."""
+    """Prepend the first cause, if there is one, to an error's message, in place."""
     for cause in causes[:1]:
         place = f"{error.place}: " if isinstance(error, LogError) else ""
         error.args = (f"{place}{cause.rstrip('.')} ({str(error).removeprefix(place)})",)

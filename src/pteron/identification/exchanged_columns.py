@@ -8,6 +8,7 @@ from itertools import combinations, permutations, product
 
 import numpy as np
 
+from pteron.arguments import join_words
 from pteron.errors import DataError
 from pteron.identification.estimators import weighted_least_squares
 from pteron.identification.logs import Log
@@ -23,7 +24,7 @@ from pteron.identification.signals import Preprocessing
 from pteron.tolerances import ROOT_OF_ROUNDING
 
 DECISIVE = 3.0
-"""Factor by which mending must reduce the error of the fit for a fault to count as found."""
+"""Factor by which a correction must reduce the error of the fit for a fault to count as found."""
 
 _EXPLAINED = 0.3
 """Error of a fit, relative to the forces, below which it explains them."""
@@ -35,12 +36,12 @@ _ROWS = 4000
 """Rows of the observations, at least, to which longer ones are thinned."""
 
 _LOOKED_INTO = 12
-"""Faults that fit alike, those of fewest changes, whose fits are tested for physical values."""
+"""Most faults of equal fit, those of fewest changes, whose fits are tested for physical values."""
 
 _ALL_ORDERS = 4
 """Joints of which all orders are tried: 23 others."""
 
-_TOLD = 3
+_LISTED = 3
 """Equivalent faults that a message lists."""
 
 
@@ -80,7 +81,7 @@ class ColumnFault:
             parts.append("gravity points the other way than in the machine's file")
         if self.order == self.joint_order != usual:
             pairs = [f"leg {k + 1}" for k in usual if self.order[k] != k]
-            parts.append(f"{_join_names(pairs)} are exchanged, forces and joints alike")
+            parts.append(f"{join_words(pairs, 'and')} are exchanged, forces and joints alike")
         else:
             for names, order in ((self.joints, self.joint_order), (self.forces, self.order)):
                 parts += _order_clauses(names, order)
@@ -93,7 +94,7 @@ class ColumnFault:
 
 
 def _exchanges(order: Sequence[int]) -> int:
-    """Return the least number of exchanges of two that make an order."""
+    """Return the least number of swaps of two that turn an order into 0, 1, 2 ..."""
     unplaced, count = set(range(len(order))), len(order)
     while unplaced:
         at, count = unplaced.pop(), count - 1
@@ -106,10 +107,10 @@ def _order_clauses(names: Sequence[str], order: Sequence[int]) -> Iterator[str]:
     """Yield a clause that states which columns are swapped or in another order, if any."""
     moved = [name for k, name in enumerate(names) if order[k] != k]
     if len(moved) == 2:
-        yield f"{_join_names(moved)} are swapped"
+        yield f"{join_words(moved, 'and')} are swapped"
     elif moved:
         right = ", ".join(names[k] for k in order)
-        yield f"{_join_names(moved)} are in another order (they should be {right})"
+        yield f"{join_words(moved, 'and')} are in another order (they should be {right})"
 
 
 def _sign_clauses(
@@ -118,7 +119,8 @@ def _sign_clauses(
     """Yield a clause that states which columns have the wrong sign, if any."""
     flipped = [names[order[k]] for k, sign in enumerate(signs) if sign < 0]
     if flipped:
-        yield f"{_join_names(flipped)} {'has' if len(flipped) == 1 else 'have'} the sign flipped"
+        verb = "has" if len(flipped) == 1 else "have"
+        yield f"{join_words(flipped, 'and')} {verb} the sign flipped"
 
 
 def column_fault(model: Model, log: Log, preprocessing: Preprocessing) -> ColumnFault | None:
@@ -131,11 +133,11 @@ def column_fault(model: Model, log: Log, preprocessing: Preprocessing) -> Column
     # Without the mask of slow joints, which depends on the order of the joints.
     plain = replace(preprocessing, slow=np.zeros_like(preprocessing.slow))
     usual = observations_of(model, log, plain)
-    none = _fault(model, usual.actuators)
-    tried = _with_signs(none, permutations(none.order))
+    unchanged = _unchanged_columns(model, usual.actuators)
+    tried = _with_signs(unchanged, permutations(unchanged.order))
     candidates = [(fault, usual, model) for fault in _with_errors(usual, tried)]
     error = candidates[0][0].after
-    candidates += _other_faults(none, model, log, plain, error)
+    candidates += _other_faults(unchanged, model, log, plain, error)
     faults = [replace(fault, before=error) for fault, _, _ in candidates]
     least = min(fault.after for fault in faults)
     limit = _ALIKE * max(least, ROOT_OF_ROUNDING)
@@ -146,7 +148,7 @@ def column_fault(model: Model, log: Log, preprocessing: Preprocessing) -> Column
         limit = _ALIKE * max(error, ROOT_OF_ROUNDING)
     alike = [k for k, fault in enumerate(faults) if fault.after <= limit]
     alike = sorted(alike, key=lambda k: (faults[k].changes, faults[k].after))[:_LOOKED_INTO]
-    states = {k: _unphysical(faults[k], *candidates[k][1:]) for k in alike}
+    states = {k: _count_unphysical(faults[k], *candidates[k][1:]) for k in alike}
     first, *equivalents = sorted(
         alike, key=lambda k: (states[k], faults[k].changes, faults[k].after)
     )
@@ -155,49 +157,49 @@ def column_fault(model: Model, log: Log, preprocessing: Preprocessing) -> Column
     # Equal legs can be renamed in every fault: faults of more changes add nothing.
     most = states[first], faults[first].changes
     as_well = [faults[k].message() for k in equivalents if (states[k], faults[k].changes) <= most]
-    return replace(faults[first], equivalents=tuple(as_well[:_TOLD]))
+    return replace(faults[first], equivalents=tuple(as_well[:_LISTED]))
 
 
 def exchanged_joints(
     model: LinearModel, log: Log, preprocessing: Preprocessing, error: float
 ) -> ColumnFault | None:
-    """Return the exchange or the sign of joints with which the error of the fit is small."""
-    none = _fault(model, log.joints.shape[1])
+    """Return the exchange or sign of joints that fits best, if below a third of `error`."""
+    unchanged = _unchanged_columns(model, log.joints.shape[1])
     best: ColumnFault | None = None
-    for fault, observations in _moved_joints(none, model, log, preprocessing):
+    for fault, observations in _joint_corrections(unchanged, model, log, preprocessing):
         (candidate,) = _with_errors(observations, [fault])
         if candidate.after * DECISIVE < (error if best is None else best.after * DECISIVE):
             best = replace(candidate, before=error)
     return best
 
 
-def _fault(model: LinearModel, n: int) -> ColumnFault:
-    """Return the columns as named: no exchange and no sign flipped."""
+def _unchanged_columns(model: LinearModel, n: int) -> ColumnFault:
+    """Return a ColumnFault that corrects nothing: columns as recorded, errors infinite."""
     usual, upright = tuple(range(n)), (1,) * n
     names = model.robot.force_names, model.robot.joint_names
     return ColumnFault(*names, usual, upright, usual, upright, np.inf, np.inf)
 
 
 def _with_signs(fault: ColumnFault, orders: Iterable[tuple[int, ...]]) -> list[ColumnFault]:
-    """Return faults with all orders and signs of the forces; unflipped signs first."""
+    """Return faults with all `orders` and all signs of the forces; unflipped ones first."""
     signs = list(product((1, -1), repeat=len(fault.order)))
     return [replace(fault, order=o, signs=s) for o in orders for s in signs]
 
 
 def _other_faults(
-    none: ColumnFault, model: Model, log: Log, how: Preprocessing, error: float
+    unchanged: ColumnFault, model: Model, log: Log, how: Preprocessing, error: float
 ) -> Iterator[tuple[ColumnFault, Observations, Model]]:
-    """Yield faults of joints, of legs and of gravity that explain the forces far better."""
+    """Yield faults of joints, legs and gravity with a fit far better than `error`."""
 
     def trials() -> Iterator[tuple[list[ColumnFault], Observations, Model]]:
         """Yield faults, the observations to which they apply, and their model."""
-        for fault, observations in _moved_joints(none, model, log, how):
-            yield _with_signs(fault, {none.order, fault.joint_order}), observations, model
+        for fault, observations in _joint_corrections(unchanged, model, log, how):
+            yield _with_signs(fault, {unchanged.order, fault.joint_order}), observations, model
         if any(model.robot.gravity):
             x, y, z = model.robot.gravity
             turned = replace(model.robot, gravity=(-x, -y, -z))
             other = replace(model, base=replace(model.base, robot=turned))
-            faults = _with_signs(replace(none, gravity=True), [none.order])
+            faults = _with_signs(replace(unchanged, gravity=True), [unchanged.order])
             yield faults, observations_of(other, log, how), other
 
     for faults, observations, other in trials():
@@ -206,15 +208,14 @@ def _other_faults(
                 yield candidate, observations, other
 
 
-def _moved_joints(
-    none: ColumnFault, model: LinearModel, log: Log, how: Preprocessing
+def _joint_corrections(
+    unchanged: ColumnFault, model: LinearModel, log: Log, how: Preprocessing
 ) -> Iterator[tuple[ColumnFault, Observations]]:
-    """Yield flipped signs and orders of joints with which all rows have poses."""
-    n = len(none.order)
-    faults = [
-        replace(none, joint_signs=tuple(-1 if k == i else 1 for k in range(n))) for i in range(n)
-    ]
-    faults += [replace(none, joint_order=order) for order in _orders(n)]
+    """Yield each flipped sign or other order of joints that has poses, and observations."""
+    n = len(unchanged.order)
+    flips = (1 - 2 * np.eye(n, dtype=int)).tolist()
+    faults = [replace(unchanged, joint_signs=tuple(signs)) for signs in flips]
+    faults += [replace(unchanged, joint_order=order) for order in _orders(n)]
     for fault in faults:
         joints = log.joints[:, list(fault.joint_order)] * np.array(fault.joint_signs)
         try:
@@ -244,7 +245,7 @@ def _orders(n: int) -> list[tuple[int, ...]]:
 
 
 def _with_errors(observations: Observations, faults: Sequence[ColumnFault]) -> list[ColumnFault]:
-    """Return faults with the error of the fit, relative to the forces, for the orders and signs."""
+    """Return the faults with the error of their fits, relative to the forces, in `after`."""
     step = max(len(observations.forces) // _ROWS, 1)
     matrix, forces = observations.matrix[::step], observations.forces[::step]
     rows, n, p = matrix.shape
@@ -260,13 +261,8 @@ def _with_errors(observations: Observations, faults: Sequence[ColumnFault]) -> l
     return with_errors
 
 
-def _unphysical(fault: ColumnFault, observations: Observations, model: Model) -> int:
+def _count_unphysical(fault: ColumnFault, observations: Observations, model: Model) -> int:
     """Return the number of unphysical values that the corrected forces give."""
     forces = observations.forces[:, list(fault.order)] * np.array(fault.signs)
     mended = observations.with_forces(forces)
     return unphysical(model, mended, weighted_least_squares(mended))
-
-
-def _join_names(names: Sequence[str]) -> str:
-    """Return names joined by commas and "and"."""
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

@@ -209,7 +209,7 @@ def _fit_values(task: FitTask, equations: FitEquations, known: Array) -> FittedV
         # The log does not determine all values: with those of the drawing it may.
         noise = np.mean([how.force_noise for how in preprocessing], axis=0)
         drawn_values = DrawnValues.from_model(model, known)
-        observations = drawn_values.rows_beside(observations, noise)
+        observations = drawn_values.append_drawn_values(observations, noise)
         estimate = _estimate_with_drawing(solve, observations, error)
         equations = replace(equations, observations=observations)
         return FittedValues(
@@ -222,9 +222,7 @@ def _fit_values(task: FitTask, equations: FitEquations, known: Array) -> FittedV
 
 
 def _estimate_with_drawing(
-    solve: Callable[[Observations], Estimate],
-    observations: Observations,
-    error: LogError,
+    solve: Callable[[Observations], Estimate], observations: Observations, error: LogError
 ) -> Estimate:
     """Return the fit of a log, with drawn values where it determines too little; or raise."""
     if error.reason != "too little motion":
@@ -254,7 +252,7 @@ def _predict_checks(task: FitTask, fit: FittedValues) -> tuple[Prediction, ...]:
 
 
 def _check_log(task: FitTask, fit: FittedValues, *, trusted: bool, distorted: bool) -> None:
-    """Refuse a log that contradicts the machine's file, has other columns, or too little motion."""
+    """Raise where a log contradicts the machine's file, in columns too, or moves too little."""
     equations, first = fit.equations, task.motions.fit[0]
     model, preprocessing = equations.model, equations.preprocessing
     if not trusted or unphysical(model, equations.observations, fit.estimate):

@@ -47,11 +47,11 @@ def fit_real_bodies(
     """Return real bodies nearest to the values of a fit, and of these, nearest to `cad`."""
     model, estimate, observations = fit.equations.model, fit.estimate, fit.equations.observations
     rank = model.base.rank
-    values = (estimate.values - fit.known)[:rank]
+    identified = (estimate.values - fit.known)[:rank]
     covariance = _make_positive(estimate.covariance[:rank, :rank])
     try:
         consistency = consistent_model(
-            model.robot, model.base, values, covariance, cad=cad, bounds=bounds
+            model.robot, model.base, identified, covariance, cad=cad, bounds=bounds
         )
     except ModelError as error:
         # Values too far from those of real bodies for the solver are no reason to say nothing; what
@@ -59,14 +59,13 @@ def fit_real_bodies(
         if bounds is not None and not isinstance(error, MissingSolver):
             raise
         return FittedBodies(None, notes=(f"No model of real bodies: {error}",))
-    shift = conditional_shift(estimate.covariance, range(rank), consistency.base_values - values)
+    change = consistency.base_values - identified
+    shift = conditional_shift(estimate.covariance, range(rank), change)
     change = np.sqrt(((observations.matrix @ shift) ** 2).mean())
     residual = np.sqrt((estimate.residuals**2).mean())
     size, tiny = np.sqrt((observations.forces**2).mean()), np.finfo(float).tiny
     return FittedBodies(
-        consistency,
-        float(change / max(residual, tiny)),
-        float(100.0 * change / max(size, tiny)),
+        consistency, float(change / max(residual, tiny)), float(100.0 * change / max(size, tiny))
     )
 
 
@@ -76,9 +75,9 @@ def _make_positive(covariance: Array) -> Array:
     Without noise many values are known alike, to rounding.
     """
     size = np.sqrt(np.maximum(np.diag(covariance), np.finfo(float).tiny))
-    values, vectors = np.linalg.eigh(covariance / np.outer(size, size))
-    least = EXACT * values[-1]
-    if values[0] >= least:
+    eigenvalues, vectors = np.linalg.eigh(covariance / np.outer(size, size))
+    least = EXACT * eigenvalues[-1]
+    if eigenvalues[0] >= least:
         return covariance
-    lifted = (vectors * np.maximum(values, least)) @ vectors.T
+    lifted = (vectors * np.maximum(eigenvalues, least)) @ vectors.T
     return np.asarray(0.5 * (lifted + lifted.T) * np.outer(size, size))

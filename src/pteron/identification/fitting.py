@@ -52,7 +52,7 @@ _FEWEST = 20
 """Rows of a log from which a spectrum can be computed; the filters' edges take more."""
 
 _LOOK = 12_000
-"""Rows, at most, in which other orders of joints are tried."""
+"""Most rows in which other orders of joints are tried."""
 
 _MOST = 10.0
 """Largest ratio of the noise of two recordings that weights take into account."""
@@ -62,7 +62,7 @@ _NOISELESS = 1e-10
 
 
 def convert_to_newtons(log: AnyLog, robot: Manipulator) -> AnyLog:
-    """Return a log; if its forces are in per cent of rated torque, by the machine's drives."""
+    """Return a log with forces in per cent of rated torque, if they are, as N or N m."""
     return apply_rated_torque(log, robot) if log.description.force_unit == "%" else log
 
 
@@ -72,7 +72,7 @@ def check_recordings(
     others: Sequence[Recording],
     processing: Processing,
 ) -> None:
-    """Refuse recordings that are none, too short, of currents, of no forces, or given twice."""
+    """Raise where recordings are missing, too short, in currents, forceless or given twice."""
     if not recordings:
         raise DataError("logs: none given, one or more expected")
     for recording in (*recordings, *others):
@@ -118,7 +118,7 @@ def check_recordings(
 
 
 def check_payload(fit: Sequence[Recording]) -> None:
-    """Refuse recordings that do not tell when a payload is carried, or carry several."""
+    """Raise LogError where recordings do not state when a payload is carried, or carry several."""
     heads = [recording.head() for recording in fit]
     masses = {head.payload_mass: head.source for head in heads if head.payload_mass is not None}
     said = ""
@@ -243,7 +243,7 @@ def append_findings(recordings: Sequence[Recording]) -> Iterator[None]:
 def check_motion(
     model: Model, estimate: Estimate, preprocessing: Sequence[Preprocessing], first: Recording
 ) -> None:
-    """Refuse a log whose forces say nothing of the machine; what motion leaves open is no fault."""
+    """Raise LogError where values are so uncertain that the forces cannot be the machine's."""
     hidden, nothing = unseen_shares(model, estimate.deviations)
     if not nothing:
         return
@@ -263,10 +263,10 @@ def check_motion(
 def check_columns(
     model: Model, recording: Recording, preprocessing: Preprocessing, *, decisive: bool = False
 ) -> None:
-    """Refuse a log whose columns, exchanged or with other signs, would be explained far better.
+    """Raise LogError where exchanged columns or signs would explain a log's forces far better.
 
-    With `decisive` only where the error falls so: not for values that are no machine's, which
-    another fault of the log may have made.
+    If `decisive`, only where they reduce the fit's error: unphysical values alone may come from
+    another fault of the log.
     """
     head = recording.head().part(0, _LOOK)
     if model.terms.payload and (head.payload is None or not head.payload.any()):

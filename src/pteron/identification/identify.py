@@ -231,7 +231,7 @@ def _judge_round(task: FitTask, last: FitRound, bodies: FittedBodies, factor: fl
         factor=factor,
         hidden_orders=hidden_orders(task.robot, task.motions.fit[0].head(), preprocessing[0]),
         followed=frozenset(name for name, chosen in options.items() if chosen),
-        left=excess_residual_cause(fit.estimate, preprocessing),
+        residual_cause=excess_residual_cause(fit.estimate, preprocessing),
     )
     verdict = replace(verdict, reasons=(*pushed, *verdict.reasons))
     return with_hidden_first(with_bodies(verdict, bodies.consistency, bodies.force_share))

@@ -77,7 +77,7 @@ class Terms:
 
 
 class Term(NamedTuple):
-    """One value beside the base parameters: its kind, name and unit."""
+    """A term beside the base parameters: its kind, its name and how it is written, and its unit."""
 
     kind: Literal[
         "coulomb", "viscous", "offset", "passive", "rotor", "payload", "stribeck", "further"
@@ -205,11 +205,11 @@ class Model:
                 sums[self.names.index(joined)] += f" {sign} {times}{names[name]}"
         return tuple(sums)
 
-    def share_of(self, name: str, value: float) -> Array:
-        """Return the part of the values (p,) that a term adds to those that absorb it."""
+    def share_of(self, name: str, size: float) -> Array:
+        """Return what a term of this value adds to the values (p,) that absorb it."""
         added = np.zeros(len(self.names))
         for joined, share in self.joins.get(name, {name: 1.0}).items():
-            added[self.names.index(joined)] = share * value
+            added[self.names.index(joined)] = share * size
         return added
 
     def known_values(self, known: Mapping[str, float]) -> Array:
@@ -217,16 +217,16 @@ class Model:
 
         A term that joins others adds to those.
         """
-        parts = [self.share_of(name, value) for name, value in known.items()]
+        parts = [self.share_of(name, size) for name, size in known.items()]
         return np.asarray(np.sum([np.zeros(len(self.names)), *parts], axis=0))
 
-    def joint_values(self, kind: str, values: Array) -> Array | None:
+    def joint_values(self, kind: str, beta: Array) -> Array | None:
         """Return the values (n,) of a kind of term; 0 where others absorb it, None without it.
 
         A term that joins others is in their values already.
         """
         terms = [term for term in self.all_terms if term.kind == kind]
-        known = dict(zip(self.names, values.tolist(), strict=True))
+        known = dict(zip(self.names, beta.tolist(), strict=True))
         return np.array([known.get(term.name, 0.0) for term in terms]) if terms else None
 
     def matrix(self, states: States) -> Array:
@@ -359,9 +359,9 @@ def _probes(robot: Manipulator) -> States:
     return States.from_motion(np.zeros(_PROBES), motion, np.arange(_PROBES) % 2)
 
 
-def diagonal(values: Array) -> Array:
-    """Return (R, n, n): a column for each joint."""
-    return np.asarray(values[..., None] * np.eye(values.shape[-1]))
+def diagonal(joint_values: Array) -> Array:
+    """Return diagonal matrices (R, n, n) of joints' values (R, n)."""
+    return np.asarray(joint_values[..., None] * np.eye(joint_values.shape[-1]))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,7 +13,7 @@ import numpy as np
 import scipy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
-from pteron.identification.errors import OfLog
+from pteron.identification.errors import LogSourceMixin
 from pteron.identification.logs import Log
 from pteron.identification.signals import Preprocessing, States
 from pteron.identification.signals.derivatives import EVEN, FourierFit
@@ -39,14 +39,14 @@ class LinearModel(Protocol):
 
     @property
     def units(self) -> tuple[str, ...]:
-        """Their SI units."""
+        """SI units of the values."""
 
     @property
     def kinds(self) -> tuple[str, ...]:
         """The kinds of the values, as `Model.kinds`."""
 
     def matrix(self, states: States) -> Array:
-        """Return their columns (R, n, p) at states."""
+        """Return the regressor (R, n, p) at states: the columns of the values."""
 
 
 _LEAST_SHARE = 0.3
@@ -58,7 +58,7 @@ _ROWS = ("matrix", "forces", "time", "gain", "payload")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Observations(OfLog, Result):
+class Observations(LogSourceMixin, Result):
     """Rows of F = W beta, after the parallel filter.
 
     Rows are divided by the filter's gain for white noise: the residuals of a fit have the standard
@@ -254,9 +254,7 @@ def assemble_observations(
 def _phases(log: Log, rate: float, fit: FourierFit) -> list[Log]:
     """Return the stretches of a periodic log with a constant payload and at least a period."""
     parts = [log.part(start, stop) for start, stop in log.phases]
-    long_enough = [
-        part for part in parts if part.duration + 1.0 / rate >= fit.period * (1.0 - 1e-3)
-    ]
+    long_enough = [p for p in parts if p.duration + 1.0 / rate >= fit.period * (1.0 - 1e-3)]
     if not long_enough:
         raise log.fault(
             "too short",
@@ -303,9 +301,7 @@ def _periodic(
 
     n, p = used.shape[1], len(model.names)
     basis = fourier_basis(instants, harmonics, period)
-    projection, force_projection = (
-        Projection(each, period, harmonics) for each in (time, log.time)
-    )
+    projection, force_projection = (Projection(t, period, harmonics) for t in (time, log.time))
     matrix = (basis @ projection.coefficients(regressor, n * p)).reshape(count, n, p)
     rows = basis @ force_projection.coefficients(lambda part: used[part] * log.forces[part], n)
     noise = projection.noise(shown, instants) * np.sqrt(len(time) / log.rows)

@@ -156,18 +156,18 @@ def estimate(
     )
     try:
         if instruments is None:
-            values = solve(fit)
+            solution = solve(fit)
         else:
             read = partial(_instruments, observations, len(fit.time), independent)
-            values = _estimate_by_instruments(fit, instruments, read)
+            solution = _estimate_by_instruments(fit, instruments, read)
     except LogError as error:
         if error.reason == "too little motion" and not reduce:
             error.args = (f"{error}; or give reduce=True, which leaves out dependent columns",)
         raise
-    prediction = _prediction(check, values, repeats=held_out is None)
+    prediction = _predict(check, solution, repeats=held_out is None)
     return RegressorFit(
-        values,
-        essential_parameters(fit, values, solve),
+        solution,
+        essential_parameters(fit, solution, solve),
         prediction,
         verdict_of([prediction], repeats=held_out is None),
         independent,
@@ -175,9 +175,7 @@ def estimate(
 
 
 def _hold_out(
-    observations: Observations,
-    held_out: tuple[ArrayLike, ...] | None,
-    kinds: Sequence[str] | None,
+    observations: Observations, held_out: tuple[ArrayLike, ...] | None, kinds: Sequence[str] | None
 ) -> tuple[Observations, Observations]:
     """Return the observations to fit, and those for validation: another motion's or the last."""
     count = len(observations.time)
@@ -208,7 +206,7 @@ def _estimate_by_instruments(
 ) -> Estimate:
     """Return the estimate by instruments, or by a function that returns them for values."""
     if callable(instruments):
-        return instrumental(fit, lambda values: read(instruments(values)))
+        return instrumental(fit, lambda beta: read(instruments(beta)))
     return instrumental(fit, read(instruments))
 
 
@@ -226,7 +224,7 @@ def _instruments(
     return part if independent is None else part.columns(independent.kept)
 
 
-def _prediction(check: Observations, estimate: Estimate, *, repeats: bool) -> Prediction:
+def _predict(check: Observations, estimate: Estimate, *, repeats: bool) -> Prediction:
     """Return the prediction of held-out forces by the estimated values, with its errors."""
     predicted = check.matrix @ estimate.values
     without = np.full(predicted.shape, np.nan)

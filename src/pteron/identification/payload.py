@@ -13,11 +13,9 @@ import scipy  # type: ignore[import-untyped]
 from pteron.bodies.inertia import PlanarInertia, SpatialInertia, inertia_count
 from pteron.bodies.parameters import LENGTH_POWERS
 from pteron.errors import ModelError
-from pteron.identification.errors import LogError
 from pteron.identification.estimators import Estimate, weighted_least_squares
 from pteron.identification.faults import FaultIsolation, isolate_faults
 from pteron.identification.fitting import (
-    NO_COLUMN,
     append_findings,
     check_columns,
     check_motion,
@@ -27,15 +25,14 @@ from pteron.identification.fitting import (
 )
 from pteron.identification.logs import Finding, Log
 from pteron.identification.model import Model, Terms, identification_model
-from pteron.identification.observation import Observations, observations_of, stack_observations
+from pteron.identification.observation import Observations
 from pteron.identification.plausibility import (
     CHANCE,
     excess_residual_cause,
     unphysical,
     unseen_names,
 )
-from pteron.identification.recordings import Recording, read_recording
-from pteron.identification.signals import Preprocessing, Processing, preprocessing_for_log
+from pteron.identification.signals import Processing
 from pteron.json_values import json_fields
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
@@ -46,6 +43,7 @@ from pteron.result import Result
 
 if TYPE_CHECKING:
     from pteron.identification.result import Identification
+from pteron.identification.payload_phases import observe_phases, read_phases
 
 _MOST_UNSEEN = 0.5
 """Share of base parameters that residuals may hide before a payload is refused: chosen."""
@@ -150,7 +148,7 @@ class Payload(Result):
     def call(self, robot: RobotLike) -> str:
         """Return the call of exported C that sets the payload, and the command-line option."""
         mass, center, inertia = (
-            ", ".join(f"{value:.9g}" for value in np.ravel(part)) for part in self.arguments(robot)
+            ", ".join(f"{x:.9g}" for x in np.ravel(part)) for part in self.arguments(robot)
         )
         option = "@".join((mass, center, inertia)).replace(" ", "")
         return (
@@ -186,9 +184,9 @@ class Payload(Result):
     def summary(self) -> str:
         """Return the payload, for people, as lines of text."""
         lines = ["Payload, about P in the platform's frame:"]
-        for name, value, deviation in zip(self.names, self.values, self.deviations, strict=True):
+        for name, size, deviation in zip(self.names, self.values, self.deviations, strict=True):
             unit = self.estimate.units[self.estimate.names.index(name)]
-            lines.append(f"  {name:<6} {value:+.5g} +- {deviation:.2g} {unit}")
+            lines.append(f"  {name:<6} {size:+.5g} +- {deviation:.2g} {unit}")
         if self.center_of_mass is not None:
             center = ", ".join(f"{x:+.5g}" for x in self.center_of_mass)
             lines.append(f"Centre of mass: ({center}) m.")
@@ -202,7 +200,7 @@ class Payload(Result):
         if not self.has_valid_errors:
             lines.append("The stated errors do not allow for that.")
         lines += [f"Note: {finding.message}" for finding in self.findings]
-        residuals = ", ".join(f"{value:.2g}" for value in self.residual)
+        residuals = ", ".join(f"{size:.2g}" for size in self.residual)
         lines.append(
             f"Residuals of the actuator forces: {residuals} (standard deviations, N or N m)."
         )
@@ -290,22 +288,20 @@ def identify_payload(
     without = convert_to_newtons(without, robot)
     if with_payload is not None:
         with_payload = convert_to_newtons(with_payload, robot)
-    fit = _phases(without, with_payload, processing)
+    fit = read_phases(without, with_payload, processing)
     check_recordings(robot, fit, (), processing or Processing())
     with append_findings(fit):
-        parts, plans = _observe_phases(model, fit, processing)
+        parts, plans = observe_phases(model, fit, processing)
         observations = stack_balanced(parts)
         estimate = estimator(observations)
         if unphysical(model, observations, estimate) or excess_residual_cause(estimate, plans):
             check_columns(model, fit[0], plans[0])
         check_motion(model, estimate, plans, fit[0])
-        hidden, cause = (
-            unseen_names(model, estimate.deviations),
-            excess_residual_cause(estimate, plans),
-        )
+        hidden = unseen_names(model, estimate.deviations)
+        cause = excess_residual_cause(estimate, plans)
         if cause and len(hidden) > _MOST_UNSEEN * model.base.rank:
             raise fit[0].log.fault("left over", cause)  # no verdict of a payload could say so
-    return _payload(
+    return _payload_of_fit(
         model,
         estimate,
         isolate_faults(model, estimate, fit, plans),
@@ -313,14 +309,14 @@ def identify_payload(
     )
 
 
-def payload_in(found: Identification) -> Payload | None:
+def payload_in(fit: Identification) -> Payload | None:
     """Return the payload that `identify` found beside the machine; None without its mass."""
-    if "m_L" not in found.estimate.names:
+    if "m_L" not in fit.estimate.names:
         return None
-    return _payload(found.model, found.estimate, found.fault_isolation, [found.findings])
+    return _payload_of_fit(fit.model, fit.estimate, fit.fault_isolation, [fit.findings])
 
 
-def _payload(
+def _payload_of_fit(
     model: Model,
     estimate: Estimate,
     isolation: FaultIsolation,
@@ -348,70 +344,3 @@ def _payload(
         fault_isolation=isolation,
         findings=tuple(chain.from_iterable(findings)),
     )
-
-
-def observations_with_payload(
-    model: Model, without: Log, with_payload: Log | None, processing: Processing | None
-) -> Observations:
-    """Return the observations of a log with both phases, or of two logs, as one."""
-    fit = _phases(without, with_payload, processing)
-    with append_findings(fit):
-        return stack_observations(_observe_phases(model, fit, processing)[0])
-
-
-def _phases(
-    without: Log, with_payload: Log | None, processing: Processing | None
-) -> list[Recording]:
-    """Return recordings with and without payload, of a log with both phases or of two logs."""
-    if with_payload is None:
-        logs = [without]
-        _check_phases(without)
-    else:
-        logs = [_set_phase(without, 0), _set_phase(with_payload, 1)]
-    period = None if processing is None else processing.period
-    return [read_recording(log, period=period) for log in logs]
-
-
-def _observe_phases(
-    model: Model, fit: Sequence[Recording], processing: Processing | None
-) -> tuple[list[Observations], list[Preprocessing]]:
-    """Return observations and preprocessing of each recording; both phases must be in them."""
-    logs = [recording.head() for recording in fit]
-    plans = [preprocessing_for_log(model.robot, log, processing) for log in logs]
-    parts = [observations_of(model, *pair) for pair in zip(logs, plans, strict=True)]
-    observations = stack_observations(parts)
-    seen = (observations.gain > 0.0).any(axis=1)
-    for phase, called in ((0, "without payload"), (1, "with payload")):
-        if not (seen & ((observations.payload != 0) == phase)).any():
-            raise logs[phase * (len(logs) - 1)].fault(
-                "too short",
-                f"no samples {called} are left between the filters' edges; record that phase "
-                "longer",
-            )
-    return parts, plans
-
-
-def _check_phases(log: Log) -> None:
-    """Refuse a single log without both phases."""
-    phases = [] if log.payload is None else np.unique(log.payload).tolist()
-    if len(phases) > 1:
-        return
-    said = NO_COLUMN
-    if phases:
-        which = "one without payload" if phases[0] else "one where a payload is carried"
-        said = f"its payload column has phase {phases[0]} only, 0 and 1 are expected; add {which}"
-    raise log.fault("no payload", f"{said}, or give two logs")
-
-
-def _set_phase(log: Log, phase: int) -> Log:
-    """Return a log in which all rows have a phase; raise if its column contradicts it."""
-    if log.payload is not None and ((log.payload != 0) != phase).any():
-        row = int(np.argmax((log.payload != 0) != phase))
-        raise LogError(
-            "no payload",
-            log.place(row),
-            f"payload {log.payload[row]} in the log {'with' if phase else 'without'} payload, "
-            f"{phase} expected throughout; give first the log without payload, then the one with "
-            "it, or one log with both phases alone",
-        )
-    return replace(log, payload=np.full(log.rows, phase, dtype=np.int64))

@@ -41,7 +41,7 @@ given."""
 
 _TOLD = 0.3
 """Largest difference of the bodies' forces from a multiple of the drawn ones, over them, for that
-multiple to be told: bodies that are up to 30 % denser or lighter than drawn differ by less."""
+multiple to be reported: bodies up to 30 % denser or lighter than drawn differ by less."""
 
 _APART = 1.5
 """Least common factor, or its inverse, that is a wrong scale rather than a bad drawing."""
@@ -61,7 +61,7 @@ _PUSHED = 0.05
 """Share of the forces from which friction that pushes counts, likewise."""
 
 _FELT = 1e-4
-"""Share of the forces from which friction below zero is told: without noise rounding has a sign."""
+"""Share of the forces from which friction below zero is reported: rounding has a sign."""
 
 _FRICTION = ("coulomb", "viscous", "passive")
 """Terms of friction, which brakes."""
@@ -73,10 +73,10 @@ CHANCE = 1e-3
 """Probability below which infeasible values, or a payload's, are not chance."""
 
 CLEAR = 5.0
-"""Standard deviations from which a scale is told from one."""
+"""Distance of a scale from one, in standard deviations, from which it is reported."""
 
 WANTED = 0.05
-"""Share of the forces, or of the weight, that a log must be able to tell."""
+"""Share of the forces, or of the weight, that a log must be able to show."""
 
 _USUAL_ERROR = 0.02
 """Error of a payload's mass, or of a rotor's inertia, that is usual: kitchen scales and data sheets
@@ -109,13 +109,13 @@ def plausibility_warnings(
         drawn = parameters(cad)
         base = model.base
         usual = usual_sizes(base, drawn)
-        values = (estimate.values - known)[: base.rank]
-        off = np.abs(values - base.grouping @ drawn)
+        base_values = (estimate.values - known)[: base.rank]
+        off = np.abs(base_values - base.grouping @ drawn)
         far = (off > _FAR * usual) & (off > 5.0 * estimate.deviations[: base.rank])
         worst = [k for k in np.argsort(-off / np.maximum(usual, 1e-300)) if far[k]][:3]
         if worst and factor == 1.0:
             names = ", ".join(
-                f"{base.names[k]} ({values[k]:.3g}, drawn {base.grouping[k] @ drawn:.3g})"
+                f"{base.names[k]} ({base_values[k]:.3g}, drawn {base.grouping[k] @ drawn:.3g})"
                 for k in worst
             )
             warnings.append(
@@ -137,9 +137,9 @@ def friction_below_zero(model: Model, observations: Observations, fit: Estimate)
         for k in chosen
     )
     return (
-        f"Below zero beyond its interval, which no friction is: {negative}. Where there is none, "
-        "one in 40 is so by chance; else something acts that the model has not, and intervals are "
-        "too short.",
+        f"Friction is below zero beyond its interval, which is impossible: {negative}. Without any "
+        "friction one in 40 is so by chance; otherwise an effect acts that the model lacks, and "
+        "the intervals are too short.",
     )
 
 
@@ -200,21 +200,19 @@ class Factor(NamedTuple):
 def known_values(
     model: Model, recordings: Sequence[Recording], rotors: Mapping[str, float]
 ) -> dict[str, float]:
-    """Return the values that are known, by name: of a declared payload, of rotors.
+    """Return the known values by name: those of a declared payload and of rotors.
 
     A rotor's is known as the model has it: where legs share their bodies' inertia one rotor joins
     them, and of the others the values are their differences from it.
     """
     part = model.known_values(rotors)
-    values = {name: float(part[model.names.index(name)]) for name in rotors if name in model.names}
+    by_name = {name: float(part[model.names.index(name)]) for name in rotors if name in model.names}
     for recording in recordings:
         if (payload := recording.head().description.payload) is not None:
             kinds = model.robot.platform.inertia.kinds
-            values |= zip((f"{kind}_L" for kind in kinds), payload.values, strict=True)
+            by_name |= zip((f"{kind}_L" for kind in kinds), payload.values, strict=True)
     least = SAME * max(map(abs, rotors.values()), default=0.0)
-    return {
-        name: value for name, value in values.items() if name in model.names and abs(value) > least
-    }
+    return {n: size for n, size in by_name.items() if n in model.names and abs(size) > least}
 
 
 def factor_of_forces(model: Model, fit: Estimate, known: Mapping[str, float]) -> Factor | None:
@@ -242,9 +240,9 @@ def excess_residual_cause(estimate: Estimate, preprocessing: Sequence[Preprocess
     )
 
 
-def has_negative_inertia(model: Model, values: Array, covariance: Array) -> bool:
-    """Say whether values (p,) give a machine whose kinetic energy is certainly negative."""
-    return _negative_directions(model, values, covariance) > 0
+def has_negative_inertia(model: Model, beta: Array, covariance: Array) -> bool:
+    """Return whether values (p,) give a machine whose kinetic energy is certainly negative."""
+    return _negative_directions(model, beta, covariance) > 0
 
 
 def unphysical(model: Model, observations: Observations, fit: Estimate) -> int:
@@ -267,7 +265,7 @@ def _values_that_contribute(
     return np.asarray((effect > share * size[:, None]).any(axis=0))
 
 
-def _negative_directions(model: Model, values: Array, covariance: Array) -> int:
+def _negative_directions(model: Model, beta: Array, covariance: Array) -> int:
     """Return the number of directions in which kinetic energy is negative in most poses."""
     # x''^T M x'' is positive for every real machine, whatever its CAD says.
     robot, rng = model.robot, np.random.default_rng(0)
@@ -285,7 +283,7 @@ def _negative_directions(model: Model, values: Array, covariance: Array) -> int:
         rows = np.einsum("rnp,rnm,rm->rp", needed - gravity_regressor, jacobians, direction)
         spread = np.sqrt(np.maximum(np.einsum("rp,pq,rq->r", rows, known, rows), 0.0))
         least = np.maximum(_CERTAIN * spread, _NOTABLE * np.abs(rows @ drawn))
-        count += bool((rows @ values[:rank] < -least).mean() > 0.5)
+        count += bool((rows @ beta[:rank] < -least).mean() > 0.5)
     return count
 
 

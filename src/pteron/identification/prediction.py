@@ -141,18 +141,18 @@ class Prediction(Result):
 
 
 def predict(
-    model: Model, values: Array, recording: Recording, preprocessing: Preprocessing
+    model: Model, beta: Array, recording: Recording, preprocessing: Preprocessing
 ) -> Prediction:
     """Return the prediction of a recording by a model with values (p,), with its preprocessing."""
     n = len(model.robot.legs)
-    plain = np.where(np.isin(model.kinds, FRICTION), 0.0, values)
+    plain = np.where(np.isin(model.kinds, FRICTION), 0.0, beta)
     sums, total = np.zeros((8, n)), 0
     shown: list[Array] = []
     step = max(recording.rows // _KEPT, 1)
     for block in samples(model.robot, recording.samples(), preprocessing):
         states, measured = block.states.part(block.fresh), block.forces[block.fresh]
         matrix = model.matrix(states)
-        predicted, without = matrix @ values, matrix @ plain
+        predicted, without = matrix @ beta, matrix @ plain
         used = motion_mask(states.joint_rates, preprocessing.slow, preprocessing.turning_rows)
         error, bare = measured - predicted, measured - without
         least = _LEAST_NOISE * np.sqrt((measured**2).mean(axis=0))

@@ -14,12 +14,12 @@ import numpy as np
 from pteron.errors import DataError
 from pteron.identification.logs import Finding, Log, LogFile
 from pteron.identification.logs.bridging import fill_gaps
-from pteron.identification.logs.log import TimeStamps
+from pteron.identification.logs.time_stamps import TimeStamps
 from pteron.identification.signals.repetition import repeating_rows
 from pteron.kernels import Array
 
 _LOOKED_AT = 2_000_000
-"""Rows of a long file, at most, from which the errors of a fit to it are computed."""
+"""Most rows of a long file from which the errors of a fit to it are computed."""
 
 _END = int(np.iinfo(np.int64).max)
 """A row beyond the last one of every file: its number of rows is known only when it has been
@@ -94,11 +94,9 @@ class Recording:
 
 
 def read_recording(
-    log: Log | LogFile,
-    progress: Callable[[int], None] | None = None,
-    period: float | None = None,
+    log: Log | LogFile, progress: Callable[[int], None] | None = None, period: float | None = None
 ) -> Recording:
-    """Return a log as a recording; files of a usual length are read whole.
+    """Return a log as a recording, with gaps filled; files of a usual length are read whole.
 
     Of a log whose description says that its motion leads in and out, the rows that repeat after the
     period (s; by default as described) are taken.
@@ -163,7 +161,7 @@ def hold_same_samples(first: Recording, other: Recording) -> bool:
 
 
 def _rebase_times(time: Array) -> Array:
-    """Return times from the first on: far from zero, stamps are rounded.
+    """Return times (T,), s, relative to the first, without the rounding of large time stamps.
 
     Those of a steady clock are put on its ticks again, with the roundest step that fits them.
     """
@@ -192,12 +190,11 @@ def split_test_data(recording: Recording, period: float | None) -> tuple[Recordi
     log = recording.log
     period = period or log.description.period
     if isinstance(log, Log) and log.payload is not None and np.ptp(log.payload):
-        out = np.zeros(log.rows, dtype=bool)
+        held_out = np.zeros(log.rows, dtype=bool)
         for start, stop in log.phases:
-            out[start + _count_fitted_rows(log.part(start, stop), stop - start, period) : stop] = (
-                True
-            )
-        parts = log.drop_samples(out), log.drop_samples(~out)
+            count = _count_fitted_rows(log.part(start, stop), stop - start, period)
+            held_out[start + count : stop] = True
+        parts = log.drop_samples(held_out), log.drop_samples(~held_out)
         first, second = (Recording(part, 0, part.rows) for part in parts)
         return first, second
     cut = recording.start + _count_fitted_rows(log, recording.rows, period)

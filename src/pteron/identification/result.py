@@ -173,15 +173,15 @@ class Identification(Result):
         Where real bodies have other base parameters than the fit, or friction came out below zero,
         the other values follow by their covariance, so that forces stay as near as they can.
         """
-        values, rank = self.values_without_rotors, self.model.base.rank
+        beta, rank = self.values_without_rotors, self.model.base.rank
         moved = self.consistency is not None and not self.consistency.feasible
-        bodies = self.consistency.base_values if moved and self.consistency else values[:rank]
+        bodies = self.consistency.base_values if moved and self.consistency else beta[:rank]
         kinds = self.model.kinds
         known = np.isin(kinds, ("coulomb", "viscous", "stribeck"))
-        if not moved and not (values[known] < 0.0).any():
-            return values
+        if not moved and not (beta[known] < 0.0).any():
+            return beta
         positive = np.flatnonzero(known).tolist()
-        return conditional_values(values, self.estimate.covariance, bodies, positive)
+        return conditional_values(beta, self.estimate.covariance, bodies, positive)
 
     @property
     def reflected_inertia(self) -> Array:
@@ -202,12 +202,12 @@ class Identification(Result):
         """
         return self._friction(self.estimate.values)
 
-    def _friction(self, values: Array) -> tuple[dict[str, Any], ...]:
+    def _friction(self, beta: Array) -> tuple[dict[str, Any], ...]:
         """Return the friction of each joint by values (p,), by the fields of `Drive`."""
         coulomb, viscous, falls = (
-            self._terms_per_joint(kind, values) for kind in ("coulomb", "viscous", "stribeck")
+            self._terms_per_joint(kind, beta) for kind in ("coulomb", "viscous", "stribeck")
         )
-        offset = self._terms_per_joint("offset", values, least=-np.inf)
+        offset = self._terms_per_joint("offset", beta, least=-np.inf)
         speeds = self.model.stribeck_speeds
         laws = [
             Stribeck(force, speed) if force > 0.0 else None
@@ -218,12 +218,12 @@ class Identification(Result):
             for c, v, o, law in zip(coulomb, viscous, offset, laws, strict=True)
         )
 
-    def _terms_per_joint(self, kind: str, values: Array, least: float = 0.0) -> Array:
+    def _terms_per_joint(self, kind: str, beta: Array, least: float = 0.0) -> Array:
         """Return the values (n,) of a kind of term, at least `least`; 0 without the term.
 
         Friction and inertia below zero are noise: no joint pushes itself.
         """
-        terms = self.model.joint_values(kind, values)
+        terms = self.model.joint_values(kind, beta)
         return np.maximum(np.zeros(len(self.robot.legs)) if terms is None else terms, least)
 
     @property

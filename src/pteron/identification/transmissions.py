@@ -15,6 +15,7 @@ from pteron.identification.signals.filters import SETTLING, lowpass
 from pteron.kernels import Array
 from pteron.legs import Drive, Elastic
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.motion.motion import interpolate_columns
 from pteron.renamed import former_attribute
 from pteron.result import Result
 from pteron.shapes import PerJoint
@@ -64,8 +65,8 @@ class Transmissions(Result):
     def add_to(self, robot: RobotLike) -> Manipulator:
         """Return a machine with elastic drives; insignificant damping and play are 0."""
         robot = as_manipulator(robot)
-        damping = _clear(self.damping, self.damping_deviations)
-        play = _clear(self.backlash, self.backlash_deviations)
+        damping = _significant(self.damping, self.damping_deviations)
+        play = _significant(self.backlash, self.backlash_deviations)
         bends = (part.tolist() for part in (self.stiffness, damping, play))
         legs = zip(robot.legs, *bends, strict=True)
         return replace(
@@ -79,9 +80,9 @@ class Transmissions(Result):
     in_drives_of = former_attribute("in_drives_of", "add_to")
 
 
-def _clear(values: Array, deviations: Array) -> Array:
+def _significant(estimates: Array, deviations: Array) -> Array:
     """Return values that differ from zero significantly, and 0 for the others."""
-    return np.where(values > _CLEAR * deviations, values, 0.0)
+    return np.where(estimates > _CLEAR * deviations, estimates, 0.0)
 
 
 def identify_transmissions(
@@ -142,8 +143,8 @@ def identify_transmissions(
     )
     bent = lowpass(motors - log.joints, log.rate, how.cutoff)
     rate = np.gradient(bent, log.time, axis=0)
-    side = lowpass(np.sign(_interpolate(time, load, log.time)), log.rate, how.cutoff)
-    bent, rate, side = (_interpolate(log.time, signal, time) for signal in (bent, rate, side))
+    side = lowpass(np.sign(interpolate_columns(time, load, log.time)), log.rate, how.cutoff)
+    bent, rate, side = (interpolate_columns(log.time, s, time) for s in (bent, rate, side))
     edge = SETTLING / (how.cutoff or log.rate)
     inner = (time > time[0] + edge) & (time < time[-1] - edge)
     fits = [
@@ -152,11 +153,6 @@ def identify_transmissions(
         for clear_rows in [inner & (np.abs(np.abs(side[:, j]) - 1.0) < _ACROSS)]
     ]
     return Transmissions(*np.array(fits).T)
-
-
-def _interpolate(known: Array, values: Array, time: Array) -> Array:
-    """Return signals (T, n), interpolated at other times."""
-    return np.column_stack([np.interp(time, known, column) for column in values.T])
 
 
 def _fit_transmission(

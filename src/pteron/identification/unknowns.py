@@ -102,7 +102,7 @@ def fit_nonlinear_terms(
     model: Model,
     observe: Callable[[LinearModel, float], Observations],
     begin: Unknowns,
-    values: Array,
+    beta: Array,
     *,
     late: bool,
 ) -> tuple[Model, Observations, Unknowns, Array]:
@@ -117,7 +117,7 @@ def fit_nonlinear_terms(
         that are so late, s.
     begin : Unknowns
         Unknowns to begin with.
-    values : array, shape (p,)
+    beta : array, shape (p,)
         Values of a fit there.
     late : bool
         Whether the delay is unknown.
@@ -134,11 +134,11 @@ def fit_nonlinear_terms(
     for _ in range(_ROUNDS):
         if speeds is not None:
             model = model.with_speeds(speeds)
-        columns = partial(_slopes, model, seen, values, late)
+        columns = partial(_slopes, model, seen, beta, late)
         rows = observe(extend_model(model, len(seen) + late, columns), unknowns.delay)
         plain = rows.columns(range(p))
         extended_fit, part = weighted_least_squares(rows), weighted_least_squares(plain)
-        values, covariance = part.values, extended_fit.covariance[:p, :p] - part.covariance
+        beta, covariance = part.values, extended_fit.covariance[:p, :p] - part.covariance
         step, deviations = extended_fit.values[p:], extended_fit.deviations[p:]
         if speeds is not None:
             forces = np.array([part.value(f"Fs{i + 1}") for i in seen])
@@ -203,12 +203,12 @@ def search_speeds(model: Model, observe: Observe, usual: Array) -> Array:
 
 
 def _coordinatewise(spline: Array, gram: Array, image: Array) -> NDArray[np.int64]:
-    """Return the index of the best speed for each joint (n,); -1 where none is significant."""
+    """Return the index of each joint's best speed (n,), joint by joint; -1: none is significant."""
     n = len(image)
     chosen = np.full(n, -1)
 
     def gain(picked: NDArray[np.int64]) -> float:
-        """Return the drop of the squares with these speeds; below 0 if friction rises."""
+        """Return the drop of the squared residuals with friction at these speeds; -1: it rises."""
         seen = np.flatnonzero(picked >= 0)
         if not len(seen):
             return 0.0
@@ -236,7 +236,7 @@ def _coordinatewise(spline: Array, gram: Array, image: Array) -> NDArray[np.int6
 
 
 def _slopes(
-    model: Model, seen: NDArray[np.int64], values: Array, late: bool, states: States
+    model: Model, seen: NDArray[np.int64], beta: Array, late: bool, states: States
 ) -> Array:
     """Return a model's columns, and how friction changes with speeds' logarithms, by its size.
 
@@ -250,6 +250,6 @@ def _slopes(
         slopes[:, seen, np.arange(len(seen))] = slope
     if late:
         dry = np.isin(model.kinds, ("coulomb", "stribeck"))
-        smooth = matrix @ np.where(dry, 0.0, values)
+        smooth = matrix @ np.where(dry, 0.0, beta)
         slopes[..., -1] = -np.gradient(smooth, states.time, axis=0, edge_order=2)
     return np.concatenate([matrix, slopes], axis=-1)

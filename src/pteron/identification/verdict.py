@@ -44,54 +44,55 @@ _SEEN = 0.5
 """Difference of the nearest real bodies' forces, percent, from which that distance counts: without
 noise the standard deviations are near zero."""
 
-_TAKEN_IN = "where a log cannot show that, other values take in what it does"
+_TAKEN_IN = "an error that the log does not show distorts the other values"
 """The harm of a fault that a log cannot show."""
 
 _HIDDEN: dict[str, tuple[str, str]] = {
     "gain": (
-        "These logs cannot show a factor that all forces have in common (gains, rated torque, gear "
-        "ratio): all values grow with it, and nothing of known mass or inertia is told apart.",
+        "These logs cannot show a common factor of all forces (gains, rated torque, gear ratio): "
+        "it scales all values alike, and no known mass or inertia fixes the scale.",
         "Carry a payload of known mass in a second phase (--payload, and [payload] in the log's "
         "description): it gives the scale of the forces.",
     ),
     "clock": (
-        "These logs cannot show a clock that runs at another rate: no weight that the drives feel "
-        "tells it from inertia.",
-        "Compare the duration of the log with another clock's.",
+        "These logs cannot show a log's clock that runs too fast or too slow: no weight acts on "
+        "the drives to distinguish it from inertia.",
+        "Compare the duration of the log with another clock.",
     ),
     "scale": (
-        "These logs cannot show that one force is out of scale by some per cent: its own values "
-        "grow with it, and what it shares with other forces is small beside the noise.",
-        "Check each drive's gain by itself, or move more coordinates at once, and faster.",
+        "These logs cannot show a scale error of a few per cent in one force: it scales that "
+        "drive's own values, and what they share with other drives is below the noise.",
+        "Check the gain of each drive separately, or move more coordinates at once, and faster.",
     ),
     "ratio": (
-        "These logs cannot show a gear ratio, lead or pulley of the joints that is off by 5 %.",
+        "These logs cannot show an error of 5 % in a gear ratio, lead or pulley of the joints.",
         f"Measure how far the joints move for a number of turns or counts: {_TAKEN_IN}.",
     ),
     "zero": (
-        "These logs cannot show a joint's zero that is off by 3 degrees, or 2 % of a leg's size.",
+        "These logs cannot show an error of 3 degrees, or 2 % of a leg's size, in a joint's zero.",
         f"Check the joints' zeros, or record a larger or faster motion: {_TAKEN_IN}.",
     ),
     "geometry": (
-        "These logs cannot show lengths or points of the geometry that are off by 1 %.",
+        "These logs cannot show errors of 1 % in lengths or points of the geometry.",
         f"Measure the geometry, or record a larger or faster motion: {_TAKEN_IN}.",
     ),
     "elasticity": (
-        "These logs cannot show drives that give (a resonance at 10 Hz).",
+        "These logs cannot show elastic drives (a resonance at 10 Hz).",
         f"Measure positions behind the drives, or record a faster motion: {_TAKEN_IN}.",
     ),
     "load": (
-        "These logs cannot show friction that grows with the load, by 5 % of it.",
+        "These logs cannot show load-dependent friction of 5 % of the load.",
         f"Record a longer motion, or forces with less noise: {_TAKEN_IN}.",
     ),
     "passive": (
-        "These logs cannot show friction in the passive joints of 5 % of the load.",
+        "These logs cannot show friction of 5 % of the load in the passive joints.",
         f"Record a faster or longer motion, or forces with less noise: {_TAKEN_IN}.",
     ),
     "play": (
-        "Play in the drives would not be seen: the load of none changes its direction often "
-        "enough, four times while the joint moves. While loads stay on one side it does no harm.",
-        "To see play, record a motion whose accelerations load the drives both ways.",
+        "Play (backlash) in the drives would not be seen: no drive's load changes its direction "
+        "often enough, four times while the joint moves. While loads keep their direction, play "
+        "does no harm.",
+        "To see play, record a motion whose accelerations load the drives in both directions.",
     ),
 }
 """Faults that a log may hide: the reason, and a remedy."""
@@ -99,8 +100,8 @@ _HIDDEN: dict[str, tuple[str, str]] = {
 _STEPS = (
     "Look at the residuals over time and speed: what repeats there is a missing term, such as "
     "friction in the passive joints (--joints each).",
-    "Friction of joints explains little of the error: look at the drive gains, the geometry and "
-    "the signs of forces and joints.",
+    "Friction of joints explains little of the error: check the drive gains, the geometry and the "
+    "signs of forces and joints.",
 )
 """Remedies for an error beyond the noise, where friction explains some of it and where little."""
 
@@ -123,7 +124,7 @@ def verdict_of(
     factor: float = 1.0,
     hidden_orders: str = "",
     followed: frozenset[str] = frozenset(),
-    left: str = "",
+    residual_cause: str = "",
 ) -> Verdict:
     """Return the verdict on a model.
 
@@ -145,7 +146,7 @@ def verdict_of(
         A sentence on orders of the legs that the logs do not show; empty without any.
     followed : frozenset of str
         Options whose advice is followed already, and not given again.
-    left : str
+    residual_cause : str
         How far what the model leaves is above the noise, said where no cause shows.
     """
     opinion = Opinion()
@@ -164,14 +165,15 @@ def verdict_of(
         opinion.lower(part.grade)
         opinion.reasons += part.reasons
         opinion.steps += part.steps
-    if left and opinion.grade != "trustworthy" and not (faults is not None and faults.causes):
-        opinion.add(f"{left[0].upper()}{left[1:]}.")
+    has_causes = faults is not None and bool(faults.causes)
+    if residual_cause and opinion.grade != "trustworthy" and not has_causes:
+        opinion.add(f"{residual_cause[0].upper()}{residual_cause[1:]}.")
     if hidden_orders:
         opinion.add(hidden_orders)
     if repeats:
         opinion.add(
-            "What was held out repeats the motion that was fitted: it tells of noise and drift, "
-            "less of other motions.",
+            "The held-out data repeat the motion that was fitted: they show noise and drift, but "
+            "hardly how well the model predicts other motions.",
             "Record another motion, such as a pick-and-place cycle, and hold it out (--held-out): "
             "pteron excite ROBOT --out motion.csv writes one too, motion-held-out.csv.",
         )
@@ -181,7 +183,7 @@ def verdict_of(
 
 
 def with_hidden_first(verdict: Verdict) -> Verdict:
-    """Return the verdict with what its logs cannot show at all in the first sentence."""
+    """Return the verdict with what its logs cannot show merged into one first reason."""
     hidden = [reason for reason in verdict.reasons if reason.startswith(_CANNOT)]
     others = [reason for reason in verdict.reasons if not reason.startswith(_CANNOT)]
     if not hidden:
@@ -191,7 +193,7 @@ def with_hidden_first(verdict: Verdict) -> Verdict:
 
 
 def with_bodies(verdict: Verdict, consistency: Consistency | None, off: float) -> Verdict:
-    """Return the verdict with a first reason, if no real bodies have the values.
+    """Return the verdict, lowered to "not trustworthy" with the reason if no real bodies are near.
 
     `off` is the difference of the forces of the nearest real bodies from those of the fit, percent.
     """
@@ -201,13 +203,13 @@ def with_bodies(verdict: Verdict, consistency: Consistency | None, off: float) -
         return verdict
     reason = (
         f"No real bodies have these values: the nearest are {consistency.distance:.2g} standard "
-        f"deviations away, and their forces {off:.2g} % off; up to {FAR:g} are trusted."
+        f"deviations away (up to {FAR:g} is trustworthy), and their forces differ by {off:.2g} %."
     )
     return replace(verdict, grade="not trustworthy", reasons=(reason, *verdict.reasons))
 
 
 def predict_held_out(
-    model: Model, values: Array, recording: Recording, preprocessing: Preprocessing
+    model: Model, beta: Array, recording: Recording, preprocessing: Preprocessing
 ) -> Prediction:
     """Return the prediction by a model with values (p,) of a recording that was not fitted.
 
@@ -215,17 +217,15 @@ def predict_held_out(
     chosen for the whole recording, whose samples at rest have less noise but do not count. No value
     is fitted to the recording, and a wrong model stays wrong at every cut-off.
     """
-    prediction = predict(model, values, recording, preprocessing)
+    prediction = predict(model, beta, recording, preprocessing)
     if preprocessing.cutoff is None or preprocessing.derivatives == "periodic":
         return prediction
     for share in _LOWER:
         if _judge_prediction(prediction).grade == "trustworthy":
             break
         lower = replace(preprocessing, cutoff=share * preprocessing.cutoff)
-        other = predict(model, values, recording, lower)
-        prediction = min(
-            prediction, other, key=lambda candidate: float(candidate.robust_nrms.max())
-        )
+        other = predict(model, beta, recording, lower)
+        prediction = min(prediction, other, key=lambda p: float(p.robust_nrms.max()))
     return prediction
 
 
@@ -237,7 +237,7 @@ def _grade_error(percent: float, small: float) -> Grade:
 
 
 def _judge_prediction(prediction: Prediction) -> Opinion:
-    """Return the opinion on a prediction of forces: its error beyond the noise."""
+    """Return the opinion on a prediction of held-out forces, by its error beyond the noise."""
     ratio = prediction.robust_nrms / np.maximum(prediction.floor, 1e-12)
     missed = prediction.unexplained_error
     # The worst actuator is the one farthest beyond both limits.
@@ -246,35 +246,35 @@ def _judge_prediction(prediction: Prediction) -> Opinion:
     drowned = int(np.argmax(prediction.robust_nrms))
     if not (prediction.robust_nrms <= DROWNED).all():
         opinion.add(
-            f"The forces of actuator {drowned + 1} are not explained: what is left of them is "
+            f"The forces of actuator {drowned + 1} are not explained: the residual is "
             f"{prediction.robust_nrms[drowned]:.0f} % of what was measured.",
-            "Look for what else acts on the forces, or move faster than their noise.",
+            "Look for what else acts on the forces, or move faster, so that forces exceed noise.",
             grade="not trustworthy",
         )
     elif ratio[worst] > AT_THE_FLOOR:
         opinion.grade = _grade_error(float(missed[worst]), SMALL)
     opinion.add(
-        f"{prediction.source}: held-out NRMS of {percentages(prediction.nrms)} where noise alone "
-        f"makes {percentages(prediction.floor)}."
+        f"{prediction.source} (held out): error of the predicted forces, by actuator: "
+        f"{percentages(prediction.nrms)} (NRMS); noise alone: {percentages(prediction.floor)}."
     )
     if (share := float(prediction.outliers.max())) > 0.0:
         opinion.add(
-            f"{prediction.source}: up to {100.0 * share:.2g} % of a force's samples stand out; "
-            f"without them the NRMS is {percentages(prediction.robust_nrms)}, which is what "
-            "counts.",
-            "Forces stand out: --estimator huber counts such samples less.",
+            f"{prediction.source}: up to {100.0 * share:.2g} % of a force's samples are outliers; "
+            f"without them, as graded, the NRMS is {percentages(prediction.robust_nrms)}.",
+            "Forces have outliers: --estimator huber gives such samples less weight.",
         )
     if opinion.grade == "trustworthy" and ratio[worst] > AT_THE_FLOOR:
         opinion.add(
-            f"The model misses {percentages([missed[worst]], 1)} of the force of actuator "
-            f"{worst + 1} beyond the noise (its error is {times(ratio[worst])} the noise); up to "
-            f"{SMALL:g} % is trusted."
+            f"Beyond the noise the model misses {percentages([missed[worst]], 1)} of the force of "
+            f"actuator {worst + 1}; up to {SMALL:g} % is trustworthy (the error is "
+            f"{times(ratio[worst])} the noise)."
         )
     elif opinion.grade != "trustworthy":
         friction = prediction.nrms_without_friction[worst] - prediction.nrms[worst]
         opinion.add(
-            f"Actuator {worst + 1} is the worst: the model misses {missed[worst]:.1f} % of its "
-            f"force beyond the noise; up to {SMALL:g} % is trusted, above {LARGE:g} % not.",
+            f"Actuator {worst + 1} is the worst: beyond the noise the model misses "
+            f"{missed[worst]:.1f} % of its force; up to {SMALL:g} % is trustworthy, above "
+            f"{LARGE:g} % is not.",
             _STEPS[bool(friction < 0.1 * prediction.nrms_without_friction[worst])],
         )
     return opinion
@@ -290,29 +290,28 @@ def _judge_faults(shown: FaultIsolation) -> Opinion:
     if not shown.tried:
         opinion.add(f"Fault isolation was not run: {shown.why_not}.", grade="usable with care")
     elif not shown.causes:
-        opinion.add(f"No fault shows in the residuals; tried: {', '.join(shown.tried)}.")
+        opinion.add(f"{shown.small_faults_text}; tested: {', '.join(shown.tested)}.")
     for fault in shown.hidden:
         opinion.add(*_HIDDEN[fault])
     if np.isnan(shown.expected_error).any():
         return opinion
     worst = int(np.argmax(shown.expected_error))
     off = float(shown.expected_error[worst])
+    size = percentages([off]) if off < 0.01 else f"up to {off:.2g} %"
     opinion.add(
-        f"A pick-and-place cycle, or another motion as fast as this one, is expected to be up to "
-        f"{percentages([off]) if off < 0.01 else f'{off:.2g} %'} off "
-        f"in its forces (actuator {worst + 1}); up to {CYCLE:g} % is trusted, above {LARGE:g} % "
-        "not.",
+        f"Expected error of the forces in a pick-and-place cycle or another motion as fast: {size} "
+        f"(actuator {worst + 1}); up to {CYCLE:g} % is trustworthy, above {LARGE:g} % is not.",
         grade=_grade_error(off, CYCLE),
     )
     if opinion.grade != "trustworthy" and shown.uncertain[worst] > shown.spoiled[worst]:
         opinion.steps.append(
-            "The motion leaves such a cycle's forces open: record a motion from pteron excite, "
-            "faster or longer."
+            "The motion does not determine the forces of such a cycle: record a motion from pteron "
+            "excite, faster or longer."
         )
     return opinion
 
 
-def percentages(values: Iterable[float], places: int = 2) -> str:
+def percentages(percents: Iterable[float], places: int = 2) -> str:
     """Return percentages as text with `places` decimals, or that all are less than the last one.
 
     Examples
@@ -320,10 +319,10 @@ def percentages(values: Iterable[float], places: int = 2) -> str:
     >>> percentages([1.234, 0.0]), percentages([3e-10, 1e-12])
     ('1.23, 0.00 %', 'less than 0.01 %')
     """
-    shown, least = list(values), 10.0**-places
-    if all(0.0 <= value < least for value in shown):
+    shown, least = list(percents), 10.0**-places
+    if all(0.0 <= percent < least for percent in shown):
         return f"less than {least:g} %"
-    return f"{', '.join(f'{value:.{places}f}' for value in shown)} %"
+    return f"{', '.join(f'{percent:.{places}f}' for percent in shown)} %"
 
 
 def times(ratio: float) -> str:

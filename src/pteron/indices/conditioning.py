@@ -116,7 +116,9 @@ def global_conditioning(
         margin = numeric(robot, "reach")(poses)[0]
         inside = np.minimum(margin, distance_to_limits(robot, poses)).min(axis=-1) >= 0.0
         # At the edge of reach the index is not defined, and 1 / c is taken as 0.
-        inverse_conditions = np.nan_to_num(1.0 / np.asarray(evaluate(robot, name, poses[inside])))
+        inverse_conditions = np.nan_to_num(
+            1.0 / np.asarray(evaluate(robot, name, poses[inside], on_failure="nan"))
+        )
         sums.append((inverse_conditions.sum(), inside.sum()))
     total, inside_count = np.array(sums, dtype=float).T
     if not inside_count.any():

@@ -13,7 +13,7 @@ from pteron.shapes import Numbers, OnFailure, PoseLike
 
 
 def evaluate(
-    robot: RobotLike, name: str | Index, poses: PoseLike, *, on_failure: OnFailure = "nan"
+    robot: RobotLike, name: str | Index, poses: PoseLike, *, on_failure: OnFailure = "raise"
 ) -> Numbers:
     """Return an index of performance at poses; `INDICES` says what each one means.
 
@@ -27,8 +27,8 @@ def evaluate(
         Name of the index, one of `indices_of(robot)`; or an `Index` of one's own, with a function.
     poses : array, shape (..., m)
         The poses, m and rad.
-    on_failure : {"nan", "raise"}
-        Whether a pose that fails gives NaN, or raises. The joints' limits do not count.
+    on_failure : {"raise", "nan"}
+        Whether a pose that fails raises, or gives NaN. The joints' limits do not count.
 
     Returns
     -------
@@ -42,15 +42,16 @@ def evaluate(
     ModelError
         If it is about turning or translation, and the platform does not move so.
     UnreachablePose
-        Under ``on_failure="raise"``, if a leg does not reach a pose.
+        If a leg does not reach a pose, unless `on_failure` is "nan".
     SingularPose
-        Under ``on_failure="raise"``, if a leg is stretched or folded (type I) or, where the index
-        needs J^-1, the actuators do not hold the platform (type II).
+        If a leg is stretched or folded (type I) or, where the index needs J^-1, the actuators do
+        not hold the platform (type II), unless `on_failure` is "nan".
 
     Examples
     --------
     >>> from pteron.indices import evaluate
-    >>> evaluate("quadrupteron", "condition", [[0.0, 0.0, 0.0, 0.0], [0.9, 0.0, 0.0, 0.0]]).round(3)
+    >>> poses = [[0.0, 0.0, 0.0, 0.0], [0.9, 0.0, 0.0, 0.0]]
+    >>> evaluate("quadrupteron", "condition", poses, on_failure="nan").round(3)
     array([2.414,   nan])
     """
     robot = as_manipulator(robot)

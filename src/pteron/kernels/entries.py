@@ -35,11 +35,53 @@ TYPE_II = 1e-9
 ANGLES = 1e-9
 """Least measure of the platform's angles where a result is the rate of one: six digits are left."""
 
-Symbols = dict[str, Any]
-"""The expressions an entry builds with, by name: the inputs, or what a caller puts for them."""
+
+@dataclass(frozen=True)
+class Inputs:
+    """The expressions of an entry's inputs, or what a caller puts for them; None: not an input.
+
+    Those of the machine's state are columns: (n,) of the joints, (m,) of the pose.
+    """
+
+    pose: Expression = None
+    velocity: Expression = None
+    acceleration: Expression = None
+    forces: Expression = None
+    wrench: Expression = None
+    """Wrench on the platform (w,)."""
+    twist: Expression = None
+    joints: Expression = None
+    joint_rates: Expression = None
+    joint_accelerations: Expression = None
+    parameters: Expression = None
+    """The inertial parameters (K,), or their rows (K, k) in the base parameters."""
+    base_parameters: Expression = None
+    """The base parameters (k,), of which `parameters` are a function."""
+    selection: Expression = None
+    """Matrix (K, k) from base parameters to inertial parameters."""
+    carried: bool = True
+    """Whether a rod's mass on a platform point is the platform's instead of the leg's."""
+    drives: Expression = None
+    actuators: Expression = None
+    kind: Any = None
+    """`DriveKind`, the features of the drives."""
+    gains: Expression = None
+    memory: Expression = None
+    mass: Expression = None
+    center: Expression = None
+    inertia: Expression = None
+    side: Expression = None
+    """Directions in which the joints slide (n,): -1, 1, or 0 where they stick."""
+    hold: Expression = None
+    brake: Expression = None
+    pace: Expression = None
+    motor: Expression = None
+    motor_rate: Expression = None
+    current: Expression = None
+    bristle: Expression = None
 
 
-_Build = Callable[[Machine, Symbols], Outputs]
+_Build = Callable[[Machine, Inputs], Outputs]
 
 
 @dataclass(frozen=True)
@@ -75,7 +117,7 @@ def equation_entry(
     `outputs` are the names of its results, separated by blanks.
     """
     return _entry_of(
-        lambda m, v: equation(m, *(v[name] for name in inputs)), inputs, outputs, needs
+        lambda m, v: equation(m, *(getattr(v, name) for name in inputs)), inputs, outputs, needs
     )
 
 
@@ -93,7 +135,7 @@ def _entry_of(build: Any, inputs: tuple[str, ...], outputs: str, needs: tuple[Ne
     """Return the entry of a function whose results have names, separated by blanks in `outputs`."""
     names = outputs.split()
 
-    def build_outputs(m: Machine, v: Symbols) -> Outputs:
+    def build_outputs(m: Machine, v: Inputs) -> Outputs:
         """Return the results of a build by their names."""
         results = build(m, v)
         return dict(zip(names, results if len(names) > 1 else [results], strict=True))
@@ -101,9 +143,9 @@ def _entry_of(build: Any, inputs: tuple[str, ...], outputs: str, needs: tuple[Ne
     return Entry(inputs, build_outputs, needs)
 
 
-def state(m: Machine, v: Symbols) -> Any:
+def state(m: Machine, v: Inputs) -> Any:
     """Return the state of a machine, to the order of the given symbols."""
-    return m.state(v["pose"], v.get("velocity"), v.get("acceleration"))
+    return m.state(v.pose, v.velocity, v.acceleration)
 
 
 def as_vector(column: Expression) -> tuple[Expression, tuple[int, ...]]:

@@ -43,10 +43,10 @@ from pteron.kernels.entries import (
     TYPE_I as TYPE_I,
     TYPE_II as TYPE_II,
     Entry as Entry,
+    Inputs as Inputs,
     Need,
     Output as Output,
     Outputs,
-    Symbols as Symbols,
     as_vector,
     equation_entry,
     state,
@@ -62,79 +62,79 @@ def _as_matrix(matrix: Expression) -> tuple[Expression, tuple[int, ...]]:
     return matrix, matrix.shape
 
 
-def _set_payload(m: Machine, v: Symbols) -> Outputs:
+def _set_payload(m: Machine, v: Inputs) -> Outputs:
     """Return the machine's inertial parameters with a load's mass and inertia on its platform."""
-    platform, inertial = m.robot.platform, v["parameters"]
-    on_axis, inertia = platform.carries_on_axis, ca.vertsplit(v["inertia"])
-    center = ca.SX(3, 1) if on_axis else v["center"]
-    load = carried_values(type(platform.inertia), v["mass"], ca.vertsplit(center), inertia)
+    platform, inertial = m.robot.platform, v.parameters
+    on_axis, inertia = platform.carries_on_axis, ca.vertsplit(v.inertia)
+    center = ca.SX(3, 1) if on_axis else v.center
+    load = carried_values(type(platform.inertia), v.mass, ca.vertsplit(center), inertia)
     start = inertial.shape[0] - len(load)  # the platform's are the last
     return {"loaded_parameters": ca.vertcat(inertial[:start], inertial[start:] + ca.vertcat(*load))}
 
 
-def _rigid(m: Machine, v: Symbols, at: Any) -> Expression:
+def _rigid(m: Machine, v: Inputs, at: Any) -> Expression:
     """Return the actuator forces of the rigid bodies at a state."""
-    carried = v.get("carried", True)
-    return inverse_dynamics(m, at, v["parameters"], v.get("wrench"), carried=carried)
+    return inverse_dynamics(m, at, v.parameters, v.wrench, carried=v.carried)
 
 
-def _inverse_dynamics(m: Machine, v: Symbols) -> Outputs:
+def _inverse_dynamics(m: Machine, v: Inputs) -> Outputs:
     """Return the actuator forces (n,) of a motion, N or N m."""
     return {"forces": _rigid(m, v, state(m, v))}
 
 
-def _dynamics_arguments(m: Machine, v: Symbols) -> Any:
+def _dynamics_arguments(m: Machine, v: Inputs) -> Any:
     """Return pose, velocity, forces, parameters and wrench."""
-    wrench = v.get("wrench", ca.SX.zeros(m.wrench_size))
-    return v["pose"], v["velocity"], v["forces"], v["parameters"], wrench
+    wrench = ca.SX.zeros(m.wrench_size) if v.wrench is None else v.wrench
+    return v.pose, v.velocity, v.forces, v.parameters, wrench
 
 
-def _forward_dynamics(m: Machine, v: Symbols) -> Outputs:
+def _forward_dynamics(m: Machine, v: Inputs) -> Outputs:
     """Return the pose's acceleration (n,) under actuator forces, without the drives' losses."""
     return {"acceleration": lagrangian.forward_dynamics(m, *_dynamics_arguments(m, v))}
 
 
-def _drive_forces(m: Machine, v: Symbols, *, smooth: bool) -> Outputs:
+def _drive_forces(m: Machine, v: Inputs, *, smooth: bool) -> Outputs:
     """Return the drives' forces (n,): of the rigid bodies, and of friction and rotors."""
-    at, drive_numbers = state(m, v), drives.Drives.from_vector(v["drives"])
+    at, drive_numbers = state(m, v), drives.Drives.from_vector(v.drives)
     moving = drives.joint_motion(at)
     return {"forces": _rigid(m, v, at) + drives.drive_forces(drive_numbers, *moving, smooth=smooth)}
 
 
-def _joint_feed_forward(m: Machine, v: Symbols) -> Outputs:
+def _joint_feed_forward(m: Machine, v: Inputs) -> Outputs:
     """Return the drives' forces (n,) of a motion of the joints, and the pose of these joints."""
-    moving = v["joint_rates"], v["joint_accelerations"]
-    pose, *_ = closing.direct_step(m, v["joints"], v["pose"], TYPE_II)
+    moving = v.joint_rates, v.joint_accelerations
+    pose, *_ = closing.direct_step(m, v.joints, v.pose, TYPE_II)
     at = m.state(pose, *kinematics.platform_rates(m, pose, *moving))
-    drive_loads = drives.drive_forces(drives.Drives.from_vector(v["drives"]), *moving, smooth=True)
+    drive_loads = drives.drive_forces(drives.Drives.from_vector(v.drives), *moving, smooth=True)
     return {"forces": _rigid(m, v, at) + drive_loads, "found": pose}
 
 
-def _drive_accelerations(m: Machine, v: Symbols) -> Outputs:
+def _drive_accelerations(m: Machine, v: Inputs) -> Outputs:
     """Return the pose's acceleration (n,) under the drives' forces, with friction and rotors."""
-    drive_numbers = drives.Drives.from_vector(v["drives"])
+    drive_numbers = drives.Drives.from_vector(v.drives)
     return {
         "acceleration": drives.drive_accelerations(m, *(*_dynamics_arguments(m, v), drive_numbers))
     }
 
 
-def _control_outputs(m: Machine, v: Symbols, *, what: str) -> Outputs:
+def _control_outputs(m: Machine, v: Inputs, *, what: str) -> Outputs:
     """Return a control law's forces and next memory; an adaptive law takes no parameters."""
-    selection = v.get("selection", ca.SX(len(m.parameters), 0))
+    count = len(m.parameters)
+    selection = ca.SX(count, 0) if v.selection is None else v.selection
     estimates = control.estimate_count(what, m.freedom, selection.shape[1])
     gains, memory = (
-        control.split_parts(v[name], control.lengths(parts[what], m.freedom, estimates))
-        for name, parts in (("gains", control.GAINS), ("memory", control.MEMORY))
+        control.split_parts(vector, control.lengths(parts[what], m.freedom, estimates))
+        for vector, parts in ((v.gains, control.GAINS), (v.memory, control.MEMORY))
     )
     sample = control.Sample(
         m,
-        control.DesiredMotion(v["pose"], v["velocity"], v["acceleration"]),
-        v["joints"],
-        v["joint_rates"],
+        control.DesiredMotion(v.pose, v.velocity, v.acceleration),
+        v.joints,
+        v.joint_rates,
         gains,
         memory,
-        drives.Drives.from_vector(v["drives"]),
-        v.get("parameters", ca.SX.nan(len(m.parameters))),
+        drives.Drives.from_vector(v.drives),
+        ca.SX.nan(count) if v.parameters is None else v.parameters,
         selection,
         TYPE_II,
     )
@@ -148,18 +148,18 @@ def _law(name: str) -> Entry:
     return Entry((*_SAMPLE, *known, "drives"), partial(_control_outputs, what=name), NEEDS_TYPE_II)
 
 
-def _forces(m: Machine, v: Symbols, *, name: str) -> Outputs:
+def _forces(m: Machine, v: Inputs, *, name: str) -> Outputs:
     """Return the forces of a state that lacks an acceleration, and perhaps a velocity."""
-    return {name: generalized_forces(m, state(m, v), v["parameters"])}
+    return {name: generalized_forces(m, state(m, v), v.parameters)}
 
 
-def _regressor(m: Machine, v: Symbols) -> Outputs:
+def _regressor(m: Machine, v: Inputs) -> Outputs:
     """Return the matrix (n, K) whose product with the parameters is the actuator forces."""
-    selection = v.get("selection", ca.SX.eye(len(m.parameters)))
+    selection = ca.SX.eye(len(m.parameters)) if v.selection is None else v.selection
     return {"regressor": _as_matrix(inverse_dynamics(m, state(m, v), selection))}
 
 
-def _paper_terms(m: Machine, v: Symbols) -> Outputs:
+def _paper_terms(m: Machine, v: Inputs) -> Outputs:
     """Return the terms of the inverse dynamics in the paper's form, by their names there."""
     parts = regressor.terms(m, state(m, v))
     return {
@@ -213,18 +213,21 @@ INTERNAL = ("driven_motion",)
 """Functions of the table whose inputs depend on the drives: the simulation's alone."""
 
 
-def _driven_motion(m: Machine, v: Symbols) -> Outputs:
+def _driven_motion(m: Machine, v: Inputs) -> Outputs:
     """Return the rates of the states of a machine and its actuators under stick-slip friction."""
-    kind: transmissions.DriveKind = v["kind"]
-    sides = sticking.Sides(v["side"], v["hold"], v["brake"]) if kind.dry else None
-    drive_numbers = drives.Drives.from_vector(v["drives"])
+    kind: transmissions.DriveKind = v.kind
+    sides = sticking.Sides(v.side, v.hold, v.brake) if kind.dry else None
+    drive_numbers = drives.Drives.from_vector(v.drives)
     if not kind.stribeck:  # a sixth of the operations less
         drive_numbers = drive_numbers._replace(stribeck=ca.SX.zeros(*drive_numbers.stribeck.shape))
-    zero = ca.SX.zeros(m.freedom)
-    states = {name: v.get(name, zero) for name in ("motor", "motor_rate", "current", "bristle")}
-    numbers = transmissions.Actuators(kind, v["actuators"])
-    motors = sticking.Motors(kind, numbers, **states, pace=v.get("pace", ca.SX(0)))
-    dynamics = v["pose"], v["velocity"], v["forces"], v["parameters"], v["wrench"]
+    zero, parts = ca.SX.zeros(m.freedom), (v.motor, v.motor_rate, v.current, v.bristle)
+    motor, motor_rate, current, bristle = (zero if part is None else part for part in parts)
+    pace, numbers = (
+        ca.SX(0) if v.pace is None else v.pace,
+        transmissions.Actuators(kind, v.actuators),
+    )
+    motors = sticking.Motors(kind, numbers, motor, motor_rate, current, bristle, pace)
+    dynamics = v.pose, v.velocity, v.forces, v.parameters, v.wrench
     return dict(sticking.stick_slip_rates(m, *dynamics, drive_numbers, motors, sides))
 
 
@@ -233,18 +236,18 @@ def _sensed_joints(at: Any) -> Any:
     return control.coordinates(at), drives.joint_motion(at)[0]
 
 
-def _geometric_index(m: Machine, v: Symbols, *, what: str) -> Outputs:
+def _geometric_index(m: Machine, v: Inputs, *, what: str) -> Outputs:
     """Return a geometric performance index at a pose, by its name."""
     return {"value": indices.GEOMETRIC_INDICES[what](m, state(m, v))}
 
 
-def _kappa(m: Machine, v: Symbols) -> Outputs:
+def _kappa(m: Machine, v: Inputs) -> Outputs:
     """Return the index kappa at a pose, with the mass matrix there."""
-    mass = lagrangian.mass_matrix(m, v["pose"], v["parameters"])
+    mass = lagrangian.mass_matrix(m, v.pose, v.parameters)
     return {"value": indices.kappa(m, state(m, v), mass)}
 
 
-def _homogeneous_jacobian(m: Machine, v: Symbols) -> Outputs:
+def _homogeneous_jacobian(m: Machine, v: Inputs) -> Outputs:
     """Return the Jacobian with joints and rotations in metres, and its length L, m."""
     homogeneous = indices.homogeneous(m, state(m, v))
     return {"jacobian": homogeneous.matrix, "length": homogeneous.length}
@@ -256,9 +259,9 @@ def _pad_rows(columns: Sequence[Expression], count: int) -> Expression:
     return ca.vertcat(rows, ca.SX.nan(count - rows.shape[0], rows.shape[1]))
 
 
-def _reactions(m: Machine, v: Symbols) -> Outputs:
+def _reactions(m: Machine, v: Inputs) -> Outputs:
     """Return the equations of the joints' reaction forces, by name, with the points of each leg."""
-    equilibrium = reactions.equilibrium(m, state(m, v), v["parameters"])
+    equilibrium = reactions.equilibrium(m, state(m, v), v.parameters)
     wrenches = [
         [ca.vertcat(at.force, at.moment) for at in leg.wrenches] for leg in equilibrium.legs
     ]
@@ -274,13 +277,13 @@ def _reactions(m: Machine, v: Symbols) -> Outputs:
         "loads": _as_matrix(equilibrium.loads),
         "driven_rows": _as_matrix(equilibrium.driven_rows),
         "driven": equilibrium.driven,
-        "ends": platform_points(m, v["pose"]),
+        "ends": platform_points(m, v.pose),
         "points": (points, (m.freedom, points.shape[0] // m.freedom, 3)),
         "passed": (passed, (m.freedom, passed.shape[0] // m.freedom, 6)),
     }
 
 
-def _beams(m: Machine, v: Symbols) -> Outputs:
+def _beams(m: Machine, v: Inputs) -> Outputs:
     """Return the legs' links as beams, by name; their rods' couples are rows (n, 3)."""
     beams = reactions.beams(m, state(m, v))
     *links, couples = beams._asdict().items()

@@ -134,6 +134,8 @@ class LoopCode:
         How many machines go side by side.
     linked : LinkedLaw, optional
         C in place of the controller's own.
+    device : bool
+        Whether it is CUDA, of which a thread runs one machine after another, a grid apart.
     """
 
     plant: Program
@@ -142,6 +144,7 @@ class LoopCode:
     kind: DriveKind
     lanes: int
     linked: LinkedLaw | None = None
+    device: bool = False
 
     @cached_property
     def _blocks(self) -> list[Block]:
@@ -182,6 +185,8 @@ class LoopCode:
             law=law,
             linked=self.linked,
             lanes=self.lanes,
+            device=self.device,
+            function="static __device__ __noinline__" if self.device else "static",
             freedom=freedom,
             joints=sizes["forces"],
             wrench=sizes["wrench"],
@@ -195,12 +200,12 @@ class LoopCode:
             parts=PARTS,
             told=LOOP_INPUTS if self.kind.bends else LOOP_INPUTS | _RIGID,
             rounds=ROUNDS,
-            ports=self._names,
+            ports=self.names,
         )
 
     @cached_property
-    def _names(self) -> list[str]:
-        """The names of the arrays of the C function, in the order of its arguments."""
+    def names(self) -> list[str]:
+        """The names of the arrays that the loop's function takes, in the order of its arguments."""
         numbers = (
             f"{block.name}_{port.name}" for block in self._blocks for port in block.machine_inputs
         )
@@ -244,8 +249,8 @@ class LoopCode:
         ask: Callable[[int, int, Array], Array] | None = None,
     ) -> None:
         """Run some samples; arrays (B or 1, T or 1, size) are read and filled in place."""
-        table = (_Port * len(self._names))()
-        for port, name in zip(table, self._names, strict=True):
+        table = (_Port * len(self.names))()
+        for port, name in zip(table, self.names, strict=True):
             optional = name in (*RESULTS, "reference", "given")
             array = arrays.get(name) if optional else arrays[name]
             if array is not None:

@@ -14,6 +14,7 @@ from pteron.equations.transmissions import DriveKind
 from pteron.errors import ModelError
 from pteron.kernels.c import c_compiler
 from pteron.kernels.choice import VARIABLE
+from pteron.kernels.cuda import run_loop
 from pteron.kernels.kernel import Array
 from pteron.kernels.loop_code import PARTS, LinkedLaw, LoopCode
 from pteron.kernels.program_cache import Program
@@ -189,6 +190,25 @@ class Loop:
     def code(self, lanes: int) -> LoopCode:
         """Return its C for some machines side by side."""
         return _code(self.plant, self.sensed, self.law, self.kind, lanes, self.linked)
+
+    def run_on_device(
+        self,
+        arrays: Mapping[str, Array],
+        samples: int,
+        times: Sequence[float],
+        counts: Sequence[int],
+    ) -> None:
+        """Run some samples on an NVIDIA GPU, one thread a machine; the parameters are `run`'s.
+
+        Raises
+        ------
+        ModelError
+            If there is no GPU, or CuPy is not installed, or the controller is a C function.
+        """
+        if self.linked is not None:
+            raise ModelError("a controller's C does not run on a GPU; give one of Pteron's")
+        parts = self.plant, self.sensed, self.law, self.kind
+        run_loop(_code(*parts, 1, None, True), arrays, samples, times, counts)
 
 
 @lru_cache(maxsize=64)

@@ -29,8 +29,8 @@ from pteron.kernels.entries import (
     TABLE,
     TYPE_II,
     Entry,
+    Inputs,
     Outputs,
-    Symbols,
     as_vector,
     equation_entry,
     state,
@@ -44,15 +44,15 @@ def _inverse_kinematics(m: Machine, pose: Expression) -> Expression:
     return kinematics.inverse_position(m, pose) + kinematics.reach_validity(m, pose)
 
 
-def _poses(m: Machine, v: Symbols, *, reached: bool) -> Outputs:
+def _poses(m: Machine, v: Inputs, *, reached: bool) -> Outputs:
     """Return the poses (modes, n) of joint coordinates in closed form; NaN where there is none."""
-    poses = kinematics.direct_position(m, v["joints"], reached=reached).T
+    poses = kinematics.direct_position(m, v.joints, reached=reached).T
     return {"poses": (poses, poses.shape)}
 
 
-def _closure_rows(m: Machine, v: Symbols) -> Outputs:
+def _closure_rows(m: Machine, v: Inputs) -> Outputs:
     """Return the rows of the closures with the joints fixed, with their origin and size, m."""
-    closures = closing.closure_rows(m, v["joints"])
+    closures = closing.closure_rows(m, v.joints)
     rows = {name: (part, part.shape) for name, part in closures._asdict().items()}
     return {**rows, "origin": closures.origin, "size": closures.size}
 
@@ -97,7 +97,7 @@ def platform_points(m: Machine, pose: Expression) -> Expression:
     return ca.vertcat(*(point.position.T for point in _platform(m, pose).points))
 
 
-def _type_ii(m: Machine, v: Symbols) -> Outputs:
+def _type_ii(m: Machine, v: Inputs) -> Outputs:
     """Return the type-II measure of a pose: 0 at a singularity."""
     at = state(m, v)
     return {"type_ii": m.closure.measure(at.platform, at.legs)}
@@ -113,9 +113,9 @@ def _velocity_of_twist(m: Machine, pose: Expression, twist: Expression) -> Any:
     return _platform(m, pose).velocity_of(twist)
 
 
-def _joint_motion(m: Machine, v: Symbols) -> Outputs:
+def _joint_motion(m: Machine, v: Inputs) -> Outputs:
     """Return the motion of actuated joints, links and passive joints up to an order."""
-    at, order = state(m, v), int("acceleration" in v)
+    at, order = state(m, v), int(v.acceleration is not None)
     links, passive = kinematics.link_turning(at, order), kinematics.passive_motion(at, order)
     return {
         "actuated": kinematics.driven_motion(at, order),
@@ -151,9 +151,7 @@ TABLE |= {
         _leg_equation(lambda leg: leg.discriminant / leg.scale), POSE, "squares"
     ),
     "type_ii": Entry(POSE, _type_ii),
-    "type_ii_distances": Entry(
-        POSE, lambda m, v: dict(type_ii_distances(m, v["pose"])), NEEDS_TYPE_I
-    ),
+    "type_ii_distances": Entry(POSE, lambda m, v: dict(type_ii_distances(m, v.pose)), NEEDS_TYPE_I),
     "clearances": equation_entry(
         lambda *at: as_vector(clearances(*at)), POSE, "distances", NEEDS_REACH
     ),

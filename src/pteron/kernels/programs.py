@@ -36,8 +36,8 @@ from pteron.kernels.functions import (
     TYPE_I,
     TYPE_II,
     Entry,
+    Inputs,
     Output,
-    Symbols,
 )
 from pteron.kernels.kernel import Port, count_operations
 from pteron.kernels.passes import optimise_function
@@ -317,7 +317,7 @@ def _build_general(layout: Manipulator, form: _Form) -> Program:
 def _program(
     machine: Machine,
     vectors: Mapping[str, Expression] = MappingProxyType({}),
-    constants: Symbols | None = None,
+    constants: dict[str, Any] | None = None,
     extra: dict[str, Expression] | None = None,
     *,
     form: _Form,
@@ -337,7 +337,7 @@ def _program(
             if form.wrench:
                 parts = ca.vertsplit(symbols["wrench"], 3)
                 known["wrench"] = ca.vertcat(*(ca.mtimes(axes.T, part) for part in parts))
-    built = definition.build(machine, known)
+    built = definition.build(machine, Inputs(**known))
     forms = [{name: _with_shape(unshaped) for name, unshaped in built.items()}]
     if form.guarded:
         results = [expression for expression, _ in forms[0].values()]
@@ -367,7 +367,7 @@ def _program(
 
 
 def _input_symbols(
-    machine: Machine, form: _Form, constants: Symbols, extra: dict[str, Expression]
+    machine: Machine, form: _Form, constants: dict[str, Any], extra: dict[str, Expression]
 ) -> dict[str, Expression]:
     """Return the inputs of a function as symbols by name, shared ones last."""
     names = [name for name in TABLE[form.what].inputs if name not in constants]

@@ -15,6 +15,7 @@ from pteron.equations.topology import stored_numbers
 from pteron.equations.transmissions import actuator_numbers
 from pteron.errors import ModelError
 from pteron.kernels.c import Compiled
+from pteron.kernels.cuda import Grid
 from pteron.kernels.fields import Exact
 from pteron.kernels.hoisting import hoist_invariants
 from pteron.kernels.intervals import Boxed
@@ -38,10 +39,11 @@ TARGETS: dict[str, type[Kernel]] = {
     "numba": Jitted,
     "c": Compiled,
     "jax": Traced,
+    "cuda": Grid,
     "exact": Exact,
     "intervals": Boxed,
 }
-"""Executors of a function, by name: CasADi's virtual machine, Numba, C, JAX, fractions,
+"""Executors of a function, by name: CasADi's virtual machine, Numba, C, JAX, CUDA, fractions,
 intervals."""
 
 Grade = Literal["specialised", "parametric", "general"]
@@ -89,6 +91,7 @@ def compile(
     grade: Grade = "specialised",
     dtype: str = "float64",
     threads: int = 1,
+    fast: bool = False,
 ) -> Kernel:
     """Compile one of the numeric functions for a machine.
 
@@ -99,10 +102,11 @@ def compile(
     what : str
         A function's name: `"inverse_dynamics"`, `"jacobian"`, ...; `pteron.kernels.FUNCTIONS` has
         them all.
-    target : {"vm", "numba", "c", "jax", "exact", "intervals"}
+    target : {"vm", "numba", "c", "jax", "cuda", "exact", "intervals"}
         What executes it: CasADi's virtual machine, ready at once; Numba; the machine's C compiler,
-        fastest, from Python too; JAX, which differentiates and runs on accelerators; fractions;
-        intervals, which take boxes of states and give proved bounds.
+        fastest, from Python too; JAX, which differentiates and runs on accelerators; an NVIDIA GPU,
+        one thread a state, on arrays of CuPy, PyTorch or JAX; fractions; intervals, which take
+        boxes of states and give proved bounds.
     base : BaseParameters, optional
         For `"inverse_dynamics"`, `"drive_forces"`, `"feed_forward"`, `"joint_feed_forward"`:
         compute from these base parameters alone, in the cheapest form that they allow (see
@@ -117,18 +121,21 @@ def compile(
         machine's own values, so that a kernel of any grade is called alike; a call may give others,
         by name: `kernel(pose, velocity, acceleration, parameters=values)`.
     dtype : {"float64", "float32"}
-        Of the numbers; `"float32"` for C and JAX.
+        Of the numbers; `"float32"` for C, JAX and CUDA.
     threads : int
-        Threads that share a large batch (not for JAX, which has its own).
+        Threads that share a large batch (not for JAX and CUDA, which have their own).
+    fast : bool
+        For CUDA: whether products and sums are contracted to fused operations. The results then
+        differ from those of other targets by rounding.
 
     Returns
     -------
     Kernel
         Called with the same arrays as the function (without `robot`); it has `operations`,
         `inputs`, `outputs` and `source`. It does not check poses: NaN where out of reach. All
-        float64 targets but JAX return the same bits. C and Numba compile at the first call, which
-        takes from half a second to some seconds; the result is kept in the user's cache directory
-        (`PTERON_CACHE` names another).
+        float64 targets but JAX return the same bits; CUDA but for its arctangents. C, Numba and
+        CUDA compile at the first call, which takes from half a second to some seconds; the result
+        is kept in the user's cache directory (`PTERON_CACHE` names another; CUDA's is CuPy's).
 
     Raises
     ------
@@ -157,15 +164,18 @@ def compile(
         raise ModelError(f'dtype: {dtype!r} given, target "{target}" has {", ".join(allowed)}')
     if threads < 1:
         raise ModelError(f"threads: {threads} given, 1 or more expected")
+    if fast and target != "cuda":
+        raise ModelError(f'fast: target "{target}" has no fused operations; only "cuda"')
+    options = wrench, grade, dtype, threads, fast
     if base is None:
-        return _cached_kernel(robot, what, target, None, None, wrench, grade, dtype, threads)
+        return _cached_kernel(robot, what, target, None, None, *options)
     if grade == "general":
         raise ModelError('base: a choice for one machine; use grade "specialised" or "parametric"')
     if not same_layout(base.robot, robot):
         raise ModelError(OTHER_LAYOUT.format(base.robot.name, robot.name))
     columns = columns_of(base)
     base_values = tuple(base.values(robot).tolist())
-    return _cached_kernel(robot, what, target, columns, base_values, wrench, grade, dtype, threads)
+    return _cached_kernel(robot, what, target, columns, base_values, *options)
 
 
 OTHER_LAYOUT = (
@@ -190,6 +200,7 @@ def _cached_kernel(
     grade: Grade,
     dtype: str,
     threads: int,
+    fast: bool,
 ) -> Kernel:
     """Return the kernel of a target, cached, with the machine's numbers as fixed inputs."""
     folded = grade == "specialised"
@@ -221,6 +232,8 @@ def _cached_kernel(
     for array in fixed.values():
         array.setflags(write=False)  # the kernel is shared by all who ask for it
     kernel = _instantiate_kernel(TARGETS[target], built, fixed, dtype, threads)
+    if isinstance(kernel, Grid):
+        kernel.fast = fast
     kernel.made.update(derived)
     return kernel
 

@@ -26,7 +26,7 @@ def direct_kinematics(
     joints: JointsLike,
     *,
     all_branches: bool = False,
-    on_failure: OnFailure = "nan",
+    on_failure: OnFailure = "raise",
 ) -> Poses:
     """Return every pose with the given joint coordinates: all assembly modes.
 
@@ -48,9 +48,9 @@ def direct_kinematics(
         Rods and planar legs close with either side of an elbow. By default only poses of the
         robot's own working mode are returned, those whose inverse kinematics are the joints; True
         returns those of the others as well.
-    on_failure : {"nan", "raise"}
-        A mode that is not real is NaN: that is an answer, not a failure, hence the default. With
-        "raise", joints that no pose has raise.
+    on_failure : {"raise", "nan"}
+        What to do with joints that no pose has, or that are not finite: raise, or give NaN. Where
+        there is a pose, further modes that are not real are NaN in either case.
 
     Returns
     -------
@@ -72,7 +72,7 @@ def direct_kinematics(
         If the machine is singular at every pose, or a platform that tilts can move with the joints
         held (a self-motion), whatever `on_failure`.
     UnreachablePose
-        With ``on_failure="raise"``, if joints have no pose.
+        If joints have no pose, unless `on_failure` is "nan".
 
     Examples
     --------

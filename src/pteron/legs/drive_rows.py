@@ -9,21 +9,21 @@ from pteron.legs.kind import LegKind
 
 _QUANTITIES = (
     ("dry friction", "coulomb", "{force}"),
-    ("more of it at rest", "stribeck.force", "{force}"),
-    ("37 % of it left at", "stribeck.speed", "{rate}"),
+    ("Stribeck friction at rest", "stribeck.force", "{force}"),
+    ("Stribeck speed (37 % left)", "stribeck.speed", "{rate}"),
     ("viscous friction", "viscous", "{damping}"),
     ("offset", "offset", "{force}"),
-    ("smooth below", "rest_speed", "{rate}"),
-    ("ratio", "ratio", "rad/{joint}"),
-    ("rotor, at the motor", "rotor_inertia", "kg m^2"),
-    ("rotor, at the joint", "inertia", "{inertia}"),
+    ("friction smoothed below", "rest_speed", "{rate}"),
+    ("gear ratio", "ratio", "rad/{joint}"),
+    ("rotor inertia at the motor", "rotor_inertia", "kg m^2"),
+    ("rotor inertia at the joint", "inertia", "{inertia}"),
     ("rated torque", "rated_torque", "N m"),
-    ("greatest force", "max_force", "{force}"),
-    ("greatest speed", "max_speed", "{rate}"),
-    ("transmission's stiffness", "elastic.stiffness", "{stiffness}"),
-    ("its backlash", "elastic.backlash", "{joint}"),
-    ("current's time constant", "current_time", "s"),
-    ("encoder", "counts_per_turn", "counts a turn of the motor"),
+    ("maximum force", "max_force", "{force}"),
+    ("maximum speed", "max_speed", "{rate}"),
+    ("transmission stiffness", "elastic.stiffness", "{stiffness}"),
+    ("transmission backlash", "elastic.backlash", "{joint}"),
+    ("current time constant", "current_time", "s"),
+    ("encoder", "counts_per_turn", "counts per turn of the motor"),
 )
 """Names, where a `Drive` has them, and units."""
 
@@ -41,7 +41,7 @@ def drive_rows(legs: Sequence[LegKind]) -> list[tuple[str, list[str]]]:
     >>> for row in drive_rows([replace(legs[0], drive=pteron.legs.Drive(coulomb=3.0)), legs[1]]):
     ...     print(row)
     ('dry friction (N m)', ['3', '-'])
-    ('smooth below (rad/s)', ['0.001', '-'])
+    ('friction smoothed below (rad/s)', ['0.001', '-'])
     """
     rows = []
     for name, place, unit in _QUANTITIES:

@@ -40,13 +40,13 @@ class ActuatedJoint:
 
 _TURN = "rad", "torque", "N m"
 SLIDER = ActuatedJoint(
-    *("slider", "rho", "m", "force", "N"), "is at 0 at its guide_point and counts along its axis"
+    *("slider", "rho", "m", "force", "N"), "0 at its guide_point, positive along its axis"
 )
 CRANK = ActuatedJoint(
     *("crank", "theta", *_TURN),
-    "is at 0 along its zero_direction and counts by the right hand about its axis",
+    "0 along its zero_direction, positive by the right-hand rule about its axis",
 )
-SHAFT = ActuatedJoint("shaft", "theta", *_TURN, "is at its ratio times phi")
+SHAFT = ActuatedJoint("shaft", "theta", *_TURN, "its gear ratio times phi")
 
 Role = Literal["point", "direction", "normal", "length", "number", "sign"]
 """The role of a quantity: a point or a unit vector in the base frame; a unit vector that no force

@@ -37,7 +37,7 @@ class RamLeg(LegKind):
     reading: Reading | None = field(default=None, kw_only=True)
     direction: Vector | None = None
 
-    joint = ActuatedJoint("ram", "rho", "m", "force", "N", "counts its length from end to end")
+    joint = ActuatedJoint("ram", "rho", "m", "force", "N", "its length from end to end")
     branches = (1,)
     names: ClassVar = {"u": "cylinder", "l": "piston"}
     measure_text = "1 everywhere, as a ram pushes the platform point in every pose"

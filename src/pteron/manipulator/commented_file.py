@@ -93,23 +93,22 @@ def kept_numbers_sentence(robot: Manipulator, dimensions: Mapping[str, Any]) -> 
     links, zero = _masses(changed, dimensions.get("stock", {})), crank_direction_text(changed)
     phrases = []
     if "platform_mass" not in dimensions:
-        phrases.append(f"the platform of {mass:.4g} kg (--platform-mass)")
+        phrases.append(f"mass of the platform, {mass:.3g} kg (--platform-mass)")
     if links:
-        phrases.append(f"sections of links, {links} (--mass-from)")
+        phrases.append(f"cross-sections of the links, masses now {links} (--mass-from)")
     if "limits" not in dimensions:
-        phrases.append("the joints' limits (--limits)")
+        phrases.append("joint limits (--limits)")
     if zero not in ("", LEVEL):
-        phrases.append(f"where a crank is at 0, {zero}")
-    return (
-        [f"As in {shorten(robot.name, bare=True)} still: {'; '.join(phrases)}."] if phrases else []
-    )
+        phrases.append(f"direction of cranks at 0, {zero}")
+    unchanged = f"Unchanged from {shorten(robot.name, bare=True)}, check them"
+    return [f"{unchanged}: {'; '.join(phrases)}."] if phrases else []
 
 
 def _masses(robot: Manipulator, stock: Mapping[str, Any]) -> str:
     """Return the text of the masses of the first leg's links without a stock."""
     leg: Any = robot.legs[0]
     links = {key: leg.bodies[letter].mass for letter, (key, *_) in leg.extents.items()}
-    return " and ".join(f"{mass:.4g} kg ({key})" for key, mass in links.items() if key not in stock)
+    return " and ".join(f"{key} {mass:.3g} kg" for key, mass in links.items() if key not in stock)
 
 
 def crank_direction_text(robot: Manipulator) -> str:

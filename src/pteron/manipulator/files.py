@@ -22,7 +22,6 @@ from pteron.manipulator.manipulator import Manipulator, faults_of
 from pteron.manipulator.radii import Radii
 from pteron.manipulator.tool import Tool
 from pteron.platforms import Bar, GearedPart, Platform
-from pteron.platforms.kinds import TILTING
 from pteron.toml import fault_lines, joined_faults, parsed_toml, toml_bytes
 
 _Built = TypeVar("_Built")
@@ -231,11 +230,16 @@ def _similar_machines(name: str) -> list[str]:
 
 def _machine(document: dict[str, Any], source: str) -> Manipulator:
     """Return the machine of a TOML document; a `ModelError` lists all its faults."""
-    from pteron.manipulator.tables import MachineTable, TiltingMachineTable, platform_table
+    from pteron.manipulator.tables import (
+        MachineTable,
+        TiltingMachineTable,
+        TiltingTable,
+        platform_table,
+    )
 
     raw_platform = document.get("platform")
     motion = raw_platform.get("motion") if isinstance(raw_platform, dict) else None
-    tilts = motion in TILTING
+    tilts = issubclass(platform_table(motion), TiltingTable)
     reading = _FileReader(tilts=tilts)
     machine = reading.table(TiltingMachineTable if tilts else MachineTable, document, "")
     table = machine.platform or reading.valid_part(platform_table(motion), raw_platform)

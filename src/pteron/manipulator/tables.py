@@ -32,7 +32,7 @@ from pteron.legs.drive import Drive, Elastic, LuGre, Stribeck, Wave, Winding
 from pteron.legs.reading import Reading
 from pteron.manipulator.manipulator import STANDARD_GRAVITY
 from pteron.manipulator.radii import Radii
-from pteron.platforms.kinds import TILTING, AngleOrder, Motion
+from pteron.platforms.kinds import AngleOrder, kind_of_motion
 
 _DESCRIPTIONS: dict[str, dict[str, Any]] = loads(
     (files("pteron.manipulator") / "parts.toml").read_text(encoding="utf-8")
@@ -80,7 +80,7 @@ DriveTable, ReadingTable, RadiiTable = map(_table_of, (Drive, Reading, Radii))
 
 
 class _Motion(TomlTable):
-    motion: Motion = key(
+    motion: str = key(
         '"3T": x, y, z. "3T1R": also phi, about axis. "2T": x, y in the plane across '
         'axis. "2T1R": also phi. Tilting: "3T3R", "3R" and "2R" about center, "1T2R" of a tripod'
     )
@@ -139,7 +139,8 @@ class TiltingTable(SpatialBody, _Motion):
 
 def platform_table(motion: Any) -> type[PlatformTable] | type[TiltingTable]:
     """Return the table model of a platform's motion; `PlatformTable` for an unknown motion."""
-    return TiltingTable if motion in TILTING else PlatformTable
+    kind = kind_of_motion(motion)
+    return TiltingTable if kind is not None and kind.tilts else PlatformTable
 
 
 class ToolTable(TomlTable):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from itertools import product
 
@@ -48,6 +48,11 @@ def with_elbows(robot: Manipulator, signs: Sequence[int]) -> Manipulator:
     """
     legs = tuple(replace(leg, elbow=sign) for leg, sign in zip(robot.legs, signs, strict=True))
     return replace(robot, legs=legs, home=robot.home if legs == robot.legs else None)
+
+
+def elbow_signs(elbows: Iterable[float]) -> str:
+    """Return a working mode's elbows as text, + or - for each leg."""
+    return "".join("+" if elbow > 0 else "-" for elbow in elbows)
 
 
 def turned(robot: RobotLike, rotation: ArrayLike, *, gravity: bool = True) -> Manipulator:

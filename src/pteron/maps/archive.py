@@ -66,7 +66,7 @@ def read_archive(source: Path) -> Map:
 
 
 def _expect_sizes_of_a_map(archive: ZipFile) -> None:
-    """Refuse an archive whose arrays would unpack to more than its grid has poses."""
+    """Raise ValueError if an archive's arrays would unpack to more than its grid has poses."""
     about = archive.getinfo(f"{_ABOUT}.npy")
     if about.file_size > _LONGEST_ABOUT:
         raise ValueError("its description is too long")

@@ -324,7 +324,7 @@ def _number(key: str, number: object) -> float:
 def expect_coordinates(
     robot: Manipulator, fixed: Mapping[str, float], ranges: Mapping[str, tuple[float, ...]]
 ) -> None:
-    """Refuse coordinates that the machine does not have, and values not finite or of wrong unit."""
+    """Raise DataError on coordinates that a machine lacks, or values infinite or in wrong units."""
     names = robot.coordinates
     for name in (*fixed, *ranges):
         if name not in names:

@@ -199,9 +199,7 @@ class Map(Result):
             f"{name} [{coordinate(name).unit}]": poses[:, k]
             for k, name in enumerate(self.grid.coordinates)
         }
-        columns |= {
-            column_heading(index): self.values[index.name].ravel() for index in self.indices
-        }
+        columns |= {column_heading(i): self.values[i.name].ravel() for i in self.indices}
         frame = pl.DataFrame(columns | {"status": self.status.ravel()})
         return frame.with_columns(pl.col(pl.Float64).fill_nan(None))
 

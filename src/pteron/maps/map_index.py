@@ -184,12 +184,12 @@ def _compute_region(
         outputs["status"][part] = status
         for index in indices:
             if index == MARGIN:
-                values = margin
+                index_values = margin
             elif index.function is None:
-                values = evaluate_kernel(robot, index.name, "nan", rows[part])
+                index_values = evaluate_kernel(robot, index.name, "nan", rows[part])
             else:
-                values = values_in_reach(robot, index, rows[part], status <= REACHABLE)
-            outputs[index.name][part] = values
+                index_values = values_in_reach(robot, index, rows[part], status <= REACHABLE)
+            outputs[index.name][part] = index_values
     return {name: array.reshape(poses.shape[:-1]) for name, array in outputs.items()}
 
 

@@ -22,7 +22,7 @@ _MANY = 2
 
 
 def expect_same(path: str | Path, stored: Any, plan: Mapping[str, Any]) -> None:
-    """Refuse to resume a store whose plan differs.
+    """Raise OutputError, listing the differences, if a store's plan is not the run's.
 
     Plans are plain JSON data: the store's, and that of the run. Texts that are TOML, as a robot's
     is, are compared by their keys.
@@ -69,9 +69,7 @@ def _machine(text: Any) -> Mapping[str, Any]:
 
 def _is_table_list(part: Any) -> bool:
     """Return whether a part of a plan is a list with tables."""
-    return isinstance(part, list) and any(
-        isinstance(entry_of_list, Mapping) for entry_of_list in part
-    )
+    return isinstance(part, list) and any(isinstance(element, Mapping) for element in part)
 
 
 def _difference_text(name: str, stored: Any, plan: Any) -> str:

@@ -217,7 +217,7 @@ def _settle(future: Future[None], where: str) -> None:
 
 @contextmanager
 def _told_if_lost(where: str) -> Iterator[None]:
-    """Raise errors of a scheduler that no longer answers as a `PteronError`, in a block."""
+    """Raise PteronError, in a block, where a scheduler no longer answers."""
     try:
         yield
     except (CancelledError, OSError, RuntimeError):

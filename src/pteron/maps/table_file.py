@@ -126,9 +126,7 @@ def _grid(table: Table, names: tuple[str, ...], poses: Array) -> tuple[Grid, NDA
 def _first_missing(shape: tuple[int, ...], ranks: NDArray[np.int64]) -> tuple[int, ...]:
     """Return the place in a grid of the first pose that sorted places (axes, N) lack."""
     places, known = product(*map(range, shape)), map(tuple, ranks.T.tolist())
-    return next(
-        place for place, place_present in zip_longest(places, known) if place != place_present
-    )
+    return next(place for place, other in zip_longest(places, known) if place != other)
 
 
 def _axis(table: Table, name: str, coordinates: Array) -> Axis:
@@ -153,7 +151,7 @@ def _checksum(index_map: Map) -> str:
 
 
 def _expect_whole(source: Path, index_map: Map) -> None:
-    """Refuse a Parquet file whose checksum, if it has one, does not match its contents."""
+    """Raise DataError if a Parquet file has a checksum that does not match its contents."""
     import polars as pl
 
     metadata = pl.read_parquet_metadata(source)

@@ -67,7 +67,7 @@ class TableStore:
 
     def finished_chunks(self) -> frozenset[int]:
         """Return the numbers of the chunks that are complete."""
-        return frozenset(number for number, _ in self._is_complete())
+        return frozenset(number for number, _ in self._complete_chunks())
 
     finished = former_attribute("finished", "finished_chunks")
 
@@ -87,12 +87,12 @@ class TableStore:
         """
         import polars as pl
 
-        files = [file for _, file in sorted(self._is_complete())]
+        files = [file for _, file in sorted(self._complete_chunks())]
         if not files:
             raise DataError(f"{self.folder}: no chunk is finished yet")
         return pl.scan_parquet(files, glob=False)
 
-    def _is_complete(self) -> Iterator[tuple[int, Path]]:
+    def _complete_chunks(self) -> Iterator[tuple[int, Path]]:
         """Yield the number and the file of each complete chunk."""
         seen = set()
         for file in sorted(self.folder.glob(f"[0-9]*{_ENDING}")):

@@ -21,7 +21,7 @@ from pteron.errors import DataError, ModelError
 from pteron.kernels import Array
 from pteron.kinematics.evaluate import finite_pose
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
-from pteron.motion.motion import Motion
+from pteron.motion.motion import Motion, interpolate_columns
 from pteron.motion.trajectories.replay import rows_of
 from pteron.shapes import Columns, PoseLike
 from pteron.tables import Table
@@ -170,7 +170,7 @@ def cue(
     samples = np.array(columns).T
     even = _even_times(time - time[0], rows.source)
     demand = _filter_motion(
-        even, _interpolate_columns(even, time - time[0], samples), washout or Washout()
+        even, interpolate_columns(time - time[0], samples, even), washout or Washout()
     )
     region, proof = _box(robot, middle, np.abs(demand[0]).max(axis=0), type_ii)
     half = 0.5 * np.ptp(region.box, axis=0)
@@ -180,7 +180,7 @@ def cue(
             break
         even = np.linspace(0.0, even[-1], 2 * len(even) - 1)
         demand = _filter_motion(
-            even, _interpolate_columns(even, time - time[0], samples), washout or Washout()
+            even, interpolate_columns(time - time[0], samples, even), washout or Washout()
         )
         parts = _compress(demand, _WITHIN * half)
     else:
@@ -205,11 +205,6 @@ def _even_times(time: Array, source: str) -> Array:
     if count > _MANY:
         raise DataError(f"{source}: {time[-1]:.4g} s make {count} samples, at most {_MANY} serve")
     return np.linspace(0.0, time[-1], count)
-
-
-def _interpolate_columns(even: Array, time: Array, columns: Array) -> Array:
-    """Return columns (T, 6) interpolated linearly at equidistant times."""
-    return np.stack([np.interp(even, time, column) for column in columns.T], axis=-1)
 
 
 def _control_points(time: Array, parts: Array) -> Array:

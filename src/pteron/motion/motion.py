@@ -168,6 +168,11 @@ class Motion(Result):
     repeated = former_attribute("repeated", "repeat")
 
 
+def interpolate_columns(time: Array, columns: Array, at: Array) -> Array:
+    """Return columns (T, k) over times (T,) interpolated linearly at times (F,): (F, k)."""
+    return np.column_stack([np.interp(at, time, column) for column in columns.T])
+
+
 def pose_text(pose: Array) -> str:
     """Return a pose in brackets for messages, five digits a number."""
     return f"[{', '.join(f'{coordinate:.5g}' for coordinate in pose + 0.0)}]"

@@ -43,14 +43,17 @@ def checked_fields(platform: Any) -> tuple[dict[str, Any], list[str]]:
 def _axes(platform: Any) -> dict[str, Any]:
     """Return the platform's `axis` and `x_axis`, unit vectors; ModelError if they are not valid."""
     axis = unit_vector(platform.axis, "axis")
-    if platform.x_axis is not None and platform.motion == "2R":
+    if platform.x_axis is not None and platform.kind.has_second_axis:
         raise ModelError(
-            "x_axis: a 2R platform's frame is the base frame at angles zero; leave it out"
+            f"x_axis: a {platform.motion} platform's frame is the base frame at angles zero; "
+            "leave it out"
         )
     if platform.x_axis is not None:
         return {"axis": axis, "x_axis": perpendicular(platform.x_axis, axis, "x_axis", "axis")}
-    if axis == BASE_Z or platform.motion == "2R":
-        return {"axis": axis, "x_axis": None if platform.motion == "2R" else (1.0, 0.0, 0.0)}
+    if platform.kind.has_second_axis:
+        return {"axis": axis, "x_axis": None}
+    if axis == BASE_Z:
+        return {"axis": axis, "x_axis": (1.0, 0.0, 0.0)}
     raise ModelError(
         f"x_axis: missing; axis {list(axis)} is not the base frame's z, so x_axis must say "
         "where the platform frame's x points at phi = 0"
@@ -90,8 +93,8 @@ def _joint(platform: Any) -> dict[str, Any]:
     elif platform.angle_order != "rpy" and platform.motion not in XYZ:
         faults.append(f'angles: a {platform.motion} platform has no "xyz"; only 3T3R and 3R')
     requirements = {
-        "center": platform.motion in ("3R", "2R"),
-        "second_axis": platform.motion == "2R",
+        "center": platform.kind.has_center,
+        "second_axis": platform.kind.has_second_axis,
     }
     for name, needed in requirements.items():
         field_value = getattr(platform, name)

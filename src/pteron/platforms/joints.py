@@ -31,10 +31,7 @@ def platform_joints(platform: Platform, poses: Array) -> list[PlatformJoint]:
     """
     kind = platform.kind
     x0, y0, k = (np.array(axis) for axis in platform.frame)
-    axes = {"x": x0, "y": y0, "z": k, "phi": k, "roll": x0, "pitch": y0, "yaw": k}
-    axes |= {"rx": x0, "ry": y0, "rz": k, "alpha": np.array(platform.axis)}
-    if platform.second_axis is not None:
-        axes["beta"] = np.array(platform.second_axis)
+    axes = {"x": x0, "y": y0, "z": k} | platform.axes_by_angle
     names = kind.joints or platform.coordinates
     axes |= dict(zip(platform.lengths, platform.directions, strict=True))
     by_name = {name: poses[..., i] for i, name in enumerate(platform.coordinates)}

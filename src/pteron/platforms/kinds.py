@@ -1,10 +1,15 @@
-"""The motions of platforms and the classes of their equations: `equations_class` picks one."""
+"""The kinds of platforms by the motion that files name: those of this folder and of packages.
+
+A package names its kinds as entry points of the group `pteron.platforms`; its module is imported
+when a file asks for the motion, not before.
+"""
 
 from __future__ import annotations
 
-from functools import cache
 from typing import Literal
 
+from pteron.errors import ModelError
+from pteron.extensions import extension_names, extension_value, load_extension
 from pteron.platforms.motion import PlatformEquations
 from pteron.platforms.sliding import Sliding
 from pteron.platforms.tilting import (
@@ -18,35 +23,61 @@ from pteron.platforms.translating import PlanarTranslating, Translating
 from pteron.platforms.tripod import Tripod
 from pteron.platforms.turning import PlanarTurning, Turning
 
-Motion = Literal["3T", "3T1R", "2T", "2T1R", "3T3R", "3R", "2R", "1T2R"]
-"""3T: the platform only translates. 3T1R: it also turns about its axis (Schoenflies motion). 2T and
-2T1R: the same in the plane across its axis. Platforms that tilt: 3T3R moves freely, 3R and 2R turn
-about a centre, on a ball joint or a universal joint, 1T2R is a tripod's."""
+GROUP = "pteron.platforms"
 
 AngleOrder = Literal["rpy", "xyz"]
 """rpy: R = Rz(yaw) Ry(pitch) Rx(roll). xyz: R = Rx(rx) Ry(ry) Rz(rz)."""
 
-_EQUATIONS: dict[str, type[PlatformEquations]] = {
-    "3T": Translating,
-    "3T1R": Turning,
-    "2T": PlanarTranslating,
-    "2T1R": PlanarTurning,
-    "3T3R": RollPitchYaw,
-    "3R": CentredRollPitchYaw,
-    "2R": Universal,
-    "1T2R": Tripod,
+KINDS: dict[str, type[PlatformEquations]] = {
+    kind.motion_name: kind
+    for kind in (
+        Translating,
+        Turning,
+        PlanarTranslating,
+        PlanarTurning,
+        RollPitchYaw,
+        CentredRollPitchYaw,
+        Universal,
+        Tripod,
+    )
 }
-XYZ: dict[str, type[PlatformEquations]] = {"3T3R": TurnsXYZ, "3R": CentredXYZ}
-"""The classes for the angle order "xyz"."""
+"""The kinds of platforms that are loaded, by their motion; add another here."""
 
-TILTING = tuple(motion for motion, kind in _EQUATIONS.items() if kind.tilts)
-"""The motions of platforms that turn about more axes than one."""
+XYZ: dict[str, type[PlatformEquations]] = {
+    kind.motion_name: kind for kind in (TurnsXYZ, CentredXYZ)
+}
+"""Those with the angle order "xyz"."""
 
 
-@cache
+def motion_names() -> tuple[str, ...]:
+    """Return the motions that files may name, of installed packages too."""
+    return (*KINDS, *(name for name in extension_names(GROUP) if name not in KINDS))
+
+
+def kind_of_motion(motion: object) -> type[PlatformEquations] | None:
+    """Return the kind of platform with a motion; None if there is none.
+
+    Raises
+    ------
+    ModelError
+        If the package that has it cannot be imported, or holds no kind with that motion.
+    """
+    if not isinstance(motion, str):
+        return None
+    if motion not in KINDS and (kind := load_extension(GROUP, motion)) is not None:
+        if not (
+            isinstance(kind, type)
+            and issubclass(kind, PlatformEquations)
+            and getattr(kind, "motion_name", None) == motion
+        ):
+            value = extension_value(GROUP, motion)
+            raise ModelError(f"{value} is no kind of platform with motion_name {motion!r}")
+        KINDS[motion] = kind
+    return KINDS.get(motion)
+
+
 def equations_class(motion: str, angle_order: str, slides: bool) -> type[PlatformEquations]:
     """Return the class of equations for a motion, an order of angles, and sliding halves or not."""
     if slides:
         return Sliding
-    turns = XYZ if angle_order == "xyz" else _EQUATIONS
-    return turns.get(motion) or _EQUATIONS[motion]
+    return XYZ[motion] if angle_order == "xyz" and motion in XYZ else KINDS[motion]

@@ -2,9 +2,9 @@
 
 From the pose x and its derivatives the equations give the motion of the platform's points, one a
 leg, and the wrench required by the platform's own weight and inertia. A kind is a subclass of
-`PlatformEquations` in this folder, entered in `kinds.py`, where `equations_class` selects it by the
-robot file. P is the platform's reference point, phi the one angle of a platform that does not tilt,
-k the axis that it turns about.
+`PlatformEquations`, in this folder and entered in `kinds.py`, or in a package as an entry point of
+the group `pteron.platforms`; its `motion_name` is what robot files name. P is the platform's
+reference point, phi the one angle of a platform that does not tilt, k the axis that it turns about.
 """
 
 from __future__ import annotations
@@ -131,6 +131,8 @@ PlatformMoments = Any
 class PlatformEquations(ABC):
     """The equations of a platform, for one state."""
 
+    motion_name: ClassVar[str]
+    """The motion that files name, such as "3T1R": translations T and rotations R."""
     coordinates: ClassVar[tuple[str, ...]]
     """The pose's coordinates, in order."""
     kinds: ClassVar[tuple[str, ...]] = PlanarInertia.kinds
@@ -152,7 +154,13 @@ class PlatformEquations(ABC):
     point_unit: ClassVar[str] = "m"
     """The unit of its platform points: "m", or "m/rad" where phi makes them slide."""
     on_legs_alone: ClassVar[bool] = True
-    """Whether the legs alone hold it, without a joint between it and the base."""
+    """Whether the legs alone hold it, without a joint or a chain between it and the base."""
+    has_center: ClassVar[bool] = False
+    """Whether P is at `center`, which files give, on a joint with the base."""
+    has_second_axis: ClassVar[bool] = False
+    """Whether it turns about `axis`, then about `second_axis`, which files give."""
+    keeps_points_in_planes: ClassVar[bool] = False
+    """Whether planes, in which its legs keep its points, fix its dependent coordinates."""
     wrench_columns: ClassVar[tuple[str, ...]] = ()
     """The names of the components of a wrench at P; none where they follow from the coordinates."""
     joints: ClassVar[tuple[str, ...]] = ()
@@ -182,6 +190,10 @@ class PlatformEquations(ABC):
         """Return the offset of a platform point: s in the platform's frame, t its fixed offset."""
         x0, y0, k = self.frame
         return Offset(x0 * s[0] + y0 * s[1], y0 * s[0] - x0 * s[1], k * s[2] + t)
+
+    def axes_by_angle(self) -> dict[str, Expression]:
+        """Return the axis (3, 1) that each angle turns it about, or along, at angles zero."""
+        return {} if self.axis_angle is None else {self.axis_angle: self.frame[2]}
 
     @classmethod
     def angles(cls) -> list[int]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any, get_args
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -20,10 +20,16 @@ from pteron.bodies.vectors import (
     Vector,
     cross,
 )
-from pteron.errors import ModelError
+from pteron.errors import ModelError, shorten
 from pteron.platforms.checked_fields import BASE_Z, checked_fields
 from pteron.platforms.coordinates import COORDINATES, Unit, are_angles
-from pteron.platforms.kinds import XYZ, AngleOrder, Motion, equations_class
+from pteron.platforms.kinds import (
+    XYZ,
+    AngleOrder,
+    equations_class,
+    kind_of_motion,
+    motion_names,
+)
 from pteron.platforms.motion import PlatformEquations, PlatformMotion
 from pteron.platforms.parts import Bar, GearedPart, HeldPoint
 from pteron.renamed import former_attribute
@@ -42,9 +48,11 @@ class Platform:
 
     Parameters
     ----------
-    motion : {"3T1R", "3T", "2T", "2T1R", "3T3R", "3R", "2R", "1T2R"}
-        Its freedom: translation, in space or in the plane across `axis`, with or without a rotation
-        about `axis`; or any motion, turns about `center`, or those of a tripod.
+    motion : {"3T", "3T1R", "2T", "2T1R", "3T3R", "3R", "2R", "1T2R"} or str
+        Its freedom. 3T: it only translates. 3T1R: it also turns about `axis` (Schoenflies motion).
+        2T and 2T1R: the same in the plane across `axis`. 3T3R: it moves freely. 3R and 2R: it turns
+        about `center`, on a ball joint or a universal joint. 1T2R: a tripod's. Installed packages
+        may have others.
     inertia : PlanarInertia or SpatialInertia
         Mass, first moment in the platform frame and moment of inertia about `axis` through P; of a
         platform that tilts its inertia tensor about P.
@@ -78,7 +86,7 @@ class Platform:
         Of a 1T2R platform the planes in which its legs keep its points: the manipulator sets them.
     """
 
-    motion: Motion
+    motion: str
     inertia: PlanarInertia | SpatialInertia
     axis: Vector = BASE_Z
     x_axis: Vector | None = None
@@ -93,9 +101,11 @@ class Platform:
     planes: tuple[HeldPoint, ...] = ()
 
     def __post_init__(self) -> None:
-        if self.motion not in get_args(Motion):
-            valid = " or ".join(f'"{m}"' for m in get_args(Motion))
-            raise ModelError(f"motion: {self.motion!r} is not {valid}")
+        if kind_of_motion(self.motion) is None:
+            *names, last = map(repr, motion_names())
+            raise ModelError(
+                f"motion: {shorten(self.motion)} given, {', '.join(names)} or {last} expected"
+            )
         sound, faults = checked_fields(self)
         raise_faults(faults)
         for name, field_value in sound.items():
@@ -112,17 +122,17 @@ class Platform:
     @property
     def planar(self) -> bool:
         """Whether the platform stays in the plane across its axis."""
-        return self.motion in ("2T", "2T1R")
+        return self.plane_normal is not None
 
     @property
     def turns(self) -> bool:
-        """Whether it turns about its axis, and no other."""
-        return self.motion in ("3T1R", "2T1R")
+        """Whether phi turns it about its axis, or slides its halves."""
+        return self.axis_angle is not None
 
     @property
     def keeps_points_in_planes(self) -> bool:
         """Whether planes, in which its legs keep its points, fix its dependent coordinates."""
-        return self.motion == "1T2R"
+        return self.kind.keeps_points_in_planes
 
     @property
     def tilts(self) -> bool:
@@ -284,8 +294,7 @@ class Platform:
     @property
     def rotation_axes(self) -> tuple[Vector, ...]:
         """Unit vectors that span the axes about which it turns against its legs."""
-        if self.motion == "2R":
-            assert self.second_axis is not None
+        if self.second_axis is not None:
             return self.axis, self.second_axis
         if self.tilts:
             return self.frame
@@ -298,6 +307,12 @@ class Platform:
         frame_axes = {"x": x, "y": y, "z": k}
         unit_vectors = np.array([frame_axes[name] for name in self.lengths]).reshape(-1, 3)
         return np.eye(3) if len(unit_vectors) == 3 else unit_vectors
+
+    @property
+    def axes_by_angle(self) -> dict[str, NDArray[np.float64]]:
+        """The unit vector (3,) that each angle turns it about, or along, at angles zero."""
+        axes = _numeric_equations(self).axes_by_angle()
+        return {name: np.array(ca.DM(axis)).ravel() for name, axis in axes.items()}
 
     def placement(
         self, poses: NDArray[np.float64]
@@ -358,7 +373,7 @@ class Platform:
 
         Names that end in "axis" denote unit vectors.
         """
-        if self.motion == "1T2R":
+        if self.keeps_points_in_planes:
             return {"side": (self._side,)}
         if self.center is None:
             return {}
@@ -376,9 +391,11 @@ class Platform:
 
         The legs determine those of a planar platform.
         """
-        if self.turns and not self.planar and not self.slides:
-            return ("axis",)
-        return {"3R": ("center",), "2R": ("center", "axis", "second_axis")}.get(self.motion, ())
+        if self.second_axis is not None:
+            return ("center", "axis", "second_axis")
+        if self.center is not None:
+            return ("center",)
+        return ("axis",) if self.turns and not self.slides and not self.planar else ()
 
     def expressions(self) -> dict[str, Any]:
         """Return its `quantities`, and the planes that hold its points, as expressions."""
@@ -470,12 +487,15 @@ def _tool_function(platform: Platform) -> ca.Function:
 
 def _rest_motion(platform: Platform, pose: ca.SX) -> PlatformMotion:
     """Return the motion of a platform at rest; its points are those kept in planes."""
+    zero_rates = ca.SX.zeros(len(platform.coordinates))
+    return _numeric_equations(platform).motion(pose, zero_rates, zero_rates)
+
+
+def _numeric_equations(platform: Platform) -> PlatformEquations:
+    """Return the equations of a platform with its numbers, and as points those kept in planes."""
     points = [_column(plane.platform_point) for plane in platform.planes]
     frame = [_column(axis) for axis in platform.frame]
-    zero_offsets, zero_rates = [ca.SX(3, 1)] * len(points), ca.SX.zeros(len(platform.coordinates))
-    return platform.kind(frame, points, zero_offsets, platform.expressions()).motion(
-        pose, zero_rates, zero_rates
-    )
+    return platform.kind(frame, points, [ca.SX(3, 1)] * len(points), platform.expressions())
 
 
 def _column(vector: Sequence[float]) -> ca.SX:

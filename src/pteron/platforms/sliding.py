@@ -27,6 +27,7 @@ class Sliding(PlatformEquations):
     of m v^2 of what slides and of the inertia of what turns, kg m^2: both per radian.
     """
 
+    motion_name = "3T1R"
     coordinates = ("x", "y", "z", "phi")
     slides, point_unit = True, "m/rad"
     axis_angle = spin_angle = "phi"

@@ -92,11 +92,10 @@ class Tilting(PlatformEquations):
         self.arms = [ca.mtimes(self.zero, s) for s in self.points]
         """R s0 at angles zero."""
 
-    def turn_axes(self) -> list[Expression]:
-        """Return the rotation axes at angles zero, in the order of `order`."""
+    def axes_by_angle(self) -> dict[str, Expression]:
+        """Return the axis (3, 1) that each angle turns it about at angles zero."""
         x, y, k = self.frame
-        known = {"roll": x, "rx": x, "pitch": y, "ry": y, "yaw": k, "rz": k}
-        return [known[name] for name in self.order]
+        return {"roll": x, "rx": x, "pitch": y, "ry": y, "yaw": k, "rz": k}
 
     def pose_rotation(
         self, pose: Expression, velocity: Expression, acceleration: Expression, sign: int = 1
@@ -106,8 +105,9 @@ class Tilting(PlatformEquations):
         With sign -1 it is the inverse rotation, by -angles in reverse order.
         """
         places = [self.coordinates.index(name) for name in self.order][::sign]
+        axes = self.axes_by_angle()
         turned = rotation(
-            self.turn_axes()[::sign],
+            [axes[name] for name in self.order][::sign],
             [(ca.cos(pose[i]), sign * ca.sin(pose[i])) for i in places],
             [sign * velocity[i] for i in places],
             [sign * acceleration[i] for i in places],
@@ -237,6 +237,7 @@ class Tilting(PlatformEquations):
 class RollPitchYaw(Tilting):
     """3T3R: R = Rz(yaw) Ry(pitch) Rx(roll)."""
 
+    motion_name = "3T3R"
     coordinates, spin_angle = ("x", "y", "z", "roll", "pitch", "yaw"), "yaw"
     freedom_text = "translates and turns in space any way (3T3R)"
     order = ("yaw", "pitch", "roll")
@@ -246,6 +247,7 @@ class RollPitchYaw(Tilting):
 class TurnsXYZ(Tilting):
     """3T3R: R = Rx(rx) Ry(ry) Rz(rz)."""
 
+    motion_name = "3T3R"
     coordinates, spin_angle = ("x", "y", "z", "rx", "ry", "rz"), "rz"
     freedom_text = "translates and turns in space any way (3T3R)"
     order = ("rx", "ry", "rz")
@@ -254,7 +256,8 @@ class TurnsXYZ(Tilting):
 class _Centred(Tilting):
     """A platform whose point P stays at `center`, on a joint there."""
 
-    on_legs_alone = False
+    motion_name = "3R"
+    on_legs_alone, has_center = False, True
     freedom_text = "turns any way about a centre that stays (3R)"
 
     def motion(
@@ -288,13 +291,15 @@ class CentredXYZ(_Centred):
 class Universal(_Centred):
     """2R: R = Rot(axis, alpha) Rot(second_axis, beta) about a universal joint."""
 
+    motion_name = "2R"
+    has_second_axis = True
     coordinates = ("alpha", "beta")
     freedom_text = "turns about two axes through a centre that stays (2R)"
     order = ("alpha", "beta")
 
-    def turn_axes(self) -> list[Expression]:
-        """Return the axes of alpha and beta, in order."""
-        return [self.quantities["first_axis"], self.quantities["second_axis"]]
+    def axes_by_angle(self) -> dict[str, Expression]:
+        """Return the axes (3, 1) of alpha and beta."""
+        return {"alpha": self.quantities["first_axis"], "beta": self.quantities["second_axis"]}
 
     def basis(self, turned: Rotation) -> tuple[Expression, Expression | None]:
         """Return the twists (6, 2) of unit rates of the angles; they are quasi-velocities."""

@@ -20,6 +20,7 @@ from pteron.platforms.motion import PlatformEquations, PlatformMotion
 class Translating(PlatformEquations):
     """c = p + s: a leg's point is P's place and a constant vector."""
 
+    motion_name = "3T"
     coordinates: ClassVar[tuple[str, ...]] = ("x", "y", "z")
     freedom_text = "translates in space and does not turn (3T)"
 
@@ -51,5 +52,6 @@ class Translating(PlatformEquations):
 class PlanarTranslating(Translating):
     """2T: c = p + s in the plane perpendicular to k."""
 
+    motion_name = "2T"
     coordinates = ("x", "y")
     freedom_text = "moves in a plane and does not turn (2T)"

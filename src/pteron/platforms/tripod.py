@@ -25,6 +25,8 @@ class Tripod(Tilting):
     planes do no work.
     """
 
+    motion_name = "1T2R"
+    keeps_points_in_planes = True
     coordinates = ("z", "roll", "pitch")
     freedom_text = "moves along its axis and tilts to every side (1T2R), a tripod's"
     order = ("yaw", "pitch", "roll")

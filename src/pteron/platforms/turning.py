@@ -25,6 +25,7 @@ class Turning(PlatformEquations):
     frame at phi = 0, whose columns are `frame`.
     """
 
+    motion_name = "3T1R"
     coordinates: ClassVar[tuple[str, ...]] = ("x", "y", "z", "phi")
     axis_angle = spin_angle = "phi"
     freedom_text = "translates in space and turns about one axis (3T1R, Schoenflies motion)"
@@ -80,6 +81,7 @@ class Turning(PlatformEquations):
 class PlanarTurning(Turning):
     """2T1R: c = p + R(phi) s0 + t0 in the plane perpendicular to k."""
 
+    motion_name = "2T1R"
     coordinates = ("x", "y", "phi")
     freedom_text = "moves and turns in a plane (2T1R)"
 

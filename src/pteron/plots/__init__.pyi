@@ -4,7 +4,6 @@ from pteron.plots.calibration import (
     row_residuals_figure as row_residuals_figure,
     tool_errors_figure as tool_errors_figure,
 )
-from pteron.plots.canvas import LEG_COLORS as LEG_COLORS
 from pteron.plots.certainty import (
     autocorrelation_figure as autocorrelation_figure,
     certainty_figure as certainty_figure,
@@ -29,6 +28,9 @@ from pteron.plots.index_maps import map_figure as map_figure
 from pteron.plots.jacobian_maps import (
     condition_figure as condition_figure,
     singularities_figure as singularities_figure,
+)
+from pteron.plots.leg_curves import (
+    LEG_COLORS as LEG_COLORS,
 )
 from pteron.plots.machine_drawing import grid_step as grid_step
 from pteron.plots.machine_figures import (

@@ -11,16 +11,8 @@ from matplotlib.figure import Figure, SubFigure
 from numpy.typing import ArrayLike
 
 from pteron.errors import DataError
-from pteron.plots.canvas import (
-    INK,
-    MUTED,
-    blank,
-    leg_curves,
-    legend,
-    plain_axes,
-    real_figure,
-    stack,
-)
+from pteron.plots.canvas import INK, MUTED, blank, legend, plain_axes, real_figure, stack
+from pteron.plots.leg_curves import leg_curves
 
 
 def bode_figure(
@@ -47,8 +39,8 @@ def bode_figure(
     axes = stack(figure, "frequency (rad/s)", ["gain", "phase (degrees)"])
     curves = list(range(responses.shape[1]))
     labels = list(names or (f"drive {i + 1}" for i in curves))
-    for plot, values, line in zip(axes, (np.abs(responses), phase), (1.0, -180.0), strict=True):
-        leg_curves(plot, omega, values, curves, 1.6, labels if plot is axes[0] else ())
+    for plot, curve, line in zip(axes, (np.abs(responses), phase), (1.0, -180.0), strict=True):
+        leg_curves(plot, omega, curve, curves, 1.6, labels if plot is axes[0] else ())
         plot.axhline(line, color=MUTED, linewidth=0.8, linestyle=(0, (4, 3)))
         plot.set_xscale("log")
     axes[0].set_yscale("log")
@@ -56,11 +48,7 @@ def bode_figure(
     return real_figure(figure)
 
 
-def poles_figure(
-    poles: Any,
-    *,
-    ax: Axes | SubFigure | None = None,
-) -> Figure:
+def poles_figure(poles: Any, *, ax: Axes | SubFigure | None = None) -> Figure:
     """Return a picture of a sampled loop's poles, complex, with the unit circle."""
     try:
         roots = np.asarray(poles, dtype=complex).ravel()

@@ -17,18 +17,8 @@ from pteron.kinematics.evaluate import finite_rows
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion import JointPoints, joint_guides, joint_points
 from pteron.motion.enlarged_points import enlarged_guides, enlarged_points, greatest_difference
-from pteron.plots.canvas import (
-    INK,
-    LEG_COLORS,
-    MUTED,
-    PAPER,
-    WARNING,
-    blank,
-    nice_step,
-    real_figure,
-    stack,
-    zero_line,
-)
+from pteron.plots.canvas import INK, MUTED, PAPER, WARNING, blank, real_figure, stack, zero_line
+from pteron.plots.leg_curves import LEG_COLORS
 from pteron.plots.machine_axes import MachineAxes
 from pteron.plots.machine_drawing import (
     Scene,
@@ -39,6 +29,7 @@ from pteron.plots.machine_drawing import (
     scene_of,
 )
 from pteron.plots.machine_figures import gravity_of, machine_figure
+from pteron.plots.ticks import nice_step
 from pteron.shapes import PoseLike
 from pteron.workspace import home_pose
 
@@ -57,7 +48,7 @@ def differences_figure(
     enlarge: float | None = None,
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return a machine in colours over another in grey, with their difference enlarged.
+    """Return a figure of a machine in colours over another in grey, their difference enlarged.
 
     Both bring the platform to the same pose.
 
@@ -121,7 +112,7 @@ def tool_errors_figure(
     enlarge: float | None = None,
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return the machine in its home pose with the tool's errors as lines, enlarged.
+    """Return a figure of the machine in its home pose, the tool's errors drawn as enlarged lines.
 
     Parameters
     ----------
@@ -164,7 +155,7 @@ def row_residuals_figure(
     *,
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return the residuals of measurements by row, with a panel for each kind.
+    """Return a figure of the residuals of measurements by row, with a panel for each kind.
 
     Parameters
     ----------
@@ -213,7 +204,7 @@ def enlargement(difference: float, size: float) -> float:
 
 
 def expect_alike(robot: Manipulator, other: Manipulator) -> None:
-    """Refuse two machines that differ in more than numbers."""
+    """Raise DataError if two machines differ in more than numbers."""
     if [leg.type for leg in robot.legs] != [leg.type for leg in other.legs] or (
         robot.coordinates != other.coordinates
     ):

@@ -1,7 +1,4 @@
-"""Empty figures and axes in the style of all pictures, with their colours, scales and legends.
-
-The legs' first four colours are Okabe and Ito's, which the colour-blind can tell apart.
-"""
+"""Empty figures and axes in the style of all pictures, with their colours and legends."""
 
 from __future__ import annotations
 
@@ -15,36 +12,16 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
-from matplotlib.ticker import (
-    AutoLocator,
-    FixedLocator,
-    FuncFormatter,
-    MaxNLocator,
-    NullLocator,
-    ScalarFormatter,
-)
 from numpy.typing import NDArray
 
 from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.platforms.coordinates import SHOWN, coordinate
 from pteron.plots.fonts import silence_glyph_warnings, take_fonts, warn_of_absent
-from pteron.short_numbers import power_of_ten
+from pteron.plots.ticks import TickLabels, TickLocator
 
 Kind = TypeVar("Kind", bound=Hashable)
 
-LEG_COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#8a6500", "#6a3fa0")
-"""Colours of legs 1 to 6."""
-
-_LEG_STYLES = (
-    "-",
-    (0, (6, 1.5)),
-    (0, (2, 1.2)),
-    (0, (6, 1.5, 1.5, 1.5)),
-    (0, (3, 1.2, 1, 1.2)),
-    (0, (1, 1)),
-)
-"""Line styles of legs 1 to 6, in every picture: colour alone does not survive every printer."""
 
 INK = "#1c2630"
 """Text and main lines."""
@@ -76,11 +53,6 @@ NO_METADATA = dict.fromkeys(("Creator", "Date", "Format", "Type"))
 TEXT: Any = {"svg.fonttype": "none", "svg.hashsalt": "pteron", "pdf.fonttype": 42}
 """Settings with which text stays text, and files are the same in each run."""
 
-_SAME = 0.004
-"""Greatest distance of curves that coincide, over the range of all: less than a line is thick."""
-
-_DASH = 4.0
-"""Length of the dashes of curves that coincide, in widths of the line."""
 
 _NOTEBOOK_DPI = 144
 """Dots an inch of a picture in a notebook, which shows it at 96."""
@@ -236,80 +208,11 @@ def plain_axes(figure: Figure, xlabel: str, ylabel: str, place: Any = None) -> A
         spine.set_visible(side in ("left", "bottom"))
         spine.set(color=MUTED, linewidth=0.7)
     for scale in (axes.xaxis, axes.yaxis):
-        scale.set_major_locator(_Ticks())
-        scale.set_major_formatter(_Numbers())
+        scale.set_major_locator(TickLocator())
+        scale.set_major_formatter(TickLabels())
     axes.grid(color=GRID, linewidth=0.6)
     axes.set_axisbelow(True)
     return axes
-
-
-class _Ticks(AutoLocator):
-    """Ticks of a scale that does not magnify the rounding of constant values."""
-
-    def nonsingular(self, v0: float, v1: float) -> tuple[float, float]:
-        """Return limits whose difference is not negligible beside their size."""
-        size = max(abs(v0), abs(v1))
-        room = 0.05 * size if abs(v1 - v0) < 1e-6 * size else 0.0
-        low, high = super().nonsingular(min(v0, v1) - room, max(v0, v1) + room)
-        return float(low), float(high)
-
-
-class _Numbers(ScalarFormatter):
-    """Short tick labels: their common power of ten stands in the scale's label."""
-
-    def __init__(self) -> None:
-        super().__init__(useOffset=False)
-        self.set_powerlimits((-3, 5))
-        self._plain = self._written = ""
-
-    def set_locs(self, locs: Any) -> None:
-        """Set the ticks, and write their power of ten into the label."""
-        super().set_locs(locs)
-        axis: Any = self.axis
-        label = axis.label
-        if label.get_text() != self._written:
-            self._plain = label.get_text()
-        power = super().get_offset().replace("\u2212", "-").partition("e")[2]
-        self._written = _label_with_power(self._plain, int(power or 0))
-        label.set_text(self._written)
-
-    def get_offset(self) -> str:
-        """Return an empty text: the label has the power of ten."""
-        return ""
-
-
-def _label_with_power(label: str, power: int) -> str:
-    """Return a label whose unit has a power of ten, if there is one."""
-    if not power:
-        return label
-    name, bracket, unit = label.rpartition("(")
-    ten = power_of_ten(power)
-    return f"{name}({ten} {unit}" if bracket else f"{label} ({ten})".lstrip()
-
-
-def log_scale(axes: Axes, low: float, high: float) -> None:
-    """Make the scale along x logarithmic, with up to seven labelled ticks."""
-    axes.set_xscale("log")
-    axes.set_xlim(low, high)
-    first, last = np.ceil(np.log10(low) - 1e-9), np.floor(np.log10(high) + 1e-9)
-    powers = np.arange(first, last + 1, max(np.ceil((last - first + 1) / 7), 1.0))
-    ticks = 10.0**powers
-    if len(ticks) < 3:
-        fine = np.outer(10.0 ** np.arange(first - 1, last + 1), (1.0, 2.0, 5.0)).ravel()
-        ticks = fine[(fine >= low) & (fine <= high)]
-    if len(ticks) < 2:  # one number tells no scale
-        fine = np.array(MaxNLocator(5, steps=[1, 2, 5, 10]).tick_values(low, high))
-        ticks = fine[(fine >= low) & (fine <= high)]
-    axes.xaxis.set_major_locator(FixedLocator(ticks.tolist()))
-    axes.xaxis.set_minor_locator(NullLocator())
-    far = len(ticks) and (ticks[0] < 1e-3 or ticks[-1] > 1e4)
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: _decade(value, bool(far))))
-
-
-def _decade(value: float, as_power: bool) -> str:
-    """Return a tick label: a power of ten where that is exact and `as_power`, else digits."""
-    power = round(float(np.log10(value)))
-    return power_of_ten(power) if as_power and np.isclose(value, 10.0**power) else f"{value:g}"
 
 
 def stack(
@@ -338,12 +241,6 @@ def panels(
     return axes_rows
 
 
-def leg_style(i: int, width: float) -> dict[str, Any]:
-    """Return the colour and style of a leg's line, with its width in points."""
-    k = i % len(LEG_COLORS)
-    return {"color": LEG_COLORS[k], "linestyle": _LEG_STYLES[k], "linewidth": width}
-
-
 def legend(figure: Figure, columns: int) -> None:
     """Put a legend without a frame above the axes."""
     figure.legend(
@@ -370,81 +267,35 @@ def axis_label(name: str) -> str:
     return f"{symbol_and_unit.symbol} ({shown_unit(symbol_and_unit.unit)[1]})"
 
 
-def leg_curves(
-    axes: Axes,
-    time: Array,
-    values: Array,
-    columns: Iterable[int],
-    width: float,
-    names: Sequence[str] = (),
-    noun: str = "",
-) -> None:
-    """Draw columns of values (T, n) over time (T,), each in its leg's style.
-
-    A curve's label is its noun and name. Curves that coincide are dashes of one line in turn; the
-    last one's label says so.
-    """
-    chosen = list(columns)
-    shown = values[:, chosen]
-    near = _SAME * float(np.ptp(shown[np.isfinite(shown)])) if np.isfinite(shown).any() else 0.0
-    for i in chosen:
-        differences = np.abs(shown - values[:, [i]])
-        known = np.atleast_1d(np.isfinite(differences).any(axis=0))
-        alike = [
-            j
-            for j, off, seen in zip(chosen, differences.T, known, strict=True)
-            if seen and not (off > near).any()
-        ]
-        style, label = leg_style(i, width), f"{noun} {names[i]}".lstrip() if names else None
-        if len(alike) > 1:
-            turn, gap = alike.index(i), len(alike) - 1
-            style |= {"linestyle": (-_DASH * turn, (_DASH, _DASH * gap)), "dash_capstyle": "butt"}
-            if label and i == alike[-1]:
-                label += f" (on {', '.join(names[j] for j in alike[:-1])})"
-        axes.plot(time, values[:, i], label=label, **style)
-    fit_time_scale(axes, time)
-
-
-def fit_time_scale(axes: Axes, time: Array) -> None:
-    """Set the scale along x to the range of times (T,); for a single time, a second about it."""
-    first, last = float(time[0]), float(time[-1])
-    room = 0.0 if last > first else 0.5
-    axes.set_xlim(first - room, last + room)
-
-
-def leg_numbers(count: int) -> list[str]:
-    """Return the names of legs in a legend, behind the noun "leg"."""
-    return [str(i) for i in range(1, count + 1)]
-
-
 def zero_line(axes: Axes) -> None:
     """Draw a thin line at zero."""
     axes.axhline(0.0, color=MUTED, linewidth=0.8)
 
 
 def groups_of(kinds: Sequence[Kind]) -> dict[Kind, list[int]]:
-    """Return the columns of each kind, such as a unit, by kind.
+    """Return the indices of equal elements, such as units, by element.
 
     Examples
     --------
     >>> groups_of(["m", "m", "rad"])
     {'m': [0, 1], 'rad': [2]}
     """
-    return {
-        kind: [i for i, column_kind in enumerate(kinds) if column_kind == kind] for kind in kinds
-    }
-
-
-def nice_step(least: float) -> float:
-    """Return the least of 1, 2 and 5 times a power of ten that is no smaller than a step."""
-    power = 10.0 ** np.floor(np.log10(least))
-    return float(power * min(factor for factor in (1.0, 2.0, 5.0, 10.0) if factor * power >= least))
+    return {kind: [i for i, k in enumerate(kinds) if k == kind] for kind in kinds}
 
 
 def spot(axes: Axes, x: float, y: float, face: str, edge: str, size: float, **options: Any) -> None:
-    """Draw a round mark."""
+    """Draw a round mark on axes, filled and outlined in colours."""
     style = {"marker": "o", "linestyle": "none", "markersize": size, **options}
     axes.plot([x], [y], markerfacecolor=face, markeredgecolor=edge, **style)
+
+
+def labelled_contours(
+    axes: Axes, x: Array, y: Array, measure: np.ma.MaskedArray[Any, Any], levels: Iterable[float]
+) -> None:
+    """Draw those of the levels that a measure (B, A) over x (A,) and y (B,) takes, with labels."""
+    if named := [level for level in levels if measure.min() < level < measure.max()]:
+        lines = axes.contour(x, y, measure, levels=named, colors=[INK], linewidths=0.7)
+        axes.clabel(lines, fmt="%.4g", fontsize=FONT_SIZE - 1.0, colors=[INK])
 
 
 def remark(axes: Axes, text: str, x: float, y: float, color: str, rise: float = 0.0) -> None:

@@ -20,21 +20,20 @@ from pteron.plots.canvas import (
     FONT_SIZE,
     GRID,
     INK,
-    LEG_COLORS,
     MUTED,
     PAPER,
     REACH,
     WARNING,
     blank,
-    leg_style,
     legend,
-    log_scale,
     plain_axes,
     real_figure,
     spot,
     zero_line,
 )
+from pteron.plots.leg_curves import LEG_COLORS, leg_style
 from pteron.plots.row_figures import row_axes
+from pteron.plots.ticks import log_scale
 
 _CERTAIN = 1.96
 """Standard deviations from zero beyond which a value is not zero, at 95 %."""
@@ -49,12 +48,8 @@ _REACH = 4.5
 """Width of a histogram to each side, in standard deviations."""
 
 
-def histogram_figure(
-    residuals: Array,
-    *,
-    ax: Axes | SubFigure | None = None,
-) -> Figure:
-    """Return a histogram of residuals in standard deviations, with the normal distribution.
+def histogram_figure(residuals: Array, *, ax: Axes | SubFigure | None = None) -> Figure:
+    """Return a figure of the histogram of residuals, in standard deviations, and the normal one.
 
     Residuals have shape (R, n), NaN where there is none.
     """
@@ -81,12 +76,9 @@ def histogram_figure(
 
 
 def autocorrelation_figure(
-    correlations: Array,
-    bound: Array,
-    *,
-    ax: Axes | SubFigure | None = None,
+    correlations: Array, bound: Array, *, ax: Axes | SubFigure | None = None
 ) -> Figure:
-    """Return the autocorrelation of residuals, with the band of white noise.
+    """Return a figure of the autocorrelation of residuals, with the band of white noise.
 
     Correlations (L, n) are those at lags 1 to L; white noise keeps below the bound (n,) nineteen
     times in twenty.
@@ -117,7 +109,7 @@ def certainty_figure(
     *,
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return the ratio of each value to its standard deviation, on a logarithmic scale.
+    """Return a figure of the ratio of each value to its standard deviation, on a logarithmic scale.
 
     The p values have names, ratios (p,) of size to standard deviation, and are `weak` (p,) where
     the data hardly show them. The first `inertial` of them are inertial parameters.
@@ -143,12 +135,9 @@ def certainty_figure(
 
 
 def correlation_figure(
-    names: Sequence[str],
-    correlation: Array,
-    *,
-    ax: Axes | SubFigure | None = None,
+    names: Sequence[str], correlation: Array, *, ax: Axes | SubFigure | None = None
 ) -> Figure:
-    """Return a correlation matrix (p, p): blue is positive, orange negative."""
+    """Return a figure of a correlation matrix (p, p): blue is positive, orange negative."""
     p = len(names)
     side = max(1.0 + 0.165 * p, 3.0)
     figure = blank(side, side, ax)

@@ -17,18 +17,17 @@ from pteron.plots.canvas import (
     FONT_SIZE,
     GRID,
     INK,
-    LEG_COLORS,
     MUTED,
     PAPER,
     blank,
-    fit_time_scale,
-    log_scale,
     plain_axes,
     real_figure,
     spot,
     stack,
     zero_line,
 )
+from pteron.plots.leg_curves import LEG_COLORS
+from pteron.plots.ticks import fit_time_scale, log_scale
 
 _COLUMNS = 360
 """Points of the curve over a whole recording, each the envelope of its samples."""
@@ -54,7 +53,7 @@ def comparison_figure(
     joint: ActuatedJoint = SLIDER,
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return an actuator's measured and predicted force over time, and their difference below.
+    """Return a figure of an actuator's measured and predicted force, and their difference below.
 
     Time (T,) is in s, forces (T,) in N or N m, the last one without friction and offset. Samples
     that are not `used` (T,) do not count and are shaded. `leg`, from 0, gives the colour, `joint`
@@ -84,13 +83,9 @@ def comparison_figure(
 
 
 def errors_figure(
-    errors: Array,
-    without_friction: Array,
-    floor: Array,
-    *,
-    ax: Axes | SubFigure | None = None,
+    errors: Array, without_friction: Array, floor: Array, *, ax: Axes | SubFigure | None = None
 ) -> Figure:
-    """Return the errors of a prediction beside the noise, on a logarithmic scale.
+    """Return a figure of the errors of a prediction beside the noise, on a logarithmic scale.
 
     The errors (n,) of the whole model and of that without friction and offset, and the noise, are
     in percent of the force's standard deviation.
@@ -126,7 +121,7 @@ def residual_time_figure(
     *,
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return the residuals of all actuators over a recording, one above the other.
+    """Return a figure of the residuals of all actuators over time, one above the other.
 
     Time (T,) is in s, residuals (T, n) in N or N m, as the joints have them. Samples that are not
     `used` (T, n) do not count: they are grey, and may lie outside.
@@ -141,8 +136,8 @@ def residual_time_figure(
     for i, axes in enumerate(panels):
         zero_line(axes)
         counted = np.where(used[:, i], residuals[:, i], np.nan)
-        for values, color in ((residuals[:, i], MUTED), (counted, LEG_COLORS[i])):
-            low, high = (f.reduceat(values, starts) for f in (np.fmin, np.fmax))
+        for series, color in ((residuals[:, i], MUTED), (counted, LEG_COLORS[i])):
+            low, high = (f.reduceat(series, starts) for f in (np.fmin, np.fmax))
             axes.fill_between(middle, low, high, facecolor=color, edgecolor=color, linewidth=0.6)
         size = float(np.nanmax(np.abs(counted), initial=0.0)) or 1.0
         axes.set_ylim(-1.15 * size, 1.15 * size)
@@ -160,7 +155,7 @@ def residual_speed_figure(
     joint: ActuatedJoint = SLIDER,
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return an actuator's residuals over its joint's speed: unmodelled friction shows here.
+    """Return a figure of an actuator's residuals over joint speed: unmodelled friction shows here.
 
     Speeds (T,) are in m/s or rad/s, residuals (T,) in N or N m. Samples that are not `used` (T,) do
     not count: they are grey, and may lie outside. `leg`, from 0, gives the colour, `joint` the

@@ -16,14 +16,10 @@ from pteron.manipulator import RobotLike, as_manipulator
 from pteron.plots.canvas import (
     FONT_SIZE,
     INK,
-    LEG_COLORS,
     MUTED,
     PAPER,
     blank,
     groups_of,
-    leg_curves,
-    leg_numbers,
-    leg_style,
     legend,
     plain_axes,
     real_figure,
@@ -31,6 +27,7 @@ from pteron.plots.canvas import (
     zero_line,
 )
 from pteron.plots.joint_columns import joints_of, pick_machine_columns, rows
+from pteron.plots.leg_curves import LEG_COLORS, leg_curves, leg_numbers, leg_style
 
 _ROOM = 1.15
 """Half width of the axes over the largest value."""
@@ -58,7 +55,7 @@ def force_speed_figure(
     robot: RobotLike | None = None,
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return each drive's force over its speed, within its limits.
+    """Return a figure of each drive's force over its speed, within its limits.
 
     A drive brakes in the quadrants where force and speed have different signs.
 
@@ -93,8 +90,8 @@ def force_speed_figure(
         zero_line(axes)
         axes.axvline(0.0, color=MUTED, linewidth=0.8)
         sizes = []
-        for values, key in ((speeds, "speed"), (forces, "force")):
-            used = float(np.abs(values[:, legs]).max()) or 1.0
+        for columns, key in ((speeds, "speed"), (forces, "force")):
+            used = float(np.abs(columns[:, legs]).max()) or 1.0
             near = [getattr(abilities[i], key) or 0.0 for i in legs]
             near += [abilities[i].rated or 0.0 for i in legs] if key == "force" else []
             sizes.append(_ROOM * max(used, *(limit for limit in near if limit <= _FAR * used), 0.0))
@@ -134,12 +131,9 @@ def _box(axes: Axes, ability: Ability, sizes: Sequence[float], color: str) -> No
 
 
 def power_figure(
-    time: ArrayLike,
-    power: ArrayLike,
-    *,
-    ax: Axes | SubFigure | None = None,
+    time: ArrayLike, power: ArrayLike, *, ax: Axes | SubFigure | None = None
 ) -> Figure:
-    """Return the power (K, n) of all drives over time (K,), s, and their sum; W."""
+    """Return a figure of the power (K, n) of all drives over time (K,), s, and of their sum; W."""
     time, power = rows(time, power, "power")
     figure = blank(5.4, 3.3, ax)
     axes = plain_axes(figure, "time (s)", "power (W)")

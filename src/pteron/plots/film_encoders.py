@@ -102,7 +102,7 @@ ENCODERS = {
 
 
 def checked_encoder(path: Path) -> None:
-    """Refuse a file whose encoder is not installed."""
+    """Raise if the encoder of a film's file is not installed."""
     if path.suffix.lower() == ".mp4":
         _ffmpeg()
 

@@ -23,12 +23,12 @@ from pteron.plots.canvas import (
     MUTED,
     blank,
     groups_of,
-    leg_curves,
     pixels,
     plain_axes,
     zero_line,
 )
 from pteron.plots.film_encoders import Pixels
+from pteron.plots.leg_curves import leg_curves
 from pteron.plots.machine_axes import MachineAxes
 from pteron.plots.machine_drawing import (
     Scene,

@@ -73,14 +73,14 @@ class Film(Result):
         """Return the film as HTML, for notebooks; the name of its file if that is gone."""
         if not self.path.is_file():
             return f"<code>{escape(str(self.path))}</code>"
-        data = b64encode(self.path.read_bytes()).decode()
+        encoded = b64encode(self.path.read_bytes()).decode()
         width = f'width="{self.size[0]}"'
         if self.path.suffix.lower() == ".gif":
-            return f'<img {width} alt="film" src="data:image/gif;base64,{data}">'
+            return f'<img {width} alt="film" src="data:image/gif;base64,{encoded}">'
         kind = 'type="video/mp4"'
         return (
             f"<video {width} controls loop muted><source {kind} "
-            f'src="data:video/mp4;base64,{data}"></video>'
+            f'src="data:video/mp4;base64,{encoded}"></video>'
         )
 
 
@@ -222,9 +222,9 @@ def _speed_text(speed: float) -> str:
     return "real time" if speed == 1.0 else f"{speed:.3g} \u00d7 real time"
 
 
-def _expect_number(name: str, value: float, low: float, high: float) -> None:
+def _expect_number(name: str, number: float, low: float, high: float) -> None:
     """Raise a `DataError` if a number is outside an interval, whose ends are allowed."""
-    expect(low <= value <= high, name, f"{value:g}", f"a number from {low:g} to {high:g}")
+    expect(low <= number <= high, name, f"{number:g}", f"a number from {low:g} to {high:g}")
 
 
 def _checked_forces(forces: ArrayLike, motion: Motion, robot: Manipulator) -> Array:

@@ -13,8 +13,6 @@ from pteron.plots.canvas import (
     MUTED,
     blank,
     groups_of,
-    leg_curves,
-    leg_numbers,
     legend,
     real_figure,
     remark,
@@ -22,6 +20,7 @@ from pteron.plots.canvas import (
     zero_line,
 )
 from pteron.plots.joint_columns import joints_of, pick_machine_columns, rows
+from pteron.plots.leg_curves import leg_curves, leg_numbers
 
 
 def forces_figure(
@@ -33,7 +32,7 @@ def forces_figure(
     robot: RobotLike | None = None,
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return the forces (T, n) of all legs, N or N m, over time (T,), s.
+    """Return a figure of the forces (T, n) of all legs, N or N m, over time (T,), s.
 
     `turning_point`, s, is marked as the beginning of the way back. With a robot whose legs give
     forces and torques, both have axes of their own. Other quantities of the legs may be shown, with

@@ -14,7 +14,8 @@ from matplotlib.figure import Figure, SubFigure
 from numpy.typing import ArrayLike
 
 from pteron.errors import DataError
-from pteron.plots.canvas import INK, LEG_COLORS, PAPER, blank, legend, plain_axes, real_figure, spot
+from pteron.plots.canvas import INK, PAPER, blank, legend, plain_axes, real_figure, spot
+from pteron.plots.leg_curves import LEG_COLORS
 
 _WIDE, _TALL = 5.4, 3.5
 """Width and height of the figure with one panel, inches."""
@@ -66,31 +67,31 @@ def front_figure(
     >>> [axes.get_ylabel() for axes in figure.axes]
     ['cube (mm)']
     """
-    values = np.asarray(objectives, dtype=float)
-    if values.ndim != 2 or values.shape[1] != len(names) or len(units) != len(names):
+    rows = np.asarray(objectives, dtype=float)
+    if rows.ndim != 2 or rows.shape[1] != len(names) or len(units) != len(names):
         raise DataError(
-            f"objectives: shape {values.shape} given, (K, {len(names)}) expected, with a unit each"
+            f"objectives: shape {rows.shape} given, (K, {len(names)}) expected, with a unit each"
         )
     begun = None if start is None else np.asarray(start, dtype=float)
-    if begun is not None and begun.shape != values.shape[1:]:
+    if begun is not None and begun.shape != rows.shape[1:]:
         raise DataError(f"start: shape {begun.shape} given, ({len(names)},) expected")
     scales = np.array([1000.0 if unit == "m" else 1.0 for unit in units])
     labels = [_label(name, unit) for name, unit in zip(names, units, strict=True)]
-    values = values * scales
+    rows = rows * scales
     begun = None if begun is None else begun * scales
-    if values.shape[1] == 1:
-        values = np.column_stack([values, np.arange(1, len(values) + 1)])
+    if rows.shape[1] == 1:
+        rows = np.column_stack([rows, np.arange(1, len(rows) + 1)])
         labels.append("design of the front")
         begun = None
-    others = values.shape[1] - 1
+    others = rows.shape[1] - 1
     figure = blank(_WIDE, _TALL + _PANEL * (others - 1), ax)
     grid = figure.add_gridspec(others, 1)
     for k in range(1, others + 1):
         axes = plain_axes(figure, labels[k], labels[0], grid[k - 1])
-        order = np.argsort(values[:, k])
+        order = np.argsort(rows[:, k])
         axes.plot(
-            values[order, k],
-            values[order, 0],
+            rows[order, k],
+            rows[order, 0],
             color=LEG_COLORS[0],
             marker="o",
             markersize=4.5,
@@ -101,13 +102,13 @@ def front_figure(
         for mark, (name, at) in zip(cycle(_MARKS), (chosen or {}).items(), strict=False):
             label = name.replace("-", " ") if k == 1 else None
             spot(
-                *(axes, values[at, k], values[at, 0], LEG_COLORS[1], PAPER, 8.0),
+                *(axes, rows[at, k], rows[at, 0], LEG_COLORS[1], PAPER, 8.0),
                 marker=mark,
                 label=label,
                 zorder=5,
             )
         if begun is not None and np.isfinite(begun[[0, k]]).all():
-            label = "to begin with" if k == 1 else None
+            label = "initial machine" if k == 1 else None
             spot(axes, begun[k], begun[0], INK, PAPER, 11.0, marker="*", label=label, zorder=6)
         axes.margins(0.08)
     legend(figure, 3)
@@ -141,9 +142,9 @@ def fronts_figure(
     axes = plain_axes(figure, labels[1], labels[0])
     styles = zip(fronts.items(), cycle(LEG_COLORS), cycle(_MARKS), strict=False)
     for (name, front), color, mark in styles:
-        values = np.array(front)[np.argsort(np.array(front)[:, 1])]
+        rows = np.array(front)[np.argsort(np.array(front)[:, 1])]
         axes.plot(
-            *(values[:, 1], values[:, 0]), color=color, marker=mark, markersize=4.5, linewidth=0.8
+            *(rows[:, 1], rows[:, 0]), color=color, marker=mark, markersize=4.5, linewidth=0.8
         )
         axes.lines[-1].set_label(name)
     axes.margins(0.08)

@@ -22,7 +22,6 @@ from pteron.plots.canvas import (
     FONT_SIZE,
     GRID,
     INK,
-    LEG_COLORS,
     MUTED,
     PAPER,
     axis_label,
@@ -32,6 +31,7 @@ from pteron.plots.canvas import (
     shown_unit,
     spot,
 )
+from pteron.plots.leg_curves import LEG_COLORS
 from pteron.tolerances import EXACT, SAME
 from pteron.workspace import BEYOND_LIMITS, REACHABLE
 
@@ -59,11 +59,7 @@ _BELOW = 4.5
 """Sizes of a letter from the axes to the legend: the scale's numbers and its name stand there."""
 
 
-def map_figure(
-    index_map: Map,
-    *names: str,
-    ax: Axes | SubFigure | None = None,
-) -> Figure:
+def map_figure(index_map: Map, *names: str, ax: Axes | SubFigure | None = None) -> Figure:
     """Return the picture of a map: a panel for each index, in a column.
 
     Over one coordinate it is a curve, over two a plane. Over three it is the three planes through
@@ -185,8 +181,8 @@ def _plane(
     axes.grid(visible=False)
     first, second = (_axis_values(axis) for axis in plane.grid.axes)
     factor = shown_unit(plane.index(name).unit)[0]
-    values = factor * np.ma.masked_invalid(plane.values[name].T)
-    drawn = np.ma.masked_where(plane.status.T != REACHABLE, values)
+    cells = factor * np.ma.masked_invalid(plane.values[name].T)
+    drawn = np.ma.masked_where(plane.status.T != REACHABLE, cells)
     better = plane.index(name).better == "more"
     mesh = axes.pcolormesh(
         first,
@@ -339,9 +335,9 @@ def _unit(index_map: Map, name: str) -> str:
 
 def _title(shown_map: Map) -> str:
     """Return the machine's name and the fixed coordinates."""
-    pairs = ((coordinate(name), value) for name, value in shown_map.grid.fixed_coordinates.items())
+    pairs = ((coordinate(name), fixed) for name, fixed in shown_map.grid.fixed_coordinates.items())
     constants = (
-        f"{c.symbol} = {c.shown_factor * value + 0.0:.4g}{' ' * (c.unit == 'm')}{c.shown_unit}"
-        for c, value in pairs
+        f"{c.symbol} = {c.shown_factor * fixed + 0.0:.4g}{' ' * (c.unit == 'm')}{c.shown_unit}"
+        for c, fixed in pairs
     )
     return "  ".join([shown_map.robot, *constants])

@@ -12,7 +12,6 @@ from pteron.errors import DataError
 from pteron.kernels import Array, as_array
 from pteron.platforms.coordinates import are_angles, coordinate
 from pteron.plots.canvas import (
-    FONT_SIZE,
     GRID,
     INK,
     MUTED,
@@ -20,6 +19,7 @@ from pteron.plots.canvas import (
     WARNING,
     axis_label,
     blank,
+    labelled_contours,
     plain_axes,
     real_figure,
     remark,
@@ -46,7 +46,7 @@ def condition_figure(
     names: tuple[str, str] = ("x", "y"),
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return the map of a condition number over two coordinates: dark is near a singularity.
+    """Return a figure of a condition number over two coordinates: dark is near a singularity.
 
     The levels are named, and are the same in every map, so that machines can be compared.
 
@@ -81,16 +81,13 @@ def condition_figure(
     >>> condition = np.linalg.cond(np.nan_to_num(jacobians))  # infinite where not in reach
     >>> figure = pteron.plots.condition_figure(cut.first, cut.second, condition)
     """
-    figure, axes, x, y, values = _map(first, second, condition, names, ax)
-    drawn = np.ma.masked_invalid(np.clip(values, 1.0, _LEVELS[-1]))
+    figure, axes, x, y, conditions = _map(first, second, condition, names, ax)
+    drawn = np.ma.masked_invalid(np.clip(conditions, 1.0, _LEVELS[-1]))
     for level in _LEVELS[1:-1]:
         if (drawn > level).any():
             axes.contourf(x, y, drawn, levels=[level, np.inf], colors=[REACH], alpha=0.17)
-    named = [level for level in _LEVELS[:_NAMED] if drawn.min() < level < drawn.max()]
-    if named:
-        lines = axes.contour(x, y, drawn, levels=named, colors=[INK], linewidths=0.7)
-        axes.clabel(lines, fmt="%g", fontsize=FONT_SIZE - 1.0, colors=[INK])
-    _rim(axes, x, y, values)
+    labelled_contours(axes, x, y, drawn, _LEVELS[:_NAMED])
+    _rim(axes, x, y, conditions)
     return real_figure(figure)
 
 
@@ -102,7 +99,7 @@ def singularities_figure(
     names: tuple[str, str] = ("x", "y"),
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return the map of a determinant's sign over two coordinates: it changes at singular poses.
+    """Return a figure of a determinant's sign over two coordinates: it changes at singular poses.
 
     Of the Jacobian of q' = J x' these are the type-II singularities, where the actuators, held
     still, no longer hold the platform. Regions of the two signs are shaded, and marked + and -: no
@@ -138,10 +135,10 @@ def singularities_figure(
     >>> determinant = np.linalg.det(pteron.jacobian(robot, poses, on_failure="nan"))
     >>> figure = pteron.plots.singularities_figure(x, phi, determinant, names=("x", "phi"))
     """
-    figure, axes, x, y, values = _map(first, second, determinant, names, ax)
+    figure, axes, x, y, determinants = _map(first, second, determinant, names, ax)
     # Near type I it goes to infinity, which hides nothing of its sign.
-    size = float(np.nanmedian(np.abs(values))) if np.isfinite(values).any() else 1.0
-    drawn = np.ma.masked_invalid(np.arctan(values / (size or 1.0)))
+    size = float(np.nanmedian(np.abs(determinants))) if np.isfinite(determinants).any() else 1.0
+    drawn = np.ma.masked_invalid(np.arctan(determinants / (size or 1.0)))
     for sign, color, alpha in ((1.0, REACH, 0.30), (-1.0, GRID, 0.75)):
         if (sign * drawn > 0.0).any():
             axes.contourf(x, y, sign * drawn, levels=[0.0, 2.0], colors=[color], alpha=alpha)
@@ -149,7 +146,7 @@ def singularities_figure(
             remark(axes, "+" if sign > 0.0 else "\u2212", float(x[column]), float(y[row]), INK)
     if drawn.min() < 0.0 < drawn.max():
         axes.contour(x, y, drawn, levels=[0.0], colors=[WARNING], linewidths=2.0)
-    _rim(axes, x, y, values)
+    _rim(axes, x, y, determinants)
     return real_figure(figure)
 
 
@@ -163,11 +160,11 @@ def _middle(region: NDArray[np.bool_]) -> tuple[int, int]:
 def _map(
     first: ArrayLike,
     second: ArrayLike,
-    values: ArrayLike,
+    measure: ArrayLike,
     names: tuple[str, str],
     ax: Axes | SubFigure | None,
 ) -> tuple[Figure, Axes, Array, Array, Array]:
-    """Return a figure, its axes, both coordinates in mm and degrees, and the values (B, A)."""
+    """Return a figure, its axes, both coordinates in mm and degrees, and a measure (B, A)."""
     scaled, labels = [], []
     for axis_values, name in zip((first, second), names, strict=True):
         numbers = as_array(axis_values, name, ())
@@ -176,7 +173,7 @@ def _map(
         scaled.append(coordinate(name).shown_factor * numbers)
         labels.append(axis_label(name))
     x, y = scaled
-    array = np.asarray(values, dtype=float)
+    array = np.asarray(measure, dtype=float)
     if array.shape != (len(y), len(x)):
         raise DataError(f"values: shape {array.shape} given, ({len(y)}, {len(x)}) expected")
     alike = len(set(are_angles(names).tolist())) == 1
@@ -190,8 +187,8 @@ def _map(
     return figure, axes, x, y, np.where(np.isfinite(array), array, np.nan)
 
 
-def _rim(axes: Axes, x: Array, y: Array, values: Array) -> None:
-    """Draw the boundary of the region with values."""
-    known = np.isfinite(values).astype(float)
+def _rim(axes: Axes, x: Array, y: Array, measure: Array) -> None:
+    """Draw the boundary of the region in which a measure is finite."""
+    known = np.isfinite(measure).astype(float)
     if known.min() < known.max():
         axes.contour(x, y, known, levels=[0.5], colors=[MUTED], linewidths=1.0)

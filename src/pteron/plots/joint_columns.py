@@ -12,20 +12,20 @@ from pteron.legs.kind import SLIDER, ActuatedJoint
 from pteron.manipulator import RobotLike, as_manipulator
 
 
-def joints_of(robot: RobotLike | None, values: ArrayLike) -> list[ActuatedJoint]:
+def joints_of(robot: RobotLike | None, columns: ArrayLike) -> list[ActuatedJoint]:
     """Return each leg's joint; without a machine, a slider for each column of values (..., n)."""
     if robot is not None:
         return [leg.joint for leg in as_manipulator(robot).legs]
-    if np.ndim(values) == 0:
+    if np.ndim(columns) == 0:
         raise DataError("one number given, an array (T, n) expected: a column for each leg")
-    return [SLIDER] * np.shape(values)[-1]
+    return [SLIDER] * np.shape(columns)[-1]
 
 
-def pick_machine_columns(robot: RobotLike | None, values: ArrayLike, what: str) -> ArrayLike:
+def pick_machine_columns(robot: RobotLike | None, table: ArrayLike, what: str) -> ArrayLike:
     """Return the columns of a table that a machine names, such as "forces"; an array unchanged."""
     if robot is None:
-        return values
-    columns: ArrayLike = pick_columns(values, as_manipulator(robot).column_names[what], what)
+        return table
+    columns: ArrayLike = pick_columns(table, as_manipulator(robot).column_names[what], what)
     return columns
 
 

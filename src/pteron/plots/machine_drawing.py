@@ -11,10 +11,12 @@ from matplotlib.figure import Figure
 
 from pteron.kernels import Array
 from pteron.motion import Guide, JointPoints, Part
-from pteron.plots.canvas import INK, LEG_COLORS, MUTED, PAPER, REACH, nice_step
+from pteron.plots.canvas import INK, MUTED, PAPER, REACH
+from pteron.plots.leg_curves import LEG_COLORS
 from pteron.plots.machine_axes import MachineAxes
 from pteron.plots.plane_axes import PlaneAxes
 from pteron.plots.space_axes import SpaceAxes, upright_rotation
+from pteron.plots.ticks import nice_step
 
 _PLATFORM_AXES = ("x\u2032", "y\u2032", "z\u2032")
 """x, y and z with a prime."""

@@ -58,7 +58,7 @@ def draw(
     angle: str = "",
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return the machine in one pose: in space with the vertical upwards, or in its plane.
+    """Return a figure of the machine in a pose: in space, the vertical upwards, or in its plane.
 
     Gravity is drawn as an arrow, for a planar machine only if it lies in its plane. `robot_figure`
     draws the same from given points.
@@ -128,7 +128,7 @@ def robot_figure(
     angle: str = "",
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return the machine in one pose: in space with the vertical upwards, or in its plane.
+    """Return a figure of the machine in a pose: in space, the vertical upwards, or in its plane.
 
     The points are those of one pose, the guides those of `pteron.motion.joint_guides`; the `path`
     (T, 3) of a point in the base frame is in m. Gravity (3,), m/s^2, is drawn as an arrow if it
@@ -174,7 +174,7 @@ def poses_figure(
     along: PoseLike | None = None,
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return a machine in several poses beside each other, from the same viewpoint.
+    """Return a figure of a machine in several poses side by side, from the same viewpoint.
 
     They may be instants of a motion, or assembly modes of one machine; its working modes are robots
     of their own.

@@ -67,17 +67,18 @@ def map_film(
     last, scales = index_map.grid.axes[-1], {name: color_scale(index_map, name)}
     rate = ENCODERS[target.suffix.lower()].rate(fps)
 
-    def drawn(value: float) -> Figure:
+    def drawn(coordinate: float) -> Figure:
         """Return the figure of the map at a value of its last coordinate."""
-        return map_panels([(index_map.slice_at(last.name, value), name)], scales, index_map.causes)
+        layer = index_map.slice_at(last.name, coordinate)
+        return map_panels([(layer, name)], scales, index_map.causes)
 
-    values = last.values.tolist()
-    figure = drawn(values[0])
+    coordinates = last.values.tolist()
+    figure = drawn(coordinates[0])
     size = _make_even(figure)
     figure.draw_without_rendering()
     places = [axes.get_position() for axes in figure.axes]
-    pictures = (_pixels(drawn(value), size, places) for value in values)
-    write_film(target, pictures, len(values), size, rate, progress)
+    pictures = (_pixels(drawn(coordinate), size, places) for coordinate in coordinates)
+    write_film(target, pictures, len(coordinates), size, rate, progress)
     return Film(target, last.count, rate, 1.0, size)
 
 

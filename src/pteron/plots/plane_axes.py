@@ -12,8 +12,9 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 
 from pteron.kernels import Array
-from pteron.plots.canvas import Picture, nice_step, plain_axes
+from pteron.plots.canvas import Picture, plain_axes
 from pteron.plots.machine_axes import MachineAxes
+from pteron.plots.ticks import nice_step
 
 _RIM = 0.06
 """Margin around the drawing, as a share of its size."""
@@ -51,12 +52,12 @@ class PlaneAxes(MachineAxes):
         if box is not None:
             if isinstance(figure, Picture):
                 figure.set_layout_engine("none")
-            left, bottom, width, height = box
+            x_start, bottom, width, height = box
             if not small:
                 wide, tall = figure.get_size_inches()
-                left, width = left + _LEFT / wide, width - (_LEFT + _TOP) / wide
+                x_start, width = x_start + _LEFT / wide, width - (_LEFT + _TOP) / wide
                 bottom, height = bottom + _BELOW / tall, height - (_BELOW + _TOP) / tall
-            axes.set_position((left, bottom, width, height))
+            axes.set_position((x_start, bottom, width, height))
         if small:
             axes.tick_params(length=0.0, labelbottom=False, labelleft=False)
             axes.set(xlabel="", ylabel="")

@@ -22,7 +22,6 @@ from pteron.plots.canvas import (
     FONT_SIZE,
     GRID,
     INK,
-    LEG_COLORS,
     MUTED,
     NO_METADATA,
     PAPER,
@@ -32,6 +31,7 @@ from pteron.plots.canvas import (
     legend,
 )
 from pteron.plots.fonts import silence_glyph_warnings, take_fonts
+from pteron.plots.leg_curves import LEG_COLORS
 
 Width = Literal["column", "page"]
 """Names of usual widths."""

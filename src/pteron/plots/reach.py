@@ -14,18 +14,18 @@ from matplotlib.ticker import MultipleLocator
 from pteron.kernels import Array
 from pteron.platforms.coordinates import coordinate
 from pteron.plots.canvas import (
-    FONT_SIZE,
     INK,
-    LEG_COLORS,
     MUTED,
     PAPER,
     REACH,
     blank,
-    nice_step,
+    labelled_contours,
     plain_axes,
     real_figure,
     spot,
 )
+from pteron.plots.leg_curves import LEG_COLORS
+from pteron.plots.ticks import nice_step
 from pteron.tolerances import ROUNDING
 from pteron.workspace import BEYOND_LIMITS, REACHABLE, ReachSlice
 
@@ -43,12 +43,9 @@ _DASHES = ("-", "-", (0, (3, 2)), (0, (3, 2)), (0, (1, 1)), (0, (1, 1)))
 
 
 def reach_figure(
-    cut: ReachSlice,
-    *,
-    path: Array | None = None,
-    ax: Axes | SubFigure | None = None,
+    cut: ReachSlice, *, path: Array | None = None, ax: Axes | SubFigure | None = None
 ) -> Figure:
-    """Return the map of a slice, with a motion's poses (T, m), or their lengths, on it.
+    """Return a figure of a slice through the reach, with a motion's poses (T, m) on it.
 
     In reach, the shade deepens with the margin. Outside, the colour is that of the leg that misses
     the pose by most; a line in a leg's colour is the end of its reach (type I).
@@ -86,7 +83,7 @@ def measure_figure(
     levels: Sequence[float] = _TENTHS,
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return the map of a measure (B, A) on a slice, where it is in reach.
+    """Return a figure of a measure (B, A) on a slice, where it is in reach.
 
     The shade deepens with the measure from level to level, by default tenths; every second line is
     named.
@@ -101,10 +98,7 @@ def measure_figure(
         for level in levels
         if level < extended.max()
     ]
-    named = [level for level in levels[::2] if inside.min() < level < inside.max()]
-    if named:
-        lines = axes.contour(first, second, inside, levels=named, colors=[INK], linewidths=0.7)
-        axes.clabel(lines, fmt="%.4g", fontsize=FONT_SIZE - 1.0, colors=[INK])
+    labelled_contours(axes, first, second, inside, levels[::2])
     edge = axes.contour(first, second, cut.margin, levels=[0.0], colors=[MUTED], linewidths=1.0)
     # Where the reach ends in a thread thinner than the grid, single cells of it are no picture.
     cell = np.array([np.ptp(first), np.ptp(second)]) / np.subtract(inside.shape, 1)
@@ -152,7 +146,7 @@ def _finish(axes: Axes, cut: ReachSlice, path: Array | None) -> None:
 
 
 def _territories(legs: Array) -> Iterator[tuple[Array, str]]:
-    """Yield fields (B, A), positive where a pose is infeasible, with colours, in painting order.
+    """Yield fields (B, A), positive where poses are infeasible, with their colours, to be painted.
 
     In the end a pose has the colour of the leg that misses it by most: the last leg's is painted
     wherever one does, then the others' over it where none after them does worse. Of legs that miss

@@ -46,7 +46,7 @@ def parameters_figure(
     reference: ArrayLike | None = None,
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return the values of parameters with their intervals, with a scale for each unit.
+    """Return a figure of parameters with their intervals, with a scale for each unit.
 
     Parameters
     ----------
@@ -109,12 +109,9 @@ def parameters_figure(
 
 
 def operations_figure(
-    names: Sequence[str],
-    counts: ArrayLike,
-    *,
-    ax: Axes | SubFigure | None = None,
+    names: Sequence[str], counts: ArrayLike, *, ax: Axes | SubFigure | None = None
 ) -> Figure:
-    """Return bars of counts, such as operations, labelled with their values.
+    """Return a figure of bars of counts, such as operations, labelled with their values.
 
     Parameters
     ----------
@@ -164,8 +161,8 @@ def row_axes(figure: Figure, names: Sequence[str], xlabel: str, place: Any = Non
     return axes
 
 
-def _checked_values(names: Sequence[str], values: ArrayLike, what: str) -> Array:
+def _checked_values(names: Sequence[str], numbers: ArrayLike, what: str) -> Array:
     """Return values of named rows as an array (N,), checked for its shape."""
-    array = np.asarray(values, dtype=float)
+    array = np.asarray(numbers, dtype=float)
     expect(array.shape == (len(names),), what, f"shape {array.shape}", f"({len(names)},)")
     return array

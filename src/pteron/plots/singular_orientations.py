@@ -36,7 +36,7 @@ def regularity_figure(
     used: tuple[float, float] | None = None,
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return the size of the type-II measure over the platform's angle; NaN leaves a gap.
+    """Return a figure of the type-II measure's size over the platform's angle; NaN leaves a gap.
 
     The angles (A,) ascend; the singular orientations, the angle of the home pose, and the least and
     greatest angle of a motion are marked. All are in rad.
@@ -56,9 +56,9 @@ def regularity_figure(
         rise = 3.0 if roomy or i % 2 else 14.0
         remark(axes, text.replace("-", "\u2212"), float(angle), inf, WARNING, rise)
     if home is not None:
-        at, value = float(np.degrees(home)), float(np.interp(home, angles, np.abs(type_ii)))
-        spot(axes, at, value, INK, PAPER, 6.0, zorder=4)
-        remark(axes, "home", at, value, INK, -12.0)
+        at, measure = float(np.degrees(home)), float(np.interp(home, angles, np.abs(type_ii)))
+        spot(axes, at, measure, INK, PAPER, 6.0, zorder=4)
+        remark(axes, "home", at, measure, INK, -12.0)
     axes.set_xlim(float(degrees[0]), float(degrees[-1]))
     axes.set_xticks(np.arange(-180, 181, 60))
     axes.set_ylim(0.0, 1.06)

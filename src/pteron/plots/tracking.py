@@ -11,21 +11,18 @@ from numpy.typing import ArrayLike
 
 from pteron.kernels import Array
 from pteron.platforms.coordinates import coordinate
-from pteron.plots.canvas import blank, groups_of, leg_curves, legend, real_figure, stack, zero_line
+from pteron.plots.canvas import blank, groups_of, legend, real_figure, stack, zero_line
 from pteron.plots.joint_columns import rows
+from pteron.plots.leg_curves import leg_curves
 
 _SCALES = ((1.0, ""), (1e3, "m"), (1e6, "µ"), (1e9, "n"))
 """Factors and prefixes of units."""
 
 
 def tracking_figure(
-    time: ArrayLike,
-    error: ArrayLike,
-    names: Sequence[str],
-    *,
-    ax: Axes | SubFigure | None = None,
+    time: ArrayLike, error: ArrayLike, names: Sequence[str], *, ax: Axes | SubFigure | None = None
 ) -> Figure:
-    """Return the errors (T, m) of the pose over time (T,), s.
+    """Return a figure of the errors (T, m) of the pose over time (T,), s.
 
     `names` are its coordinates; angles, in rad, have axes of their own, lengths are in m.
     """
@@ -42,7 +39,7 @@ def tracking_figure(
     return real_figure(figure)
 
 
-def _scale(values: Array) -> tuple[float, str]:
+def _scale(errors: Array) -> tuple[float, str]:
     """Return the factor and the SI prefix that make the largest value a number above 1."""
-    largest = float(np.abs(values).max(initial=0.0))
+    largest = float(np.abs(errors).max(initial=0.0))
     return next((pair for pair in _SCALES if largest * pair[0] >= 1.0), _SCALES[-1])

@@ -14,17 +14,9 @@ from pteron.errors import DataError
 from pteron.kernels import Array, as_array
 from pteron.manipulator import RobotLike
 from pteron.platforms.coordinates import coordinate
-from pteron.plots.canvas import (
-    blank,
-    groups_of,
-    leg_curves,
-    leg_numbers,
-    legend,
-    panels,
-    real_figure,
-    zero_line,
-)
+from pteron.plots.canvas import blank, groups_of, legend, panels, real_figure, zero_line
 from pteron.plots.joint_columns import joints_of
+from pteron.plots.leg_curves import leg_curves, leg_numbers
 
 _ORDERS = ("", "/s", "/s²", "/s³", "/s⁴")
 """Endings of the units of a quantity and its derivatives."""
@@ -40,12 +32,9 @@ _WIDE, _TALL, _HEAD = 5.4, 1.35, 0.75
 
 
 def trajectory_figure(
-    time: ArrayLike,
-    *courses: ArrayLike,
-    names: Sequence[str],
-    ax: Axes | SubFigure | None = None,
+    time: ArrayLike, *courses: ArrayLike, names: Sequence[str], ax: Axes | SubFigure | None = None
 ) -> Figure:
-    """Return a motion of the platform: pose, velocity, acceleration and jerk over time.
+    """Return a figure of the platform's pose, velocity, acceleration and jerk over time.
 
     Lengths and angles stand beside each other, derivatives below them.
 
@@ -92,7 +81,7 @@ def joints_figure(
     robot: RobotLike | None = None,
     ax: Axes | SubFigure | None = None,
 ) -> Figure:
-    """Return the joints' coordinates over time, above their speeds, accelerations and jerks.
+    """Return a figure of the joints' coordinates over time, with their derivatives below.
 
     Parameters
     ----------
@@ -142,30 +131,30 @@ def _courses_figure(
 ) -> Figure:
     """Return a figure of courses (T, k) over time: a row a derivative, a column a unit."""
     t = as_array(time, "time", ())
-    values = [as_array(course, words[min(k, 4)], ()) for k, course in enumerate(courses)]
-    _expect_fitting(t, values, len(names), words)
+    curves = [as_array(course, words[min(k, 4)], ()) for k, course in enumerate(courses)]
+    _expect_fitting(t, curves, len(names), words)
     labels = [
         [f"{word} ({unit}{order})" for unit in groups]
-        for word, order, _ in zip(words, _ORDERS, values, strict=False)
+        for word, order, _ in zip(words, _ORDERS, curves, strict=False)
     ]
-    figure = blank(_WIDE, _HEAD + _TALL * len(values), ax)
+    figure = blank(_WIDE, _HEAD + _TALL * len(curves), ax)
     axes_rows = panels(figure, "time (s)", labels)
     for column in zip(*axes_rows, strict=True):
         figure.align_ylabels(column)
-    for row, course in zip(axes_rows, values, strict=True):
+    for row, course in zip(axes_rows, curves, strict=True):
         for axes, columns in zip(row, groups.values(), strict=True):
             zero_line(axes)
-            leg_curves(axes, t, course, columns, 1.6, names if course is values[0] else (), noun)
+            leg_curves(axes, t, course, columns, 1.6, names if course is curves[0] else (), noun)
     legend(figure, len(names))
     return real_figure(figure)
 
 
-def _expect_fitting(time: Array, values: list[Array], width: int, words: Sequence[str]) -> None:
+def _expect_fitting(time: Array, curves: list[Array], width: int, words: Sequence[str]) -> None:
     """Raise a `DataError` if times or courses have unfit shapes, or there are too many courses."""
     if time.ndim != 1 or len(time) < 2:
         raise DataError(f"time: shape {time.shape} given, (T,) expected, T above 1")
-    if not 1 <= len(values) <= len(_ORDERS):
-        raise DataError(f"{len(values)} courses given, 1 to {len(_ORDERS)} expected")
-    for word, course in zip(words, values, strict=False):
+    if not 1 <= len(curves) <= len(_ORDERS):
+        raise DataError(f"{len(curves)} courses given, 1 to {len(_ORDERS)} expected")
+    for word, course in zip(words, curves, strict=False):
         if course.shape != (len(time), width):
             raise DataError(f"{word}: shape {course.shape} given, ({len(time)}, {width}) expected")

@@ -177,15 +177,14 @@ class ExactCertificate(Certificate):
             else ""
         )
         lines = [
-            f"Exact rank {self.rank} of {self.columns} columns.",
-            f"At least {self.rank}: a minor of that size of the regressor at {self.states} states "
-            f"is not zero modulo {' nor modulo '.join(map(str, self.primes))}.",
-            f"At most {self.rank}: {self.null_vectors} null vectors annihilate the regressor "
-            f"exactly at {checked}{self.modular_configurations} independent configurations modulo "
-            "a fresh prime; a false one would pass with probability below "
-            f"{self.false_acceptance:.0e}.",
-            f"{self.transfers} of the null vectors are mass transfers between bodies that share a "
-            f"point. Coefficients: {self.coefficients}.",
+            f"Exact rank {self.rank} of {self.columns} columns of the regressor, proved:",
+            f"at least {self.rank}: a minor of that size at {self.states} states is not zero "
+            f"modulo {len(self.primes)} primes of {max(self.primes).bit_length()} bits;",
+            f"at most {self.rank}: {self.null_vectors} null vectors annihilate the regressor "
+            f"exactly at {checked}{self.modular_configurations} configurations modulo another "
+            f"prime; a false one would pass with probability below {self.false_acceptance:.0e}.",
+            f"{self.transfers} of the null vectors are transfers of mass between bodies that share "
+            f"a point. Coefficients: {self.coefficients}.",
         ]
         if self.unexplained:
             lines.append(
@@ -195,16 +194,16 @@ class ExactCertificate(Certificate):
         lines += _sentence_of_list("Taken as exact", self.recognised)
         lines += _sentence_of_list("Approximated", self.approximated)
         if self.numerical is not None:
-            comparison = f"that of the machine itself is {self.numerical}"
+            comparison = f"the rank of the machine is {self.numerical}"
             if self.numerical.rank != self.rank:
                 lines.append(
-                    "The rank is that of the machine in these exact numbers, but IN FLOATING POINT "
-                    f"{comparison}: a special relation may be lost."
+                    "The exact rank is that of the machine in these exact numbers, but IN FLOATING "
+                    f"POINT {comparison}: a special relation may be lost."
                 )
             elif not self.numerical.clear:
                 lines.append(
                     f"In floating point {comparison}: WHAT WAS DROPPED IS MORE THAN ROUNDING "
-                    f"({ROUNDING:.0e}), so that floats do not confirm the rank."
+                    f"({ROUNDING:.0e}), so that floating point does not confirm the rank."
                 )
             else:
                 lines.append(f"In floating point {comparison}: the same.")

@@ -92,9 +92,7 @@ def _cheapest_columns(robot: Manipulator) -> tuple[int, ...]:
         candidates.add(
             start if many else _improve_by_exchange(model, grouping, start, [*leg_columns, *others])
         )
-    return min(
-        candidates, key=lambda base_columns: (_final_cost(robot, base_columns), base_columns)
-    )
+    return min(candidates, key=lambda columns: (_final_cost(robot, columns), columns))
 
 
 def _unitless_grouping(robot: Manipulator, base: BaseParameters) -> Array:
@@ -138,9 +136,9 @@ class _Model:
         """Return the operations for a state, before the optimisation pass, which is slow."""
         if base_columns not in self.known:
             base = ca.SX.sym("base", len(base_columns))
-            values = ca.SX(len(self.machine.parameters), 1)
-            values[list(base_columns)] = base
-            known = self.machine, self.state, values
+            base_values = ca.SX(len(self.machine.parameters), 1)
+            base_values[list(base_columns)] = base
+            known = self.machine, self.state, base_values
             self.known[base_columns] = min(
                 self._operations(base, inverse_dynamics(*known, carried=carried))
                 for carried in (True, False)

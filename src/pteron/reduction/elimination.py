@@ -37,7 +37,7 @@ def dependencies(
             continue
         work[top], work[pivot] = work[pivot], work[top]
         inverse = pow(work[top][place], -1, prime)
-        lead = work[top] = [value * inverse % prime for value in work[top]]
+        lead = work[top] = [number * inverse % prime for number in work[top]]
         for i, row in enumerate(work):
             factor = row[place]
             if i != top and factor:
@@ -51,22 +51,22 @@ def dependencies(
     return independent, relations
 
 
-def remainder(values: Sequence[int], primes: Sequence[int]) -> tuple[int, int]:
+def remainder(residues: Sequence[int], primes: Sequence[int]) -> tuple[int, int]:
     """Return the number modulo the product of the primes (Chinese remainders), and that product."""
     total, modulus = 0, 1
-    for value, prime in zip(values, primes, strict=True):
-        step = (value - total) * pow(modulus, -1, prime) % prime
+    for residue, prime in zip(residues, primes, strict=True):
+        step = (residue - total) * pow(modulus, -1, prime) % prime
         total, modulus = total + modulus * step, modulus * prime
     return total, modulus
 
 
-def reconstruct(value: int, modulus: int) -> Fraction | None:
-    """Return the fraction a / b = value (mod modulus) with a and b below sqrt(modulus / 2), if any.
+def reconstruct(residue: int, modulus: int) -> Fraction | None:
+    """Return the fraction a / b = residue (mod modulus), a and b below sqrt(modulus / 2), or None.
 
     There is at most one. Wang's algorithm: Euclid's, stopped half way.
     """
     bound = isqrt(modulus // 2)
-    a, b = modulus, value % modulus
+    a, b = modulus, residue % modulus
     u, v = 0, 1
     while b > bound:
         quotient = a // b

@@ -77,7 +77,7 @@ class _ExactRegressor:
 
     @property
     def states(self) -> int:
-        """Random states whose rows are more than the columns."""
+        """Number of random states at which the regressor has more rows than columns."""
         return -(-len(self.order) // self.robot.freedom) + _SPARE_STATES
 
     def rows(self, prime: int, states: int) -> list[list[int]]:
@@ -105,7 +105,7 @@ class _ExactRegressor:
 
 @dataclass(frozen=True)
 class _Elimination:
-    """The independent columns modulo primes, and the dependent ones' shares.
+    """The independent columns modulo several primes, and the dependent columns' shares on them.
 
     Attributes
     ----------
@@ -293,9 +293,9 @@ def _modular(
 ) -> dict[int, int]:
     """Return a transfer's null vector modulo a prime: its nonzero entries by the column's index."""
     field = PrimeField(prime)
-    symbols = {name: value.field_element(field) for name, value in geometry.symbols().items()}
+    symbols = {name: number.field_element(field) for name, number in geometry.symbols().items()}
     entries = {columns.index(c): v % prime for c, v in transfer.evaluate(symbols).items()}
-    return {column: value for column, value in entries.items() if value}
+    return {column: number for column, number in entries.items() if number}
 
 
 def _unexplained_columns(
@@ -358,7 +358,7 @@ def _annihilate(
     rows: Sequence[Sequence[int]] | Sequence[Sequence[Fraction]],
     prime: int | None,
 ) -> bool:
-    """Return whether every null vector annihilates the rows.
+    """Return whether all relations between columns hold at all rows, modulo a prime if given.
 
     A relation gives a column as shares of the kept columns; under the key -1 stands a null vector
     itself.

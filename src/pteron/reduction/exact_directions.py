@@ -39,19 +39,19 @@ UNIT: tuple[ExactVector, ...] = (_ONE, ZERO, ZERO), (ZERO, _ONE, ZERO), (ZERO, Z
 
 @dataclass(frozen=True)
 class Notes:
-    """A conversion to exact numbers that notes which were recognised and which approximated."""
+    """A conversion to exact numbers, with notes on what is recognised and what approximated."""
 
     recognised: list[str]
     approximated: list[str]
 
-    def length(self, name: str, value: float) -> Surd:
+    def length(self, name: str, metres: float) -> Surd:
         """Return a length in exact numbers."""
-        exact = length(value)
+        exact = length(metres)
         if exact is None:
-            exact = Surd(Fraction(value).limit_denominator(FINE))
-            self._note_approximated(name, value, exact)
+            exact = Surd(Fraction(metres).limit_denominator(FINE))
+            self._note_approximated(name, metres, exact)
         elif exact.s != 1:
-            self._note_recognised(name, value, exact)
+            self._note_recognised(name, metres, exact)
         return exact
 
     def direction(self, name: str, vector: Array) -> ExactVector:
@@ -59,13 +59,13 @@ class Notes:
         simple = [direction_cosine(float(c)) for c in vector]
         known = [c for c in simple if c is not None]
         if len(known) == 3 and sum(c.square for c in known) == 1:
-            for axis, value, exact in zip("xyz", vector, known, strict=True):
-                if exact.s != 1 or abs(float(exact) - float(value)) > _NOISE:
-                    self._note_recognised(f"{name}.{axis}", float(value), exact)
+            for axis, component, exact in zip("xyz", vector, known, strict=True):
+                if exact.s != 1 or abs(float(exact) - float(component)) > _NOISE:
+                    self._note_recognised(f"{name}.{axis}", float(component), exact)
             return (known[0], known[1], known[2])
         unit = rational_unit(vector)
-        for axis, value, exact in zip("xyz", vector, unit, strict=True):
-            self._note_approximated(f"{name}.{axis}", float(value), exact)
+        for axis, component, exact in zip("xyz", vector, unit, strict=True):
+            self._note_approximated(f"{name}.{axis}", float(component), exact)
         return unit
 
     def plane_vector(self, name: str, x: float, y: float) -> tuple[Surd, Surd]:
@@ -75,20 +75,20 @@ class Notes:
         if None in simple and radius is not None and radius.q != 0:
             ux, uy, _ = rational_unit(np.array([x, y, 0.0]) / np.hypot(x, y))
             polar = Surd(ux.q * radius.q, radius.s), Surd(uy.q * radius.q, radius.s)
-            for axis, value, exact in zip("xy", (x, y), polar, strict=True):
-                self._note_approximated(f"{name}.{axis}", value, exact)
+            for axis, component, exact in zip("xy", (x, y), polar, strict=True):
+                self._note_approximated(f"{name}.{axis}", component, exact)
             return polar
         return self.length(f"{name}.x", x), self.length(f"{name}.y", y)
 
-    def _note_recognised(self, name: str, value: float, exact: Surd) -> None:
+    def _note_recognised(self, name: str, number: float, exact: Surd) -> None:
         """Note that a value is recognised as an exact number, with its difference."""
-        error = abs(float(exact) - value)
+        error = abs(float(exact) - number)
         difference = f"off by {error:.0e}" if error else "to the last digit"
         self.recognised.append(f"{name} = {exact} ({difference})")
 
-    def _note_approximated(self, name: str, value: float, exact: Surd) -> None:
+    def _note_approximated(self, name: str, number: float, exact: Surd) -> None:
         """Note that a value is approximated by an exact number, unless it is equal."""
-        error = abs(float(exact) - value)
+        error = abs(float(exact) - number)
         if error:
             self.approximated.append(f"{name} (off by {error:.0e})")
 
@@ -111,7 +111,7 @@ def exact_directions(vectors: dict[str, Array], notes: Notes) -> dict[str, Exact
 
 
 def times(vector: ExactVector, factor: Fraction) -> ExactVector:
-    """Return a vector times a fraction."""
+    """Return the product of an exact vector and a fraction."""
     x, y, z = vector
     return x.times(factor), y.times(factor), z.times(factor)
 
@@ -129,11 +129,11 @@ def rational_unit(vector: Array) -> ExactVector:
         t = float(vector[i]) / (1.0 + abs(float(vector[pole])))
         plane.append(Fraction(0) if abs(t) < PARALLEL else Fraction(t).limit_denominator(FINE))
     square: Fraction = sum((t * t for t in plane), Fraction(0))
-    result = [Fraction(0)] * 3
-    result[pole] = sign * (1 - square) / (1 + square)
+    components = [Fraction(0)] * 3
+    components[pole] = sign * (1 - square) / (1 + square)
     for i, tangent in zip(others, plane, strict=True):
-        result[i] = 2 * tangent / (1 + square)
-    return (Surd(result[0]), Surd(result[1]), Surd(result[2]))
+        components[i] = 2 * tangent / (1 + square)
+    return (Surd(components[0]), Surd(components[1]), Surd(components[2]))
 
 
 def lost_right_angles(vectors: dict[str, Array], exact: dict[str, ExactVector]) -> list[str]:

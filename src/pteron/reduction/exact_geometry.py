@@ -63,24 +63,20 @@ class ExactLeg:
     @property
     def numbers(self) -> list[Surd]:
         """All numbers in one list."""
-        return [
-            number for value in (*self.values.values(), self.platform_point) for number in value
-        ]
+        return [x for vector in (*self.values.values(), self.platform_point) for x in vector]
 
     def field_elements(self, field: Field[Element]) -> dict[str, list[Element]]:
         """Return the quantities and the platform point in a field, by name."""
         d = [c.field_element(field) for c in self.direction]
         elements = {}
-        for name, value in self.values.items():
-            if value:
-                elements[name] = [number.field_element(field) for number in value]
+        for name, quantity in self.values.items():
+            if quantity:
+                elements[name] = [number.field_element(field) for number in quantity]
             else:
                 program = _plane_axis(*pole([float(c) for c in self.direction]))
                 elements[name] = evaluate(program, field, [d])[0]
         points = {"platform_point": self.platform_point, "fixed_offset": (ZERO, ZERO, ZERO)}
-        return elements | {
-            k: [number.field_element(field) for number in v] for k, v in points.items()
-        }
+        return elements | {k: [x.field_element(field) for x in v] for k, v in points.items()}
 
 
 @dataclass(frozen=True)
@@ -127,25 +123,25 @@ class ExactGeometry:
     def radicands(self) -> frozenset[int]:
         """The s > 1 of all numbers q sqrt(s)."""
         numbers = [n for leg in self.legs for n in leg.numbers] + list(self.gravity)
-        numbers += [n for value in (*self.platform.values(), *self.axes) for n in value]
+        numbers += [n for quantity in (*self.platform.values(), *self.axes) for n in quantity]
         return frozenset(n.s for n in numbers if n.s != 1)
 
     def symbols(self) -> dict[str, Surd]:
         """Return the values of the geometric symbols lu1, ll1, s1x, s1y, ... of the transfers."""
-        values: dict[str, Surd] = {}
+        lengths: dict[str, Surd] = {}
         for i, leg in enumerate(self.legs, start=1):
-            values |= {f"{symbol}{i}": value for symbol, value in leg.lengths.items()}
-            for axis, value in zip(self.arm_axes, leg.platform_point, strict=False):
-                values[f"s{i}{axis}"] = value
-        return values
+            lengths |= {f"{symbol}{i}": length for symbol, length in leg.lengths.items()}
+            for axis, length in zip(self.arm_axes, leg.platform_point, strict=False):
+                lengths[f"s{i}{axis}"] = length
+        return lengths
 
     def field_elements(self, field: Field[Element]) -> list[Element]:
         """Return the geometry vector of `Machine.symbolic` in a field."""
         numbers = [
             number
             for leg in self.legs
-            for values in leg.field_elements(field).values()
-            for number in values
+            for elements in leg.field_elements(field).values()
+            for number in elements
         ]
         vectors = (*self.axes, *self.platform.values(), self.gravity)
         return numbers + [number.field_element(field) for vector in vectors for number in vector]
@@ -209,35 +205,35 @@ def _exact_leg(
     else:
         shift = shift + np.array(robot.platform.frame).T @ np.array(leg.platform_point)
         s0 = (ZERO, ZERO, ZERO)
-    values: dict[str, tuple[Surd, ...]] = {}
+    quantities: dict[str, tuple[Surd, ...]] = {}
     lengths: dict[str, Surd] = {}
     directions: list[ExactVector] = []
     for q in leg.quantities:
         if q.role == "point":
             # It enters the regressor only through c - r: no rank hangs on its last digits.
             at = frame @ (np.array(q.value) - shift)
-            values[q.name] = tuple(_fraction(float(c)) for c in at)
+            quantities[q.name] = tuple(_fraction(float(c)) for c in at)
             if robot.platform.planes and abs(at @ frame @ leg.plane_normal) < PARALLEL:
                 # Planes of legs that meet in one line do so exactly.
                 x, y, _ = exact[f"d{i + 1}"]
                 distance = _fraction(float(at[1] * float(x) - at[0] * float(y))).q
-                values[q.name] = y.times(-distance), x.times(distance), values[q.name][2]
+                quantities[q.name] = y.times(-distance), x.times(distance), quantities[q.name][2]
         elif q.role == "direction":
             directions.append(exact[f"{q.symbol}{i + 1}"])
-            values[q.name] = directions[-1]
+            quantities[q.name] = directions[-1]
         elif q.role == "length":
             lengths[q.symbol] = notes.length(f"{q.symbol}{i + 1}", q.value[0])
-            values[q.name] = (lengths[q.symbol],)
+            quantities[q.name] = (lengths[q.symbol],)
         else:
             plain = () if q.role == "normal" else q.value
-            values[q.name] = tuple(Surd(Fraction(v)) for v in plain)
+            quantities[q.name] = tuple(Surd(Fraction(v)) for v in plain)
     # A leg without one has no axis that a force depends on.
-    return ExactLeg(values, (directions or [UNIT[2]])[0], lengths, s0)
+    return ExactLeg(quantities, (directions or [UNIT[2]])[0], lengths, s0)
 
 
-def _fraction(value: float) -> Surd:
+def _fraction(number: float) -> Surd:
     """Return a number as a surd, its fraction with a denominator of at most 1e9."""
-    return Surd(Fraction(value).limit_denominator(10**9))
+    return Surd(Fraction(number).limit_denominator(10**9))
 
 
 def _best_frame(robot: Manipulator, vectors: list[Array]) -> Array:
@@ -285,6 +281,6 @@ def _rational_rotation(frame: Array) -> tuple[ExactVector, ...]:
 
 
 def _simplicity(frame: Array, vectors: list[Array]) -> int:
-    """Return a score of simple components: 3 for a zero, 2 for a rational, 1 for a root."""
+    """Return the score of vectors in a frame: 3 for each zero, 2 a rational, 1 a root."""
     components = (direction_cosine(float(c)) for vector in vectors for c in frame @ vector)
     return sum(3 if c.q == 0 else 2 if c.s == 1 else 1 for c in components if c is not None)

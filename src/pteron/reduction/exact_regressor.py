@@ -66,10 +66,10 @@ def _cached_rows(
             if not all(is_square(delta, prime) for delta in deltas.elements(pose)):
                 continue
             motion = _draw(topology.freedom, prime, rng), _draw(topology.freedom, prime, rng)
-            values = program(pose, *motion)[0]
+            entries = program(pose, *motion)[0]
         except (NoSquareRoot, ZeroDivisionError):
             continue
-        rows += _split_rows(values, topology)
+        rows += _split_rows(entries, topology)
         if len(rows) >= states * topology.freedom:
             return rows, rng.getstate()
     raise ZeroDivisionError
@@ -108,16 +108,16 @@ def rational_rows(
             placed[at["elbow"]] = Fraction(sigma)
         motion = [[random_fraction(rng) for _ in range(topology.freedom)] for _ in range(2)]
         try:
-            values = program(placed, pose, *motion)[0]
+            entries = program(placed, pose, *motion)[0]
         except ZeroDivisionError:
             continue
-        rows += _split_rows(values, topology)
+        rows += _split_rows(entries, topology)
     return rows
 
 
-def is_square(value: int, prime: int) -> bool:
+def is_square(residue: int, prime: int) -> bool:
     """Return whether a residue is a square (Euler's criterion)."""
-    return pow(value, (prime - 1) // 2, prime) <= 1
+    return pow(residue, (prime - 1) // 2, prime) <= 1
 
 
 def _draw(count: int, prime: int, rng: random.Random) -> list[int]:
@@ -125,10 +125,10 @@ def _draw(count: int, prime: int, rng: random.Random) -> list[int]:
     return [rng.randrange(prime) for _ in range(count)]
 
 
-def _split_rows(values: Sequence[Element], topology: Manipulator) -> list[list[Element]]:
-    """Return the rows of a regressor; the program stores it transposed, by columns."""
+def _split_rows(entries: Sequence[Element], topology: Manipulator) -> list[list[Element]]:
+    """Return a regressor's entries as rows; the program gives them by columns."""
     n = len(parameter_data(topology))
-    return [list(values[i * n : (i + 1) * n]) for i in range(topology.freedom)]
+    return [list(entries[i * n : (i + 1) * n]) for i in range(topology.freedom)]
 
 
 class _Degree(NamedTuple):
@@ -152,7 +152,7 @@ class _DegreeField:
         self.names: dict[Any, int] = {}
 
     def make_degree(self, numerator: int, powers: dict[int, int], *operation: Any) -> _Degree:
-        """Return a value, named by the operation and operands that compute it."""
+        """Return a degree's bound, numerator over powers of divisors, named by its operation."""
         return _Degree(numerator, powers, self.names.setdefault(operation, len(self.names)))
 
     def degree_over(self, powers: Mapping[int, int], a: _Degree) -> int:
@@ -161,9 +161,9 @@ class _DegreeField:
         pairs = zip(powers, missing, strict=True)
         return a.numerator + sum(self.degrees[k] * n for k, n in pairs)
 
-    def number(self, value: Fraction | int) -> _Degree:
+    def number(self, constant: Fraction | int) -> _Degree:
         """Return a constant, of degree 0."""
-        return self.make_degree(0, {}, value)
+        return self.make_degree(0, {}, constant)
 
     def variable(self, name: str) -> _Degree:
         """Return a variable, of degree 1."""
@@ -207,11 +207,11 @@ class _DegreeField:
         return self.make_degree(-(-twice // 2), powers, "root", a.name)
 
 
-def common_powers(values: Iterable[_Degree]) -> dict[int, int]:
+def common_powers(degrees: Iterable[_Degree]) -> dict[int, int]:
     """Return the least common denominator of some values, as powers of divisors."""
     powers: dict[int, int] = {}
-    for value in values:
-        for k, n in value.powers.items():
+    for degree in degrees:
+        for k, n in degree.powers.items():
             powers[k] = max(n, powers.get(k, 0))
     return powers
 
@@ -239,12 +239,12 @@ def _degree_bound(topology: Manipulator) -> int:
     ]
     entries = evaluate(program, field, [constants, *states])[0]
     return max(
-        max(field.degree_over(common_powers(row), entry) for entry in row)
+        max(field.degree_over(common_powers(row), degree) for degree in row)
         for row in _split_rows(entries, topology)
     )
 
 
 def roots(topology: Manipulator) -> int:
-    """Return the number of square roots in the regressor."""
+    """Return the number of square roots in the regressor's program."""
     graph = graph_of(general_program(topology, "regressor").function)
     return sum(node.operation == "sqrt" for node in graph.nodes)

@@ -67,9 +67,9 @@ def as_latex(columns: Sequence[Parameter], terms: Terms, digits: int) -> str:
         if _is_symbolic(share):
             from sympy import latex
 
-            minus, value = _signed_text(share)
-            size = latex(value, symbol_names=_geometry_names(share))
-            size = rf"\left({size}\right)" if value.is_Add or size.startswith("-") else size
+            minus, factor = _signed_text(share)
+            size = latex(factor, symbol_names=_geometry_names(share))
+            size = rf"\left({size}\right)" if factor.is_Add or size.startswith("-") else size
         else:
             minus, size = _write_terms(share, digits, str)
         name = _latex_name(columns[column])
@@ -91,9 +91,9 @@ def _sum(terms: Terms, product: Callable[[int, Share], tuple[bool, str]]) -> str
 def _write_terms(share: Share, digits: int, write: Callable[[Any], str]) -> tuple[bool, str]:
     """Return a share's sign and size: empty for one, in brackets where it holds symbols."""
     if not _is_symbolic(share):
-        value = float(share)
-        size = f"{abs(value):.{digits}g}"
-        return value < 0, "" if size == "1" else size
+        factor = float(share)
+        size = f"{abs(factor):.{digits}g}"
+        return factor < 0, "" if size == "1" else size
     minus, quotient = _signed_text(share)
     top, bottom = quotient.as_numer_denom()
     # A sum needs brackets under a sign or over a denominator.

@@ -26,11 +26,11 @@ Form = Callable[[Expression, RegressorTerms, Expression, Expression], Expression
 
 
 def _virtual_work(
-    inverse: Expression, factors: RegressorTerms, selection: Expression, values: Expression
+    inverse: Expression, factors: RegressorTerms, selection: Expression, parameters: Expression
 ) -> Expression:
     """Return F_a = -F_p - J^-T (sum J_b^T F_b + F_e), each F_b = Om_b p_b."""
     sliders, *links, platform = factors.columns
-    standard = ca.mtimes(selection, values)
+    standard = ca.mtimes(selection, parameters)
     total = ca.mtimes(factors.platform, standard[platform])
     for jacobian, matrix, columns in zip(factors.link_jacobians, factors.links, links, strict=True):
         total = total + ca.mtimes(jacobian.T, ca.mtimes(matrix, standard[columns]))  # J_b^T F_b
@@ -39,17 +39,17 @@ def _virtual_work(
 
 
 def _regressor(
-    inverse: Expression, factors: RegressorTerms, selection: Expression, values: Expression
+    inverse: Expression, factors: RegressorTerms, selection: Expression, parameters: Expression
 ) -> Expression:
     """Return (J^-T [...]) P: the dynamic matrix is formed, then multiplied."""
-    return ca.mtimes(ca.mtimes(inverse, ca.mtimes(factors.bracket, selection)), values)
+    return ca.mtimes(ca.mtimes(inverse, ca.mtimes(factors.bracket, selection)), parameters)
 
 
 def _regressor_inverse_last(
-    inverse: Expression, factors: RegressorTerms, selection: Expression, values: Expression
+    inverse: Expression, factors: RegressorTerms, selection: Expression, parameters: Expression
 ) -> Expression:
     """Return J^-T ([...] P): one vector is multiplied by J^-T."""
-    return ca.mtimes(inverse, ca.mtimes(ca.mtimes(factors.bracket, selection), values))
+    return ca.mtimes(inverse, ca.mtimes(ca.mtimes(factors.bracket, selection), parameters))
 
 
 GRAPHS: Mapping[str, Form] = {
@@ -81,9 +81,9 @@ def model_forms(base: BaseParameters) -> dict[tuple[str, str], Kernel]:
     """
     robot = base.robot
     machine = Machine.numeric(robot)
-    values = parameters(robot)
+    inertia = parameters(robot)
     sets = {
-        "complete": (ca.SX.eye(len(values)), values),
+        "complete": (ca.SX.eye(len(inertia)), inertia),
         "reduced": (ca.sparsify(ca.SX(ca.DM(base.selection))), base.values()),
     }
     ports = [Port(name, (machine.freedom,)) for name in ("pose", "velocity", "acceleration")]
@@ -107,12 +107,8 @@ def model_forms(base: BaseParameters) -> dict[tuple[str, str], Kernel]:
                 (Port("forces", (machine.freedom,)),),
                 {"parameters": numbers},
             )
-    for name, parameter_set in (
-        ("complete", None),
-        ("reduced", base),
-        ("cheapest", cheapest_parameters(robot)),
-    ):
-        kernels["factored", name] = compile(
-            robot, "inverse_dynamics", base=parameter_set, grade="parametric"
-        )
+    bases = {"complete": None, "reduced": base, "cheapest": cheapest_parameters(robot)}
+    for name, chosen in bases.items():
+        kernel = compile(robot, "inverse_dynamics", base=chosen, grade="parametric")
+        kernels["factored", name] = kernel
     return kernels

@@ -10,11 +10,10 @@ _NEEDS = r"% In the preamble: \usepackage{amsmath, booktabs}"
 _LONGEST = 55
 """Printed letters of a sum that stand in a line; the next term begins another."""
 
-_SPECIAL = {letter: rf"\{letter}" for letter in "&%$#_{}"} | {
-    "\\": r"\textbackslash{}",
-    "~": r"\textasciitilde{}",
-    "^": r"\textasciicircum{}",
-}
+_SPECIAL = str.maketrans(
+    {letter: rf"\{letter}" for letter in "&%$#_{}"}
+    | {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}"}
+)
 """Letters that mean something in LaTeX, and how they are written."""
 
 
@@ -42,8 +41,8 @@ def latex_table(
         Significant digits of the values.
     """
     rows = [
-        rf"    {i} & ${_break_lines(text, plain)}$ & ${_number(value, digits)}$ & {_unit(unit)} \\"
-        for i, (text, plain, value, unit) in enumerate(
+        rf"    {i} & ${_break_lines(text, plain)}$ & ${_number(number, digits)}$ & {_unit(unit)} \\"
+        for i, (text, plain, number, unit) in enumerate(
             zip(sums, printed, values, units, strict=True), start=1
         )
     ]
@@ -51,7 +50,7 @@ def latex_table(
     lines = [
         *(_NEEDS, r"\begin{table}", r"  \centering"),
         *([r"  \renewcommand{\arraystretch}{1.4}"] if fractions else []),
-        rf"  \caption{{Base inertial parameters of {_escape_latex(name)}.}}",
+        rf"  \caption{{Base inertial parameters of {name.translate(_SPECIAL)}.}}",
         *(r"  \label{tab:base-parameters}", r"  \begin{tabular}{@{}rlrl@{}}", r"    \toprule"),
         r"    & Base parameter & Value & Unit \\",
         *(r"    \midrule", *rows, r"    \bottomrule"),
@@ -94,9 +93,9 @@ def _terms(text: str) -> list[str]:
     return terms
 
 
-def _number(value: float, digits: int) -> str:
+def _number(number: float, digits: int) -> str:
     """Return a number in LaTeX with `digits` digits, a power of ten where it needs an exponent."""
-    mantissa, _, exponent = f"{value:.{digits}g}".partition("e")
+    mantissa, _, exponent = f"{number:.{digits}g}".partition("e")
     return rf"{mantissa} \times 10^{{{int(exponent)}}}" if exponent else mantissa
 
 
@@ -104,8 +103,3 @@ def _unit(unit: str) -> str:
     """Return a unit in LaTeX, upright in math mode."""
     spaced = unit.replace(" ", r"\,")
     return rf"$\mathrm{{{spaced}}}$"
-
-
-def _escape_latex(text: str) -> str:
-    """Return a text with LaTeX's special characters escaped."""
-    return "".join(_SPECIAL.get(letter, letter) for letter in text)

@@ -51,9 +51,9 @@ def svd_grouping(robot: Manipulator, order: Sequence[int], sharing: Array, seed:
     least preferred first, as long as the null vectors' entries at them stay independent.
     """
     scaled = _scaled_regressor(robot, sharing, seed)
-    _, values, vectors = np.linalg.svd(scaled.matrix, full_matrices=True)  # Section 5 (a)
-    values = np.pad(values, (0, scaled.matrix.shape[1] - len(values)))
-    rank = int((values > _TOLERANCE * values[0]).sum())
+    _, singular, vectors = np.linalg.svd(scaled.matrix, full_matrices=True)  # Section 5 (a)
+    singular = np.pad(singular, (0, scaled.matrix.shape[1] - len(singular)))
+    rank = int((singular > _TOLERANCE * singular[0]).sum())
     null = vectors[rank:].T
     dropped = independent(null.T, list(reversed(order)), len(order) - rank)[0]
     base_columns = sorted(set(order) - set(dropped))
@@ -62,7 +62,7 @@ def svd_grouping(robot: Manipulator, order: Sequence[int], sharing: Array, seed:
         if dropped
         else np.empty((rank, 0))
     )
-    gap = values[rank - 1] / values[0], np.max(values[rank:], initial=0.0) / values[0]
+    gap = singular[rank - 1] / singular[0], np.max(singular[rank:], initial=0.0) / singular[0]
     return _grouping("svd", base_columns, dropped, shares, scaled, gap)
 
 
@@ -80,8 +80,8 @@ def qr_grouping(robot: Manipulator, order: Sequence[int], sharing: Array, seed: 
 def numerical_rank(robot: Manipulator, sharing: Array, seed: int) -> NumericalRank:
     """Return the rank that the singular values of the scaled regressor show."""
     scaled = _scaled_regressor(robot, sharing, seed)
-    values = np.linalg.svd(scaled.matrix, compute_uv=False)
-    relative = values / values[0]
+    singular = np.linalg.svd(scaled.matrix, compute_uv=False)
+    relative = singular / singular[0]
     is_significant = relative > _TOLERANCE
     dropped = float(relative[~is_significant].max(initial=scaled.dropped))
     return NumericalRank(int(is_significant.sum()), float(relative[is_significant][-1]), dropped)
@@ -132,9 +132,9 @@ def _scaled_regressor(robot: Manipulator, sharing: Array, seed: int) -> _Scaled:
 
 
 def _lengths(matrix: Array, axis: int) -> tuple[Array, float]:
-    """Return the lengths along an axis, infinite of those that vanish beside the longest.
+    """Return the norms along an axis, infinite where they vanish beside the longest one.
 
-    Also the greatest of these, over the longest.
+    Second is the greatest of the vanishing norms, over the longest.
     """
     lengths = np.linalg.norm(matrix, axis=axis)
     shares = lengths / max(float(lengths.max(initial=0.0)), np.finfo(float).tiny)
@@ -185,7 +185,7 @@ def _grouping(
     scaled: _Scaled,
     gap: _Gap,
 ) -> Grouping:
-    """Assemble the grouping."""
+    """Return the grouping of kept and dropped columns by their shares, with its certificate."""
     misfit = scaled.matrix[:, dropped] - scaled.matrix[:, base_columns] @ shares
     certificate = NumericalCertificate(
         method=method,

@@ -67,11 +67,7 @@ class BaseParameters(Result):
 
     @classmethod
     def from_grouping(
-        cls,
-        robot: Manipulator,
-        columns: tuple[Parameter, ...],
-        sharing: Array,
-        grouping: Grouping,
+        cls, robot: Manipulator, columns: tuple[Parameter, ...], sharing: Array, grouping: Grouping
     ) -> BaseParameters:
         """Return the base parameters of a grouping; `sharing` is (N, columns)."""
         mean = (sharing / sharing.sum(axis=0)).T
@@ -94,11 +90,11 @@ class BaseParameters(Result):
         """Return the overview table: base parameters, their values and units, and the proof."""
         columns = [Column("", "number"), Column("base parameter", "long")]
         columns += [Column("value", "number"), Column("unit")]
-        sums, values = self.expressions("html"), self.values()
+        sums, base_values = self.expressions("html"), self.values()
         rows = [
-            (i, Markup(text), float(value), self.parameters[column].unit.replace("^2", "\u00b2"))
-            for i, (text, value, column) in enumerate(
-                zip(sums, values, self.kept, strict=True), start=1
+            (i, Markup(text), float(size), self.parameters[column].unit.replace("^2", "\u00b2"))
+            for i, (text, size, column) in enumerate(
+                zip(sums, base_values, self.kept, strict=True), start=1
             )
         ]
         about = f"{self.rank} base parameters of {len(self.columns)} inertial parameters"
@@ -189,21 +185,21 @@ class BaseParameters(Result):
     @property
     def geometry_values(self) -> dict[str, float]:
         """The geometric symbols of the expressions, and their values in metres."""
-        values = self.leg_geometry_values.items()
-        return {name: value for name, value in values if str(self._symbol_values[name]) == name}
+        lengths = self.leg_geometry_values.items()
+        return {name: length for name, length in lengths if str(self._symbol_values[name]) == name}
 
     @property
     def leg_geometry_values(self) -> dict[str, float]:
         """The geometric symbols where each leg has its own, and their values in metres."""
-        values = exact_geometry(self.robot).symbols().items()
-        return {name: float(value) for name, value in values if value.q != 0}
+        lengths = exact_geometry(self.robot).symbols().items()
+        return {name: float(length) for name, length in lengths if length.q != 0}
 
     @property
     def shared_symbols(self) -> dict[str, tuple[str, ...]]:
         """The geometric symbols that stand for several values, equal but for their sign."""
         bearers: dict[str, tuple[str, ...]] = {}
-        for name, value in self._symbol_values.items():
-            bearer = str(value).lstrip("-")
+        for name, symbol in self._symbol_values.items():
+            bearer = str(symbol).lstrip("-")
             if bearer not in (name, "0"):
                 bearers[bearer] = (*bearers.get(bearer, ()), name)
         return bearers
@@ -302,8 +298,7 @@ class BaseParameters(Result):
 def _matrix(grouping: Grouping, columns: int) -> Array:
     """Return the matrix (rank, columns) that takes column parameters to base parameters."""
     matrix = np.zeros((len(grouping.kept), columns))
-    for row, column in enumerate(grouping.kept):
-        matrix[row, column] = 1.0
+    matrix[range(len(matrix)), list(grouping.kept)] = 1.0
     place = {column: row for row, column in enumerate(grouping.kept)}
     for column, shares in grouping.given.items():
         for k, share in shares.items():

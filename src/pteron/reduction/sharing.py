@@ -48,7 +48,7 @@ def leg_groups(robot: Manipulator, shared: Sharing) -> list[tuple[int, ...]]:
 def share(
     robot: Manipulator, groups: Sequence[tuple[int, ...]]
 ) -> tuple[tuple[Parameter, ...], Array]:
-    """Return the K parameters of the columns, and the matrix (N, K) of ones that adds N columns."""
+    """Return the columns' K parameters, and the matrix (N, K) of ones that adds N columns up."""
     everything = parameter_data(robot)
     columns = parameter_data(robot, groups)
 

@@ -43,7 +43,7 @@ class Surd:
 
     @property
     def square(self) -> Fraction:
-        """q^2 s."""
+        """The square of the number: q^2 s."""
         return self.q * self.q * self.s
 
     def times(self, factor: Fraction) -> Surd:
@@ -56,10 +56,10 @@ class Surd:
         The root of s is the product of the roots of its primes, so that sqrt(2) sqrt(3) = sqrt(6)
         holds in every field.
         """
-        value = field.number(self.q)
+        element = field.number(self.q)
         for prime in prime_factors(self.s):
-            value = field.multiply(value, field.square_root(field.number(prime)))
-        return value
+            element = field.multiply(element, field.square_root(field.number(prime)))
+        return element
 
 
 _COSINE_TOLERANCE = 1e-9
@@ -75,29 +75,29 @@ _LENGTH_DENOMINATOR = 10**6
 """Lengths in metres are decimals to the micrometre, or roots of such."""
 
 
-def direction_cosine(value: float) -> Surd | None:
+def direction_cosine(component: float) -> Surd | None:
     """Return the simple exact number nearest to a unit vector's component; None without.
 
     Simple: itself or its square a fraction with a denominator up to 300, within 1e-9.
     """
-    return _simple(value, _COSINE_DENOMINATOR, _COSINE_TOLERANCE, _COSINE_TOLERANCE)
+    return _simple(component, _COSINE_DENOMINATOR, _COSINE_TOLERANCE, _COSINE_TOLERANCE)
 
 
-def length(value: float) -> Surd | None:
+def length(metres: float) -> Surd | None:
     """Return the simple exact number nearest to a length in metres; None without.
 
     Simple: a decimal to the micrometre, or the root of a fraction with a denominator up to 10^6.
     """
-    least = abs(value) * _LENGTH_TOLERANCE
-    return _simple(value, _LENGTH_DENOMINATOR, _LENGTH_TOLERANCE, least)
+    least = abs(metres) * _LENGTH_TOLERANCE
+    return _simple(metres, _LENGTH_DENOMINATOR, _LENGTH_TOLERANCE, least)
 
 
-def _simple(value: float, most: int, near: float, near_square: float) -> Surd | None:
+def _simple(number: float, most: int, near: float, near_square: float) -> Surd | None:
     """Return a fraction of at most this denominator near a number, or the root of one."""
-    plain = Fraction(value).limit_denominator(most)
-    if abs(plain - Fraction(value)) <= near:
+    plain = Fraction(number).limit_denominator(most)
+    if abs(plain - Fraction(number)) <= near:
         return Surd(plain)
-    square = Fraction(value * value).limit_denominator(most)
-    if square > 0 and abs(square - Fraction(value * value)) <= near_square:
-        return Surd.root(square, value)
+    square = Fraction(number * number).limit_denominator(most)
+    if square > 0 and abs(square - Fraction(number * number)) <= near_square:
+        return Surd.root(square, number)
     return None

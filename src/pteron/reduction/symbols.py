@@ -23,19 +23,19 @@ def named_values(geometry: ExactGeometry, *, shared: bool = True) -> dict[str, A
     """
     named: dict[str, Any] = {}
     first: dict[Fraction | str, tuple[str, Surd]] = {}
-    for name, value in geometry.symbols().items():
-        if value.q == 0:
+    for name, length in geometry.symbols().items():
+        if length.q == 0:
             named[name] = Integer(0)
             continue
-        bearer, first_value = first.setdefault(value.square if shared else name, (name, value))
-        sign = 1 if (first_value.q > 0) == (value.q > 0) else -1
+        bearer, first_value = first.setdefault(length.square if shared else name, (name, length))
+        sign = 1 if (first_value.q > 0) == (length.q > 0) else -1
         named[name] = sign * Symbol(bearer)
     return named
 
 
 def algebraic_values(geometry: ExactGeometry) -> dict[str, Any]:
     """Return the values of the geometric symbols as exact SymPy numbers."""
-    return {name: sympify(value.q) * sqrt(value.s) for name, value in geometry.symbols().items()}
+    return {name: sympify(surd.q) * sqrt(surd.s) for name, surd in geometry.symbols().items()}
 
 
 def symbolic_shares(
@@ -63,7 +63,7 @@ def symbolic_shares(
     dropped = [j for j in range(len(columns)) if j not in base_columns]
     order = [*dropped, *base_columns]
     vectors: list[Mapping[int, Any]] = [
-        {columns.index(column): entry for column, entry in transfer.evaluate(symbols).items()}
+        {columns.index(column): share for column, share in transfer.evaluate(symbols).items()}
         for transfer in mass_transfers
     ]
     rows = [[sympify(vector.get(j, 0)) for j in order] for vector in (*vectors, *extra)]

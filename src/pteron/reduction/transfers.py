@@ -83,11 +83,11 @@ def transfers(robot: Manipulator, columns: Sequence[Parameter]) -> list[MassTran
 
 
 def _leg_entries(
-    transfer: LegTransfer, places: Mapping[tuple[str, str], Parameter], leg: int, values: Values
+    transfer: LegTransfer, places: Mapping[tuple[str, str], Parameter], leg: int, symbols: Values
 ) -> dict[Parameter, Any]:
     """Return the entries of a leg's transfer; legs count from 1."""
     return {
-        places[key]: math.prod((values[f"{name}{leg}"] for name in names), start=factor)
+        places[key]: math.prod((symbols[f"{name}{leg}"] for name in names), start=factor)
         for key, (factor, names) in transfer.entries.items()
     }
 
@@ -97,14 +97,14 @@ def _rider_entries(
     mass: Parameter,
     platform: Mapping[str, Parameter],
     group: Sequence[int],
-    values: Values,
+    symbols: Values,
 ) -> dict[Parameter, Any]:
     """Return the entries by which legs' masses on platform points join the platform's inertia."""
     shares: dict[Parameter, Any] = {mass: 1}
     axes = "xyz" if robot.platform.tilts else "xy"
     for leg in group:
         coordinates = zip("xyz", robot.legs[leg - 1].platform_point, strict=True)
-        point = [values[f"s{leg}{a}"] if a in axes and c else 0 for a, c in coordinates]
+        point = [symbols[f"s{leg}{a}"] if a in axes and c else 0 for a, c in coordinates]
         for kind, share in robot.platform.inertia.shares_of_point(*point).items():
             shares[platform[kind]] = shares.get(platform[kind], 0) - share
     return shares

@@ -18,14 +18,7 @@ from pteron.kinematics.jacobian_at import JacobianAtPose, jacobian_at
 from pteron.kinematics.singularities import best_type_ii
 from pteron.manipulator import Manipulator
 from pteron.manipulator.template_masses import template_masses
-from pteron.motion import (
-    Motion,
-    PickAndPlace,
-    Sizing,
-    least_margin,
-    pick_and_place,
-    size,
-)
+from pteron.motion import Motion, PickAndPlace, Sizing, least_margin, pick_and_place, size
 from pteron.playback import Playback
 from pteron.reduction import BaseParameters, base_parameters
 from pteron.report.costs import Cost, costs

@@ -64,18 +64,18 @@ def costs(base: BaseParameters) -> tuple[Cost, ...]:
     table = []
     for form in ("dense", *FORMS):
         complete, reduced = counts[form, "complete"], counts[form, "reduced"]
-        name, note = _NAMES[form], fewer(reduced, complete)
+        name, note = _NAMES[form], saving_text(reduced, complete)
         table.append(Cost(f"{name}, {len(every)} parameters", complete, ""))
         table.append(Cost(f"{name}, {base.rank} parameters", reduced, note))
     cheapest, complete = (counts["factored", which] for which in ("cheapest", "complete"))
     name = f"{_NAMES['factored']}, {base.rank} of least cost"
-    table.append(Cost(name, cheapest, f"{fewer(cheapest, complete)} than complete"))
+    table.append(Cost(name, cheapest, f"{saving_text(cheapest, complete)} than complete"))
     return tuple(table)
 
 
-def fewer(value: float, reference: float, less: str = "fewer") -> str:
-    """Return the text of the percentage by which a value is below, or above, a reference."""
-    percent = 100.0 * (1.0 - value / reference)
+def saving_text(count: float, reference: float, less: str = "fewer") -> str:
+    """Return the text of how many per cent a count is below a reference, or above it."""
+    percent = 100.0 * (1.0 - count / reference)
     return f"{abs(percent):.0f} % {less if percent >= 0.0 else 'more'}"
 
 

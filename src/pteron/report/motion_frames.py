@@ -12,6 +12,7 @@ from pteron.dynamics import drive_forces
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
 from pteron.motion import Guide, JointPoints, Motion, joint_guides, joint_points
+from pteron.motion.motion import interpolate_columns
 from pteron.platforms.coordinates import SHOWN
 from pteron.plots.machine_drawing import APART, base_outline, grid_step
 from pteron.report.quantities import coordinate
@@ -102,7 +103,7 @@ def frames(
         )
     else:
         time = even[: len(even) - int(closed)]
-        frame_forces = None if forces is None else _interpolate(motion.time, forces, time)
+        frame_forces = None if forces is None else interpolate_columns(motion.time, forces, time)
         pose, velocity, acceleration = motion.at(time)
     if frame_forces is None:
         frame_forces = drive_forces(robot, pose, velocity, acceleration, smooth=True)
@@ -124,11 +125,6 @@ def is_closed(motion: Motion) -> bool:
 def line_samples(count: int) -> slice:
     """Return the slice that thins samples out to the number a drawn line needs."""
     return slice(None, None, max(1, count // _DRAWN))
-
-
-def _interpolate(time: Array, values: Array, at: Array) -> Array:
-    """Return columns (T, k) interpolated linearly at times (F,): (F, k)."""
-    return np.column_stack([np.interp(at, time, column) for column in values.T])
 
 
 def scene(robot: Manipulator, shown: Frames) -> dict[str, Any]:

@@ -125,12 +125,7 @@ def _force_origin(motion_shown: ShownMotion) -> tuple[str, str]:
 def _figures(motion_shown: ShownMotion) -> dict[str, Figure]:
     """Return the pictures, by their names in the template."""
     robot, motion, at = motion_shown.robot, motion_shown.playback.motion, motion_shown.frames
-    machine = robot_figure(
-        at.still,
-        at.guides,
-        gravity=gravity_of(robot),
-        path=at.points.tool,
-    )
+    machine = robot_figure(at.still, at.guides, gravity=gravity_of(robot), path=at.points.tool)
     joints = [leg.joint for leg in robot.legs]
     some = line_samples(len(motion.time))
     time = motion.time[some] - motion.time[0]
@@ -143,6 +138,6 @@ def _figures(motion_shown: ShownMotion) -> dict[str, Figure]:
     }
 
 
-def _joint_figure(time: Array, values: Array, quantity: JointQuantity) -> Figure:
+def _joint_figure(time: Array, columns: Array, quantity: JointQuantity) -> Figure:
     """Return the figure of a joint quantity (T, n) over time, in its display units."""
-    return forces_figure(time, values * np.array(quantity.factors), ylabel=quantity.axis)
+    return forces_figure(time, columns * np.array(quantity.factors), ylabel=quantity.axis)

@@ -26,7 +26,7 @@ _PACES = (
 
 
 def stage(robot: Manipulator, shown: Frames, **words: str) -> dict[str, Any]:
-    """Return the variables of `moving_picture.html.j2`, without its pictures.
+    """Return the template's variables for the moving picture of a machine, without its pictures.
 
     The words are what the machine is `doing`, what the `still` picture shows, and the
     `force_title` over the forces of the moment.

@@ -6,7 +6,6 @@ import re
 from functools import partial
 from importlib.metadata import version
 from math import prod
-from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -110,7 +109,7 @@ def typeset_account(text: str) -> Markup:
 
 
 def kinds(robot: Manipulator) -> list[tuple[LegKind, list[int]]]:
-    """Return a leg of each kind, and the legs of that kind, from 1."""
+    """Return a leg of each kind, with the numbers, from 1, of all legs of that kind."""
     legs_of_kinds: dict[str, list[int]] = {}
     for i, leg in enumerate(robot.legs, start=1):
         legs_of_kinds.setdefault(leg.type, []).append(i)
@@ -121,8 +120,8 @@ def geometry(robot: Manipulator) -> list[tuple[str, list[str]]]:
     """Return the rows of the legs' geometry, mm: a name, and a text per leg."""
     roles = {"guide_point": "point"}
     # A leg with more lengths has those of the others among them, in its order.
-    counts = [sum(q.role == "length" for q in leg.quantities) for leg in robot.legs]
-    for _, leg in sorted(zip(counts, robot.legs, strict=True), key=itemgetter(0), reverse=True):
+    counts = {leg: sum(q.role == "length" for q in leg.quantities) for leg in robot.legs}
+    for leg in sorted(robot.legs, key=counts.__getitem__, reverse=True):
         roles |= {name: key.role for name, key in leg.keys.items()}
     roles["platform_point"] = "point of the platform"
     if any(any(leg.fixed_offset) for leg in robot.legs):
@@ -137,16 +136,16 @@ def geometry(robot: Manipulator) -> list[tuple[str, list[str]]]:
             directions = [
                 q.value for q in leg.quantities if q.name == name and q.role == "direction"
             ]
-            value: Any = directions[0] if directions else getattr(leg, name, None)
-            if value is None:
+            size: Any = directions[0] if directions else getattr(leg, name, None)
+            if size is None:
                 texts.append("\u2013")
             elif role in ("length", "number"):
-                texts.append(format_fixed(1e3 * value) if role == "length" else compact(value))
+                texts.append(format_fixed(1e3 * size) if role == "length" else compact(size))
             elif role == "count":
-                texts.append(str(value))
+                texts.append(str(size))
             else:
                 # Micrometres, and directions to a ten-thousandth: no rounding is shown beyond.
-                exact = np.round(value, 6 if "point" in role else 4) + 0.0
+                exact = np.round(size, 6 if "point" in role else 4) + 0.0
                 texts.append(triple(exact, 1e3) if "point" in role else triple(exact, digits=3))
         if any(text != "\u2013" for text in texts):
             rows.append((name.replace("_", " "), texts))
@@ -227,10 +226,7 @@ def _figures(report: Report) -> dict[str, Any]:
     out = slice(len(shown.time) // 2 + 1 if standard else None)
     path = shown.pose[out]
     machine = robot_figure(
-        shown.still,
-        shown.guides,
-        gravity=gravity_of(robot),
-        path=shown.points.tool[out],
+        shown.still, shown.guides, gravity=gravity_of(robot), path=shown.points.tool[out]
     )
     whose = "drive" if report.has_drives else "actuator"
     label = f"{whose} {force([leg.joint for leg in robot.legs]).axis}"
@@ -260,10 +256,10 @@ def _figures(report: Report) -> dict[str, Any]:
 
 def _zero_rounding(base: BaseParameters) -> Array:
     """Return the base parameters' values, those within rounding of zero set to zero."""
-    values = base.values()
+    base_values = base.values()
     units = np.array([base.parameters[k].unit for k in base.kept])
-    largest = [np.abs(values[units == unit]).max() for unit in units]
-    return np.where(np.abs(values) > 1e-12 * np.array(largest), values, 0.0)
+    largest = [np.abs(base_values[units == unit]).max() for unit in units]
+    return np.where(np.abs(base_values) > 1e-12 * np.array(largest), base_values, 0.0)
 
 
 def symbolic_sums(base: BaseParameters) -> dict[str, list[Any]] | None:
@@ -276,7 +272,7 @@ def symbolic_sums(base: BaseParameters) -> dict[str, list[Any]] | None:
     sums, lengths = texts
     return {
         "sums": [Markup(line) for line in sums],
-        "lengths": [(Markup(name), value) for name, value in lengths],
+        "lengths": [(Markup(name), length) for name, length in lengths],
     }
 
 
@@ -289,6 +285,6 @@ def _symbolic_texts(base: BaseParameters) -> tuple[list[str], list[tuple[str, fl
     if max(map(len, lines)) > _LONGEST:
         return None
     used = {s.name for line in base.expressions("sympy", symbols=True) for s in line.free_symbols}
-    values = base.geometry_values.items()
-    lengths = [(str(html_symbol(name)), value) for name, value in values if name in used]
+    by_symbol = base.geometry_values.items()
+    lengths = [(str(html_symbol(name)), length) for name, length in by_symbol if name in used]
     return list(map(str, base.expressions("html", symbols=True))), lengths

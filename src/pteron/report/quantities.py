@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from pteron.kernels import Array
@@ -49,33 +49,30 @@ class JointQuantity:
 
 def coordinate(joints: Sequence[ActuatedJoint]) -> JointQuantity:
     """Return the joint coordinates, in display units."""
-    names = _distinct(joint.coordinate for joint in joints)
+    names = dict.fromkeys(joint.coordinate for joint in joints)
     name = ", ".join(SYMBOLS.get(letter, letter) for letter in names)
-    shown = [SHOWN[joint.unit] for joint in joints]
-    return JointQuantity(
-        name, tuple(unit for unit, _ in shown), tuple(factor for _, factor in shown)
-    )
+    units, factors = zip(*(SHOWN[joint.unit] for joint in joints), strict=True)
+    return JointQuantity(name, units, factors)
 
 
 def force(joints: Sequence[ActuatedJoint]) -> JointQuantity:
     """Return the actuator forces."""
-    name = " or ".join(_distinct(joint.force for joint in joints))
+    name = " or ".join(dict.fromkeys(joint.force for joint in joints))
     return JointQuantity(name, tuple(joint.force_unit for joint in joints), (1.0,) * len(joints))
 
 
 def speed(joints: Sequence[ActuatedJoint]) -> JointQuantity:
     """Return the joint speeds."""
-    return JointQuantity(
-        "speed", tuple(f"{joint.unit}/s" for joint in joints), (1.0,) * len(joints)
-    )
+    units = tuple(f"{joint.unit}/s" for joint in joints)
+    return JointQuantity("speed", units, (1.0,) * len(joints))
 
 
 def nouns(joints: Sequence[ActuatedJoint]) -> str:
-    """Return the nouns of the actuated joints: "slider", or "slider or crank"."""
-    return " or ".join(_distinct(joint.noun for joint in joints))
+    """Return the noun of the actuated joints, such as "slider", or "slider or crank"."""
+    return " or ".join(dict.fromkeys(joint.noun for joint in joints))
 
 
-def readable(value: float, unit: str, places: int = 1) -> str:
+def readable(coordinate: float, unit: str, places: int = 1) -> str:
     """Return the text of a coordinate, in display units.
 
     Examples
@@ -84,19 +81,15 @@ def readable(value: float, unit: str, places: int = 1) -> str:
     ('28.6°', '120.0 mm')
     """
     shown, factor = SHOWN[unit]
-    return f"{format_fixed(factor * float(value), places)}{shown if shown == '°' else ' ' + shown}"
+    text = format_fixed(factor * float(coordinate), places)
+    return f"{text}{shown if shown == '°' else ' ' + shown}"
 
 
 def angles_text(robot: Manipulator, pose: Array) -> str:
     """Return the angles of a pose (m,) with their symbols; empty without angles."""
     pairs = zip(robot.coordinates, pose, strict=True)
     return ", ".join(
-        f"{pose_coordinate(name).symbol} = {readable(value, 'rad', 0)}"
-        for name, value in pairs
+        f"{pose_coordinate(name).symbol} = {readable(angle, 'rad', 0)}"
+        for name, angle in pairs
         if name in robot.platform.angles
     )
-
-
-def _distinct(words: Iterable[str]) -> list[str]:
-    """Return words in their order, without repetition."""
-    return list(dict.fromkeys(words))

@@ -28,10 +28,10 @@ _KINDS = {
 
 
 class _Changed(NamedTuple):
-    """A quantity that trials change, in headings and column heads, {} for the unit; its factor."""
+    """A quantity that trials vary: its heading, its column's head, {} for the unit, its factor."""
 
-    many: str
-    one: str
+    heading: str
+    column: str
     factor: float
 
 
@@ -60,8 +60,8 @@ def tuning_page(tuning: Tuning, trials: pl.DataFrame) -> str:
         required=tuning.required,
         least=tuning.least,
         gains=tuning.gains(),
-        units=_gain_units(tuning),
-        forces=_force_units(robot),
+        units=gain_units(tuning),
+        forces=force_units(robot),
         each={
             name: np.min([getattr(margins, name) for margins in tuning.margins], axis=0)
             for name in ("gain", "phase", "delay")
@@ -78,7 +78,7 @@ def tuning_page(tuning: Tuning, trials: pl.DataFrame) -> str:
             if len(trials) and name in trials["changed"]
         },
         changed={
-            name: change._replace(one=change.one.format(readings))
+            name: change._replace(column=change.column.format(readings))
             for name, change in _CHANGED.items()
         },
         length="rad" if robot.platform.angular.all() else "m",
@@ -86,7 +86,7 @@ def tuning_page(tuning: Tuning, trials: pl.DataFrame) -> str:
     )
 
 
-def _gain_units(tuning: Tuning) -> list[str]:
+def gain_units(tuning: Tuning) -> list[str]:
     """Return the units of a joint's gains by kind; empty if joints differ."""
     units = {(leg.joint.force_unit, leg.joint.unit) for leg in tuning.robot.legs}
     if tuning.controller.law_name == "computed_torque":
@@ -98,7 +98,7 @@ def _gain_units(tuning: Tuning) -> list[str]:
     return [first, f"{force} s/{unit}"]
 
 
-def _force_units(robot: Manipulator) -> list[str]:
+def force_units(robot: Manipulator) -> list[str]:
     """Return the units of the trials' forces: shares if a drive's largest force is known."""
     known = zip(np.isfinite(limits_of(robot).force), robot.legs, strict=True)
     units = ("share" if sure else leg.joint.force_unit for sure, leg in known)

@@ -45,7 +45,7 @@ _CODE = r"<code>\g<0></code>"
 """HTML of a command."""
 
 
-def significant(value: float, digits: int = 3) -> str:
+def significant(number: float, digits: int = 3) -> str:
     r"""Return a number to significant digits, tiny and huge ones with a power of ten.
 
     Examples
@@ -53,20 +53,20 @@ def significant(value: float, digits: int = 3) -> str:
     >>> significant(0.0123456), significant(1234.6), significant(-2.0, 2), significant(-6e-14, 2)
     ('0.0123', '1235', '−2.0', '−6.0\xa0×\xa010⁻¹⁴')
     """
-    if not isfinite(value):
-        return "∞" if value > 0 else "\u2013"
-    if value == 0.0:
+    if not isfinite(number):
+        return "∞" if number > 0 else "\u2013"
+    if number == 0.0:
         return "0"
     # 999.6 is 1000 in three digits: the size counts after rounding.
-    text = f"{value:.{digits - 1}e}"
+    text = f"{number:.{digits - 1}e}"
     rounded = float(text)
     if not _TINY <= abs(rounded) < _HUGE:
         mantissa, _, power = text.partition("e")
         return f"{mantissa.replace('-', _MINUS)}{_SPACE}\u00d7{_SPACE}{power_of_ten(int(power))}"
-    return format_fixed(value, max(digits - 1 - floor(log10(abs(rounded))), 0))
+    return format_fixed(number, max(digits - 1 - floor(log10(abs(rounded))), 0))
 
 
-def percent(value: float, digits: int = 3) -> str:
+def percent(share: float, digits: int = 3) -> str:
     r"""Return a percentage; below the least one shown it is "< least %".
 
     Examples
@@ -74,12 +74,12 @@ def percent(value: float, digits: int = 3) -> str:
     >>> percent(12.345), percent(3.1e-10)
     ('12.3\xa0%', '<\xa00.001\xa0%')
     """
-    if 0.0 <= value < _LEAST:
+    if 0.0 <= share < _LEAST:
         return f"<\u00a0{_LEAST:g}\u00a0%"
-    return f"{significant(value, digits)}\u00a0%"
+    return f"{significant(share, digits)}\u00a0%"
 
 
-def format_fixed(value: float, places: int = 1) -> str:
+def format_fixed(number: float, places: int = 1) -> str:
     """Return a number with `places` decimals, a true minus sign and no negative zero.
 
     Examples
@@ -87,13 +87,13 @@ def format_fixed(value: float, places: int = 1) -> str:
     >>> format_fixed(-12.34), format_fixed(-0.001)
     ('−12.3', '0.0')
     """
-    text = f"{value:.{places}f}"
+    text = f"{number:.{places}f}"
     if float(text) == 0.0:
         text = text.lstrip("-")
     return text.replace("-", _MINUS)
 
 
-def value_with_uncertainty(value: float, half: float) -> tuple[str, str]:
+def value_with_uncertainty(estimate: float, half: float) -> tuple[str, str]:
     """Return a value and half its interval as texts, both rounded to two digits of the half.
 
     Examples
@@ -101,12 +101,12 @@ def value_with_uncertainty(value: float, half: float) -> tuple[str, str]:
     >>> value_with_uncertainty(1.2361326, 0.012752), value_with_uncertainty(-0.004113744, 4.4e-05)
     (('1.236', '0.013'), ('−0.004114', '0.000044'))
     """
-    if not isfinite(half) or half <= abs(value) * 10.0 ** (1 - _DIGITS):
-        digits = _DIGITS if 0.0 < half < abs(value) else 6
-        return significant(value, digits), significant(half, 2)
+    if not isfinite(half) or half <= abs(estimate) * 10.0 ** (1 - _DIGITS):
+        digits = _DIGITS if 0.0 < half < abs(estimate) else 6
+        return significant(estimate, digits), significant(half, 2)
     # 0.0996 is 0.10 in two digits: the size counts after rounding.
     places = max(1 - floor(log10(float(f"{half:.1e}"))), 0)
-    return format_fixed(value, places), format_fixed(half, places)
+    return format_fixed(estimate, places), format_fixed(half, places)
 
 
 def _millimetres(metres: float, places: int = 1) -> str:
@@ -114,14 +114,14 @@ def _millimetres(metres: float, places: int = 1) -> str:
     return format_fixed(1e3 * float(metres), places)
 
 
-def compact(value: float, digits: int = 4) -> str:
+def compact(number: float, digits: int = 4) -> str:
     """Return a number to at most `digits` significant digits, without trailing zeros."""
-    return "0" if abs(value) < 1e-9 else f"{value:.{digits}g}".replace("-", _MINUS)
+    return "0" if abs(number) < 1e-9 else f"{number:.{digits}g}".replace("-", _MINUS)
 
 
-def triple(values: Iterable[float], factor: float = 1.0, digits: int = 4) -> str:
+def triple(vector: Iterable[float], factor: float = 1.0, digits: int = 4) -> str:
     """Return a vector in brackets, each component formatted by `compact`."""
-    return f"({', '.join(compact(factor * value, digits) for value in values)})"
+    return f"({', '.join(compact(factor * component, digits) for component in vector)})"
 
 
 def prose(text: str) -> Markup:
@@ -137,9 +137,9 @@ def resource(name: str, folder: str = "report") -> Markup:
     return Markup((files("pteron") / folder / name).read_text(encoding="utf-8"))
 
 
-def embed_json(data: Any) -> Markup:
+def embed_json(content: Any) -> Markup:
     """Return data as JSON for a page's script element, "<" escaped."""
-    text = json.dumps(data, separators=(",", ":"), allow_nan=False)
+    text = json.dumps(content, separators=(",", ":"), allow_nan=False)
     return Markup(text.replace("<", "\\u003c"))
 
 

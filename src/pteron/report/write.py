@@ -65,8 +65,8 @@ def write_report(robot: RobotLike, folder: str | Path, *, motion: Given | None =
 
     target = checked_folder(folder)
     report = contents(robot, None if motion is None else playback(robot, motion))
-    data = json_text(numbers(report))
-    return write_texts(target, {"report.html": page(report), "report.json": data})[0]
+    report_json = json_text(numbers(report))
+    return write_texts(target, {"report.html": page(report), "report.json": report_json})[0]
 
 
 def write_motion_page(robot: RobotLike, motion: Given, path: str | Path) -> Path:

@@ -113,7 +113,7 @@ def stop_reason(robot: Manipulator, beyond: Array) -> str:
         i = int(room.argmin())
         leg = robot.legs[i]
         assert leg.limits is not None
-        limit = min(leg.limits, key=lambda value: abs(value - joints[i]))
+        limit = min(leg.limits, key=lambda end: abs(end - joints[i]))
         name, unit = leg.joint.noun, leg.joint.unit
         return f"The {name} of leg {i + 1} is at its limit, {readable(limit, unit)}"
     for joint in limited_joints(robot, beyond):

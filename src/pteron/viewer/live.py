@@ -64,7 +64,7 @@ class Live:
         self._actions: dict[str, Callable[[], object]] = {}
         self._wake = threading.Condition()
         self._closed = False
-        self._tabs, self._kept = set[Tab](), dict[str, str]()
+        self._tabs, self._last_messages = set[Tab](), dict[str, str]()
         self._files: dict[Tab, str] = {}
         self._last: tuple[str, float] = ("", 0.0)
         self._sliced: tuple[object, ...] = ()
@@ -108,7 +108,7 @@ class Live:
         """Send a new tab its contents."""
         with self._wake:
             self._tabs.add(tab)
-            for kind, message in self._kept.items():
+            for kind, message in self._last_messages.items():
                 tab.send(kind, message)
 
     def close_tab(self, tab: Tab) -> None:
@@ -164,15 +164,15 @@ class Live:
         threading.Thread(target=compile_equations, name="pteron push", daemon=True).start()
 
     def _tell(self, text: str) -> None:
-        """Stop the motion and show a message."""
+        """Stop the motion, and show a message on the page."""
         self.session.playing = False
         self.session.state = stop_motion(self.session.state, _sentence(text))
 
-    def _send(self, kind: str, data: dict[str, Any]) -> None:
+    def _send(self, kind: str, content: dict[str, Any]) -> None:
         """Send data of a kind to all tabs, and store it for new tabs."""
-        text = json.dumps({kind: data}, allow_nan=False)
+        text = json.dumps({kind: content}, allow_nan=False)
         with self._wake:
-            self._kept[kind] = text
+            self._last_messages[kind] = text
             for tab in self._tabs:
                 tab.send(kind, text)
 
@@ -278,9 +278,9 @@ class Live:
             },
         )
         if settled:
-            values = panel.settled_values(session, lambda: bool(self._actions))
-            if values is not None:
-                self._send("settled", values)
+            shown = panel.settled_values(session, lambda: bool(self._actions))
+            if shown is not None:
+                self._send("settled", shown)
                 self._show_slice()
 
     def _show_slice(self) -> None:
@@ -289,8 +289,8 @@ class Live:
         plane = choices(state.robot).get(self.session.plane)
         # A map shows where the machine is, too.
         fixed_coordinates = [
-            value
-            for name, value in zip(state.robot.coordinates, state.pose, strict=True)
+            coordinate
+            for name, coordinate in zip(state.robot.coordinates, state.pose, strict=True)
             if not isinstance(plane, str) or name not in plane
         ]
         key = (plane, state.robot, *np.round(fixed_coordinates, 9)) if plane else ()
@@ -309,9 +309,9 @@ class Live:
         self._send("slice", {"parts": parts, "map": map_})
 
 
-def _finite_or_none(values: Any) -> list[float | None]:
+def _finite_or_none(numbers: Any) -> list[float | None]:
     """Return values as floats; None, which JSON can hold, for NaN and infinities."""
-    return [float(value) if np.isfinite(value) else None for value in values]
+    return [float(number) if np.isfinite(number) else None for number in numbers]
 
 
 def _sentence(text: str) -> str:

@@ -15,7 +15,7 @@ _LARGEST = 100 << 20
 """Greatest size of a file, bytes; the motion of a larger one takes minutes to compute."""
 
 
-def motion_of_file(robot: Manipulator, name: str, data: bytes, start: Array) -> Motion:
+def motion_of_file(robot: Manipulator, name: str, content: bytes, start: Array) -> Motion:
     """Return the motion that a file holds.
 
     The ending of its name says whether it is CSV or Parquet; `start` is a pose of the assembly mode
@@ -25,9 +25,9 @@ def motion_of_file(robot: Manipulator, name: str, data: bytes, start: Array) -> 
     ending = PurePath(name).suffix.lower()
     if ending not in ENDINGS:
         raise DataError(f"{source}: a motion's file ends in {' or '.join(ENDINGS)}")
-    if len(data) > _LARGEST:
-        size, most = len(data) >> 20, _LARGEST >> 20
+    if len(content) > _LARGEST:
+        size, most = len(content) >> 20, _LARGEST >> 20
         raise DataError(f"{source}: {size} MB given, {most} MB or less expected; cut a part out")
-    if not data:
+    if not content:
         raise DataError(f"{source}: is empty")
-    return playback(robot, read_content(robot, data, source), start).motion
+    return playback(robot, read_content(robot, content, source), start).motion

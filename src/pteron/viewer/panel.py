@@ -14,6 +14,7 @@ import numpy as np
 from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
+from pteron.manipulator.variants import elbow_signs
 from pteron.platforms.coordinates import SHOWN
 from pteron.report.motion_frames import view_frame
 from pteron.report.typeset import format_fixed
@@ -43,7 +44,7 @@ def controls(session: Session) -> dict[str, Any]:
         "lengths": len(robot.platform.lengths),
         "angles": len(robot.platform.angles),
         "hint": f"{' '.join(robot.coordinates)} in {pose_units(robot)}, such as {home}",
-        "modes": [signs(mode) for mode in session.modes()],
+        "modes": [elbow_signs(mode) for mode in session.modes()],
         "planes": list(choices(robot)),
         "slice": [[SERVES, "in reach"], [BEYOND, "beyond a joint's limit"]],
         "speeds": list(SPEEDS),
@@ -73,7 +74,7 @@ def values(session: Session, joints: Array) -> dict[str, Any]:
         "joints": _tenths(np.array(joints_in_display_units(state.robot, joints))),
         "payload": f"{state.payload:g}",
         "payloadDoubt": state.payload_doubt,
-        "mode": signs(leg.elbow for leg in state.robot.legs),
+        "mode": elbow_signs(leg.elbow for leg in state.robot.legs),
         "screws": session.screws,
         "plane": session.plane,
         "speed": next(name for name, factor in SPEEDS.items() if factor == session.speed),
@@ -90,8 +91,8 @@ def values(session: Session, joints: Array) -> dict[str, Any]:
 
 def _pose_text(robot: Manipulator, pose: Array) -> str:
     """Return the text of a pose (m,), each unit named once."""
-    values, units = pose_factors(robot) * pose, (SHOWN[unit][0] for unit in robot.units)
-    named = zip(robot.coordinates, values, units, strict=True)
+    coordinates, units = pose_factors(robot) * pose, (SHOWN[unit][0] for unit in robot.units)
+    named = zip(robot.coordinates, coordinates, units, strict=True)
     groups = groupby(
         ((f"{name} {format_fixed(x)}", unit) for name, x, unit in named), lambda pair: pair[1]
     )
@@ -260,7 +261,7 @@ class _Request:
 
     def mode(self) -> _Action:
         """Return the action that sets the working mode."""
-        elbows = {signs(mode): mode for mode in self.session.modes()}[self.fields["mode"]]
+        elbows = {elbow_signs(mode): mode for mode in self.session.modes()}[self.fields["mode"]]
         return "mode", lambda: self.session.set_working_mode(elbows)
 
     def speed(self) -> _Action:
@@ -318,8 +319,3 @@ def _tenths(array: Array) -> list[float]:
     """Return an array as a list, rounded to tenths."""
     rounded: list[float] = (np.round(array, 1) + 0.0).tolist()
     return rounded
-
-
-def signs(mode: Any) -> str:
-    """Return the signs of a working mode's elbows as text."""
-    return "".join("+" if side > 0 else "-" for side in mode)

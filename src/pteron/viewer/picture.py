@@ -146,7 +146,7 @@ class ViewerPicture:
 
 
 def _round(axis: Array, arm: Array, angle: float) -> Array:
-    """Return unit vectors (K, 3) across an axis, turned by up to an angle from an arm's side on."""
+    """Return unit vectors (K, 3) on an arc about an axis, from an arm's direction on."""
     normal = np.cross(axis, arm)
     if np.linalg.norm(normal) < 1e-6 * np.linalg.norm(arm):  # an arm along the axis has no side
         normal = np.cross(axis, np.eye(3)[np.abs(axis).argmin()])

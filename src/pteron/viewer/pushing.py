@@ -80,21 +80,21 @@ class Push:
         off = f"Drives off: {'it falls' if pull > _NO_PULL else 'nothing holds it'}"
         self.does = off if self._law is None else "The drives hold its pose"
         self._arm: Array | None = None
-        self._held = np.zeros(3)
+        self._spring_end = np.zeros(3)
         self._move(_PERIOD)  # the first call compiles
         self._begin(pose, zeros)
 
     @property
     def spring(self) -> tuple[Array, Array] | None:
         """The spring's ends, m; None without a spring."""
-        return None if self._arm is None else (self._grip()[0], self._held)
+        return None if self._arm is None else (self._grip()[0], self._spring_end)
 
     def pull(self, grip: Array, spring_end: Array) -> None:
         """Attach a loose spring at `grip` (3,), m, and set its free end (3,), m."""
         if self._arm is None:
             place, axes = self._robot.platform.placement(self.pose)
             self._arm = axes @ (grip - place)
-        self._held = spring_end
+        self._spring_end = spring_end
 
     def release(self) -> None:
         """Let the spring go."""
@@ -147,7 +147,7 @@ class Push:
         rotors = np.array([leg.drive.inertia if leg.drive else 0.0 for leg in robot.legs])
         if self._arm is not None:
             place, axes = robot.platform.placement(pose)
-            stretch = float(np.linalg.norm(self._held - place - self._arm @ axes))
+            stretch = float(np.linalg.norm(self._spring_end - place - self._arm @ axes))
         bodies = kinetic_energy(robot, pose, velocity, on_failure="nan")
         bodies = bodies + potential_energy(robot, pose, on_failure="nan")
         return float(bodies + 0.5 * rotors @ rates**2 + 0.5 * self.stiffness * stretch**2)
@@ -177,6 +177,6 @@ class Push:
             ahead = self._robot.platform.placement(self.pose + 1e-6 * self.velocity)
             speed = (ahead[0] + self._arm @ ahead[1] - grip) / 1e-6
             damping = 2.0 * _DAMPING * np.sqrt(self.stiffness * self._mass)
-            force = self.stiffness * (self._held - grip) - damping * speed
+            force = self.stiffness * (self._spring_end - grip) - damping * speed
         moment = np.cross(arm, force)
         return platform.wrench_of(force, moment)

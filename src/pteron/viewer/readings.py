@@ -99,14 +99,14 @@ def readings(state: ViewerState, forces: Array | None = None) -> Readings:
     )
 
 
-def level(value: float) -> Level:
-    """Return the level of a margin, which is at most 1.
+def level(share: float) -> Level:
+    """Return the level of a margin, 1 at best and 0 at a singularity or limit: "far" and so on.
 
     Examples
     --------
     >>> level(0.8), level(0.2), level(0.0)
     ('far', 'near', 'close')
     """
-    if value >= _NEAR:
+    if share >= _NEAR:
         return "far"
-    return "near" if value >= _CLOSE else "close"
+    return "near" if share >= _CLOSE else "close"

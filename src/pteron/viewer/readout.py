@@ -9,7 +9,7 @@ import numpy as np
 from jinja2 import Template
 
 from pteron.manipulator.readings import has_readings, to_readings
-from pteron.plots.canvas import LEG_COLORS
+from pteron.plots.leg_curves import LEG_COLORS
 from pteron.report.quantities import nouns, readable
 from pteron.report.typeset import format_fixed, template
 from pteron.viewer.readings import Level, Readings, level

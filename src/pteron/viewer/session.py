@@ -55,13 +55,13 @@ _MARGIN = 0.08
 """Share by which the range of poses is extended for sliders."""
 
 _RIM = 0.05
-"""The same for joints."""
+"""Share by which the range of joint coordinates is extended for sliders."""
 
 _KEPT = 200
 """Most states that can be undone."""
 
 _ALONG = 241
-"""Poses along each coordinate at which the platform is asked whether it may go there."""
+"""Poses along each coordinate at which it is tested whether the platform may go there."""
 
 _FRAME = 1.0 / 60.0
 """Time of a step of a motion, s."""
@@ -104,7 +104,7 @@ class Session:
         self.push: Push | None = None
         self.preparing = False
         self.screws, self.plane = False, NONE
-        self._before = list[ViewerState]()
+        self._undo_states = list[ViewerState]()
         self._set_ranges()
 
     def _set_ranges(self) -> None:
@@ -147,24 +147,24 @@ class Session:
     def remember(self) -> None:
         """Save the state for `undo`."""
         if not self.playing and self.push is None:
-            self._before = [*self._before[-_KEPT:], self.state]
+            self._undo_states = [*self._undo_states[-_KEPT:], self.state]
 
     def undo(self) -> None:
         """Restore the state before the last action."""
-        if not self._before:
+        if not self._undo_states:
             self.state = stop_motion(self.state, "There is nothing to undo.")
             return
         self._end_motion()
-        was = self._before.pop()
+        was = self._undo_states.pop()
         if was.robot != self.state.robot:
             self.state = move_home(was)
             self._set_ranges()
         self.state = stop_motion(was)
 
-    def set_coordinate(self, i: int, value: float) -> None:
+    def set_coordinate(self, i: int, coordinate: float) -> None:
         """Move the platform along one of its pose's coordinates, from 0, to a value in m or rad."""
         target = self.state.pose.copy()
-        target[i] = value
+        target[i] = coordinate
         self.set_pose(target)
 
     def set_pose(self, target: Array) -> None:
@@ -190,10 +190,10 @@ class Session:
         if hint := metres_hint(self.state.robot, pose):
             self.state = replace(self.state, message=f"{hint} {self.state.message}".strip())
 
-    def set_joint(self, i: int, value: float) -> None:
+    def set_joint(self, i: int, coordinate: float) -> None:
         """Move one joint, from 0, to a value in m or rad."""
         self._end_motion()
-        self.state = move_joint(self.state, i, value)
+        self.state = move_joint(self.state, i, coordinate)
 
     def set_payload(self, text: str) -> None:
         """Set the payload from a text, kg."""
@@ -259,9 +259,9 @@ class Session:
         self.push = None
         self.state = stop_motion(self.state)
 
-    def load(self, name: str, data: bytes) -> None:
+    def load(self, name: str, content: bytes) -> None:
         """Load a motion from a file's name and content; playback starts at its beginning."""
-        motion = motion_of_file(self.state.robot, name, data, self.state.pose)
+        motion = motion_of_file(self.state.robot, name, content, self.state.pose)
         self.take(motion, name)
 
     def load_standard(self) -> None:

@@ -72,23 +72,23 @@ def slice_map(robot: Manipulator, pose: Array, plane: Plane, span: Array) -> str
 def _sides(
     robot: Manipulator, pose: Array, plane: str, sides: tuple[float, ...]
 ) -> tuple[float, float, float, float]:
-    """Return the extent of the reach in a slice; a side beyond which it continues is unchanged."""
+    """Return the sides of the reach in a slice; one beyond which the reach goes on is unchanged."""
     first_low, first_high, low, high = sides
     wide, tall = first_high - first_low, high - low
     extent = first_low - wide, first_high + wide, low - tall, high + tall
     cut = reach_slice(robot, pose, plane, extent=extent, points=_COARSE)
     is_reached = cut.leg_margins.min(axis=-1) >= 0.0
     extent_ends = list[float]()
-    for values, axis, ends in (
+    for coordinates, axis, ends in (
         (cut.first, 0, (first_low, first_high)),
         (cut.second, 1, (low, high)),
     ):
-        at, step = np.flatnonzero(is_reached.any(axis=axis)), float(values[1] - values[0])
+        at, step = np.flatnonzero(is_reached.any(axis=axis)), float(coordinates[1] - coordinates[0])
         if not len(at):
-            at = np.array([0, len(values) - 1])
+            at = np.array([0, len(coordinates) - 1])
         extent_ends += [
-            ends[0] if at[0] == 0 else float(values[at[0]]) - step,
-            ends[1] if at[-1] == len(values) - 1 else float(values[at[-1]]) + step,
+            ends[0] if at[0] == 0 else float(coordinates[at[0]]) - step,
+            ends[1] if at[-1] == len(coordinates) - 1 else float(coordinates[at[-1]]) + step,
         ]
     return extent_ends[0], extent_ends[1], extent_ends[2], extent_ends[3]
 

@@ -14,10 +14,10 @@ _ROUNDS = 40
 """Most steps along the boundary."""
 
 _STRIDE = 0.15
-"""Longest of them, as a share of the longest leg's size."""
+"""Greatest length of a step, as a share of the longest leg's size."""
 
 _TURN = 0.3
-"""Most that an angle changes in one, rad."""
+"""Greatest change of an angle in a step, rad."""
 
 _WITHIN = 2e-4
 """Margin that is kept to the end of a leg's reach, as a share of the leg's size."""
@@ -81,7 +81,7 @@ def _weights(robot: Manipulator) -> Array:
 
 
 def _step(robot: Manipulator, pose: Array, wish: Array, weights: Array) -> Array:
-    """Return the step (m,) nearest to a desired one that keeps the linearised margins.
+    """Return the step (m,) nearest to a desired one at which linearised margins stay positive.
 
     Least distance programming by non-negative least squares (Lawson and Hanson, chapter 23).
     """

@@ -22,7 +22,7 @@ from pteron.viewer.sliding import nearest_reachable_pose
 from pteron.workspace import home_pose
 
 _METRES = 3.0
-"""Largest length, mm, up to which it is asked whether what was typed is in m."""
+"""Largest length, mm, up to which a hint asks whether it was typed in m."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,14 +84,14 @@ def move_platform(state: ViewerState, target: Array) -> ViewerState:
     return _stop_at(state, last, f"{why}. The platform is {distance} from the pose asked for.")
 
 
-def move_joint(state: ViewerState, i: int, value: float) -> ViewerState:
+def move_joint(state: ViewerState, i: int, coordinate: float) -> ViewerState:
     """Return the machine with a joint, from 0, moved; the assembly mode is unchanged.
 
     It stops where a leg, a limit or the end of the assembly mode stops it.
     """
     joints = state.joints
     target = joints.copy()
-    target[i] = value
+    target[i] = coordinate
     last, beyond = follow_joints(state.robot, state.pose, joints, target)
     if beyond is None:
         return _stop_at(state, last)
@@ -103,7 +103,7 @@ def move_joint(state: ViewerState, i: int, value: float) -> ViewerState:
 def assembly_poses(state: ViewerState) -> Array:
     """Return the poses (K, m) with the same joint coordinates, in the robot's working mode."""
     try:
-        poses = direct_kinematics(state.robot, state.joints)
+        poses = direct_kinematics(state.robot, state.joints, on_failure="nan")
     except PteronError:
         return state.pose[None]
     return np.asarray(poses[~np.isnan(poses).any(axis=-1)])
@@ -207,13 +207,13 @@ def pose_units(robot: Manipulator) -> str:
 def _number(text: str, name: str, expected: str) -> float:
     """Return a text as a finite number; a `DataError` says what is expected."""
     try:
-        value = float(text)
+        number = float(text)
     except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
+        number = math.nan
+    if not math.isfinite(number):
         comma = "; write the decimal sign as a point" if "," in text else ""
         raise DataError(f"{name}: {shorten(text)} given, {expected} expected{comma}")
-    return value
+    return number
 
 
 def state_in_motion(state: ViewerState, motion: Motion, time: float) -> ViewerState:

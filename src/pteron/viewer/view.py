@@ -46,7 +46,8 @@ class Viewer:
         handlers: dict[str, Any] = {"/": live}
         if beside:
             every = (live, *beside)
-            handlers = {"/": lambda: _render_side_by_side([page.name for page in every])}
+            names = [page.name for page in every]
+            handlers = {"/": lambda: template("beside.html.j2", "viewer").render(names=names)}
             handlers |= {f"/{k}": page for k, page in enumerate(every, start=1)}
         self._server: Server | None = Server(host, port, handlers)
         self.port = self._server.port
@@ -120,11 +121,6 @@ class Viewer:
         if self._server is not None:
             self._server.stop()
             self._server = None
-
-
-def _render_side_by_side(names: Sequence[str]) -> str:
-    """Return the HTML page that shows viewers of several names side by side."""
-    return template("beside.html.j2", "viewer").render(names=names)
 
 
 def view(

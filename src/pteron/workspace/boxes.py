@@ -10,7 +10,7 @@ from pteron.kernels import Array
 
 
 def vary_coordinates(pose: Array, coordinates: Array, indices: Any = None) -> Array:
-    """Return poses (..., m) with values (..., k) of some coordinates, the others from a pose.
+    """Return poses (..., m) with values (..., k) of some coordinates, the others from a pose (m,).
 
     `where` says for which, such as their indices (k,); by default they are the first.
     """

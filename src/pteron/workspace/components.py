@@ -144,10 +144,8 @@ def lattice(paving: Paving, most: int = _CELLS) -> Lattice:
     sizes = [list(paving.group_by_size(boxes)) for boxes in (paving.inner, paving.boundary)]
     finest = np.array([depth for depth, _ in chain(*sizes)]).max(axis=0, initial=0)
     nonempty = np.concatenate([paving.inner, paving.boundary])
-    low, high = (
-        (nonempty[:, 0].min(axis=0) - start) / extent,
-        (nonempty[:, 1].max(axis=0) - start) / extent,
-    )
+    low = (nonempty[:, 0].min(axis=0) - start) / extent
+    high = (nonempty[:, 1].max(axis=0) - start) / extent
     while np.prod(np.ceil((high - low) * 2.0**finest) + 1.0) > most:
         finest[finest.argmax()] -= 1
     first = np.floor(low * 2.0**finest + ROUNDING).astype(np.int64)

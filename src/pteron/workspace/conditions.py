@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pteron.arguments import expect
-from pteron.equations.edges import Edge, edges
+from pteron.equations.edges import edges
 from pteron.equations.machine import Machine
 from pteron.errors import DataError
 from pteron.kernels import Array, bounded_function, layout_of, numeric
@@ -73,15 +73,10 @@ EDGES = ("stretched", "folded", _CAUSES["reach"])
 """The causes that are edges of a leg's reach, where its elbow may change its side."""
 
 
-def _clause(edge: Edge) -> str:
-    """Return the phrase for the edge of a condition, such as "at the edge of its reach"."""
-    return _CAUSES.get(edge.cause, edge.cause).format(edge.noun)
-
-
 def conditions(
     robot: RobotLike, *, type_i: float = 0.0, type_ii: float = 0.0
 ) -> tuple[Condition, ...]:
-    """Return the conditions on a pose: each leg's reach, all joints' limits, and two floors.
+    """Return the conditions on a pose: each leg's reach, all joints' limits, two optional floors.
 
     Parameters
     ----------
@@ -127,8 +122,8 @@ def _edges(layout: Manipulator) -> tuple[Condition, ...]:
     """Return the conditions of reach and limits, cached for machines of a topology."""
     pose = ca.SX.sym("pose", layout.freedom)
     return tuple(
-        Condition(edge.leg, _clause(edge), "room", "room", k)
-        for k, edge in enumerate(edges(Machine.numeric(layout), pose))
+        Condition(e.leg, _CAUSES.get(e.cause, e.cause).format(e.noun), "room", "room", k)
+        for k, e in enumerate(edges(Machine.numeric(layout), pose))
     )
 
 
@@ -164,12 +159,12 @@ class IntervalTest:
     """
 
     def __init__(self, robot: Manipulator, required: Sequence[Condition]) -> None:
-        self.given = tuple(required)
-        if not 0 < len(self.given) <= _MOST:
-            raise DataError(f"given: {len(self.given)} conditions, 1 to {_MOST} expected")
-        self.all = np.uint64((1 << len(self.given)) - 1)
+        self.conditions = tuple(required)
+        if not 0 < len(self.conditions) <= _MOST:
+            raise DataError(f"given: {len(self.conditions)} conditions, 1 to {_MOST} expected")
+        self.all = np.uint64((1 << len(self.conditions)) - 1)
         self._rows = []
-        for condition in self.given:
+        for condition in self.conditions:
             function = bounded_function(robot, condition.what)
             self._rows.append((function, function.rows(condition.output)[condition.element]))
 
@@ -183,7 +178,7 @@ class IntervalTest:
         and none is any more of a box that lies outside.
         """
         outside, open_ = np.zeros(len(low), bool), open_.copy()
-        for c, condition in enumerate(self.given):
+        for c, condition in enumerate(self.conditions):
             bit = np.uint64(1 << c)
             chosen = np.flatnonzero((open_ & bit != 0) & ~outside)
             if not len(chosen):
@@ -195,12 +190,13 @@ class IntervalTest:
         return outside, open_
 
     def undecided_conditions(self, low: Array, high: Array) -> NDArray[np.bool_]:
-        """Return which conditions (B, C) may fail in a box, where they are defined.
+        """Return which conditions (B, C) may fail in each box with corners (B, m).
 
-        A limit is not undefined by itself, but out of reach: it is the reach that ends there.
+        A condition that is undefined in a box, such as a limit out of reach, counts as kept: it is
+        the reach that fails there.
         """
-        may_fail = np.empty((len(low), len(self.given)), bool)
-        for c, condition in enumerate(self.given):
+        may_fail = np.empty((len(low), len(self.conditions)), bool)
+        for c, condition in enumerate(self.conditions):
             may_fail[:, c] = ~(self.bounds(c, low, high)[0] >= condition.floor)
         return may_fail
 
@@ -209,7 +205,7 @@ class IntervalTest:
         function, row = self._rows[c]
         enclosures = function(low, high, [row])
         least, most, defined = enclosures[0][:, 0], enclosures[1][:, 0], enclosures[2][:, 0]
-        if self.given[c].sized:
+        if self.conditions[c].sized:
             size = np.maximum(np.maximum(least, np.negative(most)), 0.0)
             least, most = size, np.maximum(np.negative(least), most)
         return least, most, defined

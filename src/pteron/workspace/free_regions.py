@@ -143,7 +143,7 @@ def free_of_singularities(
 
 
 def _refutation(robot: Manipulator, pose: Array, examined: int) -> FreeRegion:
-    """Return the result that a region is not free of type-II singularities: a pose refutes it."""
+    """Return the result for a region with a singular pose, which is not free of them."""
     measure = abs(float(numeric(robot, "type_ii")(pose)[0]))
     return FreeRegion(False, pose, measure, examined, np.empty((0, 2, robot.freedom)))
 

@@ -92,7 +92,7 @@ def measure_holding(robot: Manipulator, home: Array) -> Holding:
 
 @lru_cache(maxsize=256)
 def _singular_distances(robot: Manipulator, home: tuple[float, ...]) -> tuple[float, float, float]:
-    """Return L, and the distances to singularity, m: at home, and the greatest of all poses."""
+    """Return the length L and the distances to singularity at home and at the best pose, m."""
     poses = np.array([home])
     drawn = draw_poses(robot, _POSES, np.random.default_rng(0), limits=False)
     distances = coordinate_distances(robot, np.vstack([poses, drawn]))
@@ -124,7 +124,7 @@ def _holding_forces(robot: Manipulator, poses: Array) -> Array:
 
 
 def expect_regular(robot: Manipulator, home: Array) -> None:
-    """Refuse a machine that is singular in every pose up to the rounding of its file.
+    """Raise ModelError if a machine is singular in every pose, up to the rounding of its file.
 
     Raises
     ------
@@ -145,20 +145,20 @@ def expect_regular(robot: Manipulator, home: Array) -> None:
     least = float(least_singular_values(robot, home[None])[0])
     raise ModelError(
         f"singular everywhere within {_length(everywhere)} of these coordinates (type II), less "
-        f"than the {_length(rounding)} that files are rounded to: {figures}a load takes leg "
-        f"forces up to {1.0 / least:.2g} times as great at the best pose found; "
+        f"than the {_length(rounding)} that files are rounded to: {figures}leg forces are up to "
+        f"{1.0 / least:.2g} times a load at the best pose found; "
         "change the figure of the platform points or that of the guide points",
         subject=robot.name,
     )
 
 
 def holding_warnings(of: Holding) -> tuple[str, ...]:
-    """Return warnings of a platform that drives hold badly at home, or nearly singular there."""
+    """Return warnings of drives that hold the platform badly at home, or of a near singularity."""
     warnings = []
     if of.everywhere <= INACCURATE * of.rounding:
         warnings.append(
             f"legs: coordinates that differ by {_length(of.everywhere)} make the machine singular "
-            "(type II), in whichever pose: parts of ordinary accuracy may not hold the platform"
+            "(type II) at every pose: parts of ordinary accuracy may not hold the platform"
         )
     elif of.distance <= INACCURATE * of.rounding:
         warnings.append(
@@ -167,19 +167,19 @@ def holding_warnings(of: Holding) -> tuple[str, ...]:
         )
     if of.least_singular_value < LEAST_SINGULAR_VALUE:
         warnings.append(
-            f"home: least singular value {of.least_singular_value:.2g} of the unit rows (1 of "
-            "three perpendicular legs): a load takes leg forces up to "
-            f"{1.0 / of.least_singular_value:.2g} times as great, and errors of legs grow as much"
+            f"home: leg forces are up to {1.0 / of.least_singular_value:.2g} times a load, and "
+            "errors of the legs move the platform by as much (least singular value "
+            f"{of.least_singular_value:.2g} of the unit rows; 1 for three perpendicular legs)"
         )
     if of.force > HOLDING_FORCE:
         warnings.append(
-            f"home: to hold the weight, {of.weight:.3g} N, a leg has to push or pull with "
-            f"{of.force:.3g} times as much"
+            f"home: to hold the weight of the bodies, {of.weight:.3g} N, a leg has to push or pull "
+            f"with {of.force:.3g} times as much"
         )
     elif of.force_near > HOLDING_FORCE_NEAR:
         warnings.append(
-            f"home: near it a leg has to push or pull with {of.force_near:.3g} times the weight, "
-            f"{of.weight:.3g} N, to hold it: a singularity is near"
+            f"home: near it a leg has to push or pull with {of.force_near:.3g} times the weight of "
+            f"the bodies, {of.weight:.3g} N, to hold them: a singularity is near"
         )
     return tuple(warnings)
 

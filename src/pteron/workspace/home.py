@@ -12,20 +12,23 @@ from functools import lru_cache
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pteron.bodies.vectors import rotation_matrices
 from pteron.errors import ModelError
 from pteron.kernels import Array, geometry_only
 from pteron.kernels.program_cache import cached_result
 from pteron.kinematics import inverse_kinematics, singular_orientations
-from pteron.kinematics.sampling import search_ball
-from pteron.kinematics.simplex_ascent import climb
 from pteron.kinematics.singularities import best_type_ii
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.result import Result
-from pteron.tolerances import ROUNDING
 from pteron.workspace.holding import expect_regular
+from pteron.workspace.home_search import (
+    FIRST_STEPS,
+    distinct_poses,
+    home_margins,
+    pose_steps,
+    refine_poses,
+    tilting_angles,
+)
 from pteron.workspace.home_starts import (
     axis_poses,
     grid_poses,
@@ -35,32 +38,14 @@ from pteron.workspace.home_starts import (
 )
 from pteron.workspace.margins import pose_margins
 from pteron.workspace.reach_errors import limits_error, why_unreachable
+from pteron.workspace.simplest_pose import ON_AXIS, simplest_pose
 
 _STARTS = 8
 """Best poses of each kind, on each side of the base, that are improved by a local search."""
 
 _NEAR = 200
-"""Best candidates among which those that differ are chosen, and that the axis is sought with."""
+"""Number of best candidates from which distinct starts, and poses for the axis, are taken."""
 
-_LEVELLED = 4
-"""The best of these, made level, that are improved by another."""
-
-_CONVERGED, _GAIN = 1e-5, 1e-6
-"""Size of a simplex, in units of the longest leg and rad, and difference of its margins, below
-which it has converged."""
-
-_STEPS = (0.05, 0.2)
-"""Size of a local search's first simplex: share of the longest leg, and rad."""
-
-_ROUND = (0.1, 0.05, 0.01, 0.005, 0.001, 0.0001)
-"""Round numbers that the pose is rounded to, coarsest first: shares of the power of ten that the
-longest leg does not exceed."""
-
-_DEGREES = (30.0, 15.0, 5.0, 1.0)
-"""The same of angles, degrees."""
-
-_WORTH = 0.99
-"""Share of the best margin from which on a simpler pose is preferred."""
 
 _SIDE = 0.5
 """Share of the best margin from which on the side of the base along the platform's axis is
@@ -80,17 +65,7 @@ _ALIKE = 0.5
 none, and of others what a local search leaves."""
 
 _ENDS = 4
-"""Poses on each side from which such a way is sought."""
-
-_AXIS = 0.1
-"""Share of the best margin from which on a pose on the axis of a machine's symmetry is
-preferred."""
-
-_LEVEL = 0.75
-"""Share of the best margin from which on a level pose of a platform that tilts is preferred."""
-
-_MIDDLE = 0.9
-"""The share that the middle between equals must have: from there the machine moves every way."""
+"""Poses on each side between which a path across the base is tested."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -186,8 +161,8 @@ def home_poses(robot: RobotLike) -> HomePoses:
 
 
 def expect_usable(robot: Manipulator, pose: Array) -> None:
-    """Refuse a file's home pose (m,) that is out of reach or beyond limits."""
-    least = float(_worth(robot, pose[None])[0])
+    """Raise ModelError where a file's home pose (m,) is out of reach or beyond limits."""
+    least = float(home_margins(robot, pose[None])[0])
     if least <= 0.0:
         margins = pose_margins(robot, pose)
         legs = np.minimum(margins.type_i, margins.joints)
@@ -209,7 +184,7 @@ def _cached_home_poses(robot: Manipulator) -> tuple[tuple[float, ...], tuple[flo
 
 
 def _both_sides(robot: Manipulator) -> tuple[tuple[float, ...], tuple[float, ...] | None]:
-    """Return the home pose, and the best pose on the other side of the base, if it is as good."""
+    """Return the home pose, and the best one on the base's other side if it is mirrored."""
     singular_orientations(robot)  # refuses a machine that is singular everywhere
     try:
         best_type_ii(robot)
@@ -217,8 +192,8 @@ def _both_sides(robot: Manipulator) -> tuple[tuple[float, ...], tuple[float, ...
         raise why_unreachable(robot) from None
     candidates = _candidates(robot)
     starts = _starts(robot, candidates)
-    refined = np.concatenate([_refine_level_starts(robot, starts), _refine_poses(robot, starts)])
-    margins = _worth(robot, refined)
+    refined = np.concatenate([_refine_level_starts(robot, starts), refine_poses(robot, starts)])
+    margins = home_margins(robot, refined)
     most = float(margins.max())
     if most <= 0.0:
         reachable = ~np.isnan(inverse_kinematics(robot, refined, on_failure="nan")).any(axis=-1)
@@ -227,16 +202,16 @@ def _both_sides(robot: Manipulator) -> tuple[tuple[float, ...], tuple[float, ...
         )
     side = sides(robot, refined)
     if not _are_mirrored(robot, refined, margins, side):
-        home = _simplest(robot, refined, candidates)
+        home = simplest_pose(robot, refined, candidates[:_NEAR])
         expect_regular(robot, home)
         return tuple(home.tolist()), None
     candidate_sides = sides(robot, candidates)
-    pose, mirror = (
-        tuple(_simplest(robot, refined[side == sign], candidates[candidate_sides == sign]).tolist())
-        for sign in (1.0, -1.0)
-    )
-    expect_regular(robot, np.array(pose))
-    return pose, mirror
+    poses = []
+    for sign in (1.0, -1.0):
+        nearby = candidates[candidate_sides == sign][:_NEAR]
+        poses.append(simplest_pose(robot, refined[side == sign], nearby))
+    expect_regular(robot, poses[0])
+    return tuple(poses[0].tolist()), tuple(poses[1].tolist())
 
 
 def _are_mirrored(robot: Manipulator, poses: Array, margins: Array, side: Array) -> bool:
@@ -251,24 +226,24 @@ def _are_mirrored(robot: Manipulator, poses: Array, margins: Array, side: Array)
         for start, end in product(above[:_ENDS], below[:_ENDS])
         if (np.abs(start - end)[angular] <= _ALIKE).all()
     ]
-    if any(_leads(robot, start, end, _AXIS * most) for start, end in pairs):
+    if any(_leads(robot, start, end, ON_AXIS * most) for start, end in pairs):
         return False
     return bool(pairs) or (not branched and len(above) > 0 and len(below) > 0)
 
 
 def _leads(robot: Manipulator, start: Array, end: Array, least: float) -> bool:
-    """Return whether all poses on the straight line between two poses (m,) keep a margin."""
+    """Return whether all poses on the line between two poses (m,) keep a margin above `least`."""
     line = np.linspace(start, end, _BETWEEN)
-    return bool((_worth(robot, line) > least).all())
+    return bool((home_margins(robot, line) > least).all())
 
 
 def _candidates(robot: Manipulator) -> Array:
     """Return the initial candidates (K, m) of the search, best first, closed forms foremost."""
     on_axis = axis_poses(robot)
-    worth = _worth(robot, on_axis)
+    worth = home_margins(robot, on_axis)
     mid_range = mid_range_poses(robot, on_axis[np.argsort(-worth, kind="stable")])
     others = np.concatenate([mid_range, grid_poses(robot), random_box_poses(robot)])
-    poses, worth = np.concatenate([on_axis, others]), np.append(worth, _worth(robot, others))
+    poses, worth = np.concatenate([on_axis, others]), np.append(worth, home_margins(robot, others))
     candidates: Array = poses[np.argsort(-worth, kind="stable")]
     return candidates
 
@@ -280,18 +255,13 @@ def _starts(robot: Manipulator, candidates: Array) -> Array:
     starts = []
     for sign, flat in product((1.0, 0.0, -1.0), (True, False)):
         on_side = candidates[(side == sign) & (level == flat)][:_NEAR]
-        starts.append(_distinct(on_side, _steps(robot, *_STEPS))[:_STARTS])
+        starts.append(distinct_poses(on_side, pose_steps(robot, *FIRST_STEPS))[:_STARTS])
     return np.concatenate(starts)
 
 
 def has_exact_home(robot: Manipulator) -> bool:
     """Return whether home is defined by itself: in the file, or as the level pose."""
-    return robot.home is not None or bool(_tilting_angles(robot).any())
-
-
-def _tilting_angles(robot: Manipulator) -> NDArray[np.bool_]:
-    """Return which coordinates (m,) are 0 at level poses: none if it cannot tilt."""
-    return robot.platform.angular & robot.platform.tilts
+    return robot.home is not None or bool(tilting_angles(robot).any())
 
 
 def _refine_level_starts(robot: Manipulator, starts: Array) -> Array:
@@ -299,130 +269,7 @@ def _refine_level_starts(robot: Manipulator, starts: Array) -> Array:
 
     There are none of a platform that does not tilt: all its starts are improved as they are.
     """
-    tilting = _tilting_angles(robot)
+    tilting = tilting_angles(robot)
     if not tilting.any() or tilting.all():
         return starts[:0]
-    return _refine_poses(robot, starts[~starts[:, tilting].any(axis=-1)], ~tilting)
-
-
-def _simplest(robot: Manipulator, refined: Array, candidates: Array) -> Array:
-    """Return the simplest pose (m,) with nearly the best margin, of optima and candidates."""
-    margins = _worth(robot, refined)
-    most = float(margins.max())
-    level = _best_level_poses(robot, refined)
-    worth = _worth(robot, level)
-    nearby = candidates[:_NEAR]
-    if worth.max(initial=0.0) >= _LEVEL * most:
-        refined, nearby = level, nearby * ~robot.platform.angular
-        margins, most = worth, float(worth.max())
-    # Zero says where the joints are meant to be, where nothing else tells.
-    equals = refined[margins >= _WORTH * most]
-    best = _least_travel(robot, equals)
-    middle = _distinct(equals, _steps(robot, *_STEPS)).mean(axis=0)
-    if _worth(robot, middle) >= _MIDDLE * most:
-        best = middle
-    on_axis = _move_onto_axis(robot, np.concatenate([refined, nearby]))
-    worth = _worth(robot, on_axis)
-    if worth.max(initial=0.0) >= _AXIS * most:
-        best = _least_travel(robot, on_axis[worth >= _WORTH * worth.max()])
-    least = _WORTH * float(_worth(robot, best))
-    for k in range(robot.freedom if _tilting_angles(robot).any() else 0):
-        middle = np.where(np.arange(robot.freedom) == k, 0.0, best)
-        best = middle if _worth(robot, middle) >= least else best
-    decade = 10.0 ** np.ceil(np.log10(longest_leg(robot)))
-    for share, degrees in product(_ROUND, _DEGREES):
-        step = np.where(robot.platform.angular, np.radians(degrees), share * decade)
-        rounded: Array = np.round(best / step) * step + 0.0  # -0.0 becomes 0.0
-        if _worth(robot, rounded) >= least:
-            return rounded
-    return best
-
-
-def _least_travel(robot: Manipulator, poses: Array) -> Array:
-    """Return the pose whose joints are nearest to zero."""
-    travel = np.abs(inverse_kinematics(robot, poses)).max(axis=-1)
-    nearest: Array = poses[travel.argmin()]
-    return nearest
-
-
-def _best_level_poses(robot: Manipulator, poses: Array) -> Array:
-    """Return locally best poses with all angles 0; none if the platform does not tilt."""
-    tilting = _tilting_angles(robot)
-    if not tilting.any():
-        return poses[:0]
-    level = poses * ~tilting
-    if not tilting.all():
-        order = np.argsort(-_worth(robot, level), kind="stable")
-        level = _refine_poses(robot, level[order[:_LEVELLED]], ~tilting)
-    return level
-
-
-def _move_onto_axis(robot: Manipulator, poses: Array) -> Array:
-    """Return poses (K, m) moved onto the axis of the machine's symmetry; none if it has none.
-
-    A symmetry is a turn about the platform's axis after which each leg stands where another stood:
-    the margins are the same then.
-    """
-    center, _ = search_ball(robot)
-    directions, axis = robot.platform.directions, np.array(robot.platform.axis)
-    lengths, count, tilting = len(center), len(robot.legs), _tilting_angles(robot)
-    if poses[:, tilting].any():
-        return poses[:0]  # the turn would turn their angles too
-    offsets, direction = poses[:, :lengths] - center, directions @ axis
-    # Legs of a hexapod may stand in pairs, or in two halves.
-    folds = [count, *(k for k in (3, 2) if k < count)] if tilting.any() else [count]
-    for fold in folds:
-        turn = rotation_matrices(2.0 * np.pi / fold * axis)
-        images = poses.copy()
-        images[:, :lengths] = center + offsets @ (directions @ turn @ directions.T).T
-        if np.allclose(_worth(robot, images), _worth(robot, poses), rtol=0.0, atol=ROUNDING):
-            images[:, :lengths] = center + np.outer(offsets @ direction, direction)
-            return images
-    return poses[:0]
-
-
-def _distinct(poses: Array, spacing: Array) -> Array:
-    """Return poses (K, m) without those near an earlier pose."""
-    is_near = np.asarray((np.abs(poses[:, None] - poses) <= spacing).all(axis=-1))
-    return poses[[not is_near[i, :i].any() for i in range(len(poses))]]
-
-
-def _worth(robot: Manipulator, poses: Array) -> Array:
-    """Return the least margin (...), at most 0 where the platform is turned back."""
-    least = pose_margins(robot, poses).least
-    turned_share = np.abs(poses[..., robot.platform.angular]) / np.pi
-    worth = np.minimum(least, 1.0 - turned_share.max(axis=-1, initial=0.0))
-    return np.asarray(np.where(np.isfinite(worth), worth, -np.inf))
-
-
-def longest_leg(robot: Manipulator) -> float:
-    """Return the length of the longest leg, m, the scale of home's lengths."""
-    return max(leg.size for leg in robot.legs) or 1.0
-
-
-def _steps(robot: Manipulator, share: float, radians: float) -> Array:
-    """Return a step of each pose coordinate; lengths are a share of the longest leg."""
-    return np.where(robot.platform.angular, radians, share * longest_leg(robot))
-
-
-def _refine_poses(
-    robot: Manipulator, starts: Array, moved: NDArray[np.bool_] | None = None
-) -> Array:
-    """Return poses (S, m) with locally best margins, varied in the marked coordinates."""
-    movable = np.ones(robot.freedom, dtype=bool) if moved is None else moved
-    units = _steps(robot, 1.0, 1.0)[movable]
-
-    def poses(scaled: Array) -> Array:
-        """Return poses (..., m) from scaled values (..., k) of movable coordinates, others 0."""
-        # Simplices (S, ..., k), or points (4, S, k): coordinates that stay are alike, or 0.
-        all_coordinates = np.zeros((*scaled.shape[:-1], robot.freedom))
-        all_coordinates[..., movable] = scaled * units
-        return all_coordinates
-
-    steps = _steps(robot, *_STEPS)[movable] / units
-    edges = np.vstack([np.zeros(len(steps)), np.diag(steps)])
-    simplices = (starts[:, movable] / units)[:, None, :] + edges
-    best, _ = climb(
-        lambda scaled: _worth(robot, poses(scaled)), simplices, size=_CONVERGED, gain=_GAIN
-    )
-    return poses(best)
+    return refine_poses(robot, starts[~starts[:, tilting].any(axis=-1)], ~tilting)

@@ -30,10 +30,10 @@ _RANDOM = 2048
 """Random poses, somewhat more than those of the grid."""
 
 _LED = 64
-"""Best poses that Newton's method starts from."""
+"""Best poses from which Newton's method starts."""
 
 _NEWTON = 25
-"""Its steps: it doubles the digits with each of the last ones."""
+"""Steps of Newton's method: it doubles the digits with each of the last ones."""
 
 _UPRIGHT = 0.1
 """Height of the platform over its base, as a share of a leg's length, from which it is clearly on
@@ -100,7 +100,7 @@ def mid_range_poses(robot: Manipulator, starts: Array) -> Array:
 
 
 def sides(robot: Manipulator, poses: Array) -> Array:
-    """Return the side of the base of the platform at poses (K, m): 1, -1, or 0 for neither.
+    """Return on which side of its base the platform is at poses (K, m): 1, -1, or 0 for neither.
 
     1 is the side along the platform's axis; of a platform that moves across its axis alone, the
     side against gravity. The base is the mean of the guide points, of sliders that of where they

@@ -71,7 +71,7 @@ def failing_places(
 
 
 def _neighbourhood_extremes(array: Array, extreme: np.ufunc, count: int) -> Array:
-    """Return the least or greatest value of each point and its neighbours along `count` axes."""
+    """Return the least or greatest of each point and its neighbours, along `count` axes."""
     for axis in range(count):
         source = np.moveaxis(array, axis, 0)
         extremes = array.copy()

@@ -86,19 +86,17 @@ def pose_margins(robot: RobotLike, pose: PoseLike) -> PoseMargins:
     return PoseMargins(type_i, type_ii, shares, least)
 
 
-def least_margin_text(robot: Manipulator, pose: Array) -> str:
-    """Return the least margin of a pose (m,) and its cause, in words: "0.59 of the type-II ..."."""
+def least_margin_text(robot: Manipulator, pose: Array) -> tuple[str, str]:
+    """Return the least margin of a pose (m,) in percent, and what it is the distance to."""
     margins = pose_margins(robot, pose)
     least = float(margins.least)
     if float(margins.type_ii) <= least:
-        what = "of the greatest type-II measure of this layout, 0 where drives hold nothing"
+        cause = "a type-II singularity, where the drives cannot hold the platform (100 % is best)"
     elif float(margins.type_i.min()) <= least:
-        leg = _first_least(margins.type_i)
-        what = f"of leg {leg}'s type-I measure, 0 where it is stretched or folded"
+        cause = f"leg {_first_least(margins.type_i)} stretched or folded (100 % is best)"
     else:
-        leg = _first_least(margins.joints)
-        what = f"of half the range of leg {leg}'s joint that is nearest to a limit"
-    return f"{least:.2f} {what}"
+        cause = f"a joint limit of leg {_first_least(margins.joints)} (100 % is mid-range)"
+    return f"{100.0 * least:.0f} %", cause
 
 
 def _first_least(margins: Array) -> int:

@@ -11,7 +11,7 @@ import numpy as np
 from pteron.kernels import Array, geometry_only
 from pteron.kinematics import inverse_kinematics, random_poses
 from pteron.manipulator import Manipulator, working_modes
-from pteron.manipulator.variants import with_elbows
+from pteron.manipulator.variants import elbow_signs, with_elbows
 from pteron.tolerances import ROUNDING
 from pteron.workspace.margins import pose_margins
 
@@ -64,11 +64,11 @@ class ModePlace:
     @property
     def signs(self) -> str:
         """Its elbows as text for the option --elbows, such as ++-."""
-        return "".join("+" if sign > 0 else "-" for sign in self.elbows)
+        return elbow_signs(self.elbows)
 
 
 def mode_places(robot: Manipulator, home: Array) -> tuple[ModePlace, ...]:
-    """Return the platform's place in each working mode, at home for the file's mode.
+    """Return where the platform is in each working mode: at home in the file's, else at its best.
 
     None of a machine that has one mode, or that gravity does not tell above from below.
     """

@@ -111,9 +111,7 @@ def _contact(
     first: Paving, second: Paving, elbows: tuple[tuple[int, ...], tuple[int, ...]], leg: int
 ) -> Contact:
     """Return the contact of two working modes at a leg, by bisection of both pavings' boxes."""
-    first_test, second_test = (
-        interval_test(side.robot, side.conditions) for side in (first, second)
-    )
+    first_test, second_test = (interval_test(s.robot, s.conditions) for s in (first, second))
     edges = [k for k, c in enumerate(first.conditions) if c.leg == leg and c.cause in EDGES]
     boxes = np.concatenate([first.inner, first.boundary])
     for _ in range(_ROUNDS):
@@ -144,9 +142,9 @@ def _contact(
 def _find_crossing(
     side: Paving, test: IntervalTest, k: int, low: Array, high: Array
 ) -> Array | None:
-    """Return a pose on a condition's boundary, bisected in a box.
+    """Return a pose where a condition changes its sign, bisected in a box; None without a box.
 
-    Of the box one corner is proved inside and one outside; None where there is no such box.
+    One corner of the box is proved inside, another outside.
     """
     corners = np.array(list(np.ndindex(*(2,) * low.shape[1])))
     for a, b in zip(low, high, strict=True):

@@ -31,7 +31,7 @@ from pteron.workspace.nearest_vanishing import SINGULAR, Nearest, Search
 from pteron.workspace.vanishing import Kind, Vanishing
 
 _MOST = 20_000
-"""Boxes that the search for each kind and motion looks at by default before it ends undecided."""
+"""Boxes that the search for each kind and motion examines by default before it ends undecided."""
 
 By = Literal["translation", "rotation"]
 """The motion that leads to the singular pose, alone."""
@@ -77,11 +77,7 @@ class NearestSingularity(Result):
 
 
 def nearest_singularities(
-    robot: RobotLike,
-    pose: PoseLike,
-    *,
-    most: int = _MOST,
-    progress: Progress | None = None,
+    robot: RobotLike, pose: PoseLike, *, most: int = _MOST, progress: Progress | None = None
 ) -> tuple[NearestSingularity, ...]:
     """Return the nearest singular poses of each kind, by translation and by rotation alone.
 

@@ -71,7 +71,7 @@ largest: of a pose on the edge."""
 
 
 class Nearest(NamedTuple):
-    """A pose at which a function vanishes; None if there is none."""
+    """The nearest pose found at which a function vanishes, if any, and a proved lower bound."""
 
     pose: Array | None
     measure: float
@@ -95,7 +95,7 @@ class Search:
         report: Callable[[float], None],
     ) -> None:
         self._report = report
-        self.vanishing, self.at, self.moving, self.box = vanishing, at, moving, box
+        self.vanishing, self.reference, self.moving, self.box = vanishing, at, moving, box
         self.smooth = vanishing.smooth
         others = np.ones(len(at), bool)
         if vanishing.leg:
@@ -171,7 +171,7 @@ class Search:
     def _pose(self, state: Array) -> Array:
         """Return poses (..., m) of states (..., k + R)."""
         ways = self._sizes[0] * state[..., : len(self.moving)]
-        return vary_coordinates(self.at, self.at[self.moving] + ways, self.moving)
+        return vary_coordinates(self.reference, self.reference[self.moving] + ways, self.moving)
 
     def _length(self, state: Array) -> float:
         """Return the distance, m or rad, of a state's pose from the reference pose."""
@@ -180,8 +180,8 @@ class Search:
     def _values(self, states: Array) -> tuple[Array, Array, Array]:
         """Return equality residuals, inequality residuals and both Jacobians at states (K, k + R).
 
-        The value and r^2 - g, (K, 1 + R); r and the squares of the other legs' measures, (K, R + n)
-        or one less; the slopes (K, 1 + 2 R + n, k + R).
+        The residuals are the function's value and r^2 - g, (K, 1 + R); r and the squares of the
+        other legs' measures, (K, R + n) or one less; the Jacobians are (K, 1 + 2 R + n, k + R).
         """
         k, (length, sizes) = len(self.moving), self._sizes
         count, r = len(states), len(sizes)
@@ -189,8 +189,8 @@ class Search:
         outputs, slopes = (
             np.asarray(part) for part in self.smooth.function(self._pose(states).T, roots.T)
         )
-        slopes = slopes.reshape(len(outputs), count, len(self.at) + r).swapaxes(0, 1)
-        columns = [*self.moving, *range(len(self.at), len(self.at) + r)]
+        slopes = slopes.reshape(len(outputs), count, len(self.reference) + r).swapaxes(0, 1)
+        columns = [*self.moving, *range(len(self.reference), len(self.reference) + r)]
         slopes = slopes[:, :, columns] * np.concatenate([np.full(k, length), sizes])
         outputs = outputs.T
         radicand_errors = (roots * roots - outputs[:, 1 : 1 + r]) / sizes**2
@@ -215,7 +215,7 @@ class Search:
         """
         k, (length, sizes) = len(self.moving), self._sizes
         states = np.zeros((len(places), k + len(sizes)))
-        states[:, :k] = (places - self.at[self.moving]) / length
+        states[:, :k] = (places - self.reference[self.moving]) / length
         if not len(states):
             return states
         roots = np.zeros((len(sizes), len(states)))
@@ -323,7 +323,7 @@ class Search:
             )
             size = float(np.linalg.norm(state[:k]))
             places = state[:k] * (1.0 - shares[:, None]) + offsets * (size * shares[:, None])
-            places = self.at[self.moving] + self._sizes[0] * places.reshape(-1, k)
+            places = self.reference[self.moving] + self._sizes[0] * places.reshape(-1, k)
             states = self._singular_states(places)
             nearest = min(states, key=self._length, default=state)
             if self._length(nearest) > (1.0 - _GAIN) * self._length(state):
@@ -333,10 +333,10 @@ class Search:
 
     def _pose_boxes(self, boxes: Array) -> Array:
         """Return boxes (B, 2, m) of poses."""
-        return vary_coordinates(self.at, boxes, self.moving)
+        return vary_coordinates(self.reference, boxes, self.moving)
 
     def _distances(self, boxes: Array) -> Array:
         """Return the distances (B,) of boxes (B, 2, k) from the reference pose."""
-        here = self.at[self.moving]
+        here = self.reference[self.moving]
         gaps = np.maximum(np.maximum(boxes[:, 0] - here, here - boxes[:, 1]), 0.0)
         return np.asarray(np.linalg.norm(gaps, axis=-1))

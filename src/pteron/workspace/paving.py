@@ -115,10 +115,7 @@ class Paving(Result):
         return dict(sorted(shares.items(), key=lambda pair: -pair[1]))
 
     def group_by_size(self, boxes: Array) -> Iterator[tuple[NDArray[np.int64], NDArray[np.int64]]]:
-        """Yield the lattice indices (P, k) of the boxes (B, 2, k) of each size.
-
-        Before them comes how often each side of the whole was halved, (k,).
-        """
+        """Yield how often each side was halved (k,) and lattice indices (P, k), by box size."""
         moving = np.flatnonzero(self.box[0] < self.box[1])
         start, size = self.box[0, moving], (self.box[1] - self.box[0])[moving]
         depths = np.round(np.log2(size / (boxes[:, 1] - boxes[:, 0]))).astype(np.int64)

@@ -76,15 +76,13 @@ class Proof(Result):
         causes = ", ".join(map(str, self.causes))
         if self.holds:
             count = len(self.conditions)
-            return f"proved: every pose keeps all {count} conditions (boxes: {self.boxes})"
+            return f"proved: every pose meets all {count} conditions (boxes: {self.boxes})"
         if self.counterexample is not None:
-            return (
-                f"not so: pose {self.counterexample.round(6).tolist()} does not serve: {self.why}"
-            )
+            return f"disproved: pose {self.counterexample.round(6).tolist()} fails: {self.why}"
         assert self.undecided is not None
         low, high = (corner.round(6).tolist() for corner in self.undecided)
         return (
-            f"not decided of poses from {low} to {high}: {causes}; the region may touch that edge"
+            f"undecided for poses from {low} to {high}: {causes}; the region may touch the boundary"
         )
 
     @property
@@ -102,7 +100,8 @@ class Proof(Result):
             if joint is not None:
                 text += f" ({joint.value:.4g} {joint.unit} of {joint.limits_text('{:g}'.format)})"
             elif condition.floor:
-                text += f" ({excess + condition.floor:.4g}, at least {condition.floor:.4g} asked)"
+                value = excess + condition.floor
+                text += f" ({value:.4g}, at least {condition.floor:.4g} required)"
             elif condition.leg and margins[condition.leg - 1] < 0.0:
                 text += f" (it misses the pose by {-margins[condition.leg - 1]:.3g} m)"
             texts.append(text)
@@ -212,7 +211,7 @@ def prove(
 def _failed_conditions(
     robot: Manipulator, required: tuple[Condition, ...], pose: Array
 ) -> tuple[Condition, ...]:
-    """Return the conditions that a pose violates; out of reach limits have no margin."""
+    """Return the conditions that a pose violates or, if there are none, those undefined there."""
     margins = condition_margins(robot, required, pose)
     fails = margins < 0.0
     fails = fails if fails.any() else np.isnan(margins)
@@ -220,7 +219,7 @@ def _failed_conditions(
 
 
 def expect_space(robot: Manipulator, name: str) -> None:
-    """Refuse a cylinder, an argument of this name, if the pose has no x, y and z."""
+    """Raise DataError, naming an argument, if a cylinder is given but not x, y and z."""
     lengths = robot.platform.lengths
     if len(lengths) != 3:
         motion, places = robot.platform.motion, ", ".join(lengths) or "no lengths"
@@ -243,6 +242,7 @@ def _find_counterexample(
         poses.append(pose)
     candidates = np.concatenate(poses)
     candidates = candidates[region.holds(candidates)]
-    failing = candidates[~(condition_margins(robot, test.given, candidates) >= 0.0).all(axis=-1)]
+    margins = condition_margins(robot, test.conditions, candidates)
+    failing = candidates[~(margins >= 0.0).all(axis=-1)]
     proved: NDArray[np.bool_] = test(failing, failing, np.full(len(failing), test.all))[0]
     return failing[proved.argmax()] if proved.any() else None

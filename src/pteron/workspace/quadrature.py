@@ -93,9 +93,7 @@ def quadrature_volume(
     line_axes = box.shape[1] - 1
     expect_to_fit("lines", lines, 3.0 * float(lines) ** line_axes * line_axes)
     required = conditions(robot) if given is None else given
-    fine, coarse = (
-        _integral(robot, required, reference, box, count) for count in (lines, lines // 2)
-    )
+    fine, coarse = (_integral(robot, required, reference, box, n) for n in (lines, lines // 2))
     return Quadrature(fine, abs(fine - coarse))
 
 

@@ -252,7 +252,7 @@ def largest_ball(
 
 
 def _expect_tilting(robot: RobotLike, pose: PoseLike) -> tuple[Manipulator, Array]:
-    """Return a machine and a pose (m,); a platform that does not tilt to every side is refused."""
+    """Return the machine and the pose (m,); raise if the platform cannot tilt to every side."""
     machine = as_manipulator(robot)
     platform = machine.platform
     upright = not platform.second_axis or (

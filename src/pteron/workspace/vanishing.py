@@ -104,7 +104,7 @@ class Smooth(NamedTuple):
 
 @lru_cache(maxsize=256)
 def _smooth(robot: Manipulator, kind: Kind, leg: int) -> Smooth:
-    """Return a measure of singularity, in pose and roots, with its Jacobian; cached."""
+    """Return a measure of singularity as a function of pose and roots, with its Jacobian."""
     graph = graph_of(bounded_function(robot, _PROGRAM[kind]).function)
     pose = ca.SX.sym("pose", robot.freedom)
     radicands, roots = [], []

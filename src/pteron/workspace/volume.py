@@ -49,7 +49,7 @@ _SLACK = 1e-8
 """Metres by which the optimiser may overstep a bound."""
 
 _BACK = 101
-"""Positions tried between the optimiser's start and its result, if that oversteps a bound."""
+"""Positions tested between the optimiser's start and its result, if that oversteps a bound."""
 
 _OPTIONS = {"ftol": 1e-10, "maxiter": 200}
 """Options of the optimiser SLSQP."""
@@ -83,7 +83,7 @@ class ReachVolume(Result):
 
 
 def expect_places(robot: Manipulator, instead: str) -> None:
-    """Refuse a platform that only rotates, with a clause on what to do instead."""
+    """Raise ModelError, with a clause on what to do instead, if a platform only rotates."""
     if not robot.platform.lengths:
         raise ModelError(
             f"a {robot.platform.motion} platform has no places to move to: {instead}",

@@ -57,12 +57,12 @@ class LegStance:
 def leg_stances(robot: Manipulator, poses: Array) -> list[LegStance]:
     """Return the legs at a pose (m,), or at poses (K, m)."""
     function, names = _function(robot)
-    values = dict(zip(names, function.call([ca.DM(poses.T)]), strict=True))
+    arrays = dict(zip(names, function.call([ca.DM(poses.T)]), strict=True))
     batch = poses.shape[:-1]
 
     def vector(*name: Any) -> Array:
         """Return stacked values (..., size) by name, with the axes of the batch of poses first."""
-        stances = np.asarray(values[name]).T
+        stances = np.asarray(arrays[name]).T
         return stances.reshape(*batch, -1)
 
     stances = []

@@ -43,25 +43,25 @@ def coordinates(opened: Tree, poses: PoseLike) -> Array:
     rows = as_array(poses, "poses", (robot.freedom,), columns=robot.coordinates)
     flat = rows.reshape(-1, robot.freedom)
     joints = inverse_kinematics(robot, flat)
-    values = {joint.name: joint.values for joint in platform_joints(robot.platform, flat)}
+    by_joint = {joint.name: joint.values for joint in platform_joints(robot.platform, flat)}
     for i, (home, away) in enumerate(
         zip(leg_stances(robot, opened.home), leg_stances(robot, flat), strict=True)
     ):
         for k, angle in zip(home.numbers, _leg(home, away), strict=True):
             driven = k == home.driven
             name = robot.joint_names[i] if driven else f"leg{i + 1}_joint{k}"
-            values[name] = joints[:, i] if driven else angle
+            by_joint[name] = joints[:, i] if driven else angle
     p, axes = robot.platform.placement(flat)
     home_p, home_axes = robot.platform.placement(opened.home)
     for body in opened.bodies:
         for joint in body.joints:
             if joint.follows is not None:
                 name, ratio = joint.follows
-                values[joint.name] = ratio * values[name]
-            elif joint.name not in values:  # of a part that slides with a hinge of the platform
+                by_joint[joint.name] = ratio * by_joint[name]
+            elif joint.name not in by_joint:  # of a part that slides with a hinge of the platform
                 arm = home_axes @ (joint.point - home_p)
-                values[joint.name] = (p + np.einsum("kij,i->kj", axes, arm)) @ joint.axis
-    columns = np.stack([values[joint.name] for joint in opened.joints], axis=-1)
+                by_joint[joint.name] = (p + np.einsum("kij,i->kj", axes, arm)) @ joint.axis
+    columns = np.stack([by_joint[joint.name] for joint in opened.joints], axis=-1)
     return np.asarray(columns.reshape(*rows.shape[:-1], -1))
 
 

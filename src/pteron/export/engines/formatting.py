@@ -28,34 +28,34 @@ BASE_COLOR = "0.45 0.46 0.48 1"
 """Colour of the base."""
 
 
-def number(value: float) -> str:
+def number(coordinate: float) -> str:
     """Return a coordinate, rounded to 1e-15, in the shortest form that reads back unchanged."""
-    return repr(round(_finite(value), _DIGITS) + 0.0).removesuffix(".0")
+    return repr(round(_finite(coordinate), _DIGITS) + 0.0).removesuffix(".0")
 
 
-def small(value: float) -> str:
-    """Return a number that may be tiny: a moment of inertia."""
-    return repr(_finite(value)).removesuffix(".0")
+def small(number: float) -> str:
+    """Return a number that may be tiny, such as a moment of inertia, as text."""
+    return repr(_finite(number)).removesuffix(".0")
 
 
-def row(values: Sequence[float] | Array) -> str:
-    """Return numbers with spaces between them."""
-    return " ".join(map(number, np.ravel(values)))
+def row(numbers: Sequence[float] | Array) -> str:
+    """Return numbers as text, separated by blanks."""
+    return " ".join(map(number, np.ravel(numbers)))
 
 
-def look(values: Sequence[float] | Array | float) -> str:
+def look(sizes: Sequence[float] | Array | float) -> str:
     """Return the sizes or colours of a drawn shape as text, to six decimals."""
-    return " ".join(f"{round(_finite(value), 6) + 0.0:g}" for value in np.ravel(values))
+    return " ".join(f"{round(_finite(size), 6) + 0.0:g}" for size in np.ravel(sizes))
 
 
-def _finite(value: float) -> float:
+def _finite(number: float) -> float:
     """Return a finite float; infinity and NaN, which no engine reads, are refused."""
-    if not np.isfinite(value):
+    if not np.isfinite(number):
         raise ModelError(
-            f"a number of the model is {value} in its home pose; give another home, or report it "
+            f"a number of the model is {number} in its home pose; give another home, or report it "
             "with the robot's file"
         )
-    return float(value)
+    return float(number)
 
 
 def frame(body: TreeBody) -> Array:
@@ -107,7 +107,7 @@ def omission_notes(opened: Tree, written: Sequence[str]) -> list[str]:
 
 
 def head(opened: Tree, language: str) -> list[str]:
-    """Return the head comment of every file: machine, home pose, and assumed numbers."""
+    """Return the comment lines that begin every engine's file: machine, home pose, assumptions."""
     robot = opened.robot
     name = re.sub(r"[^\w ,.+-]|--+", "?", " ".join(robot.name.split()))
     pairs = zip(robot.coordinates, opened.home, strict=True)

@@ -41,10 +41,10 @@ SHARE = 1e-10
 
 def central_inertia(inertia: Inertia) -> tuple[float, Array, float]:
     """Return a body's mass, its centre of mass (2,) in body axes and the central moment."""
-    values = dict(zip(inertia.kinds, inertia.values, strict=True))
-    mass = values["m"]
-    center = np.array([values.get(kind, 0.0) for kind in ("mgx", "mgy")]) / mass
-    return mass, center, values.get("I", 0.0) - mass * float(center @ center)
+    by_kind = dict(zip(inertia.kinds, inertia.values, strict=True))
+    mass = by_kind["m"]
+    center = np.array([by_kind.get(kind, 0.0) for kind in ("mgx", "mgy")]) / mass
+    return mass, center, by_kind.get("I", 0.0) - mass * float(center @ center)
 
 
 def plane_moments(mass: float, moment: float, lever: float) -> Array:

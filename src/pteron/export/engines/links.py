@@ -83,7 +83,7 @@ class LinkShape(NamedTuple):
 
 
 def link_shape(shape: BodyShape, body: TreeBody | None) -> LinkShape:
-    """Return a shape in a body's frame, or in the base frame."""
+    """Return a body's shape with its pose and sizes as texts, in the body's or the base frame."""
     ends = shape.ends if body is None else (shape.ends - body.origin) @ body.axes
     axis, middle = ends[1] - ends[0], ends.mean(axis=0)
     length = float(np.linalg.norm(axis))

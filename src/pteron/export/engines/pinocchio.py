@@ -177,11 +177,11 @@ def _with_gear(body: TreeBody, gear: TreeBody, ratio: float) -> TreeBody:
     return replace(body, mass=mass, center=center, moments=moments)
 
 
-def _bound(value: float | None, infinite: str) -> str:
+def _bound(limit: float | None, infinite: str) -> str:
     """Return a joint limit as a literal; the text for infinity if there is no limit."""
-    return infinite if value is None else number(value)
+    return infinite if limit is None else number(limit)
 
 
-def _list(values: Any) -> str:
+def _list(array: Any) -> str:
     """Return an array's values, flattened, as literals with commas."""
-    return ", ".join(map(number, np.ravel(values)))
+    return ", ".join(map(number, np.ravel(array)))

@@ -155,19 +155,19 @@ def _joints(platform: Platform, pose: Array) -> list[TreeJoint]:
     """Return the joints by which the platform moves, the tool's where its halves slide."""
     p, moved, joints = platform.placement(pose)[0], np.eye(4), []
     limits = platform.angle_limits
-    for name, is_prismatic, axis, value in platform_joints(platform, pose):
+    for name, is_prismatic, axis, coordinate in platform_joints(platform, pose):
         axis = moved[:3, :3] @ axis
-        joint = TreeJoint(name, is_prismatic, axis, p, float(value), limits.get(name))
+        joint = TreeJoint(name, is_prismatic, axis, p, float(coordinate), limits.get(name))
         if not is_prismatic:
-            moved = displacement(joint, float(value)) @ moved
+            moved = displacement(joint, float(coordinate)) @ moved
         joints.append(joint)
     return joints
 
 
 def _angle(platform: Platform, pose: Array) -> tuple[str, float]:
     """Return the name and value of the platform's single angle."""
-    (name,), (value,) = platform.angles, pose[platform.angular].tolist()
-    return name, value
+    (name,), (angle,) = platform.angles, pose[platform.angular].tolist()
+    return name, angle
 
 
 def _plane_body(
@@ -221,7 +221,7 @@ def _gears(platform: Platform, pose: Array, masses: Array, against: float) -> li
 
 
 def _share_axis(first: Array, second: Array) -> bool:
-    """Return whether two places are on a common axis of the platform."""
+    """Return whether two places (3,) are on one line along the platform's axis."""
     return bool(np.abs(first - second)[:2].max() <= ROUNDING)
 
 

@@ -90,7 +90,7 @@ def tree(robot: RobotLike, home: PoseLike | None = None) -> Tree:
 
 
 def _expect_axes(stances: Sequence[LegStance], pose: Array) -> None:
-    """Refuse a home pose at which the axis of a leg's joint is undefined."""
+    """Raise SingularPose if the axis of a leg's joint is undefined at a home pose (m,)."""
     for i, stance in enumerate(stances, start=1):
         places = (*stance.axes, *stance.points, *stance.references.values(), stance.end)
         if not np.isfinite(np.concatenate(places)).all():

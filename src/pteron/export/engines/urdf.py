@@ -111,8 +111,8 @@ def closure_yaml(opened: Tree) -> str:
     )
 
 
-def _real(value: float) -> str:
+def _real(coordinate: float) -> str:
     """Return a number as text that YAML reads as a float: with a point, before an exponent too."""
-    text = number(value)
+    text = number(coordinate)
     head_, mark, tail = text.partition("e")
     return text if "." in head_ else f"{head_}.0{mark}{tail}"

@@ -23,7 +23,7 @@ _LEVELS, _RINGS, _DIRECTIONS = 200, 20, 24
 """Heights tried, and at each one the rings of poses and the poses on a ring."""
 
 
-def bed(robot: Manipulator, reach: float, low: float, high: float) -> tuple[float, float]:
+def find_bed(robot: Manipulator, reach: float, low: float, high: float) -> tuple[float, float]:
     """Return P's z at the bed, and the usable radius about the axis there, at most `reach`, m.
 
     The tool is at 0 there if the machine can work at 0 and below the end stops; else the bed is the
@@ -51,8 +51,8 @@ def bed(robot: Manipulator, reach: float, low: float, high: float) -> tuple[floa
     return float(levels[best]), float(radii[best])
 
 
-def told_bed(robot: Manipulator, level: float, good: float, most: float) -> tuple[str, ...]:
-    """Return comments on the bed: its height, and the usable part of Klipper's range."""
+def bed_comments(robot: Manipulator, level: float, good: float, most: float) -> tuple[str, ...]:
+    """Return comment lines on the bed: its height, and the usable part of Klipper's range."""
     tool = tool_of(robot)
     who = "the tool's" if tool.any() else "the pose's"
     comments = [

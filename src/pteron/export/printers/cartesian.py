@@ -33,7 +33,7 @@ axes."""
 
 
 def cartesian(robot: Manipulator) -> dict[str, Any]:
-    """Return the values of `generic_cartesian`: each stepper a sum of x, y and z.
+    """Return the template's values for `generic_cartesian`: each stepper a sum of x, y and z.
 
     Raises
     ------
@@ -83,11 +83,11 @@ def cartesian(robot: Manipulator) -> dict[str, Any]:
 def _sum(row: Array) -> str:
     """Return a linear combination as kinematic_stepper.py reads it: no blanks, no exponents."""
     terms: list[str] = []
-    for axis, value in zip("xyz", row, strict=True):
-        if abs(value) <= ZERO:
+    for axis, coefficient in zip("xyz", row, strict=True):
+        if abs(coefficient) <= ZERO:
             continue
-        sign = "-" if value < 0.0 else "+" if terms else ""
-        text = f"{abs(value):.15f}".rstrip("0").rstrip(".")
+        sign = "-" if coefficient < 0.0 else "+" if terms else ""
+        text = f"{abs(coefficient):.15f}".rstrip("0").rstrip(".")
         terms.append(sign + (axis if text == "1" else f"{text}*{axis}"))
     return "".join(terms)
 

@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 
 from pteron.equations.machine import Machine
-from pteron.export.printers.sections import differs
+from pteron.export.printers.sections import unfit_error
 from pteron.kernels import Array
 from pteron.legs.leg import SphereLocus
 from pteron.manipulator import Manipulator
@@ -21,13 +21,13 @@ SAME = 1e-6
 
 @dataclass(frozen=True)
 class Center:
-    """The centre of the sphere on which P moves at a fixed joint coordinate q.
+    """The centre of the sphere on which P, the platform's point, moves at a fixed joint q.
 
-    It is at + q along, or at + along cos(q) + across sin(q); P is the platform's reference point.
+    It is origin + q along, or origin + along cos(q) + across sin(q).
     """
 
     leg: int
-    at: Array
+    origin: Array
     along: Array
     across: Array | None
     radius: float
@@ -48,42 +48,42 @@ class Center:
             "center", [q], [locus.center - offset.a - offset.constant, locus.radius]
         )
 
-        def center(value: float) -> Array:
+        def center(coordinate: float) -> Array:
             """Return the centre (3,), m, at a joint coordinate, m or rad."""
-            return np.array(function(value)[0]).ravel()
+            return np.array(function(coordinate)[0]).ravel()
 
         radius = float(function(0.0)[1])
         start, step = center(0.0), center(1.0) - center(0.0)
         if np.allclose(center(2.0), start + 2.0 * step, rtol=0.0, atol=1e-12):
             return cls(leg, start, step, None, radius)
         half, quarter = center(math.pi), center(0.5 * math.pi)
-        at = 0.5 * (start + half)
-        cosine_arm, sine_arm = start - at, quarter - at
+        origin = 0.5 * (start + half)
+        cosine_arm, sine_arm = start - origin, quarter - origin
         if np.allclose(
-            center(1.0), at + math.cos(1.0) * cosine_arm + math.sin(1.0) * sine_arm, 0.0, 1e-12
+            center(1.0), origin + math.cos(1.0) * cosine_arm + math.sin(1.0) * sine_arm, 0.0, 1e-12
         ):
-            return cls(leg, at, cosine_arm, sine_arm, radius)
+            return cls(leg, origin, cosine_arm, sine_arm, radius)
         return None
 
 
-def common(robot: Manipulator, values: Sequence[float], reason: str, taker: str) -> float:
-    """Return the value that the legs share.
+def common_value(robot: Manipulator, numbers: Sequence[float], reason: str, taker: str) -> float:
+    """Return the common value of all legs, m; `reason` and `taker` are for the error's message.
 
     Raises
     ------
     ModelError
         If they do not, by more than a micrometre.
     """
-    for i, value in enumerate(values[1:], start=2):
-        if abs(value - values[0]) > SAME:
-            first_value, second_value = (round(1000.0 * v, 6) + 0.0 for v in (value, values[0]))
+    for i, number in enumerate(numbers[1:], start=2):
+        if abs(number - numbers[0]) > SAME:
+            first_value, second_value = (round(1000.0 * v, 6) + 0.0 for v in (number, numbers[0]))
             text = f"{reason.format(first_value)}, leg 1 {second_value:.6g} mm"
-            raise differs(robot, i, text, taker)
-    return float(np.mean(values))
+            raise unfit_error(robot, i, text, taker)
+    return float(np.mean(numbers))
 
 
-def degrees(point: Array) -> float:
-    """Return the direction of a point as seen from the z axis, 0 to 360."""
+def bearing(point: Array) -> float:
+    """Return the bearing of a point as seen from the z axis, degrees from x, 0 to 360."""
     angle = math.degrees(math.atan2(point[1], point[0])) % 360.0
     return 0.0 if 360.0 - angle < 1e-9 else angle
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from pteron.export.printers.bed import told_bed
+from pteron.export.printers.bed import bed_comments
 from pteron.export.printers.centers import Center, end_stop
 from pteron.export.printers.linear_delta import LinearDelta
 from pteron.export.printers.sections import (
@@ -19,7 +19,7 @@ from pteron.manipulator import Manipulator
 
 
 def delta(robot: Manipulator, centers: Sequence[Center]) -> dict[str, Any]:
-    """Return the values of `delta`: the numbers of `LinearDelta` as texts."""
+    """Return the template's values for Klipper's `delta`, from the numbers of `LinearDelta`."""
     numbers = LinearDelta.from_centers(robot, centers, "Klipper's delta")
     good = numbers.most if numbers.ends is None else numbers.bed
     steppers = []
@@ -41,7 +41,10 @@ def delta(robot: Manipulator, centers: Sequence[Center]) -> dict[str, Any]:
         )
     return {
         "kinematics": "delta",
-        "comments": (*told_bed(robot, numbers.level, good, numbers.most), *numbers.error_comments),
+        "comments": (
+            *bed_comments(robot, numbers.level, good, numbers.most),
+            *numbers.error_comments,
+        ),
         "radius": mm(numbers.radius),
         "steppers": steppers,
     }

@@ -160,10 +160,10 @@ def _wrap_degrees(angle: float | np.ndarray) -> np.ndarray:
     return np.asarray((np.asarray(angle) + 180.0) % 360.0 - 180.0)
 
 
-def _lettered_values(letters: str, values: Sequence[float], factor: float = 1000.0) -> str:
+def _lettered_values(letters: str, numbers: Sequence[float], factor: float = 1000.0) -> str:
     """Return G-code words: each letter with its value, scaled by `factor`, to four decimals."""
-    pairs = zip(letters, values, strict=True)
-    return "".join(f" {letter}{round(factor * value, 4) + 0.0:.4f}" for letter, value in pairs)
+    pairs = zip(letters, numbers, strict=True)
+    return "".join(f" {letter}{round(factor * number, 4) + 0.0:.4f}" for letter, number in pairs)
 
 
 def _mm(metres: float) -> str:

@@ -17,9 +17,9 @@ import scipy  # type: ignore[import-untyped]
 
 from pteron.equations.machine import Machine
 from pteron.errors import ModelError
-from pteron.export.printers.bed import bed, tool_of
-from pteron.export.printers.centers import SAME, Center, degrees
-from pteron.export.printers.sections import INSTEAD, differs, mm
+from pteron.export.printers.bed import find_bed, tool_of
+from pteron.export.printers.centers import SAME, Center, bearing
+from pteron.export.printers.sections import INSTEAD, mm, unfit_error
 from pteron.kernels import Array
 from pteron.kinematics import inverse_kinematics, jacobian, random_poses
 from pteron.manipulator import Manipulator
@@ -94,9 +94,7 @@ class LinearDelta:
         """
         machine = Machine.numeric(robot)
         centers = [Center.from_leg(machine, i) for i in range(len(robot.legs))]
-        sliding_centers = [
-            center for center in centers if center is not None and center.is_prismatic
-        ]
+        sliding_centers = [c for c in centers if c is not None and c.is_prismatic]
         if robot.platform.coordinates != ("x", "y", "z") or len(sliding_centers) != 3:
             raise ModelError(
                 f"{robot.name}: no linear Delta, whose platform moves x, y and z by three rods on "
@@ -109,13 +107,13 @@ class LinearDelta:
         """Return the numbers from the spheres on which P moves; errors name `taker`."""
         for i, center in enumerate(centers, start=1):
             if np.hypot(*center.along[:2]) > _LEAN:
-                raise differs(robot, i, "its guide is not vertical, along z", taker)
+                raise unfit_error(robot, i, "its guide is not vertical, along z", taker)
         rises = np.array([np.sign(center.along[2]) for center in centers])
         limits = [leg.limits for leg in robot.legs]
         known = all(pair is not None for pair in limits)
         travels = np.array([pair or (0.0, 0.0) for pair in limits]) * rises[:, None]
         lowest, highest = travels.min(axis=1), travels.max(axis=1)
-        feet = np.array([center.at for center in centers])
+        feet = np.array([center.origin for center in centers])
         leans = np.array([center.along for center in centers]) * rises[:, None]
         _refuse_sliders_below(robot, centers, taker)
         # Towers as they stand where the carriages are on their way.
@@ -126,15 +124,15 @@ class LinearDelta:
                 reason = (
                     f"its rod of {mm(arm)} mm is shorter than the radius, {mm(radii.mean())} mm"
                 )
-                raise differs(robot, i, reason, taker)
+                raise unfit_error(robot, i, reason, taker)
         radius = float(radii.mean())
         below = np.sqrt(arms**2 - radius**2)
         most = min(radius, float(arms.min()) - radius)
         level, good = -float(tool_of(robot)[2]), _INSIDE * most
         if known:
             low, high = (feet[:, 2] + end - below for end in (lowest, highest))
-            level, good = bed(robot, most, float(low.max()), float(high.min()))
-        angles = np.radians([degrees(tower) for tower in towers])
+            level, good = find_bed(robot, most, float(low.max()), float(high.min()))
+        angles = np.radians([bearing(tower) for tower in towers])
         start = np.array([radius, *angles, *arms, *(feet[:, 2] + highest - level)])
         solution, off = _fit_numbers(
             lambda p: _errors(robot, p, level, rises, highest, good), start, radius
@@ -144,7 +142,7 @@ class LinearDelta:
             reason = (
                 f"is {mm(round(radii[i - 1], 9))} mm from the z axis or leans, unlike the others"
             )
-            raise differs(robot, i, reason, taker)
+            raise unfit_error(robot, i, reason, taker)
         radius, angles, arms = solution[0], solution[1:4], solution[4:7]
         ends = solution[7:] - np.sqrt(arms**2 - radius**2)
         zeros = solution[7:] - highest
@@ -176,16 +174,16 @@ def _fit_numbers(
 
 
 def _refuse_sliders_below(robot: Manipulator, centers: Sequence[Center], taker: str) -> None:
-    """Refuse a machine whose sliders are below its platform."""
+    """Raise ModelError if a machine's sliders are below its platform."""
     poses = random_poses(robot, 50, seed=1, type_i=0.02, type_ii=0.0, limits=False)
     joints = inverse_kinematics(robot, poses)
     for i, center in enumerate(centers):
-        height = center.at[2] + center.along[2] * joints[:, i]
+        height = center.origin[2] + center.along[2] * joints[:, i]
         if not (height > poses[:, 2]).all():
             reason = (
                 "its slider is below the platform, and firmware has it above: turn the model over"
             )
-            raise differs(robot, i + 1, reason, taker)
+            raise unfit_error(robot, i + 1, reason, taker)
 
 
 def _errors(
@@ -194,9 +192,7 @@ def _errors(
     """Return where the machine's tool is (K, 3), from where the firmware takes it to be, m."""
     radius, angles, arms, ends = numbers[0], numbers[1:4], numbers[4:7], numbers[7:]
     turns = np.linspace(0.0, 2.0 * math.pi, 12, endpoint=False)
-    rings = [
-        good * share * np.stack([np.cos(turns), np.sin(turns)], axis=-1) for share in (0.5, 1.0)
-    ]
+    rings = [good * s * np.stack([np.cos(turns), np.sin(turns)], axis=-1) for s in (0.5, 1.0)]
     places = np.concatenate([np.zeros((1, 2)), *rings])
     poses = np.concatenate(
         [np.column_stack([places, np.full(len(places), level + z)]) for z in (0.0, 0.3 * good)]

@@ -37,7 +37,7 @@ class _Kind(NamedTuple):
     template: str
     angles: tuple[float, float, float]
     """Degrees at which its towers stand where the file does not say."""
-    own: tuple[float, float, float]
+    template_angles: tuple[float, float, float]
     """Degrees at which the template's do."""
     printer: tuple[str, ...]
     tower: tuple[str, ...]
@@ -99,11 +99,11 @@ def setting(config: configparser.RawConfigParser, section: str, key: str) -> flo
     if text is None:
         return None
     try:
-        value = float(text)
+        number = float(text)
     except ValueError:
         raise DataError(f"[{section}] {key}: {shorten(text)} given, a number expected") from None
-    expect(math.isfinite(value), f"[{section}] {key}", shorten(text), "a finite number")
-    return value
+    expect(math.isfinite(number), f"[{section}] {key}", shorten(text), "a finite number")
+    return number
 
 
 def _way_a_turn(config: configparser.RawConfigParser, tower: str) -> float | None:
@@ -192,10 +192,12 @@ def from_klipper(config: str | Path, *, name: str = "printer") -> Manipulator:
 
     def length(section: str, key: str, default: float | None = None) -> float:
         """Return a setting, m, of a section with mm; raise if it is missing or not positive."""
-        value = setting(parser, section, key)
-        metres = default if value is None else 1e-3 * value
+        millimetres = setting(parser, section, key)
+        metres = default if millimetres is None else 1e-3 * millimetres
         if metres is None or metres <= 0.0:
-            raise DataError(f"{source}: [{section}] {key}: {value} given, mm above 0 expected")
+            raise DataError(
+                f"{source}: [{section}] {key}: {millimetres} given, mm above 0 expected"
+            )
         return metres
 
     base = [length("printer", key) for key in kind.printer]
@@ -203,7 +205,7 @@ def from_klipper(config: str | Path, *, name: str = "printer") -> Manipulator:
     legs = []
     template = load(kind.template)
     for tower, usual, template_angle, leg in zip(
-        "abc", kind.angles, kind.own, template.legs, strict=True
+        "abc", kind.angles, kind.template_angles, template.legs, strict=True
     ):
         section = f"stepper_{tower}"
         angle = setting(parser, section, "angle")

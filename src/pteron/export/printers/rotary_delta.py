@@ -9,15 +9,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pteron.errors import ModelError
-from pteron.export.printers.bed import bed, told_bed
-from pteron.export.printers.centers import SAME, Center, common, degrees, end_stop
+from pteron.export.printers.bed import bed_comments, find_bed
+from pteron.export.printers.centers import SAME, Center, bearing, common_value, end_stop
 from pteron.export.printers.sections import (
     INSTEAD,
-    differs,
     mm,
     number,
     reading_comment,
     signed_number,
+    unfit_error,
 )
 from pteron.kernels import Array
 from pteron.kinematics import inverse_kinematics, random_poses
@@ -34,7 +34,7 @@ class _Arm(NamedTuple):
     """The leg's, from 1."""
     limits: tuple[float, float] | None
     shoulder: Array
-    out: Array
+    outward: Array
     """From the z axis to the shoulder, a unit vector."""
     lift: float
     """1 where the arm lifts as its joint coordinate grows, else -1."""
@@ -46,19 +46,19 @@ class _Arm(NamedTuple):
     def from_center(cls, robot: Manipulator, center: Center) -> _Arm:
         """Return the arm of a leg whose crank turns in a vertical plane through z."""
         assert center.across is not None  # it turns
-        out = np.array([*center.at[:2], 0.0]) / np.hypot(*center.at[:2])
+        out = np.array([*center.origin[:2], 0.0]) / np.hypot(*center.origin[:2])
         axis = np.cross(center.along, center.across)
         axis /= np.linalg.norm(axis)
-        i, aside = center.leg + 1, 1000.0 * float(center.at @ axis)
+        i, aside = center.leg + 1, 1000.0 * float(center.origin @ axis)
         if abs(axis[2]) > SAME:
-            raise differs(robot, i, "its crank's axis is not horizontal", _TAKER)
+            raise unfit_error(robot, i, "its crank's axis is not horizontal", _TAKER)
         if abs(aside) > 1000.0 * SAME:
             reason = f"its crank's plane passes the z axis at {abs(aside):.6g} mm, not through it"
-            raise differs(robot, i, reason, _TAKER)
+            raise unfit_error(robot, i, reason, _TAKER)
         lift = float(np.sign(np.cross(out, [0.0, 0.0, 1.0]) @ axis))
         zero, upper = math.atan2(center.along[2], center.along @ out), np.linalg.norm(center.along)
         limits = robot.legs[center.leg].limits
-        return cls(i, limits, center.at, out, lift, zero, float(upper), center.radius)
+        return cls(i, limits, center.origin, out, lift, zero, float(upper), center.radius)
 
     def top(self, radius: float) -> float | None:
         """Return z over the shoulder, on the axis, where its limits let it be highest."""
@@ -72,12 +72,12 @@ class _Arm(NamedTuple):
 
 
 def rotary(robot: Manipulator, centers: Sequence[Center]) -> dict[str, Any]:
-    """Return the values of `rotary_delta`: arms that turn in vertical planes through z."""
+    """Return the template's values for Klipper's `rotary_delta`: arms in planes through z."""
     arms = [_Arm.from_center(robot, center) for center in centers]
     radii = [float(np.hypot(*arm.shoulder[:2])) for arm in arms]
-    radius = common(robot, radii, "has its shoulder {:.6g} mm from the z axis", _TAKER)
+    radius = common_value(robot, radii, "has its shoulder {:.6g} mm from the z axis", _TAKER)
     heights = [float(arm.shoulder[2]) for arm in arms]
-    height = common(robot, heights, "has its shoulder at z = {:.6g} mm", _TAKER)
+    height = common_value(robot, heights, "has its shoulder at z = {:.6g} mm", _TAKER)
     _refuse_elbows_inside(robot, arms, height)
     tops = [arm.top(radius) for arm in arms]
     highest = min((top for top in tops if top is not None), default=0.0)
@@ -94,7 +94,7 @@ def rotary(robot: Manipulator, centers: Sequence[Center]) -> dict[str, Any]:
         steppers.append(
             {
                 "comments": (place, *end_stop(end, "arm"), *reading),
-                "angle": number(degrees(arm.shoulder)),
+                "angle": number(bearing(arm.shoulder)),
                 "upper": mm(arm.upper),
                 "lower": mm(arm.lower),
                 "end": end,
@@ -111,7 +111,7 @@ def rotary(robot: Manipulator, centers: Sequence[Center]) -> dict[str, Any]:
 
 
 def _refuse_elbows_inside(robot: Manipulator, arms: Sequence[_Arm], height: float) -> None:
-    """Refuse a machine whose elbows are not where kin_rotary_delta.c takes them: outside.
+    """Raise ModelError if elbows are not where kin_rotary_delta.c takes them: outside.
 
     The platform is below the shoulders; of the two elbows it takes that of the greater angle.
     """
@@ -124,13 +124,13 @@ def _refuse_elbows_inside(robot: Manipulator, arms: Sequence[_Arm], height: floa
         )
     for arm, q in zip(arms, inverse_kinematics(robot, poses).T, strict=True):
         wrist = poses - arm.shoulder
-        down = np.arctan2(wrist[:, 2], wrist @ arm.out)
+        down = np.arctan2(wrist[:, 2], wrist @ arm.outward)
         if (np.sin(arm.lift * q + arm.zero - down) < 0.0).any():
             reason = (
                 "its elbow is inside while the platform is below, and Klipper has it outside; turn "
                 "a model over whose platform is above"
             )
-            raise differs(robot, arm.number, reason, _TAKER)
+            raise unfit_error(robot, arm.number, reason, _TAKER)
 
 
 def _bed(
@@ -139,12 +139,12 @@ def _bed(
     """Return P's z at Klipper's bed, m, and comments on it."""
     for arm in arms:
         if arm.upper + arm.lower <= radius:
-            raise differs(robot, arm.number, "its arms do not reach the z axis", _TAKER)
+            raise unfit_error(robot, arm.number, "its arms do not reach the z axis", _TAKER)
     reach = math.sqrt(min(arm.upper + arm.lower for arm in arms) ** 2 - radius**2)
     # Klipper lets the tool go so far from the axis, whatever the legs reach.
     most = min(radius + min(arm.upper for arm in arms), min(arm.lower for arm in arms) - radius)
-    level, good = bed(robot, most, height - reach, height + top)
-    return level, told_bed(robot, level, good, most)
+    level, good = find_bed(robot, most, height - reach, height + top)
+    return level, bed_comments(robot, level, good, most)
 
 
 def _gear(robot: Manipulator, leg: int) -> str | None:

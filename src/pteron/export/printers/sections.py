@@ -12,8 +12,8 @@ INSTEAD = "use --linuxcnc, or --c for a controller of your own"
 """Advice at the end of error messages."""
 
 
-def differs(robot: Manipulator, leg: int, reason: str, taker: str) -> ModelError:
-    """Return the error that the firmware does not fit a machine because of a leg."""
+def unfit_error(robot: Manipulator, leg: int, reason: str, taker: str) -> ModelError:
+    """Return the ModelError that the firmware `taker` cannot move a machine because of a leg."""
     return ModelError(f"{robot.name}: {taker} does not fit leg {leg}: {reason}; {INSTEAD}")
 
 
@@ -22,15 +22,15 @@ def mm(metres: float) -> str:
     return number(1000.0 * metres)
 
 
-def number(value: float) -> str:
+def number(size: float) -> str:
     """Return a number without an exponent."""
-    text = f"{value:.12f}".rstrip("0").rstrip(".")
+    text = f"{size:.12f}".rstrip("0").rstrip(".")
     return "0" if text in ("-0", "") else text
 
 
-def signed_number(value: float) -> str:
+def signed_number(size: float) -> str:
     """Return a number as it is added to something: "+ 1.5"."""
-    return f"{'-' if value < 0.0 else '+'} {abs(value):.9g}"
+    return f"{'-' if size < 0.0 else '+'} {abs(size):.9g}"
 
 
 def rotation_distance(robot: Manipulator, leg: int) -> str | None:

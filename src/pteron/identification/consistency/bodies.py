@@ -68,7 +68,7 @@ class Bodies:
         )
 
     def scale(self, masses: Array) -> Array:
-        """Return the unit of each free parameter, from the bodies' masses, kg."""
+        """Return the scale (k,) of each free parameter, from the bodies' masses (bodies,), kg."""
         lengths = self.extents[:, 1] - self.extents[:, 0]
         units = np.empty(len(self.columns))
         for mass, length, place in zip(masses, lengths, self.places.values(), strict=True):
@@ -76,33 +76,33 @@ class Bodies:
                 units[column] = mass * length ** self.columns[column].length_power
         return units
 
-    def mean(self, values: Array) -> Array:
-        """Return the free parameters for parameters (N,); the mean of those that legs share."""
-        return np.asarray((self.sharing / self.sharing.sum(axis=0)).T @ values)
+    def mean(self, parameters: Array) -> Array:
+        """Return the free parameters (k,) of all N; shared ones are the mean over the legs."""
+        return np.asarray((self.sharing / self.sharing.sum(axis=0)).T @ parameters)
 
     def least(self, scaled: Array) -> Array:
-        """Return the least eigenvalue (bodies,) of each body's matrix: above 0 for a real one."""
+        """Return each body's least eigenvalue of the pseudo-inertia (bodies,); real if positive."""
         return np.array([np.linalg.eigvalsh(each @ scaled)[0] for each in self.moments])
 
 
-def _moments(values: Mapping[str, Any]) -> list[list[Any]]:
+def _moments(parameters: Mapping[str, Any]) -> list[list[Any]]:
     """Return the matrix of a body, linear in its values by kind.
 
     A body that turns about any axis has its second moments (4, 4); one that turns in a plane
     [[I, 0, hx], [0, I, hy], [hx, hy, m]], whose least eigenvalue is that of [[m, |h|], [|h|, I]];
     one that does not turn has its mass.
     """
-    if "Izz" in values:
-        return SpatialInertia.second_moments(values)
-    m, zero = values["m"], 0.0 * values["m"]
-    if "I" not in values:
+    if "Izz" in parameters:
+        return SpatialInertia.second_moments(parameters)
+    m, zero = parameters["m"], 0.0 * parameters["m"]
+    if "I" not in parameters:
         return [[m]]
-    hx, hy, inertia = (values.get(kind, zero) for kind in PlanarInertia.kinds[1:])
+    hx, hy, inertia = (parameters.get(kind, zero) for kind in PlanarInertia.kinds[1:])
     return [[inertia, zero, hx], [zero, inertia, hy], [hx, hy, m]]
 
 
 def bodies_of(base: BaseParameters) -> Bodies:
-    """Return the bodies whose parameters `base` is made of."""
+    """Return the bodies of a machine's base parameters, and how these are shared."""
     robot, columns = base.robot, base.parameters
     groups = list(dict.fromkeys(p.legs for p in columns if p.legs))
     _, sharing = share(robot, groups)
@@ -121,9 +121,9 @@ def bodies_of(base: BaseParameters) -> Bodies:
     return Bodies(columns, sharing, np.array(list(extents.values())))
 
 
-def parameters_of(robot: Manipulator, values: ArrayLike, what: str) -> Array:
-    """Return parameters (N,) as a checked array."""
-    vector = np.asarray(values, dtype=float)
+def parameters_of(robot: Manipulator, parameters: ArrayLike, what: str) -> Array:
+    """Return inertial parameters (N,) as an array; raise on a wrong shape or NaN."""
+    vector = np.asarray(parameters, dtype=float)
     count = len(parameter_names(robot))
     if vector.shape != (count,):
         raise ModelError(f"{what}: shape {vector.shape} given, ({count},) expected")
@@ -169,10 +169,10 @@ def real_bodies(robot: Manipulator, values: ArrayLike | None = None) -> tuple[st
     ('p1: mass: -0.1 kg is not positive; give a value above 0 kg',)
     """
     vector = parameters(robot) if values is None else parameters_of(robot, values, "parameters")
-    data, lines = parameter_data(robot), []
-    for name, place in body_places(data).items():
+    columns_info, lines = parameter_data(robot), []
+    for name, place in body_places(columns_info).items():
         columns = list(place.values())
-        first = data[columns[0]]
+        first = columns_info[columns[0]]
         legs, platform = robot.legs, robot.platform
         kind = legs[first.legs[0] - 1].bodies[first.body] if first.legs else platform.total_inertia
         try:
@@ -198,7 +198,7 @@ class Target:
 
 
 def cad_target(bodies: Bodies, cad: Array) -> Target:
-    """Return the distance to CAD parameters (N,), each kind by the body's mass and length."""
+    """Return the target "nearest to CAD parameters" (N,), scaled by each body's mass and length."""
     free = bodies.mean(cad)
     heads = free[bodies.masses]
     # An array from a drawing may hold any mass; a scale must be positive.
@@ -210,15 +210,15 @@ def cad_target(bodies: Bodies, cad: Array) -> Target:
     return Target("CAD", scale, margins, np.eye(len(z)), z)
 
 
-def plain_target(bodies: Bodies, base: BaseParameters, values: Array) -> Target:
-    """Return the deviation from uniform rods and a uniform disc, all of about one mass.
+def plain_target(bodies: Bodies, base: BaseParameters, base_values: Array) -> Target:
+    """Return the target "nearest to uniform rods and a uniform disc", all of about one mass.
 
     It sums (m - mean)^2 + (hx - c m)^2 + hy^2 + (I - k m)^2 over bodies, with c and k of a rod
     (1/2, 1/3) or a disc (0, 1/2), in lengths of the body: strictly convex, so that the answer is
     one, also where the forces leave a parameter entirely free (a Tripteron's platform's inertia).
     """
     parameters = (base.parameters[column] for column in base.kept)
-    masses = [abs(v) for v, p in zip(values, parameters, strict=True) if p.kind == "m"]
+    masses = [abs(v) for v, p in zip(base_values, parameters, strict=True) if p.kind == "m"]
     typical = float(np.mean(masses)) if masses and np.mean(masses) > 0.0 else 1.0
     heads, count = bodies.masses, len(bodies.names)
     scale = bodies.scale(np.full(count, typical))

@@ -21,15 +21,15 @@ axis."""
 
 @dataclass(frozen=True)
 class LinearLimits:
-    """Linear limits `matrix @ parameters <= right`, and what each one is called."""
+    """Linear limits `matrix @ parameters <= right`, each with its name."""
 
     matrix: Array
     right: Array
     names: tuple[str, ...]
 
-    def violations(self, values: Array, tolerance: Array) -> tuple[str, ...]:
-        """Return the limits that parameters (N,) do not keep, and by how much, SI units."""
-        over = self.matrix @ values - self.right
+    def violations(self, parameters: Array, tolerance: Array) -> tuple[str, ...]:
+        """Return the limits that parameters (N,) violate, and by how much, SI units."""
+        over = self.matrix @ parameters - self.right
         return tuple(
             f"{name}: by {excess:.3g}"
             for name, excess, small in zip(self.names, over, tolerance, strict=True)
@@ -73,9 +73,7 @@ class Bounds:
     total_mass: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
-        pairs = {
-            name: (self.lower[name], self.upper[name]) for name in self.lower.keys() & self.upper
-        }
+        pairs = {n: (self.lower[n], self.upper[n]) for n in self.lower.keys() & self.upper}
         if self.total_mass is not None:
             pairs["total_mass"] = self.total_mass
         for body, box in self.boxes.items():
@@ -94,7 +92,7 @@ class Bounds:
                 raise ModelError(f"bounds: {name}: lower limit {low:g} is above the upper {high:g}")
 
     def limits(self, robot: Manipulator) -> LinearLimits:
-        """Return the limits as rows on the N parameters, with what every rod keeps.
+        """Return all limits as linear inequalities on the N parameters, with those of rods.
 
         The centre of mass of a rod is between its ends, whatever else is known.
 
@@ -136,7 +134,7 @@ class Bounds:
 
 
 def _rods(robot: Manipulator) -> dict[str, tuple[float, float]]:
-    """Return the ends of each rod along its x axis, m; rods without extents are left out."""
+    """Return the ends of each rod along its x axis, m, by body; without rods of no extent."""
     ends = {}
     for p in parameter_data(robot):
         if p.kind == "I" and p.legs:
@@ -147,7 +145,7 @@ def _rods(robot: Manipulator) -> dict[str, tuple[float, float]]:
 
 
 def _names_of_key(key: str, known: Mapping[str, str], what: str) -> list[str]:
-    """Return the name itself, or the names of all legs whose stem it is."""
+    """Return the names that a key stands for: itself, or all those with it as their stem."""
     names = [name for name, stem in known.items() if key in (name, stem)]
     if not names:
         raise ModelError(f"bounds: {key!r} is no {what} of this machine: {', '.join(known)}")

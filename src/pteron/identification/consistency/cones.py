@@ -28,7 +28,7 @@ are no problem, and where the solver gives up one of the others is in its range.
 
 @dataclass(frozen=True)
 class RealBodies:
-    """The set of scaled free parameters z that real bodies can have, where matrix @ z <= right.
+    """The scaled free parameters z (k,) that real bodies can have, with matrix @ z <= right.
 
     Times the depth asked for, `margins` (bodies,) are how far inside its cone each body shall be.
     """
@@ -40,7 +40,7 @@ class RealBodies:
 
     @property
     def counts(self) -> list[int]:
-        """Number of rows of each body: those of a triangle."""
+        """Number of constraint rows of each body: the entries of a symmetric matrix's triangle."""
         return [len(moments) * (len(moments) + 1) // 2 for moments in self.bodies.moments]
 
     @cached_property
@@ -62,8 +62,8 @@ class RealBodies:
         return matrix, np.concatenate(of_depth), constant
 
 
-def widest(real: RealBodies, start: Array, free: Array, most: float) -> tuple[float, Array]:
-    """Return the greatest depth in the set for z = start + free @ y, at most `most`, and that z.
+def deepest_point(real: RealBodies, start: Array, free: Array, most: float) -> tuple[float, Array]:
+    """Return the greatest depth in the set for z = start + free @ y, at most `most`, and z.
 
     The depth is minus infinity where there is no such z.
     """
@@ -79,7 +79,7 @@ def widest(real: RealBodies, start: Array, free: Array, most: float) -> tuple[fl
     return float(solution[0][-1]), start + free @ solution[0][:-1]
 
 
-def nearest(
+def nearest_to_target(
     real: RealBodies, start: Array, free: Array, depth: float, matrix: Array, right: Array
 ) -> Array | None:
     """Return z = start + free @ y in the set with the least |matrix @ z - right|, or None."""
@@ -91,8 +91,8 @@ def nearest(
     return None if solution is None else np.asarray(start + free @ solution[0][: free.shape[1]])
 
 
-def closest(
-    real: RealBodies, matrix: Array, values: Array, spread: Array, depth: float
+def closest_to_values(
+    real: RealBodies, matrix: Array, targets: Array, spread: Array, depth: float
 ) -> tuple[Array, Array] | None:
     """Return z in the set with the least |r|, where matrix @ z = values + spread @ r, or None.
 
@@ -100,12 +100,12 @@ def closest(
     """
     of_z, of_depth, constant = real.rows
     size = np.linalg.norm(matrix, axis=1)
-    distance = float(np.linalg.norm(np.linalg.solve(spread, values)))
+    distance = float(np.linalg.norm(np.linalg.solve(spread, targets)))
     for share in _UNITS:
         solution = _least_squares(
             real,
             matrix / size[:, None],
-            -values / size,
+            -targets / size,
             max(1.0, share * distance) * spread / size[:, None],
             of_z,
             constant + depth * of_depth,

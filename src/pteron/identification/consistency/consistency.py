@@ -69,7 +69,7 @@ class Consistency(Result):
     nearest_to: Literal["CAD", "nothing"]
 
     def summary(self) -> str:
-        """Return what was found, for people, as lines of text."""
+        """Return the feasibility, the shifts and the violations as lines of text for people."""
         lines = []
         if self.feasible:
             lines.append("Fit: real bodies have the identified base parameters exactly.")

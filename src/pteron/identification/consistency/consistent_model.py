@@ -22,7 +22,12 @@ from pteron.identification.consistency.bodies import (
     real_bodies,
 )
 from pteron.identification.consistency.bounds import Bounds, LinearLimits
-from pteron.identification.consistency.cones import RealBodies, closest, nearest, widest
+from pteron.identification.consistency.cones import (
+    RealBodies,
+    closest_to_values,
+    deepest_point,
+    nearest_to_target,
+)
 from pteron.identification.consistency.consistency import Consistency
 from pteron.kernels import Array
 from pteron.manipulator import (
@@ -194,13 +199,13 @@ class _Aim:
         return self.multipliers is None
 
 
-def _check_values(robot: Manipulator, base: BaseParameters, values: ArrayLike) -> Array:
+def _check_values(robot: Manipulator, base: BaseParameters, base_values: ArrayLike) -> Array:
     """Return identified values (rank,) as an array, after checking that they are the machine's."""
     if parameter_names(robot) != parameter_names(base.robot):
         raise ModelError(
             f"base: made for {base.robot.name}, which has other parameters than {robot.name}"
         )
-    vector = np.asarray(values, dtype=float)
+    vector = np.asarray(base_values, dtype=float)
     expect(vector.shape == (base.rank,), "values", f"shape {vector.shape}", f"({base.rank},)")
     if not np.isfinite(vector).all():
         raise DataError("values: not all are finite numbers; identify the parameters again")
@@ -210,14 +215,14 @@ def _check_values(robot: Manipulator, base: BaseParameters, values: ArrayLike) -
 def _scale_problem(
     robot: Manipulator,
     base: BaseParameters,
-    values: Array,
+    base_values: Array,
     root: Array | None,
     cad: RobotLike | ArrayLike | None,
     bounds: Bounds,
 ) -> _Problem:
     """Return the problem in scaled parameters; without a `root` its spread is relative."""
     bodies, limits, prior = bodies_of(base), bounds.limits(robot), _prior(robot, cad)
-    target = plain_target(bodies, base, values) if prior is None else cad_target(bodies, prior)
+    target = plain_target(bodies, base, base_values) if prior is None else cad_target(bodies, prior)
     matrix = limits.matrix @ bodies.sharing * target.scale
     lengths = np.linalg.norm(matrix, axis=1)
     real = RealBodies(bodies, target.margins, matrix / lengths[:, None], limits.right / lengths)
@@ -226,7 +231,7 @@ def _scale_problem(
     u, singular, vt = np.linalg.svd(grouping / sizes[:, None])
     return _Problem(
         robot=robot,
-        values=values,
+        values=base_values,
         spread=np.diag(sizes) if root is None else root,
         limits=limits,
         cad=prior,
@@ -241,18 +246,18 @@ def _scale_problem(
 
 def _choose_aim(problem: _Problem) -> _Aim:
     """Return the identified values if they are feasible, else the nearest feasible values."""
-    real, target, values, free = problem.real, problem.target, problem.values, problem.free
-    depth, deepest = widest(real, problem.inverse @ (values / problem.sizes), free, _DEEPEST)
+    real, target, beta, free = problem.real, problem.target, problem.values, problem.free
+    depth, deepest = deepest_point(real, problem.inverse @ (beta / problem.sizes), free, _DEEPEST)
     if depth >= _SHALLOW:
-        return _Aim(values, deepest, 0.5 * depth)
-    count = free.shape[0]
-    inside = nearest(real, np.zeros(count), np.eye(count), 1.0, target.matrix, target.right)
+        return _Aim(beta, deepest, 0.5 * depth)
+    n = free.shape[0]
+    inside = nearest_to_target(real, np.zeros(n), np.eye(n), 1.0, target.matrix, target.right)
     if inside is None:
         raise ModelError(
             "bounds: no real bodies keep them all, whatever the identified values are; "
             f"loosen some of: {', '.join(problem.limits.names)}"
         )
-    solution = closest(real, problem.grouping, values, problem.spread, _SHALLOW)
+    solution = closest_to_values(real, problem.grouping, beta, problem.spread, _SHALLOW)
     if solution is None:
         raise ModelError(_TOO_FAR)
     point, multipliers = solution
@@ -264,7 +269,7 @@ def _bodies_nearest_target(problem: _Problem, aim: _Aim) -> Array:
     """Return the bodies z (k,) with the values aimed at that are nearest to the target."""
     bodies, target = problem.bodies, problem.target
     start = problem.inverse @ (aim.values / problem.sizes)
-    z = nearest(problem.real, start, problem.free, aim.depth, target.matrix, target.right)
+    z = nearest_to_target(problem.real, start, problem.free, aim.depth, target.matrix, target.right)
     if z is not None and not (bodies.least(z) <= 0.0).any():
         return z
     # The closest model is then the only one, to the solver's accuracy; of feasible values that

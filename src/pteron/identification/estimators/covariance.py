@@ -38,7 +38,7 @@ _BLOCK = 1 << 13
 
 @dataclass(frozen=True)
 class Noise:
-    """Noise e of n actuators, row by row: A_i(q) e_i = (root u)_i, with q the shift by a row.
+    """Autoregressive noise e of n actuators: A_i(q) e_i = (root u)_i, with q the shift by a row.
 
     Attributes
     ----------
@@ -70,12 +70,12 @@ class Noise:
             total += each.T @ each
         return total
 
-    def times(self, matrix: Array) -> Array:
-        """Return the covariance of the noise of all rows times columns (R, n, p)."""
-        backwards = self._apply_whitening(matrix[::-1])[::-1]
-        return self._apply_whitening(np.einsum("ij,rjp->rip", self.root @ self.root.T, backwards))
+    def multiply_covariance(self, matrix: Array) -> Array:
+        """Return C X for columns X (R, n, p), C being the covariance of the noise of all rows."""
+        backwards = self._filter_noise(matrix[::-1])[::-1]
+        return self._filter_noise(np.einsum("ij,rjp->rip", self.root @ self.root.T, backwards))
 
-    def _apply_whitening(self, matrix: Array) -> Array:
+    def _filter_noise(self, matrix: Array) -> Array:
         """Return columns (R, n, p) filtered by 1 / A_i along the rows of each actuator."""
         columns = [
             scipy.signal.lfilter([1.0], polynomial, matrix[:, i], axis=0)
@@ -123,7 +123,7 @@ def noise_of(
     columns = orthonormal.reshape(rows, n, p)  # H = X X^T
     noise = Noise((np.ones(1),) * n, np.diag(np.sqrt(autocovariances[0] / counts[0])))
     for _ in range(_ROUNDS):
-        times = noise.times(columns) * used[..., None]
+        times = noise.multiply_covariance(columns) * used[..., None]
         taken = columns @ np.einsum("rip,riq->pq", columns, times)
         missing = (
             _lagged_products(columns, times)
@@ -145,7 +145,7 @@ def _lagged_products(first: Array, second: Array | None = None) -> Array:
 
 
 def _autoregression(lagged: Array, rows: int) -> Noise:
-    """Return the noise with autocovariances (K, n) over these lags, each actuator for itself."""
+    """Return the autoregressive noise with these autocovariances (K, n), by actuator."""
     most = 1.0 - 1.0 / np.sqrt(rows)  # beyond it memory is as long as the whole
     polynomials, sizes = [], []
     for g in lagged.T.copy():
@@ -168,7 +168,7 @@ def _autoregression(lagged: Array, rows: int) -> Noise:
 
 
 def _levinson(autocovariances: Array) -> tuple[Array, float]:
-    """Return the polynomial of an autoregression, 1 first, and the variance of its innovations."""
+    """Return an autoregression's polynomial, 1 first, and its innovations' variance."""
     g = autocovariances
     polynomial, variance = np.ones(1), float(g[0])
     for order in range(1, len(g)):

@@ -73,13 +73,13 @@ def essential_parameters(
     A value that was dropped need not be zero, only too small for these data; what it did is then
     done by those it is correlated with. For statements about single values use the full estimate.
     """
-    values = estimate.values
+    beta = estimate.values
     gone: list[int] = []
     p_value = 1.0
-    remaining = list(range(len(values)))
+    remaining = list(range(len(beta)))
     while len(remaining) > 1:
         # Cost of dropping each of those left, beside those already gone.
-        statistics = [estimate.wald(values[[*gone, k]], [*gone, k]) for k in remaining]
+        statistics = [estimate.wald(beta[[*gone, k]], [*gone, k]) for k in remaining]
         least = int(np.argmin(statistics))
         count = len(gone) + 1
         chance = float(scipy.stats.f.sf(statistics[least] / count, count, estimate.degrees))

@@ -101,7 +101,7 @@ class Estimate(Result):
 
     @property
     def degrees(self) -> int:
-        """Equations more than values."""
+        """Degrees of freedom: the number of equations less that of values."""
         return self.rows - len(self.values)
 
     @property
@@ -127,9 +127,9 @@ class Estimate(Result):
         return self.values - reach, self.values + reach
 
     def distance(self, truth: ArrayLike) -> float:
-        """Return how far values (p,) are from the estimate, in standard deviations of all.
+        """Return the Mahalanobis distance of true values (p,) from the estimate.
 
-        The square root of (values - truth)^T covariance^-1 (values - truth).
+        It is the square root of (values - truth)^T covariance^-1 (values - truth).
         """
         return float(np.sqrt(self.wald(self.values - np.asarray(truth, dtype=float))))
 
@@ -142,7 +142,7 @@ class Estimate(Result):
         return float(scipy.stats.f.sf(self.distance(truth) ** 2 / p, p, self.degrees))
 
     def wald(self, shift: Array, chosen: Sequence[int] | None = None) -> float:
-        """Return the square of a shift of values, all or some, in terms of their covariance."""
+        """Return Wald's statistic of a shift of all or `chosen` values: s^T covariance^-1 s."""
         rows = range(len(self.values)) if chosen is None else chosen
         return wald(shift, self.covariance[np.ix_(rows, rows)])
 
@@ -181,7 +181,7 @@ class Estimate(Result):
 
 
 def wald(shift: Array, covariance: Array) -> float:
-    """Return Wald's statistic of a shift (q,), its square in terms of a covariance (q, q)."""
+    """Return Wald's statistic s^T covariance^-1 s of a shift s (q,), covariance (q, q)."""
     unit = np.maximum(np.sqrt(np.maximum(np.diag(covariance), 0.0)), 1e-150)
     standard = shift / unit
     # Values of a fit without noise may be known alike: least squares, where it is singular.
@@ -189,9 +189,9 @@ def wald(shift: Array, covariance: Array) -> float:
     return float(standard @ np.linalg.lstsq(correlation, standard, rcond=None)[0])
 
 
-def residuals_of(observations: Observations, values: Array) -> Array:
-    """Return F - W values (R, n)."""
-    return np.asarray(observations.forces - observations.matrix @ values)
+def residuals_of(observations: Observations, beta: Array) -> Array:
+    """Return the residuals F - W beta (R, n) of fitted values beta (p,)."""
+    return np.asarray(observations.forces - observations.matrix @ beta)
 
 
 @dataclass
@@ -214,22 +214,22 @@ def estimate_of(
     search: SearchRecord,
     observations: Observations,
     factor: QrFactor,
-    values: Array,
+    beta: Array,
     *,
     weights: Array,
     pull: Array | None = None,
     inverse: Array | None = None,
     instruments: Array | None = None,
-    beside: Array | float = 0.0,
+    extra: Array | float = 0.0,
 ) -> Estimate:
-    """Return the estimate of an estimator's values.
+    """Return an estimator's result: values (p,) with covariance, noise and whiteness of residuals.
 
     The values are B Z^T V F, `factor` is that of the rows times `weights` (R, n) or (n,), whose
-    squares are V, and the covariance B (Z^T V cov(F) V Z + `beside`) B, (p, p). By default B is
+    squares are V, and the covariance B (Z^T V cov(F) V Z + `extra`) B, (p, p). By default B is
     (W^T V W)^-1, another one is `inverse`, and Z is W, another one is `instruments` (R, n, p).
     `pull` (R, n) stands for the weighted residuals where these count in another way.
     """
-    residuals = residuals_of(observations, values)
+    residuals = residuals_of(observations, beta)
     share = factor.degrees / factor.rows
     noise = np.sqrt(
         (residuals**2).sum(axis=0) / np.maximum(observations.equation_counts, 1) / share
@@ -240,18 +240,16 @@ def estimate_of(
     whitened = factor.inverse_triangle() if instruments is None else None
     noise_model = noise_of(rows, pulled, observations.gain > 0.0, weights, whitened)
     middle = noise_model.sum_covariance(rows, weights)
-    covariance = bread @ (middle + beside) @ bread.T
-    symmetric, white = (
-        0.5 * (covariance + covariance.T),
-        whiteness(residuals, observations.gain > 0.0),
-    )
+    covariance = bread @ (middle + extra) @ bread.T
+    symmetric = 0.5 * (covariance + covariance.T)
+    white = whiteness(residuals, observations.gain > 0.0)
     figures = factor.condition, factor.rows, search.iterations, search.converged, residuals
     names, units = observations.names, observations.units
-    return Estimate(search.method, names, units, values, symmetric, noise, white, *figures)
+    return Estimate(search.method, names, units, beta, symmetric, noise, white, *figures)
 
 
 def whiteness(residuals: Array, used: NDArray[np.bool_] | None = None) -> Whiteness:
-    """Return the test of residuals (R, n), in the order of time.
+    """Return Ljung and Box's whiteness test of residuals (R, n), in the order of time.
 
     Those that are not `used` (R, n) take no part: a lag has the pairs of which both are used.
     """

@@ -70,23 +70,23 @@ def instrumental(
     robot identification", IEEE Transactions on Control Systems Technology 22(1), 2014.
     """
     factor = qr_factor(observations).check_seen()
-    values = factor.values()
-    noise = actuator_noise(observations, values)
+    beta = factor.values()
+    noise = actuator_noise(observations, beta)
     search = SearchRecord("instrumental")
     for _ in search.steps(iterations):
         if callable(instruments) or search.iterations == 1:
-            instrument_rows = instruments(values) if callable(instruments) else instruments
-            both, z, differences = _together(observations, instrument_rows, mutual=mutual)
+            instrument_rows = instruments(beta) if callable(instruments) else instruments
+            both, z, differences = _align_instruments(observations, instrument_rows, mutual=mutual)
             qr_factor(replace(both, matrix=z)).check_seen()
         inverse, moment = _normal_equations(both, z, differences, noise)
-        earlier, values = values, inverse @ moment
+        previous, beta = beta, inverse @ moment
         factor = qr_factor(both, 1.0 / noise)
-        last_noise, noise = noise, actuator_noise(both, values)
+        last_noise, noise = noise, actuator_noise(both, beta)
         size = np.sqrt(np.maximum(np.diag(factor.inverse()), np.finfo(float).tiny))
         settled = np.abs(noise / last_noise - 1.0).max() < _SETTLED
-        values_settled = (np.abs(values - earlier) <= _SETTLED * size).all()
+        values_settled = (np.abs(beta - previous) <= _SETTLED * size).all()
         search.converged = bool(settled and values_settled)
-    solved, weights = (search, both, factor, values), 1.0 / last_noise
+    solved, weights = (search, both, factor, beta), 1.0 / last_noise
     return estimate_of(*solved, weights=weights, inverse=inverse, instruments=z)
 
 
@@ -99,13 +99,11 @@ def halves(
     not the same in two samples, as long as a joint passes a step or more between them, so that
     the halves are mutual instruments of each other, and no controller needs to be known.
     """
-    first, second = (
-        observations_of(model, _every_other(log, start), preprocessing) for start in (0, 1)
-    )
+    first, second = (observations_of(model, _every_other(log, s), preprocessing) for s in (0, 1))
     return first, second
 
 
-def _together(
+def _align_instruments(
     observations: Observations, instruments: Observations, *, mutual: bool
 ) -> tuple[Observations, Array, Array | None]:
     """Return observations and instruments at common rows, and half their difference if mutual.

@@ -72,10 +72,10 @@ def weighted_least_squares(
     search = SearchRecord("weighted")
     for _ in search.steps(iterations):
         factor = qr_factor(triangles, 1.0 / noise)
-        values = factor.values()
-        last_noise, noise = noise, actuator_noise(observations, values)
+        beta = factor.values()
+        last_noise, noise = noise, actuator_noise(observations, beta)
         search.converged = bool(np.abs(noise / last_noise - 1.0).max() < _SETTLED_NOISE)
-    return estimate_of(search, observations, factor, values, weights=1.0 / last_noise)
+    return estimate_of(search, observations, factor, beta, weights=1.0 / last_noise)
 
 
 def huber(
@@ -103,34 +103,34 @@ def huber(
     """
     expect(threshold > 0.0, "threshold", threshold, "a number above 0")
     factor = qr_factor(observations).check_seen()
-    values = factor.values()
+    beta = factor.values()
     search = SearchRecord("huber")
     for _ in search.steps(iterations):
-        residuals = residuals_of(observations, values)
+        residuals = residuals_of(observations, beta)
         scale = median_noise(observations, residuals)
         # An actuator without equations needs a scale too: any positive one.
-        scale = np.where(scale > 0.0, scale, actuator_noise(observations, values))
+        scale = np.where(scale > 0.0, scale, actuator_noise(observations, beta))
         reduction = np.minimum(1.0, threshold / np.maximum(np.abs(residuals) / scale, 1e-300))
         factor = qr_factor(observations, np.sqrt(reduction) / scale)
-        last_values, values = values, factor.values()
-        change = factor.scale * np.abs(values - last_values)
+        last_beta, beta = beta, factor.values()
+        change = factor.scale * np.abs(beta - last_beta)
         search.converged = bool(change.max() <= _SETTLED_VALUES * np.sqrt(observations.rows))
     plain = qr_factor(observations, 1.0 / scale)
-    standard = residuals_of(observations, values) / scale
+    standard = residuals_of(observations, beta) / scale
     pull = np.clip(standard, -threshold, threshold)
     # Huber (1981), section 7.6: variance of the pull over the square of its mean slope, with the
     # correction for a small number of equations for each value.
     used = observations.gain > 0.0
     slope = float((np.abs(standard)[used] < threshold).mean())
-    spent = 1.0 + len(values) / observations.rows * (1.0 - slope) / slope
+    spent = 1.0 + len(beta) / observations.rows * (1.0 - slope) / slope
     pull = spent * pull / slope
-    return estimate_of(search, observations, plain, values, weights=1.0 / scale, pull=pull)
+    return estimate_of(search, observations, plain, beta, weights=1.0 / scale, pull=pull)
 
 
-def actuator_noise(observations: Observations, values: Array) -> Array:
+def actuator_noise(observations: Observations, beta: Array) -> Array:
     """Return the standard deviation (n,) of the residuals of fitted values, N or N m."""
-    residuals = residuals_of(observations, values)
-    spent = len(values) / observations.rows
+    residuals = residuals_of(observations, beta)
+    spent = len(beta) / observations.rows
     used = np.maximum(observations.equation_counts, 1)
     noise = np.sqrt((residuals**2).sum(axis=0) / used / (1.0 - spent))
     size = np.sqrt((observations.forces**2).sum(axis=0) / used)

@@ -75,14 +75,14 @@ def maximum_likelihood(
     estimate = weighted_least_squares(observations_of(model, log, preprocessing))
     if preprocessing.cutoff is None:
         return replace(estimate, method=_NAME)  # positions carry no noise
-    _check(log)
+    _check_continuous(log)
     curve = preprocessing.differentiator.curve(log)
     measured = curve.coefficients
     _expect_small(log, measured.size)
     base = curve.bases[0]
     precision = scipy.sparse.diags(1.0 / preprocessing.joint_noise**2)
     information = scipy.sparse.kron(base.T @ base, precision, format="csc")
-    values = estimate.values
+    beta = estimate.values
     # The motion can be bent until it explains nearly all of the forces: what is noise on them is
     # known without a model, and they are not to be followed closer than that.
     least = np.maximum(preprocessing.force_noise, _LEAST_NOISE * estimate.noise.max())
@@ -91,13 +91,12 @@ def maximum_likelihood(
     for _ in search.steps(iterations):
         observations = _sample_observations(model, log, curve, preprocessing)
         if search.iterations <= _RENEWED:
-            used, start = observations.gain, preprocessing.start
-            slopes = _slopes(model, values, log, curve, used, start)
+            slopes = _slopes(model, beta, log, curve, observations.gain, preprocessing.start)
         # Linearised about the present motion
         weights = np.tile(1.0 / noise, (len(observations.time), 1))
-        w = (weights[..., None] * observations.matrix).reshape(-1, len(values))
+        w = (weights[..., None] * observations.matrix).reshape(-1, len(beta))
         s = scipy.sparse.diags(weights.ravel()) @ slopes
-        residuals = (weights * (observations.forces - observations.matrix @ values)).ravel()
+        residuals = (weights * (observations.forces - observations.matrix @ beta)).ravel()
         # Normal equations; the motion is eliminated, its measurement being its prior.
         normal = scipy.sparse.linalg.splu((information + s.T @ s).tocsc())
         pull = information @ (measured - curve.coefficients).ravel() + s.T @ residuals
@@ -108,30 +107,28 @@ def maximum_likelihood(
         inverse = np.linalg.inv(schur / np.outer(size, size)) / np.outer(size, size)
         step = inverse @ (w.T @ residuals - coupling.T @ solved[:, -1])
         motion_step = solved[:, -1] - solved[:, :-1] @ step
-        values = values + step
-        shifted = curve.coefficients + motion_step.reshape(measured.shape)
-        curve = replace(curve, coefficients=shifted)
+        beta = beta + step
+        coefficients = curve.coefficients + motion_step.reshape(measured.shape)
+        curve = replace(curve, coefficients=coefficients)
         # What is left of the forces, less what the values and the motion took.
         remainder = (residuals - w @ step - s @ motion_step).reshape(weights.shape) * noise
-        spent = 1.0 - len(values) / observations.rows
-        noise = np.sqrt(
-            (remainder**2).sum(axis=0) / np.maximum(observations.equation_counts, 1) / spent
-        )
-        noise = np.maximum(noise, least)
+        spent = 1.0 - len(beta) / observations.rows
+        counts = np.maximum(observations.equation_counts, 1)
+        noise = np.maximum(np.sqrt((remainder**2).sum(axis=0) / counts / spent), least)
         search.converged = bool((np.abs(step) <= _SETTLED * np.sqrt(np.diag(inverse))).all())
     # The values' own part of the forces: what the motion could do as well is taken out of it.
     moved = solved[:, :-1]
-    own_rows = (w - s @ moved).reshape(observations.matrix.shape) * noise[:, None]
+    projected_rows = (w - s @ moved).reshape(observations.matrix.shape) * noise[:, None]
     observations = _sample_observations(model, log, curve, preprocessing)
-    beside, factor = moved.T @ (information @ moved), qr_factor(observations, 1.0 / noise)
-    solution, weights = (search, observations, factor, values), 1.0 / noise
+    solution = search, observations, qr_factor(observations, 1.0 / noise), beta
+    extra = moved.T @ (information @ moved)
     return estimate_of(
-        *solution, weights=weights, inverse=inverse, instruments=own_rows, beside=beside
+        *solution, weights=1.0 / noise, inverse=inverse, instruments=projected_rows, extra=extra
     )
 
 
-def _check(log: Log) -> None:
-    """Raise where a log has gaps or its payload changes."""
+def _check_continuous(log: Log) -> None:
+    """Raise LogError where a log has gaps or its payload changes."""
     advice = "to maximum likelihood, or choose another estimator"
     if len(log.segments) > 1:
         raise log.fault("gap", f"has gaps; give a part without one {advice}")
@@ -141,7 +138,7 @@ def _check(log: Log) -> None:
 
 
 def _expect_small(log: Log, coefficients: int) -> None:
-    """Refuse a motion of more coefficients than are fitted at once."""
+    """Raise LogError if a motion has more coefficients than are fitted at once."""
     if coefficients > _MOST:
         raise log.fault(
             "too large",
@@ -153,7 +150,7 @@ def _expect_small(log: Log, coefficients: int) -> None:
 def _sample_observations(
     model: Model, log: Log, curve: Curve, preprocessing: Preprocessing
 ) -> Observations:
-    """Return unfiltered observations of a motion at the log's samples."""
+    """Return the unfiltered observations of a curve's motion at the log's samples."""
     states = States.from_log(model.robot, log, curve.motion, preprocessing.start)
     used = motion_mask(states.joint_rates, preprocessing.slow, preprocessing.settling_rows)
     used[: curve.ends] = used[len(used) - curve.ends :] = 0.0
@@ -163,11 +160,11 @@ def _sample_observations(
 
 
 def _slopes(
-    model: Model, values: Array, log: Log, curve: Curve, used: Array, start: PoseLike
+    model: Model, beta: Array, log: Log, curve: Curve, used: Array, start: PoseLike
 ) -> scipy.sparse.csr_matrix:
     """Return the derivatives (T n, C n) of the forces by the motion's coefficients."""
     # Coulomb friction has no slope, but where the rate changes its sign.
-    smooth = np.where(np.isin(model.kinds, ("coulomb", "stribeck")), 0.0, values)
+    smooth = np.where(np.isin(model.kinds, ("coulomb", "stribeck")), 0.0, beta)
     n = used.shape[1]
     motion = curve.motion
     total = scipy.sparse.csr_matrix((used.size, curve.coefficients.size))

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy  # type: ignore[import-untyped]
 
-from pteron.identification.errors import OfLog
+from pteron.identification.errors import LogSourceMixin
 from pteron.identification.observation import Observations, triangle
 from pteron.kernels import Array
 
@@ -26,7 +26,7 @@ _PLAIN = 1e5
 
 
 @dataclass(frozen=True)
-class QrFactor(OfLog):
+class QrFactor(LogSourceMixin):
     """The triangular factor R of [W F], regressor and forces, W's columns scaled to length 1."""
 
     factor: Array
@@ -34,11 +34,11 @@ class QrFactor(OfLog):
     image: Array
     """Q^T F (p,)."""
     rest: float
-    """Sum of the squares that no values explain."""
+    """Sum of squares of the least-squares residuals."""
     scale: Array
     """Lengths (p,) of W's columns: values = solution / scale."""
     rows: int
-    """Equations that went in."""
+    """Number of equations."""
     names: tuple[str, ...]
     source: str
     """The log's name in messages."""
@@ -50,11 +50,11 @@ class QrFactor(OfLog):
 
     @property
     def degrees(self) -> int:
-        """Equations more than values."""
+        """Degrees of freedom: the number of equations less that of values."""
         return self.rows - len(self.names)
 
     def values(self) -> Array:
-        """Return the values of least squares (p,)."""
+        """Return the least-squares values (p,)."""
         return np.asarray(scipy.linalg.solve_triangular(self.factor, self.image) / self.scale)
 
     def inverse(self) -> Array:
@@ -70,7 +70,7 @@ class QrFactor(OfLog):
         return np.asarray(inverse / self.scale[:, None])
 
     def check_seen(self) -> QrFactor:
-        """Return the factor; raise a LogError with the names of the undetermined values."""
+        """Return the factor itself; raise LogError, naming them, if values are undetermined."""
         if self.degrees <= 0:
             raise self.fault(
                 "too short",
@@ -122,8 +122,8 @@ def qr_factor(
     divisor = np.where(scale > 0.0, scale, 1.0)
     blocks = _blocks(observations, weights, block)
     full = triangle((np.column_stack([rows / divisor, f]) for rows, f in blocks), p + 1)
-    about = observations.rows, observations.names, observations.source
-    return QrFactor(full[:p, :p], full[:p, p], float(full[p, p] ** 2), scale, *about)
+    labels = observations.rows, observations.names, observations.source
+    return QrFactor(full[:p, :p], full[:p, p], float(full[p, p] ** 2), scale, *labels)
 
 
 def _blocks(

@@ -29,7 +29,7 @@ _CONSTANT = ("coulomb", "offset")
 
 
 class SmallestCorrections(NamedTuple):
-    """The solution of mixed total least squares."""
+    """The solution of mixed total least squares: values (p,) and singular values."""
 
     values: Array
     sizes: Array
@@ -98,7 +98,7 @@ def total(
     stack = np.vstack([stack, np.r_[np.zeros(p), np.sqrt(factor.rest)]])
     upper = np.asarray(np.linalg.qr(stack[:, [*order, p]], mode="r"))
     forces, search = 1.0, SearchRecord("total")
-    values = np.empty(p)
+    beta = np.empty(p)
     for _ in search.steps(iterations):
         corrections = smallest_corrections(upper, exact, np.r_[errors[order[exact:]], forces])
         sizes = corrections.sizes
@@ -107,23 +107,23 @@ def total(
                 "too little motion",
                 "total least squares: noise explains all there is; record a livelier motion",
             )
-        values[order] = corrections.values
-        through = ((values * errors) ** 2).sum()
+        beta[order] = corrections.values
+        modelled = ((beta * errors) ** 2).sum()
         # The residuals hold the noise of the columns as well as that of the forces.
         squares_left = (
-            factor.rest + ((factor.image - factor.factor @ (factor.scale * values)) ** 2).sum()
+            factor.rest + ((factor.image - factor.factor @ (factor.scale * beta)) ** 2).sum()
         )
         variance = squares_left / factor.degrees
         search.converged = given_errors is None or variance == 0.0
         if not search.converged:
-            last_forces, forces = forces, np.sqrt(max(variance - through, _LEAST_SHARE * variance))
+            last_forces, forces = forces, np.sqrt(max(variance - modelled, _LEAST_SHARE * variance))
             search.converged = bool(abs(forces / last_forces - 1.0) < _SETTLED)
     # The normal equations without the bias of the columns' noise, least^2 times its variance.
     normal = (factor.scale[:, None] * factor.factor.T) @ (factor.factor * factor.scale)
     normal = normal - float(sizes[-1] ** 2) * np.diag(errors**2)
     lengths = np.outer(factor.scale, factor.scale)
     inverse = np.linalg.inv(normal / lengths) / lengths
-    return estimate_of(search, observations, factor, values, weights=1.0 / noise, inverse=inverse)
+    return estimate_of(search, observations, factor, beta, weights=1.0 / noise, inverse=inverse)
 
 
 def column_errors(model: Model, log: Log, preprocessing: Preprocessing, *, seed: Seed = 0) -> Array:

@@ -96,7 +96,7 @@ def conditioning(
     ModelError
         If `base` belongs to a machine of another layout.
     """
-    return conditioning_of(information_root(motion, base, samples), base.values(motion.robot))
+    return condition_numbers(information_root(motion, base, samples), base.values(motion.robot))
 
 
 def information_root(
@@ -115,7 +115,7 @@ def information_root(
     return np.asarray(triangle(pieces, base.rank) / np.sqrt(count))
 
 
-def conditioning_of(root: Array, values: Array) -> Conditioning:
+def condition_numbers(root: Array, base_values: Array) -> Conditioning:
     """Return the condition numbers of `information_root`, for base parameters of these values."""
     if not np.isfinite(root).all():
         return Conditioning(np.inf, np.inf, np.inf, -np.inf)
@@ -126,10 +126,10 @@ def conditioning_of(root: Array, values: Array) -> Conditioning:
         # Equilibrated first: the columns' sizes differ by more than the digits would bear.
         singular = np.linalg.svd(root / lengths, compute_uv=False)
         logdet = float(2.0 * (np.log(singular).sum() + np.log(lengths).sum()))
-    return Conditioning(scaled, _condition(root), _condition(root * values), logdet)
+    return Conditioning(scaled, _condition(root), _condition(root * base_values), logdet)
 
 
-def condition_of_long(root: Array, short: Array) -> float:
+def condition_with_penalty(root: Array, short: Array) -> float:
     """Return `scaled_condition` times sqrt(1 + (short / length)^2) of every column, `short` (p,).
 
     The scaled condition number alone does not see that a motion hardly moves a body.
@@ -150,7 +150,7 @@ def stacked_regressor(motion: FourierMotion, base: BaseParameters, times: Array)
 
 def _condition(matrix: Array) -> float:
     """Return the condition number of a matrix; infinity where its rank is deficient."""
-    values = np.linalg.svd(matrix, compute_uv=False)
-    if len(matrix) < matrix.shape[1] or values[-1] <= np.finfo(float).eps * values[0]:
+    singular = np.linalg.svd(matrix, compute_uv=False)
+    if len(matrix) < matrix.shape[1] or singular[-1] <= np.finfo(float).eps * singular[0]:
         return float("inf")
-    return float(values[0] / values[-1])
+    return float(singular[0] / singular[-1])

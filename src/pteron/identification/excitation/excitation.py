@@ -111,15 +111,19 @@ class Excitation(Result):
     def progress_text(self) -> str:
         """How far the search came, and whether its motion identifies the machine, in sentences."""
         finished = sum(start.finished for start in self.starts)
-        how = f"{self.draws} random motions drawn, {finished} of {len(self.starts)} improved to the"
-        reached = self.conditioning.scaled
-        text = f"Search: {how} end, {self.seconds:.0f} s; condition number {reached:.3g}."
-        if reached <= IDENTIFIES:
-            return text
+        search = (
+            f"Search: {self.draws} random motions drawn, {finished} of {len(self.starts)} "
+            f"optimised to convergence, {self.seconds:.0f} s."
+        )
+        condition = self.conditioning.scaled
+        size = f"{condition:.0f}" if 1e3 <= condition < 1e6 else f"{condition:.3g}"
+        reached = f"condition number {size}, at most {IDENTIFIES:g} allowed"
+        if condition <= IDENTIFIES:
+            return f"This motion identifies all base parameters: {reached}. {search}"
         return (
-            f"{text} Above {IDENTIFIES:g} such a motion leaves some base parameters open: search "
-            "longer (--seconds), allow more speed and acceleration, take more --harmonics; or "
-            "identify legs that are alike with --shared."
+            f"This motion does not identify all base parameters: {reached}. {search} Search longer "
+            "(--seconds), allow more speed and acceleration, take more --harmonics; or identify "
+            "equal legs together with --shared."
         )
 
     def with_leads(self, periods: int = 1) -> LedMotion:
@@ -127,7 +131,7 @@ class Excitation(Result):
         return LedMotion(self.motion, self.lead, periods)
 
     def held_out(self, rate: float = 1000.0) -> RepeatedCycle:
-        """Return a motion of another kind, within the same limits, to judge a model by.
+        """Return a pick-and-place cycle within the same limits, to validate a model with.
 
         See `held_out_cycle` for `rate` and errors.
         """
@@ -275,7 +279,7 @@ def _describe(movement: Movement, layout: MotionLayout) -> Description:
 
 
 def _mode_of(movement: Movement) -> int | None:
-    """Return the pose of `direct_kinematics` throughout a movement, from 1."""
+    """Return the assembly mode of a movement, from 1; None where modes have no fixed number."""
     robot = movement.robot
     if not closure_of(robot).keeps_modes:
         return None

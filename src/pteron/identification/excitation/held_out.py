@@ -81,7 +81,7 @@ class RepeatedCycle(Result):
         return FullMotion.from_platform(self.robot, pose, *rates)
 
     def margins(self, limits: Limits, rate: float = 1000.0) -> Margins:
-        """Return the margins of a cycle, at ten times as many samples a second."""
+        """Return one cycle's margins to limits, evaluated at ten times `rate` samples a second."""
         once = replace(self, count=1)
         return margins(once, limits, max(round(10.0 * rate * self.length), _SAMPLES))
 
@@ -127,7 +127,7 @@ def held_out_cycle(
     (True, True)
     """
     limits = limits or Limits.of(robot)
-    repeated = _standard(robot, min(limits.type_i, limits.type_ii))
+    repeated = _largest_standard_cycle(robot, min(limits.type_i, limits.type_ii))
     cycle = repeated.cycle
     while not is_clear(replace(repeated, length=_AT_REST), limits, _SAMPLES, _CLEAR):
         cycle = replace(cycle, scale=_SMALLER * cycle.scale)
@@ -145,7 +145,7 @@ def held_out_cycle(
     return replace(repeated, length=length, count=count)
 
 
-def _standard(robot: Manipulator, least: float) -> RepeatedCycle:
+def _largest_standard_cycle(robot: Manipulator, least: float) -> RepeatedCycle:
     """Return the largest standard cycle that fits, in the direction that moves every joint most.
 
     A joint that rests says nothing of its forces.

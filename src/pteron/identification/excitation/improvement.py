@@ -27,7 +27,7 @@ _CHECKED = 200
 
 @dataclass(frozen=True)
 class Round:
-    """A round of the improvement: its stages."""
+    """A round of the improvement: the stages that each of its starts goes through."""
 
     doublings: tuple[int, ...]
     """Sharpness of each stage's measure: the blunt one has wide valleys, the sharp one is all but
@@ -51,14 +51,14 @@ ROUNDS = {
 
 
 class Stage(NamedTuple):
-    """The result of a stage of the improvement of a start."""
+    """The result of one stage in the improvement of a start."""
 
     number: int
-    """The start."""
+    """Number of the start."""
     done: int
     """Number of stages done."""
-    found: FourierMotion | None
-    """A motion that keeps all limits, if the stage found one."""
+    feasible: FourierMotion | None
+    """A motion that keeps all limits, if the stage reached one."""
     ended: bool
     finished: bool
     """Whether it was done thoroughly."""
@@ -66,7 +66,7 @@ class Stage(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Improvement:
-    """The improvement of one start, a motion that keeps all limits, in so many seconds."""
+    """The improvement of one start, a motion that keeps all limits, within `seconds`."""
 
     number: int
     setting: Setting
@@ -79,7 +79,7 @@ class Improvement:
         plan, setting, remaining = self.plan, self.setting, self.seconds
         safe = current = self.start
         # The limits that the program keeps, by name, and instants (E,) beside its own samples, s
-        watched, instants = _near_limits(current, setting), np.empty(0)
+        watched, instants = _watched_limits(current, setting), np.empty(0)
         for stage in range(plan.stages):
             if remaining <= 0.0:
                 yield Stage(self.number, stage, None, ended=True, finished=False)
@@ -109,9 +109,9 @@ class Improvement:
 
 
 def improve_starts(starts: Sequence[Improvement], workers: int) -> Generator[Stage, None, None]:
-    """Yield every stage of all starts, computed by `workers` processes; without others by this.
+    """Yield every stage of all starts, computed by `workers` processes, or in this one for 1.
 
-    A start whose process fails is improved here; where the iteration is given up, all are ended.
+    A start whose process fails is improved here; closing the generator ends all processes.
     """
     if workers > 1:
         starts = yield from _improve_in_processes(starts, workers)
@@ -140,21 +140,21 @@ def _send_stages(start: Improvement, send: Callable[[Stage], None]) -> Stage:
     return stage
 
 
-def _near_limits(motion: FourierMotion, setting: Setting) -> tuple[str, ...]:
-    """Return the limits that the motion is near to; the platform's place is always watched."""
+def _watched_limits(motion: FourierMotion, setting: Setting) -> tuple[str, ...]:
+    """Return the names of the limits to watch: those near, and always types I and II."""
     margins, always = _margins(motion, setting)[0], ("type_i", "type_ii")
-    return tuple(name for name, values in margins.items() if name in always or values.min() < _NEAR)
+    return tuple(name for name, margin in margins.items() if name in always or margin.min() < _NEAR)
 
 
 def _violations(motion: FourierMotion, setting: Setting) -> tuple[tuple[str, ...], Array]:
-    """Return the limits that are violated, and the instants (E,) of the least margins."""
+    """Return the violated limits' names, and instants (E,), s, of margins' negative minima."""
     margins, times = _margins(motion, setting)
     instants = [np.empty(0)]
     for margin in np.hstack(list(margins.values())).T:
         # Of a stretch out of reach, all -inf, the first instant counts.
         dip = (margin < 0.0) & (margin <= np.roll(margin, -1)) & (margin < np.roll(margin, 1))
         instants.append(times[dip])
-    names = tuple(name for name, values in margins.items() if (values < 0.0).any())
+    names = tuple(name for name, margin_values in margins.items() if (margin_values < 0.0).any())
     return names, np.concatenate(instants)
 
 

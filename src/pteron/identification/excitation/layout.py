@@ -106,10 +106,10 @@ class MotionLayout:
         )
         description.check(robot)
         names = ["t", *(name for name, _ in self._columns(robot))]
-        twice = next((name for k, name in enumerate(names) if name in names[:k]), None)
-        if twice is not None:
+        duplicate = next((name for k, name in enumerate(names) if name in names[:k]), None)
+        if duplicate is not None:
             raise DataError(
-                f"columns: {shorten(twice)} would be the name of two columns; choose another"
+                f"columns: {shorten(duplicate)} would be the name of two columns; choose another"
             )
         return description
 
@@ -128,12 +128,12 @@ class MotionLayout:
         ticks = np.arange(math.ceil(samples - SAME) + 1)
         state = movement.states(ticks / rate)
         joints, scales = to_readings(robot, state.joints), reading_scales(robot)
-        values = {"joints": [joints], "poses": [state.pose]}.get(self.contents) or [
+        blocks = {"joints": [joints], "poses": [state.pose]}.get(self.contents) or [
             *(joints, state.pose, state.rates / scales, state.accelerations / scales),
             *(state.velocity, state.acceleration, scales * drive_forces(robot, *state[:3])),
         ]
         columns = {"t": np.asarray(ticks * self._factor("s") / rate, dtype=np.float64)}
-        for (name, unit), column in zip(self._columns(robot), np.hstack(values).T, strict=True):
+        for (name, unit), column in zip(self._columns(robot), np.hstack(blocks).T, strict=True):
             columns[name] = column * self._factor(unit) + 0.0  # no minus zero
         return pl.DataFrame(columns)
 

@@ -129,7 +129,7 @@ class LedMotion(Result):
         """Return the motion of platform and joints at times (T,), s; it rests before and after."""
         span = self.lead.duration
         (far_in, rate_in, gain_in), (far_out, rate_out, gain_out) = (
-            _set_off(moments, span) for moments in (times, self.duration - times)
+            _lead_phase(moments, span) for moments in (times, self.duration - times)
         )
         steady = np.clip(times, self.start, self.end) - self.start
         phase = self.lead.phase + far_in + steady - far_out
@@ -159,7 +159,8 @@ def found_lead(motion: FourierMotion, limits: Limits) -> Lead:
     phases = [float(phase) for phase in motion.uniform_times(_PHASES)]
     for length in _LENGTHS:
         leads = [Lead(length * motion.period, phase) for phase in phases]
-        rooms = [_room(LedMotion(motion, lead, 0), limits, 2 * length * coarse) for lead in leads]
+        step = 2 * length * coarse
+        rooms = [_least_margin(LedMotion(motion, lead, 0), limits, step) for lead in leads]
         for best in np.argsort(rooms)[::-1][:_TRIED]:
             led = LedMotion(motion, leads[best], 0)
             if rooms[best] > _CLEAR and is_clear(led, limits, 2 * length * fine, _CLEAR):
@@ -170,13 +171,13 @@ def found_lead(motion: FourierMotion, limits: Limits) -> Lead:
     )
 
 
-def _room(led: LedMotion, limits: Limits, samples: int) -> float:
-    """Return the least relative margin to limits of speed, acceleration and force."""
+def _least_margin(led: LedMotion, limits: Limits, samples: int) -> float:
+    """Return the least relative margin of a motion to limits of speed, acceleration and force."""
     margins = relative_margins(led, limits, np.linspace(0.0, led.duration, samples))
     return min(float(margins[name].min()) for name in PER_JOINT if name in margins)
 
 
-def _set_off(times: Array, span: float) -> tuple[Array, Array, Array]:
+def _lead_phase(times: Array, span: float) -> tuple[Array, Array, Array]:
     """Return the phase relative to the lead's end, s, its rate and acceleration, 1/s, (T,) each."""
     u = np.clip(times / span, 0.0, 1.0)
     rate, gain, _ = quintic(u, 0.0, 1.0)

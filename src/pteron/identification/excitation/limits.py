@@ -34,13 +34,13 @@ PER_JOINT = ("speed", "acceleration", "force")
 """Limits that may be given for each joint."""
 
 _SHARES: dict[str, tuple[Callable[[float], bool], str]] = {
-    "type_i": (lambda value: 0.0 < value < 1.0, "between 0 and 1"),
-    "type_ii": (lambda value: 0.0 < value < 1.0, "between 0 and 1"),
-    "joint_clearance": (lambda value: value >= 0.0, "0 or more"),
-    "joint_share": (lambda value: 0.0 <= value < 0.5, "at least 0 and below 0.5"),
-    "passive_clearance": (lambda value: 0.0 <= value < 1.0, "at least 0 and below 1"),
+    "type_i": (lambda share: 0.0 < share < 1.0, "between 0 and 1"),
+    "type_ii": (lambda share: 0.0 < share < 1.0, "between 0 and 1"),
+    "joint_clearance": (lambda length: length >= 0.0, "0 or more"),
+    "joint_share": (lambda share: 0.0 <= share < 0.5, "at least 0 and below 0.5"),
+    "passive_clearance": (lambda share: 0.0 <= share < 1.0, "at least 0 and below 1"),
 }
-"""Whether a number can be each of the other limits, and what is expected."""
+"""Check of each of the other limits, and the range that its message states."""
 
 _SPEED = 1.0
 """Speed limit of joints whose drives have none, m/s or rad/s."""
@@ -97,8 +97,8 @@ class Limits:
     joint_share: float = 0.0
 
     @classmethod
-    def of(cls, robot: Manipulator, **given: Any) -> Limits:
-        """Return the limits given and, of speed and force, else those of the machine's drives.
+    def of(cls, robot: Manipulator, **limits: Any) -> Limits:
+        """Return limits with defaults for speed and force taken from the machine's drives.
 
         Examples
         --------
@@ -110,9 +110,9 @@ class Limits:
         drives = [leg.drive or Drive() for leg in robot.legs]
         for name, fallback in (("speed", _SPEED), ("force", math.inf)):
             drive_limits = [getattr(drive, f"max_{name}") for drive in drives]
-            if given.get(name) is None and any(value is not None for value in drive_limits):
-                given[name] = tuple(fallback if value is None else value for value in drive_limits)
-        return cls(**{name: value for name, value in given.items() if value is not None})
+            if limits.get(name) is None and any(limit is not None for limit in drive_limits):
+                limits[name] = tuple(fallback if limit is None else limit for limit in drive_limits)
+        return cls(**{name: limit for name, limit in limits.items() if limit is not None})
 
     def __post_init__(self) -> None:
         for name in PER_JOINT:
@@ -120,24 +120,24 @@ class Limits:
             if setting is None and name == "force":
                 continue
             several = isinstance(setting, list | tuple | np.ndarray)
-            values = tuple(_number(name, value) for value in (setting if several else (setting,)))
-            expect(min(values, default=0.0) > 0.0, "limits", f"{name} {setting}", "numbers above 0")
-            object.__setattr__(self, name, values if several else values[0])
+            limits = tuple(_number(name, limit) for limit in (setting if several else (setting,)))
+            expect(min(limits, default=0.0) > 0.0, "limits", f"{name} {setting}", "numbers above 0")
+            object.__setattr__(self, name, limits if several else limits[0])
         for name, (fits, expected) in _SHARES.items():
-            value = _number(name, getattr(self, name))
-            expect(fits(value), "limits", f"{name} {value:g}", expected)
+            number = _number(name, getattr(self, name))
+            expect(fits(number), "limits", f"{name} {number:g}", expected)
 
 
 def joint_limits(limits: Limits, name: str, robot: Manipulator) -> Array:
-    """Return a limit of each joint (n,), infinite where there is none."""
+    """Return a limit's number for each joint (n,), infinite where there is none."""
     setting = getattr(limits, name)
-    values = np.atleast_1d(np.array(np.inf if setting is None else setting, dtype=float))
-    if values.size not in (1, robot.joint_count):
+    bounds = np.atleast_1d(np.array(np.inf if setting is None else setting, dtype=float))
+    if bounds.size not in (1, robot.joint_count):
         raise DataError(
-            f"limits: {values.size} numbers for {name}, one expected or {robot.joint_count}, one "
+            f"limits: {bounds.size} numbers for {name}, one expected or {robot.joint_count}, one "
             f"for each joint of {robot.name}"
         )
-    return np.broadcast_to(values, (robot.joint_count,)).copy()
+    return np.broadcast_to(bounds, (robot.joint_count,)).copy()
 
 
 def joint_sizes(robot: Manipulator) -> Array:
@@ -147,7 +147,7 @@ def joint_sizes(robot: Manipulator) -> Array:
 
 
 def joint_clearances(limits: Limits, robot: Manipulator) -> Array:
-    """Return how far (n,) the joints are to keep from their limits, m or rad."""
+    """Return the least distance (n,) of the joints from their limits, m or rad."""
     # A share is for safety, and must not refuse a machine whose home pose is near a limit.
     most = 0.5 * np.maximum(_home_distances(robot), 0.0)
     share = np.minimum(2.0 * limits.joint_share * joint_sizes(robot), most)
@@ -166,12 +166,12 @@ def unit_of(robot: Manipulator, name: str, leg: int) -> str:
     return UNITS[name].format(unit=joint.unit, force_unit=joint.force_unit)
 
 
-def _number(name: str, value: object) -> float:
+def _number(name: str, setting: object) -> float:
     """Return a limit as a number; raise unless it is finite, or an infinite force."""
     try:
-        number = float(value)  # type: ignore[arg-type]
+        number = float(setting)  # type: ignore[arg-type]
     except (TypeError, ValueError):
-        raise DataError(f"limits: {name} {value!r} given, a number expected") from None
+        raise DataError(f"limits: {name} {setting!r} given, a number expected") from None
     sound = math.isfinite(number) or (name, number) == ("force", math.inf)
     expect(sound, "limits", f"{name} {number}", "a finite number")
     return number

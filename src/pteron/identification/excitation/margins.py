@@ -110,14 +110,14 @@ def margins(motion: Movement, limits: Limits, samples: int = 4000) -> Margins:
     times, step = np.linspace(0.0, motion.duration, samples, retstep=True)
     least_margins, robot = [], motion.robot
     coarse = _margins_of(robot, limits, motion.states(times))
-    for name, values in coarse.items():
-        tightest = times[int(values.min(axis=-1).argmin())]
+    for name, of_limit in coarse.items():
+        tightest = times[int(of_limit.min(axis=-1).argmin())]
         near = tightest + np.linspace(-step, step, _REFINED)
-        values = _margins_of(robot, limits, motion.states(near))[name]
-        k, leg = np.unravel_index(int(values.argmin()), values.shape)
+        of_limit = _margins_of(robot, limits, motion.states(near))[name]
+        k, leg = np.unravel_index(int(of_limit.argmin()), of_limit.shape)
         owner, unit = None if name == "type_ii" else int(leg) + 1, unit_of(robot, name, int(leg))
         when = float(near[k] % motion.duration)
-        least_margins.append(Margin(name, float(values[k, leg]), owner, when, unit))
+        least_margins.append(Margin(name, float(of_limit[k, leg]), owner, when, unit))
     return Margins(tuple(least_margins), samples)
 
 
@@ -129,22 +129,22 @@ def relative_margins(motion: Movement, limits: Limits, times: Array) -> dict[str
     sizes["joint_clearance"] = joint_sizes(robot)
     absolute = _margins_of(robot, limits, motion.states(times))
     relative = {}
-    for name, values in absolute.items():
-        size = np.broadcast_to(sizes.get(name, 1.0), values.shape[1:])
+    for name, margin in absolute.items():
+        size = np.broadcast_to(sizes.get(name, 1.0), margin.shape[1:])
         # A limit that is infinite has its whole margin.
         relative[name] = np.divide(
-            values, size, out=np.full(values.shape, np.inf), where=np.isfinite(size)
+            margin, size, out=np.full(margin.shape, np.inf), where=np.isfinite(size)
         )
     return relative
 
 
 def check_rest(robot: Manipulator, home: Array, limits: Limits) -> None:
-    """Refuse limits that the machine violates at rest in its home pose; the message names one."""
+    """Raise ModelError if the machine violates limits at rest in its home pose, naming one."""
     zero = np.zeros((1, len(home)))
     at_rest = FullMotion.from_platform(robot, home[None], zero, zero)
-    for name, values in _margins_of(robot, limits, at_rest).items():
-        leg = int(values[0].argmin())
-        margin = values[0, leg]
+    for name, at_home in _margins_of(robot, limits, at_rest).items():
+        leg = int(at_home[0].argmin())
+        margin = at_home[0, leg]
         if margin > 0.0:
             continue
         whose = "the platform" if name == "type_ii" else f"leg {leg + 1}"
@@ -161,7 +161,7 @@ def check_rest(robot: Manipulator, home: Array, limits: Limits) -> None:
 
 
 @lru_cache(maxsize=64)
-def _limits_passive(robot: Manipulator) -> bool:
+def _has_passive_limits(robot: Manipulator) -> bool:
     """Return whether any passive joint has limits."""
     joints = limited_joints(robot, np.array(home(robot)))
     return not all(joint.actuated for joint in joints)
@@ -176,7 +176,7 @@ def _margins_of(robot: Manipulator, limits: Limits, state: FullMotion) -> dict[s
     if any(leg.limits for leg in robot.legs):
         clearances = joint_clearances(limits, robot)
         margins["joint_clearance"] = joint_distances(robot, state.joints) - clearances
-    if _limits_passive(robot):
+    if _has_passive_limits(robot):
         passive = evaluate_unchecked(robot, "passive_room", state.pose)[0]
         margins["passive_clearance"] = passive - limits.passive_clearance
     margins["speed"] = joint_limits(limits, "speed", robot) - np.abs(state.rates)
@@ -192,4 +192,4 @@ def _margins_of(robot: Manipulator, limits: Limits, state: FullMotion) -> dict[s
         # Dry friction counts in full, whichever way a joint moves.
         dry = drives.coulomb + drives.stribeck
         margins["force"] = joint_limits(limits, "force", robot) - dry - needed
-    return {name: np.where(np.isnan(values), -np.inf, values) for name, values in margins.items()}
+    return {name: np.where(np.isnan(margin), -np.inf, margin) for name, margin in margins.items()}

@@ -13,7 +13,7 @@ from pteron.identification.logs import Description, find_description
 from pteron.identification.logs.description_file import description_text
 from pteron.tables import check_output, table_bytes
 
-_BESIDE = "-held-out", "-slow"
+_ENDINGS = "-held-out", "-slow"
 """Endings of the files beside the motion's: cycles held out for validation, and slow passages."""
 
 
@@ -28,15 +28,13 @@ def motion_paths(path: str | Path, layout: MotionLayout | None = None) -> tuple[
     """
     dialect = None if layout is None else layout.dialect
     first = check_output(path, dialect)
-    held_out, slow = (
-        check_output(first.with_stem(first.stem + ending), dialect) for ending in _BESIDE
-    )
+    held_out, slow = (check_output(first.with_stem(first.stem + e), dialect) for e in _ENDINGS)
     for table in (first, held_out, slow):
-        beside = table.with_suffix(".toml")
-        if beside.is_dir():
-            raise OutputError(f"{beside}: is a folder; name another file")
-        if beside.is_file() and find_description(table) != beside:
-            raise OutputError(f"{beside}: describes a machine, and is kept; name another file")
+        toml = table.with_suffix(".toml")
+        if toml.is_dir():
+            raise OutputError(f"{toml}: is a folder; name another file")
+        if toml.is_file() and find_description(table) != toml:
+            raise OutputError(f"{toml}: describes a machine, and is kept; name another file")
     return first, held_out, slow
 
 

@@ -143,15 +143,15 @@ def sizes(robot: Manipulator, space: Space) -> Array:
 
 
 def is_clear(motion: Movement, limits: Limits, samples: int, clear: float = _CLEAR) -> bool:
-    """Return whether samples keep all limits by a relative margin."""
+    """Return whether a motion keeps all limits by a relative margin at so many samples."""
     margins = relative_margins(motion, limits, np.linspace(0.0, motion.duration, samples))
-    return all(float(values.min()) >= clear for values in margins.values())
+    return all(float(margin.min()) >= clear for margin in margins.values())
 
 
 def shrink_into_limits(motion: FourierMotion, limits: Limits) -> FourierMotion | None:
-    """Return the motion shrunk about its center as little as it takes to keep the limits, or None.
+    """Return the motion shrunk about its center as little as it takes to keep the limits.
 
-    None is enough around a place that a leg cannot reach.
+    None where no scale keeps them: the center itself is then out of a leg's reach.
     """
 
     def keeps_limits(scale: float) -> bool:

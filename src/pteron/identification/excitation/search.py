@@ -16,8 +16,8 @@ from pteron.arguments import expect, expect_one_of
 from pteron.errors import DataError
 from pteron.identification.excitation.conditioning import (
     Conditioning,
-    condition_of_long,
-    conditioning_of,
+    condition_numbers,
+    condition_with_penalty,
     information_root,
 )
 from pteron.identification.excitation.excitation import IDENTIFIES, Excitation, Start
@@ -52,13 +52,13 @@ scaled to length 1 alone a motion that all but rests in some direction would be 
 moves: that of a Delta with a shaft went straight up and down, and left the shaft's values open."""
 
 _FEWEST = 10
-"""Random motions that are drawn whatever the time: the best of one would be no choice."""
+"""Least number of random motions, whatever the time: the best of one would be no choice."""
 
 _LONGER = 3
-"""Times `seconds`, at most, that the search takes where its motion would not do."""
+"""Greatest duration of the search, over `seconds`, if its motion identifies too little."""
 
 _SEEN = 0.1
-"""The share of the progress that the random motions are."""
+"""Share of the progress bar that the random motions take."""
 
 
 def optimal_excitation(
@@ -157,8 +157,8 @@ def optimal_excitation(
     robot = as_manipulator(robot)
     limits = limits or Limits.of(robot)
     expect_one_of(get_args(Criterion), criterion=criterion)
-    for name, value in (("starts", starts), ("draws", draws)):
-        expect(value >= 1, name, value, "1 or more")
+    for name, count in (("starts", starts), ("draws", draws)):
+        expect(count >= 1, name, count, "1 or more")
     expect(0.0 < seconds < math.inf, "seconds", seconds, "a number above 0")
     base = base or base_parameters(robot)
     motion: dict[str, Any] = {"space": space, "harmonics": harmonics, "period": period}
@@ -201,14 +201,16 @@ def optimal_excitation(
 
 
 class _Candidate(NamedTuple):
+    """A motion with its conditioning and the root (p, p) of its information matrix."""
+
     motion: FourierMotion
     conditioning: Conditioning
     root: Array
 
 
 @dataclass
-class _Started:
-    """A start of the search: the random motion, by its number, and the best made of it."""
+class _SearchStart:
+    """A start of the search: a random motion by its number, and the best motion made from it."""
 
     draw: int
     first: _Candidate
@@ -218,7 +220,7 @@ class _Started:
 
 @dataclass
 class _Search:
-    """The state of the search."""
+    """The state of the search for an exciting motion."""
 
     criterion: Criterion
     base: BaseParameters
@@ -226,15 +228,15 @@ class _Search:
     short: Array = field(default_factory=lambda: np.zeros(1))
     """The lengths of columns (p,) below which a parameter is shown too little."""
     drawn: list[_Candidate] = field(default_factory=list)
-    starts: list[_Started] = field(default_factory=list)
+    starts: list[_SearchStart] = field(default_factory=list)
     setting: Setting = field(init=False)
-    seen: float = 0.0
+    share_done: float = 0.0
     """The share of the work that is done."""
 
     def judge_motion(self, motion: FourierMotion) -> _Candidate:
         """Return a motion with its conditioning and the root of its information matrix."""
         root = information_root(motion, self.base)
-        return _Candidate(motion, conditioning_of(root, self.base.values(motion.robot)), root)
+        return _Candidate(motion, condition_numbers(root, self.base.values(motion.robot)), root)
 
     def lengths(self) -> Array:
         """Return the columns' root mean square lengths (p,) over the random motions."""
@@ -246,7 +248,7 @@ class _Search:
         """Return a candidate's cost: -log det, or the condition number of columns long enough."""
         if self.criterion == "logdet":
             return -candidate.conditioning.logdet
-        return condition_of_long(candidate.root, self.short)
+        return condition_with_penalty(candidate.root, self.short)
 
     @property
     def identifies(self) -> bool:
@@ -257,7 +259,7 @@ class _Search:
     def choose(self, starts: int) -> None:
         """Choose the best random motions as starts."""
         order = sorted(range(len(self.drawn)), key=lambda k: self.cost(self.drawn[k]))[:starts]
-        self.starts = [_Started(k, self.drawn[k], self.drawn[k]) for k in order]
+        self.starts = [_SearchStart(k, self.drawn[k], self.drawn[k]) for k in order]
         if not math.isfinite(self.cost(self.starts[0].best)):
             raise DataError(
                 f"harmonics: {self.setting.harmonics} given, too few to tell {self.base.rank} "
@@ -265,7 +267,7 @@ class _Search:
             )
 
     def improve(
-        self, starts: Sequence[_Started], plan: Round, seconds: float, workers: int
+        self, starts: Sequence[_SearchStart], plan: Round, seconds: float, workers: int
     ) -> None:
         """Improve some starts in parallel, for `seconds` in all."""
         workers = min(workers, len(starts))
@@ -274,20 +276,20 @@ class _Search:
             return
         motions = enumerate(stage.best.motion for stage in starts)
         tasks = [Improvement(k, self.setting, plan, motion, each) for k, motion in motions]
-        seen, share = self.seen, [0.0] * len(starts)
+        seen, share = self.share_done, [0.0] * len(starts)
         weight = (1.0 - seen) if plan.thorough else _FIRST * (1.0 - seen)
         with closing(improve_starts(tasks, workers)) as stages:
             for stage in stages:
                 share[stage.number] = 1.0 if stage.ended else stage.done / (plan.stages + 1)
                 start = starts[stage.number]
                 start.finished = start.finished or (stage.finished and plan.thorough)
-                if stage.found is not None:
-                    start.best = min(start.best, self.judge_motion(stage.found), key=self.cost)
+                if stage.feasible is not None:
+                    start.best = min(start.best, self.judge_motion(stage.feasible), key=self.cost)
                 self.report(seen + weight * sum(share) / len(share))
 
     def report(self, share: float) -> None:
         """Record the share of the work that is done, and report it."""
-        self.seen = share
+        self.share_done = share
         self.progress(share)
 
     def result(self, limits: Limits, seed: int, seconds: float, interrupted: bool) -> Excitation:

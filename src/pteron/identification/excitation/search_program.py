@@ -63,7 +63,7 @@ class Setting:
     limits: Limits
     criterion: Criterion
     short: tuple[float, ...]
-    """Column lengths (p,), root mean square, below which a column is short: `condition_of_long`."""
+    """RMS lengths (p,) below which a column is short for `condition_with_penalty`."""
 
 
 def minimise(
@@ -74,20 +74,20 @@ def minimise(
     extra: Array,
     seconds: float,
 ) -> Array | None:
-    """Return coefficients (2 H + 1, n) that are better, but need not keep the limits.
+    """Return improved coefficients (2 H + 1, n), which need not keep the limits.
 
     None if it could not begin at `start` (2 H + 1, n). `doublings` is the sharpness of `measure`.
     The limits `watched` by name are kept, at the `extra` instants (E,) too; the fewer, the faster.
     """
     size = sizes(setting.robot, setting.space)
     cost = _cost(setting, doublings)
-    constraints = _Kept(setting, watched, np.concatenate([_instants(setting), extra]))
+    constraints = _LimitConstraints(setting, watched, np.concatenate([_instants(setting), extra]))
     deadline = time.monotonic() + seconds
 
     def measure(z: Array) -> tuple[float, Array]:
         """Return the cost and its gradient, flat, at flat coefficients z."""
-        value, gradient = cost(z.reshape(start.shape))
-        return float(_numbers(value).item()), _numbers(gradient).ravel()
+        size, gradient = cost(z.reshape(start.shape))
+        return float(_numbers(size).item()), _numbers(gradient).ravel()
 
     minimum = sequential_minimum(
         NonlinearProgram(measure, constraints.values, constraints.slopes),
@@ -100,7 +100,7 @@ def minimise(
 
 
 def _numbers(matrix: ca.DM) -> Array:
-    """Return the entries of a matrix; in the middle of an interrupt CasADi gives none, or fails."""
+    """Return a CasADi matrix as an array; raise KeyboardInterrupt where an interrupt spoiled it."""
     try:
         array: Array | None = matrix.full()
         if array is None:
@@ -110,8 +110,8 @@ def _numbers(matrix: ca.DM) -> Array:
     return array
 
 
-class _Kept:
-    """Inequality constraints at instants (T,), at least 0 where the limits are kept."""
+class _LimitConstraints:
+    """Inequality constraints of the program at instants (T,): at least 0 where limits are kept."""
 
     def __init__(self, setting: Setting, watched: tuple[str, ...], times: Array) -> None:
         path, slopes, low, high = _path(setting, watched)
@@ -122,12 +122,12 @@ class _Kept:
         self._above, self._below = np.isfinite(low), np.isfinite(high)
 
     def values(self, z: Array) -> Array:
-        """Return the margins (R,)."""
+        """Return the margins (R,) at variables z (v,)."""
         path_values = _numbers(self._path(*self._evaluate_rows(z))).T
         return self._sides(path_values - self._low, self._high - path_values)
 
     def slopes(self, z: Array) -> Array:
-        """Return their derivatives by the variables (R, v)."""
+        """Return the margins' derivatives by the variables (R, v)."""
         count, limits, n = self._rows.shape[1], len(self._low), len(self._size)
         blocks = _numbers(self._slopes(*self._evaluate_rows(z))).T.reshape(count, 3, n, limits)
         derivatives = np.einsum("tdig,dtk->tgki", blocks * self._size[:, None], self._rows)
@@ -135,7 +135,7 @@ class _Kept:
         return self._sides(derivatives, -derivatives)
 
     def _evaluate_rows(self, z: Array) -> list[Array]:
-        """Return q, q' and q'' at the instants, (n, T) each, of the program's variables (v,)."""
+        """Return q, q' and q'' at the instants, (n, T) each, at the program's variables z (v,)."""
         coefficients = z.reshape(-1, len(self._size)) * self._size
         return [(rows @ coefficients).T for rows in self._rows]
 
@@ -166,8 +166,8 @@ def _cost(setting: Setting, doublings: int) -> ca.Function:
     curve = [ca.mtimes(ca.DM(row), coefficients).T for row in _bases(setting, times)]
     blocks = _regressor(setting).map(len(times))(*curve)
     information = ca.mtimes(blocks, blocks.T) / len(times)
-    value = measure(information, setting.criterion, doublings, setting.short)
-    return ca.Function("cost", [z], [value, ca.gradient(value, z)])
+    criterion = measure(information, setting.criterion, doublings, setting.short)
+    return ca.Function("cost", [z], [criterion, ca.gradient(criterion, z)])
 
 
 @lru_cache(maxsize=16)
@@ -208,28 +208,25 @@ def _path(
     limit_terms["joint_clearance"] = joints, ranges[:, 0] + clearance, ranges[:, 1] - clearance
     passive = program(robot, "passive_room").function(pose)[0].T
     limit_terms["passive_clearance"] = passive, limits.passive_clearance + _BACK_OFF, np.inf
-    for name, value in (("speed", rates), ("acceleration", seconds)):
-        limit_terms[name] = (
-            value / joint_limits(limits, name, robot),
-            _BACK_OFF - 1.0,
-            1.0 - _BACK_OFF,
-        )
+    for name, motion in (("speed", rates), ("acceleration", seconds)):
+        share = motion / joint_limits(limits, name, robot)
+        limit_terms[name] = share, _BACK_OFF - 1.0, 1.0 - _BACK_OFF
     dynamics, zeros = program(robot, "inverse_dynamics").function, ca.SX(pose.shape[0], 1)
-    drives, values = Drives(*map(ca.DM, drives_of(robot))), ca.DM(parameters(robot))
-    moving = dynamics(*state, values).T + drives.inertia * seconds + drives.viscous * rates
-    static = dynamics(pose, zeros, zeros, values).T
+    drives, inertia = Drives(*map(ca.DM, drives_of(robot))), ca.DM(parameters(robot))
+    moving = dynamics(*state, inertia).T + drives.inertia * seconds + drives.viscous * rates
+    static = dynamics(pose, zeros, zeros, inertia).T
     most = ca.DM(joint_limits(limits, "force", robot)) - (drives.coulomb + drives.stribeck)
     needed = ca.vertcat(*((forces + drives.offset) / most for forces in (moving, static)))
     limit_terms["force"] = needed, _BACK_OFF - 1.0, 1.0 - _BACK_OFF
-    values, *sides = zip(*(limit_terms[name] for name in watched), strict=True)
+    terms, *sides = zip(*(limit_terms[name] for name in watched), strict=True)
     low, high = (
-        np.concatenate([np.broadcast_to(b, v.shape[0]) for v, b in zip(values, side, strict=True)])
+        np.concatenate([np.broadcast_to(b, v.shape[0]) for v, b in zip(terms, side, strict=True)])
         for side in sides
     )
-    value = ca.densify(ca.vertcat(*values))
-    slopes = ca.vec(ca.densify(ca.jacobian(value, ca.vertcat(*q))))
+    limited = ca.densify(ca.vertcat(*terms))
+    slopes = ca.vec(ca.densify(ca.jacobian(limited, ca.vertcat(*q))))
     return (
-        ca.Function("path", q, [value], {"cse": True}),
+        ca.Function("path", q, [limited], {"cse": True}),
         ca.Function("slopes", q, [slopes], {"cse": True}),
         low,
         high,

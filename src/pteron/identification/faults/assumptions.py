@@ -1,4 +1,4 @@
-"""Assumptions of the machine's file that a log contradicts, tried one by one, discrete ones.
+"""Discrete assumptions of the machine's file that a log contradicts, each tried by itself.
 
 Gear ratio or lead by a factor, gravity along another axis, another working mode, another order or
 sign of columns: none of these is small, so that no slope tells it. Each is tried on a few hundred
@@ -28,17 +28,17 @@ from pteron.manipulator import Manipulator
 from pteron.manipulator.variants import working_modes
 
 _LOOK = 12_000
-"""Rows of the log, at most, that these samples are from."""
+"""Most rows of the log from which these samples are drawn."""
 
 _SAMPLES = 400
-"""Samples that each assumption is tried on: 800 equations or more for some 40 values."""
+"""Number of samples on which each assumption is tried: 800 equations or more for some 40 values."""
 
 _DECISIVE = 3.0
-"""Factor by which another assumption must lower what is left of the forces."""
+"""Factor by which another assumption must reduce the residual forces to be accepted."""
 
 _EXPLAINED = 0.03
-"""Share of the forces that may be left for them to count as explained, or three times their noise:
-with all parameters free other machines' logs leave 10 % or more."""
+"""Residual forces, as a share of the forces, up to which they count as explained, or three times
+their noise: with all parameters free other machines' logs leave 10 % or more."""
 
 _EXPLAINED_ALONE = 0.06
 """The same where the joints have no poses as the file has it: few assumptions give them any."""
@@ -117,8 +117,8 @@ def find_contradiction(
 ) -> Assumption | None:
     """Return the assumption that explains a log's forces far better than the file does.
 
-    `rotors` (n,) is the inertia that motors are known to add at the joints. None where none makes
-    what is left three times smaller.
+    `rotors` (n,) is the inertia that motors are known to add at the joints. None where no
+    assumption reduces the residuals to a third.
     """
     samples = _samples(log, how, rotors)
     if samples is None:
@@ -182,8 +182,8 @@ def hidden_orders(robot: Manipulator, log: Log, how: Preprocessing) -> str:
         )
     names = ", or ".join("-".join(str(k + 1) for k in order) for order in hidden)
     return (
-        f"These logs cannot show whether the legs are in another order, {names}: mirrored or "
-        "turned the machine explains the forces as well."
+        f"These logs cannot show whether the legs are in another order, {names}: the mirrored or "
+        "rotated machine explains the forces as well."
     )
 
 
@@ -214,7 +214,7 @@ def _sentence(message: tuple[str, str], error_before: float, error_after: float)
 
 
 def _samples(log: Log, how: Preprocessing, rotors: Array) -> _Samples | None:
-    """Return samples of the longest stretch's first part; None where it is too short."""
+    """Return some 400 samples of the longest stretch without a gap; None where it is too short."""
     longest = max(log.segments, key=lambda part: part.stop - part.start)
     part = log.part(longest.start, min(longest.stop, longest.start + _LOOK))
     edge = how.differentiator.edge
@@ -230,7 +230,7 @@ def _samples(log: Log, how: Preprocessing, rotors: Array) -> _Samples | None:
 def _alternatives(
     robot: Manipulator, s: _Samples
 ) -> Iterator[tuple[Literal["ratio", "gravity", "mode"], tuple[str, str], Manipulator, _Samples]]:
-    """Yield alternative assumptions: gear ratios, directions of gravity, working modes."""
+    """Yield alternative assumptions, each with message, machine and samples to evaluate it on."""
     at_home = evaluate_unchecked(robot, "joint_coordinates", np.array(s.start))
     for factor in _FACTORS:
         for middle, where in ((at_home, "home"), (np.zeros_like(at_home), "zero")):
@@ -326,7 +326,7 @@ def _paths(robot: Manipulator, s: _Samples) -> Iterator[Array]:
 
 
 def _residual(robot: Manipulator, pose: Array, s: _Samples) -> float:
-    """Return the share of the forces' variation that a machine's model leaves unexplained."""
+    """Return the share of the forces' variation that a machine at poses leaves unexplained."""
     good = np.isfinite(pose).all(axis=1)
     if good.mean() < 1.0 - _MOST_LOST:
         return np.inf

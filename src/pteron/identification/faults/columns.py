@@ -45,11 +45,11 @@ _NEGLIGIBLE = 1e-3
 bias of smoothed positions next to singularities looks like up to 0.7 of them."""
 
 _LIGHT = 0.1
-"""Payload, over the platform's mass, that is none: it varies with time as freely as the bias of
-positions next to singularities, which looks like up to 0.09 of it."""
+"""Payload, as a share of the platform's mass, that is negligible: it varies with time as freely as
+the bias of positions next to singularities, which looks like up to 0.09 of it."""
 
 _DRY = ("coulomb", "stribeck")
-"""Kinds of terms that jump where a joint turns round."""
+"""Kinds of terms that jump where a joint reverses."""
 
 
 class Tolerance(NamedTuple):
@@ -64,7 +64,7 @@ _UNKNOWN = Tolerance()
 
 @dataclass(frozen=True)
 class Family:
-    """The columns of one fault.
+    """A family of fault columns: how one fault changes the forces.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ class Family:
     effect: Callable[[FittedMotion], Array] | None = None
 
     def deviation_columns(self, motion: FittedMotion) -> Array:
-        """Return the columns (R, n, k) by which the machine differs from the model without it."""
+        """Return the forces (R, n, k), per unit of the fault, that a model without it lacks."""
         return (self.effect or self.columns)(motion)
 
 
@@ -143,7 +143,7 @@ def _elasticity(m: FittedMotion) -> Array:
         # Noise of the accelerations would be in both, the residuals and the column.
         load = lowpass(load, pace, m.cutoff)
     rate = m.rate(load)
-    return m.give_slopes([load, rate, m.rate(rate)])
+    return m.lag_slopes([load, rate, m.rate(rate)])
 
 
 def _drift(m: FittedMotion) -> Array:
@@ -330,7 +330,7 @@ class FaultColumns:
 
     @cached_property
     def places(self) -> tuple[slice, ...]:
-        """Columns of each family among all."""
+        """Slice of each family's columns among all columns of the extended model."""
         counts = (len(family.sizes(self.model)) for family in self.families)
         ends = np.cumsum([len(self.model.names), *counts]).tolist()
         return tuple(slice(a, b) for a, b in pairwise(ends))
@@ -346,7 +346,7 @@ class FaultColumns:
         return FittedMotion(self.model, self.values, states, self.usual, share, stride, self.cutoff)
 
     def matrix(self, states: States) -> Array:
-        """Return all columns (R, n, p + k)."""
+        """Return the columns (R, n, p + k) of the model and of all faults at states."""
         share = (states.time - self.begin) / (self.end - self.begin) - 0.5
         motion = self.motion(states, share, self.stride)
         columns = [family.columns(motion) for family in self.families]

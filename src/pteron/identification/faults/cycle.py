@@ -47,7 +47,7 @@ class Extent(NamedTuple):
 
 @dataclass(frozen=True)
 class ReferenceCycle:
-    """States of a cycle, and where each joint moves (R, n).
+    """States of a cycle, and a mask (R, n) of the rows in which each joint moves.
 
     They may be `in_order`, one after the other, or each by itself.
     """
@@ -104,7 +104,7 @@ class ReferenceCycle:
         return cls(States.from_motion(time, full_motion), moves, in_order=False)
 
     def share(self, error: Array, forces: Array) -> Array:
-        """Return the size of an error (R, n), percent of the forces' standard deviation (n,)."""
+        """Return an error's RMS (n,) where joints move, percent of the forces' deviation."""
         count = np.maximum(self.moves.sum(axis=0), 1)
         size = np.sqrt((self.moves * error**2).sum(axis=0) / count)
         spread = forces.std(axis=0)

@@ -40,7 +40,7 @@ ORDER: tuple[FaultName, ...] = (
     *("delay", "clock", "gain", "scale", "ratio", "zero", "gravity", "geometry"),
     *("play", "elasticity", "rotors", "payload", "drift", "stribeck", "load", "passive"),
 )
-"""The order in which faults are mended, and named: what comes first distorts what comes later."""
+"""The order in which faults are corrected and named: an earlier one distorts the later ones."""
 
 _SHIFT = 1.0
 """Change of a value by a fault, in standard deviations, above which the fault matters: a smaller
@@ -67,43 +67,43 @@ _SENTENCES = {
     "delay": "The {late} are {size_ms:.3g} ms (+- {error_ms:.1g}) late for the {early}",
     "sampling": _SAMPLING,
     "scale": "{label} is {percent:.2g} % (+- {error:.1g}) too {more} beside the others",
-    "ratio": "{label_moves} {percent:.2g} % (+- {error:.1g}) {less} than the log says, as where "
-    "a gear ratio, a lead or a pulley is off by that",
-    "zero": "The zero of {label} is off by about {shown_size}",
+    "ratio": "{label_moves} {percent:.2g} % (+- {error:.1g}) {less} than the log says, as if "
+    "a gear ratio, a lead or a pulley were wrong by that",
+    "zero": "The zero of {label} is wrong by about {shown_size}",
     "gravity": "Gravity is {tilt:.2g} degrees (+- {tilt_error:.1g}) off the direction in the model",
     "gain": "All forces are {percent:.3g} % (+- {error:.1g}) too {more} for what is known",
-    "clock": "The weight is {percent:.2g} % (+- {error:.1g}) too {more} for the inertia, as where "
-    "the log's clock runs {clock:.2g} % {pace}",
+    "clock": "The weight is {percent:.2g} % (+- {error:.1g}) too {more} for the inertia, as if the "
+    "log's clock ran {clock:.2g} % {pace}",
     "sign": "The weight acts the other way: gravity has the wrong sign",
-    "geometry": "Lengths or points of the geometry are off, most clearly in {clearest}, by about "
+    "geometry": "Lengths or points of the geometry are wrong, most clearly in {clearest}, by about "
     "{shown_leg}",
     "stribeck": "Friction falls with speed, most clearly at {clearest}",
-    "elasticity": "The drives give, most clearly under {clearest}",
+    "elasticity": "The drives are elastic, most clearly under {clearest}",
     "payload": "The platform carries about {mass:.2g} kg more in {most} of the log than in "
-    "{least}, as a payload that nobody declared",
+    "{least}, as an undeclared payload",
     "drift": "Friction or offset changes during the log, most clearly at {clearest}",
     "load": "Friction grows with the load, most clearly at {clearest}",
     "passive": "Passive joints have friction, most clearly in {clearest}",
     "rotors": "The motors' own inertia acts, most clearly {clearest}, and the model has none of it",
     "play": "Residuals of {labels} are {times:.2g} times as large where the load changes "
-    "direction, as where a drive has play",
+    "direction, as if a drive had play (backlash)",
 }
 """Sentences on the faults, on a delay of sampling, and on gravity that acts the other way."""
 
-_IN_WORDS: dict[FaultName, str] = {
+IN_WORDS: dict[FaultName, str] = {
     "delay": "a delay",
-    "scale": "the scale of a force",
-    "ratio": "a gear ratio",
-    "zero": "the zero of a joint",
-    "gain": "the gain of all forces",
-    "gravity": "tilted gravity",
-    "clock": "the log's clock",
-    "geometry": "lengths or points of the geometry",
+    "scale": "a scale error of one force",
+    "ratio": "a wrong gear ratio",
+    "zero": "a wrong joint zero",
+    "gain": "a scale error of all forces",
+    "gravity": "a wrong direction of gravity",
+    "clock": "a wrong clock",
+    "geometry": "a wrong length or point of the geometry",
     "stribeck": "friction that falls with speed",
-    "elasticity": "drives that give",
-    "payload": "a payload during a part of the log",
+    "elasticity": "elasticity of a drive",
+    "payload": "a payload in a part of the log",
     "drift": "friction that changes during the log",
-    "load": "friction that grows with the load",
+    "load": "load-dependent friction",
     "passive": "friction of passive joints",
     "rotors": "the motors' inertia",
     "play": "play of a drive",
@@ -111,7 +111,7 @@ _IN_WORDS: dict[FaultName, str] = {
 """Faults as nouns."""
 
 _REMEDY: dict[FaultName, str] = {
-    "delay": "--delay auto takes it out",
+    "delay": "--delay auto corrects it",
     "scale": "check that drive's gain, or its torque constant",
     "ratio": "check the ratio, lead or pulley that positions are computed with",
     "zero": "home that joint again, or calibrate its zero",
@@ -123,17 +123,17 @@ _REMEDY: dict[FaultName, str] = {
     "pteron excite --stribeck writes, show them best. It hides a delay: take --delay auto with it",
     "elasticity": "measure positions behind the drive, or move more slowly",
     "payload": "declare it in a payload column (--payload), or record without it",
-    "drift": "warm the machine up, or record shorter",
-    "load": "no term of the model has it: keep to loads like those of the log",
+    "drift": "warm the machine up, or record a shorter log",
+    "load": "the model has no term for it: keep to loads like those of the log",
     "passive": "--joints each adds it to the model",
     "rotors": "--rotors adds it to the model",
-    "play": "take the play out of that drive, or keep to motions whose load does not change "
-    "direction; faults named after it may be its own",
+    "play": "remove the play of that drive, or keep to motions whose load does not change "
+    "direction; the faults named after it may be effects of it",
 }
 
 
 def _format_size(size: float, angle: bool = False) -> str:
-    """Return a size in mm, or degrees, with the digits that an estimate has."""
+    """Return a size, m or rad, as text in mm or degrees, rounded as an estimate is."""
     number = np.degrees(size) if angle else 1e3 * size
     text = f"{number:.0f}" if number >= 10.0 else f"{number:.2g}"
     return f"{text} {'degrees' if angle else 'mm'}"
@@ -202,12 +202,12 @@ class IsolatedFault(Result):
 
     @property
     def understates(self) -> bool:
-        """Whether a value is off by more than its stated error, which does not allow for it."""
+        """Whether the fault shifts a value by more than its stated error."""
         return self.matters or self.shift > _SHIFT
 
     @property
     def matters(self) -> bool:
-        """Whether that lowers the grade: a delay of sampling hardly changes a machine's forces."""
+        """Whether the fault lowers the grade of the verdict."""
         if self.is_half_sample_delay:
             return bool((self.cycle > _CYCLE_OF_SAMPLING).any())
         # Play is no error of a value: what it makes is in the residuals, wherever it is.
@@ -222,7 +222,8 @@ class IsolatedFault(Result):
     def text_without_remedy(self) -> str:
         """The sentence without a remedy: the fault may be an effect of the fault before it."""
         return (
-            f"{self._sentence()}{self._equivalents()}, or what is named before looks so: mend that."
+            f"{self._sentence()}{self._equivalents()}, or the fault named before causes this: "
+            "mend that first."
         )
 
     def as_dict(self) -> dict[str, Any]:
@@ -243,7 +244,7 @@ class IsolatedFault(Result):
         """Return, in parentheses, the other faults that explain the residuals equally well."""
         if not self.as_well:
             return ""
-        return f" (as well explained by: {', '.join(_IN_WORDS[name] for name in self.as_well)})"
+        return f" (explained equally well by: {', '.join(IN_WORDS[name] for name in self.as_well)})"
 
     def _leg_size(self, label: str) -> float:
         """Return the Euclidean norm of all sizes with a label."""
@@ -252,10 +253,8 @@ class IsolatedFault(Result):
 
     def _sentence(self) -> str:
         """Return a sentence that states the fault with its size and error."""
-        first, key = (
-            float(self.sizes[0]),
-            "sampling" if self.is_half_sample_delay else str(self.fault),
-        )
+        first = float(self.sizes[0])
+        key = "sampling" if self.is_half_sample_delay else str(self.fault)
         if key == "clock" and first <= -1.0:
             key = "sign"
         size, error = abs(first), float(self.deviations[0])

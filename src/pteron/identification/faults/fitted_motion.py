@@ -25,7 +25,7 @@ _FEWEST = 8
 
 
 def lengths_of(robot: Manipulator) -> list[tuple[int, int]]:
-    """Return leg, from 0, and place in the vector of `numbers`, of each number that is in m."""
+    """Return (leg from 0, index into `numbers`) of each geometric number that is a length, m."""
     places = []
     for i, (leg, at) in enumerate(zip(robot.legs, number_places(robot), strict=False)):
         sizes = {q.name: len(q.value) for q in leg.quantities if q.role in ("point", "length")}
@@ -71,7 +71,7 @@ class FittedMotion:
         return self.model.matrix(self.states)
 
     def forces(self, *, of: Sequence[str] | None = None, without: Sequence[str] = ()) -> Array:
-        """Return forces of the fit (R, n): `of` some kinds of terms only, or without some."""
+        """Return the fit's forces (R, n): of all terms, `of` some kinds, or `without` some."""
         chosen = [(of is None or kind in of) and kind not in without for kind in self.model.kinds]
         return np.asarray(self.matrix @ np.where(chosen, self.values, 0.0))
 
@@ -96,14 +96,14 @@ class FittedMotion:
     def zero_slopes(self) -> Array:
         """Slopes (R, n, n) of forces by the zero of each joint."""
         zero = np.zeros_like(self.states.joints)
-        return self.give_slopes([zero + 1.0, zero, zero])
+        return self.lag_slopes([zero + 1.0, zero, zero])
 
     @cached_property
     def ratio_slopes(self) -> Array:
         """Slopes (R, n, n) of forces as each joint moves less than was measured, as a share."""
         s = self.states
         middle = s.joints.mean(axis=0)
-        return self.give_slopes([s.joints - middle, s.joint_rates, s.joint_accelerations])
+        return self.lag_slopes([s.joints - middle, s.joint_rates, s.joint_accelerations])
 
     def tilt_slopes(self) -> Array:
         """Return slopes (R, n, 2) of forces as gravity tilts about two axes."""
@@ -114,7 +114,7 @@ class FittedMotion:
             changes[:, -3:] = size * np.linalg.svd(g[None, :])[2][1:]
         return self._slopes_along(changes)
 
-    def give_slopes(self, motion: Sequence[Array]) -> Array:
+    def lag_slopes(self, motion: Sequence[Array]) -> Array:
         """Return slopes (R, n, n) of forces with respect to a lag of each joint.
 
         Joints are behind by a `motion`: its coordinates, rates and accelerations, (R, n) each.
@@ -159,14 +159,14 @@ class FittedMotion:
 
     @cached_property
     def _rigid(self) -> tuple[States, Array]:
-        """Some of the states, and parameters as drawn but with the base parameters of the fit."""
+        """The sampled states, and drawn parameters (N,) adjusted to the fitted base values."""
         base, drawn = self.model.base, parameters(self.model.robot)
         change = self.values[: base.rank] - base.grouping @ drawn
         return self.states.part(self._sampled_rows), drawn + base.selection @ change
 
     @cached_property
     def _kernels(self) -> tuple[Kernel, ...]:
-        """The kernels of a Newton step, the platform's motion and inverse dynamics."""
+        """The compiled kernels of a Newton step, the platform's motion and inverse dynamics."""
         outputs = "newton_step", "platform_motion", "inverse_dynamics"
         return tuple(compile(self.model.robot, what, "vm", grade="general") for what in outputs)
 

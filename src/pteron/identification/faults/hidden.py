@@ -30,10 +30,7 @@ up to 3 % is trusted, and a fault may be larger than usual."""
 
 
 def hidden_faults(
-    columns: FaultColumns,
-    observations: Observations,
-    noise: Array,
-    other: ReferenceCycle,
+    columns: FaultColumns, observations: Observations, noise: Array, other: ReferenceCycle
 ) -> list[FaultName]:
     """Return the faults that the equations cannot show beyond the noise (n,) of the forces.
 

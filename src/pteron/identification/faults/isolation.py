@@ -15,7 +15,7 @@ from pteron.identification.estimators import Estimate
 from pteron.identification.faults.columns import DELAY, Family, FaultColumns
 from pteron.identification.faults.cycle import ReferenceCycle
 from pteron.identification.faults.cycle_errors import expected_errors
-from pteron.identification.faults.fault import ORDER, FaultName, IsolatedFault
+from pteron.identification.faults.fault import IN_WORDS, ORDER, FaultName, IsolatedFault
 from pteron.identification.faults.hidden import hidden_faults
 from pteron.identification.faults.log_faults import LogFault
 from pteron.identification.faults.play import PlayRecord, backlash_signature
@@ -41,8 +41,8 @@ _ROUNDS = 6
 """Greatest number of times that a delay is corrected and sought again."""
 
 _OF_FACTOR = (
-    "All forces of the bodies are {factor:.2g} times those of the drawing, as where the gain of "
-    "all torques or the gear ratio is off by that factor: check gains, rated torque and gear "
+    "All forces of the bodies are {factor:.2g} times those of the drawing, as if the gain of all "
+    "torques or the gear ratio were wrong by that factor: check gains, rated torque and gear "
     "ratio, or the drawing's masses."
 )
 """Sentence on forces that have a factor in common beside those of the drawing."""
@@ -83,11 +83,14 @@ class FaultIsolation(Result):
         Faults of the logs as such.
     factor : float
         Forces of the bodies over those of the drawing, where all have that factor in common.
+    small : tuple of (str, float)
+        Faults that show but are too small to be named among `faults`: the name, and the largest
+        error that the fault makes in the forces of a reference cycle, percent.
     """
 
     ROWS = "faults"
 
-    tried: tuple[str, ...]
+    tried: tuple[FaultName, ...]
     faults: tuple[IsolatedFault, ...]
     uncertain: Array
     spoiled: Array
@@ -96,6 +99,7 @@ class FaultIsolation(Result):
     late: bool = False
     log: tuple[LogFault, ...] = ()
     factor: float = 1.0
+    small: tuple[tuple[FaultName, float], ...] = ()
 
     suspicions = former_attribute("suspicions", "faults")
 
@@ -111,6 +115,25 @@ class FaultIsolation(Result):
             for k, fault in enumerate(ranked)
         ]
         return (*(fault.message for fault in self.log), *of_file, *machine)
+
+    @property
+    def small_faults_text(self) -> str:
+        """A clause on the faults that show but are too small to matter, or that none shows."""
+        if not self.small:
+            return "No fault shows in the residuals"
+        names = ", ".join(IN_WORDS[name] for name, _ in self.small)
+        most = max(percent for _, percent in self.small)
+        effect = "less than 0.01" if most < 0.01 else f"up to {most:.2g}"
+        threshold = f"below the threshold of {_NAMED:g} %" if most < _NAMED else "a negligible size"
+        return (
+            f"No fault that matters shows in the residuals: {names} changes the forces of a cycle "
+            f"by {effect} % ({threshold})"
+        )
+
+    @property
+    def tested(self) -> tuple[str, ...]:
+        """The faults that were tried, in words."""
+        return tuple(IN_WORDS[name] for name in self.tried)
 
     @property
     def expected_error(self) -> Array:
@@ -135,8 +158,8 @@ class FaultIsolation(Result):
         ) | {
             "log": [fault.as_dict() for fault in self.log],
             "cycle_percent": {
-                name: None if np.isnan(values).any() else values.tolist()
-                for name, values in shares.items()
+                name: None if np.isnan(percentages).any() else percentages.tolist()
+                for name, percentages in shares.items()
             },
         }
 
@@ -194,32 +217,32 @@ def _isolate_in_parts(
 ) -> FaultIsolation:
     """Return the faults that the residuals of a fit to parts of a log show."""
     columns = parts[0].model
-    noise = np.mean([part.how.force_noise for part in parts], axis=0)
+    noise = np.mean([part.preprocessing.force_noise for part in parts], axis=0)
 
     def observe(some: Sequence[SearchedPart]) -> Observations:
         """Return the observations of parts, with rows for values known from the drawing."""
         rows = observe_parts(some)
-        return rows if drawn is None else drawn.rows_beside(rows, estimate.noise)
+        return rows if drawn is None else drawn.append_drawn_values(rows, estimate.noise)
 
     observations = observe(parts)
-    plain, found_faults = _found_faults(parts, observations, observe, estimate, noise)
+    plain, found_faults = _search_with_delay(parts, observations, observe, estimate, noise)
     states = [s for part in parts for s in part.states]
     other = ReferenceCycle.from_range(model.robot, states)
     uncertain, spoiled, each = expected_errors(
         columns, states, other, estimate, plain, found_faults
     )
-    step = 1.0 / max(part.how.rate for part in parts)
-    faults = _named_faults(columns, plain, found_faults, each, step)
+    step = 1.0 / max(part.preprocessing.rate for part in parts)
+    faults, small = _named_faults(columns, plain, found_faults, each, step)
 
     # Play, which no column has
-    play, looked = _play(parts, estimate.values, step)
+    play, tested = _isolate_play(parts, estimate.values, step)
     if play is not None and not (play.cycle < _NAMED).all():
         faults.insert(0, play)
         spoiled = np.hypot(spoiled, play.cycle)
 
     # The scale of all forces, which the residuals cannot show
     factor = factor_of_forces(model, found_faults[-1].fit if found_faults else plain, known)
-    gain = None if factor is None else _wrong_gain(factor, tuple(known), faults, len(noise))
+    gain = None if factor is None else _isolate_gain(factor, tuple(known), faults, len(noise))
     left_open = hidden_faults(columns, observations, noise, other)
     if gain is not None:
         if "clock" in left_open:
@@ -227,11 +250,12 @@ def _isolate_in_parts(
             gain = replace(gain, as_well=("clock",))
         faults.insert(0, gain)
         spoiled = np.hypot(spoiled, gain.cycle)
-    names = dict.fromkeys(family.name for family in columns.families)
-    tried = (*names, *["play"] * looked, *["gain"] * (factor is not None))
+    names: dict[FaultName, None] = dict.fromkeys(family.name for family in columns.families)
+    further: dict[FaultName, bool] = {"play": tested, "gain": factor is not None}
+    tried = (*names, *(name for name, was_tried in further.items() if was_tried))
     if factor is None or not factor.is_detectable:
         left_open.insert(0, "gain")
-    if not looked:
+    if not tested:
         left_open.append("play")
     return FaultIsolation(
         tried,
@@ -240,24 +264,25 @@ def _isolate_in_parts(
         spoiled,
         hidden=tuple(name for name in left_open if name not in {fault.fault for fault in faults}),
         late=any(fault.family is DELAY for fault in found_faults),
+        small=small,
     )
 
 
-def _found_faults(
+def _search_with_delay(
     parts: list[SearchedPart],
     observations: Observations,
     observe: Callable[[Sequence[SearchedPart]], Observations],
     estimate: Estimate,
     noise: Array,
 ) -> tuple[Estimate, list[FoundFault]]:
-    """Return the fit without faults, and the faults that residuals show together."""
+    """Return the fit without faults, and the faults that its residuals show together."""
     columns = parts[0].model
     largest = max(float(np.abs(part.log.forces).max()) for part in parts)
     exact = np.abs(estimate.residuals).max() < ROOT_OF_ROUNDING * largest
     plain, found_faults = search_faults(columns, observations, () if exact else None, noise)
     if any(fault.family is DELAY for fault in found_faults):
         # Columns hold for small delays: other faults are sought after a long one is corrected.
-        late, shifted = _delay(parts, observe)
+        late, shifted = _isolate_delay(parts, observe)
         others = tuple(family for family in columns.families if family is not DELAY)
         fit, found_faults = _search_families(others, shifted, observe)
         if late is not None:
@@ -271,15 +296,19 @@ def _named_faults(
     found_faults: Sequence[FoundFault],
     each: Sequence[Array],
     step: float,
-) -> list[IsolatedFault]:
-    """Return the faults that change a cycle's forces by enough to be named."""
+) -> tuple[list[IsolatedFault], tuple[tuple[FaultName, float], ...]]:
+    """Return the faults that change a cycle's forces by enough to be named, and the smaller ones.
+
+    Of these the name and the largest change, percent.
+    """
     p = len(columns.model.names)
     fits = [plain, *(fault.fit for fault in found_faults)]
     shifts = [
         float(np.abs((b.values[:p] - a.values[:p]) / b.deviations[:p]).max())
         for a, b in pairwise(fits)
     ]
-    faults = []
+    faults: list[IsolatedFault] = []
+    small: list[tuple[FaultName, float]] = []
     for fault, shift, spoils in zip(found_faults, shifts, each, strict=True):
         family = fault.family
         negligible = np.abs(fault.sizes).max() <= family.tolerance.negligible
@@ -288,10 +317,12 @@ def _named_faults(
             speeds = None if family.speed is None else family.speed * columns.usual
             labels = tuple(family.sizes(columns.model))
             faults.append(IsolatedFault(family.name, labels, *seen, speeds, step, fault.as_well))
-    return faults
+        else:
+            small.append((family.name, float(np.max(spoils))))
+    return faults, tuple(small)
 
 
-def _wrong_gain(
+def _isolate_gain(
     factor: Factor, known: tuple[str, ...], faults: Sequence[IsolatedFault], count: int
 ) -> IsolatedFault | None:
     """Return the fault of a common factor of all forces; None if the factor may be 1."""
@@ -307,27 +338,27 @@ def _wrong_gain(
     )
 
 
-def _play(
-    parts: Sequence[SearchedPart], values: Array, step: float
+def _isolate_play(
+    parts: Sequence[SearchedPart], beta: Array, step: float
 ) -> tuple[IsolatedFault | None, bool]:
-    """Return the play of drives, or None, and whether any load changes direction often enough.
+    """Return the backlash of drives as a fault, or None, and whether enough load reversals occur.
 
     Play shows as large residuals where loads change direction.
     """
-    records, band = [], max(part.how.band for part in parts)
+    records, band = [], max(part.preprocessing.band for part in parts)
     for part in parts:
-        model, how = part.model.model, part.how
+        model, how = part.model.model, part.preprocessing
         carried = np.isin(model.kinds, ("base", "payload"))
         for block in samples(model.robot, part.log, how):
             matrix = model.matrix(block.states)
             moving = motion_mask(block.states.joint_rates, how.slow, how.turning_rows) > 0.0
-            residual = block.forces - matrix @ values
-            load = matrix @ np.where(carried, values, 0.0)
+            residual = block.forces - matrix @ beta
+            load = matrix @ np.where(carried, beta, 0.0)
             records.append(PlayRecord(block.states.time, load, residual, moving))
     signature = backlash_signature(records, band)
-    looked = bool(signature.looked.any())
+    tested = bool(signature.tested.any())
     if np.isnan(signature.times).all():
-        return None, looked
+        return None, tested
     named = np.flatnonzero(~np.isnan(signature.times)).tolist()
     labels = tuple(parts[0].model.model.robot.force_names[joint] for joint in named)
     # The knocks of a cycle are taken to be as strong as those of the logs.
@@ -337,7 +368,7 @@ def _play(
     fault = IsolatedFault(
         "play", labels, signature.times[named], unknown, signature.chance, 0.0, cycle, step=step
     )
-    return fault, looked
+    return fault, tested
 
 
 def delay_of(
@@ -348,8 +379,8 @@ def delay_of(
 ) -> float:
     """Return the delay, s, of recordings' forces that fits best, less the assumed delay."""
     parts = choose_parts(model, estimate, recordings, preprocessing, _ROWS)
-    _, shifted = _delay(parts, observe_parts)
-    return shifted[0].how.delay - parts[0].how.delay
+    _, shifted = _isolate_delay(parts, observe_parts)
+    return shifted[0].preprocessing.delay - parts[0].preprocessing.delay
 
 
 def _search_families(
@@ -359,24 +390,24 @@ def _search_families(
 ) -> tuple[Estimate, list[FoundFault]]:
     """Return the fit of parts without faults, and the faults of some families that they show."""
     some = [replace(part, model=replace(part.model, families=families)) for part in parts]
-    noise = np.mean([part.how.force_noise for part in parts], axis=0)
+    noise = np.mean([part.preprocessing.force_noise for part in parts], axis=0)
     return search_faults(some[0].model, observe(some), noise=noise)
 
 
-def _delay(
+def _isolate_delay(
     parts: Sequence[SearchedPart], observe: Callable[[Sequence[SearchedPart]], Observations]
 ) -> tuple[FoundFault | None, list[SearchedPart]]:
-    """Return the total delay of the logs' forces, None if insignificant, and parts without it."""
+    """Return the forces' delay as a fault, None if insignificant, and parts corrected for it."""
     late, shifted = None, list(parts)
     for _ in range(_ROUNDS):
         _, found_faults = _search_families((DELAY,), shifted, observe)
         if not found_faults:
             break
         first, late = late or found_faults[0], found_faults[0]
-        delay = shifted[0].how.delay + float(late.sizes[0])
+        delay = shifted[0].preprocessing.delay + float(late.sizes[0])
         delay = min(max(delay, -LATEST), LATEST)
-        shifted = [replace(part, how=replace(part.how, delay=delay)) for part in shifted]
+        shifted = [replace(p, preprocessing=replace(p.preprocessing, delay=delay)) for p in shifted]
     if late is not None:
-        total_delay = np.array([shifted[0].how.delay - parts[0].how.delay])
+        total_delay = np.array([shifted[0].preprocessing.delay - parts[0].preprocessing.delay])
         late = replace(late, sizes=total_delay, chance=first.chance)
     return late, shifted

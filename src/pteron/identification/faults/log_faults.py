@@ -13,36 +13,36 @@ from typing import Literal
 import numpy as np
 
 from pteron.identification.logs import Log
-from pteron.identification.logs.log import gaps
+from pteron.identification.logs.gaps import gaps
 from pteron.identification.logs.recorded import saturation_sentences
 from pteron.identification.signals import Preprocessing
 from pteron.identification.signals.derivatives import uniform
-from pteron.identification.signals.filters import DIFFERENCE, force_steps, lowpass
+from pteron.identification.signals.filters import DIFFERENCE, lowpass, quantisation_steps
 from pteron.json_values import json_fields
 from pteron.kernels import Array
 
 _LOST = 0.01
-"""Share of missing samples from which they are named: fewer cost less than a tenth of the
+"""Share of missing samples from which they are reported: fewer cost less than a tenth of the
 precision, and change no value beyond its interval."""
 
 _SURE = 6.0
-"""Standard deviations from which jitter is told: by chance in one of 10^9 logs."""
+"""Size of jitter, in standard deviations, to be reported: by chance in one of 10^9 logs."""
 
 _LIKELY = 3.0
 """The same where a fault of the machine shows, such as drives that give: 5 % of a step made up to
 8 % of a cycle's forces of it (own plants)."""
 
 _FELT = 0.5
-"""Position errors of jitter, over the positions' other noise, from which it is named: below it adds
-less than an eighth to the noise."""
+"""Position errors by jitter, over the positions' other noise, from which it is reported: below it
+adds less than an eighth to the noise."""
 
 _UNEVEN = 0.05
-"""Jitter, over the time step, from which it is named. Chosen: 1 %, as of a usual clock, leaves the
-forces of a cycle within 0.2 %."""
+"""Jitter, over the time step, from which it is reported. Chosen: 1 %, as of a usual clock, leaves
+the forces of a cycle within 0.2 %."""
 
 _COARSE = 0.02
-"""Step of forces' values, over their deviation, from which it is named: rounding by 0.6 % of the
-deviation, more than usual noise of 0.5 %."""
+"""Step of the forces' values, over their standard deviation, from which it is reported: it is
+rounding by 0.6 % of the deviation, more than the usual noise of 0.5 %."""
 
 _EXTREME, _SHARE, _LEVEL = 0.01, 0.06, 5.0
 """Criteria of a plateau: the share of samples with the extreme value, the least share of samples
@@ -51,7 +51,7 @@ times as many, random motions without limits up to 0.1 and 4.8 (own plants), wit
 or more."""
 
 _LOOK = 60_000
-"""Rows that are looked at for jitter."""
+"""Most rows that are examined for jitter."""
 
 _ALIKE = (comb(32, 16) / comb(16, 8) ** 2) ** 0.5
 """Deviation of a sum of squares of eighth differences, over that of independent ones."""
@@ -128,7 +128,7 @@ def log_faults(
             message = _merge_limit_sentences(said)
             faults.append(LogFault("saturation", message, float("nan"), True))
     for log in logs:
-        steps = force_steps(log.forces) / np.maximum(log.forces.std(axis=0), 1e-300)
+        steps = quantisation_steps(log.forces) / np.maximum(log.forces.std(axis=0), 1e-300)
         if (coarse := float(steps.max(initial=0.0))) > _COARSE:
             name = log.force_names[int(np.argmax(steps))]
             message = (
@@ -174,12 +174,12 @@ def _plateaus(log: Log, noise: Array) -> tuple[str, ...]:
 
 
 def delay_fault(delay: float, deviation: float) -> LogFault:
-    """Return the fault of delayed forces (s), which is corrected."""
+    """Return the fault that forces are late by a delay, s, which the fit has corrected."""
     late, early = ("forces", "positions")[:: 1 if delay > 0.0 else -1]
     said = (
         f"The {late} are {1e3 * abs(delay):.3g} ms (+- {2e3 * deviation:.1g}) late for the {early}"
     )
-    return LogFault("delay", f"{said}; that is taken out (--delay 0 leaves it in).", delay, False)
+    return LogFault("delay", f"{said}; this is corrected (--delay 0 leaves it in).", delay, False)
 
 
 def lost_share(log: Log) -> float:
@@ -195,7 +195,7 @@ def lost_share(log: Log) -> float:
 
 
 _PAUSE = 0.02
-"""Longest gap, over the log, that is lost samples rather than a pause."""
+"""Longest gap, as a share of the log, that counts as lost samples rather than as a pause."""
 
 
 def sampling_jitter(log: Log, how: Preprocessing) -> tuple[float, float, float]:

@@ -21,9 +21,8 @@ _LENGTH = 1.0
 """Length of a window, over the period of the highest frequency that the forces are seen at."""
 
 _TIMES = 2.5
-"""How many times as large residuals are there where there is play.
-
-What follows the load's rate, as all that is smooth does at most, is 1.6 times as large there."""
+"""Ratio of the residuals at load reversals to those elsewhere from which there is play. What
+follows the load's rate, as all that is smooth does at most, makes a ratio of 1.6."""
 
 _CHANCE = 1e-4
 """Chance that windows of all joints are so much larger by luck, below which it counts."""
@@ -43,10 +42,10 @@ class PlayRecord(NamedTuple):
     """Where it moves: as it turns round, dry friction alone makes residuals."""
 
 
-class Knocks(NamedTuple):
-    """The ratio by which joints' residuals are larger where their loads change direction."""
+class BacklashSignature(NamedTuple):
+    """The signature of backlash: how much larger residuals are where loads reverse."""
 
-    looked: NDArray[np.bool_]
+    tested: NDArray[np.bool_]
     """(n,); False where the load changes direction too seldom to tell."""
     times: Array
     """(n,); NaN where too little is seen, or nothing."""
@@ -55,7 +54,7 @@ class Knocks(NamedTuple):
     """Mean square (n,) that this adds to the residuals, over all samples."""
 
 
-def backlash_signature(records: Sequence[PlayRecord], band: float) -> Knocks:
+def backlash_signature(records: Sequence[PlayRecord], band: float) -> BacklashSignature:
     """Return the signature of backlash in joints' drives, and the joints with enough data.
 
     Windows' mean squares are ranked (Mann and Whitney's test, over all joints, each in units of its
@@ -75,16 +74,17 @@ def backlash_signature(records: Sequence[PlayRecord], band: float) -> Knocks:
         power[joint] = max(float(np.mean(near)) - usual, 0.0) * share
         every[0].append(near / usual)
         every[1].append(far / usual)
-    looked, shows, chance = ~np.isnan(times), times >= _TIMES, 1.0
+    tested, shows, chance = ~np.isnan(times), times >= _TIMES, 1.0
     if shows.any():
         both = (np.concatenate(part) for part in every)
         chance = float(scipy.stats.mannwhitneyu(*both, alternative="greater").pvalue)
     shows &= chance <= _CHANCE
-    return Knocks(looked, np.where(shows, times, np.nan), chance, np.where(shows, power, 0.0))
+    times, power = np.where(shows, times, np.nan), np.where(shows, power, 0.0)
+    return BacklashSignature(tested, times, chance, power)
 
 
 def _windows(records: Sequence[PlayRecord], band: float, joint: int) -> tuple[Array, Array, float]:
-    """Return mean squares of windows at load reversals and elsewhere, and the share of the former.
+    """Return mean squares of windows at load reversals and elsewhere, and the former's share.
 
     A joint moves all through a window.
     """

@@ -31,7 +31,7 @@ _AT_NOISE = 1.15
 """Residuals, over the forces' noise, that are noise: both are known to some per cent."""
 
 _TOLD = 3
-"""Faults, at most, that are named as explaining the residuals as well."""
+"""Most faults that are named as explaining the residuals equally well."""
 
 _VANISHED = 1e-3
 """Residuals, over those before, that count as none, in logs without noise."""
@@ -140,7 +140,7 @@ def search_faults(
 
 
 def _likelihood_gain(fault: FoundFault, fit_noise: Array, rows: Array) -> float:
-    """Return by how much a fault raises the log-likelihood of so many rows (n,) of forces."""
+    """Return by how much a fault raises the log-likelihood of `rows` (n,) equations."""
     noise = np.maximum(fault.fit.noise, 1e-300)
     return float(rows @ np.log(np.maximum(fit_noise, 1e-300) / noise))
 
@@ -148,7 +148,7 @@ def _likelihood_gain(fault: FoundFault, fit_noise: Array, rows: Array) -> float:
 def _likeliest(
     faults: Sequence[FoundFault], fit_noise: Array, rows: Array, floor: Array
 ) -> FoundFault:
-    """Return the fault that explains residuals of deviations (n,) of so many rows (n,).
+    """Return the likeliest fault, for residual deviations (n,) of `rows` (n,) equations.
 
     Where one leaves only the noise of forces, `floor` (n,), likelihood decides: of those that
     explain as much the one of fewest sizes. Else the fault is large, its columns hold to first

@@ -38,7 +38,7 @@ class SearchedPart:
 
     model: FaultColumns
     log: Log
-    how: Preprocessing
+    preprocessing: Preprocessing
     states: list[States]
 
 
@@ -107,5 +107,5 @@ def _plan_single_periods(model: Model, log: Log, how: Preprocessing) -> Preproce
 def observe_parts(parts: Sequence[SearchedPart]) -> Observations:
     """Return the observations of parts, with the columns of all faults."""
     return stack_observations(
-        [observations_of(part.model.extended_model, part.log, part.how) for part in parts]
+        [observations_of(part.model.extended_model, part.log, part.preprocessing) for part in parts]
     )

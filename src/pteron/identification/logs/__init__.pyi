@@ -8,13 +8,17 @@ from pteron.identification.logs.description_file import (
     read_description as read_description,
     write_description as write_description,
 )
-from pteron.identification.logs.log import (
+from pteron.identification.logs.findings import (
     Finding as Finding,
+)
+from pteron.identification.logs.log import (
     Log as Log,
     join_logs as join_logs,
 )
 from pteron.identification.logs.log_file import (
     LogFile as LogFile,
+)
+from pteron.identification.logs.log_reading import (
     open_log as open_log,
     read_log as read_log,
 )

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from pteron.errors import DataError
 from pteron.identification.logs.description import Description
-from pteron.identification.logs.log import Finding
+from pteron.identification.logs.findings import Finding
 from pteron.identification.logs.search import Group
 from pteron.legs import Drive
 from pteron.manipulator import Manipulator

@@ -13,7 +13,9 @@ import numpy as np
 import scipy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
-from pteron.identification.logs.log import Finding, Log, gaps, rows_of, stretches
+from pteron.identification.logs.findings import Finding
+from pteron.identification.logs.gaps import gaps, stretches
+from pteron.identification.logs.log import Log, rows_of
 from pteron.kernels import Array
 
 _LONGEST = 3
@@ -32,7 +34,7 @@ _AROUND = 40
 
 
 def fill_gaps(log: Log) -> Log:
-    """Return a log with short gaps filled and a finding; unchanged if they are rare.
+    """Return a log with short gaps filled, and a finding of it; unchanged where gaps are rare.
 
     Positions get polynomials of degree 5, forces of degree 3, which passes on less noise.
     """
@@ -78,10 +80,10 @@ def _insert_samples(log: Log, missing: NDArray[np.int64]) -> Log:
     order = np.argsort(time, kind="stable")
     rows = rows_of(log)
 
-    def interpolate(values: Array, degree: int) -> Array:
+    def interpolate(samples: Array, degree: int) -> Array:
         """Return values (T, k) with missing samples filled in by local polynomials of a degree."""
-        filled = _interpolate_locally(log.time, values, places, instants, degree)
-        return np.asarray(np.concatenate([values, filled])[order])
+        filled = _interpolate_locally(log.time, samples, places, instants, degree)
+        return np.asarray(np.concatenate([samples, filled])[order])
 
     return replace(
         log,
@@ -95,7 +97,7 @@ def _insert_samples(log: Log, missing: NDArray[np.int64]) -> Log:
 
 
 def _interpolate_locally(
-    time: Array, values: Array, places: NDArray[np.int64], instants: Array, degree: int
+    time: Array, samples: Array, places: NDArray[np.int64], instants: Array, degree: int
 ) -> Array:
     """Return values (K, n) at instants behind rows `places` (K,), of polynomials fitted around.
 
@@ -103,17 +105,17 @@ def _interpolate_locally(
     filters and their cut-offs are made for white noise.
     """
     step = float(np.median(np.diff(time)))
-    side = _side(time / step, values, degree)
-    predictions = np.empty((len(places), values.shape[1]))
+    side = _best_side(time / step, samples, degree)
+    predictions = np.empty((len(places), samples.shape[1]))
     for k, (row, at) in enumerate(zip(places.tolist(), instants.tolist(), strict=True)):
         start = min(max(row + 1 - side, 0), max(len(time) - 2 * side, 0))
         rows = slice(start, start + 2 * side)
         powers = np.vander((time[rows] - at) / step, degree + 1, increasing=True)
-        predictions[k] = np.linalg.lstsq(powers, values[rows], rcond=None)[0][0]
+        predictions[k] = np.linalg.lstsq(powers, samples[rows], rcond=None)[0][0]
     return predictions
 
 
-def _side(ticks: Array, values: Array, degree: int) -> int:
+def _best_side(ticks: Array, samples: Array, degree: int) -> int:
     """Return the number of rows on each side with which polynomials predict a row best.
 
     Many rows make less of the noise, few follow a motion that is fast for its sampling.
@@ -123,10 +125,10 @@ def _side(ticks: Array, values: Array, degree: int) -> int:
         offsets = np.r_[-side:0, 1 : side + 1].astype(float)
         weights = np.linalg.pinv(np.vander(offsets, degree + 1, increasing=True))[0]
         kernel = np.insert(weights, side, 0.0)
-        predicted = scipy.ndimage.correlate1d(values, kernel, axis=0)[side:-side]
+        predicted = scipy.ndimage.correlate1d(samples, kernel, axis=0)[side:-side]
         is_even = ticks[2 * side :] - ticks[: -2 * side] < 2 * side + 0.5
         if is_even.any():
-            errors[side] = np.median(np.abs(predicted - values[side:-side])[is_even], axis=0)
+            errors[side] = np.median(np.abs(predicted - samples[side:-side])[is_even], axis=0)
     if not errors:
         return _SIDES[-1]
     least = np.min([*errors.values()], axis=0)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pteron.errors import DataError
-from pteron.identification.logs.log import Finding, Kind
+from pteron.identification.logs.findings import Finding, Kind
 from pteron.tolerances import ROUNDING
 
 _CLIPPED_ROWS = 3
@@ -65,28 +65,28 @@ class Channel:
         limits: tuple[float, float] | None = None,
     ) -> None:
         self._column, self._source = column, source
-        self._moved = _MOVED * spans
+        self._least_travel = _MOVED * spans
         if joint is not None:
-            self._moved[joint] = np.inf
+            self._least_travel[joint] = np.inf
         self._is_force, self._limits = joint is None, limits
         self._rows = self._beyond = self._first_beyond = 0
         self._least, self._greatest = np.inf, -np.inf
         self._runs: list[_Run] = []
 
-    def take(self, values: Values, joints: Values) -> None:
+    def take(self, samples: Values, joints: Values) -> None:
         """Examine the next piece: this channel, (rows,), and all joint coordinates, (rows, n)."""
-        self._least = min(self._least, float(values.min()))
-        self._greatest = max(self._greatest, float(values.max()))
+        self._least = min(self._least, float(samples.min()))
+        self._greatest = max(self._greatest, float(samples.max()))
         if self._limits is not None:
             low, high = self._limits
             rounding = ROUNDING * max(abs(low), abs(high))
-            beyond = (values <= low + rounding) | (values >= high - rounding)
+            beyond = (samples <= low + rounding) | (samples >= high - rounding)
             if not self._beyond:
                 self._first_beyond = self._rows + int(np.argmax(beyond))
             self._beyond += int(beyond.sum())
-        starts = np.flatnonzero(np.diff(values, prepend=np.nan))
-        lengths = np.diff(starts, append=len(values))
-        levels = values[starts]
+        starts = np.flatnonzero(np.diff(samples, prepend=np.nan))
+        lengths = np.diff(starts, append=len(samples))
+        levels = samples[starts]
         extreme = np.isin(levels, [self._least, self._greatest])
         telling = (lengths > _FROZEN_ROWS) | extreme & (lengths >= _CLIPPED_ROWS)
         # The first may go on with the run of the piece before, and the last in the next one.
@@ -102,7 +102,7 @@ class Channel:
                 last.greatest = np.maximum(last.greatest, greatest)
             else:
                 self._runs.append(run)
-        self._rows += len(values)
+        self._rows += len(samples)
 
     def finish(self) -> tuple[Finding, ...]:
         """Return the findings, after all pieces.
@@ -135,13 +135,13 @@ class Channel:
             findings.append(
                 self._make_finding("clipped", message, self._first_beyond, self._beyond)
             )
-        for word, value in (("greatest", self._greatest), ("least", self._least)):
-            extreme_runs = [run for run in runs if run.value == value and run.rows >= _CLIPPED_ROWS]
+        for word, extreme in (("greatest", self._greatest), ("least", self._least)):
+            extreme_runs = [r for r in runs if r.value == extreme and r.rows >= _CLIPPED_ROWS]
             if self._limits is None and self._is_force and len(extreme_runs) >= _CLIPPED_RUNS:
                 rows, start = sum(run.rows for run in extreme_runs), extreme_runs[0].start
                 message = (
-                    f"{column} holds its {word} value {value:g} in {len(extreme_runs)} stretches, "
-                    f"{rows} rows in all, first from row {start + 1}: clipped"
+                    f"{column} holds its {word} value {extreme:g} in {len(extreme_runs)} "
+                    f"stretches, {rows} rows in all, first from row {start + 1}: clipped"
                 )
                 findings.append(self._make_finding("clipped", message, start, rows))
         return tuple(findings)
@@ -149,7 +149,7 @@ class Channel:
     def _is_frozen(self, run: _Run) -> bool:
         """Return whether other joints move too far in a stretch for the channel to be at rest."""
         at_the_end = run.start == 0 or run.stop == self._rows
-        moved = self._moved * (_RESTED if at_the_end else 1.0)
+        moved = self._least_travel * (_RESTED if at_the_end else 1.0)
         return bool((run.greatest - run.least > moved).any())
 
     def _make_finding(self, kind: Kind, message: str, start: int, count: int) -> Finding:

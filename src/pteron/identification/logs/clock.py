@@ -84,7 +84,7 @@ class Clock:
     _days: int = field(default=0, repr=False)
 
     def fresh(self) -> Clock:
-        """Return the clock reset to before the first row."""
+        """Return a copy of the clock that is reset to before the first row."""
         return replace(self, _origin=None, _last=0, _days=0)
 
     def seconds(self, table: Table) -> Values:
@@ -98,9 +98,7 @@ class Clock:
             If a cell holds no time; the message names the row.
         """
         if len(self.columns) == 2:
-            seconds_part, nanoseconds_part = (
-                self._integer_column(table, name) for name in self.columns
-            )
+            seconds_part, nanoseconds_part = (self._integer_column(table, n) for n in self.columns)
             if seconds_part is not None and nanoseconds_part is not None:
                 return self._seconds_of_counts(seconds_part * _NANO + nanoseconds_part, _NANO)
             numbers = table.numbers(self.columns)
@@ -159,10 +157,7 @@ class Clock:
 
 
 def find_clock(
-    table: Table,
-    columns: tuple[str, ...],
-    unit: str | None,
-    declared: TimeFormat | None,
+    table: Table, columns: tuple[str, ...], unit: str | None, declared: TimeFormat | None
 ) -> Clock:
     """Return the format of a file's times.
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from pteron.errors import DataError
-from pteron.identification.logs.log import Finding
-from pteron.identification.logs.names import means, parse_column_name
+from pteron.identification.logs.findings import Finding
+from pteron.identification.logs.names import is_synonym, parse_column_name
 from pteron.tables import declaration, join_names
 
 _LONGEST = 60
@@ -18,7 +18,7 @@ _STEMS = ("t", "rho", "theta", "force", "torque", "payload")
 """Documented words that column names begin with."""
 
 
-class Wanted(NamedTuple):
+class SoughtColumn(NamedTuple):
     """A column looked for: its table, documented name, word for messages, SI and declared unit."""
 
     table: str
@@ -42,7 +42,7 @@ class ColumnNames:
     taken: set[str] = field(default_factory=set)
 
     def incomplete(
-        self, kind: Wanted, numbers: Sequence[int], families: Sequence[Mapping[int, str]]
+        self, kind: SoughtColumn, numbers: Sequence[int], families: Sequence[Mapping[int, str]]
     ) -> DataError:
         """Return the error for columns that a file lacks, entirely or for some legs.
 
@@ -67,21 +67,21 @@ class ColumnNames:
             f"log of another machine; else declare the columns in a TOML file beside it{example}"
         )
 
-    def ambiguous(self, kind: Wanted, choices: Sequence[Sequence[str]]) -> DataError:
+    def ambiguous(self, kind: SoughtColumn, choices: Sequence[Sequence[str]]) -> DataError:
         """Return the error for ambiguous columns, with a declaration of the first as an example."""
         names = [columns[0] for columns in choices] if len(choices) > 1 else choices[0]
         single = kind.table in ("time", "payload")
-        entry = {"column": choices[0][0]} if single else {"columns": list(choices[0])}
+        declared = {"column": choices[0][0]} if single else {"columns": list(choices[0])}
         if kind.table == "pose" or (not single and len(choices[0]) != self.legs):
             example = f", under [{kind.table}]"
         else:
-            example = ", such as" + declaration(kind.table, **entry)
+            example = ", such as" + declaration(kind.table, **declared)
         return DataError(
             f"{self.source}: {join_names(names)} could each be meant for the {kind.noun}; say "
             f"which in a TOML file beside it{example}"
         )
 
-    def _example(self, kind: Wanted) -> str:
+    def _example(self, kind: SoughtColumn) -> str:
         """Return an example of a declaration, with columns whose names have no other meaning."""
         others = [stem for stem in _STEMS if stem != kind.stem]
         free = [
@@ -89,7 +89,7 @@ class ColumnNames:
             for name in self.names
             if name not in self.taken and name.isprintable() and len(name) < _LONGEST
             if (parts := parse_column_name(name)) is None
-            or not any(means(parts.word, s) for s in others)
+            or not any(is_synonym(parts.word, s) for s in others)
         ]
         if kind.table == "time":
             return ", such as" + declaration("time", column=free[0]) if free else ""

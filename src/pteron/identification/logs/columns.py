@@ -13,10 +13,10 @@ import numpy as np
 
 from pteron.errors import DataError, shorten
 from pteron.identification.logs.clock import Clock
-from pteron.identification.logs.column_names import Wanted
+from pteron.identification.logs.column_names import SoughtColumn
 from pteron.identification.logs.description import Description, joint_symbols
-from pteron.identification.logs.log import Finding
-from pteron.identification.logs.names import means, parse_column_name
+from pteron.identification.logs.findings import Finding
+from pteron.identification.logs.names import is_synonym, parse_column_name
 from pteron.identification.logs.search import ColumnSearch, Group
 from pteron.manipulator import Manipulator
 from pteron.tables import Table, join_names
@@ -60,17 +60,17 @@ def find_columns(
     needed += d.force_columns or [f"{joint.force}{i}" for i, joint in enumerate(joints, 1)]
     search = ColumnSearch(tuple(names), units, len(joints), needed, source, hint)
     travels = [
-        Wanted("joints", joint.coordinate, f"{joint.noun}s", joint.unit, unit)
+        SoughtColumn("joints", joint.coordinate, f"{joint.noun}s", joint.unit, unit)
         for joint, unit in zip(joints, d.joint_units(robot), strict=True)
     ]
     raw = d.column_force_unit
     units_of_forces = [joint.force_unit if raw in ("N", "N m") else raw for joint in joints]
     actuators = [
-        Wanted("forces", joint.force, f"{joint.force}s", joint.force_unit, unit)
+        SoughtColumn("forces", joint.force, f"{joint.force}s", joint.force_unit, unit)
         for joint, unit in zip(joints, units_of_forces, strict=True)
     ]
     numbers = range(1, len(joints) + 1)
-    time = search.time(Wanted("time", "t", "time", "s", d.time_unit), d.time_column)
+    time = search.time(SoughtColumn("time", "t", "time", "s", d.time_unit), d.time_column)
     coordinates = search.group(travels, d.joint_columns, numbers)
     forces = search.group(actuators, d.force_columns, numbers)
     if len({unit if unit not in ("N", "N m") else "SI" for unit in forces.units}) > 1:
@@ -80,7 +80,7 @@ def find_columns(
         )
     declared = {"m": d.length_unit, "rad": d.angle_unit}
     pose = [
-        Wanted("pose", name, "pose", unit, declared[unit])
+        SoughtColumn("pose", name, "pose", unit, declared[unit])
         for name, unit in zip(robot.coordinates, robot.units, strict=True)
     ]
     measured, payload = search.pose(pose, d.pose_columns), search.payload(d.payload_column)
@@ -91,8 +91,8 @@ def check_names(repeated: Mapping[str, str], source: str) -> None:
     """Raise a `DataError` where a file has a column of a joint or a force twice."""
     for name in repeated.values():
         parts = parse_column_name(name)
-        if parts and any(means(parts.word, stem) for stem in _ONCE):
-            raise _twice(name, source)
+        if parts and any(is_synonym(parts.word, stem) for stem in _ONCE):
+            raise _duplicate_error(name, source)
 
 
 def repeated_times(repeated: Mapping[str, str], columns: Columns, source: str) -> tuple[str, ...]:
@@ -108,7 +108,7 @@ def repeated_times(repeated: Mapping[str, str], columns: Columns, source: str) -
     used = [name for group in columns[1:5] for name in group.names]
     for name in repeated.values():
         if name in used:
-            raise _twice(name, source)
+            raise _duplicate_error(name, source)
     return tuple(new for new, name in repeated.items() if name in columns.time.names)
 
 
@@ -126,30 +126,30 @@ def check_times(table: Table, first: str, others: Sequence[str]) -> None:
             )
 
 
-def as_read(
+def reading_findings(
     source: str,
-    found: Sequence[str],
+    dialect_notes: Sequence[str],
     columns: Columns,
     description: Description,
     clock: Clock,
-    again: Sequence[str],
+    repeated: Sequence[str],
 ) -> tuple[Finding, ...]:
     """Return a finding that states how a file was read, if not documented or declared.
 
-    `found` is what is unlike a plain CSV file, `again` are the `repeated_times`.
+    `dialect_notes` state what is unlike a plain CSV file, `repeated` are the `repeated_times`.
     """
-    parts = list(found)
+    parts = list(dialect_notes)
     time = columns.time.phrase("time")
     if clock.format is not None:
         time = f"{time.removesuffix(' in s')} as text, {clock.format}"
     elif clock.guessed:
         time = f"{time.removesuffix(' in s')} in {clock.unit} (guessed from its size)"
-    if columns.time.told or clock.guessed or (clock.format and not description.time_format):
+    if columns.time.reported or clock.guessed or (clock.format and not description.time_format):
         parts.append(time)
-    if again:
-        parts.append(f"{len(again) + 1} equal columns of times")
+    if repeated:
+        parts.append(f"{len(repeated) + 1} equal columns of times")
     groups = {"joints": columns.joints, "forces": columns.forces, "pose": columns.pose}
-    parts += [group.phrase(noun) for noun, group in groups.items() if group.told]
+    parts += [group.phrase(noun) for noun, group in groups.items() if group.reported]
     if not parts:
         return ()
     guessed = any(group.guessed for group in (columns.time, *groups.values()))
@@ -157,6 +157,6 @@ def as_read(
     return (Finding("read", f"{source}: read as: {', '.join(parts)}{advice}"),)
 
 
-def _twice(name: str, source: str) -> DataError:
+def _duplicate_error(name: str, source: str) -> DataError:
     """Return the error that two columns have the same name."""
     return DataError(f"{source}: two columns are called {shorten(name)}; rename or remove one")

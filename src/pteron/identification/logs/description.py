@@ -59,11 +59,11 @@ _OF_DRIVES = ("A", "V", "%")
 _Class = TypeVar("_Class", bound=type)
 
 
-def _not_zero(value: float) -> float:
-    """Return the value; raise where it is zero."""
-    if value == 0.0:
+def _not_zero(factor: float) -> float:
+    """Return the factor; raise where it is zero."""
+    if factor == 0.0:
         raise ValueError("0 given: its motor would not move the joint")
-    return value
+    return factor
 
 
 def _check_rising(pair: tuple[float, float]) -> tuple[float, float]:
@@ -317,10 +317,10 @@ class Description:
             "drives.ratio": (self.ratio, legs),
             "pose.columns": (self.pose_columns, coordinates),
         }
-        for key, (values, needed) in lists.items():
-            if values is not None and len(values) != int(needed.split()[0]):
+        for key, (entries, needed) in lists.items():
+            if entries is not None and len(entries) != int(needed.split()[0]):
                 raise DataError(
-                    f"{key}: {len(values)} given, but the machine has {needed}; give one each, or "
+                    f"{key}: {len(entries)} given, but the machine has {needed}; give one each, or "
                     "name the machine the log belongs to"
                 )
         if self.limits is not None and len(self.limits) not in (1, len(robot.legs)):

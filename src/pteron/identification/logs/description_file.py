@@ -82,11 +82,11 @@ def read_description(path: str | Path) -> Description:
         if table not in tables or not isinstance(entries, dict):
             flat[table] = entries
             continue
-        for entry, value in entries.items():
-            if table in _WHOLE and (table, entry) != ("payload", "column"):
-                flat.setdefault(table, {})[entry] = value
+        for subkey, setting in entries.items():
+            if table in _WHOLE and (table, subkey) != ("payload", "column"):
+                flat.setdefault(table, {})[subkey] = setting
             else:
-                flat[f"{table}.{entry}"] = value
+                flat[f"{table}.{subkey}"] = setting
     return to_model(Description, flat, source, DataError)
 
 
@@ -106,9 +106,9 @@ def description_text(description: Description) -> str:
     import tomlkit
 
     tables: dict[str, dict[str, Any]] = {}
-    for key, value in _plain(description).items():
-        table, _, entry = key.partition(".")
-        tables.setdefault(table, {}).update({entry: value} if entry else value)
+    for key, setting in _plain(description).items():
+        table, _, subkey = key.partition(".")
+        tables.setdefault(table, {}).update({subkey: setting} if subkey else setting)
     document = tomlkit.document()
     document.add(tomlkit.comment("A log for Pteron: its columns, their units, what is known."))
     for name, entries in tables.items():
@@ -174,7 +174,7 @@ def _add_tables(about: Description, added: dict[str, Any]) -> Description:
         if table == "csv":
             tables["csv"] = tables.get("csv", {}) | entries
         else:
-            tables |= {f"{table}.{key}": value for key, value in entries.items()}
+            tables |= {f"{table}.{key}": setting for key, setting in entries.items()}
     return to_model(Description, tables, "", DataError)
 
 

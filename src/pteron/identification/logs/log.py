@@ -1,18 +1,19 @@
-"""A log, the recorded motion of a machine in SI units; logs joined, divided, and their gaps."""
+"""A log, the recorded motion of a machine in SI units, and the joining of its pieces."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pteron.errors import DataError
-from pteron.identification.errors import OfLog
+from pteron.identification.errors import LogSourceMixin
 from pteron.identification.logs.description import Description, joint_symbols
+from pteron.identification.logs.findings import Finding
+from pteron.identification.logs.gaps import gaps, stretches
 from pteron.kernels import as_array
 from pteron.kernels.named_columns import column_names, pick_columns
 from pteron.legs.kind import SLIDER, ActuatedJoint
@@ -21,18 +22,6 @@ from pteron.manipulator import RobotLike, as_manipulator
 from pteron.renamed import former_attribute
 from pteron.shapes import Columns, Int, JointsLike, PerCoordinate, PerJoint, PoseLike, Series
 
-_WIDE = 1.5
-"""Length of a time step, in usual steps, beyond which a sample may be missing."""
-
-_SURELY = 2.5
-"""Length beyond which a sample is surely missing, however uneven the stamps are."""
-
-_AROUND = 16
-"""Rows on each side that tell a missing sample from an uneven stamp in between."""
-
-_LATER = 0.5
-"""Usual steps, at least, by which all rows after a missing sample come later."""
-
 _ARRAYS = ("time", "joints", "forces", "pose", "payload", "rows_in_file")
 """Fields of a log with a row for each sample."""
 
@@ -40,41 +29,8 @@ _Phases = Int[np.ndarray, "*batch"]
 """Whole numbers, one a row."""
 
 
-Kind = Literal[
-    "gap", "jitter", "clipped", "frozen", "spike", "read", "guessed", "units", "periodic"
-]
-"""Missing samples, uneven steps, saturated forces, a channel that stops, samples that stand out,
-how the file was read where that is not as documented, columns that may have been meant, a unit that
-looks wrong, which rows repeat."""
-
-
 @dataclass(frozen=True)
-class Finding:
-    """An oddity of a log that a person should know; nothing was repaired.
-
-    Parameters
-    ----------
-    kind : str
-        One of `Kind`.
-    message : str
-        One line: the oddity, its place and its size.
-    row : int or None
-        Its first data row, from 1.
-    column : str or None
-        The column, as the file calls it.
-    count : int
-        Number of gaps, uneven steps, clipped rows, frozen stretches, spikes or columns.
-    """
-
-    kind: Kind
-    message: str
-    row: int | None = None
-    column: str | None = None
-    count: int = 1
-
-
-@dataclass(frozen=True)
-class Log(OfLog):
+class Log(LogSourceMixin):
     """Samples of a motion, or a part of them; the arrays are not copied and not to be changed.
 
     Parameters
@@ -137,16 +93,16 @@ class Log(OfLog):
 
     def __post_init__(self) -> None:
         for name in _ARRAYS:
-            values = getattr(self, name)
-            if isinstance(values, np.ma.MaskedArray):
-                if count := int(np.ma.getmaskarray(values).sum()):
+            numbers = getattr(self, name)
+            if isinstance(numbers, np.ma.MaskedArray):
+                if count := int(np.ma.getmaskarray(numbers).sum()):
                     raise DataError(
                         f"{self.source}: {count} values of {name} are masked; leave their rows "
                         "out: a gap in time is understood"
                     )
-                values = np.ma.getdata(values)
-            if values is not None:
-                object.__setattr__(self, name, self._rows_of_numbers(name, values))
+                numbers = np.ma.getdata(numbers)
+            if numbers is not None:
+                object.__setattr__(self, name, self._rows_of_numbers(name, numbers))
         if self.joints.shape != self.forces.shape:
             raise DataError(
                 f"{self.source}: joints of shape {self.joints.shape} and forces of shape "
@@ -238,11 +194,11 @@ class Log(OfLog):
             coordinates=machine.coordinates,
         )
 
-    def _rows_of_numbers(self, name: str, values: Any) -> Any:
-        """Return an array of the log as numbers, a row for each time."""
+    def _rows_of_numbers(self, name: str, numbers: Any) -> Any:
+        """Return an array of the log as numbers, a row for each time; raise on a wrong shape."""
         axes = 2 if name in ("joints", "forces", "pose") else 1
         integral = name in ("payload", "rows_in_file")
-        array = values if integral else as_array(values, f"{self.source}: {name}", ())
+        array = numbers if integral else as_array(numbers, f"{self.source}: {name}", ())
         array = np.asarray(array)
         rows = len(array) if name == "time" else len(self.time)
         if array.ndim != axes or len(array) != rows:
@@ -325,7 +281,7 @@ class Log(OfLog):
         return replace(self._take_samples(slice(start, stop)), first_row=first)
 
     def with_gains(self, description: Description, finding: Finding) -> Log:
-        """Return the log with the gains of a description, which a finding tells."""
+        """Return the log with forces times a description's gains, and a finding that says so."""
         forces = self.forces * np.array(description.gains)
         findings = (*self.findings, finding)
         return replace(self, forces=forces, description=description, findings=findings)
@@ -338,7 +294,7 @@ class Log(OfLog):
         """Return the log's samples at rows, a slice or their numbers."""
         arrays = {name: getattr(self, name) for name in _ARRAYS}
         changed: dict[str, Any] = {
-            name: values[rows] for name, values in arrays.items() if values is not None
+            name: samples[rows] for name, samples in arrays.items() if samples is not None
         }
         return replace(self, **changed)
 
@@ -365,126 +321,6 @@ def rows_of(log: Log) -> NDArray[np.int64]:
     if log.rows_in_file is not None:
         return log.rows_in_file
     return log.first_row + np.arange(log.rows)
-
-
-def stretches(ends: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """Return first row, and row behind the last, of stretches that end where (T - 1,) is true."""
-    return list(pairwise([0, *(np.flatnonzero(ends) + 1).tolist(), len(ends) + 1]))
-
-
-def gaps(time: NDArray[np.float64], step: float) -> NDArray[np.bool_]:
-    """Return which steps (T - 1,) of rising times (T,), s, have samples missing in them.
-
-    A missing sample makes all later ones late by the usual `step`; a stamp that is late by itself
-    does not.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> even = np.arange(8.0)
-    >>> gaps(np.delete(even, 4), 1.0).nonzero()
-    (array([3]),)
-    >>> gaps(even + [0, 0, 0, -0.3, 0.3, 0, 0, 0], 1.0).any()
-    np.False_
-    """
-    is_gap = np.diff(time) > _WIDE * step
-    late = time / step - np.arange(len(time))
-    for i in np.flatnonzero(is_gap & (np.diff(time) <= _SURELY * step)):
-        lateness_before = float(np.median(late[max(i + 1 - _AROUND, 0) : i + 1]))
-        lateness_after = float(np.median(late[i + 1 : i + 1 + _AROUND]))
-        is_gap[i] = lateness_after - lateness_before > _LATER
-    return is_gap
-
-
-def are_apart(before: NDArray[np.float64], after: NDArray[np.float64], step: float) -> bool:
-    """Return whether samples are missing between consecutive times."""
-    near = before[-_AROUND:]
-    return bool(gaps(np.concatenate([near, after[:_AROUND]]), step)[len(near) - 1])
-
-
-_CONTEXT = 32
-"""Rows of the piece before that are kept."""
-
-_JITTER = 0.01
-"""Steps that differ from the usual one by more than this part of it are uneven."""
-
-
-class TimeStamps:
-    """The record of a log's time stamps; `step` is the usual one, s."""
-
-    def __init__(self, step: float, column: str, source: str) -> None:
-        self._step, self._column, self._source = step, column, source
-        self._before = np.zeros(0)
-        self._rows = 0
-        self._gaps: list[tuple[int, float, float]] = []
-        self._uneven = 0
-        self._worst = (0.0, 0)
-
-    def take(self, time: NDArray[np.float64]) -> None:
-        """Check the next piece, in seconds.
-
-        Raises
-        ------
-        DataError
-            If a time stamp is repeated, runs backward, or is too large to tell its steps.
-        """
-        vague = np.spacing(np.abs(time)) > self._step
-        if vague.any():
-            i = int(np.argmax(vague))
-            raise DataError(
-                f"{self._source}: row {self._rows + i + 1}, column {self._column}: at "
-                f"{time[i]:g} s a number's digits cannot tell time steps apart; correct the cell, "
-                "or declare the unit of time"
-            )
-        first = not len(self._before)
-        earlier_times = time[:1] if first else self._before
-        steps = np.diff(time, prepend=earlier_times[-1:])
-        if first:
-            steps[:1] = self._step
-        if (steps <= 0.0).any():
-            i = int(np.argmax(steps <= 0.0))
-            earlier = float(time[i - 1] if i else earlier_times[-1])
-            what = "is repeated" if time[i] == earlier else "runs backward"
-            raise DataError(
-                f"{self._source}: row {self._rows + i + 1}, column {self._column}: time {what} "
-                f"({time[i]:.12g} s behind {earlier:.12g} s); put the rows in order, each with its "
-                "own time"
-            )
-        missing = gaps(np.concatenate([earlier_times, time]), self._step)[len(earlier_times) - 1 :]
-        self._gaps += [
-            (self._rows + int(i), float(time[i] - steps[i]), float(steps[i]))
-            for i in np.flatnonzero(missing)
-        ]
-        deviations = np.where(missing, 0.0, np.abs(steps - self._step))
-        self._uneven += int((deviations > _JITTER * self._step).sum())
-        worst = int(np.argmax(deviations))
-        if deviations[worst] > self._worst[0]:
-            self._worst = (float(deviations[worst]), self._rows + worst)
-        self._before = np.concatenate([earlier_times, time])[-_CONTEXT:]
-        self._rows += len(time)
-
-    def findings(self) -> tuple[Finding, ...]:
-        """Return the findings of the pieces taken so far."""
-        findings = []
-        if self._gaps:
-            row, start, step = self._gaps[0]
-            lost = np.maximum(np.rint([gap[2] / self._step for gap in self._gaps]) - 1.0, 1.0)
-            count = len(lost)
-            message = (
-                f"{self._source}: {count} gap{'s' * (count > 1)}, {lost.sum():.0f} samples missing "
-                f"in all; the first is before row {row + 1}, behind t = {start:.9g} s: "
-                f"{lost[0]:.0f} missing (a step of {step:.6g} s where {self._step:.6g} s is usual)"
-            )
-            findings.append(Finding("gap", message, row + 1, self._column, count))
-        if self._uneven:
-            worst, row = self._worst
-            message = (
-                f"{self._source}: {self._uneven} time steps differ from the usual "
-                f"{self._step:.6g} s by over {_JITTER:.0%}; the worst, at row {row + 1}, by "
-                f"{worst / self._step:.1%} ({worst:.3g} s)"
-            )
-            findings.append(Finding("jitter", message, row + 1, self._column, self._uneven))
-        return tuple(findings)
 
 
 def _column(table: Any, name: str, source: str) -> NDArray[np.float64]:

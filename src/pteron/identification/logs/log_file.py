@@ -6,31 +6,26 @@ from collections.abc import Callable, Iterator
 from copy import copy
 from dataclasses import replace
 from itertools import chain, cycle, pairwise
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pteron.errors import DataError, shorten
-from pteron.identification.errors import OfLog
+from pteron.errors import DataError
+from pteron.identification.errors import LogSourceMixin
 from pteron.identification.logs.at_motor import joint_factors
 from pteron.identification.logs.channels import Channel
 from pteron.identification.logs.clock import Clock, find_clock
 from pteron.identification.logs.columns import (
-    as_read,
     check_names,
     check_times,
     find_columns,
+    reading_findings,
     repeated_times,
 )
 from pteron.identification.logs.description import Description, joint_symbols
-from pteron.identification.logs.description_file import (
-    collect_undeclared,
-    find_description,
-    read_description,
-)
-from pteron.identification.logs.log import Finding, Log, TimeStamps, join_logs
+from pteron.identification.logs.findings import Finding
+from pteron.identification.logs.log import Log, join_logs
 from pteron.identification.logs.recorded import check_forces
 from pteron.identification.logs.sizes import (
     check_bounds,
@@ -38,26 +33,26 @@ from pteron.identification.logs.sizes import (
     joint_bounds,
     joint_spans,
     pose_bounds,
-    standstill,
+    standstill_findings,
 )
 from pteron.identification.logs.spikes import MARGIN, Spikes
-from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.identification.logs.time_stamps import TimeStamps
+from pteron.manipulator import Manipulator
 from pteron.manipulator.readings import from_readings, reading_scales
-from pteron.progress import Progress
-from pteron.tables import CsvFile, Dialect, ParquetFile, open_table
+from pteron.tables import CsvFile, ParquetFile
 
 _FEWEST = 50
 """Least rows of a log; a shorter one is refused."""
 
 _AHEAD = 10_000
-"""Rows looked at when a log is opened: the usual step is their median."""
+"""Rows that are read when a log is opened: the usual step is their median."""
 
 _PER_METRE = {"mm": 1e3, "um": 1e6}
 
 Values = NDArray[np.float64]
 
 
-class LogFile(OfLog):
+class LogFile(LogSourceMixin):
     """A log that is open for reading; each pass over its pieces reads the file anew.
 
     Attributes
@@ -101,13 +96,13 @@ class LogFile(OfLog):
         self._mass: float | None = None
         self._clock, self._step = self._usual_step()
         self._read = (
-            *as_read(source, file.found, c, description, self._clock, self._again),
+            *reading_findings(source, file.found, c, description, self._clock, self._again),
             *c.findings,
         )
         self.findings = self._read
 
     def with_gains(self, description: Description, finding: Finding) -> LogFile:
-        """Return the file with the gains of a description, which a finding tells."""
+        """Return the file with a description's gains to apply, and a finding that says so."""
         again = copy(self)
         again.description = description
         again._read = (*self._read, finding)
@@ -174,8 +169,8 @@ class LogFile(OfLog):
         n = self._robot.joint_count
         low, high = np.full(n, np.inf), np.full(n, -np.inf)
         first = 0
-        for values in self._values(self.rows_in_piece):
-            piece = self._piece(values, first)
+        for block in self._number_blocks(self.rows_in_piece):
+            piece = self._log_piece(block, first)
             stamps.take(piece.time)
             both = np.hstack([piece.joints, piece.forces])
             for channel, column in zip(channels, np.ascontiguousarray(both.T), strict=True):
@@ -186,7 +181,7 @@ class LogFile(OfLog):
             yield piece
         findings = [finding for channel in channels for finding in channel.finish()]
         declared = any(unit is not None for unit in self.description.joint_units(self._robot))
-        findings += standstill(
+        findings += standstill_findings(
             high - low, self._robot, self._columns.joints, self.source, declared=declared
         )
         self.findings = (*self._read, *stamps.findings(), *findings)
@@ -195,7 +190,7 @@ class LogFile(OfLog):
         """Return the whole log, with all findings."""
         return replace(join_logs(list(self.pieces(progress=progress))), findings=self.findings)
 
-    def _values(self, rows: int) -> Iterator[Values]:
+    def _number_blocks(self, rows: int) -> Iterator[Values]:
         """Yield the file's numbers in arrays of so many rows: the time in s, then `_names`."""
         blocks: list[Values] = []
         count = 0
@@ -212,7 +207,7 @@ class LogFile(OfLog):
         if count:
             yield np.concatenate(blocks)
 
-    def _piece(self, values: Values, first: int) -> Log:
+    def _log_piece(self, block: Values, first: int) -> Log:
         """Return a log of rows read from the file, in SI units; raise on impossible numbers."""
         c, source = self._columns, self.source
         edges = np.cumsum([len(group.names) for group in self._groups])[:-1]
@@ -220,9 +215,7 @@ class LogFile(OfLog):
             np.ascontiguousarray(
                 np.transpose([_to_si(*both) for both in zip(part.T, group.units, strict=True)])
             )
-            for group, part in zip(
-                self._groups, np.split(values[:, 1:], edges, axis=1), strict=True
-            )
+            for group, part in zip(self._groups, np.split(block[:, 1:], edges, axis=1), strict=True)
         )
         joints = from_readings(self._robot, joints * self._factors)
         of_joints, of_pose = self._bounds
@@ -235,11 +228,11 @@ class LogFile(OfLog):
             check_bounds(pose, of_pose, c.pose, source, first)
         return Log(
             source=source,
-            time=np.ascontiguousarray(values[:, 0]),
+            time=np.ascontiguousarray(block[:, 0]),
             joints=joints,
             forces=forces,
             pose=pose if c.pose.names else None,
-            payload=self._phases(payload[:, 0], first) if c.payload.names else None,
+            payload=self._payload_phases(payload[:, 0], first) if c.payload.names else None,
             payload_mass=self._mass,
             description=self.description,
             first_row=first,
@@ -249,24 +242,24 @@ class LogFile(OfLog):
             readings=tuple(leg.reading for leg in self._robot.legs),
         )
 
-    def _phases(self, values: Values, first: int) -> NDArray[np.int64]:
-        """Return 1 where a payload is carried: where the column is not 0, but 1 or its mass."""
-        carried = values[values != 0.0]
+    def _payload_phases(self, masses: Values, first: int) -> NDArray[np.int64]:
+        """Return the payload's phase (T,): 0 where the column is 0, 1 where it is 1 or the mass."""
+        carried = masses[masses != 0.0]
         if self._mass is None and len(carried):
             self._mass = float(carried[0])
-        bad = (values != 0.0) & ((values != self._mass) | ~(values > 0.0))
+        bad = (masses != 0.0) & ((masses != self._mass) | ~(masses > 0.0))
         if bad.any():
             i = int(np.argmax(bad))
             raise DataError(
                 f"{self.source}: row {first + i + 1}, column "
-                f"{self._columns.payload.printable_names[0]}: {values[i]:g} given; 0 (without "
+                f"{self._columns.payload.printable_names[0]}: {masses[i]:g} given; 0 (without "
                 "payload) or 1 (with) was expected, or one mass in kg; give each payload its own "
                 "log"
             )
-        return np.asarray(values != 0.0, dtype=np.int64)
+        return np.asarray(masses != 0.0, dtype=np.int64)
 
     def _usual_step(self) -> tuple[Clock, float]:
-        """Return how times are written, and their median step, s."""
+        """Return the format of the file's times, and their median step, s."""
         c, about = self._columns, self.description
         column, names = c.time.printable_names[0], c.time.names
         table = next(self._file.tables((*names, *self._names)), None)
@@ -277,22 +270,22 @@ class LogFile(OfLog):
                 "length says nothing; record a longer one"
             )
         table = replace(table, frame=table.frame.head(_AHEAD))
-        unit = c.time.units[0] if c.time.said else None
+        unit = c.time.units[0] if c.time.unit_stated else None
         clock = find_clock(table, names, unit, about.time_format)
         time = clock.fresh().seconds(table)
         # A fault in the order of time is told with its row, before any step is judged.
         TimeStamps(1.0, column, self.source).take(time)
         step = float(np.median(np.diff(time)))
-        if not (c.time.said or clock.format or len(names) > 1):
+        if not (c.time.unit_stated or clock.format or len(names) > 1):
             check_step(step, column, self.source)
         return clock, step
 
     def _channels(self) -> list[Channel]:
-        """Return a record for each column of joints and forces, which finds channels that stop."""
+        """Return a record for each column of joints and forces, to detect channels that stop."""
         spans, source, c = joint_spans(self._robot), self.source, self._columns
         limits = self.description.limits or (None,)
         joints = [
-            Channel(name, source, spans, joint=j) for j, name in enumerate(c.joints.printable_names)
+            Channel(n, source, spans, joint=j) for j, n in enumerate(c.joints.printable_names)
         ]
         forces = zip(
             c.forces.printable_names, cycle(limits), reading_scales(self._robot), strict=False
@@ -303,102 +296,6 @@ class LogFile(OfLog):
         ]
 
 
-def _to_si(values: Values, unit: str) -> Values:
+def _to_si(readings: Values, unit: str) -> Values:
     """Return lengths in m, angles in rad, and other values unchanged."""
-    return np.radians(values) if unit == "deg" else values / _PER_METRE.get(unit, 1.0)
-
-
-def open_log(
-    path: str | Path, robot: RobotLike, *, description: Description | str | Path | None = None
-) -> LogFile:
-    """Open a log to read it in pieces: its columns are found, its first rows checked.
-
-    Parameters and errors are those of `read_log`.
-    """
-    robot = as_manipulator(robot)
-    described_by = (find_description(path) or Description()) if description is None else description
-    origin, about = (
-        (path, described_by) if isinstance(described_by, Description) else (described_by, None)
-    )
-    about = about or read_description(origin)
-    try:
-        about.check(robot)
-    except DataError as error:
-        raise DataError(f"{shorten(str(origin), bare=True, longest=1000)}: {error}") from None
-
-    def open_described(described: Description) -> LogFile:
-        """Return the opened log file, read as the description says."""
-        dialect = described.csv or Dialect()
-        return LogFile(open_table(path, noun="log", dialect=dialect), robot, described)
-
-    def check_described(described: Description) -> None:
-        """Read the first piece of the log as the description says; raise on faults."""
-        next(open_described(described).pieces(), None)
-
-    try:
-        return open_described(about)
-    except DataError as error:
-        raise collect_undeclared(error, about, check_described, robot.legs[0].joint) from None
-
-
-def read_log(
-    path: str | Path,
-    robot: RobotLike,
-    *,
-    description: Description | str | Path | None = None,
-    progress: Progress | None = None,
-) -> Log:
-    """Read a whole log: t, rho1.., force1.. (at cranks theta, torque), x y z phi if measured.
-
-    Parameters
-    ----------
-    path : str or path
-        A CSV or Parquet file; its ending says which.
-    robot : Manipulator, name or path
-        The machine it belongs to.
-    description : Description or path, optional
-        The description; the TOML file of the same stem where it is not given.
-    progress : callable, optional
-        Takes the share of the rows that is read.
-
-    Returns
-    -------
-    Log
-        In SI units, with all findings.
-
-    Raises
-    ------
-    DataError
-        If a column is missing or ambiguous; if a cell is empty, text or not finite; if time stamps
-        are repeated or run backward; if there are fewer than 50 rows; if a unit cannot be; if a
-        joint coordinate or force holds one value throughout. The message names the row and the
-        column.
-
-    Examples
-    --------
-    >>> import numpy as np, pteron, tempfile
-    >>> from pathlib import Path
-    >>> from pteron.identification.logs import Log, read_log, write_log
-    >>> t = np.arange(500) / 1000
-    >>> wave = np.sin(np.outer(t, [7.0, 9.0, 11.0]) + 1.0)
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     path = write_log(Log("a motion", t, 0.05 * wave, 20.0 * wave), Path(folder) / "a.csv")
-    ...     log = read_log(path, pteron.load("tripteron"))
-    >>> log.rows, log.joints.shape, round(log.rate), log.findings
-    (500, (500, 3), 1000, ())
-    """
-    robot = as_manipulator(robot)
-    file = open_log(path, robot, description=description)
-    if progress is None:
-        return file.read()
-    total, done = file.rows_estimate or 1, 0
-
-    def count_rows(rows: int) -> None:
-        """Add rows to those read and report the log's share, 0 to 1."""
-        nonlocal done
-        done += rows
-        progress(min(done / total, 1.0))
-
-    log = file.read(count_rows)
-    progress(1.0)
-    return log
+    return np.radians(readings) if unit == "deg" else readings / _PER_METRE.get(unit, 1.0)

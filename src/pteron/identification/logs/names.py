@@ -44,7 +44,7 @@ _WORDS: dict[str, tuple[str, ...]] = {
 CURRENTS = ("current", "i", "actcurrent", "actualcurrent", "iststrom")
 """Words that say amperes."""
 
-_SPELLED = "|".join(re.escape(one) for units in UNITS.values() for one in units if len(one) > 1)
+_SPELLED = "|".join(re.escape(u) for units in UNITS.values() for u in units if len(u) > 1)
 _SPELLED += "|(?-i:[smANV%°])"
 """Units without brackets: a last single letter is one only as it is usually written."""
 
@@ -72,7 +72,7 @@ _STAMP = re.compile(r"(?:.*[./])?header[./]stamp(?P<part>[./](?:secs?|nsecs?|nan
 """The time of measurement in a message of ROS."""
 
 
-class Called(NamedTuple):
+class NameParts(NamedTuple):
     """The parts of a column's name."""
 
     word: str
@@ -84,13 +84,13 @@ class Called(NamedTuple):
     """In small letters, empty where there is none."""
 
 
-def parse_column_name(name: str) -> Called | None:
+def parse_column_name(name: str) -> NameParts | None:
     """Return the parts of a name, or None where it is no word with a number and a unit, or without.
 
     Examples
     --------
     >>> parse_column_name("Rho_1 (mm)")
-    Called(word='rho', number=1, family='Rho_# (mm)', unit='mm')
+    NameParts(word='rho', number=1, family='Rho_# (mm)', unit='mm')
     >>> parse_column_name("/joint_states/position[0]").number
     0
     """
@@ -110,15 +110,15 @@ def parse_column_name(name: str) -> Called | None:
     if number is not None and len(number) > _DIGITS:
         return None  # no machine has so many joints
     unit = parts["inside"] or parts["behind"] or parts["under"] or ""
-    return Called(word, None if number is None else int(number), family, unit.lower())
+    return NameParts(word, None if number is None else int(number), family, unit.lower())
 
 
-def means(word: str, stem: str) -> bool:
+def is_synonym(word: str, stem: str) -> bool:
     """Return whether a word is a synonym of the documented word."""
     return word in _WORDS.get(stem, (stem,))
 
 
-def unit_called(text: str, si: str) -> str | None:
+def parse_unit(text: str, si: str) -> str | None:
     """Return the unit with this spelling for quantities in `si`; None if unknown."""
     return UNITS[si].get(text.strip().lower())
 

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pteron.errors import DataError
-from pteron.identification.logs.log import Log, gaps
+from pteron.identification.logs.gaps import gaps
+from pteron.identification.logs.log import Log
 from pteron.identification.logs.spikes import LONGEST
 from pteron.tolerances import ROUNDING
 
@@ -52,7 +53,7 @@ def check_forces(
 
 
 def check_recorded(log: Log) -> None:
-    """Refuse forces that never change, and joints whose encoder wraps; all of them at once."""
+    """Raise LogError where forces never change, or else where encoders wrap."""
     constant = [
         f"{name} is {force[0]:g} throughout"
         for name, force in zip(log.force_names, log.forces.T, strict=True)
@@ -90,23 +91,24 @@ def saturation_sentences(log: Log) -> tuple[str, ...]:
         if not moving.size:
             continue
         for word, signed in (("largest", moving), ("least", -moving)):
-            values, counts = np.unique(signed, return_counts=True)
-            first = values >= values[-1] - ROUNDING * np.ptp(force)
+            levels, counts = np.unique(signed, return_counts=True)
+            first = levels >= levels[-1] - ROUNDING * np.ptp(force)
             top, below = int(counts[first].sum()), counts[~first]
             if top < _LEAST * len(moving) or not below.size or top < _LEVEL * below[-1]:
                 continue
-            value = values[-1] if word == "largest" else -values[-1]
+            extreme = levels[-1] if word == "largest" else -levels[-1]
+            share = 100.0 * top / len(moving)
             sentences.append(
-                f"{name} stays at its {word} value, {value:.4g}, in {100.0 * top / len(moving):.2g}"
-                f" % of the samples of {log.source}: the drive or what measures it is at its limit "
-                "(saturation), and forces there need not be those that act; move more slowly, or "
-                "leave such stretches out."
+                f"{name} stays at its {word} value, {extreme:.4g}, in {share:.2g} % of the samples "
+                f"of {log.source}: the drive or what measures it is at its limit (saturation), and "
+                "forces there need not be those that act; move more slowly, or leave such "
+                "stretches out."
             )
     return tuple(sentences)
 
 
 def _jump(log: Log, joint: NDArray[np.float64], turns: bool) -> list[tuple[float, int]]:
-    """Return by how much a joint jumps and in which row, from 0, where its encoder wraps."""
+    """Return the size and row, from 0, of the jumps of a joint whose encoder wraps."""
     if len(joint) < 2 * LONGEST:
         return []
     steps = np.diff(joint)

@@ -6,16 +6,16 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from pteron.errors import DataError, shorten
-from pteron.identification.logs.column_names import ColumnNames, Wanted
-from pteron.identification.logs.log import Finding
+from pteron.identification.logs.column_names import ColumnNames, SoughtColumn
+from pteron.identification.logs.findings import Finding
 from pteron.identification.logs.names import (
     CURRENTS,
     RATED,
-    Called,
-    means,
+    NameParts,
+    is_synonym,
     parse_column_name,
+    parse_unit,
     stamp_columns,
-    unit_called,
 )
 from pteron.tables import declaration, join_names
 
@@ -28,10 +28,10 @@ class Group(NamedTuple):
 
     names: tuple[str, ...] = ()
     units: tuple[str, ...] = ()
-    said: bool = True
-    """Whether the file or its description says the units."""
-    told: bool = False
-    """Whether names or units come from the file's own words, which is told."""
+    unit_stated: bool = True
+    """Whether the file or its description states the units."""
+    reported: bool = False
+    """Whether names or units come from words of the file, which a finding reports."""
     guessed: bool = False
     """Whether the columns are taken by names that are not the documented ones."""
 
@@ -49,7 +49,7 @@ class Group(NamedTuple):
 class ColumnSearch(ColumnNames):
     """The search for the columns of a log."""
 
-    def time(self, kind: Wanted, declared: str | None) -> Group:
+    def time(self, kind: SoughtColumn, declared: str | None) -> Group:
         """Return the column of the times, or those of seconds and nanoseconds."""
         stamps = stamp_columns(self.names)
         if declared is not None:
@@ -66,58 +66,53 @@ class ColumnSearch(ColumnNames):
         guessed = declared is None and columns != ("t",)
         group = self._group_by_unit([kind] * len(columns), columns, guessed=guessed)
         # What a name says of the time's unit is told, declared or not.
-        return group._replace(told=group.told or self.unit_of(columns[0], kind) is not None)
+        return group._replace(reported=group.reported or self.unit_of(columns[0], kind) is not None)
 
     def group(
-        self,
-        wanted: Sequence[Wanted],
-        declared: Sequence[str] | None,
-        numbers: Sequence[int],
+        self, sought: Sequence[SoughtColumn], declared: Sequence[str] | None, numbers: Sequence[int]
     ) -> Group:
         """Return the columns of quantities, one for each number, by declaration or by name."""
         if declared is not None:
-            columns = self.declared_columns(wanted[0].table, declared)
-            return self._group_by_unit(wanted, columns, guessed=False)
+            columns = self.declared_columns(sought[0].table, declared)
+            return self._group_by_unit(sought, columns, guessed=False)
         names_by_number, guessed = dict[int, str](), False
-        for kind in dict.fromkeys(wanted):
-            numbers_of_kind = [
-                i for i, member in zip(numbers, wanted, strict=True) if member == kind
-            ]
+        for kind in dict.fromkeys(sought):
+            numbers_of_kind = [i for i, m in zip(numbers, sought, strict=True) if m == kind]
             names, by_name = self.family(kind, numbers_of_kind)
             names_by_number |= zip(numbers_of_kind, names, strict=True)
             guessed = guessed or by_name
         columns = [names_by_number[i] for i in numbers]
         # Names that are documented say their units as documented.
-        return self._group_by_unit(wanted, columns, guessed=guessed)._replace(told=guessed)
+        return self._group_by_unit(sought, columns, guessed=guessed)._replace(reported=guessed)
 
     def _group_by_unit(
-        self, wanted: Sequence[Wanted], columns: Sequence[str], *, guessed: bool
+        self, sought: Sequence[SoughtColumn], columns: Sequence[str], *, guessed: bool
     ) -> Group:
         """Return columns with their units; all lengths share a unit, and so do all angles."""
         units, said, is_stated = dict[str, str](), True, guessed
-        for kind in {member.unit: member for member in wanted}.values():
-            alike = zip(columns, wanted, strict=True)
+        for kind in {member.unit: member for member in sought}.values():
+            alike = zip(columns, sought, strict=True)
             named = self.common_unit([c for c, member in alike if member.unit == kind.unit], kind)
             units[kind.unit] = self.unit(kind, named)
             said = said and (kind.declared or named) is not None
             is_stated = is_stated or (named is not None and not kind.declared)
         self.taken.update(columns)
-        each = tuple(units[member.unit] for member in wanted)
+        each = tuple(units[member.unit] for member in sought)
         return Group(tuple(columns), each, said, is_stated, guessed)
 
-    def matches(self, kind: Wanted) -> Iterator[tuple[str, Called]]:
+    def matches(self, kind: SoughtColumn) -> Iterator[tuple[str, NameParts]]:
         """Yield the columns whose names are a synonym of a quantity, with a fitting unit if any."""
         for name in self.names:
             parts = parse_column_name(name)
             if (
                 parts is not None
-                and means(parts.word, kind.stem)
-                and (not parts.unit or unit_called(parts.unit, kind.unit))
+                and is_synonym(parts.word, kind.stem)
+                and (not parts.unit or parse_unit(parts.unit, kind.unit))
             ):
                 yield name, parts
 
-    def family(self, kind: Wanted, numbers: Sequence[int]) -> tuple[list[str], bool]:
-        """Return the columns with these numbers (0: none), and whether they have another name."""
+    def family(self, kind: SoughtColumn, numbers: Sequence[int]) -> tuple[list[str], bool]:
+        """Return the columns with these numbers (0: none); whether by undocumented names."""
         families: dict[str, dict[int, str]] = {}
         for name, parts in self.matches(kind):
             if (parts.number is not None) == (numbers[0] > 0):
@@ -149,16 +144,16 @@ class ColumnSearch(ColumnNames):
         columns = [families[complete[0]][number] for number in numbers]
         return columns, complete[0] != exact
 
-    def pose(self, wanted: Sequence[Wanted], declared: Sequence[str] | None) -> Group:
+    def pose(self, sought: Sequence[SoughtColumn], declared: Sequence[str] | None) -> Group:
         """Return the columns of a measured pose, none where it is not whole."""
-        stems = [member.stem for member in wanted]
+        stems = [member.stem for member in sought]
         if declared is not None:
             columns = self.declared_columns("pose", declared)
         elif set(stems) <= set(self.names):
             columns = stems
         else:
-            columns = [name for member in wanted for name in self.lone(member)]
-        if len(columns) < len(wanted):
+            columns = [name for member in sought for name in self.lone(member)]
+        if len(columns) < len(sought):
             if columns:
                 message = (
                     f"{self.source}: {join_names(columns)} alone are no pose ({', '.join(stems)} "
@@ -168,9 +163,9 @@ class ColumnSearch(ColumnNames):
                 self.findings.append(Finding("guessed", message, column=first, count=len(columns)))
             return Group()
         guessed = declared is None and columns != stems
-        return self._group_by_unit(wanted, columns, guessed=guessed)
+        return self._group_by_unit(sought, columns, guessed=guessed)
 
-    def lone(self, kind: Wanted) -> list[str]:
+    def lone(self, kind: SoughtColumn) -> list[str]:
         """Return the column without a number that fits, as a list; empty if there is none."""
         candidates = [name for name, parts in self.matches(kind) if parts.number is None]
         if len(candidates) > 1:
@@ -183,11 +178,11 @@ class ColumnSearch(ColumnNames):
         if declared is not None:
             candidates = self.declared_columns("payload", [declared])
         if len(candidates) > 1:
-            kind = Wanted("payload", "payload", "payload", "", None)
+            kind = SoughtColumn("payload", "payload", "payload", "", None)
             raise self.ambiguous(kind, [[name] for name in candidates])
         return Group(tuple(candidates), ("",) * len(candidates))
 
-    def unit_of(self, name: str, kind: Wanted) -> str | None:
+    def unit_of(self, name: str, kind: SoughtColumn) -> str | None:
         """Return the unit from the line of units, else from the column's name; None without.
 
         A word such as current says another unit than the documented one; rho and force do not.
@@ -195,7 +190,7 @@ class ColumnSearch(ColumnNames):
         parts = parse_column_name(name)
         text = self.units.get(name, "")
         if text.lower() not in _NO_UNIT:
-            unit = unit_called(text, kind.unit)
+            unit = parse_unit(text, kind.unit)
             if unit is None and kind.declared is None:
                 raise DataError(
                     f"{self.source}: column {shorten(name, bare=True)} is in {shorten(text)}, "
@@ -207,16 +202,16 @@ class ColumnSearch(ColumnNames):
         if parts is None:
             return None
         implied = "A" if kind.table == "forces" and parts.word in CURRENTS else None
-        return unit_called(parts.unit, kind.unit) or implied
+        return parse_unit(parts.unit, kind.unit) or implied
 
     @staticmethod
-    def unit_key(kind: Wanted) -> str:
+    def unit_key(kind: SoughtColumn) -> str:
         """Return the key of a unit in its table."""
         if kind.table != "pose":
             return "unit"
         return "angle_unit" if kind.unit == "rad" else "length_unit"
 
-    def common_unit(self, columns: Sequence[str], kind: Wanted) -> str | None:
+    def common_unit(self, columns: Sequence[str], kind: SoughtColumn) -> str | None:
         """Return the unit of columns that belong together."""
         units = dict.fromkeys(self.unit_of(name, kind) for name in columns)
         if len(units) > 1 and kind.declared is None:
@@ -235,7 +230,7 @@ class ColumnSearch(ColumnNames):
             )
         return next(iter(units))
 
-    def unit(self, kind: Wanted, named: str | None) -> str:
+    def unit(self, kind: SoughtColumn, named: str | None) -> str:
         """Return the declared unit, else that in the file, else the documented unit."""
         if kind.declared and named and kind.declared != named:
             # Currents called F1 are the file's business; that the two differ must be said.

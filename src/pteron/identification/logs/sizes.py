@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pteron.errors import DataError
 from pteron.identification.logs.description import joint_symbols
-from pteron.identification.logs.log import Finding
+from pteron.identification.logs.findings import Finding
 from pteron.identification.logs.search import Group
 from pteron.legs import LegKind
 from pteron.manipulator import Manipulator
@@ -51,7 +51,7 @@ class Bound(NamedTuple):
 
 
 def joint_bounds(robot: Manipulator) -> list[Bound]:
-    """Return how far each joint may travel.
+    """Return the bound on each joint's coordinate.
 
     A joint cannot leave the others far behind: its coordinate is bound by its limits, or by the
     machine's size, along a guide that may be oblique to the leg's plane. A crank makes few turns; a
@@ -62,7 +62,7 @@ def joint_bounds(robot: Manipulator) -> list[Bound]:
 
 
 def pose_bounds(robot: Manipulator) -> list[Bound]:
-    """Return how large each coordinate of a measured pose may be."""
+    """Return the bound on each coordinate of a measured pose."""
     far = max(float(np.linalg.norm(leg.guide_point)) for leg in robot.legs)
     limits = [leg.limits for leg in robot.legs if leg.joint.unit == "m"]
     size = _size_of(robot) + far + max(map(_farthest, limits), default=0.0)
@@ -76,22 +76,22 @@ def pose_bounds(robot: Manipulator) -> list[Bound]:
 
 
 def check_bounds(
-    values: NDArray[np.float64], bounds: Sequence[Bound], group: Group, source: str, first_row: int
+    moved: NDArray[np.float64], bounds: Sequence[Bound], group: Group, source: str, first_row: int
 ) -> None:
-    """Raise a `DataError` where coordinates, (rows, n) in SI, are too large for the machine."""
+    """Raise a `DataError` where coordinates `moved`, (rows, n) in SI, exceed their bounds."""
     for j, (usual, owner, key) in enumerate(bounds):
-        beyond = np.abs(values[:, j]) > (_TURNS if usual is None else _BEYOND * usual)
+        beyond = np.abs(moved[:, j]) > (_TURNS if usual is None else _BEYOND * usual)
         if not beyond.any():
             continue
         i, unit, name = int(np.argmax(beyond)), group.units[j], group.printable_names[j]
-        place = f"{source}: row {first_row + i + 1}, column {name}: {values[i, j]:g}"
+        place = f"{source}: row {first_row + i + 1}, column {name}: {moved[i, j]:g}"
         if usual is None:
             raise DataError(
                 f"{place} rad, read as {unit}, is over two turns; {_declare('degrees', key, 'deg')}"
             )
         advice, peak = "check the unit, and that the log belongs to this machine", np.inf
         if unit == "m":
-            peak = float(np.abs(values[:, j]).max())
+            peak = float(np.abs(moved[:, j]).max())
         for factor, smaller in reversed(_SMALLER):
             if peak / factor <= _BEYOND * usual:
                 advice = _declare(smaller, key, smaller)
@@ -110,13 +110,8 @@ def check_step(step: float, column: str, source: str) -> None:
     )
 
 
-def standstill(
-    travelled: NDArray[np.float64],
-    robot: Manipulator,
-    group: Group,
-    source: str,
-    *,
-    declared: bool,
+def standstill_findings(
+    travelled: NDArray[np.float64], robot: Manipulator, group: Group, source: str, *, declared: bool
 ) -> tuple[Finding, ...]:
     """Return a finding where no joint moves by a thousandth of its span: the unit may be wrong.
 
@@ -163,7 +158,7 @@ def _size_of(robot: Manipulator) -> float:
 
 
 def _travel_of(leg: LegKind, robot: Manipulator) -> float | None:
-    """Return a bound on a slider's coordinate, m; infinity for a crank, None if it is endless."""
+    """Return a slider's usual travel, m; infinity for an endless joint, None for a crank."""
     if leg.joint.unit == "rad":
         return None if leg.goes_round else math.inf
     if leg.limits is not None or leg.reach_bound is None:
@@ -179,6 +174,6 @@ def _farthest(limits: tuple[float, float] | None) -> float:
 
 def _declare(contents: str, key: str, unit: str) -> str:
     """Return advice to declare a unit in a TOML file, with the lines to write."""
-    table, _, entry = key.partition("] ")
-    said = declaration(table.removeprefix("["), **{entry: unit})
+    table, _, subkey = key.partition("] ")
+    said = declaration(table.removeprefix("["), **{subkey: unit})
     return f"if the file holds {contents}, say so in a TOML file beside it:{said}"

@@ -6,7 +6,7 @@ import numpy as np
 import scipy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
-from pteron.identification.logs.log import Finding
+from pteron.identification.logs.findings import Finding
 
 LONGEST = 16
 """Samples in a row that are a spike at most: what stays away longer is a step, and no spike."""
@@ -40,7 +40,7 @@ _MOST = 0.01
 _SPAN = (1.0, 99.0)
 """Percentiles between which a channel's usual values lie."""
 
-_TOLD = 5
+_LISTED = 5
 """Groups of spikes whose rows a message names."""
 
 Values = NDArray[np.float64]
@@ -50,37 +50,37 @@ Mask = NDArray[np.bool_]
 """Whether each row counts."""
 
 
-def joint_spikes(values: Values) -> Mask:
+def joint_spikes(coordinates: Values) -> Mask:
     """Return which samples (T,) of a joint coordinate stand out.
 
     A group jumps away from the motion within one sample, at most `LONGEST` samples later back onto
     it, each time by far more than the joint moves in a sample.
     """
-    steps = np.abs(np.diff(values))
+    steps = np.abs(np.diff(coordinates))
     nearby = scipy.ndimage.median_filter(steps, _WINDOW, mode="nearest")
-    return _groups(values, _SHARE_OF_JOINT, _FASTER * nearby)
+    return _spike_groups(coordinates, _SHARE_OF_JOINT, _FASTER * nearby)
 
 
-def force_spikes(values: Values, joints: Values, own: int) -> Mask:
+def force_spikes(forces: Values, joints: Values, joint: int) -> Mask:
     """Return which samples (T,) of a force stand out that no motion explains.
 
     Forces may jump where an acceleration does, as in an emergency stop, and where friction turns
-    with the joint itself: the motion (T, n) says so, in which `own` is the joint of this force.
+    with the joint itself: the motion (T, n) says so, in which `joint` is that of this force.
     """
-    is_spike = _groups(values, _SHARE_OF_FORCE, 0.0)
+    is_spike = _spike_groups(forces, _SHARE_OF_FORCE, 0.0)
     if not is_spike.any():
         return is_spike
-    speed = np.abs(np.gradient(joints[:, own]))
+    speed = np.abs(np.gradient(joints[:, joint]))
     turns = speed < _REVERSING * np.percentile(speed, 95.0)
-    low, high = np.percentile(values, _SPAN)
+    low, high = np.percentile(forces, _SPAN)
     far = _BEYOND * (high - low)
-    usual = (values > low - far) & (values < high + far)
+    usual = (forces > low - far) & (forces < high + far)
     turns = scipy.ndimage.maximum_filter1d(turns.astype(np.int8), 5) > 0
     motion = _JointMotion(joints)
     for start, stop in runs(is_spike):
         group = slice(start, stop)
         turned = turns[group].any() and usual[group].all()
-        if turned or motion.is_pushed(start, stop):
+        if turned or motion.accelerates(start, stop):
             is_spike[group] = False
     return is_spike
 
@@ -95,17 +95,17 @@ class _JointMotion:
         travel = np.percentile(np.abs(joints[LONGEST:] - joints[:-LONGEST]), 90.0, axis=0)
         self._travel = np.maximum(travel, np.finfo(float).tiny)
 
-    def is_pushed(self, start: int, stop: int) -> bool:
-        """Return whether joints accelerate in some samples unlike before and after.
+    def accelerates(self, start: int, stop: int) -> bool:
+        """Return whether joints accelerate in rows `start` to `stop` unlike before and after.
 
         They may stop in them, or start.
         """
         length = stop - start
         if length not in self._usual:
-            self._usual[length] = np.percentile(_pushes(self._steps, length), 90.0, axis=0)
+            self._usual[length] = np.percentile(_speed_gains(self._steps, length), 90.0, axis=0)
         # Derivatives and forces may be a sample apart.
         first = max(start - length - 2, 0)
-        pushes = _pushes(self._steps[first : first + 3 * length + 3], length)
+        pushes = _speed_gains(self._steps[first : first + 3 * length + 3], length)
         if (pushes > _UNUSUAL * self._usual[length]).any():
             return True
         # Noise of the positions may hide that, but not that all joints rest.
@@ -119,22 +119,22 @@ class _JointMotion:
         return float((np.abs(self._joints[stop] - self._joints[start]) / self._travel).max())
 
 
-def _pushes(steps: Values, length: int) -> Values:
-    """Return the gain of speed over `length` steps beyond that before and after."""
+def _speed_gains(steps: Values, length: int) -> Values:
+    """Return the gain of speed over `length` steps beyond that before and after, per joint."""
     gain = steps[length:] - steps[:-length]
     return np.abs(gain[length:-length] - (gain[: -2 * length] + gain[2 * length :]) / 2.0)
 
 
-def _groups(values: Values, share: float, least: Values | float) -> Mask:
+def _spike_groups(signal: Values, share: float, least: Values | float) -> Mask:
     """Return the mask of samples between a jump and the jump back; empty for short signals."""
-    is_spike = np.zeros(len(values), dtype=bool)
-    if len(values) < 2 * _WINDOW:
+    is_spike = np.zeros(len(signal), dtype=bool)
+    if len(signal) < 2 * _WINDOW:
         return is_spike
-    steps = np.diff(values)
+    steps = np.diff(signal)
     jumps = steps - scipy.ndimage.median_filter(steps, _WINDOW, mode="nearest")
     usual = _USUAL * float(np.percentile(np.abs(jumps), 95.0))
     large = np.abs(jumps) > np.maximum(
-        max(usual, share * np.ptp(np.percentile(values, _SPAN))), least
+        max(usual, share * np.ptp(np.percentile(signal, _SPAN))), least
     )
     places = np.flatnonzero(large)
     i = 0
@@ -168,7 +168,7 @@ class Spikes:
 
     def __init__(self, columns: tuple[str, ...], source: str) -> None:
         self._columns, self._source = columns, source
-        self._found: dict[str, list[tuple[int, int, float]]] = {name: [] for name in columns}
+        self._spikes: dict[str, list[tuple[int, int, float]]] = {name: [] for name in columns}
         self._too_many = False
 
     def find(self, joints: Values, forces: Values, inner: slice, first_row: int) -> Mask:
@@ -184,7 +184,7 @@ class Spikes:
         ):
             is_spike = joint_spikes(channel) if j < n else force_spikes(channel, joints, j - n)
             out |= is_spike[inner]
-            self._found[name] += [
+            self._spikes[name] += [
                 (first_row + a, first_row + b, float(channel[inner][a]))
                 for a, b in runs(is_spike[inner])
             ]
@@ -199,12 +199,12 @@ class Spikes:
         fate = "left out like a gap, not repaired"
         if self._too_many:
             fate = f"left in, for over {_MOST:.0%} of the rows are spikes; record it again"
-        for name, groups in self._found.items():
+        for name, groups in self._spikes.items():
             count = sum(b - a for a, b, _ in groups)
             if not count:
                 continue
-            named = [f"{a + 1} to {b}" if b - a > 1 else f"{b}" for a, b, _ in groups[:_TOLD]]
-            ellipsis = ", ..." if len(groups) > _TOLD else ""
+            named = [f"{a + 1} to {b}" if b - a > 1 else f"{b}" for a, b, _ in groups[:_LISTED]]
+            ellipsis = ", ..." if len(groups) > _LISTED else ""
             plural = "s" * (count > 1)
             what = "spikes" if plural else "a spike"
             message = (

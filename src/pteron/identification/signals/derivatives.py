@@ -10,6 +10,7 @@ nothing of the positions is left. The band is that of the parallel filter, Hz.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from math import ceil
 from typing import ClassVar, Literal, NamedTuple
 
@@ -89,7 +90,7 @@ class Curve:
 
 @dataclass(frozen=True)
 class _Sampled:
-    """The sampling rate and cut-off, Hz, and the delay of central differences and splines."""
+    """A differentiator with a sampling rate and a cut-off, Hz, and the forces' delay, s."""
 
     rate: float
     cutoff: float | None
@@ -109,7 +110,7 @@ class _Sampled:
         return Curve(spline.c, (bases[0], bases[1], bases[2]), ends)
 
     def fastest(self, band: float) -> float | None:
-        """Return the cut-off."""
+        """Return the cut-off, Hz: above it nothing passes, whatever the band; None without one."""
         return self.cutoff
 
 
@@ -119,12 +120,12 @@ class CentralDifferences(_Sampled):
 
     @property
     def edge(self) -> int:
-        """Rows that the filter takes to settle, and the differences' own ends."""
+        """Rows lost at each end: the filter's settling, the differences' own ends and the delay."""
         settling = ceil(SETTLING * self.rate / self.cutoff) if self.cutoff else 0
         return LOST + settling + self.shift
 
     def differentiate(self, block: Log, edge: int) -> Differentiated:
-        """Return the block at even steps of time."""
+        """Return a block's motion and forces at even times, without `edge` rows at each end."""
         time, joints = uniform(block.time, block.joints)
         even = joints is block.joints
         forces = block.forces if even else uniform(block.time, block.forces)[1]
@@ -134,7 +135,9 @@ class CentralDifferences(_Sampled):
         inner, lost = slice(edge, len(time) - edge), slice(edge - LOST, len(first) - (edge - LOST))
         parts = [joints[LOST:-LOST], first, second]
         if self.delay:
-            parts = [_earlier(time[LOST:-LOST], part, self.delay) for part in parts]
+            known = time[LOST:-LOST]
+            spline = partial(scipy.interpolate.make_interp_spline, known, k=5)
+            parts = [spline(part)(known - self.delay) for part in parts]
         motion = parts[0][lost], parts[1][lost], parts[2][lost]
         return Differentiated(
             time[inner], motion, forces[inner], np.ones(len(motion[0]), dtype=bool)
@@ -147,12 +150,12 @@ class SmoothingSpline(_Sampled):
 
     @property
     def edge(self) -> int:
-        """Rows at a block's ends that the spline feels."""
+        """Rows lost at each end, where the spline depends on the block's end, and by the delay."""
         knot = 1.0 / (2.0 * self.cutoff) if self.cutoff else 1.0 / self.rate
         return ceil(_SPLINE_SETTLING * knot * self.rate) + self.shift
 
     def differentiate(self, block: Log, edge: int) -> Differentiated:
-        """Return the block at its own times."""
+        """Return a block's motion and forces at its own times, without `edge` rows at each end."""
         inner = slice(edge, block.rows - edge)
         q, dq, ddq = spline_motion(block.time, block.joints, self.cutoff, self.delay)
         smooth = np.ones(block.rows, dtype=bool)
@@ -178,7 +181,7 @@ class FourierFit:
         return series.later(self.delay)
 
     def differentiate(self, block: Log, edge: int) -> Differentiated:
-        """Return the log at its own times."""
+        """Return the log's motion and forces at its own times, all of them."""
         motion = self.series(block).at(block.time)
         return Differentiated(block.time, motion, block.forces, np.ones(block.rows, dtype=bool))
 
@@ -193,11 +196,6 @@ class FourierFit:
     def fastest(self, band: float) -> float | None:
         """Return the highest frequency that passes, Hz: cut-off or band; None without a cut-off."""
         return None if self.cutoff is None else max(self.cutoff, band)
-
-
-def _earlier(time: Array, signal: Array, delay: float) -> Array:
-    """Return smooth signals (T, k) at times (T,) less a delay, s."""
-    return np.asarray(scipy.interpolate.make_interp_spline(time, signal, k=5)(time - delay))
 
 
 Differentiator = CentralDifferences | SmoothingSpline | FourierFit

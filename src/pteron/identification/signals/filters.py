@@ -55,7 +55,7 @@ _CORRELATED = 12870.0 / 4900.0
 the mean of w^4 over the square of that of w^2."""
 
 _LOOK = 60_000
-"""Samples that the search for a cut-off looks at."""
+"""Samples that are used in the search for a cut-off."""
 
 _HALF = 4
 """Half the parallel filter's length, in samples that are kept."""
@@ -81,7 +81,7 @@ def white_noise(signal: Array) -> Array:
     )
     # The median forgives jumps, such as those of Coulomb friction.
     spread = np.median(rough, axis=0) / MEDIAN_SIZE
-    return np.asarray(np.maximum(spread, _grid(signal) / np.sqrt(12.0)))
+    return np.asarray(np.maximum(spread, quantisation_steps(signal) / np.sqrt(12.0)))
 
 
 def position_noise(signal: Array) -> Array:
@@ -95,7 +95,7 @@ def position_noise(signal: Array) -> Array:
     high = power[len(power) // 2 :]
     # Of noise the median of a periodogram is its mean times log 2; it forgives lines.
     plateau = np.sqrt(np.median(high, axis=0) / np.log(2.0))
-    return np.asarray(np.maximum(plateau, _grid(signal) / np.sqrt(12.0)))
+    return np.asarray(np.maximum(plateau, quantisation_steps(signal) / np.sqrt(12.0)))
 
 
 def _spectrum(signal: Array) -> Array:
@@ -106,11 +106,11 @@ def _spectrum(signal: Array) -> Array:
     return np.asarray(np.abs(transform) ** 2 / (window**2).sum())
 
 
-def _grid(signal: Array) -> Array:
-    """Return the quantisation step (k,) of signals; 0 where there is none."""
+def quantisation_steps(signal: Array) -> Array:
+    """Return the quantisation step (k,) of signals (T, k); 0 where there is none."""
     steps = np.zeros(signal.shape[1])
-    for k, values in enumerate(signal[:_GRID_LOOK].T):
-        levels = np.unique(values)
+    for k, samples in enumerate(signal[:_GRID_LOOK].T):
+        levels = np.unique(samples)
         if len(levels) < 2:
             continue
         step = float(np.diff(levels).min())
@@ -119,11 +119,6 @@ def _grid(signal: Array) -> Array:
         if np.abs(multiples - np.round(multiples)).max() < _ON_GRID:
             steps[k] = step
     return steps
-
-
-def force_steps(forces: Array) -> Array:
-    """Return the quantisation step (n,) of the forces; 0 where there is none."""
-    return _grid(forces)
 
 
 def lowpass(signal: Array, rate: float, cutoff: float | None) -> Array:

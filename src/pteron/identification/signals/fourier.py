@@ -70,7 +70,7 @@ class Projection:
         return np.asarray(scipy.linalg.cho_solve(self._normal, right))
 
     def noise(self, used: Array, times: Array) -> Array:
-        """Return the standard deviation (K, n) of the series at the times `kept` (K,).
+        """Return the standard deviation (K, n) of the fitted series at `times` (K,), s.
 
         The samples have white noise of unit variance where `used` (T, n) is 1, none where it is 0.
         """

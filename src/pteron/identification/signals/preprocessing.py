@@ -53,8 +53,8 @@ _TOLERABLE = 0.5
 grows by a ninth, the root of 1 + 0.5^2."""
 
 _REPEATS = 0.02
-"""Largest residual of a series, as a share of the span, of a motion that is said to repeat: a
-controller that tracks badly leaves up to 1 % of it, another motion tens of percent."""
+"""Largest residual of a series, as a share of the span, of a motion that repeats: a controller that
+tracks badly leaves up to 1 % of it, another motion tens of percent."""
 
 _NOISE_ALONE = 1.25
 """Largest residual, over the positions' noise, that is noise alone: stick and slip above the last
@@ -64,10 +64,11 @@ _MIXED = 1.5
 """Reach of the positions' filter, its ringing included, in periods of its cut-off."""
 
 _UNSURE = 0.1
-"""Within which the smoothed rate may have the wrong sign, likewise: the filter's delay there."""
+"""Time about a reversal, in periods of the cut-off, within which the smoothed rate may have the
+wrong sign: the delay of the positions' filter there."""
 
 _MENTIONED = 0.1
-"""Speed, as a share of a joint's root mean square, from which its sign counts: noise's does not."""
+"""Speed, over a joint's root mean square speed, above which its sign is not that of noise."""
 
 _SPARED = 0.25
 """Share of the time between two reversals of a joint that is left out, at most, on each side, so
@@ -120,8 +121,8 @@ class Processing:
         if self.derivatives is not None:
             expect_one_of(get_args(Derivatives), derivatives=self.derivatives)
         for name in ("cutoff", "band", "period"):
-            value = getattr(self, name)
-            expect(value is None or 0.0 < value < np.inf, name, value, "a number above 0")
+            setting = getattr(self, name)
+            expect(setting is None or 0.0 < setting < np.inf, name, setting, "a number above 0")
         expect(0.0 <= self.slow < 1.0, "slow", self.slow, "a share from 0 to below 1")
         small = self.delay in (None, "auto") or abs(float(self.delay)) <= LATEST
         expect(small, "delay", f"{self.delay} s", f'at most {LATEST:g} s or "auto"')
@@ -237,9 +238,9 @@ def preprocessing_for_log(
     settings = processing or Processing()
     # Noise and cut-offs concern samples as they came: uneven steps are noise to them.
     head = _longest_part(log)
-    time, values = uniform(head.time, np.hstack([head.joints, head.forces]))
+    time, channels = uniform(head.time, np.hstack([head.joints, head.forces]))
     rate = (len(time) - 1) / float(time[-1] - time[0])
-    joints, forces = np.hsplit(values, 2)
+    joints, forces = np.hsplit(channels, 2)
     _check_frequencies(settings, rate)
     noise = white_noise(forces)
     # A median, which single wild forces do not change.
@@ -286,7 +287,7 @@ def preprocessing_for_log(
 
 
 def _longest_part(log: Log) -> Log:
-    """Return the longest part without a gap, cut to a usual length."""
+    """Return the first two minutes' worth of samples of the longest stretch without a gap."""
     longest = max(log.segments, key=lambda part: part.stop - part.start)
     return log.part(longest.start, min(longest.stop, longest.start + _LOOK))
 
@@ -336,13 +337,13 @@ def _rate_spectrum(rates: Array, rate: float, series: FittedSeries | None) -> tu
 
 
 def _check_frequencies(settings: Processing, rate: float) -> None:
-    """Raise where a frequency in the settings is not below half the sampling rate."""
+    """Raise DataError where a frequency in the settings is not below half the sampling rate."""
     for name in ("cutoff", "band"):
-        value = getattr(settings, name)
-        if value is not None and value >= rate / 2.0:
+        frequency = getattr(settings, name)
+        if frequency is not None and frequency >= rate / 2.0:
             raise DataError(
-                f"{name}: {value:g} Hz given; the log has {rate:g} samples a second, so that it "
-                f"must be below {rate / 2.0:g} Hz"
+                f"{name}: {frequency:g} Hz given; the log has {rate:g} samples a second, so that "
+                f"it must be below {rate / 2.0:g} Hz"
             )
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pteron.identification.errors import LogError
 from pteron.identification.logs import Log, join_logs
-from pteron.identification.logs.log import are_apart, gaps, stretches
+from pteron.identification.logs.gaps import are_apart, gaps, stretches
 from pteron.identification.signals.preprocessing import Preprocessing
 from pteron.identification.signals.states import States
 from pteron.kernels import Array

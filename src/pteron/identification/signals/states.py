@@ -104,7 +104,7 @@ class States(Result):
         source: str = "joints",
         first_row: int = 0,
     ) -> States:
-        """Return the states of joints that move so: q = J x inverted, and differentiated twice.
+        """Return the states that follow from the joints' motion, by direct kinematics.
 
         `motion` holds joint coordinates, rates and accelerations (R, n) at times (R,), s; `start`
         is a pose (m,) of their assembly mode, and `payload` the phases (R,). Messages call the log
@@ -116,7 +116,7 @@ class States(Result):
             If no pose has the joints of a sample, or if it is next to a singularity.
         """
         joints, rates, accelerations = motion
-        pose = path(robot, joints, start)
+        pose = poses_along(robot, joints, start)
         lost = np.isnan(pose).any(axis=-1)
         if lost.any():
             raise _no_pose(robot, joints, lost, source, first_row)
@@ -130,7 +130,7 @@ class States(Result):
     def from_log(
         cls, robot: Manipulator, log: Log, motion: tuple[Array, Array, Array], start: PoseLike
     ) -> States:
-        """Return the states at a log's samples of joints that move so; see `of_joints`."""
+        """Return the states at a log's samples, from its joints' motion; see `from_joints`."""
         about: dict[str, Any] = {"source": log.source, "first_row": log.first_row}
         return cls.from_joints(robot, motion, log.time, start, payload=log.payload, **about)
 
@@ -139,11 +139,11 @@ class States(Result):
 
     def part(self, rows: slice | NDArray[np.int64]) -> States:
         """Return some of the samples."""
-        return replace(self, **{name: value[rows] for name, value in vars(self).items()})
+        return replace(self, **{name: samples[rows] for name, samples in vars(self).items()})
 
 
-def path(robot: Manipulator, joints: Array, start: PoseLike) -> Poses:
-    """Return the poses (R, m) of joints that move, (R, n), in the assembly mode of a pose (m,).
+def poses_along(robot: Manipulator, joints: Array, start: PoseLike) -> Poses:
+    """Return the poses (R, m) of joint coordinates (R, n), in the assembly mode of a pose (m,).
 
     NaN where they have none; where that is found by following them, in all that come after too.
     """
@@ -155,7 +155,7 @@ def path(robot: Manipulator, joints: Array, start: PoseLike) -> Poses:
 
 
 def start_pose(robot: Manipulator, log: Log) -> tuple[float, ...]:
-    """Return a pose of the assembly mode that a log is in.
+    """Return a pose (m,) of the assembly mode that a log is in.
 
     The description's choice counts first, then the measured pose, if there is one, and else the
     mode of the machine's home pose.
@@ -177,7 +177,7 @@ def start_pose(robot: Manipulator, log: Log) -> tuple[float, ...]:
         poses = assembly_modes(robot, log.joints[seen])
         column = int(np.argmin(np.median(_distances_to(robot, poses, log.pose[seen]), axis=0)))
     else:
-        poses, column = direct_kinematics(robot, log.joints[seen]), declared - 1
+        poses, column = direct_kinematics(robot, log.joints[seen], on_failure="nan"), declared - 1
         if declared > closure.modes:
             raise DataError(
                 f"{log.source}: assembly_mode = {declared}; {robot.name} has "
@@ -207,7 +207,7 @@ def _distances_to(robot: Manipulator, poses: Poses, measured: Array) -> Array:
 
 @lru_cache(maxsize=64)
 def home(robot: Manipulator) -> tuple[float, ...]:
-    """Return the home pose, which takes a search the first time."""
+    """Return the home pose (m,) of a machine, which takes a search the first time."""
     return tuple(home_pose(robot).tolist())
 
 
@@ -221,16 +221,16 @@ def _no_pose(
 ) -> LogError:
     """Return the error for the first sample without a pose, with a hint at its cause."""
     row = int(np.argmax(lost))
-    values = ", ".join(f"{value:.4f}" for value in joints[row])
+    coordinates = ", ".join(f"{coordinate:.4f}" for coordinate in joints[row])
     followed = not closure_of(robot).closed_form
     rows = [row] if followed else lost  # of what comes after the first nothing is known
-    others = ~np.isnan(direct_kinematics(robot, joints[rows])).any(axis=(0, -1))
+    others = ~np.isnan(direct_kinematics(robot, joints[rows], on_failure="nan")).any(axis=(0, -1))
     count = len(joints[rows])
     count_text = f", nor those of {count - 1} more rows" if count > 1 else ""
-    what = f"no pose of {robot.name} has the joints ({values}){count_text}"
+    what = f"no pose of {robot.name} has the joints ({coordinates}){count_text}"
     hint = "perhaps it is the log of another machine, or its joints have other zeros"
     if others.any() and followed:
-        what = f"{robot.name} does not come to the joints ({values}) in its assembly mode"
+        what = f"{robot.name} does not come to the joints ({coordinates}) in its assembly mode"
         hint = (
             "perhaps samples are missing, or the mode is another: measure the pose, or declare it"
         )

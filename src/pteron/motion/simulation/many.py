@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pteron.arguments import expect_one_of
 from pteron.atomic import make_folder
 from pteron.controllers import Controller, Custom
 from pteron.errors import DataError
@@ -38,6 +39,9 @@ if TYPE_CHECKING:
 
 _ROWS = 200_000
 """Samples that are held in memory at once, and stand in one file, about."""
+
+Device = Literal["cpu", "cuda"]
+"""Where machines run: the processor, or an NVIDIA GPU."""
 
 _WHY = ("", "no forces were asked for", "a leg came to the edge of its reach, or it diverged")
 """Why a machine ended, by its fault."""
@@ -91,6 +95,7 @@ def simulate_many(
     duration: float | None = None,
     out: str | Path | None = None,
     threads: Workers = 1,
+    device: Device = "cpu",
 ) -> Batch:
     """Return statistics of many simulated machines that follow a motion under a controller.
 
@@ -121,6 +126,9 @@ def simulate_many(
         memory does not grow with their number.
     threads : int
         How many share the work.
+    device : {"cpu", "cuda"}
+        Where the machines run: in C, or on an NVIDIA GPU, one thread a machine, with the same bits
+        but for arctangents.
 
     Returns
     -------
@@ -130,6 +138,8 @@ def simulate_many(
     ------
     DataError
         If a number is not sensible, or the folder has samples already.
+    ModelError
+        If `device` is "cuda" and CuPy or a GPU is missing.
     OutputError
         If it cannot be written.
 
@@ -145,6 +155,7 @@ def simulate_many(
     <Batch of 2 'tripteron': 0 ended early>
     """
     robot = machines.robot
+    expect_one_of(get_args(Device), device=device)
     _expect_own_controller(controller)
     check_delay(delay)
     check_positive(step=step)
@@ -170,7 +181,11 @@ def simulate_many(
         noise = encoder_noise(sensors, robot, count, range(start, start + len(group)))
         arrays = _group_arrays(simulator, group, shared_arrays | noise, controller.period)
         samples = {name: np.full((len(group), count, k), np.nan) for name, k in sizes.items()}
-        simulator.run(arrays | samples, count, times, [*counts, 0, 1], threads=threads)
+        run = arrays | samples, count, times, [*counts, 0, 1]
+        if device == "cuda":
+            simulator.run_on_device(*run)
+        else:
+            simulator.run(*run, threads=threads)
         ended = np.arange(count) >= arrays["done"][:, 0]
         _limit_forces(simulator, robot, samples)
         statistics.append(_group_statistics(samples, arrays, reference.pose, ended))

@@ -42,8 +42,8 @@ class DriveMargin(Result):
         needed = f"{self.needed:.4g} {self.unit}"
         if self.quantity == "rms_force":
             return (
-                f"leg {self.leg}: the cycle takes {needed} root mean square{where}, but the motor "
-                f"gives {self.most:.4g} {self.unit} all the time ({self.limit})"
+                f"leg {self.leg}: the cycle needs {needed} RMS{where}, but the motor gives "
+                f"{self.most:.4g} {self.unit} continuously ({self.limit})"
             )
         if self.quantity == "force_at_speed":
             return (

@@ -61,7 +61,7 @@ class CyclePlace(Result):
     def __str__(self) -> str:
         """Return it in words."""
         turned = f" turned {np.degrees(self.turn) % 360:.4g} deg" if self.turn else ""
-        return f"about {pose_text(np.round(self.pose, 6))}{turned}"
+        return f"about {pose_text(np.round(self.pose, 4))}{turned}"
 
 
 @dataclass(frozen=True)

@@ -31,19 +31,19 @@ class FirmwareFit:
 
     def as_dict(self) -> dict[str, Any]:
         """Return it as plain data: values in mm and degrees, as texts with significant digits."""
-        values = [
+        records = [
             {"name": row.name, "drawn": row.drawn, "found": row.found, "unit": row.unit}
             for row in self.rows
         ]
-        return {"values": values, "sentence": self.sentence, "grade": self.result.verdict.grade}
+        return {"values": records, "sentence": self.sentence, "grade": self.result.verdict.grade}
 
 
-def firmware_fit(result: Calibration) -> FirmwareFit | None:
+def firmware_fit(calibration: Calibration) -> FirmwareFit | None:
     """Return the firmware's values fitted to a calibration's data; None if that is impossible."""
     try:
-        drawn = LinearDelta.from_robot(result.drawn)
+        drawn = LinearDelta.from_robot(calibration.drawn)
         loose = dict.fromkeys(("radius", "angles", "zeros"), float("inf"))
-        fitted = calibrate(result.drawn, result.measurements, free=_FREE, prior=loose)
+        fitted = calibrate(calibration.drawn, calibration.measurements, free=_FREE, prior=loose)
         estimated = LinearDelta.from_robot(fitted.robot)
     except PteronError:  # another machine, or too few rows
         return None
@@ -75,7 +75,7 @@ def _row(name: str, drawn: float, estimated: float, unit: str, deviation: float)
     if unit == "°":
         change = (change + 180.0) % 360.0 - 180.0
     drawn_text, estimated_text, changed = (
-        value_with_uncertainty(value, half)[0] for value in (drawn, estimated, change)
+        value_with_uncertainty(number, half)[0] for number in (drawn, estimated, change)
     )
     return CalibrationRow(
         name,
@@ -90,16 +90,16 @@ def _row(name: str, drawn: float, estimated: float, unit: str, deviation: float)
 
 
 def _sentence(fitted: Calibration) -> str:
-    """Return a sentence on the errors in rows that were not fitted, with and without the fit."""
+    """Return a sentence on the errors at held-out rows, with and without the firmware's fit."""
     held_out = fitted.held_out
     if held_out is None:
         return "With these six values alone no rows were left for a check."
     parts = [
-        f"the {kind} error is {1e3 * after:.3g} mm, {1e3 * held_out.before[kind]:.3g} before"
+        f"the {kind} error is {1e3 * after:.3g} mm ({1e3 * held_out.before[kind]:.3g} mm before)"
         for kind, after in held_out.after.items()
         if kind != "angle"
     ]
     return (
-        f"With these six values alone, at {held_out.rows} rows that were not fitted, "
+        f"With these six values alone, at {held_out.rows} rows held out of the fit, "
         f"{' and '.join(parts)}."
     )

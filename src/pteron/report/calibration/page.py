@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from pteron.calibration import Calibration
+from pteron.calibration.measurements import error_unit
 from pteron.errors import ModelError, PteronError
 from pteron.kernels import Array
 from pteron.kinematics import random_poses
@@ -18,7 +19,7 @@ from pteron.plots import (
     row_residuals_figure,
     tool_errors_figure,
 )
-from pteron.plots.canvas import nice_step
+from pteron.plots.ticks import nice_step
 from pteron.report.calibration.firmware import FirmwareFit
 from pteron.report.calibration.values import next_steps, notes, value_rows
 from pteron.report.typeset import significant, template
@@ -48,40 +49,37 @@ class ErrorMap(NamedTuple):
     unit: str
 
 
-def page(result: Calibration, *, written: bool = True, firmware: FirmwareFit | None = None) -> str:
+def page(
+    calibration: Calibration, *, written: bool = True, firmware: FirmwareFit | None = None
+) -> str:
     """Return the page as self-contained HTML; `written` says whether robot.toml is written."""
     document = template("calibration/page.html.j2", error_text=error_text)
     return document.render(
-        result=result,
-        robot=result.drawn,
-        shown=result.observability,
-        rows=value_rows(result),
-        maps=error_maps(result),
-        figures=_figures(result),
-        notes=notes(result),
+        result=calibration,
+        robot=calibration.drawn,
+        shown=calibration.observability,
+        rows=value_rows(calibration),
+        maps=error_maps(calibration),
+        figures=_figures(calibration),
+        notes=notes(calibration),
         written=written,
         firmware=firmware,
         most=MOST_ROWS,
-        next_steps=next_steps(result, written=written, printer=firmware is not None),
+        next_steps=next_steps(calibration, written=written, printer=firmware is not None),
     )
 
 
-def error_text(value: float, kind: str) -> str:
+def error_text(error: float, kind: str) -> str:
     """Return an error of a kind of measurement with its unit, in the page's format."""
-    return f"{significant(1e3 * value)} {_unit(kind)}"
+    return f"{significant(1e3 * error)} {error_unit(kind)}"
 
 
-def _unit(kind: str) -> str:
-    """Return the unit that a kind of residual is shown in."""
-    return "mrad" if kind == "angle" else "mm"
-
-
-def error_maps(result: Calibration) -> list[ErrorMap]:
+def error_maps(calibration: Calibration) -> list[ErrorMap]:
     """Return the tool's errors on the slices through the home pose of a machine's lengths.
 
     Where the platform turns only they are the angles', on the slices of these.
     """
-    robot, home = result.drawn, home_pose(result.drawn)
+    robot, home = calibration.drawn, home_pose(calibration.drawn)
     lengths = set(robot.platform.lengths)
     kind = "position" if lengths else "angle"
     planes = slice_planes(robot)
@@ -90,41 +88,42 @@ def error_maps(result: Calibration) -> list[ErrorMap]:
     for plane in (level or planes)[:3]:
         with suppress(ModelError):
             cut = reach_slice(robot, home, plane, points=_POINTS)
-            drawn_errors, calibrated_errors = result.errors(cut.poses.reshape(-1, robot.freedom))
+            poses = cut.poses.reshape(-1, robot.freedom)
+            drawn_errors, calibrated_errors = calibration.errors(poses)
             errors = np.linalg.norm(drawn_errors, axis=-1), calibrated_errors
             reached = (cut.status == 0).ravel() & np.isfinite(errors[0]) & np.isfinite(errors[1])
             if not reached.any() or not errors[0][reached].max() > 0.0:
                 continue
             greatest = [error_text(float(error[reached].max()), kind) for error in errors]
-            values = [
+            errors_on_slice = [
                 np.where(reached, 1e3 * error, np.nan).reshape(cut.status.shape) for error in errors
             ]
-            shades = levels(np.stack(values))  # of both, so that they compare
-            drawn = [measure_figure(cut, part, levels=shades) for part in values]
-            maps.append(ErrorMap(tuple(plane), drawn[0], drawn[1], greatest, _unit(kind)))
+            shades = levels(np.stack(errors_on_slice))  # of both, so that they compare
+            drawn = [measure_figure(cut, part, levels=shades) for part in errors_on_slice]
+            maps.append(ErrorMap(tuple(plane), drawn[0], drawn[1], greatest, error_unit(kind)))
     return maps
 
 
-def levels(values: Array) -> list[float]:
-    """Return round contour levels of a map, the first below all values."""
-    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+def levels(errors: Array) -> list[float]:
+    """Return round contour levels of errors on a map, the first below all of them."""
+    low, high = float(np.nanmin(errors)), float(np.nanmax(errors))
     step = nice_step(max((high - low) / _LEVELS, 1e-3 * high, 1e-12))
     first, last = int(np.floor(low / step)), int(np.ceil(high / step))
     return [step * k for k in range(first, last + 1)]
 
 
-def _figures(result: Calibration) -> dict[str, Any]:
+def _figures(calibration: Calibration) -> dict[str, Any]:
     """Return the figures of the page by name; None for those that the machine does not allow."""
-    fit, robot = result.fit, result.drawn
+    fit, robot = calibration.fit, calibration.drawn
     kinds = [*["position"] * 3, *["angle"] * int(robot.platform.angular.sum())]
     rows = [*kinds, "height", "distance"]
-    residuals = row_residuals_figure(fit.residuals, rows, fit.measured, fit.kept, result.noise)
+    residuals = row_residuals_figure(fit.residuals, rows, fit.measured, fit.kept, calibration.noise)
     figures: dict[str, Any] = {"residuals": residuals, "machine": None, "arrows": None}
     with suppress(PteronError):  # the found machine does not reach the drawn one's home
-        figures["machine"] = differences_figure(robot, result.robot)
+        figures["machine"] = differences_figure(robot, calibration.robot)
     if robot.platform.lengths:
         poses = random_poses(robot, _ARROWS, seed=0)
-        errors, _ = result.errors(poses)
+        errors, _ = calibration.errors(poses)
         if np.abs(errors).max(initial=0.0, where=np.isfinite(errors)) > 0.0:
             place, axes = robot.platform.placement(poses)
             tools = place + robot.platform.tool @ axes

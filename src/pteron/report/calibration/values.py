@@ -31,31 +31,31 @@ class CalibrationRow:
     """The size of the change beside an ordinary tolerance."""
 
 
-def value_rows(result: Calibration) -> tuple[CalibrationRow, ...]:
+def value_rows(calibration: Calibration) -> tuple[CalibrationRow, ...]:
     """Return the values of a calibration, the greatest changes first."""
     rows = []
-    for value in result.values:
-        factor, unit = _UNITS[value.unit]
-        half = factor * 0.5 * (value.interval[1] - value.interval[0])
-        change = value.found - value.drawn
+    for known in calibration.values:
+        factor, unit = _UNITS[known.unit]
+        half = factor * 0.5 * (known.interval[1] - known.interval[0])
+        change = known.found - known.drawn
         drawn, estimated, changed = (
             value_with_uncertainty(factor * number, half)[0]
-            for number in (value.drawn, value.found, change)
+            for number in (known.drawn, known.found, change)
         )
-        size, error = abs(change) / _ORDINARY[value.unit], value_with_uncertainty(0.0, half)[1]
+        size, error = abs(change) / _ORDINARY[known.unit], value_with_uncertainty(0.0, half)[1]
         rows.append(
-            CalibrationRow(value.name, drawn, estimated, changed, error, unit, value.origin, size)
+            CalibrationRow(known.name, drawn, estimated, changed, error, unit, known.origin, size)
         )
     return tuple(sorted(rows, key=lambda row: -row.size))
 
 
 def next_steps(
-    result: Calibration, *, written: bool = True, printer: bool = False
+    calibration: Calibration, *, written: bool = True, printer: bool = False
 ) -> tuple[str, ...]:
     """Return the next steps: the verdict's advice, then commands that use the files."""
     if not written:
         return (
-            *result.verdict.next_steps,
+            *calibration.verdict.next_steps,
             "Mend the cause, measure again and calibrate anew.",
         )
     steps = ["Give robot.toml, beside this page, to every command in place of the drawing."]
@@ -68,27 +68,27 @@ def next_steps(
         "pteron view robot.toml --compare DRAWING --enlarge 50 shows what changed.",
         "Measure once more at other places, and let that judge: --held-out LOG.",
     ]
-    return (*steps, *result.verdict.next_steps)
+    return (*steps, *calibration.verdict.next_steps)
 
 
-def notes(result: Calibration) -> tuple[str, ...]:
+def notes(calibration: Calibration) -> tuple[str, ...]:
     """Return notes for a user of the calibrated machine: zeros, and bodies' parameters."""
-    reading_legs = [str(i) for i, leg in enumerate(result.robot.legs, start=1) if leg.reading]
+    reading_legs = [str(i) for i, leg in enumerate(calibration.robot.legs, start=1) if leg.reading]
     sentences = []
-    if any(finding.kind == "mistake" for finding in result.findings):
+    if any(finding.kind == "mistake" for finding in calibration.findings):
         sentences.append(
-            "The machine as found belongs to the log with its mistake undone: mend the log, or the "
-            "controller that wrote it, before readings lead to poses."
+            "The calibrated machine belongs to the log with its mistake undone: correct the log, "
+            "or the controller that wrote it, before you compute poses from readings."
         )
-    if any(value.group in ("zeros", "scales") for value in result.values):
+    if any(known.group in ("zeros", "scales") for known in calibration.values):
         sentences.append(
-            f"Zeros and scales of joints {', '.join(reading_legs)} are the legs' reading in "
-            "robot.toml: joint coordinate = zero + scale x reading."
+            f"Zeros and scales of joints {', '.join(reading_legs)} are in robot.toml as reading of "
+            "the legs: joint coordinate = zero + scale x reading."
             if reading_legs
-            else "The geometry has taken the joints' zeros: joint coordinates are readings."
+            else "The geometry contains the joints' zeros: joint coordinates equal readings."
         )
     sentences.append(
-        "Masses, centres of mass, moments of inertia and friction are as they were on the drawn "
-        "geometry: where they were identified, identify them again on this one."
+        "Masses, centres of mass, moments of inertia and friction are unchanged: if they were "
+        "identified with the drawn geometry, identify them again with this one."
     )
     return tuple(sentences)

@@ -17,7 +17,7 @@ from pteron.report.written import Written as Written, write_found
 
 
 def write_calibration(
-    result: Calibration,
+    calibration: Calibration,
     folder: str | Path,
     *,
     sources: Iterable[str | Path] = (),
@@ -31,7 +31,7 @@ def write_calibration(
 
     Parameters
     ----------
-    result : Calibration
+    calibration : Calibration
         The calibration.
     folder : str or path
         Where to write; made if it is missing.
@@ -58,10 +58,10 @@ def write_calibration(
     for file in ("calibration.html", "calibration.json", "robot.toml"):
         checked_output(target / file, sources)
     models = {}
-    if anyway or result.verdict.grade != "not trustworthy":
-        models["robot.toml"] = comment_lines(_header(result)) + text_of(result.robot)
-    html = page(result, written=bool(models), firmware=firmware)
-    files = write_found(target, "calibration", html, numbers(result, firmware), models)
+    if anyway or calibration.verdict.grade != "not trustworthy":
+        models["robot.toml"] = comment_lines(_header(calibration)) + text_of(calibration.robot)
+    html = page(calibration, written=bool(models), firmware=firmware)
+    files = write_found(target, "calibration", html, numbers(calibration, firmware), models)
     if models:
         return files
     stale = (target / "robot.toml").exists()
@@ -73,20 +73,21 @@ def write_calibration(
     )
 
 
-def numbers(result: Calibration, firmware: FirmwareFit | None = None) -> dict[str, Any]:
+def numbers(calibration: Calibration, firmware: FirmwareFit | None = None) -> dict[str, Any]:
     """Return the numbers of a calibration for JSON, null for non-finite ones."""
-    contents = result.as_dict() | {"notes": list(notes(result))}
+    contents = calibration.as_dict() | {"notes": list(notes(calibration))}
     if firmware is not None:
         contents["firmware"] = firmware.as_dict()
     ready: dict[str, Any] = json_ready(contents)
     return ready
 
 
-def _header(result: Calibration) -> list[str]:
+def _header(calibration: Calibration) -> list[str]:
     """Return the comments at the head of the machine's file: origin, verdict, reasons, notes."""
+    rows = len(calibration.measurements)
     return [
-        f"{result.drawn.name}, calibrated from {len(result.measurements)} rows of measurements.",
-        f"Verdict: {result.verdict.grade}.",
-        *result.verdict.reasons,
-        *notes(result),
+        f"{calibration.drawn.name}, calibrated from {rows} rows of measurements.",
+        f"Verdict: {calibration.verdict.grade}.",
+        *calibration.verdict.reasons,
+        *notes(calibration),
     ]

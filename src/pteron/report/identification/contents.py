@@ -92,10 +92,10 @@ class Contents:
         return sum(not row.weak for row in self.parameters)
 
 
-def short_sources(result: Identification) -> dict[str, str]:
+def short_sources(identification: Identification) -> dict[str, str]:
     """Return display names of recordings: without folders, unless names coincide."""
     every = list(
-        dict.fromkeys(prediction.source for prediction in (*result.fitted, *result.held_out))
+        dict.fromkeys(p.source for p in (*identification.fitted, *identification.held_out))
     )
     names = [PurePath(source).name or source for source in every]
     return {
@@ -114,25 +114,25 @@ def shorten_sources(texts: Iterable[str], sources: Mapping[str, str]) -> tuple[s
     return tuple(short_texts)
 
 
-def contents(result: Identification) -> Contents:
+def contents(identification: Identification) -> Contents:
     """Return the contents of the page of an identification."""
-    names, verdict = short_sources(result), result.verdict
-    said = [shown.message for shown in result.findings]
+    names, verdict = short_sources(identification), identification.verdict
+    said = [shown.message for shown in identification.findings]
     reasons, steps, notes, messages = (
         shorten_sources(texts, names)
-        for texts in (verdict.reasons, verdict.next_steps, result.notes, said)
+        for texts in (verdict.reasons, verdict.next_steps, identification.notes, said)
     )
-    findings = zip(result.findings, messages, strict=True)
+    findings = zip(identification.findings, messages, strict=True)
     held_out, fitted = (
         tuple(_page_recording(prediction, names) for prediction in predictions)
-        for predictions in (result.held_out, result.fitted)
+        for predictions in (identification.held_out, identification.fitted)
     )
     worst = sorted(held_out, key=lambda shown: -float(shown.prediction.nrms.max()))
-    residuals = _residuals(result)
+    residuals = _residuals(identification)
     used = np.isfinite(residuals)
     return Contents(
         result=replace(
-            result,
+            identification,
             verdict=replace(verdict, reasons=reasons, next_steps=steps),
             notes=notes,
             findings=tuple(replace(shown, message=text) for shown, text in findings),
@@ -142,8 +142,8 @@ def contents(result: Identification) -> Contents:
         # A single sample is nothing to draw.
         drawn=tuple(shown for shown in worst if len(shown.prediction.time) > 1)[:_MOST_PICTURES],
         repeats={shown.name for shown in held_out} <= {shown.name for shown in fitted},
-        parameters=parameter_rows(result),
-        bodies=body_rows(result),
+        parameters=parameter_rows(identification),
+        bodies=body_rows(identification),
         residuals=residuals,
         correlations=autocorrelations(residuals, used, _LAGS)[0],
         bound=np.asarray(1.96 / np.sqrt(np.maximum(used.sum(axis=0), 1))),
@@ -161,9 +161,9 @@ def _page_recording(prediction: Prediction, names: dict[str, str]) -> PageRecord
     return PageRecording(names[prediction.source], prediction, slice(start, start + length))
 
 
-def _residuals(result: Identification) -> Array:
+def _residuals(identification: Identification) -> Array:
     """Return the residuals of the equations; NaN for unused equations."""
-    residuals = result.estimate.residuals
+    residuals = identification.estimate.residuals
     if not residuals.size:
-        return np.full((0, len(result.robot.legs)), np.nan)
+        return np.full((0, len(identification.robot.legs)), np.nan)
     return np.where(residuals == 0.0, np.nan, residuals)

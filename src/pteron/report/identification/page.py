@@ -26,23 +26,23 @@ from pteron.report.quantities import force, nouns
 from pteron.report.typeset import template, value_with_uncertainty
 
 
-def page(result: Identification, model_file: str | None = None) -> str:
+def page(identification: Identification, model_file: str | None = None) -> str:
     """Return the page as HTML; its only link is to the machine's file beside it."""
     document = template(
         "identification/page.html.j2",
         measured=lambda row: value_with_uncertainty(row.value, row.half),
     )
-    page_contents = contents(result)
-    joints = [leg.joint for leg in result.robot.legs]
+    page_contents = contents(identification)
+    joints = [leg.joint for leg in identification.robot.legs]
     return document.render(
         contents=page_contents,
         result=page_contents.result,
-        robot=result.robot,
-        estimate=result.estimate,
-        bodies=result.consistency,
+        robot=identification.robot,
+        estimate=identification.estimate,
+        bodies=identification.consistency,
         legs=range(len(joints)),
         joints=joints,
-        modes=closure_of(result.robot).modes,
+        modes=closure_of(identification.robot).modes,
         force=force(joints),
         nouns=nouns(joints),
         limits=(AT_THE_FLOOR, SMALL, LARGE, CYCLE),

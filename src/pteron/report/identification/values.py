@@ -48,27 +48,27 @@ class ReportedParameter:
         return self.status != "essential"
 
 
-def parameter_rows(result: Identification) -> tuple[ReportedParameter, ...]:
+def parameter_rows(identification: Identification) -> tuple[ReportedParameter, ...]:
     """Return the values of an identification, in the model's order."""
-    estimate, model = result.estimate, result.model
-    base = model.base.values(result.robot)
+    estimate, model = identification.estimate, identification.model
+    base = model.base.values(identification.robot)
     expressions, names = html_expressions(model), html_names(model)
     partners, strengths = _partners(estimate.correlation)
     rows = []
     for k, name in enumerate(estimate.names):
-        value, deviation = float(estimate.values[k]), float(estimate.deviations[k])
+        size, deviation = float(estimate.values[k]), float(estimate.deviations[k])
         status: Literal["essential", "dropped", "unseen"] = "essential"
-        if name in (*result.unseen, *result.essential.dropped):
-            status = "unseen" if name in result.unseen else "dropped"
+        if name in (*identification.unseen, *identification.essential.dropped):
+            status = "unseen" if name in identification.unseen else "dropped"
         rows.append(
             ReportedParameter(
                 name=name,
                 expression=expressions[k],
                 unit=estimate.units[k],
-                value=value,
+                value=size,
                 half=_NORMAL * deviation,
-                relative=deviation / abs(value) if value else float("inf"),
-                ratio=abs(value) / deviation if deviation > 0.0 else float("inf"),
+                relative=deviation / abs(size) if size else float("inf"),
+                ratio=abs(size) / deviation if deviation > 0.0 else float("inf"),
                 cad=float(base[k]) if k < model.base.rank else None,
                 status=status,
                 partner=names[estimate.names[partners[k]]] if abs(strengths[k]) > _STRONG else None,
@@ -102,19 +102,19 @@ class ReportedBody:
     border: bool
 
 
-def body_rows(result: Identification) -> tuple[ReportedBody, ...]:
+def body_rows(identification: Identification) -> tuple[ReportedBody, ...]:
     """Return the bodies of an identification; empty if no physical bodies exist."""
-    consistency = result.consistency
+    consistency = identification.consistency
     if consistency is None:
         return ()
     # A name at the border may stand for a body of several legs.
     border = {
         (p.body, leg)
-        for p in result.model.base.parameters
+        for p in identification.model.base.parameters
         if p.owner in consistency.at_border
         for leg in p.legs or (None,)
     }
-    identified, drawn = consistency.robot, result.robot
+    identified, drawn = consistency.robot, identification.robot
     rows = [
         ReportedBody(
             leg.names[letter], i - 1, _values(body_inertia), _values(old), (letter, i) in border
@@ -130,5 +130,5 @@ def body_rows(result: Identification) -> tuple[ReportedBody, ...]:
 
 def _values(inertia: Inertia) -> tuple[float | None, ...]:
     """Return m, mgx, mgy and I of an inertia with a moment of inertia, else its mass alone."""
-    values = with_center(inertia)
-    return tuple(map(values.get, ("m", "mgx", "mgy", "I"))) if "I" in values else (values["m"],)
+    by_name = with_center(inertia)
+    return tuple(map(by_name.get, ("m", "mgx", "mgy", "I"))) if "I" in by_name else (by_name["m"],)

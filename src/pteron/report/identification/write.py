@@ -19,7 +19,7 @@ _SAFE = re.compile(r"[^\w.-]+")
 
 
 def write_identification(
-    result: Identification, folder: str | Path, *, sources: Iterable[str | Path] = ()
+    identification: Identification, folder: str | Path, *, sources: Iterable[str | Path] = ()
 ) -> Written:
     """Write an identification: a page, `identification.json`, and the machine's model file.
 
@@ -27,8 +27,8 @@ def write_identification(
 
     Parameters
     ----------
-    result : Identification
-        What was found.
+    identification : Identification
+        The identified machine.
     folder : str or path
         Where to write; made if it is missing.
     sources : iterable of str or path
@@ -46,13 +46,13 @@ def write_identification(
     # This import loads Matplotlib and Jinja, which are slow.
     from pteron.report.identification.page import page
 
-    path = model_path(folder, result.robot.name, sources)
+    path = model_path(folder, identification.robot.name, sources)
     target = checked_folder(folder)
     model = {}
-    if result.machine is not None:
-        model[path.name] = comment_lines(_header(result)) + text_of(result.machine)
-    html = page(result, path.name if model else None)
-    return write_found(target, "identification", html, numbers(result), model)
+    if identification.machine is not None:
+        model[path.name] = comment_lines(_header(identification)) + text_of(identification.machine)
+    html = page(identification, path.name if model else None)
+    return write_found(target, "identification", html, numbers(identification), model)
 
 
 def model_path(folder: str | Path, name: str, sources: Iterable[str | Path] = ()) -> Path:
@@ -62,13 +62,13 @@ def model_path(folder: str | Path, name: str, sources: Iterable[str | Path] = ()
     return checked_output(path, sources)
 
 
-def _header(result: Identification) -> list[str]:
+def _header(identification: Identification) -> list[str]:
     """Return the comments at the head of the model file: origin, verdict, and what is uncertain."""
-    consistency = result.consistency
+    consistency = identification.consistency
     assert consistency is not None
-    names = short_sources(result)
-    fitted = list(dict.fromkeys(names[p.source] for p in result.fitted))
-    held_out = list(dict.fromkeys(names[p.source] for p in result.held_out))
+    names = short_sources(identification)
+    fitted = list(dict.fromkeys(names[p.source] for p in identification.fitted))
+    held_out = list(dict.fromkeys(names[p.source] for p in identification.held_out))
     repeats = "" if set(held_out) - set(fitted) else " (their last part)"
     distance = (
         "exactly"
@@ -77,10 +77,10 @@ def _header(result: Identification) -> list[str]:
     )
     plain = "near uniform rods and a uniform disc."
     return [
-        f"{result.robot.name}, identified from {', '.join(fitted)}; "
+        f"{identification.robot.name}, identified from {', '.join(fitted)}; "
         f"judged on {', '.join(held_out)}{repeats}.",
-        f"Verdict: {result.verdict.grade}.",
-        *shorten_sources(result.verdict.reasons, names),
+        f"Verdict: {identification.verdict.grade}.",
+        *shorten_sources(identification.verdict.reasons, names),
         f"Bodies that have the identified base parameters {distance}.",
         "What the forces do not show of them is "
         + ("as near as can be to the CAD model." if consistency.nearest_to == "CAD" else plain),
@@ -88,7 +88,7 @@ def _header(result: Identification) -> list[str]:
     ]
 
 
-def numbers(result: Identification) -> dict[str, Any]:
+def numbers(identification: Identification) -> dict[str, Any]:
     """Return the numbers of an identification for JSON, null for non-finite ones."""
-    ready: dict[str, Any] = json_ready(result.as_dict())
+    ready: dict[str, Any] = json_ready(identification.as_dict())
     return ready

@@ -1,0 +1,133 @@
+"""A GPU of the host: CuPy's interface as far as Pteron uses it, with CUDA compiled by g++.
+
+`emulated` puts it in CuPy's place. Device arrays are of a class of their own, so that a NumPy array
+that is taken for one is seen; a grid runs thread after thread.
+"""
+
+import ctypes
+import hashlib
+import subprocess
+import sys
+import tempfile
+from contextlib import contextmanager
+from functools import cache
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
+
+import numpy as np
+
+SHIM = """
+#include <cmath>
+#include <cstring>
+#define __CUDACC__ 1
+#define __CUDACC_RTC__ 1
+#define __device__
+#define __global__
+#define __forceinline__ inline
+#define __noinline__
+struct Index { unsigned x; };
+static Index blockIdx, blockDim, gridDim, threadIdx;
+extern "C" void set_thread(unsigned block, unsigned thread, unsigned blocks, unsigned threads)
+{
+    blockIdx.x = block, threadIdx.x = thread, gridDim.x = blocks, blockDim.x = threads;
+}
+"""
+FLAGS = ("-std=c++17", "-O1", "-ffp-contract=off", "-fPIC", "-shared", "-w")
+GRID, BLOCK = 2, 3
+"""Blocks and threads of an emulated grid at most: states are evaluated in turns."""
+
+
+class DeviceArray(np.ndarray):
+    """An array of the emulated GPU."""
+
+    @property
+    def data(self):
+        """The memory, as CuPy names its address."""
+        return SimpleNamespace(ptr=self.ctypes.data)
+
+    def get(self):
+        """Return a copy on the host."""
+        return np.array(self)
+
+
+def asarray(values, dtype=None):
+    """Return a copy of values on the emulated GPU."""
+    return np.array(values, dtype).view(DeviceArray)
+
+
+def from_dlpack(array):
+    """Return an array of the emulated GPU in the memory of another library's array."""
+    return np.from_dlpack(array).view(DeviceArray)
+
+
+@cache
+def _library(code, flags=FLAGS):
+    """Return the library of a source, compiled once."""
+    folder = Path(tempfile.gettempdir(), "pteron-emulated-gpu")
+    folder.mkdir(exist_ok=True)
+    text = SHIM + code
+    name = hashlib.sha256((text + " ".join(flags)).encode()).hexdigest()[:24]
+    library = folder / f"{name}.so"
+    if not library.exists():
+        with tempfile.TemporaryDirectory(dir=folder) as made:
+            (Path(made) / "kernel.cpp").write_text(text)
+            command = ["g++", *flags, "kernel.cpp", "-o", "kernel.so"]
+            done = subprocess.run(command, cwd=made, capture_output=True, text=True, check=False)
+            assert done.returncode == 0, done.stderr
+            (Path(made) / "kernel.so").rename(library)
+    return ctypes.CDLL(str(library))
+
+
+class RawModule:
+    """A module of CUDA code."""
+
+    def __init__(self, code, options=()):
+        assert all(option.startswith(("-std=", "--fmad=")) for option in options)
+        self._library = _library(code)
+
+    def get_function(self, name):
+        """Return a function that launches a kernel."""
+        kernel = getattr(self._library, name)
+
+        def launch(grid, block, arguments):
+            values = []
+            for argument in arguments:
+                if isinstance(argument, np.integer):
+                    values.append(ctypes.c_longlong(int(argument)))
+                else:
+                    assert isinstance(argument, DeviceArray), type(argument)
+                    values.append(ctypes.c_void_p(argument.ctypes.data))
+            blocks, threads = min(grid[0], GRID), min(block[0], BLOCK)
+            for k in range(blocks * threads):
+                self._library.set_thread(k // threads, k % threads, blocks, threads)
+                kernel(*values)
+
+        return launch
+
+
+def module(available=True):
+    """Return a module in place of CuPy."""
+    cupy = ModuleType("cupy")
+    cupy.ndarray, cupy.RawModule = DeviceArray, RawModule
+    cupy.asarray, cupy.from_dlpack = asarray, from_dlpack
+    cupy.empty = lambda shape, dtype=float: np.empty(shape, dtype).view(DeviceArray)
+    cupy.broadcast_to = lambda array, shape: np.broadcast_to(array, shape, subok=True)
+    cupy.ascontiguousarray = lambda array: np.ascontiguousarray(array).view(DeviceArray)
+    cupy.is_available = lambda: available
+    return cupy
+
+
+@contextmanager
+def emulated(available=True):
+    """Put the emulated GPU in CuPy's place."""
+    from pteron.kernels import cuda
+
+    before, sys.modules["cupy"] = sys.modules.get("cupy"), module(available)
+    cuda.compiled_module.cache_clear()
+    try:
+        yield sys.modules["cupy"]
+    finally:
+        cuda.compiled_module.cache_clear()
+        del sys.modules["cupy"]
+        if before is not None:
+            sys.modules["cupy"] = before

@@ -1,0 +1,301 @@
+"""Kernels and loops on a GPU that the host emulates: the bits of the target "c".
+
+The CUDA code is compiled by g++ for the host; NVIDIA's compiler, which needs no GPU, compiles it
+for two generations of GPUs. Nothing here has run on a GPU.
+"""
+
+import json
+from dataclasses import replace
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+
+import numpy as np
+import nvrtc
+import pytest
+from commands import refused, run
+from emulated_gpu import BLOCK, GRID, DeviceArray, emulated
+from exported_code import compiled
+from mechanisms import CATALOG, CLIENTS, NIGHTLY, gated
+
+import pteron
+from pteron.controllers import ComputedTorque, PDGravity
+from pteron.export import export_cuda
+from pteron.export.functions import exported_functions
+from pteron.kernels import FUNCTIONS
+from pteron.kernels.loops import loop
+from pteron.legs import Drive
+from pteron.motion import Sensors, machines_about, pick_and_place, simulate_many
+
+GATE = ("quadrupteron", "delta", "3-rrr")
+FEW = ("inverse_kinematics", "inverse_dynamics", "direct_step")
+BAD = (np.nan, 1e3, 1e6, np.inf, -np.inf)
+
+
+@pytest.fixture
+def cupy():
+    """Return the emulated GPU in CuPy's place."""
+    with emulated() as module:
+        yield module
+
+
+def arguments_of(kernel, robot, count=30, seed=0):
+    """Return inputs of states, some out of reach, one each with a number of `BAD`."""
+    rng = np.random.default_rng(seed)
+    poses = pteron.random_poses(robot, count, seed=seed)
+    joints = pteron.inverse_kinematics(robot, poses)
+    poses[:3] += 0.5 * rng.normal(size=poses[:3].shape)
+    known = {"pose": poses, "joints": joints}
+    inputs = [
+        known.get(port.name, rng.normal(size=(count, *port.shape)))[0 if port.shared else ...]
+        for port in kernel.inputs
+    ]
+    states = [array for array, port in zip(inputs, kernel.inputs, strict=True) if not port.shared]
+    for k, number in enumerate(BAD if states else ()):
+        states[k % len(states)][5 + k].flat[0] = number
+    return inputs
+
+
+def outputs_of(kernel, inputs):
+    """Return the outputs as a tuple of arrays."""
+    outputs = kernel(*inputs)
+    return outputs if isinstance(outputs, tuple) else (outputs,)
+
+
+def expect_bits_of_c(cupy, robot, what, **options):
+    """Compare the results of both targets, bit for bit; return whether there is such a function."""
+    try:
+        host = pteron.compile(robot, what, "c", **options)
+    except pteron.ModelError:
+        return False
+    device = pteron.compile(robot, what, "cuda", **options)
+    inputs = arguments_of(host, robot)
+    present = outputs_of(device, [cupy.asarray(array, host.dtype) for array in inputs])
+    for expected, result in zip(outputs_of(host, inputs), present, strict=True):
+        assert isinstance(result, DeviceArray)
+        np.testing.assert_array_equal(np.asarray(result), expected, err_msg=what)
+    return True
+
+
+@pytest.mark.parametrize("name", GATE)
+def test_kernels_have_the_bits_of_c(cupy, name):
+    assert sum(expect_bits_of_c(cupy, CATALOG[name], what) for what in FEW) == 3
+
+
+@NIGHTLY
+@pytest.mark.parametrize("name", pteron.catalog())
+def test_every_function_has_the_bits_of_c(cupy, name):
+    assert sum(expect_bits_of_c(cupy, pteron.load(name), what) for what in FUNCTIONS) > 40
+    for options in ({"dtype": "float32"}, {"grade": "parametric"}, {"grade": "general"}):
+        assert expect_bits_of_c(cupy, pteron.load(name), "inverse_dynamics", **options)
+
+
+@pytest.mark.parametrize("options", [{"dtype": "float32"}, {"grade": "parametric"}])
+def test_other_numbers_and_inputs_too(cupy, options):
+    assert expect_bits_of_c(cupy, CATALOG["delta"], "inverse_dynamics", **options)
+
+
+def test_arrays_may_have_any_strides(cupy):
+    robot = CATALOG["delta"]
+    kernel = pteron.compile(robot, "inverse_kinematics", "cuda")
+    poses = pteron.random_poses(robot, 24)
+    expected = pteron.inverse_kinematics(robot, poses)
+    columns = cupy.asarray(np.ascontiguousarray(poses.T)).T
+    by_columns = kernel(columns)
+    assert by_columns.strides == columns.strides
+    np.testing.assert_array_equal(by_columns, expected)
+    np.testing.assert_array_equal(kernel(cupy.asarray(poses)[::2]), expected[::2])
+    np.testing.assert_array_equal(
+        kernel(cupy.asarray(poses.reshape(4, 6, 3))), expected.reshape(4, 6, 3)
+    )
+    np.testing.assert_array_equal(kernel(poses[5]), expected[5])
+    assert kernel(cupy.empty((0, 3))).shape == (0, 3)
+    assert kernel(cupy.empty((2, 0, 3))).shape == (2, 0, 3)
+
+
+def test_leading_axes_broadcast(cupy):
+    robot = CATALOG["quadrupteron"]
+    poses, rates = pteron.random_poses(robot, 3), np.random.default_rng(0).normal(size=(5, 1, 4))
+    kernel = pteron.compile(robot, "inverse_dynamics", "cuda")
+    expected = pteron.compile(robot, "inverse_dynamics", "c")(poses, rates, np.zeros(4))
+    present = kernel(cupy.asarray(poses), cupy.asarray(rates), np.zeros(4))
+    np.testing.assert_array_equal(present, expected)
+
+
+def test_more_states_than_threads(cupy):
+    poses = np.tile(pteron.random_poses("delta", 100), (1000, 1))
+    assert len(poses) > GRID * BLOCK
+    present = pteron.compile("delta", "inverse_kinematics", "cuda")(cupy.asarray(poses))
+    np.testing.assert_array_equal(present, pteron.inverse_kinematics("delta", poses))
+
+
+def test_arrays_of_other_libraries_come_back_as_they_were(cupy):
+    jnp = pytest.importorskip("jax").numpy
+    kernel = pteron.compile("delta", "inverse_kinematics", "cuda", dtype="float32")
+    pose = jnp.asarray([[0.0, 0.0, -0.9]], "float32")
+    joints = kernel(pose)
+    assert isinstance(joints, type(pose))
+    np.testing.assert_allclose(joints, pteron.inverse_kinematics("delta", pose), rtol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("pose", "words"),
+    [
+        (np.zeros((2, 4)), r"pose: shape \(2, 4\) given, \(..., 3\) expected"),
+        (["a", "b", "c"], "pose: not an array of real numbers"),
+        (np.zeros((2, 3), np.float32).view(DeviceArray), "an array of float32 given, float64"),
+    ],
+)
+def test_what_is_no_input_is_refused(cupy, pose, words):
+    with pytest.raises(pteron.DataError, match=words):
+        pteron.compile("delta", "inverse_kinematics", "cuda")(pose)
+
+
+def test_without_a_gpu_one_line_says_so():
+    with (
+        emulated(available=False),
+        pytest.raises(pteron.ModelError, match=r'needs an NVIDIA GPU .* use "c"'),
+    ):
+        pteron.compile("delta", "inverse_kinematics", "cuda")(np.zeros(3))
+
+
+def test_fused_operations_are_for_the_gpu_alone():
+    assert pteron.compile("delta", "inverse_kinematics", "cuda", fast=True).fast
+    assert not pteron.compile("delta", "inverse_kinematics", "cuda").fast
+    with pytest.raises(pteron.ModelError, match='only "cuda"'):
+        pteron.compile("delta", "inverse_kinematics", "c", fast=True)
+
+
+# Loops: a thread runs a machine.
+
+DRIVE = Drive(0.3, 0.4, 0.05, 1e-5)
+
+
+def driven(robot):
+    """Return a machine whose drives have dry friction, so that joints stick."""
+    return replace(robot, legs=tuple(replace(leg, drive=DRIVE) for leg in robot.legs))
+
+
+CASES = {
+    "tripteron": (CATALOG["tripteron"], [0.0, 0.0, 0.0], PDGravity()),
+    "delta with friction": (driven(CATALOG["delta"]), [0.0, 0.0, -0.9], ComputedTorque()),
+    "3-rrr": (driven(CATALOG["3-rrr"]), [0.0, 0.0, 0.29], PDGravity()),
+    "quadrupteron": (driven(CATALOG["quadrupteron"]), [0.0] * 4, ComputedTorque()),
+    "par4": (driven(CATALOG["par4"]), [0.0, 0.0, -0.9, 0.0], ComputedTorque()),
+    "stewart": (driven(pteron.load("stewart")), [0.0, 0.0, 2.0, 0, 0, 0], ComputedTorque()),
+}
+
+
+@pytest.mark.parametrize("name", gated(CASES, ["tripteron", "delta with friction"]))
+def test_simulations_have_the_bits_of_c(cupy, name):
+    robot, home, law = CASES[name]
+    motion = pick_and_place(robot, home)
+    machines = machines_about(robot, 7, masses=0.1, friction=0.2)
+    sensors = Sensors(noise=1e-5, samples=1)
+    options = {"duration": 0.03, "sensors": sensors, "delay": 2e-4}
+    host, device = (
+        simulate_many(machines, motion, law, device=place, **options) for place in ("cpu", "cuda")
+    )
+    assert (host.samples > 10).all()
+    for field in ("samples", "rms", "largest", "force", "stopped"):
+        np.testing.assert_array_equal(getattr(device, field), getattr(host, field))
+
+
+def test_an_unknown_device_is_refused():
+    motion = pick_and_place("tripteron", [0.0, 0.0, 0.0])
+    with pytest.raises(pteron.DataError, match="device: 'gpu' is not one of cpu, cuda"):
+        simulate_many(machines_about("tripteron", 2), motion, PDGravity(), device="gpu")
+
+
+# NVIDIA's compiler.
+
+
+@CLIENTS
+@pytest.mark.parametrize("architecture", ["sm_80", "sm_90"])
+@pytest.mark.parametrize("name", gated(pteron.catalog(), GATE))
+def test_nvidia_compiles_it(name, architecture):
+    if nvrtc.library() is None:
+        pytest.skip("the wheel nvidia-cuda-nvrtc-cu12 is not installed")
+    robot = pteron.load(name)
+    for what in ("inverse_dynamics", "forward_dynamics", "inverse_kinematics"):
+        report = nvrtc.compiled(pteron.compile(robot, what, "cuda").source, architecture)
+        assert report.registers <= 255
+        if robot.joint_count <= 4:
+            assert report.spilled == 0, (what, report)
+    code = loop(robot, pteron.kernels.program(robot, "pd_gravity")).code(1)
+    assert nvrtc.compiled(replace(code, device=True).source, architecture).registers <= 255
+
+
+# Exported code.
+
+
+def exported(folder, robot, functions=None, **options):
+    """Return the module of a machine's exported CUDA, as a user imports it."""
+    files = export_cuda(robot, functions, folder, **options)
+    (path,) = (file for file in files if file.suffix == ".py")
+    spec = spec_from_file_location(path.stem, path)
+    module = module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.parametrize("name", gated(pteron.catalog(), GATE))
+def test_exported_functions_have_results_and_status_of_c(cupy, name, tmp_path):
+    """Those of the exported C, compiled, at its own examples and at states that have no result."""
+    robot = pteron.load(name)
+    functions = ["inverse_kinematics", "inverse_dynamics", "forward_dynamics"]
+    module = exported(tmp_path, robot, functions)
+    call, _ = compiled(robot, functions, tmp_path / "c")
+    for item in exported_functions(robot, functions, specialised=False):
+        states = [
+            np.stack(arrays) for arrays in zip(*(e.inputs for e in item.examples), strict=True)
+        ]
+        states = [
+            array[:1].repeat(3, axis=0) if port.shared else array
+            for array, port in zip(states, item.inputs, strict=True)
+        ]
+        for k, number in enumerate(BAD[-2:]):
+            states[0][1 + k, 0] = number
+        inputs = [
+            array[0] if port.shared else array
+            for array, port in zip(states, item.inputs, strict=True)
+        ]
+        *results, status = getattr(module, item.name)(*map(cupy.asarray, inputs))
+        for k in range(3):
+            sizes = [port.size for port in item.outputs]
+            code, *expected = call(item.name, *(array[k] for array in states), sizes=sizes)
+            assert status[k] == code
+            for result, row in zip(results, expected, strict=True):
+                np.testing.assert_array_equal(np.ravel(result[k]), row)
+    assert {0, 1} <= set(np.ravel(status).tolist())
+
+
+def test_exported_parameters_are_the_default(cupy, tmp_path):
+    module = exported(tmp_path, "delta", ["inverse_dynamics"])
+    pose, zero = [0.0, 0.1, -0.9], np.zeros(3)
+    forces, status = module.inverse_dynamics(pose, zero, zero)
+    np.testing.assert_allclose(forces, pteron.inverse_dynamics("delta", pose, zero, zero))
+    assert status == 0
+    heavier = module.inverse_dynamics(pose, zero, zero, 2.0 * module.PARAMETERS)[0]
+    np.testing.assert_allclose(heavier, 2.0 * forces)
+    with pytest.raises(ValueError, match=r"pose: shape \(2,\) given, \(..., 3\) expected"):
+        module.inverse_dynamics([0.0, 0.0], zero, zero)
+
+
+@CLIENTS
+@pytest.mark.parametrize("real", ["double", "float"])
+@pytest.mark.parametrize("name", gated(pteron.catalog(), GATE))
+def test_nvidia_compiles_exported_code(name, real, tmp_path):
+    if nvrtc.library() is None:
+        pytest.skip("the wheel nvidia-cuda-nvrtc-cu12 is not installed")
+    files = export_cuda(name, None, tmp_path, real=real)
+    texts = [file.read_text() for file in files if file.suffix != ".py"]
+    header, kernels = sorted(texts, key=lambda text: "__global__" in text)
+    nvrtc.compiled(header + kernels)
+
+
+def test_the_command_writes_it(tmp_path):
+    files = json.loads(run(f"export tripteron --cuda {tmp_path / 'out'} --json").stdout)["files"]
+    names = sorted(Path(file).name for file in files)
+    assert names == ["tripteron.cu", "tripteron.cuh", "tripteron_cuda.py"]
+    line = f"export tripteron --cuda {tmp_path} --mjcf {tmp_path}"
+    assert "give one at a time; only --c, --st and --cuda go together" in refused(line)
