@@ -30,7 +30,7 @@ def test_the_whole_way(tmp_path, monkeypatch):
     # Without noise nothing is accused, but what no log can show is said.
     simulated = verdicts[0].replace("\n", " ")
     assert "half a sample (0.5 ms) late" in simulated
-    assert "cannot show a factor that all forces have in common" in simulated
+    assert "cannot show a common factor of all forces" in simulated
     assert "stated errors of the values do not allow" not in simulated
 
     # The C of the page, against the model file: real bodies have the values of the page's list.
