@@ -26,7 +26,7 @@ forces are 50 times a load in the worst direction, and a leg's error of 0.1 mm m
 
 HOLDING_FORCE = 10.0
 """Force along one leg that holds the weight at home, over the weight, above which it is a warning:
-legs that lean 84 degrees off the load. The machines of the catalog have up to 2."""
+legs that lean 84 degrees off the load. The machines of the catalog have up to 0.7."""
 
 HOLDING_FORCE_NEAR = 100.0
 """The same, of the poses about home: within them a singularity is passed or nearly so."""

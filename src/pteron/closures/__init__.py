@@ -1,4 +1,4 @@
-"""Closures, which solve a machine's closed loops; `closures.closure` has their base class."""
+"""Solvers of the closure equations of a machine; `closures.closure` has their base class."""
 
 from collections.abc import Sequence
 

@@ -1,4 +1,4 @@
-"""Controllers: the drives' forces from a reference motion and the measured joints."""
+"""Control laws: drive forces from a planned motion and the measured joint coordinates."""
 
 from pteron.controllers.adaptive import Adaptive as Adaptive
 from pteron.controllers.computed_torque import ComputedTorque as ComputedTorque

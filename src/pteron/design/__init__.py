@@ -1,9 +1,9 @@
 """Searches for the best dimensions of a machine, or the best machine, with proofs.
 
-`search` and `survey` vary one machine as a `Spec` asks, `choose_machine` those of the catalog as a
-`Job` does. Its files, each used by those below it:
+`search` and `survey` vary one machine as a `Spec` states; `choose_machine` varies the machines of
+the catalog for a `Job`. The files of the package, each used by those below it:
 
-- what is asked: load_tables, workspace_tables, requirement_tables; `spec` with user_quantities and
+- requirements: load_tables, workspace_tables, requirement_tables; `spec` with user_quantities and
   spec_faults, and `job`
 - loads and errors: worst_cases, cycle_loads, tool_errors, drive_options; `quantities`, by name
 - a machine that varies: `paths`, `variables` and `task` of a spec; `kinds` of a job
@@ -12,7 +12,7 @@
 - proofs of both: `regions`, `proofs`
 - searches: `evolution` has what both share; `rows`, `front`, `improvement`, `search`, `survey` of
   designs; kind_search, `candidate`, best_design, `choose` of kinds
-- in words: `differences` and `report` of a front; a `Candidate` and a `Choice` have their own
+- reports: `differences` and `report` of a front; `Candidate` and `Choice` contain their own
 """
 
 from pteron.public import publish as _publish

@@ -1,9 +1,9 @@
-"""Identification of a machine's parameters from logs of its motion, with a verdict on their trust.
+"""Identification of a machine's parameters from logs of its motion, with a verdict.
 
-`identify` does all of it. Its parts can be used by themselves: `logs` reads, `signals` turns
-samples into states, `observations_of` stacks the regressor, `estimators` solve, `faults` names what
-residuals show, `consistency` finds real bodies, `excitation` makes the motions worth recording.
-`estimate` takes a regressor of any robot.
+`identify` performs all steps. They can be used separately: `logs` reads files, `signals` converts
+samples to states, `observations_of` stacks the regressor, `estimators` solve for the parameters,
+`faults` finds faults from the residuals, `consistency` finds physically possible bodies, and
+`excitation` plans motions to record. `estimate` accepts the regressor of any robot.
 """
 
 from pteron.public import publish as _publish

@@ -1,6 +1,6 @@
 """CasADi expressions made executable ("kernels"): by CasADi, Numba, C, JAX, fractions, intervals.
 
-Batches of states, threads and the cache of compiled code live here and only here.
+Batches of states, threads and the cache of compiled code are handled in this package only.
 """
 
 from pteron.public import publish as _publish

@@ -1,4 +1,4 @@
-"""Kinds of legs, one file each; `legs.leg` is the page to read before writing another."""
+"""Kinds of legs, one file each; read `legs.leg` before you write another."""
 
 from pteron.public import publish as _publish
 

@@ -1,4 +1,4 @@
-"""Kinds of platforms, entered in `kinds.py`; read `platforms.motion` before writing another."""
+"""Kinds of platforms, entered in `kinds.py`; read `platforms.motion` before you write another."""
 
 from pteron.public import publish as _publish
 

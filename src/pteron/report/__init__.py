@@ -1,6 +1,6 @@
-"""HTML reports: all about a machine on one page, or one of its motions.
+"""HTML reports on a machine, and animations of a motion.
 
-`write_report` has all that Pteron knows of a machine; `write_motion_page` shows one motion of it.
+`write_report` writes a page with all properties of a machine; `write_motion_page` one of a motion.
 """
 
 from pteron.public import publish as _publish

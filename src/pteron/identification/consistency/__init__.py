@@ -1,4 +1,4 @@
-"""Real bodies for identified base parameters: masses above zero, inertias that a body can have."""
+"""Physically possible bodies with identified base parameters: positive masses, valid inertias."""
 
 from pteron.public import publish as _publish
 

@@ -1,4 +1,4 @@
-"""States of the machine from a log's samples, with noise kept out and nothing shifted in time.
+"""States of the machine from the samples of a log, filtered without a shift in time.
 
 Positions are smoothed and differentiated in joint space, where they were measured; poses,
 velocities and accelerations of the platform follow from them by exact kinematics.

@@ -1,4 +1,4 @@
-"""A machine with its drives, simulated under a controller, under given forces, or free."""
+"""Simulation of a machine with its drives: under a controller, given forces, or free."""
 
 from pteron.public import publish as _publish
 

@@ -1,1 +1,1 @@
-"""Sizing of drives: forces and energy over a cycle, and the motors and ratios that serve."""
+"""Sizing of drives: forces and energy over a cycle, and the motors and ratios that suffice."""

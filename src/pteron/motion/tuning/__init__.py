@@ -1,4 +1,4 @@
-"""Stability margins of a machine under a controller, and gains chosen for stated ones."""
+"""Stability margins of a controlled machine, and choice of gains for required margins."""
 
 from pteron.public import publish as _publish
 
