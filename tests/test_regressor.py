@@ -60,13 +60,13 @@ def test_a_model_is_judged_by_another_motion():
     fit = estimate(w, f, held_out=(other, measured))
     assert fit.verdict.grade == "trustworthy"
     assert fit.estimate.rows == 800
-    assert not any("repeats" in reason for reason in fit.verdict.reasons)
+    assert not any("repeat the motion" in reason for reason in fit.verdict.reasons)
     assert fit.held_out.error == pytest.approx([0.05, 0.05], rel=0.2)
     # A term is missing.
     fit = estimate(w[..., :2], f, held_out=(other[..., :2], measured))
     assert fit.verdict.grade == "not trustworthy"
     repeated = estimate(w, f)
-    assert any("repeats" in reason for reason in repeated.verdict.reasons)
+    assert any("repeat the motion" in reason for reason in repeated.verdict.reasons)
 
 
 def test_friction_that_is_named_so_is_told_apart():
