@@ -41,7 +41,8 @@ _CLEAR = 2.0
 """Misfit that leaves no doubt: its expected value is below 1 where nothing is wrong."""
 
 _FINALISTS = 12
-"""Number of mistakes of least misfit row by row, between which all rows together decide."""
+"""Number of mistakes of least misfit row by row, between which all rows together decide. Chosen:
+with 4 a wrong lead of all screws is missed, with 36 nothing changes but the time."""
 
 _ALIKE = 20.0
 """Excess of the squared residuals of all rows, in variances, up to which the mistake that is more
