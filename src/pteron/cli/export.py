@@ -129,19 +129,18 @@ def export(
             asked_for = [*(function or []), read_gains(machine, gains)]
         dynamics: dict[str, Any] = {"wrench": wrench, "output": output, "base": base}
         real: Real = "float" if float_ else "double"
+        form: dict[str, Any] = {"real": real, "specialised": specialised, **dynamics}
         for place, write in ((c, export_c), (cuda, export_cuda)):
             if place is not None:
-                form: dict[str, Any] = {"real": real, "specialised": specialised}
-                files += write(machine, asked_for, place, **form, **dynamics)
+                files += write(machine, asked_for, place, **form)
         if st is not None:
             files += export_st(machine, asked_for, st, **dynamics)
         for name in targets.keys() - {*_CODE}:
             files += _export_target(machine, name, targets[name])
     if grade != _TRUSTED:
         note(f"Warning: {base}: the verdict on these values is: {grade}")
-    return CommandResult(
-        {"robot": machine.name, "files": [str(path) for path in files]}, files=files
-    )
+    record = {"robot": machine.name, "files": [str(path) for path in files]}
+    return CommandResult(record, files=files)
 
 
 def _export_target(machine: Manipulator, target: str, folder: str) -> list[Path]:

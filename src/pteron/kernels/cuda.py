@@ -38,7 +38,7 @@ _BLOCKS = 1 << 16
 """Most blocks of a grid; more states than its threads are evaluated in turns."""
 
 
-class Grid(Kernel):
+class DeviceKernel(Kernel):
     """A kernel on a GPU. It takes and returns arrays of CuPy, PyTorch or JAX that are there.
 
     NumPy arrays are copied to the GPU; results are arrays of the library of the first input, of
@@ -54,8 +54,8 @@ class Grid(Kernel):
         """The CUDA code."""
         graph = graph_of(with_lowered_exponentials(self.function), self.ports)
         language = c_language(self.dtype)
-        values = module_values(self.name, graph, self.ports, self.outputs, language)
-        return module_of("kernel.cu.j2", values, self.dtype)
+        texts = module_values(self.name, graph, self.ports, self.outputs, language)
+        return module_of("kernel.cu.j2", texts, self.dtype)
 
     @cached_property
     def _launch(self) -> Any:
@@ -87,13 +87,13 @@ class Grid(Kernel):
         results = []
         for port in self.outputs:
             order = (port.size, batch) if by_columns else (batch, port.size)
-            result = cupy.empty(order, dtype=self.dtype)
-            result = result.T if by_columns else result
-            arguments += [result, *(step // result.itemsize for step in result.strides)]
-            results.append(result.reshape(lead + port.shape))
+            array = cupy.empty(order, dtype=self.dtype)
+            array = array.T if by_columns else array
+            arguments += [array, *(step // array.itemsize for step in array.strides)]
+            results.append(array.reshape(lead + port.shape))
         if batch:
             launch(self._launch, batch, arguments)
-        present = tuple(like(result, values[0] if values else None) for result in results)
+        present = tuple(like(array, values[0] if values else None) for array in results)
         return present[0] if len(present) == 1 else present
 
     def _on_device(self, array: Any, port: Port) -> Any:

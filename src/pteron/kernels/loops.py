@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
 from threading import Event
+from typing import Literal
 
 import numpy as np
 
@@ -97,6 +98,7 @@ class Loop:
         ask: Ask | None = None,
         threads: int = 1,
         go: Callable[..., None] | None = None,
+        device: Literal["cpu", "cuda"] = "cpu",
     ) -> None:
         """Run some samples, and change and fill `arrays`, each (B or 1, T or 1, size), in place.
 
@@ -118,7 +120,17 @@ class Loop:
             How many share a batch.
         go : callable, optional
             In place of `Plant.go`.
+        device : {"cpu", "cuda"}
+            The processor, or an NVIDIA GPU, of which a thread runs a machine.
+
+        Raises
+        ------
+        ModelError
+            If there is no GPU, or CuPy is not installed, or the controller is a C function.
         """
+        if device == "cuda":
+            self._run_on_device(arrays, samples, times, counts)
+            return
         if self.linked is not None and c_compiler() is None:
             raise ModelError("a controller's C needs a C compiler, which is not here; install one")
         batch = len(arrays["state"])
@@ -153,6 +165,19 @@ class Loop:
                 list(pool.map(part, bounds[:-1], bounds[1:]))
             finally:
                 ended.set()
+
+    def _run_on_device(
+        self,
+        arrays: Mapping[str, Array],
+        samples: int,
+        times: Sequence[float],
+        counts: Sequence[int],
+    ) -> None:
+        """Run some samples on an NVIDIA GPU; the parameters are those of `run`."""
+        if self.linked is not None:
+            raise ModelError("a controller's C does not run on a GPU; give one of Pteron's")
+        parts = self.plant, self.sensed, self.law, self.kind
+        run_loop(_code(*parts, 1, None, True), arrays, samples, times, counts)
 
     def idle(self, robot: Manipulator, state: Array, late: int = 0, behind: int = 0) -> Arrays:
         """Return `run`'s arrays for states (B, 1, Y) without loads, limits or encoders.
@@ -190,25 +215,6 @@ class Loop:
     def code(self, lanes: int) -> LoopCode:
         """Return its C for some machines side by side."""
         return _code(self.plant, self.sensed, self.law, self.kind, lanes, self.linked)
-
-    def run_on_device(
-        self,
-        arrays: Mapping[str, Array],
-        samples: int,
-        times: Sequence[float],
-        counts: Sequence[int],
-    ) -> None:
-        """Run some samples on an NVIDIA GPU, one thread a machine; the parameters are `run`'s.
-
-        Raises
-        ------
-        ModelError
-            If there is no GPU, or CuPy is not installed, or the controller is a C function.
-        """
-        if self.linked is not None:
-            raise ModelError("a controller's C does not run on a GPU; give one of Pteron's")
-        parts = self.plant, self.sensed, self.law, self.kind
-        run_loop(_code(*parts, 1, None, True), arrays, samples, times, counts)
 
 
 @lru_cache(maxsize=64)

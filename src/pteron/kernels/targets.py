@@ -15,7 +15,7 @@ from pteron.equations.topology import stored_numbers
 from pteron.equations.transmissions import actuator_numbers
 from pteron.errors import ModelError
 from pteron.kernels.c import Compiled
-from pteron.kernels.cuda import Grid
+from pteron.kernels.cuda import DeviceKernel
 from pteron.kernels.fields import Exact
 from pteron.kernels.hoisting import hoist_invariants
 from pteron.kernels.intervals import Boxed
@@ -39,7 +39,7 @@ TARGETS: dict[str, type[Kernel]] = {
     "numba": Jitted,
     "c": Compiled,
     "jax": Traced,
-    "cuda": Grid,
+    "cuda": DeviceKernel,
     "exact": Exact,
     "intervals": Boxed,
 }
@@ -232,7 +232,7 @@ def _cached_kernel(
     for array in fixed.values():
         array.setflags(write=False)  # the kernel is shared by all who ask for it
     kernel = _instantiate_kernel(TARGETS[target], built, fixed, dtype, threads)
-    if isinstance(kernel, Grid):
+    if isinstance(kernel, DeviceKernel):
         kernel.fast = fast
     kernel.made.update(derived)
     return kernel

@@ -182,10 +182,7 @@ def simulate_many(
         arrays = _group_arrays(simulator, group, shared_arrays | noise, controller.period)
         samples = {name: np.full((len(group), count, k), np.nan) for name, k in sizes.items()}
         run = arrays | samples, count, times, [*counts, 0, 1]
-        if device == "cuda":
-            simulator.run_on_device(*run)
-        else:
-            simulator.run(*run, threads=threads)
+        simulator.run(*run, threads=threads, device=device)
         ended = np.arange(count) >= arrays["done"][:, 0]
         _limit_forces(simulator, robot, samples)
         statistics.append(_group_statistics(samples, arrays, reference.pose, ended))
