@@ -189,9 +189,7 @@ def simulate_many(
         if folder is not None:
             table = _table(machines, start, reference.time, samples, ~ended)
             files.append(_write_samples(folder, start, table))
-    columns = {
-        name: np.concatenate([figures[name] for figures in statistics]) for name in statistics[0]
-    }
+    columns = {name: np.concatenate([row[name] for row in statistics]) for name in statistics[0]}
     return Batch(
         machines,
         columns["done"].astype(np.int64),
