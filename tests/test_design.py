@@ -523,7 +523,7 @@ def test_the_command_writes_what_it_finds(tmp_path):
     assert chosen["links"] == pytest.approx(rows["links (m)"].min())
     again = run(line)
     assert json.loads(again.stdout) == data
-    assert "going on; an earlier run has begun 2 generations" in again.stderr
+    assert "resumed; an earlier run has begun 2 generations" in again.stderr
     assert "--sweep: needs --out" in refused(f"design {spec} --sweep 10")
 
 
