@@ -127,12 +127,12 @@ def test_what_is_tried_is_told_first_and_the_page_says_it_well(chosen, tmp_path)
     file.write_text(tomlkit.dumps(JOB | {"search": {"evaluations": 12}}))
     first, kind = run(f"choose {file}").stderr.splitlines()
     assert first == (
-        "One kind with 12 designs to rate, the best of them to be proved: linear-delta"
+        "One kind with 12 designs to evaluate, the best of them to be proved: linear-delta"
     )
     assert re.fullmatch(r"1 of 1: linear-delta: (infeasible; )?\d+ of 12 designs meet all .*", kind)
     file.write_text(tomlkit.dumps(JOB))
     found = run(f"choose {file} --out {folder}")
-    assert found.stderr == f"Gone on in {folder}: linear-delta finished before\n"
+    assert found.stderr == f"Resumed from {folder}: linear-delta finished before\n"
     text = (folder / "choose.html").read_text(encoding="utf-8")
     assert "linear-delta, the one kind of machine that was tried, does what is asked." in text
     assert "linear-delta in the middle of its workspace" in text
@@ -528,7 +528,7 @@ def test_ctrl_c_keeps_what_is_finished(tmp_path):
     process.send_signal(signal.SIGINT)
     _, told = process.communicate(timeout=60)
     assert process.returncode == 130
-    assert f"What is finished is kept in {out}" in told
+    assert f"Finished kinds are kept in {out}" in told
     assert "Traceback" not in told
     assert (out / "kinds" / "linear-delta.json").exists()
     assert not (out / "choose.json").exists()
@@ -566,7 +566,7 @@ def test_the_command_writes_a_page_and_files_that_other_commands_take(tmp_path):
     file.write_text(tomlkit.dumps(JOB | {"kinds": ["linear-delta", "delta"]}))
     found = run(f"choose {file} --out {out}")
     assert found.exit_code == 0
-    assert found.stderr.startswith("2 kinds with 40 designs each to rate, ")
+    assert found.stderr.startswith("2 kinds with 40 designs each to evaluate, ")
     assert "linear-delta" in found.stdout
     assert "linear-delta" in (out / "choose.html").read_text()
     data = json.loads((out / "choose.json").read_text())

@@ -523,7 +523,7 @@ def test_the_command_writes_what_it_finds(tmp_path):
     assert chosen["links"] == pytest.approx(rows["links (m)"].min())
     again = run(line)
     assert json.loads(again.stdout) == data
-    assert "going on; an earlier run has begun 2 generations" in again.stderr
+    assert "resumed; an earlier run has begun 2 generations" in again.stderr
     assert "--sweep: needs --out" in refused(f"design {spec} --sweep 10")
 
 
@@ -586,7 +586,7 @@ def test_a_report_tells_how_far_each_quantity_is_known_and_what_was_asked(loaded
         "- type_ii at least 0.1\n",
         "- a payload of 0.3 kg\n",
         "- cycle 1: 2 points in 0.4 s, then 0.1 s of rest\n",
-        "workspace placed about (",
+        "workspace centred at (",
         ": exact over all directions, at 25 sampled poses",
         "; the proof is of at least 0.1\n",
     ):

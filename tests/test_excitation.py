@@ -674,9 +674,7 @@ def test_the_command_says_what_it_leaves_out(tmp_path: Path, monkeypatch):
     # A base parameter of the five-bar is 0: its column has no nominal size.
     result = run(f"excite five-bar {QUICK} --seconds 0.5")
     assert result.exit_code == 0
-    assert result.stderr == (
-        "Note: no file will be written; to have the trajectory, add --out FILE.csv\n"
-    )
+    assert result.stderr == ("Note: no file will be written; --out FILE.csv saves the motion\n")
     assert "inf" not in result.stdout
     assert "nan" not in result.stdout
     assert "nominal value is 0" in " ".join(result.stdout.split())

@@ -561,6 +561,26 @@ def test_a_trusted_error_above_the_noise_is_told_beside_it():
 
 
 @pytest.mark.parametrize(
+    ("small", "words"),
+    [
+        ((), "No fault shows in the residuals; tested: a delay, a wrong length or point"),
+        (
+            (("geometry", 0.02),),
+            "No fault that matters shows in the residuals: a wrong length or point of the geometry "
+            "changes the forces of a cycle by up to 0.02 % (below the threshold of 0.05 %); tested",
+        ),
+        ((("geometry", 0.2),), "by up to 0.2 % (a negligible size); tested"),
+    ],
+)
+def test_a_fault_that_is_too_small_to_matter_is_named(small, words):
+    shares = np.zeros((2, 2))
+    faults = FaultIsolation(("delay", "geometry"), (), *shares, small=small)
+    verdict = verdict_of([prediction((0.01, 0.01), (0.01, 0.01))], faults, repeats=False)
+    assert verdict.grade == "trustworthy"
+    assert words in " ".join(verdict.reasons)
+
+
+@pytest.mark.parametrize(
     ("uncertain", "spoiled", "grade"),
     [
         (1.0, 2.0, "trustworthy"),

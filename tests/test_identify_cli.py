@@ -166,7 +166,7 @@ def test_findings_and_a_bad_verdict_are_said_plainly():
     held = {"t": other.time, **{f"rho{i + 1}": c for i, c in enumerate(other.joints.T)}}
     pl.DataFrame(held | {f"force{i + 1}": c for i, c in enumerate(wrong.T)}).write_csv("bad.csv")
     text = done("identify gap.csv --held-out bad.csv --robot tripteron --out out")
-    assert text.startswith("tripteron: not trustworthy, ")
+    assert text.startswith("tripteron: not trustworthy; ")
     assert "Note: gap.csv: " in text
     assert "# Verdict: not trustworthy." in Path("out/tripteron.toml").read_text()
     assert (

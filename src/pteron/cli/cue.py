@@ -10,12 +10,16 @@ from pteron.cli.arguments import MachineArgument
 from pteron.cli.motion_table import motion_frame, peaks_table
 from pteron.cli.progress import spinner
 from pteron.cli.result import CommandResult
-from pteron.cli.terminal import note, percent, plain
+from pteron.cli.terminal import note, percent, plain, significant
 from pteron.errors import DataError
 
 if TYPE_CHECKING:
     from pteron.manipulator import Manipulator
     from pteron.motion import Cue
+
+
+_REDUCED = 1e-3
+"""Share of reduced amplitudes from which it is stated."""
 
 
 def cue(
@@ -105,7 +109,9 @@ def cue(
         f"[bold]{plain(machine.name)}[/bold], motion of {plain(motion)}: {cued.duration:.4g} s "
         f"({len(cued.time)} samples), in a box of poses proved to be in reach and within limits: "
         f"{_box_text(machine, cued)}.",
-        f"Amplitudes are reduced by {percent(cued.pressed)} at most to keep the motion in the box.",
+        f"Amplitudes are reduced by at most {percent(cued.pressed)} to stay in the box."
+        if cued.pressed >= _REDUCED
+        else "Amplitudes are not reduced: the motion fits into the box.",
         peaks_table(largest),
     ]
     return CommandResult(record, lines, files)
@@ -130,9 +136,9 @@ def _box_text(machine: Manipulator, cued: Cue) -> str:
     """Return the box that the motion stays in, mm and degrees."""
     low, high = cued.region.box
     return ", ".join(
-        f"{name} {1e3 * a:.4g} to {1e3 * b:.4g} mm"
+        f"{name} {significant(1e3 * a)} to {significant(1e3 * b)} mm"
         if unit == "m"
-        else f"{name} {math.degrees(a):.4g} to {math.degrees(b):.4g} deg"
+        else f"{name} {math.degrees(a):.3g} to {math.degrees(b):.3g} deg"
         for name, unit, a, b in zip(
             machine.coordinates, machine.platform.units, low, high, strict=True
         )

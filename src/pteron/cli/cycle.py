@@ -150,7 +150,7 @@ def cycle(
     _expect_fitting(way, options | {"duration": duration, "jerk": jerk})
     if way == "replay" and table is None:
         raise DataError("no motion given; give --table FILE")
-    with spinner(f"A motion of {machine.name}"):
+    with spinner(f"Planning a motion of {machine.name}"):
         step = 1.0 / rate
         if table is not None:
             start = None if from_ is None else given_pose(machine, from_, "--from")

@@ -200,7 +200,7 @@ def excite(
     limits = limited.limits(machine)
     if out is None and not json:
         note("Note: no file will be written; --out FILE.csv saves the motion")
-    with progress_bar(f"Exciting {machine.name}") as progress:
+    with progress_bar(f"Searching a motion of {machine.name}") as progress:
         excitation = optimal_excitation(
             machine,
             space=series.space,
@@ -269,6 +269,8 @@ def _result(
             f"Slow motion: the same path in {slow.duration:g} s, for friction that falls with "
             "speed."
         )
+    if files:
+        lines.append("Next: record these motions, then pteron identify LOG --robot ROBOT --out DIR")
     return CommandResult(record, lines, files)
 
 

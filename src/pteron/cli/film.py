@@ -56,7 +56,7 @@ def film(
     checked_film(out)
     sides = _sides(size)
     machine, carrying = carried.mount_tool(machine), carried.load_machine(machine)
-    with spinner(f"A cycle of {machine.name}"):
+    with spinner(f"Planning the cycle of {machine.name}"):
         motion = cycle_of(machine, cycle, duration)
         state = motion.pose, motion.velocity, motion.acceleration
         drawn = drive_forces(carrying, *state, smooth=True) if forces else None

@@ -197,7 +197,7 @@ def check(file: str, *, elbows: str | None = None) -> CommandResult:
     unlikely = machine_warnings(robot)
     warn(unlikely, f"{file}: ")
     try:
-        with spinner(f"Looking where {robot.name} can work"):
+        with spinner(f"Examining {robot.name}"):
             findings = _findings(robot)
         warn(findings["doubts"][len(unlikely) :], f"{file}: ")
     except PteronError as error:

@@ -125,10 +125,10 @@ def workspace(
             "--scheduler: the workers write to a store that all reach; give it with --out, such as "
             "--out map.zarr"
         )
-    with spinner(f"The reach of {machine.name}"):
+    with spinner(f"Computing the reach of {machine.name}"):
         grid = _grid(machine, slice_, points, ending)
     warn(warnings)
-    with spinner(f"The reach of {machine.name}"):
+    with spinner(f"Computing the reach of {machine.name}"):
         volume = _volume(machine, grid)
     warn(outside := _unreachable_slice_warnings(grid, volume))
     with progress_bar(f"Mapping {machine.name}") as tell:
