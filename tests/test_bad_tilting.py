@@ -90,7 +90,7 @@ def test_equal_plates_are_told_to_move_with_their_rams_held(tmp_path):
     done = run(f"check {pteron.save(replace(robot, legs=legs), tmp_path / 'plates.toml')}")
     assert done.exit_code == 0
     words = (
-        "with its rams held where a half turn takes the platform points of legs 1 and 4, 2 and 5"
+        "with its rams locked where a half turn takes the platform points of legs 1 and 4, 2 and 5"
     )
     assert words in " ".join(done.stdout.split())
 

@@ -308,7 +308,7 @@ def test_trials_tell_errors_and_why_one_ended() -> None:
         ({"required": (2.0, 0.0)}, "phase margin: 0.0 rad given"),
         ({"required": (2.0, 45.0)}, "less than 90 degrees"),
         ({"required": (2.0, 0.7, np.nan)}, "delay margin: nan given"),
-        ({"required": (2.0, 0.7, 5.0)}, "no bandwidth has the margins"),
+        ({"required": (2.0, 0.7, 5.0)}, "no bandwidth has the required margins"),
         ({"delay": -1.0}, "delay: -1.0 given"),
         ({"controller": FeedForwardPD(bandwidth=4000.0)}, "half the sample rate of 1000 Hz"),
         ({"controller": FeedForwardPD(bandwidth=2500.0)}, "lower the gains, or ask for less"),

@@ -69,9 +69,10 @@ class Observability(Result):
     def summary(self) -> str:
         """Return the reasons for the rank in a few sentences."""
         exact = (
-            f"Exact rank {self.rank} of {self.columns} values: a minor of that size at "
-            f"{self.rows} random rows is not zero modulo {len(self.primes)} primes of "
-            f"{max(self.primes, default=0).bit_length()} bits, and no greater one was found."
+            f"Exact rank {self.rank} of {self.columns} values: at {self.rows} random rows a square "
+            "submatrix of that size has a nonzero determinant, computed exactly modulo "
+            f"{len(self.primes)} primes of {max(self.primes, default=0).bit_length()} bits, and no "
+            "greater one has."
         )
         here = (
             f"At the measured poses {self.at_poses} (smallest singular value kept "

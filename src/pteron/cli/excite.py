@@ -32,7 +32,7 @@ _CLEARANCE = "joint_clearance"
 _MEASURES = {
     "type_i": "stretched or folded leg (type-I measure)",
     "type_ii": "platform not held (type-II measure)",
-    "joint_clearance": "joint limits",
+    "joint_clearance": "joint limits, beyond the required distance",
     "passive_clearance": "passive joint limits (over half the range)",
 }
 """Names of limits in the output, where they are not those of the code."""

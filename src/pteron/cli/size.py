@@ -258,7 +258,7 @@ def _energy(sizing: Sizing, share: float) -> list[str]:
     mean, peak = significant(net / sizing.duration), significant(float(total.max()))
     lines = [
         f"All drives together: net energy {significant(net)} J per cycle{without}, "
-        f"mean power {mean} W, peak power {peak} W"
+        f"mean net power {mean} W, peak power {peak} W (driving less braking)"
     ]
     if sizing.assumed_friction.any():
         units = [leg.joint.force_unit for leg in sizing.robot.legs]
@@ -330,7 +330,7 @@ def _loads(sizing: Sizing) -> rich.table.Table:
 def _powers(sizing: Sizing) -> rich.table.Table:
     """Return a table of each drive's power (W) and energy (J), motoring and braking."""
     names = (
-        *("leg", "peak power (W)", "mean power (W)", "peak braking (W)"),
+        *("leg", "peak driving (W)", "mean driving (W)", "peak braking (W)"),
         *("energy supplied (J)", "energy braked (J)"),
     )
     powers = (sizing.peak_power, sizing.mean_power, sizing.peak_braking)

@@ -178,18 +178,19 @@ class ExactCertificate(Certificate):
         )
         lines = [
             f"Exact rank {self.rank} of {self.columns} columns of the regressor, proved:",
-            f"at least {self.rank}: a minor of that size at {self.states} states is not zero "
-            f"modulo {len(self.primes)} primes of {max(self.primes).bit_length()} bits;",
+            f"at least {self.rank}: a square submatrix of that size, at {self.states} states, has "
+            f"a nonzero determinant, computed exactly modulo {len(self.primes)} primes of "
+            f"{max(self.primes).bit_length()} bits;",
             f"at most {self.rank}: {self.null_vectors} null vectors annihilate the regressor "
             f"exactly at {checked}{self.modular_configurations} configurations modulo another "
             f"prime; a false one would pass with probability below {self.false_acceptance:.0e}.",
             f"{self.transfers} of the null vectors are transfers of mass between bodies that share "
-            f"a point. Coefficients: {self.coefficients}.",
+            f"a point. Coefficients of the sums: {self.coefficients} numbers, in powers of m.",
         ]
         if self.unexplained:
             lines.append(
-                "No transfer explains, but this machine's special geometry adds, what is grouped "
-                f"of {', '.join(self.unexplained)}."
+                f"The grouping of {', '.join(self.unexplained)} is explained by this machine's "
+                "special geometry, not by a transfer."
             )
         lines += _sentence_of_list("Taken as exact", self.recognised)
         lines += _sentence_of_list("Approximated", self.approximated)

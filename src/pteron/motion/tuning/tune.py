@@ -319,8 +319,8 @@ class _Search:
         best = max(tried, key=lambda trial_share: trial_share[0])[1]
         _, at = self.share(best, every)
         raise DataError(
-            f"no bandwidth has the margins asked for; best {self._margins_text(best, at)}; ask for "
-            "less, sample faster, or shorten the delay"
+            f"no bandwidth has the required margins; the best: {self._margins_text(best, at)}; "
+            "require less, sample faster, or shorten the delay"
         )
 
     def _greatest(
@@ -365,8 +365,8 @@ class _Search:
         rate = controller.bandwidth
         with_ = f"with {np.max(rate):.4g} rad/s" if rate is not None else "with these gains"
         return (
-            f"{with_}, at pose {pose_text(self.states[i][0])} the margins are a gain of "
-            f"{least['gain']:.3g}, {np.degrees(least['phase']):.3g} degrees and "
-            f"{1e3 * least['delay']:.3g} ms; "
-            f"{required.gain:.3g}, {np.degrees(required.phase):.3g} degrees{delay_text} asked for"
+            f"{with_}, at pose {pose_text(self.states[i][0])} the gain margin is "
+            f"{least['gain']:.3g}, the phase margin {np.degrees(least['phase']):.3g} degrees, the "
+            f"delay margin {1e3 * least['delay']:.3g} ms; required are "
+            f"{required.gain:.3g} and {np.degrees(required.phase):.3g} degrees{delay_text}"
         )
