@@ -13,6 +13,7 @@ from __future__ import annotations
 import argparse
 import shutil
 import sys
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
@@ -103,10 +104,10 @@ def _write_rollouts(robot: pteron.Manipulator, folder: Path, count: int) -> None
     (folder / f"{robot.name}_loop.cu").write_text(code[0].source)
 
 
-def prepare(folder: Path, states: int, rollouts: int) -> None:
+def prepare(folder: Path, states: int, rollouts: int, machines: Sequence[str]) -> None:
     """Write the folder that goes to a machine with a GPU."""
     folder.mkdir(parents=True, exist_ok=True)
-    for name in _MACHINES:
+    for name in machines:
         robot = pteron.load(name)
         export_cuda(robot, _FUNCTIONS, folder)
         _write_states(robot, folder, states)
@@ -114,7 +115,7 @@ def prepare(folder: Path, states: int, rollouts: int) -> None:
         text = pteron.compile(robot, "inverse_dynamics", "jax").source
         (folder / f"{name}_jax.py").write_text(text)
         print(f"{name}: written", flush=True)
-    shutil.copy(_HERE / "gpu_run.py", folder / "run.py")
+    shutil.copy(_HERE / "device" / "compare_targets.py", folder / "run.py")
 
 
 def main() -> None:
@@ -122,13 +123,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder", nargs="?", type=Path)
     parser.add_argument("--registers", action="store_true")
-    parser.add_argument("--quick", action="store_true", help="few states")
+    parser.add_argument("--quick", action="store_true", help="few states of one machine")
     options = parser.parse_args()
     if options.registers:
         print_registers()
     else:
         counts = (1000, 7) if options.quick else (_STATES, _ROLLOUTS)
-        prepare(options.folder or Path("gpu"), *counts)
+        machines = ("tripteron",) if options.quick else _MACHINES
+        prepare(options.folder or Path("gpu"), *counts, machines)
 
 
 if __name__ == "__main__":

@@ -114,6 +114,13 @@ def module(available=True):
     cupy.broadcast_to = lambda array, shape: np.broadcast_to(array, shape, subok=True)
     cupy.ascontiguousarray = lambda array: np.ascontiguousarray(array).view(DeviceArray)
     cupy.is_available = lambda: available
+    # What benchmarks use beside.
+    cupy.tile = lambda array, count: np.tile(array, count).view(DeviceArray)
+    cupy.ones = lambda size: np.ones(size).view(DeviceArray)
+    cupy.copyto, cupy.asnumpy = np.copyto, np.array
+    device = SimpleNamespace(mem_info=(2**32, 2**32), synchronize=lambda: None)
+    runtime = SimpleNamespace(getDeviceProperties=lambda _: {"name": b"emulated"})
+    cupy.cuda = SimpleNamespace(Device=lambda: device, runtime=runtime)
     return cupy
 
 

@@ -5,6 +5,9 @@ for two generations of GPUs. Nothing here has run on a GPU.
 """
 
 import json
+import re
+import subprocess
+import sys
 from dataclasses import replace
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
@@ -299,3 +302,21 @@ def test_the_command_writes_it(tmp_path):
     assert names == ["tripteron.cu", "tripteron.cuh", "tripteron_cuda.py"]
     line = f"export tripteron --cuda {tmp_path} --mjcf {tmp_path}"
     assert "give one at a time; only --c, --st and --cuda go together" in refused(line)
+
+
+@CLIENTS
+def test_the_folder_for_a_machine_with_a_gpu_runs_there(tmp_path):
+    """On the emulated one, whose interface a module `cupy` in the folder has."""
+    root = Path(__file__).parents[1]
+    command = [sys.executable, root / "benchmarks" / "gpu.py", tmp_path, "--quick"]
+    subprocess.run(command, check=True, capture_output=True)
+    (tmp_path / "cupy.py").write_text(
+        f"import sys\nsys.path.append({str(root / 'tests')!r})\n"
+        "from emulated_gpu import module\nglobals().update(vars(module()))\n"
+    )
+    command = [sys.executable, tmp_path / "run.py", "--largest", "1e4", "--seconds", "0.01"]
+    text = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+    for key in ("joints", "forces", "accelerations"):
+        assert re.search(rf"tripteron +{key} +3000 of 3000 numbers equal", text)
+    assert "rollouts of 7: 42 of 42 numbers equal" in text
+    assert re.search(r"tripteron +10000 states: [\d.e+]+ /s", text)
