@@ -55,7 +55,7 @@ INSIDE = {
     "bodies": "Vectors, inertia, parameters, and a body in motion.",
     "indices": "How good a pose is: the parts of `pteron.indices`.",
     "reduction": "Which parameters count: the parts of `pteron.reduction`.",
-    "kinematics": "Numbers: what stands behind the functions of kinematics.",
+    "kinematics": "The modules that compute poses, joint coordinates, modes and singularities.",
 }
 """Packages whose parts have a page, for those who read on."""
 

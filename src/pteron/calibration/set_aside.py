@@ -1,7 +1,7 @@
 """Rows that are set aside before a calibration's first fit, and why.
 
-Most are back where they fit after it. A row under a plane that others touch is not: no fit moves it
-out of the plate.
+Rows that the fit explains are used again after it. A row far under a plane that other rows touch is
+not: no fit moves it out of the plate.
 """
 
 from __future__ import annotations
@@ -38,8 +38,8 @@ _FACTORS = {
 """Factors of readings, as wrong step units make them, and how they are called."""
 
 _PUT_BACK = 0.1
-"""Residual, as a share of that before, below which a factor puts a row where it belongs."""
-
+"""Greatest residual with a factor on the readings, as a share of the residual without it, at which
+the factor explains the row."""
 
 _TELLING = 2
 """Least number of measured values in a row: with one, some factor of many fits by chance."""

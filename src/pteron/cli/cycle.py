@@ -229,7 +229,7 @@ def _result(
         f"{motion.duration:.4g} s ({len(motion.time)} samples)"
     )
     if bound is not None:
-        text += f"; without --optimal the same path takes {bound:.4g} s"
+        text += f"; a polynomial of degree 5 along the same path takes {bound:.4g} s"
     text += f". Travel: {travel_text(machine, motion)}."
     return CommandResult(
         record, partial(_show, [text, peaks_table(largest)], out), [out] if out else []

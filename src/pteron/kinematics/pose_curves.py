@@ -1,7 +1,8 @@
-"""Curves of poses: self-motions, in which a platform moves while all joints are held.
+"""Curves of poses: self-motions, in which a platform moves while its actuated joints are held.
 
-Paths to such a machine end at points of the curve, in general complex ones, where Newton's steps
-fail. From their real parts a damped descent leads to real points, if the curve has any.
+The homotopy paths of `pose_paths` that lead to such a machine end at points of the curve, in
+general complex ones, where Newton's steps fail. From their real parts Levenberg-Marquardt steps
+lead to real points, if the curve has any.
 """
 
 from __future__ import annotations
@@ -14,7 +15,8 @@ from pteron.kernels import Array
 from pteron.kernels.path_programs import rows_kernel
 
 ROUNDING = 2e-14
-"""Greatest residual, as a share of its terms, of a pose without proof, where two poses meet."""
+"""Greatest residual, over the bound of `second_slopes`, of a z that counts as a pose where no proof
+is possible: next to a singularity, where two poses meet."""
 
 _STEPS = 30
 """Number of steps of a descent."""
@@ -28,7 +30,9 @@ residuals there are about its m-th power, far above rounding."""
 
 
 def lie_on_curves(closed: Closed, machines: Array, z: Array) -> NDArray[np.bool_]:
-    """Return which z (K, d) converge to a pose on a curve of poses of its machine (K, k, 7).
+    """Return which z (K, d) converge to a pose on a curve of poses, each of its own machine.
+
+    `machines` (K, k, 7) holds seven numbers for each of the k closure equations, as in `Closed`.
 
     Where the closures' derivatives lose a rank, other poses are sought at a distance in the free
     direction, to both sides.

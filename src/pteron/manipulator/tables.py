@@ -99,7 +99,7 @@ class _Motion(TomlTable):
 class PlatformTable(PlanarBody, _Motion):
     """`[platform]`: its body's origin is P, its frame turns with phi."""
 
-    slides: bool = key("whether phi moves the platform points straight, m/rad, as in an I4", False)
+    slides: bool = key("two halves slide by phi, as in an I4; platform points in m/rad", False)
     limits: Two | None = key(
         "least and greatest phi that the hinges allow, rad; may be several turns",
         None,

@@ -14,8 +14,8 @@ _MOST = 0.5
 """Share of numbers or times among its cells from which a column counts as one of these."""
 
 _NUMBER = r"[+-]?(?:\d++(?:{0}\d*+)?|{0}\d++)(?:[eE][+-]?\d++)?|[+-]?(?:nan|inf)"
-"""Pattern of a number; {0} is the decimal sign. It takes its digits once, as a cell of thousands of
-them would else take the square of that time."""
+"""Pattern of a number; {0} is the decimal sign. Quantifiers are possessive: with backtracking, the
+time for a cell of many digits would grow with the square of their number."""
 
 _STAMP = r"(?:\d[\d./-]*[T ] ?)?\d\d?:\d\d:\d\d(?:[.,:]\d+)?(?: ?[AP]M|Z|[+-]\d\d:?\d\d)?"
 """Pattern of a date and time."""
@@ -31,7 +31,9 @@ class Record(NamedTuple):
     """A line that is not blank, or lines joined by a quoted line end; lines count from 0."""
 
     line: int
+    """Number of its first line."""
     after: int
+    """Number of the line after its last one."""
     cells: tuple[str, ...]
 
 

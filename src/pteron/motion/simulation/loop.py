@@ -40,7 +40,7 @@ from pteron.tolerances import ROUNDING
 _BLOCK = 1000
 """Samples after which a run returns from compiled code: some 10 ms, at most a second."""
 
-_ASKED, _MOVED = 1.0, 2.0
+_NO_FORCES, _NOT_INTEGRATED = 1.0, 2.0
 """Fault codes of a run: no force command, or the state could not be integrated further."""
 
 
@@ -252,14 +252,14 @@ def _fault_text(
 ) -> str | None:
     """Return why a loop ended before its time; None if it did not."""
     fault, m = arrays["fault"].item(), robot.freedom
-    if fault == _ASKED and has_callback:
+    if fault == _NO_FORCES and has_callback:
         return "no forces are asked for: the controller returns some that are not finite numbers"
-    if fault == _ASKED:
+    if fault == _NO_FORCES:
         return (
             f"no forces are asked for at the joints {pose_text(joints[-1])}: they have no pose "
             "near the last one, or the wanted pose is out of the controller's reach"
         )
-    if fault == _MOVED:
+    if fault == _NOT_INTEGRATED:
         return why_not_further(robot, *np.split(arrays["state"].ravel(), [m, 2 * m])[:2])
     return None
 

@@ -18,8 +18,8 @@ from pteron.tables import read_table
 from pteron.toml import joined_faults, read_toml, to_model
 
 _FASTEST = 3000.0
-"""Speed, rad/s, from which on `Motor.warnings` asks whether it is in revolutions per minute: 29 000
-of them."""
+"""Speed, rad/s, from which on `Motor.warnings` asks whether it is in revolutions per minute:
+3000 rad/s are 29 000 revolutions per minute, far beyond servo motors."""
 
 _SLUGGISH = 30.0
 """Rated torque over rotor inertia, rad/s^2, below which `Motor.warnings` asks whether the inertia
