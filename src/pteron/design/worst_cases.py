@@ -30,7 +30,7 @@ overstate it by less than 0.4 % in space, and by less than 0.2 % in a plane."""
 
 
 def worst_speeds(robot: Manipulator, poses: Array, speed: float) -> Array:
-    """Return the greatest speed of each joint (N, n) as P moves at a speed in any direction.
+    """Return the greatest speed of each joint (N, n) as P moves at `speed` in any direction.
 
     The platform does not turn meanwhile; m/s or rad/s. Exact: the norm of a row of J.
     """
@@ -68,12 +68,12 @@ def worst_forces(robot: Manipulator, poses: Array, speed: float, acceleration: f
 
 
 def _frictionless(drive: Drive | None) -> Drive | None:
-    """Return a drive with its rotor's inertia and ratio alone; None without a drive."""
+    """Return a drive with its rotor inertia and ratio only, no friction; None without a drive."""
     return drive and Drive(rotor_inertia=drive.rotor_inertia, ratio=drive.ratio)
 
 
 def _force_expansion(robot: Manipulator, poses: Array) -> tuple[Array, Array, Array]:
-    """Return forces at rest (N, n), by acceleration (N, n, k), and as a form in v (N, n, k, k)."""
+    """Return forces at rest (N, n), by acceleration (N, n, k), by velocities (N, n, k, k)."""
     k = len(robot.platform.lengths)
     axes = np.eye(robot.freedom)[:k]
     pairs = list(combinations(range(k), 2))
@@ -112,7 +112,7 @@ def _greatest_over_directions(eigenvalues: Array, parts: Array, size: float) -> 
 
 
 def worst_position_errors(robot: Manipulator, poses: Array, tolerances: Tolerances) -> Array:
-    """Return how far the tool may be off at each pose (N,), m, if all errors are at their limits.
+    """Return an upper bound of the tool's position error at each pose (N,), m.
 
     An upper bound, to first order in the errors: for every unit vector u the sum of |u . error| of
     all sources; the greatest of these, over directions so dense that no other is larger by more
@@ -126,7 +126,7 @@ def worst_position_errors(robot: Manipulator, poses: Array, tolerances: Toleranc
 
 @lru_cache(maxsize=4)
 def _directions(count: int) -> tuple[Array, float]:
-    """Return unit vectors (D, count), and the cosine of their covering angle.
+    """Return unit vectors (D, count) over all directions, and the cosine of their covering angle.
 
     They lead through the middles of cells on a cube's faces; opposite ones count as one.
     """

@@ -20,7 +20,7 @@ carry up to their own moving mass, presses and simulators up to ten times it."""
 
 
 def payload_warning(robot: Manipulator, mass: float) -> str:
-    """Return a warning about an unlikely payload, kg, as a clause; else an empty text."""
+    """Return a warning if a payload of `mass` kg is unlikely for the machine; else ''."""
     bodies = [body for leg in robot.legs for body in leg.bodies.values()]
     moving = sum(body.values[0] for body in (*bodies, robot.platform.total_inertia))
     if mass <= _HEAVY * moving:
@@ -141,7 +141,7 @@ def add_payload(
     center: Sequence[float] | None = None,
     inertia: float | Sequence[float] = 0.0,
 ) -> Manipulator:
-    """Return the machine with a body, like `with_payload`, without a warning about its mass."""
+    """Return the machine with a payload on its platform; unlike `with_payload` it never warns."""
     payload = number_or_nan(mass)
     if not (math.isfinite(payload) and payload >= 0.0):
         raise DataError(f"payload: {mass!r} given, a mass of 0 kg or more expected")

@@ -144,7 +144,7 @@ def advance(
 
 
 def drive_states(robot: Manipulator, pose: Array, velocity: Array) -> Array:
-    """Return the states (..., K) of drives with extra states at zero acceleration."""
+    """Return the states (..., K) of drives that bend or lag, as at zero acceleration."""
     states = motor_states(robot, pose, velocity, np.zeros_like(pose))
     return np.concatenate([np.empty((*pose.shape[:-1], 0)), *states.values()], axis=-1)
 
@@ -152,7 +152,7 @@ def drive_states(robot: Manipulator, pose: Array, velocity: Array) -> Array:
 def motor_states(
     robot: Manipulator, pose: Array, velocity: Array, acceleration: Array
 ) -> dict[str, Array]:
-    """Return the extra drive states, (..., n) each, that a motion requires, by name."""
+    """Return by name the drive states (..., n) that a motion requires beyond joint coordinates."""
     kind = DriveKind.from_robot(robot)
     if not kind.extra_states:
         return {}
@@ -197,7 +197,7 @@ class AdaptivePlant:
         m, loads = len(state) // 2, (loads_held["forces"][0], loads_held["wrench"][0])
 
         def rates(_: float, state: Array) -> Array:
-            """Return the rates (2 m,) of a state of pose and velocity; NaN without a solution."""
+            """Return the time derivative (2 m,) of pose and velocity; NaN without a solution."""
             velocity = state[m:]
             acceleration, status = self._accelerations(state[:m], velocity, *loads)
             return np.concatenate([velocity, acceleration if status else np.full(m, np.nan)])

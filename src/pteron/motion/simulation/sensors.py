@@ -71,7 +71,7 @@ class Sensors:
 def encoder_arrays(
     sensors: Sensors, robot: Manipulator, period: float, state: Mapping[str, Array]
 ) -> dict[str, Array]:
-    """Return a control loop's arrays for encoders that begin in a state: numbers and memory.
+    """Return the loop's arrays of encoder resolution, noise and initial memory, by name.
 
     The angle of a crank that may go all the way round jumps by a turn: its readings go on by the
     shorter way.
@@ -152,14 +152,14 @@ def rate_shares(sensors: Sensors, robot: Manipulator, period: float) -> Array:
 
 
 def _share(sensors: Sensors, period: float) -> float:
-    """Return the filter gain of a rate estimated from differences, by the filter's cut-off."""
+    """Return the gain (0 to 1) of the low-pass filter that estimates rates from differences."""
     if sensors.cutoff is None:
         return 1.0
     return -float(np.expm1(-2.0 * np.pi * sensors.cutoff * period))
 
 
 def expect_encoders(robot: Manipulator, law: Program) -> None:
-    """Refuse a controller that needs readings of motors where there is no encoder."""
+    """Raise if the law needs motor readings where a drive has its encoder at the joint only."""
     motor_readings = [port.name for port in law.inputs if port.name in ("motors", "motor_rates")]
     legs_without = [
         str(i) for i, leg in enumerate(robot.legs, 1) if encoder_of(leg.drive) == "joint"

@@ -43,7 +43,7 @@ def longest_step(robot: RobotLike, poses: PoseLike, machines: Machines | None = 
 def _longest_stable_step(
     robot: Manipulator, poses: PoseLike, machines: Machines | None = None
 ) -> tuple[float, str]:
-    """Return the longest stable step, s, and a clause that begins a sentence on its cause."""
+    """Return the longest stable integration step, s, and a phrase that names its cause."""
     kind, drives = DriveKind.from_robot(robot), drives_of(robot)
     if machines is not None:
         parts = machines.drives.reshape(len(machines), len(drives), -1)
@@ -70,7 +70,7 @@ def _longest_stable_step(
 
 
 def _supply_damping(robot: Manipulator) -> Array:
-    """Return the fall (n,) of drive forces per joint rate where the supply is at its limit."""
+    """Return (n,) the decrease of drive force per joint rate where the supply voltage limits it."""
     falls = np.zeros(robot.joint_count)
     for i, leg in enumerate(robot.legs):
         if leg.drive and leg.drive.winding:
@@ -82,7 +82,7 @@ def _supply_damping(robot: Manipulator) -> Array:
 def _step_of_drives(
     robot: Manipulator, rows: Array, mass: Array, drives: Drives
 ) -> tuple[float, str]:
-    """Return the longest step and its cause, from J, M and drives of poses or of machines."""
+    """Return the longest stable step, s, and its cause, from Jacobian, mass matrix and drives."""
     kind, longest = DriveKind.from_robot(robot), (float("inf"), "")
     if drives.viscous.any() or kind.bends:
         system, bent = _linear_machine(robot, rows, mass, drives)
@@ -113,7 +113,7 @@ def _step_of_drives(
 
 
 def modes(robot: RobotLike, poses: PoseLike) -> tuple[Array, Array]:
-    """Return the eigenvalues of a machine with its drives, linear about rest at poses.
+    """Return the eigenvalues of the machine with its drives, linearised about rest at poses.
 
     The linear machine is M x'' = J^T (k d + c d') and I w' = -k d - c d' - b w, with d the
     deflection of each transmission; play, dry friction and the change of gravity forces with the
@@ -211,7 +211,7 @@ def allowed_step(
     usual: bool = True,
     machines: Machines | None = None,
 ) -> float:
-    """Return min(step, longest stable step), s.
+    """Return min(step, longest stable step), s; raise if that is too short to be sensible.
 
     Raises
     ------

@@ -58,11 +58,11 @@ class DutyCycle:
 
     @cached_property
     def course(self) -> Course:
-        """The tool's paths of the motions, relative to their middle."""
+        """The tool's paths of the cycle's motions, relative to their common middle."""
         return Course.from_motions(self.robot, self.motions)
 
     def thin_out(self) -> DutyCycle:
-        """Return the cycle resampled to the number of samples that each place evaluates."""
+        """Return the cycle with its motions resampled to at most `_SAMPLES` samples each."""
         motions = []
         for motion in self.motions:
             time = np.linspace(motion.time[0], motion.time[-1], _SAMPLES)
@@ -85,7 +85,7 @@ class DutyCycle:
         return self._loads_of_curves(curves, places)
 
     def _loads_of_curves(self, curves: Sequence[Curve], places: Sequence[CyclePlace]) -> Sizing:
-        """Return the loads over motions (T, m), or (T, W, m) of places."""
+        """Return the drive loads over motions (T, m), or over (T, W, m) at W places."""
         clock, inertias = float(self.motions[0].time[0]), []
         blocks: list[tuple[Array, ...]] = []
         for motion, curve, pause in zip(self.motions, curves, self.rests, strict=True):
@@ -144,14 +144,14 @@ class DutyCycle:
         return joint_inertias.min(axis=0), joint_inertias.max(axis=0)
 
     def _assumed_friction(self, forces: Array) -> Array:
-        """Return dry friction (n,) of the drives that have none in the file."""
+        """Return the assumed dry friction (n,), N or N m, of drives without any in the file."""
         most = np.abs(forces).reshape(-1, self.robot.joint_count).max(axis=0)
         frictionless = [not (d.coulomb or d.viscous or d.stribeck) for d in self.drives]
         return np.asarray(self.friction * most * frictionless)
 
 
 def _sample_curve(time: Array, curve: Curve, middles: Array) -> Curve:
-    """Return a curve (T, ..., m) interpolated at other times."""
+    """Return a curve (T, ..., m) with two derivatives interpolated at other times."""
     flat = Motion(time, *(part.reshape(len(time), -1) for part in curve))
     shape = len(middles), *curve[0].shape[1:]
     pose, velocity, acceleration = (part.reshape(shape) for part in flat.at(middles))

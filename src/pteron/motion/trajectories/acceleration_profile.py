@@ -34,7 +34,7 @@ class Profile(NamedTuple):
         return float(self.time[-1])
 
     def smooth(self, h: float) -> Callable[[Array], tuple[Array, Array, Array]]:
-        """Return s averaged over h before and after, by a triangle's weights, from rest to rest.
+        """Return a function of tau (0 to 1): s averaged over +-h by a triangular weight.
 
         Its acceleration is continuous, and its jerk too but for steps.
         """
@@ -51,7 +51,7 @@ class Profile(NamedTuple):
         return progress
 
     def _state(self, t: Array) -> tuple[Array, Array]:
-        """Return s and s' (T,) at times (T,)."""
+        """Return the path parameter s and its rate s' (T,) at times (T,)."""
         clipped = np.clip(t, 0.0, self.duration)
         k = np.clip(np.searchsorted(self.time, clipped, side="right") - 1, 0, len(self.gain) - 1)
         d = clipped - self.time[k]
@@ -62,7 +62,7 @@ class Profile(NamedTuple):
         )
 
     def _moments(self, t: Array, h: float) -> tuple[Array, Array, Array]:
-        """Return the parts of s(t + h) and its integrals due to s'' from t to t + h, h of any sign.
+        """Return integrals (T,) of s'' from t to t + h, weighted by (h - r)^k / k!, k = 1, 2, 3.
 
         The integrals of (h - r)^k / k! s''(t + r) over r, k = 1, 2 and 3: small where h is, so that
         averages are exact to rounding however little they take in.

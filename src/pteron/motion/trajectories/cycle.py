@@ -33,7 +33,7 @@ the corners and saves time."""
 
 
 def quintic(tau: Array, begin: float, end: float) -> tuple[Array, Array, Array]:
-    """Return a move from 0 to 1 within [begin, end], and its first two derivatives.
+    """Return a smooth step s(tau) from 0 to 1 within [begin, end], and its first two derivatives.
 
     s = 10 t^3 - 15 t^4 + 6 t^5 with t = (tau - begin) / (end - begin): velocity and acceleration
     are zero at both ends, so that it joins rest without a jump of either.
@@ -138,13 +138,13 @@ class Cycle:
 
     @property
     def _turns_across(self) -> NDArray[np.bool_]:
-        """Whether each angle (a,) rotates on the way across: the last angle does."""
+        """Whether each platform angle (a,) rotates on the way across; only the last one does."""
         count = len(self.platform.angles)
         return np.asarray(np.arange(count) == count - 1)
 
     @property
     def _turns_up(self) -> NDArray[np.bool_]:
-        """Whether each angle (a,) rises and falls: all but the last, for fewer than two lengths."""
+        """Whether each platform angle (a,) rises and falls: all but the last, for < 2 lengths."""
         return np.asarray(~self._turns_across & (len(self.platform.lengths) < 2))
 
     def acceleration(self, tau: Array, radius: float) -> Array:
