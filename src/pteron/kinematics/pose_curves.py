@@ -28,7 +28,7 @@ residuals there are about its m-th power, far above rounding."""
 
 
 def lie_on_curves(closed: Closed, machines: Array, z: Array) -> NDArray[np.bool_]:
-    """Return which z (K, d) converge to a pose on a curve of poses of its machine (K, k, 7).
+    """Return which states z (K, d) lie on a continuous curve of poses of their machine.
 
     Where the closures' derivatives lose a rank, other poses are sought at a distance in the free
     direction, to both sides.
@@ -53,7 +53,7 @@ def lie_on_curves(closed: Closed, machines: Array, z: Array) -> NDArray[np.bool_
 def _levenberg_marquardt(
     closed: Closed, machines: Array, z: Array, projectors: Array
 ) -> tuple[Array, Array]:
-    """Return the best z (K, d) of Levenberg-Marquardt steps, and the norms of its residuals (K,).
+    """Return z (K, d) after Levenberg-Marquardt steps, and the norms of their residuals (K,).
 
     Damped by the square of the residual they reach a curve of poses as fast as Newton's a regular
     pose (Yamashita and Fukushima, On the rate of convergence of the Levenberg-Marquardt method,
@@ -74,7 +74,7 @@ def _levenberg_marquardt(
 
 
 def second_slopes(closed: Closed, machines: Array) -> Array:
-    """Return a bound (K,) of the closures' second derivatives, which are constant: quadrics."""
+    """Return an upper bound (K,) of the second derivatives of the closure equations."""
     a, b, r = machines[..., :3], machines[..., 3:6], np.abs(machines[..., 6])
     length_a, length_b = (np.linalg.norm(v, axis=-1) for v in (a, b))
     bends = (length_a + length_b) ** 2 + 4.0 * closed.moves + r
@@ -83,5 +83,5 @@ def second_slopes(closed: Closed, machines: Array) -> Array:
 
 
 def normalise_rows(z: Array) -> Array:
-    """Return z (..., d) divided by their lengths."""
+    """Return rows z (..., d) scaled to unit length."""
     return np.asarray(z / np.linalg.norm(z, axis=-1, keepdims=True))

@@ -22,7 +22,7 @@ def random_poses(
     type_ii: float | None = None,
     limits: bool = True,
 ) -> Poses:
-    """Return poses drawn at random from those in reach and away from singularities.
+    """Return `count` random poses in reach and away from singularities, (count, m).
 
     Uniformly in position and orientation, within a box that holds all but the rarest corners.
     Passive joints and the platform's angle keep their limits; the actuated joints need not. A

@@ -21,7 +21,7 @@ def climb(
     gain: float,
     evaluations: float = math.inf,
 ) -> tuple[Array, Array]:
-    """Return local maxima (S, k) of a function of points (..., k), and its values (S,) there.
+    """Return local maxima (S, k) of `worth` near S simplices, and its values there (S,).
 
     From each simplex (S, k + 1, k) the search goes on until it is no larger than `size` and its
     values differ by `gain` at most, or until as many `evaluations` would have been needed, one by
@@ -58,7 +58,7 @@ def climb(
 def _step_simplices(
     worth: Callable[[Array], Array], simplex: Array, height: Array
 ) -> tuple[Array, Array, Array]:
-    """Return simplices (S, k + 1, k) after one step, their values, and the evaluations it needs.
+    """Return simplices (S, k + 1, k) after one Nelder-Mead step, values, evaluation counts.
 
     In each simplex the best point stands first.
     """

@@ -61,7 +61,7 @@ class RowFrame:
     angular: NDArray[np.bool_]
 
     def normalise(self, rows: Array) -> tuple[Array, Array]:
-        """Return unit rows (..., K, n, m) of a kernel's rows, and their divisors (..., K, n)."""
+        """Return Jacobian rows (..., K, n, m) scaled to unit length, and their divisors."""
         if self.motion is None:
             scaled = np.where(self.angular, rows / self.length, rows)
             sizes = np.linalg.norm(scaled[..., ~self.angular], axis=-1)
@@ -72,14 +72,14 @@ class RowFrame:
 
 
 def unit_rows(robot: Manipulator, poses: Array) -> UnitRows:
-    """Return the unit rows of the legs at poses (K, m)."""
+    """Return the legs' Jacobian rows at poses (K, m), scaled to unit length, with the scales."""
     frame = row_frame(robot, poses)
     rows, sizes = frame.normalise(numeric(robot, frame.kernel)(poses)[0])
     return UnitRows(rows, sizes, frame.length)
 
 
 def row_frame(robot: Manipulator, poses: Array) -> RowFrame:
-    """Return the scaling of a kernel's rows at poses (K, m) to unit rows."""
+    """Return the scaling that makes Jacobian rows at poses (K, m) unit rows."""
     points = np.array([leg.platform_point for leg in robot.legs])
     middle = np.zeros(3) if robot.platform.center else points.mean(axis=0)
     length = float(np.linalg.norm(points - middle, axis=1).max())

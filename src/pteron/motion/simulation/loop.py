@@ -311,7 +311,7 @@ def _callback(
     """Return the callback that evaluates a Python controller at a sample, to (n,) forces."""
 
     def ask(_: int, sample: int, measured: Array) -> Array:
-        """Return the controller's forces (n,) at a sample, from positions and rates (2 n,)."""
+        """Return the controller's forces (n,) at a sample, from measured joints and rates."""
         parts = reference.pose, reference.velocity, reference.acceleration
         pose, velocity, acceleration = (part[sample] for part in parts)
         readings = measured[:joints], measured[joints:]

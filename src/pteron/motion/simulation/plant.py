@@ -192,7 +192,7 @@ class AdaptivePlant:
     def go(
         self, steps: int, step: float, loads_held: Loads, arrays: Mapping[str, Array], alive: Array
     ) -> None:
-        """Advance the state by several steps, like `pteron.kernels.samples.Plant.go`."""
+        """Advance the state in `arrays` by `steps` steps of `step` s, by an adaptive method."""
         state, clock, span = arrays["state"][0, 0], arrays["clock"][0, 0], steps * step
         m, loads = len(state) // 2, (loads_held["forces"][0], loads_held["wrench"][0])
 

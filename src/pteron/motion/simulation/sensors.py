@@ -122,7 +122,7 @@ def encoder_memory(joints: Array, rates: Array, steps: Array, period: float) -> 
 def encoder_noise(
     sensors: Sensors, robot: Manipulator, samples: int, machines: range | None = None
 ) -> dict[str, Array]:
-    """Return standardised noise of the samples, of a machine or of numbered machines."""
+    """Return {"noise": standard normal noise (B, samples, encoders)}, B machines."""
     count = robot.joint_count * (2 if DriveKind.from_robot(robot).bends else 1)
     if not np.any(sensors.noise):
         return {"noise": np.zeros((1, 1, count))}

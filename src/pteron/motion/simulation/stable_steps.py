@@ -178,7 +178,7 @@ def _linear_machine(
     rigid = np.where(soft, 0.0, 1.0)
 
     def assemble(joints: Array, motors: Array, springs: Array) -> Array:
-        """Return the matrix (..., K, K) of coefficients at joints, motors and springs, (..., n)."""
+        """Return the matrix (..., K, K) of coefficients (..., n) at joints, motors, springs."""
         joint_part = rows.mT @ (joints[..., None] * rows)
         spring_part = bent.mT @ (springs[:, None] * bent)
         matrix = np.zeros(

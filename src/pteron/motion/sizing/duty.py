@@ -72,7 +72,7 @@ class DutyCycle:
         return replace(self, motions=tuple(motions))
 
     def loads_at(self, places: Sequence[CyclePlace] = ()) -> Sizing:
-        """Return the loads at places, or of the original motions without places."""
+        """Return the drive loads of the cycle at places; without places, where its motions are."""
         curves: list[Curve] = [(m.pose, m.velocity, m.acceleration) for m in self.motions]
         if places:
             count = sum(2.0 * curve[0].size for curve in curves)
@@ -129,7 +129,7 @@ class DutyCycle:
         return tuple(leg.drive or Drive() for leg in self.robot.legs)
 
     def _loads(self, pose: Array, velocity: Array, acceleration: Array) -> Curve:
-        """Return forces of the drives, rates and accelerations of the joints (..., n)."""
+        """Return drive forces, joint rates and joint accelerations (..., n) at platform states."""
         state = pose, velocity, acceleration
         return (
             drive_forces(self.robot, *state, self.wrench, smooth=True),
@@ -138,7 +138,7 @@ class DutyCycle:
         )
 
     def _inertia(self, poses: Array) -> tuple[Array, Array]:
-        """Return least and greatest inertia at each joint (n,), the other joints fixed."""
+        """Return least and greatest reflected inertia (n,) at the joints, kg or kg m^2."""
         rows, mass = jacobian(self.robot, poses), mass_matrix(self.robot, poses)
         joint_inertias = moved_inertias(rows, mass).reshape(-1, self.robot.joint_count)
         return joint_inertias.min(axis=0), joint_inertias.max(axis=0)
@@ -166,6 +166,6 @@ def _interleave(samples: Array, middles: Array) -> Array:
 
 
 def _join_parts(parts: Sequence[Array]) -> Array:
-    """Return parts concatenated, with an interval of zero length between two."""
+    """Return arrays (T, ...) concatenated in time; the last row of each but one is repeated."""
     rows = [row for part in parts for row in (part, part[-1:])]
     return np.concatenate(rows[:-1])

@@ -78,7 +78,7 @@ class Motor:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Warnings of unlikely numbers, most often in a wrong unit, one line each."""
+        """Warnings about unlikely numbers of the motor, often of a wrong unit, one line each."""
         texts = []
         if self.max_speed >= _FASTEST:
             texts.append(

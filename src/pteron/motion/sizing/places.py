@@ -123,7 +123,7 @@ class Course:
         return np.asarray(directions @ matrix @ directions.T)
 
     def extent(self, turn: float) -> Array:
-        """Return the least and the greatest coordinates (2, m) of the path from its middle."""
+        """Return least and greatest coordinates (2, m) of the turned course about its middle."""
         poses = np.vstack([curve[0] for curve in self.curves])
         lengths = ~self.robot.platform.angular
         poses[:, lengths] = poses[:, lengths] @ self.rotation(turn).T

@@ -22,7 +22,7 @@ class Profile(NamedTuple):
 
     @classmethod
     def from_squares(cls, grid: Array, squares: Array) -> Profile:
-        """Return the profile with the squared speeds s'^2 (K,) on a grid of s, at rest outside."""
+        """Return the profile s(t) of squared speeds `squares` (K,) at the values `grid` of s."""
         rate = np.sqrt(np.maximum(squares, 0.0))
         spans = 2.0 * np.diff(grid) / (rate[1:] + rate[:-1])
         time = np.concatenate([[0.0], np.cumsum(spans)])

@@ -182,7 +182,7 @@ def _joint_failure(curve: _Curve, marks: Array) -> _Failure | None:
     """Return the first failure where an actuated joint passes its limits, or None."""
 
     def margin(at: Array) -> Array:
-        """Return the distances of actuated joints to their limits at places, m or rad."""
+        """Return actuated joints' distances (K, n) to their limits at parameters (K,)."""
         return joint_distances(curve.robot, curve.value("joint_coordinates", at))
 
     first = first_below(margin, marks, -ROUNDING)

@@ -84,7 +84,7 @@ class Cycle:
     scale: float
 
     def path(self, tau: Array) -> tuple[Array, Array, Array]:
-        """Return the tool's displacement from the middle (T, k), and two derivatives by tau.
+        """Return the tool's displacement from the cycle's middle (T, k), m, and two derivatives.
 
         k is the number of the pose's lengths, tau (T,) in [0, 1].
         """
@@ -99,7 +99,7 @@ class Cycle:
         return place, velocity, acceleration
 
     def at(self, tau: Array) -> tuple[Array, Array, Array]:
-        """Return poses (T, m) at times `tau` (T,) in [0, 1], and two derivatives by tau.
+        """Return poses (T, m) of the cycle at `tau` (T,) in [0, 1], and two derivatives by tau.
 
         Of a platform that tilts it is P that goes the path, and the angles turn with both moves.
         """
@@ -148,7 +148,7 @@ class Cycle:
         return np.asarray(~self._turns_across & (len(self.platform.lengths) < 2))
 
     def acceleration(self, tau: Array, radius: float) -> Array:
-        """Return the tool's acceleration (T, k) by tau; angular accelerations follow if it tilts.
+        """Return second derivatives by tau (T, k) of tool position, and of angles by `radius`.
 
         Of a platform that tilts that of a point at a radius from P, m, as it turns, comes behind.
         """
@@ -163,7 +163,7 @@ _Shares = tuple[Array, Array, Array]
 
 
 def _shares(tau: Array) -> tuple[_Shares, _Shares]:
-    """Return the progress of the moves across and up, from -1/2 to 1/2, with two derivatives.
+    """Return the progress of the moves across and up (-1/2 to 1/2), with two derivatives each.
 
     The first half of the time is the path out, the second the same path back.
     """
@@ -179,7 +179,7 @@ def _shares(tau: Array) -> tuple[_Shares, _Shares]:
 def moves(
     robot: Manipulator, direction: ArrayLike | None, count: int
 ) -> tuple[tuple[Array, Array], ...]:
-    """Return pairs of unit vectors across and up: for a direction, or `count` candidates.
+    """Return (across, up) unit vectors (3,) of a cycle: for one direction, or `count` candidates.
 
     Up is against gravity, or the platform's axis where there is none, and of a tripod; of a planar
     machine, against what gravity does in its plane or, where that is nothing, the axis times

@@ -172,12 +172,12 @@ def cycle_path(found: PickAndPlace) -> BackPath:
 
 
 def farthest_point(robot: Manipulator) -> float:
-    """Return how far the farthest platform point is from P, m."""
+    """Return the greatest distance of a platform point from P, m."""
     return max(float(np.linalg.norm(leg.platform_point)) for leg in robot.legs)
 
 
 def _peak_acceleration(cycle: Cycle, radius: float) -> float:
-    """Return the largest acceleration over a cycle that takes one second, m/s^2."""
+    """Return the largest acceleration, m/s^2, of a tool cycle that takes one second."""
     low, high = 0.0, 0.5
     for _ in range(_ZOOMS):
         tau = np.linspace(low, high, 1001)

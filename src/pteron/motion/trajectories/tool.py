@@ -12,7 +12,7 @@ Curve = tuple[Array, Array, Array]
 
 
 def tool_motion(platform: Platform, pose: Array, first: Array, second: Array) -> Curve:
-    """Return poses with their lengths moved from P to the tool, and two derivatives.
+    """Return poses (..., m) whose lengths are the tool's place instead of P's, and two derivatives.
 
     Where the platform turns about its axis alone, the constant part from P to the tool along that
     axis is left out. A platform whose lengths cannot move the tool to any place, such as a
@@ -22,7 +22,7 @@ def tool_motion(platform: Platform, pose: Array, first: Array, second: Array) ->
 
 
 def pose_motion(platform: Platform, place: Array, first: Array, second: Array) -> Curve:
-    """Return the poses from the motion of the tool: the inverse of `tool_motion`."""
+    """Return poses of P from those of the tool, and two derivatives: inverse of `tool_motion`."""
     return _shift_curve(platform, (place, first, second), -1.0)
 
 
@@ -54,7 +54,7 @@ def _shift_curve(platform: Platform, curve: Curve, side: float) -> Curve:
 
 
 def carries(platform: Platform) -> bool:
-    """Return whether the pose's lengths can compensate the tool's displacement by its angles."""
+    """Return whether the platform's lengths can move the tool to any place as its angles change."""
     return bool(platform.angles) and set(platform.arm_axes) <= set(platform.lengths)
 
 

@@ -63,7 +63,7 @@ class LinearPlant(Result):
         return np.asarray(np.linalg.eigvals(self.matrix))
 
     def zero_order_hold(self, span: float) -> tuple[Array, Array]:
-        """Return exp(A t) and the integral of exp(A s) B over a span: exact for constant forces."""
+        """Return exp(A t) and the integral of exp(A s) B over a time span, s: the sampled plant."""
         size, count = self.inputs.shape
         block = np.zeros((size + count, size + count))
         block[:size] = np.hstack([self.matrix, self.inputs]) * span
@@ -182,7 +182,7 @@ def with_linear_drives(robot: Manipulator) -> Manipulator:
 
 @lru_cache(maxsize=16)
 def _derivatives(robot: Manipulator, kind: DriveKind) -> ca.Function:
-    """Return Jacobians of the state's rates by state and by forces, and of J x' by x."""
+    """Return a CasADi function: Jacobians of the state derivative by state and drive forces."""
     plant_program = motion_program(robot, kind)
     names, symbols = [port.name for port in plant_program.inputs], plant_program.function.sx_in()
     by_name = dict(zip(names, symbols, strict=True))

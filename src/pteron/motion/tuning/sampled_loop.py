@@ -100,7 +100,7 @@ class SampledLoop:
         return matrix, inputs, force_rows
 
     def closed_loop(self, more: float = 0.0) -> Array:
-        """Return the closed loop's matrix; `more` is an additional delay of all forces, s."""
+        """Return the matrix (S, S) of the closed loop per sample, with `more` s of extra delay."""
         matrix, inputs, force_rows = self.open_loop(more)
         return matrix + inputs @ force_rows
 
