@@ -287,7 +287,7 @@ def _round_components(axis: Array) -> list[float]:
 
 
 def _dependent_legs(rows: Array) -> list[int]:
-    """Return the legs, from 1, whose rows (K, n, m) depend on each other at all poses."""
+    """Return the legs, from 1, whose Jacobian rows (K, n, m) are dependent at all poses."""
     _, _, axes = np.linalg.svd(np.swapaxes(rows, -1, -2))
     weights = np.abs(axes[:, -1, :]).max(axis=0)
     return [i for i, weight in enumerate(weights, start=1) if weight > 1e-8]

@@ -115,7 +115,7 @@ def _prime_factors(number: int) -> list[int]:
 def _same_right_angles(
     vectors: Sequence[Sequence[float]], units: Sequence[Sequence[int]], field: PrimeField
 ) -> bool:
-    """Return whether vectors that are perpendicular up to rounding are so in the field."""
+    """Return whether vectors perpendicular up to rounding are perpendicular in the field."""
     pairs = [(i, j) for i in range(len(units)) for j in range(i)]
     return all(
         sum(a * b for a, b in zip(units[i], units[j], strict=True)) % field.prime == 0

@@ -121,7 +121,7 @@ def real_poses(closed: Closed, machines: Array) -> RealPoses:
 
 
 def _real_poses(known: Generic, machines: Array, first: int) -> RealPoses:
-    """Return the real poses of machines, by up to `_TRIALS` random turns of each machine."""
+    """Return all real poses of machines (B, k, 7), up to `_TRIALS` random rotations of each."""
     rng = np.random.default_rng(1)
     remaining, move = np.arange(len(machines)), np.zeros(len(machines), dtype=bool)
     which, poses = np.empty(0, dtype=np.int64), np.empty((0, known.closed.size))
@@ -200,7 +200,7 @@ def follow_paths(
 
 
 def _track_paths(step: _Step, target: Array, z: Array, d: int) -> tuple[Array, NDArray[np.bool_]]:
-    """Return the ends (K, 2 d) of paths from z to machines, real parts first."""
+    """Return the ends (K, 2 d) of paths from z to target machines; whether each arrived (K,)."""
     at = _initial_states(z)
     at, _ = step(at, target)  # for dz/dt
     at[:, 4 * d : 8 * d] = at[:, : 4 * d]
@@ -248,7 +248,7 @@ def _all_differ(ends: Complex) -> NDArray[np.bool_]:
 
 
 def _candidates(ends: Complex, arrived: NDArray[np.bool_]) -> tuple[NDArray[np.int64], Array]:
-    """Return the machines' numbers (K,) and ends z (K, d), of (B, N, d), that may be real."""
+    """Return machine indices (K,) and ends z (K, d), of path ends (B, N, d), that may be real."""
     turned = _largest_real(ends)
     real = arrived & (np.abs(turned.imag).max(axis=-1) <= _REAL)
     return np.nonzero(real)[0], normalise_rows(turned.real[real])

@@ -105,7 +105,7 @@ def row_frame(robot: Manipulator, poses: Array) -> RowFrame:
 
 
 def normalise_rows(twists: Array, arm: Array, length: float) -> tuple[Array, Array]:
-    """Return rows (K, n, 6) of unit forces in (v, L omega), and their divisors (K, n).
+    """Return force rows (K, n, 6) scaled to unit size, moments over `length`, and divisors (K, n).
 
     A leg that turns the platform alone has a unit couple, force times L.
     """
@@ -117,7 +117,7 @@ def normalise_rows(twists: Array, arm: Array, length: float) -> tuple[Array, Arr
 
 
 def least_singular_values(robot: Manipulator, poses: Array) -> Array:
-    """Return the least singular value (K,) of the unit rows at poses; NaN out of reach."""
+    """Return the least singular value (K,) of the unit Jacobian rows at poses; NaN out of reach."""
     rows = unit_rows(robot, poses).rows
     least = np.full(len(rows), np.nan)
     good = np.isfinite(rows).all(axis=(1, 2))

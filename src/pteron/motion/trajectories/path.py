@@ -229,7 +229,7 @@ def return_path(path: Path) -> BackPath:
 
 
 def poses_of(path: Path, count: int) -> tuple[Array, Array]:
-    """Return about `count` values of s (K,) along a path, its rests included, and poses (K, m)."""
+    """Return about `count` arc lengths s (K,), m, along a path with its rests; poses (K, m)."""
     spans = np.diff(path.rests)
     parts: Sequence[Array] = [
         np.linspace(a, b, max(2, int(np.ceil(count * (b - a) / spans.sum()))), endpoint=False)
