@@ -18,7 +18,7 @@ from pteron.tolerances import ROUNDING
 
 
 def constraint_rows(machine: Machine, state: State) -> Expression | None:
-    """Return the couples' rows (K, u) on the rotations they constrain; None if a leg's is unknown.
+    """Return couples' rows (K, u) on the rotations that they constrain; None if unknown.
 
     The columns are the turns of the platform: all three where it does not turn, those across its
     axis k where it does or where the machine is planar. Then come the turns about k of its parts
@@ -63,7 +63,7 @@ def _may_act_along(couple: Expression, axis: Expression) -> bool:
 
 
 def constraint_measure(machine: Machine, state: State) -> Expression:
-    """Return the constraint measure: 1 in size at best, 0 at a constraint singularity.
+    """Return the constraint measure, no unit: 1 in size at best, 0 at a constraint singularity.
 
     It is the volume that the couples span, each of length 1 or less, over the largest: det R of as
     many couples as turns, with its sign, else the root of det R^T R.

@@ -23,7 +23,7 @@ class PassiveJoint(NamedTuple):
 
 
 def passive_friction(machine: Machine, state: State) -> Expression:
-    """Return, for a unit coefficient in each passive joint, the actuator forces (n, columns).
+    """Return actuator forces (n, columns) for a unit friction coefficient in each passive joint.
 
     By virtual work: a joint at the rate q' with the coefficient c needs J^T F = c (dq'/dx')^T q'.
     Columns are the passive joints of leg 1 that move with its point, of leg 2, ...; where legs have
@@ -46,13 +46,13 @@ def passive_friction(machine: Machine, state: State) -> Expression:
 
 @lru_cache(maxsize=64)
 def passive_joints(robot: Manipulator) -> tuple[PassiveJoint, ...]:
-    """Return the passive joint of each column of `passive_friction`."""
+    """Return the passive joint that each column of `passive_friction` belongs to."""
     machine = Machine.numeric(robot)
     return _moving_passive_joints(machine.state(ca.SX.sym("pose", machine.freedom)))
 
 
 def _moving_passive_joints(state: State) -> tuple[PassiveJoint, ...]:
-    """Return the moving passive joints; all that turn with the platform alone count as the last."""
+    """Return the passive joints that move; all that turn with the platform alone count as one."""
     passive, turning = [], []
     for i, leg in enumerate(state.legs, start=1):
         for k, joint in enumerate(leg.chain):

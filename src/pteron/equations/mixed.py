@@ -25,7 +25,7 @@ def mixed_forces(
     reference_accelerations: Expression,
     parameters: Expression,
 ) -> Expression:
-    """Return F (n, K) with J^T F = M a + C(x, v) w + g, for the columns of parameters (N, K).
+    """Return drive forces (n, K) of M a + C(x, v) w + g with different rates v and w.
 
     J v = `rates`, J w = `reference_rates`, and a is such that the joints' acceleration
     J a + J'(x, v) w is `reference_accelerations`; these are (n, 1) each. Where the reference rates

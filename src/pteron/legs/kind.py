@@ -189,7 +189,7 @@ class LegKind(ABC):
         return replace(self, **{key: length}) if key in self.every_key() else None
 
     def with_zero(self, zero: float) -> Self | None:
-        """Return the leg with its coordinate counted from `zero`, m or rad: q becomes q - zero.
+        """Return the leg with its coordinate counted from `zero`, m or rad, or None.
 
         Limits and a `reading` are shifted with it, so that the drive's readings stay the same. None
         where the geometry cannot represent a zero, such as a ram's length.
@@ -217,7 +217,7 @@ class LegKind(ABC):
 
     @property
     def goes_round(self) -> bool:
-        """Whether a full turn of its joint leads to the same pose, as a crank's does."""
+        """Whether a full turn of the actuated joint gives the same pose, as a crank's does."""
         return self.joint.unit == "rad" and not self.follows_angle
 
     @property
@@ -233,7 +233,7 @@ class LegKind(ABC):
         """
 
     def couples(self, motion: LegMotion, axis: Vector | None) -> Sequence[Expression] | None:
-        """Return the constraint couples (3, 1), of length 1 or less, of the leg.
+        """Return the leg's constraint couples (3, 1) on the platform, each of length 1 or less.
 
         They constrain rotations of the part of the platform that it carries; each vanishes where it
         loses its effect. `axis` is as in `free_axes`. None where the file does not define them.
@@ -322,11 +322,11 @@ class LegKind(ABC):
 
     @property
     def extents(self) -> dict[str, tuple[str, float, float, str]]:
-        """The usual range of x of each body's mass: TOML key, least, greatest, what ends there."""
+        """Usual x of each body's centre of mass, by letter: TOML key, low, high (m), end names."""
         return {}
 
     def center_of_mass_warning(self, letter: str, x: float) -> str | None:
-        """Return a warning about a centre of mass at x, m, beyond its body's ends; None within."""
+        """Return a warning if a body's centre of mass at x, m, lies beyond the body's ends."""
         if letter not in self.extents:
             return None
         _, low, high, ends = self.extents[letter]
@@ -377,7 +377,7 @@ class LegKind(ABC):
         yield from ()
 
     def equations(self, values: Mapping[str, Expression] | None = None) -> LegEquations:
-        """Return its equations, for its geometry or for other values of its quantities."""
+        """Return the leg's equations, for its own geometry or other `values` of its quantities."""
         if values is None:
             values = {q.name: ca.SX(ca.DM(list(q.value))) for q in self.quantities}
         return self.equations_class(**values)

@@ -267,7 +267,7 @@ class LegEquations(ABC):
 
     @abstractmethod
     def locus(self, q: Expression) -> Locus:
-        """Return the locus of c while the actuated joint is at q."""
+        """Return the locus of the platform point c while the actuated joint is held at q."""
 
     def exported_terms(self, point: PointMotion, rotation: RotationMotion) -> dict[str, Expression]:
         """Return intermediate quantities of the leg's equations by name, for exported code."""

@@ -122,7 +122,7 @@ class PRRR(LegKind):
         )
 
     def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
-        """Return the axes of R3 and, if the platform turns, of the joint along its axis."""
+        """Return the axes of platform rotations that the leg leaves free: R3's and `axis`."""
         return (self.direction,) if axis is None else (self.direction, axis)
 
     def passive_joints(
@@ -181,7 +181,7 @@ class PRRR(LegKind):
     def draw_closure(
         cls, values: Mapping[str, Sequence[Fraction]], rng: Random
     ) -> tuple[list[Fraction], int]:
-        """Draw the directions of the links in the leg's plane; the triangle then closes."""
+        """Return a random rational platform point, the sum of two links, and the elbow's sign."""
         return random_triangle(values, rng)
 
 

@@ -54,7 +54,7 @@ class PSS(RodLeg, SlideLeg):
 
     @property
     def _counting_axis(self) -> Vector:
-        """The first axis of the rod's universal joints: the bar of parallel rods.
+        """The unit vector of the first axis of the rod's universal joints: that of the rods' bar.
 
         A single rod's is across the guide: universal joints about it are singular where the rod
         lies along it, and there the leg is singular anyway (type I).

@@ -73,7 +73,7 @@ class RPR(RamLeg):
         return (self.plane_normal,)
 
     def transfers(self, gravity: Vector) -> tuple[LegTransfer, ...]:
-        """Return the transfers of a cylinder on a fixed axis and of two bodies that turn alike."""
+        """Return how inertial parameters of cylinder and piston transfer to others, and why."""
         transfer_list = [
             LegTransfer("the cylinder{} turns about a fixed axis", {("m", "u"): (1, ())}),
             LegTransfer(

@@ -68,7 +68,7 @@ class RRR(CrankLeg):
     def draw_closure(
         cls, values: Mapping[str, Sequence[Fraction]], rng: Random
     ) -> tuple[list[Fraction], int]:
-        """Draw the directions of the links; the triangle then closes."""
+        """Return a random rational platform point, the sum of two links, and the elbow's sign."""
         return random_triangle(values, rng)
 
 

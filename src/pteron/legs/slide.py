@@ -152,7 +152,7 @@ class SlideEquations(LegEquations):
         """Return the link's motion, the joints after the slider, the link's angular motion."""
 
     def _closure_terms(self, c: Expression) -> tuple[Expression, Expression, Expression]:
-        """Return w, h = w . e and ll^2 - |w - h e|^2, with |w - h e| the distance c to guide."""
+        """Return w = c - r, h = w . e, and ll^2 minus the squared distance of c to the guide."""
         w, e = self.to_link_space(c - self.r), self.to_link_space(self.e)
         h = ca.dot(w, e)
         perpendicular = w - h * e

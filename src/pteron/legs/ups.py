@@ -105,7 +105,7 @@ class UPS(RamLeg):
         return ca.SX(3, 1)
 
     def transfers(self, gravity: Vector) -> tuple[LegTransfer, ...]:
-        """Return the transfers of a cylinder on a fixed point and of two bodies that turn alike."""
+        """Return how inertial parameters of cylinder and piston transfer to others, and why."""
         return (
             LegTransfer("the cylinder{} turns about a fixed point", {("m", "u"): (1, ())}),
             LegTransfer(
@@ -144,7 +144,7 @@ class UPSEquations(LegEquations):
         self.r, self.d = guide_point, direction
 
     def change_frame(self, axes: Expression, origin: Expression) -> UPSEquations:
-        """Return the leg in axes that are the columns of (3, 3), about an origin (3, 1)."""
+        """Return the leg's equations in axes, the columns of (3, 3), about an origin (3, 1)."""
         guide = ca.mtimes(axes.T, self.r) - ca.mtimes(axes.T, origin)
         return UPSEquations(guide, ca.mtimes(axes.T, self.d), ca.SX(1))
 
@@ -209,7 +209,7 @@ class UPSEquations(LegEquations):
         gravity: Expression,
         inertia: Mapping[str, Moments],
     ) -> Needs:
-        """Return the required forces of cylinder and piston; those along the ram at the joint.
+        """Return the forces that cylinder and piston require, axial ones at the joint.
 
         With P_n = 1 - n n^T, beside the mass that rides: m gamma_l n'' + P_n ((I_u + I_l) n'' - m
         gamma_u g + m gamma_l (c'' - g)) / L. As P_n n'' = P_n (c'' - 2 L'/L c') / L that is P_n x -
