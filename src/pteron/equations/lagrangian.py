@@ -54,7 +54,7 @@ def kinetic_energy(
 
 
 def potential_energy(machine: Machine, pose: Expression, parameters: Expression) -> Expression:
-    """Return V = - sum m g . (centre of mass), zero for bodies at the base frame's origin."""
+    """Return the potential energy in gravity, J; zero for bodies at the base frame's origin."""
     legs, inertia = machine.moments(parameters)
     state = machine.state(pose)
     total = machine.platform.mass_moment(state.platform, inertia)

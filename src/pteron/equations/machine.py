@@ -98,7 +98,7 @@ class Machine:
         quantities: dict[str, Any],
         gravity: Expression,
     ) -> Machine:
-        """Return the equations of a machine from those of its legs and its platform's geometry."""
+        """Return a machine's equations from its legs' equations and its platform's geometry."""
         quantities = {**quantities, "planes": [leg.holds for leg in legs]}
         platform = robot.platform.kind(frame, points, fixed, quantities)
         closure = kind_for([type(leg) for leg in legs], type(platform))

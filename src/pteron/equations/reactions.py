@@ -123,7 +123,7 @@ class Beams(NamedTuple):
 
 
 def beams(machine: Machine, state: State) -> Beams:
-    """Return upper and lower link vectors, platform points and rod couples of all legs."""
+    """Return start point, vector and bending axis of every link of the legs; the rods' couples."""
     links = Beams([], [], [], [])
     for leg, motion in zip(machine.robot.legs, state.legs, strict=True):
         rows = []

@@ -62,7 +62,7 @@ class DriveKind:
 
     @property
     def extra_states(self) -> tuple[tuple[str, str], ...]:
-        """The states beyond pose and velocity, each (n,), and the names of their rates."""
+        """Names of the drives' extra states, (n,) each, and of their time derivatives."""
         bends = ("motor", "motor_rate"), ("motor_rate", "motor_growth")
         lag_states = [("current", "change")] * any(self.lag) + [("bristle", "yield")] * any(
             self.lugre

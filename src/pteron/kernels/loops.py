@@ -40,7 +40,7 @@ Arrays = dict[str, Array]
 def _pieces(
     arrays: Mapping[str, Array], samples: int, counts: Sequence[int], machines: int
 ) -> Iterator[tuple[Mapping[str, Array], int, Sequence[int]]]:
-    """Yield the pieces of a run: arrays, number of samples and `counts` of each."""
+    """Yield pieces of a run that are short enough to interrupt: arrays, samples, counts."""
     *fixed, first, end = counts
     size = max(1, _PIECE // (max(1, machines) * max(1, sum(counts[:PARTS]))))
     if size >= samples:
@@ -85,7 +85,7 @@ class Loop:
 
     @property
     def is_compiled(self) -> bool:
-        """Whether the steps run in C."""
+        """Whether the integration steps run as compiled C."""
         return os.environ.get(VARIABLE) != "vm" and c_compiler() is not None
 
     def run(
@@ -98,7 +98,7 @@ class Loop:
         threads: int = 1,
         go: Callable[..., None] | None = None,
     ) -> None:
-        """Run some samples, and change and fill `arrays`, each (B or 1, T or 1, size), in place.
+        """Simulate a number of samples; arrays (B or 1, T or 1, size) are changed in place.
 
         Parameters
         ----------
@@ -138,7 +138,7 @@ class Loop:
         ended = Event()
 
         def part(start: int, stop: int) -> None:
-            """Run the machines `start` to `stop`, piece by piece, until the run is ended."""
+            """Simulate the machines `start` to `stop`, piece by piece, until `ended` is set."""
             cut = {n: a[start:stop] if len(a) == batch else a for n, a in arrays.items()}
             for piece, size, numbers in _pieces(cut, samples, counts, stop - start):
                 if ended.is_set():
@@ -155,7 +155,7 @@ class Loop:
                 ended.set()
 
     def idle(self, robot: Manipulator, state: Array, late: int = 0, behind: int = 0) -> Arrays:
-        """Return `run`'s arrays for states (B, 1, Y) without loads, limits or encoders.
+        """Return the arrays of `run` for states (B, 1, Y) without loads, limits or encoders.
 
         Commands are so many samples late, and readings so many behind.
         """
@@ -178,7 +178,7 @@ class Loop:
         }
 
     def _can_run(self, lanes: int) -> bool:
-        """Return whether the steps run in C; False if the compiler fails."""
+        """Return whether the steps can run in C; False if the compiler fails."""
         if not self.is_compiled:
             return False
         try:
@@ -188,7 +188,7 @@ class Loop:
         return True
 
     def code(self, lanes: int) -> LoopCode:
-        """Return its C for some machines side by side."""
+        """Return the loop's C code for `lanes` machines side by side."""
         return _code(self.plant, self.sensed, self.law, self.kind, lanes, self.linked)
 
     def run_on_device(
@@ -198,7 +198,7 @@ class Loop:
         times: Sequence[float],
         counts: Sequence[int],
     ) -> None:
-        """Run some samples on an NVIDIA GPU, one thread a machine; the parameters are `run`'s.
+        """Simulate a number of samples on an NVIDIA GPU, one thread a machine.
 
         Raises
         ------
@@ -218,12 +218,12 @@ def loop(
     linked: LinkedLaw | None = None,
     general: bool = False,
 ) -> Loop:
-    """Return the loop of a machine under a controller, or under given forces; see `Loop`."""
+    """Return the simulation loop of a machine under a control law or given forces."""
     return Loop(robot, law, linked, general)
 
 
 def machine_numbers(robot: Manipulator, part: Program, name: str) -> dict[str, Array]:
-    """Return a machine's own numbers for a program of the loop, as `Loop.run` takes them."""
+    """Return a machine's parameters as arrays by name, for a program of the loop."""
     return {
         f"{name}_{port.name}": _numbers(robot, port.name)
         for port in part.inputs
@@ -233,7 +233,7 @@ def machine_numbers(robot: Manipulator, part: Program, name: str) -> dict[str, A
 
 @lru_cache(maxsize=256)
 def _numbers(robot: Manipulator, what: str) -> Array:
-    """Return the numbers of a machine for an input, (1, 1, k), read-only and cached."""
+    """Return a machine's parameters for the input `what`, (1, 1, k), read-only and cached."""
     array = FIXED[what](robot).reshape(1, 1, -1)
     array.setflags(write=False)  # all runs of the machine read it
     return array

@@ -38,7 +38,7 @@ class Jitted(ArrayKernel):
 
     @cached_property
     def source(self) -> str:
-        """The Python code."""
+        """The Python source of the Numba function."""
         graph = graph_of(with_lowered_exponentials(self.function), self.ports)
         return _source(self.name, graph, self.ports, self.outputs)
 
