@@ -150,7 +150,7 @@ class Block:
 
     @cached_property
     def _passed_rows(self) -> dict[int, int]:
-        """The rows of `kept`, by node: values of the first part that the second reads."""
+        """Rows of the C array `kept`, by graph node: first-part values that the second needs."""
         if not self.split:
             return {}
         graph = self._graph
@@ -170,7 +170,7 @@ class Block:
         return {k: row for row, k in enumerate(sorted(read & self._shared_nodes))}
 
     def _names(self) -> list[str]:
-        """Return each node's name in C: an element of the inputs, a constant or a variable."""
+        """Return the C expression of each graph node: an input's element, literal or variable."""
         ports = self.program.inputs
 
         def name(i: int, j: int) -> str:
