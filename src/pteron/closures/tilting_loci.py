@@ -32,13 +32,13 @@ class TiltingLoci(Closure):
 
     @property
     def modes(self) -> int:
-        """The most poses of joint coordinates: 40 of six legs, 16 of a tripod, 8 where P stays."""
+        """The greatest number of poses of joint coordinates: 40 (six legs), 16 (tripod) or 8."""
         if len(self.legs) == 6:
             return 40
         return 16 if "z" in self.platform.coordinates else 8
 
     def poses(self, joints: Expression) -> Expression:
-        """Raise ModelError: there is no closed form."""
+        """Raise ModelError: these machines have no closed-form direct kinematics."""
         raise ModelError(
             "direct_kinematics: these legs have no closed form of it under a platform that tilts; "
             '"direct_step" follows the pose from one that is near'
@@ -50,7 +50,7 @@ class TiltingLoci(Closure):
         rows: Sequence[Expression],
         sizes: Sequence[Expression] | None = None,
     ) -> Expression:
-        """Return the type-II measure of the forces that the legs and the platform's planes exert.
+        """Return the type-II measure, no unit, of the legs' rows (1, 6) and the platform's planes.
 
         It is the determinant of their rows in (v, omega) of P, or omega where P stays, each row a
         unit force, over an upper bound of the determinant of as many unit forces on these points.
@@ -70,7 +70,7 @@ class TiltingLoci(Closure):
     def measure_squares(
         self, platform: PlatformMotion, legs: Sequence[LegMotion]
     ) -> list[Expression]:
-        """Return the measure's square by the determinant, and by the LQ factors of `forces`."""
+        """Return equivalent expressions of the squared type-II measure, to choose the cheapest."""
         squares = super().measure_squares(platform, legs)
         if len(legs) == 6:
             bound = reduce(mul, (leg.wrench_size for leg in legs), self._bound(1))

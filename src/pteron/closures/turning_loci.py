@@ -45,7 +45,7 @@ class TurningLoci(Closure):
 
     @property
     def modes(self) -> int:
-        """The degree of the polynomial that elimination leaves."""
+        """The greatest number of poses with the same joint coordinates."""
         return self._mode_count
 
     def poses(self, joints: Expression) -> Expression:

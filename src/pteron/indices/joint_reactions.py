@@ -67,7 +67,7 @@ class Reactions(Result):
 
     @property
     def is_unique(self) -> bool:
-        """Whether statics alone determine the reactions."""
+        """Whether statics alone determine the joint reactions (no self-stress)."""
         return self.redundancy == 0
 
     unique = former_attribute("unique", "is_unique")
@@ -185,7 +185,7 @@ def _solve_reactions(
     wrench: Array,
     moment: Array,
 ) -> tuple[Array, Array, Array, Array, int]:
-    """Return points, joint wrenches (B, n, j, 6), actuator forces, residual, self-stress count.
+    """Return joint points, wrenches (B, n, j, 6), actuator forces, residual, self-stress count.
 
     Where a self-stress leaves the wrenches undetermined, the minimum-norm solution is taken.
     """
@@ -229,7 +229,7 @@ def _solve_reactions(
 
 
 def _names(robot: Manipulator) -> tuple[tuple[str, ...], ...]:
-    """Return the joints' names, of the paper: P0 and R1 to R4."""
+    """Return the names of each leg's joints: "P0", "R1" and so on, as in the paper."""
     machine = Machine.numeric(robot)
     legs = machine.state(ca.SX.zeros(robot.freedom)).legs
     return tuple(tuple(f"{joint.kind}{k}" for k, joint in enumerate(leg.chain)) for leg in legs)

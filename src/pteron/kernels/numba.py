@@ -57,7 +57,7 @@ class Jitted(ArrayKernel):
 
     @cached_property
     def _module(self) -> ModuleType:
-        """The compiled module, from the cache or written on demand."""
+        """The Python module with the compiled function, from the cache or written on demand."""
         name = self._entry
 
         def build(folder: Path) -> None:

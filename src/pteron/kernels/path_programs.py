@@ -35,7 +35,7 @@ def path_kernel(closed: Closed, start: Parts | None) -> TieredKernel:
     count = closed.numbers
 
     def build() -> Program:
-        """Return the program of a step along the path: next state, remaining correction."""
+        """Build the program of a path step: from a path state to the next, with its correction."""
         at = ca.SX.sym("at", closed.path_state_size)
         ends, inputs = [], {"at": at}
         for name, fixed in (("start", start), ("target", None)):

@@ -203,7 +203,7 @@ class VirtualMachine(ArrayKernel):
         return copies[0] if len(copies) == 1 else copies
 
     def _run(self, batch: int, inputs: Sequence[Array], outputs: Sequence[Array]) -> None:
-        """Fill `outputs`: batches by the interpreter, what remains by functions of few states."""
+        """Fill `outputs` for a batch of states: most by the interpreter, the rest by CasADi."""
         shared = tuple(i for i, port in enumerate(self.ports) if port.shared)
         function = self._lowered_function
         remainder = batch % LENGTH

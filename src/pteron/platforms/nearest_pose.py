@@ -29,7 +29,7 @@ _SINGULAR = 1e-12
 
 
 def nearest_pose(platform: Platform, position: Array, rotation: Array) -> Array:
-    """Return the pose (..., m) with a position (..., 3) of P and a rotation, if one exists.
+    """Return the pose (..., m) nearest to a position of P (..., 3) and a rotation (..., 3, 3).
 
     Where the motion cannot have them it is a pose near to them. Roll, or rz, is 0 where the angles
     are singular.
@@ -42,7 +42,7 @@ def nearest_pose(platform: Platform, position: Array, rotation: Array) -> Array:
 
 
 def pose_nearest_frame(platform: Platform, pose: Array, axes: Array) -> Array:
-    """Return the pose (m,) near `pose` whose axes are nearest to a frame's.
+    """Return the pose (m,) near `pose` whose platform axes are nearest to `axes` (3, 3).
 
     `axes` (3, 3) are the frame's, one a row, not necessarily feasible for the platform; the sum of
     squared differences is minimised by Gauss-Newton; a single angle turns x to the frame's.
@@ -68,7 +68,7 @@ def pose_nearest_frame(platform: Platform, pose: Array, axes: Array) -> Array:
 
 
 def _angles(platform: Platform, rotation: Array) -> tuple[Array, ...]:
-    """Return the pose's angles (...), in order."""
+    """Return the platform's angles (...) for a rotation, rad, in the pose's order."""
     if not platform.angles:
         return ()
     if platform.second_axis is not None:
@@ -85,7 +85,7 @@ def _angles(platform: Platform, rotation: Array) -> tuple[Array, ...]:
 
 
 def _roll_pitch_yaw(matrix: Array) -> tuple[Array, Array, Array]:
-    """Return the angles of Rz(yaw) Ry(pitch) Rx(roll)."""
+    """Return roll, pitch and yaw, rad, of matrices Rz(yaw) Ry(pitch) Rx(roll)."""
     cosine = np.hypot(matrix[..., 0, 0], matrix[..., 1, 0])
     pitch = np.arctan2(-matrix[..., 2, 0], cosine)
     is_singular = cosine < _SINGULAR
