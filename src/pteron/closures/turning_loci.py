@@ -49,7 +49,7 @@ class TurningLoci(Closure):
         return self._mode_count
 
     def poses(self, joints: Expression) -> Expression:
-        """Return the poses as columns (m, k), if a leg determines phi or all loci are planes."""
+        """Return every pose of joint coordinates as columns (m, k); closed-form layouts only."""
         loci = [leg.locus(q) for leg, q in zip(self.legs, ca.vertsplit(joints), strict=True)]
         offsets = self.platform.offsets
         for angle_locus in loci:

@@ -9,7 +9,7 @@ _Array = NDArray[np.float64]
 
 
 def mass_with_rotors(rows: _Array, mass: _Array, rotors: _Array) -> _Array:
-    """Return M + J^T D J (..., m, m), D being the rotors' inertias (..., n) at the joints."""
+    """Return mass matrices with rotor inertias, M + J^T D J (..., m, m)."""
     return np.asarray(mass + (rows.mT * rotors[..., None, :]) @ rows)
 
 
@@ -22,6 +22,6 @@ def joint_mobilities(rows: _Array, mass: _Array) -> _Array:
 
 
 def moved_inertias(rows: _Array, mass: _Array) -> _Array:
-    """Return the inertias (..., n) of joints with the others locked: diag(J^-T M J^-1)."""
+    """Return the inertia (..., n) at each joint, kg or kg m^2, with the other joints locked."""
     inverse = np.linalg.inv(rows)
     return np.asarray(np.einsum("...ai,...ab,...bi->...i", inverse, mass, inverse))

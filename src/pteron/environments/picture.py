@@ -28,12 +28,12 @@ class EnvironmentPicture:
 
     @cached_property
     def _guides(self) -> tuple[Guide, ...]:
-        """The guides of the machine's joints, from random poses of the world."""
+        """The paths of the machine's actuated joints, over random poses."""
         generators = [np.random.default_rng(seed) for seed in range(_POSES)]
         return joint_guides(self._world.robot, self._world.start_episodes(generators, None).pose)
 
     def render(self, state: EpisodeState) -> NDArray[np.uint8]:
-        """Return pixels (height, width, 3) of a state (m,), with a line from tool to target.
+        """Return pixels (height, width, 3) of the machine in a state, with a line to its target.
 
         All pictures have the size of the one in which the machine is at home.
         """
@@ -43,7 +43,7 @@ class EnvironmentPicture:
 
     @cached_property
     def _size(self) -> tuple[float, float]:
-        """The width and height of the figure of the machine at home, in inches."""
+        """Width and height of the figure with the machine at home, in inches."""
         width, height = self._drawn(self._world.home, self._world.home).get_size_inches()
         return float(width), float(height)
 

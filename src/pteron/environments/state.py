@@ -34,5 +34,5 @@ class EpisodeState:
         return EpisodeState(*columns)
 
     def row(self, i: int) -> EpisodeState:
-        """Return the state of one machine."""
+        """Return the state of episode number i."""
         return EpisodeState(*(getattr(self, part.name)[i] for part in fields(self)))

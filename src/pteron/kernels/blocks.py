@@ -105,7 +105,7 @@ class Block:
         return [*lines, *(f"out[{row}][k] = {names[k]};" for row, k in self._results(later=True))]
 
     def _results(self, *, later: bool) -> list[tuple[int, int]]:
-        """Return rows of `out` and their nodes, of one of the parts."""
+        """Return (row of `out`, graph node) pairs of the second part if `later`, else of part 1."""
         return [
             (self.output_rows[(self.later or {}).get(port.name, port.name)] + i, k)
             for port, part in zip(self.program.outputs, self._graph.outputs, strict=True)

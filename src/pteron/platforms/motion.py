@@ -217,7 +217,7 @@ class PlatformEquations(ABC):
     def motion(
         self, pose: Expression, velocity: Expression, acceleration: Expression
     ) -> PlatformMotion:
-        """Return the motion of the platform and of its points."""
+        """Return the motion of platform and points at a pose, with its rates and second rates."""
 
     @abstractmethod
     def needs(

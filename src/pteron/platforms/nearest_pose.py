@@ -99,7 +99,7 @@ def _roll_pitch_yaw(matrix: Array) -> tuple[Array, Array, Array]:
 
 
 def _universal_angles(first: Array, second: Array, rotation: Array) -> tuple[Array, Array]:
-    """Return the angles of Rot(first, alpha) Rot(second, beta)."""
+    """Return the angles (alpha, beta), rad, of rotations Rot(first, alpha) Rot(second, beta)."""
     alpha = _angle_about(first, second, rotation @ second)
     # In the base frame the second axis is R b, and its normal turns about it by beta.
     second_now = rotation @ second
@@ -109,13 +109,13 @@ def _universal_angles(first: Array, second: Array, rotation: Array) -> tuple[Arr
 
 
 def _angle_about(axis: Array, start: Array, end: Array) -> Array:
-    """Return the angle (...) about an axis that takes one vector to another, both normal to it."""
+    """Return the angle (...), rad, about `axis` that takes `start` to `end`, both normal to it."""
     sine = (axis * np.cross(start, end)).sum(axis=-1)
     cosine = (start * end).sum(axis=-1) - (axis * start).sum(axis=-1) * (axis * end).sum(axis=-1)
     return np.asarray(np.arctan2(sine, cosine))
 
 
 def _rotate(axis: Array, angle: Array, vector: Array) -> Array:
-    """Return a vector normal to an axis (3,), rotated about it."""
+    """Return a vector (3,) normal to an axis (3,), rotated about it by angles (...), rad."""
     cosine, sine = np.cos(angle)[..., None], np.sin(angle)[..., None]
     return np.asarray(cosine * vector + sine * np.cross(axis, vector))

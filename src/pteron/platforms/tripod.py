@@ -109,13 +109,13 @@ class Tripod(Tilting):
         return self.assemble_motion(PointMotion(place, dp, ddp), turned, twist, None)
 
     def plane_wrenches(self, motion: PlatformMotion) -> Expression:
-        """Return the wrenches (3, 6) with which the planes constrain their points, about P."""
+        """Return the unit wrenches (3, 6) about P by which the planes hold their points."""
         normals = [plane.normal.T for plane in self.planes]
         pairs = zip(normals, motion.point_twists, strict=True)
         return ca.vertcat(*(ca.mtimes(n, shift[:3, :]) for n, shift in pairs))
 
     def constraint(self, motion: PlatformMotion) -> Expression:
-        """Return the constraint measure of x, y and yaw: 0 at a constraint singularity.
+        """Return the constraint measure of x, y and yaw, 1 at best: 0 at a constraint singularity.
 
         It is the determinant of the planes' forces and moments about k over its upper bound.
         """
