@@ -48,7 +48,7 @@ class EnvironmentPicture:
         return float(width), float(height)
 
     def _drawn(self, pose: Array, target: Array) -> Figure:
-        """Return the figure of the machine in a pose, with a line from its tool to the target."""
+        """Return the figure of the machine at a pose (m,), with a line from tool to target."""
         robot = self._world.robot
         points = joint_points(robot, pose)
         figure = robot_figure(

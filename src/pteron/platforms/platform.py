@@ -131,7 +131,7 @@ class Platform:
 
     @property
     def keeps_points_in_planes(self) -> bool:
-        """Whether planes, in which its legs keep its points, fix its dependent coordinates."""
+        """Whether legs keep platform points in planes, which fix the other coordinates."""
         return self.kind.keeps_points_in_planes
 
     @property
@@ -215,7 +215,7 @@ class Platform:
 
     @property
     def payload_axes(self) -> str:
-        """Axes of its frame along which a payload's centre of mass matters to its forces.
+        """Platform axes, such as "xy", along which a payload's centre of mass changes forces.
 
         "" where it does not turn, or where a payload is on its axis, as on one that slides.
         """
@@ -223,7 +223,7 @@ class Platform:
 
     @property
     def carries_on_axis(self) -> bool:
-        """Whether a payload counts as on its axis: phi moves it, and no arm of it turns."""
+        """Whether a payload counts as on the axis: the pose has an angle, no arm turns with it."""
         return bool(self.angles) and not self.payload_axes
 
     @property
@@ -271,7 +271,7 @@ class Platform:
 
     @property
     def spin_axis(self) -> Vector | None:
-        """The axis about which `spin_angle` turns the platform at every pose.
+        """The axis about which `spin_angle` turns the platform at every pose, or None.
 
         None if it is not fixed.
         """
@@ -288,7 +288,7 @@ class Platform:
         return len(self.coordinates) == 6
 
     def has_points_in_line(self, points: NDArray[np.float64]) -> bool:
-        """Return whether it turns about an axis through platform points (k, 3), up to rounding."""
+        """Return whether the platform turns about a line that has all points (k, 3)."""
         size = ROUNDING * max(float(np.abs(points).max()), ROUNDING)
         if not self.tilts:
             return bool(np.ptp(points[:, :2], axis=0).max() <= size)
@@ -364,7 +364,7 @@ class Platform:
         velocities: NDArray[np.float64],
         accelerations: NDArray[np.float64],
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Return position, velocity and acceleration (..., 3) of the tool's centre point."""
+        """Return position, velocity, acceleration (..., 3) of the tool point in a motion."""
         parts = poses, velocities, accelerations
         rows = [np.asarray(part, dtype=float).reshape(-1, part.shape[-1]).T for part in parts]
         place, first, second = (
@@ -393,7 +393,7 @@ class Platform:
 
     @property
     def turning_keys(self) -> tuple[str, ...]:
-        """Names of the points and directions about which the platform turns, if not set by legs.
+        """Names of the points and directions about which the platform turns, if legs fix none.
 
         The legs determine those of a planar platform.
         """
@@ -404,7 +404,7 @@ class Platform:
         return ("axis",) if self.turns and not self.slides and not self.planar else ()
 
     def expressions(self) -> dict[str, Any]:
-        """The `quantities` as CasADi expressions, and the planes that hold platform points."""
+        """Return the `quantities` by name, and planes that hold points, as CasADi expressions."""
         quantities: dict[str, Any] = {name: _column(v) for name, v in self.quantities.items()}
         planes = [HeldPlane(_column(n), _column(r)) for n, r, _ in self.planes]
         return {**quantities, "planes": planes} if planes else quantities
@@ -419,7 +419,7 @@ class Platform:
         return float(np.copysign(1.0, -(weights * (np.cross(normals, arms) @ k)).sum()))
 
     def arms(self, points: NDArray[np.float64], poses: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return vectors (..., k, 3) from P to platform points (k, 3), without fixed offsets."""
+        """Return vectors (..., k, 3), m, from P to points (k, 3) at poses, in the base frame."""
         if self.slides:
             return np.asarray(poses[..., -1:, None] * (points @ np.array(self.frame)))
         return np.asarray(points @ self.placement(poses)[1])
@@ -461,7 +461,7 @@ class Platform:
         return PlanarInertia(mass, (hx, hy), inertia)
 
     def with_total_inertia(self, inertia: PlanarInertia | SpatialInertia) -> Platform:
-        """Return the platform with this inertia for all of it, without separate parts."""
+        """Return the platform with `inertia` for all of it, without bars and geared parts."""
         return replace(self, inertia=inertia, bars=(), geared=())
 
     at = former_attribute("at", "placement")

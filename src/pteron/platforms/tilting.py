@@ -273,7 +273,10 @@ class _Centred(Tilting):
         return self.assemble_motion(place, turned, *self.basis(turned))
 
     def basis(self, turned: Rotation) -> tuple[Expression, Expression | None]:
-        """Return the matrix (6, k) of the quasi-velocities, and that from the angles' rates."""
+        """Return the twists (6, k) of unit quasi-velocities.
+
+        The matrix from angle rates to them.
+        """
         return ca.vertcat(ca.SX(3, 3), ca.SX.eye(3)), turned.axes
 
 
@@ -305,5 +308,5 @@ class Universal(_Centred):
         return {"alpha": self.quantities["first_axis"], "beta": self.quantities["second_axis"]}
 
     def basis(self, turned: Rotation) -> tuple[Expression, Expression | None]:
-        """Return the twists (6, 2) of unit rates of the angles; they are quasi-velocities."""
+        """Return the twists (6, 2) of unit angle rates (the quasi-velocities), and None."""
         return ca.vertcat(ca.SX(3, 2), turned.axes), None

@@ -48,7 +48,7 @@ class Tripod(Tilting):
         """(3, 1) a leg: P moves by the sum of them times n_i . v_i if plane i moves by v_i."""
 
     def _yaw(self, level: Expression) -> tuple[Expression, Expression]:
-        """Return the yaw's cosine and sine; `level` (3, 3) turns by roll and pitch."""
+        """Return cosine and sine of the yaw that follows from roll and pitch (`level`, (3, 3))."""
         k = self.frame[2]
         a, b, c = ca.SX(0), ca.SX(0), ca.SX(0)
         for weight, (n, r), arm in zip(self.weights, self.planes, self.arms, strict=True):

@@ -50,7 +50,7 @@ class Turning(PlatformEquations):
         return PlatformMotion(tuple(points), tuple(matrices), rotation, axes, body, at_p)
 
     def _matrix(self, lever: Expression) -> Expression:
-        """Return the matrix (6, m) of a point with this k x s."""
+        """Return the matrix (6, m) from pose rates to (v, omega) of a point, `lever` = k x s."""
         zero = ca.SX(3, self.directions.shape[1])
         return ca.blockcat([[self.directions, lever], [zero, self.frame[2]]])
 

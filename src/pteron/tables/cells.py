@@ -82,7 +82,7 @@ def best_cut(text: Sequence[str], declared: Dialect) -> Cut | None:
     ]
 
     def sense(rows: Cut) -> tuple[float, int, int]:
-        """Return a cut's share and number of numeric columns, and its cells that match."""
+        """Return a sort key: share and number of numeric columns, count of matching cells."""
         return len(rows.columns) / rows.width, len(rows.columns), rows.matched
 
     several = [rows for rows in cuts if len(rows.columns) > 1]

@@ -212,6 +212,6 @@ ENDINGS: dict[str, Callable[[pl.DataFrame, io.BytesIO, Dialect], None]] = {
 
 
 def _ending_fault(file: Path, noun: str) -> str:
-    """Return the text of the fault of a file's ending, with the valid endings."""
+    """Return a message that a file's ending is wrong, with the valid endings."""
     fault = f"unknown ending {shorten(file.suffix)}" if file.suffix else "no ending"
     return f"{fault}; a {noun}'s file ends in {' or '.join(ENDINGS)}"
