@@ -25,7 +25,7 @@ class PointMotion(NamedTuple):
 
 
 def point_rows(rows: Expression) -> Expression:
-    """Return rows (k, 6) in (c', omega) from rows (k, 3) in c' alone."""
+    """Return derivatives (k, 6) by (c', omega), from those (k, 3) by the velocity c' alone."""
     return ca.horzcat(rows, ca.SX(rows.shape[0], 3))
 
 

@@ -164,5 +164,5 @@ def plain_rows(platform: PlatformMotion, legs: Sequence[LegMotion]) -> Expressio
 
 
 def rows_in_quasi_velocities(platform: PlatformMotion, rows: Sequence[Expression]) -> Expression:
-    """Return legs' rows (1, 6) in (c', omega) as a matrix (n, m) in quasi-velocities."""
+    """Return the legs' Jacobian rows (n, m) by quasi-velocities, from those by (c', omega)."""
     return ca.vertcat(*(ca.mtimes(*pair) for pair in zip(rows, platform.matrices, strict=True)))

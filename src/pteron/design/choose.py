@@ -236,7 +236,7 @@ def evaluators_of(job: Job) -> dict[str, KindEvaluator]:
 
 
 def _has_drives(name: str, options: Mapping[str, Options], job: Job) -> bool:
-    """Return whether the list has gearboxes for all joints of a kind; raise if the job names it."""
+    """Return whether gearboxes exist for all joints of a kind; raise if the job names the kind."""
     units = {leg.joint.unit for leg in load(name).legs}
     lacking = [unit for unit in sorted(units) if not options[unit].all]
     if lacking and job.kinds is not None:

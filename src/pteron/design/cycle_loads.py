@@ -79,7 +79,7 @@ def _first_root(square: Array, line: Array, constant: Array) -> Array:
 
 
 def _best_fit(sizing: Sizing, leg: int, motor: Motor) -> MotorFit:
-    """Return the motor with the gear ratio of the greatest margin (limit over load; 1 suffices).
+    """Return the motor's fit at the gear ratio of its greatest margin (limit over load).
 
     Each limit allows an interval of ratios, so that the least of their margins has one maximum.
     """

@@ -166,7 +166,7 @@ class KindEvaluator:
         return rating
 
     def _judge_reach(self, rating: Rating) -> None:
-        """Rate reach, singularity measures and joint limits over the workspace.
+        """Rate reach, singularity measures and joint limits over the workspace, in `rating`.
 
         Set joints' travel.
         """

@@ -134,7 +134,7 @@ class DesignRows:
         plan: dict[str, Any],
         progress: Progress | None = None,
     ) -> pl.DataFrame:
-        """Return `function`'s rows for jobs.
+        """Return the table rows that `function` computes for jobs, in order.
 
         Those already stored in the folder `name` are reused.
         """

@@ -62,7 +62,7 @@ class Task:
 
     @classmethod
     def from_spec(cls, spec: Spec) -> Task:
-        """Return the task of a specification: it with its machine, variables and motors loaded.
+        """Return the task of a design search: the specification with machine, variables, motors.
 
         Raises
         ------

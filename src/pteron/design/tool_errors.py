@@ -80,7 +80,7 @@ def errors_with(
 
 
 def link_sections(robot: Manipulator, stocks: Mapping[str, str]) -> dict[str, Section]:
-    """Return the sections of links made of stock; `stocks` has its name for "upper", "lower"."""
+    """Return the cross-sections of links made of bar stock; `stocks` has its name by link."""
     sections = {}
     for key, name in stocks.items():
         stock = Stock.parse(name)

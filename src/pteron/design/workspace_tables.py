@@ -34,7 +34,7 @@ def _expect_near(coordinates: Any) -> Any:
 
 
 def _fine(error: float) -> float:
-    """Return an error in m; raise if it is too large for a machine."""
+    """Return an accuracy (error), m; raise if it is too large for a machine."""
     if error > _COARSE:
         raise ValueError(f"{error:g} m given: is this mm?")
     return error

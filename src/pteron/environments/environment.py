@@ -113,7 +113,7 @@ class PteronEnv(gymnasium.Env[Numbers, Numbers]):
         return self.world.observations(self._state), float(reward), bool(ended), False, info
 
     def _info(self, distance: Any) -> dict[str, Any]:
-        """Return a dictionary: the distance to the target, m, and whether it is tolerable."""
+        """Return a dictionary: the distance to the target, m, and if it is within tolerance."""
         return {"distance": float(distance), "is_success": bool(distance < self.world.tolerance)}
 
     def render(self) -> NDArray[np.uint8] | None:

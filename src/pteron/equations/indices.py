@@ -30,7 +30,7 @@ class Homogeneous(NamedTuple):
 
 
 def lever_arms(machine: Machine, state: State) -> list[Expression]:
-    """Return the derivatives (3, k) of each pushed platform point by the platform's turns."""
+    """Return the derivatives (3, k) of each pushed platform point by the platform's rotations."""
     lengths = _lengths_of(machine)
     pairs = zip(state.legs, state.platform.matrices, strict=True)
     return [matrix[:3, lengths:] for leg, matrix in pairs if leg.pushes]

@@ -193,7 +193,7 @@ def _gram(s: Array) -> Array:
 def _points(
     rows: Array, which: NDArray[np.int64], phi: Array
 ) -> tuple[NDArray[np.int64], Array, Array]:
-    """Return points (L, d) on the pencil of the two smallest singular vectors, with state and phi.
+    """Return points (L, d) on the line of the two smallest singular vectors, with state, phi.
 
     `rows` (K, n, d + 2) are those at phi (K,).
     """

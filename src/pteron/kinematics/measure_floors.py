@@ -38,7 +38,7 @@ class Floors(NamedTuple):
 def usual_floors(
     robot: Manipulator, type_i: float | None, type_ii: float | None, limits: bool
 ) -> Floors:
-    """Return least type-I and type-II measures of usable poses; defaults fill in for None.
+    """Return type-I and type-II thresholds for poses far from singular; None means default.
 
     A default is 0.1 where at least a tenth of the machine's poses exceed it, else their median.
     """
@@ -69,7 +69,7 @@ def _measures(robot: Manipulator, type_i: float, limits: bool) -> tuple[Array, A
 
 
 def _usual(measures: Array) -> float:
-    """Return the floor 0.1 if enough measures (K,) exceed it, else their median."""
+    """Return the default threshold, 0.1, if enough measures (K,) exceed it, else their median."""
     enough = int((measures >= _USUAL).sum()) >= _SHARE * len(measures)
     return _USUAL if enough else _median(measures)
 

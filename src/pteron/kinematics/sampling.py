@@ -203,7 +203,7 @@ class _Sample:
 
 
 def widest_box(robot: Manipulator) -> tuple[Array, Array]:
-    """Return low and high end (m,) of a box that holds all poses in reach, to draw from."""
+    """Return low and high end (m,) of the box from which random poses are drawn."""
     center, radius = search_ball(robot)
     platform = robot.platform
     angles = np.array(list(platform.angle_box.values())).reshape(-1, 2)

@@ -93,7 +93,7 @@ class PRR(SlideLeg):
         return self.direction
 
     def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
-        """Return the plane's normal, about which the leg leaves the platform free to turn."""
+        """Return (normal,): the leg leaves the platform free to turn about its plane's normal."""
         return (self.plane_normal,)
 
     @classmethod

@@ -100,7 +100,7 @@ class RodLeg(LegKind):
 
 
 def rod_body(point: PointMotion, n: Expression, ddn: Expression, swing: Expression) -> BodyMotion:
-    """Return a rod's motion from its unit vector n towards the platform point, n'' and n''s row.
+    """Return a rod's motion from its unit vector n, n'' and the matrix `swing` (3, 6) of n'.
 
     `swing` is (3, 6). The rod's angular velocity is n x n', its reference point the platform point.
     """

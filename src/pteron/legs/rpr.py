@@ -69,7 +69,7 @@ class RPR(RamLeg):
         return self.direction
 
     def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
-        """Return the plane's normal, about which the leg leaves the platform free to turn."""
+        """Return (normal,): the leg leaves the platform free to turn about its plane's normal."""
         return (self.plane_normal,)
 
     def transfers(self, gravity: Vector) -> tuple[LegTransfer, ...]:

@@ -43,7 +43,7 @@ class RRR(CrankLeg):
     conditions = (FieldCondition(("elbow_limits",), check_elbow),)
 
     def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
-        """Return the revolute axis, about which the leg leaves the platform free to turn."""
+        """Return (axis,): the leg leaves the platform free to turn about its revolute axis."""
         return (self.direction,)
 
     def passive_joints(

@@ -170,7 +170,7 @@ class RUPU(LegKind):
     def draw_closure(
         cls, values: Mapping[str, Sequence[Fraction]], rng: Random
     ) -> tuple[list[Fraction], int]:
-        """Return the shaft as a random rational vector (3,), and 1 for the elbow."""
+        """Return a random rational shaft vector (3,), and 1 for the elbow's sign."""
         return random_vector(abs(random_fraction(rng)), 3, rng), 1
 
 

@@ -98,7 +98,7 @@ class SlideLeg(LegKind):
     def draw_closure(
         cls, values: Mapping[str, Sequence[Fraction]], rng: Random
     ) -> tuple[list[Fraction], int]:
-        """Return a random rational platform point, as slider position plus link, and the elbow."""
+        """Return a random rational platform point, slider position plus link; the elbow's sign."""
         b, e, q = cls.random_link(values, rng), values["slider_direction"], random_fraction(rng)
         ahead = sum(x * y for x, y in zip(b, e, strict=True))
         return [x + q * y for x, y in zip(b, e, strict=True)], 1 if ahead > 0 else -1

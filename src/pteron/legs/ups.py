@@ -117,7 +117,7 @@ class UPS(RamLeg):
     def draw_closure(
         cls, values: Mapping[str, Sequence[Fraction]], rng: Random
     ) -> tuple[list[Fraction], int]:
-        """Return the ram as a random rational vector (3,), and 1 for the elbow."""
+        """Return a random rational ram vector (3,), and 1 for the elbow's sign."""
         return random_vector(abs(random_fraction(rng)), 3, rng), 1
 
 

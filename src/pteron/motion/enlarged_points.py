@@ -12,7 +12,7 @@ from pteron.motion.joint_points import Guide, JointPoints, Part
 
 
 def enlarged_points(points: JointPoints, other: JointPoints, times: float) -> JointPoints:
-    """Return joint points moved `times` as far as another machine's are away: difference enlarged.
+    """Return joint points moved by `times` their difference from another machine's points.
 
     With 1 they are the other machine's.
     """
@@ -39,7 +39,7 @@ def enlarged_points(points: JointPoints, other: JointPoints, times: float) -> Jo
 def enlarged_guides(
     guides: Sequence[Guide], others: Sequence[Guide], times: float
 ) -> tuple[Guide, ...]:
-    """Return guides whose differences from another machine's guides are enlarged `times`."""
+    """Return guides moved by `times` their difference from another machine's guides."""
     return tuple(
         replace(guide, path=guide.path + times * (other.path - guide.path))
         for guide, other in zip(guides, others, strict=True)

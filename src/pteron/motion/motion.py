@@ -92,7 +92,7 @@ class Motion(Result):
         return float(self.time[-1] - self.time[0])
 
     def at(self, time: ArrayLike) -> tuple[Array, Array, Array]:
-        """Return pose, velocity and acceleration at any times.
+        """Return pose, velocity and acceleration at any times, (..., m) each.
 
         Between two samples the pose is the polynomial of the fifth degree that has their poses,
         velocities and accelerations; before the first and after the last the platform rests there.

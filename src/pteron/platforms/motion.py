@@ -64,7 +64,7 @@ class PlatformMotion(NamedTuple):
     k angles, and x' above stands for them. None where they are the pose's rates."""
 
     def pose_rows(self, rows: Expression) -> Expression:
-        """Return rows (j, m) against the pose rates from rows against the quasi-velocities."""
+        """Return the matrix (j, m) that applies to pose rates, from that for quasi-velocities."""
         if self.angular is None:
             return rows
         lengths = rows.shape[1] - self.angular.shape[0]

@@ -202,12 +202,12 @@ def _quasirandom_places(course: Course, box: Array) -> Iterator[CyclePlace]:
 
 
 def stays(course: Course, place: CyclePlace, fits: Fits) -> bool:
-    """Return whether the complete course lies in a region when moved to a place."""
+    """Return whether the complete course of a cycle lies in a region when moved to a place."""
     return all(fits(poses[:, 0]) for poses, *_ in course.curves_at([place]))
 
 
 def with_platform(place: CyclePlace, yaw: Array, turn: float) -> CyclePlace:
-    """Return a place with its platform turned further by `turn`, rad, along `yaw` (m,)."""
+    """Return a cycle's place with the platform turned further by `turn`, rad, along `yaw` (m,)."""
     pose = np.array(place.pose) + yaw * np.angle(np.exp(1j * turn))
     return CyclePlace(tuple(map(float, pose)), place.turn)
 
@@ -215,7 +215,7 @@ def with_platform(place: CyclePlace, yaw: Array, turn: float) -> CyclePlace:
 def neighbours(
     place: CyclePlace, steps: Array, turn: float, yaw: Array, *, oblique: bool
 ) -> Iterator[CyclePlace]:
-    """Yield a place's neighbours at +- `steps` (m,) in each coordinate and +- `turn`, rad.
+    """Yield neighbours of a cycle's place at +- `steps` (m,) in coordinates and +- `turn`, rad.
 
     A turn is that of the path alone, and that of the platform, too. In a region whose boundary is
     oblique come steps along all coordinates and turns at once.

@@ -59,7 +59,7 @@ def carries(platform: Platform) -> bool:
 
 
 def arm_motion(platform: Platform, angles: Array, rates: Array, growths: Array) -> Curve:
-    """Return the rotating part of the arm from P to the tool, and two derivatives, (..., k).
+    """Return the part of the vector from P to the tool that turns (..., k), and two derivatives.
 
     The k components are along the pose's lengths; angles, rates and growths, their second
     derivatives, are (..., j). The platform is one that `carries` its tool.

@@ -161,7 +161,7 @@ def radius(matrix: Array) -> float:
 
 
 def _smallest_change(radius_of: Callable[[float], float], unit: float, which: int) -> float:
-    """Return the least x with spectral radius radius_of(x) = 1, or infinity; `unit` scales x."""
+    """Return the least x at which radius_of(x), a spectral radius, reaches 1; inf if none."""
     step, below = _STEPS[which] * unit, 0.0
     while below < _MOST[which] * unit:
         above = below + max(step, 0.1 * below)
