@@ -110,7 +110,7 @@ def _candidate(
     figures |= margins.figures
 
     def least(values_of: Callable[[Array], ArrayLike]) -> float:
-        """Return the least `values_of(poses)` over the workspace, refined between samples."""
+        """Return the minimum of `values_of(poses)` over the workspace, refined between samples."""
 
         def column(poses: Array) -> Array:
             """Return the quantity (K, 1) at poses (K, m) about the middle."""

@@ -143,9 +143,9 @@ def choose_machine(
     """Search all kinds of machines for one that does a job, with its dimensions and drives.
 
     Each kind is a machine of the catalog whose size, proportions, links and place under the
-    workspace vary. A design must keep reach, floors and limits over the workspace, its room, and
-    have drives for all cycles at every place and in every direction; of what is left the best is
-    proved by intervals.
+    workspace vary. A feasible design keeps its reach, singularity thresholds and joint limits over
+    the workspace, fits in the permitted space, and has drives for all cycles at every place and in
+    every direction. The best feasible design is proved by interval arithmetic.
 
     Parameters
     ----------

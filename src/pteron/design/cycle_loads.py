@@ -28,8 +28,9 @@ _DECADES = 4.0
 def shortest_time(robot: Manipulator, motion: Motion) -> float:
     """Return the shortest duration, s, of a motion within the drives' limits, by uniform scaling.
 
-    At the rate u the forces are A + B u + C u^2 at each sample, and the first u at which one is at
-    its limit is exact. Stribeck's part of dry friction counts in full at every speed.
+    At a rate of u times the given speed the forces are A + B u + C u^2 at each sample; the first u
+    at which a force reaches its limit is computed exactly. The Stribeck force counts in full at
+    every speed.
 
     Raises
     ------
@@ -81,7 +82,7 @@ def _first_root(square: Array, line: Array, constant: Array) -> Array:
 def _best_fit(sizing: Sizing, leg: int, motor: Motor) -> MotorFit:
     """Return the motor's fit at the gear ratio of its greatest margin (limit over load).
 
-    Each limit allows an interval of ratios, so that the least of their margins has one maximum.
+    Each limit allows an interval of ratios, so that the least margin has a single maximum.
     """
     span, fastest = serving_span(sizing, leg, motor, 1.0), float(sizing.peak_speeds[leg - 1])
 
@@ -102,7 +103,7 @@ def _best_fit(sizing: Sizing, leg: int, motor: Motor) -> MotorFit:
 def best_motors(sizing: Sizing, motors: Sequence[Motor], enough: float = inf) -> list[MotorFit]:
     """Return for each joint the smallest motor of the list with a margin of at least `enough`.
 
-    Where no margin reaches `enough`, it is the motor with the greatest margin.
+    Where no motor has the margin `enough`, it is the motor with the greatest margin.
     """
     best = []
     for leg in range(1, sizing.robot.joint_count + 1):

@@ -104,7 +104,7 @@ class Places:
     def states(self) -> Curve:
         """Poses about the middle, velocities, accelerations (B, K, m), for a duration of 1 s.
 
-        It goes from rest to rest by quintics, all of the same greatest acceleration.
+        The tool moves from rest to rest by quintics, all with the same greatest acceleration.
         """
         spans = np.sqrt(np.diff(self.path.rests)).tolist()
         timed = timed_path(self.path, spans, [polynomial("quintic")] * len(spans))
@@ -163,8 +163,8 @@ def _cycle_places(job: Job, robot: Manipulator, cycle: ToolCycleTable, k: int) -
 def neighbour_places(job: Job, cycle: Places, chosen: Iterable[int], part: float) -> Places:
     """Return a cycle at the `chosen` places and at their neighbours in shift and turn.
 
-    A neighbour is turned by a part of the angle between directions, or shifted by that part of
-    half the workspace or of the range of turns.
+    A neighbour is turned by `part` of the angle between directions, or shifted by `part` of half
+    the workspace or of the range of turns.
     """
     half, count = job.workspace.half, len(cycle.robot.platform.lengths)
     poses = cycle.path.at(np.linspace(0.0, cycle.path.length, _IN_CYCLE))[0]
@@ -237,7 +237,7 @@ def _fitting_shifts(
 def _angles(job: Job, robot: Manipulator, angles: Array) -> Iterator[Array]:
     """Yield shifts (a,), rad, of a cycle's angles: to each end of the turn, to each tilt.
 
-    A cycle that tilts by itself keeps its tilts.
+    A cycle whose poses tilt keeps its own tilts.
     """
     tilted = np.zeros((1, angles.shape[1])) if angles[:, :-1].any() else tilts(job, robot)
     last, ends = angles[:, -1], {0.0}
@@ -250,7 +250,8 @@ def _angles(job: Job, robot: Manipulator, angles: Array) -> Iterator[Array]:
 def _share(job: Job, path: Array, shift: Array) -> float | None:
     """Return the largest share (0 to 1) of a shift at which a path (K, 3) fits; None if none.
 
-    Of a cylinder the corner of its box is outside: it goes as far towards it as can be.
+    The corners of the box around a cylinder lie outside it; the path is shifted towards them as far
+    as it fits.
     """
     space, half = job.workspace, job.workspace.half
     for share in _SHARES:

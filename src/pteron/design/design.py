@@ -156,8 +156,8 @@ class Design(Result):
     ) -> float:
         """Return the maximum of `of(design, poses)` over the workspace; the minimum if sign = -1.
 
-        It is taken at the sampled poses, then nearer and nearer about the worst of them; NaN where
-        one of them has none.
+        The function is evaluated at the sampled poses, then at ever closer neighbours of the worst
+        of them; the result is NaN if it is NaN at a sampled pose.
         """
         poses = self.fine_poses if fine else self.poses
         signed = sign * of(self, poses)
@@ -203,7 +203,7 @@ class Design(Result):
     def cycle_loads(self) -> Sizing:
         """The loads on the drives (a `Sizing`) over all cycles in sequence, with the payload.
 
-        Where one may be anywhere they are taken at all its places and turns in the workspace.
+        A cycle that may be done anywhere is evaluated at all its places and turns in the workspace.
         """
         cycles, pose = self.task.spec.cycles, self.task.orientations[0]
         anywhere = self.workspace is not None and any(cycle.anywhere for cycle in cycles)
@@ -241,7 +241,8 @@ class Design(Result):
     def margin(self) -> float:
         """The least condition over the workspace; below 0 where a pose is infeasible.
 
-        Of a workspace that floats and does not fit, how much of it is left out.
+        If a workspace that floats does not fit, it is the share of the workspace that does not fit,
+        negative.
         """
         if self.workspace is None:
             return self.cube.margin

@@ -107,8 +107,8 @@ class Front(Result):
     def selection(self) -> dict[str, int]:
         """Row indices of the designs in a report: best in each objective, and the compromise.
 
-        The compromise is nearest to the best of all objectives at once, each measured by its range
-        over the front; of one objective there is none.
+        The compromise is the design nearest to the best value of all objectives at once, each
+        objective scaled by its range over the front; with one objective there is none.
         """
         costs, objectives = self.task.costs(self.designs), self.task.spec.objectives
         best = zip(objectives, costs.argmin(axis=0).tolist(), strict=True)
@@ -154,7 +154,8 @@ class ProvedRows:
     def front(self, parts: Callable[[], Iterable[pl.DataFrame]]) -> Front:
         """Return the Pareto front of designs that come in tables, after proving every design on it.
 
-        Where a proof takes something from one, the front is another, and that is proved.
+        A proof can reduce the values of a design, which changes the front; the new front is then
+        proved too.
         """
         while True:
             front = front_of_parts(self._task, map(self.replace_rows, parts()))

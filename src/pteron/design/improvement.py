@@ -32,10 +32,10 @@ _FIRST = 5
 def improve_design(task: Task, point: Sequence[float], objective: int) -> list[float]:
     """Return variables (V,) of a design with a better objective; `point` itself if none is found.
 
-    The unknowns are the variables together with the cube's centre and edge. Quantities of the
-    machine alone are held to first order, those of its poses are not: the caller evaluates the
-    design again. Where a proof of the workspace or the cube fails, the design is sought once more,
-    with the counterexample among its conditions.
+    The unknowns are the variables, and the cube's centre and edge. Requirements on quantities of
+    the machine alone are linearised; quantities that depend on poses are not constrained, so the
+    caller evaluates the design again. If the proof of the workspace or the cube fails, the search
+    is repeated with the counterexample among its conditions.
     """
     spec, start = task.spec, np.array(point)
     target = spec.objectives[objective]

@@ -71,7 +71,7 @@ def _evolve(
 ) -> None:
     """Rate designs by differential evolution, leaving `_REFINED` of the `end` evaluations.
 
-    The population begins with the best designs rated so far, whatever they were rated for.
+    The population begins with the best designs rated so far, also for other objectives.
     """
     size = len(ranges[0])
     count = _POPULATION * size
@@ -108,7 +108,7 @@ def _refine(
 ) -> None:
     """Improve the design `start` by stock choices and Nelder-Mead until `end` designs are rated.
 
-    `counts` are the numbers of choices of each of its values, 0 for one that varies freely.
+    `counts` are the numbers of choices of the coordinates of a design, 0 for continuous ones.
     """
 
     def cost(units: Array) -> float:

@@ -80,7 +80,8 @@ class Kind:
     def robot(self) -> Manipulator:
         """The catalog's machine of this kind, without limits of sliders.
 
-        So are ball joints, whose cones follow from a machine's proportions.
+        Sliders' limits follow from the task, and the cones of ball joints, also left out, from a
+        machine's proportions.
         """
         template = load(self.name)
         legs = []
@@ -192,8 +193,8 @@ def _build_machine(
 ) -> Manipulator:
     """Return the machine scaled by the design `numbers`, with links cut from the given stock.
 
-    Lengths grow with the size, other inertias than those of links, platform and carriages with
-    its powers.
+    Lengths grow with the size; inertias, except those of links, platform and carriages, grow with
+    powers of it.
     """
     size, platform = numbers["size"], robot.platform
     axis, frame = np.array(platform.axis), np.array(platform.frame)

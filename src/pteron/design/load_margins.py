@@ -71,9 +71,9 @@ def margins_of(
 ) -> LoadMargins:
     """Return the drives' margins (limit over load) for all cycles and motions of the job.
 
-    Friction and rotors count, and cycles that may be anywhere are taken at all their outermost
-    places. `middle` (m,) is the pose in the middle of the workspace; `time`, s, is the duration of
-    cycles that are given none.
+    Friction and rotor inertia are included; cycles that may be anywhere are evaluated at all their
+    outermost places. `middle` (m,) is the pose in the middle of the workspace; `time`, s, is the
+    duration of cycles without one.
     """
     drives = [leg.drive for leg in robot.legs if leg.drive is not None]
     most, rated, fastest = (

@@ -59,7 +59,8 @@ class MachineSpace:
     def extents(self, robot: Manipulator, poses: Array, middle: Array) -> Array:
         """Return a machine's extents at poses (N, 6 + boxes), from the tool's middle, m.
 
-        The least coordinates, minus the greatest, and how far it stays outside each keep-out box.
+        The columns are the least coordinates, the negated greatest ones, and the distance to each
+        keep-out box.
         """
         points = np.asarray(numeric(robot, "joint_points")(poses)[0])
         return self._extents_of_points(robot, poses, points, middle)
@@ -84,7 +85,7 @@ class MachineSpace:
     def judge_extents(self, extents: Array, tight: float = 0.0) -> tuple[dict[str, float], Misses]:
         """Return sizes in m by name from extents (6 + boxes,), and the space limits they exceed.
 
-        Bounds are tighter by a length, m.
+        The limits are tightened by `tight`, m.
         """
         cell, (low, high, outside) = self._job.cell, np.split(extents, [3, 6])
         high = -high
@@ -114,8 +115,8 @@ class MachineSpace:
     def _clearance(self, robot: Manipulator, poses: Array, points: Array) -> float:
         """Return the least distance between bodies, m, at poses with the given joint points.
 
-        Guides, whose ends a program of many machines does not know, are measured to the links of
-        other legs.
+        The distances between guides and links of other legs are computed apart, as shared programs
+        do not know the guides' ends.
         """
         radii, distances = robot.radii, [np.inf]
         assert radii is not None  # every design has them
@@ -165,7 +166,7 @@ def _lines(robot: Manipulator, poses: Array, points: Array) -> tuple[Array, Arra
 def _depths(starts: Array, ends: Array, low: Array, high: Array) -> Array:
     """Return the greatest depth of line segments (..., 3) inside a box, m; negative outside.
 
-    Along a line it is concave, so that thirds find its most.
+    Along a line the depth is concave, so that ternary search finds its maximum.
     """
 
     def depth(share: Array) -> Array:

@@ -136,8 +136,8 @@ def start_design(task: Task) -> Design:
 def proved_cube(design: Design) -> ProvedCube | None:
     """Return the largest cube of a design that can be proved feasible; None if there is none.
 
-    Of a workspace that floats the place that is found, at the size that is required or, where its
-    `scale` is asked for, the largest.
+    For a workspace that floats, it is the place found for it, at the required size or, if `scale`
+    is a quantity of the search, at the largest size.
     """
     task = design.task
     shape, least = task.shape
@@ -146,7 +146,7 @@ def proved_cube(design: Design) -> ProvedCube | None:
     def search(failing: Array) -> Fit:
         """Return the largest feasible cube without the positions (F, k).
 
-        `least` at most if capped.
+        If the size is capped, the edge is `least` at most.
         """
         fit = design.cube_without(failing) if len(failing) else design.cube
         if not capped:
@@ -169,7 +169,8 @@ def proved_cube(design: Design) -> ProvedCube | None:
 def cube_proofs(design: Design, center: Array, edge: float) -> tuple[Proof, ...]:
     """Return proofs that a cube is feasible, one an orientation, up to the first that fails.
 
-    Of a workspace that floats, at this place, its greatest side being `edge`.
+    If the workspace floats, the proofs are for the workspace at this centre, with `edge` its
+    greatest side.
     """
     proofs = []
     floating = design.task.spec.workspace if design.task.floats else None
@@ -189,8 +190,8 @@ def cube_proofs(design: Design, center: Array, edge: float) -> tuple[Proof, ...]
 def workspace_proofs(design: Design) -> tuple[Proof, ...]:
     """Return proofs that the required workspace is feasible, one for each orientation.
 
-    Where it touches the boundary it is undecided; the proof is then of 0.9999 of it, about its
-    middle, if that can be proved: its region tells, and `workspace_share`.
+    A workspace that touches the boundary of the feasible poses is undecided; the proof is then for
+    0.9999 of it, about its middle, if that can be proved. `workspace_share` returns this share.
     """
     proofs: list[Proof] = []
     required = design.workspace

@@ -279,8 +279,8 @@ _BUILT_IN = {
 def quantities() -> dict[str, DesignQuantity]:
     """Return all design quantities by name: built-in, worst values of indices, and extensions'.
 
-    A package names its own as entry points of the group `pteron.design`: a function of the machine
-    or a `DesignQuantity`.
+    Packages register quantities as entry points of the group `pteron.design`: a function of the
+    machine or a `DesignQuantity`.
     """
     known = _BUILT_IN | {name: _worst(index) for name, index in INDICES.items()}
     for name in extension_names(GROUP):

@@ -168,7 +168,7 @@ class KindEvaluator:
     def _judge_reach(self, rating: Rating) -> None:
         """Rate reach, singularity measures and joint limits over the workspace, in `rating`.
 
-        Set joints' travel.
+        The travel of guides and rams is set from the poses.
         """
         robot, poses, floors = rating.machine, rating.middle + self.visited, self.job.floors
         least = float(np.min(numeric(robot, "squared_type_i")(poses)[0]))
@@ -207,7 +207,7 @@ class KindEvaluator:
             def ends(places: Array) -> Array:
                 """Return joint coordinates and their negatives (N, 2 n), m or rad.
 
-                Infinity out of reach.
+                They are infinite out of reach.
                 """
                 at = inverse_kinematics(robot, rating.middle + places, on_failure="nan")
                 return np.asarray(np.nan_to_num(np.hstack([at, -at]), nan=np.inf))
@@ -243,7 +243,7 @@ class KindEvaluator:
     def _choose_drives(self, rating: Rating) -> None:
         """Choose the cheapest drives that suffice for loads, accuracy and stiffness.
 
-        Record figures.
+        The figures of the rating (masses, energy, errors) are recorded.
         """
         robot = self.add_payload(rating.machine)
         numbers = self.kind.numbers(rating.values)
@@ -315,7 +315,7 @@ class KindEvaluator:
     def shares(self, time: float | None) -> Array:
         """Return the durations, s, by which a duty cycle weights its cycles.
 
-        Empty without shares.
+        The array is empty if no cycle has a share.
         """
         pairs = [(c.share, (c.duration or time or 1.0) + c.dwell) for c in self.cycles if c.share]
         return np.array([share * duration for share, duration in pairs])

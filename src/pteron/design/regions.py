@@ -131,7 +131,8 @@ class TurnedTool:
     def _arm(self, low: Array, high: Array) -> tuple[Array, Array]:
         """Return the vector (B, m) from P to the tool at each box's middle angle, with its error.
 
-        Over half the box's range of angles the arm's end moves by its length times that at most.
+        Over half the box's range of angles the tool moves by at most this half range times the
+        vector's length, which is the error.
         """
         platform, angular = self.platform, self.platform.angular
         middle, half = 0.5 * (low + high)[:, angular], 0.5 * (high - low)[:, -1:]

@@ -160,7 +160,7 @@ class FrontReport(Result):
     def selection(self) -> list[ReportedDesign]:
         """The best design in each objective and the compromise.
 
-        A design with several names once.
+        A design that is best in several objectives is listed once, under all names.
         """
         task, names = self.front.task, dict[int, str]()
         for name, at in self.front.selection.items():

@@ -31,9 +31,9 @@ def evaluate_design(
 ) -> dict[str, float]:
     """Return quantities and violations of a design (V,), by column name.
 
-    "misses workspace" is how far the least condition is below 0, and "misses 1 links" how far
-    the first requirement, of `links`, is missed over its bound; 0 where it is kept. With proofs the
-    cube is the proved one, and a workspace that is not proved is missed.
+    "misses workspace" is by how much the least condition is below 0, and "misses 1 links" the
+    relative violation of the first requirement, on `links`; both are 0 if satisfied. With `proofs`
+    the cube is the proved one, and a workspace that is not proved counts as violated.
     """
     try:
         design = Design(task, task.machine(point))
@@ -55,7 +55,7 @@ def evaluate_design(
 def places(task: Task) -> list[str]:
     """Return names of the columns for the centre of a workspace that floats.
 
-    Empty if it is fixed.
+    The list is empty if the workspace is fixed.
     """
     return [f"center {name}" for name in task.robot.platform.lengths] if task.floats else []
 

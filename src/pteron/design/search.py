@@ -51,9 +51,9 @@ def search(
 ) -> Front:
     """Search for the Pareto-optimal designs of a machine and return their front.
 
-    The first generation is a Latin hypercube with the machine to begin with; NSGA-II makes the
+    The first generation is a Latin hypercube that includes the initial machine; NSGA-II makes the
     others, and the best designs of each are improved by gradients. The same spec and seed give the
-    same front, whoever computes it and however often the run was ended meanwhile.
+    same front, on any computer, also after interruptions.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ class DesignRows:
     ) -> pl.DataFrame:
         """Return the table rows that `function` computes for jobs, in order.
 
-        Those already stored in the folder `name` are reused.
+        Rows already stored in the folder `name` are reused.
         """
         store = TableStore(self.folder / name, {**self.task.plan, **plan})
         chunks = [jobs[k : k + _CHUNK] for k in range(0, len(jobs), _CHUNK)]

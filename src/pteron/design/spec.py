@@ -301,7 +301,7 @@ class Spec(TomlTable):
 def read_spec(path: str | Path) -> Spec:
     """Read the specification of a design search from a TOML file.
 
-    Files of a machine and of motors that it names are sought in its own folder first.
+    Machine and motor files that it names are sought in its own folder first.
 
     Parameters
     ----------

@@ -39,8 +39,9 @@ def survey(
 ) -> Front:
     """Evaluate many designs, spread by a Sobol sequence, and return their Pareto front.
 
-    They are the points of Sobol's sequence, shifted by a vector that the spec's seed gives: they
-    cover the ranges more evenly than random ones, and a larger count continues a smaller one.
+    The designs are points of a Sobol sequence, shifted by a random vector from the spec's seed:
+    they cover the ranges more evenly than random points, and a larger count continues a smaller
+    one.
 
     Parameters
     ----------

@@ -103,7 +103,7 @@ class Task:
     def plan(self) -> dict[str, Any]:
         """Plain data that results depend on: specification, machine, versions.
 
-        They name stored rows.
+        Stored rows are reused only while this data is unchanged.
         """
         spec = self.spec.model_dump(mode="json", exclude={"robot"})
         spec = {key: part for key, part in spec.items() if part or key not in _LATER}
@@ -148,7 +148,7 @@ class Task:
     def shape(self) -> tuple[Shape, float]:
         """The shape to be enlarged in each design, and the required edge, m; 0 for none.
 
-        It is the workspace where that floats, else the cube.
+        The shape is the workspace if that floats, else the cube.
         """
         count = len(self.robot.platform.lengths)
         if self.spec.workspace is not None and self.floats:

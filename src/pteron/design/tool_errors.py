@@ -72,7 +72,7 @@ def errors_with(
 ) -> Array:
     """Return the tool's greatest error, m, for each of O choices of drives: (O,).
 
-    `units` are those of `unit_errors`.
+    `units` are errors as `unit_errors` returns them.
     """
     joint = joint_errors(accuracy, ratios, backlash)[:, None] * units[0]
     total = joint + units[1] if accuracy.counted == "worst" else np.hypot(joint, units[1])
@@ -103,8 +103,8 @@ def compliances(
 ) -> tuple[Array, Array]:
     """Return greatest compliances (N,) at poses: with rigid drives, m/N; slope by drives'.
 
-    The first, m/N, is that with rigid drives; the second is the slope by the compliance of the
-    drives.
+    The first result, m/N, is for rigid drives; the second is the derivative by the drives'
+    compliance.
     """
     soft, hard = (
         np.asarray(1.0 / stiffness(robot, poses, elasticity(sections, k)).least)

@@ -108,7 +108,7 @@ def move_variables(
 ) -> Manipulator:
     """Return the machine with the design variables set to `point` (V,).
 
-    `stretch` says whether links of another length have another inertia.
+    With `stretch`, links of changed length change their inertia too.
     """
     legs = list(robot.legs)
     changed: dict[int, dict[str, list[float]]] = {}
@@ -137,7 +137,7 @@ def geometry_slopes(
 ) -> Array:
     """Return d geometry / d variables (G, V); rows as in `equations.machine.numbers`.
 
-    Lengths and points are linear in them, so that a difference is exact but for rounding.
+    Lengths and points are linear in the variables, so that differences are exact up to rounding.
     """
 
     def geometry(point: Array) -> Array:

@@ -62,10 +62,10 @@ def refine_worst_values(
 ) -> tuple[Array, Array]:
     """Return the minimum of each column of values (C,), and its pose (C, m).
 
-    `values_of` gives the values (B, C) at poses (B, m), which are from the middle. They are taken
-    at `sample_poses`, and then ever nearer about those that are worst in a column, `keep` of each:
-    what is worst near a singularity is worst in a valley that samples miss. Poses `besides` those
-    of the workspace count as they are.
+    `values_of` returns values (B, C) at poses (B, m) relative to the workspace's middle. They are
+    evaluated at `sample_poses`, then at ever closer neighbours of the `keep` worst poses of each
+    column, since near a singularity the minimum lies in a valley between samples. Poses `besides`
+    those of the workspace are added as they are.
     """
     samples, space = samples or _positions_along(job), job.workspace
     count = len(robot.platform.lengths)
@@ -105,7 +105,7 @@ def _neighbour_steps(steps: Array, count: int) -> Array:
 def _clip_to_workspace(job: Job, places: Array, count: int) -> Array:
     """Return places (N, m), relative to the middle, clipped to the workspace.
 
-    Duplicates removed.
+    Duplicates are removed.
     """
     space, half, clipped = job.workspace, job.workspace.half[:count], places.copy()
     if space.poses is None:
@@ -133,7 +133,7 @@ def _positions_along(job: Job) -> int:
 def _places(job: Job, robot: Manipulator, count: int) -> Array:
     """Return places (N, m): tool positions relative to the middle, and platform angles.
 
-    Of a cone of tilts the angles are how far the platform leans to x and to y, and its turn.
+    For a cone of tilts the angles are the leans towards x and y, and the turn about z.
     """
     points = _positions(job, count)[:, : len(robot.platform.lengths)]
     angles = orientations(job, robot)

@@ -164,13 +164,13 @@ _Step = Callable[[Array, Array], tuple[Array, Array]]
 
 
 def _step(known: Generic) -> _Step:
-    """Return the compiled path step from a known machine towards real machines."""
+    """Return the compiled step of the path tracker from a known machine to real machines."""
     machine = known.machine
     return path_kernel(known.closed, (tuple(machine.real.tolist()), tuple(machine.imag.tolist())))
 
 
 def _any_step(known: Generic) -> _Step:
-    """Return the compiled path step from a known machine towards complex machines."""
+    """Return the compiled step of the path tracker from a known machine to complex ones."""
     kernel, start = path_kernel(known.closed, None), _parts(known.machine)
     return lambda at, target: kernel(at, start, target)
 

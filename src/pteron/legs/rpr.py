@@ -91,7 +91,7 @@ class RPR(RamLeg):
     def draw_closure(
         cls, values: Mapping[str, Sequence[Fraction]], rng: Random
     ) -> tuple[list[Fraction], int]:
-        """Return the ram as a random rational vector in the leg's plane, and 1 for the elbow."""
+        """Return a random rational ram vector (3,) in the leg's plane; 1 for the elbow's sign."""
         a, (x, y) = values["plane_axis"], random_vector(abs(random_fraction(rng)), 2, rng)
         b = cross(values["direction"], a)
         return [x * p + y * q for p, q in zip(a, b, strict=True)], 1

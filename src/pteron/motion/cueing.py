@@ -210,7 +210,7 @@ def _even_times(time: Array, source: str) -> Array:
 def _control_points(time: Array, parts: Array) -> Array:
     """Return the absolute Bernstein coefficients (6, T - 1, 6) of a motion between samples.
 
-    The curve between two samples lies in the hull of its six coefficients.
+    The curve between two samples lies in the convex hull of its six coefficients.
     """
     step = np.diff(time)[:, None]
     (a, va, aa), (b, vb, ab) = parts[:, :-1], parts[:, 1:]
@@ -283,7 +283,7 @@ def _compress(demand: Array, half: Array) -> Array:
 def _box(robot: Manipulator, middle: Array, demand: Array, type_ii: float) -> tuple[Box, Proof]:
     """Return a box of poses about the middle, and the proof that it lies in the workspace.
 
-    Its sides are in proportion to the ranges of the uncompressed motion.
+    Its sides are proportional to the ranges of the motion `demand` before compression.
     """
     required: tuple[Condition, ...] = conditions(robot, type_ii=type_ii)
     least = 1e-3 * max(float(demand.max()), 1e-3)

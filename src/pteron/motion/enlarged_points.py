@@ -14,7 +14,7 @@ from pteron.motion.joint_points import Guide, JointPoints, Part
 def enlarged_points(points: JointPoints, other: JointPoints, times: float) -> JointPoints:
     """Return joint points moved by `times` their difference from another machine's points.
 
-    With 1 they are the other machine's.
+    With `times` = 1 they are the other machine's points.
     """
     other_corners = np.vstack([part.corners for part in other.parts])
     return replace(

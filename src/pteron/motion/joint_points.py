@@ -40,7 +40,7 @@ class Part(NamedTuple):
     def triangles(self) -> NDArray[np.intp] | None:
         """Triangles (F, 3) of the part's convex hull, as corner indices; None if it is flat.
 
-        Seen from outside their corners follow each other anticlockwise.
+        Seen from outside, the corners of a triangle are in anticlockwise order.
         """
         corners = self.corners[(0,) * (self.corners.ndim - 2)]
         away = corners - corners[:1]

@@ -87,9 +87,10 @@ def with_payload(
 ) -> Manipulator:
     """Return the machine with a body on its platform: a point mass at the tool by default.
 
-    It is the same machine whose platform is heavier: m + m_L, m gamma + m_L s and I + I_L + m_L
-    |s|^2, s being `center` across the platform's axis; as a whole, where the platform tilts, and
-    with its part of the inertia tensor. Exported code does the same while it runs: `set_payload`.
+    The platform's mass becomes m + m_L, its first moment m gamma + m_L s and its inertia I + I_L +
+    m_L |s|^2, s being the part of `center` perpendicular to the platform's axis; for a platform
+    that tilts, s is all of `center` and the inertia is a tensor. Exported code does the same at run
+    time by `set_payload`.
 
     Parameters
     ----------

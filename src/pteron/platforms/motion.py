@@ -192,7 +192,7 @@ class PlatformEquations(ABC):
         return Offset(x0 * s[0] + y0 * s[1], y0 * s[0] - x0 * s[1], k * s[2] + t)
 
     def axes_by_angle(self) -> dict[str, Expression]:
-        """Return by angle the axis (3, 1), at angles zero, that it turns the platform about."""
+        """Return the rotation axis (3, 1) of each angle, at angles zero, by the angle's name."""
         return {} if self.axis_angle is None else {self.axis_angle: self.frame[2]}
 
     @classmethod

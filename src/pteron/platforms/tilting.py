@@ -93,7 +93,7 @@ class Tilting(PlatformEquations):
         """R s0 at angles zero."""
 
     def axes_by_angle(self) -> dict[str, Expression]:
-        """Return by angle the axis (3, 1), at angles zero, that it turns the platform about."""
+        """Return the rotation axis (3, 1) of each angle, at angles zero, by the angle's name."""
         x, y, k = self.frame
         return {"roll": x, "rx": x, "pitch": y, "ry": y, "yaw": k, "rz": k}
 
@@ -304,7 +304,7 @@ class Universal(_Centred):
     order = ("alpha", "beta")
 
     def axes_by_angle(self) -> dict[str, Expression]:
-        """Return by angle, alpha and beta, the axis (3, 1) that it turns the platform about."""
+        """Return the rotation axes (3, 1) of alpha and beta, at angles zero, by these names."""
         return {"alpha": self.quantities["first_axis"], "beta": self.quantities["second_axis"]}
 
     def basis(self, turned: Rotation) -> tuple[Expression, Expression | None]:

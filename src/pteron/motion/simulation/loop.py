@@ -142,7 +142,8 @@ def run_simulation(
 ) -> Simulation:
     """Simulate the machine under a control law or given forces (T, n); return the `Simulation`.
 
-    The source of forces is a controller's law, or forces at each sample.
+    `source` is a control law, or the forces at each sample. With `limits` the simulation ends at
+    joint limits and type-II singularities.
     """
     time, m, n = reference.time, robot.freedom, robot.joint_count
     count, period = len(time), float(time[1] - time[0])
@@ -206,7 +207,7 @@ def _run_segments(
 ) -> None:
     """Run the loop for each payload in turn, in blocks of samples; it fills `outputs`.
 
-    It returns from compiled code after `_BLOCK` samples, for interrupts and progress.
+    Compiled code returns after every `_BLOCK` samples, for interrupts and progress.
     """
     count = len(loads.masses)
     changes = np.flatnonzero(np.diff(loads.masses)) + 1
@@ -287,7 +288,7 @@ def loop_arrays(
 ) -> dict[str, Array]:
     """Return the input arrays, by name, of a simulation loop with or without a control law.
 
-    `counts` are those of `Timing.parts`.
+    `counts` are the sample counts that `Timing.parts` returns.
     """
     period = float(reference.time[1] - reference.time[0])
     parts = reference.pose, reference.velocity, reference.acceleration

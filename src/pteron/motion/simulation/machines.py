@@ -136,9 +136,9 @@ def machines_about(
 ) -> Machines:
     """Return `count` random machines about a nominal one, varied within given tolerances.
 
-    Each body is made of lighter or heavier material (one factor a body, so that it stays a real
-    one), and each drive has factors of its dry friction, Stribeck's included, of its viscous
-    friction and of its rotor's inertia. Factors are uniform between 1 - share and 1 + share.
+    Each body's mass, first moment and inertia have one common factor, so that it remains physically
+    possible; each drive has factors of its dry friction (Stribeck's included), its viscous friction
+    and its rotor's inertia. Factors are uniform between 1 - share and 1 + share.
 
     Parameters
     ----------

@@ -99,9 +99,10 @@ def simulate_many(
 ) -> Batch:
     """Return statistics of many simulated machines that follow a motion under a controller.
 
-    Each is what `simulate` makes of it, to the same bits but for the noise, whose seed is that of
-    the sensors with the machine's number; where machines have a geometry of their own, to rounding.
-    Joints' limits and singularities of type II do not end it. In C eight machines share a vector.
+    Each machine's result equals that of `simulate` to the bit, except for noise, whose seed is the
+    sensors' seed with the machine's number; for machines with geometry of their own it is equal up
+    to rounding. Joint limits and type-II singularities do not end a simulation. In C, eight
+    machines share a vector instruction.
 
     Parameters
     ----------

@@ -42,10 +42,9 @@ def advance(
 ) -> tuple[Array, Array, Array, Any]:
     """Return machines' states after several fourth-order Runge-Kutta steps.
 
-    Friction and the motors' inertia count; a joint at rest sticks while its drive and its loads are
-    less than its dry friction. Where there is a C compiler the steps are one loop of machine code,
-    which is compiled when it is first asked for, and several states of a batch are computed by one
-    instruction.
+    Friction and the motors' inertia are included; a joint at rest sticks while the force on it is
+    less than its dry friction. With a C compiler the steps run as one loop of machine code,
+    compiled at the first call, and several states of a batch share an instruction.
 
     Parameters
     ----------

@@ -73,8 +73,8 @@ def encoder_arrays(
 ) -> dict[str, Array]:
     """Return the loop's arrays of encoder resolution, noise and initial memory, by name.
 
-    The angle of a crank that may go all the way round jumps by a turn: its readings go on by the
-    shorter way.
+    The angle of a crank that can turn all the way round jumps by a full turn: its readings continue
+    by the shorter way.
     """
     pose, velocity = state["pose"], state["velocity"]
     joints = inverse_kinematics(robot, pose)
@@ -111,7 +111,7 @@ def encoder_arrays(
 def encoder_memory(joints: Array, rates: Array, steps: Array, period: float) -> Array:
     """Return the initial memory (..., 4 E) of encoders at joints and rates (..., E).
 
-    `steps` (E,) are theirs, `period` is from one sample to the next.
+    `steps` (E,) are the encoders' resolutions, m or rad, and `period`, s, is the sampling period.
     """
     last_readings = joints - period * rates
     widths = np.where(steps > 0.0, steps, 1.0)
@@ -139,8 +139,8 @@ def encoder_of(drive: Drive | None) -> str:
 def rate_shares(sensors: Sensors, robot: Manipulator, period: float) -> Array:
     """Return the filter gain of each estimated rate (n,); NaN where the rate is measured.
 
-    A rate is that of the differences of its encoder where this rounds or is noisy, and it is the
-    motor's where the drive tells the motor's.
+    A rate is estimated from differences of an encoder that rounds or is noisy; it is the motor's
+    rate if the drive's encoder is at the motor.
     """
     count = robot.joint_count
     at_motors = sensors.encoder if sensors.motor_encoder is None else sensors.motor_encoder

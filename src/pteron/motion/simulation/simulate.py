@@ -84,12 +84,12 @@ def simulate(
     """Simulate a machine with drives under a controller, under given forces, or free.
 
     The rigid bodies and the motors' inertia move under the drives' forces and friction. Dry
-    friction sticks: a joint at rest does not move until it is pulled by more than its friction
-    (with "dop853" it is smooth at rest, by `rest_speed`, and such a joint creeps). No drive gives
-    more than its `max_force`. At each sample the controller sees the reference and the measured
-    joints; what it asks for is held until the next, as a digital drive does. The simulation ends,
-    and says why, where a leg comes to the edge of its reach; and under a controller, unless told
-    otherwise, where a joint comes to its limits or the platform to a singularity of type II.
+    friction sticks: a joint at rest does not move until the force on it exceeds its friction (with
+    "dop853" friction is smooth at rest, by `rest_speed`, and such a joint creeps). No drive gives
+    more than its `max_force`. At each sample the controller receives the reference and the measured
+    joints; the forces that it returns are held until the next sample, as in a digital drive. The
+    simulation ends, with the reason in `stopped`, where a leg reaches the limit of its reach; and
+    under a controller, unless `limits` is false, at a joint limit or a type-II singularity.
 
     Parameters
     ----------
@@ -201,9 +201,10 @@ def _refine_steps(
 ) -> Simulation:
     """Repeat a simulation with shorter steps until no pose changes by more than `error`.
 
-    A step that holds a joint's reversal is of first order in its length and depends on where in the
-    step that is. So each run has an odd number of steps more than twice the last one's, by which no
-    two runs divide a sample alike, and two changes in a row must be small enough.
+    The error of a step in which a joint reverses is of first order in its length, and depends on
+    when in the step it reverses. So each run has an odd number of steps, more than twice the
+    previous number, so that no two runs divide a sample alike, and two successive changes must be
+    small enough.
     """
     check_positive(error=error)
     if timing.method != "rk4":
