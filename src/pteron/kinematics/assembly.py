@@ -72,7 +72,7 @@ poses, and above rounding. It separates modes to some 1e-7 of the size."""
 def every_pose(robot: Manipulator, joints: Array, most: int) -> Array:
     """Return all platform poses (..., most, m) with joint coordinates (..., n), padded with NaN.
 
-    They are ordered by phi, z, y and x: the coordinates from the last to the first.
+    Poses are sorted by phi, z, y and x: the coordinates from the last to the first.
     """
     shape = joints.shape[:-1]
     flat = joints.reshape(-1, joints.shape[-1])
@@ -118,9 +118,9 @@ def _poses(robot: Manipulator, joints: Array, most: int) -> Array:
 def _orthonormal_rows(rows: Array) -> Array:
     """Return orthonormal rows (B, n, d + 2, 3) with the same span at each phi.
 
-    0 where they are linearly dependent, so that the platform can move with the joints held. Two
-    spheres with equal motion may nearly coincide, as where two rods of a Par4's side are parallel:
-    their well-scaled difference determines where they meet.
+    Rows are 0 where they are linearly dependent, so that the platform can move with the joints
+    held. Two spheres with equal motion may nearly coincide, as where two rods of a Par4's side are
+    parallel: their well-scaled difference then determines where they meet.
     """
     q, r = np.linalg.qr(rows.reshape(*rows.shape[:2], -1).swapaxes(-1, -2))
     is_independent = np.abs(np.diagonal(r, axis1=-2, axis2=-1)).min(axis=-1) > _COINCIDING
@@ -131,7 +131,7 @@ def _orthonormal_rows(rows: Array) -> Array:
 def _angles(rows: Array, slides: bool) -> tuple[NDArray[np.int64], Array]:
     """Return the angles phi (K,) at which det G vanishes, and the state's index of each (K,).
 
-    `rows` (B, n, d + 2, 3) are those of 1, f_1 and f_2.
+    `rows` (B, n, d + 2, 3) are the coefficients of 1, f_1 and f_2 in the closure rows.
     """
     form = _form(rows, slides)
     n = rows.shape[1]
@@ -156,8 +156,8 @@ def _angles(rows: Array, slides: bool) -> tuple[NDArray[np.int64], Array]:
 def _form(rows: Array, slides: bool) -> Array:
     """Return the coefficients (B, n, n, 3) of c^2, c s, s^2 in the matrix G of angle alpha.
 
-    phi = 2 alpha where the platform turns; where it slides phi = `_SPAN` s / c, and G is taken c^2
-    times.
+    phi = 2 alpha for a platform that turns; for one that slides phi = `_SPAN` s / c, and the form
+    is that of c^2 G.
     """
     low = _gram(_rows_at(rows, 0.0, slides))
     if slides:
@@ -195,7 +195,7 @@ def _points(
 ) -> tuple[NDArray[np.int64], Array, Array]:
     """Return points (L, d) on the line of the two smallest singular vectors, with state, phi.
 
-    `rows` (K, n, d + 2) are those at phi (K,).
+    `rows` (K, n, d + 2) are the closure rows at phi (K,).
     """
     _, _, vectors = np.linalg.svd(rows)
     first, second = vectors[:, -1], vectors[:, -2]

@@ -31,12 +31,12 @@ def direct_kinematics(
     """Return every pose with the given joint coordinates: all assembly modes.
 
     With the joints held, legs keep points of the platform on planes (P-R-R-R), spheres (the ends of
-    rods) or circles (planar legs); the poses are where these meet. They are found in closed form,
-    but for platforms with an angle on legs with rods or planar legs: there as the zeros of a
-    polynomial whose degree is k, polished by Newton's method to 1e-14 or so. Those of platforms
-    that tilt lie at the ends of k paths from a machine whose poses are known: all of them, each
-    proved, or next to a singularity missed by rounding alone. Where they form a curve it is found,
-    and refused.
+    rods) or circles (planar legs); the poses are where these intersect. They are computed in closed
+    form, except for platforms with an angle on legs with rods or planar legs: there phi is a root
+    of a polynomial of degree k, refined by Newton's method to about 1e-14. The poses of platforms
+    that tilt are the ends of k paths from a machine whose poses are known: each is proved, and none
+    is missed except, by rounding, next to a singularity. If the poses form a curve (self-motion),
+    an error is raised.
 
     Parameters
     ----------
@@ -190,9 +190,9 @@ def working_mode(robot: RobotLike, pose: PoseLike, joints: JointsLike) -> NDArra
 def assembly_modes(robot: RobotLike, joints: Array, *, all_branches: bool = False) -> Poses:
     """Return the pose (..., k, m) of joint coordinates (..., n) in each assembly mode; else NaN.
 
-    Where the poses have a closed form they are not sorted, unlike those of `direct_kinematics`:
-    along a motion each column is one mode, a side of the singularities. NaN where a mode has no
-    pose, or one of other elbows.
+    Poses in closed form are not sorted, unlike those of `direct_kinematics`: along a motion each
+    column is one mode, on one side of the singularities. NaN stands for a mode without a pose, or
+    with other elbows.
     """
     robot = as_manipulator(robot)
     closure = closure_of(robot)

@@ -160,7 +160,7 @@ def place(name: str, index: tuple[int, ...]) -> str:
 def _is_any_far(robot: Manipulator, poses: Array) -> bool:
     """Return whether any of the poses (K, m) is so far out of reach that it is probably in mm.
 
-    The first failing pose may be near: a motion in millimetres may begin at zero.
+    The first failed pose may be near: a motion in millimetres may begin at zero.
     """
     misses = -numeric(robot, "reach")(poses)[0]
     return bool((misses > _MILLIMETRES * np.array([leg.size for leg in robot.legs])).any())

@@ -19,9 +19,9 @@ def follow(
 ) -> PerCoordinate:
     """Return the poses along a motion of the joints, in the assembly mode of the start pose.
 
-    Each pose is extrapolated from the last two and found by Newton's steps; where they do not
-    converge the joints' step is halved. A mode ends where the machine is singular (type II), and
-    the motion with it.
+    Each pose is extrapolated from the last two and refined by Newton's method; if that does not
+    converge, the joints' step is halved. An assembly mode, and the motion with it, ends at a
+    type-II singularity.
 
     Parameters
     ----------

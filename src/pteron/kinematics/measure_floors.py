@@ -40,7 +40,7 @@ def usual_floors(
 ) -> Floors:
     """Return type-I and type-II thresholds for poses far from singular; None means default.
 
-    A default is 0.1 where at least a tenth of the machine's poses exceed it, else their median.
+    The default is 0.1 if at least a tenth of the machine's poses exceed it, else their median.
     """
     if type_i is not None and type_ii is not None:
         return Floors(type_i, type_ii)
@@ -54,7 +54,7 @@ def usual_floors(
 def median_floors(robot: Manipulator, limits: bool = True) -> Floors:
     """Return the median type-I measure of poses, and the median type-II measure above it.
 
-    So a quarter of the poses in reach pass both, whatever machine it is.
+    So a quarter of the poses in reach exceed both, for any machine.
     """
     type_i_measures, type_ii_measures = _measures(robot, 0.0, limits)
     least = _median(type_i_measures)

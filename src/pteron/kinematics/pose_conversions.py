@@ -292,9 +292,9 @@ def twist_jacobian(
 ) -> Matrices:
     """Return the Jacobian (..., n, 6) against the platform's twist: joint rates = A @ twist.
 
-    Where `jacobian` stands against the pose's derivative, they have no part in the singularities of
-    its angles: row i is (g, s x g), with g the row against the velocity of the leg's platform point
-    and s the way there from P.
+    Unlike the rows of `jacobian`, which refer to the pose's derivative, these rows do not depend on
+    the choice of angles and their singularities: row i is (g, s x g), with g the derivative by the
+    velocity of the leg's platform point and s the vector from P to that point.
 
     Parameters
     ----------
@@ -385,7 +385,7 @@ def _tilt_torsion(matrix: Array) -> Array:
 def _quaternion(matrix: Array) -> Array:
     """Return quaternions (x, y, z, w), w >= 0, of rotation matrices (..., 3, 3): (..., 4).
 
-    The largest of the four components is the root of a sum, the others are quotients by it.
+    The largest of the four components is computed by a square root, the others as quotients by it.
     """
     trace = np.trace(matrix, axis1=-2, axis2=-1)
     diagonal = np.diagonal(matrix, axis1=-2, axis2=-1)

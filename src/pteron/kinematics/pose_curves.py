@@ -30,8 +30,8 @@ residuals there are about its m-th power, far above rounding."""
 def lie_on_curves(closed: Closed, machines: Array, z: Array) -> NDArray[np.bool_]:
     """Return which states z (K, d) lie on a continuous curve of poses of their machine.
 
-    Where the closures' derivatives lose a rank, other poses are sought at a distance in the free
-    direction, to both sides.
+    Where the Jacobian of the closure equations loses rank, other poses are sought at a distance in
+    the null direction, to both sides.
     """
     if not len(z):
         return np.zeros(0, dtype=bool)
@@ -55,9 +55,10 @@ def _levenberg_marquardt(
 ) -> tuple[Array, Array]:
     """Return z (K, d) after Levenberg-Marquardt steps, and the norms of their residuals (K,).
 
-    Damped by the square of the residual they reach a curve of poses as fast as Newton's a regular
-    pose (Yamashita and Fukushima, On the rate of convergence of the Levenberg-Marquardt method,
-    2001). `projectors` (d, d) or (K, d, d) project onto the allowed steps.
+    Damped by the squared residual, the steps converge to a curve of poses as fast as Newton's
+    method to a regular pose (Yamashita and Fukushima, On the rate of convergence of the
+    Levenberg-Marquardt method, 2001). `projectors` (d, d) or (K, d, d) project onto the allowed
+    steps.
     """
     numbers = machines.reshape(len(z), 7 * closed.equations)
     best, least = z, np.full(len(z), np.inf)

@@ -107,7 +107,7 @@ class RealPoses(NamedTuple):
 def real_poses(closed: Closed, machines: Array) -> RealPoses:
     """Return all real poses of machines with numbers (B, k, 7), by path following.
 
-    See `advance_path` for the numbers of a machine; they should be about 1.
+    See `advance_path` for the numbers of a machine, which should be of size 1 or so.
     """
     known = generic(closed)
     share = max(_PATHS // len(known.poses), 1)
@@ -180,7 +180,8 @@ def follow_paths(
 ) -> tuple[Complex, NDArray[np.bool_], NDArray[np.bool_]]:
     """Return path ends z (B, N, d) at machines (B, k, 7), whether reached, and whether converged.
 
-    Two arrays (B, N) follow: whether a path has arrived, and whether Newton's steps then converge.
+    Two arrays (B, N) follow: whether a path has arrived, and whether Newton's method then
+    converges.
     """
     count, d = known.poses.shape
     machines = targets.reshape(len(targets), 7 * known.closed.equations)
@@ -291,8 +292,8 @@ def _polish_poses(closed: Closed, machines: Array, z: Array) -> Array:
 def _prove_poses(closed: Closed, machines: Array, z: Array) -> tuple[NDArray[np.bool_], Array]:
     """Return which z (K, d) are proved to be poses, and the radius in which each is unique (K,).
 
-    The proof is Kantorovich's theorem. A pose next to a singularity, where it proves nothing,
-    counts if its residuals are rounding alone; the radius is then 0.
+    The proof is Kantorovich's theorem. A pose next to a singularity, where the theorem does not
+    apply, is accepted if its residuals are mere rounding; its radius is then 0.
     """
     if not len(z):
         return np.zeros(0, dtype=bool), np.zeros(0)

@@ -22,7 +22,7 @@ ROUNDING = 1e-10
 def balance_of_rams(robot: Manipulator) -> str:
     """Return as text why a hexapod of rams is singular at every pose; '' if its points show none.
 
-    It is proved up to rounding of the points.
+    The conditions are checked up to rounding of the points.
     """
     figures = ram_figures(robot)
     if figures is None:
@@ -48,7 +48,7 @@ def balance_of_rams(robot: Manipulator) -> str:
 def ram_figures(robot: Manipulator) -> tuple[Array, Array] | None:
     """Return centred guide points and platform points (6, 3) of a hexapod of rams, m, or None.
 
-    None for any other machine, and where all points of a figure coincide.
+    The result is None for any other machine, or if all points of a figure coincide.
     """
     if not robot.platform.moves_freely:
         return None
@@ -64,8 +64,8 @@ def ram_figures(robot: Manipulator) -> tuple[Array, Array] | None:
 def similarity(robot: Manipulator) -> tuple[float, float] | None:
     """Return a hexapod's scale factor platform/base figure, and its deviation from similar, m.
 
-    None where the machine is no hexapod of rams. The distance is the greatest of a platform point
-    from its image.
+    The result is None if the machine is no hexapod of rams. The deviation is the greatest distance
+    of a platform point from the image of its guide point.
     """
     figures = ram_figures(robot)
     if figures is None:

@@ -222,8 +222,8 @@ def _solved_poses(
 ) -> Array:
     """Return poses found by Newton's method for random joint coordinates, if usable.
 
-    With short rams or cranks hardly any pose of the box is in reach. Empty where the platform does
-    not tilt, or a joint has no range (`_joint_ranges`).
+    With short rams or cranks hardly any pose of the box is in reach. The result is empty if the
+    platform does not tilt, or a joint has no range (`_joint_ranges`).
     """
     ranges = _joint_ranges(robot, limits=conditions.limits)
     if ranges is None:
@@ -244,7 +244,7 @@ def joints_limit_reach(robot: Manipulator) -> bool:
 def _joint_ranges(robot: Manipulator, *, limits: bool) -> Array | None:
     """Return (2, n) low and high joint coordinates of a platform that tilts; None if endless.
 
-    A crank has a turn where it has no limits, or where these do not count.
+    A crank has the range of a full turn if it has no limits, or if limits are ignored.
     """
     if not joints_limit_reach(robot):
         return None
@@ -301,9 +301,10 @@ def _random_walk(
 ) -> Array:
     """Return usable poses (k, m) that a random walk finds, about `count` of them.
 
-    It serves where poses in reach are so rare that drawing meets next to none: links of very
-    unequal length have a reach as thin as a shell. The poses that miss the legs' reach by least
-    lead to it; from poses in reach it spreads, in steps of which some, not all, stay there.
+    It serves machines whose poses in reach are so rare that random drawing finds next to none:
+    links of very unequal length have a reach as thin as a shell. The walk starts from the poses
+    that are least out of reach; from poses in reach it spreads by steps of which some, not all,
+    stay in reach.
     """
     poses = rng.uniform(low, high, (_BATCH, robot.freedom))
     kin = poses[:0]
@@ -436,7 +437,7 @@ def search_ball(robot: Manipulator) -> tuple[Array, float]:
 def type_ii_sizes(robot: Manipulator, poses: PoseLike) -> Array:
     """Return the absolute type-II measure (...) at poses (..., m); 0 where it is not finite.
 
-    A pose out of reach, or where a leg loses its force, thus fails every floor.
+    A pose out of reach, or where a leg transmits no force, thus fails any threshold.
     """
     sizes = np.abs(numeric(robot, "type_ii")(poses)[0])
     return np.where(np.isfinite(sizes), sizes, 0.0)

@@ -23,7 +23,7 @@ _STEP = 1e-6
 def coordinate_distances(robot: Manipulator, poses: Array) -> Array:
     """Return the least change of points and lengths, m, that makes each pose singular (K,).
 
-    It is to first order, at a held pose; NaN out of reach.
+    The distance is to first order, at a fixed pose; NaN out of reach.
     """
     unit = unit_rows(robot, poses)
     distances = np.full(len(poses), np.nan)
@@ -56,8 +56,8 @@ def _rows_of(
 ) -> Array:
     """Return the Jacobian rows (B, K, n, 6 or m) of B changed machines at poses (K, m).
 
-    `kernel` is that of a `RowFrame`, and `amounts` (B, len(changes)), m, are the sizes of the
-    changes of each machine.
+    `kernel` is the one that a `RowFrame` names, and `amounts` (B, len(changes)), m, are the changes
+    of each machine.
     """
     geometry = varied_numbers(robot, changes, amounts)
     function = general_program(robot, kernel).function

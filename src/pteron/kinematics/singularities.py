@@ -51,8 +51,8 @@ _HALVINGS = 50
 def best_type_ii(robot: Manipulator) -> float:
     """Return the largest absolute type-II measure over poses in reach; 1 if all are singular.
 
-    It is the best of many random poses, the foremost of them improved by Nelder and Mead's method.
-    Limits do not count: it is a measure of the geometry, which another limit leaves as it is.
+    The best of many random poses are improved by the Nelder-Mead method. Joint limits are ignored,
+    so that the value depends on the geometry alone.
     """
     key = "best_type_ii", geometry_only(robot)
     return cached_result(key, ("kinematics",), lambda: _best_type_ii(robot))

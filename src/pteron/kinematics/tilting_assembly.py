@@ -26,9 +26,9 @@ def tilting_poses(
 ) -> tuple[NDArray[np.int64], Array, NDArray[np.bool_]]:
     """Return all poses of joint coordinates (B, n) of a tilting platform, with the row of each.
 
-    The third result is whether the platform can move while a row's joints are held (B,), a
-    self-motion, of which no poses are listed. Poses of a tripod on the other side of its yaw are
-    excluded.
+    The third result (B,) is whether the platform can move while a row's joints are held (a
+    self-motion), for which no poses are listed. Poses of a tripod with the other solution of its
+    yaw are excluded.
     """
     centers, squares = spheres_kernel(robot)(joints)
     good = np.flatnonzero(

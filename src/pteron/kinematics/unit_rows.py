@@ -107,7 +107,7 @@ def row_frame(robot: Manipulator, poses: Array) -> RowFrame:
 def normalise_rows(twists: Array, arm: Array, length: float) -> tuple[Array, Array]:
     """Return force rows (K, n, 6) scaled to unit size, moments over `length`, and divisors (K, n).
 
-    A leg that turns the platform alone has a unit couple, force times L.
+    The row of a leg that only turns the platform has a unit couple, force times `length`.
     """
     forces, moments = twists[..., :3], twists[..., 3:]
     moments = (moments - np.cross(arm[:, None, :], forces)) / length

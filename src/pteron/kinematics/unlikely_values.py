@@ -28,8 +28,8 @@ def unlikely_values(
 ) -> tuple[str, ...]:
     """Return a warning for each column of poses or joints that is probably in another unit.
 
-    `coordinates` (..., C), m and rad, are those of the columns, such as ``x``, ``phi`` or ``rho1``;
-    columns of other names are ignored.
+    `coordinates` (..., C), m and rad, are the values of the columns, such as ``x``, ``phi`` or
+    ``rho1``; columns of other names are ignored.
     """
     length, limits = unlikely_length(robot), robot.platform.angle_limits
     # Angles of a platform that tilts repeat beyond half a turn.

@@ -134,11 +134,12 @@ class Simulation(Result):
     def table(self) -> pl.DataFrame:
         """Return the samples as a table, a row for each time.
 
-        Its columns are t; x y z phi, dx dy dz dphi, ddx ddy ddz ddphi and xref yref zref phiref,
-        those that the machine has; its joints (rho1, theta2) and their rates (drho1, dtheta2);
-        forces (force1, torque2); and payload. Joints and forces are as the drives count them: where
-        a transmission bends and its encoder is at the motor, the joint's columns are the motor's.
-        With such transmissions motor_rho1, ..., dmotor_rho1, ... are the motors' everywhere.
+        The columns are t; x y z phi, dx dy dz dphi, ddx ddy ddz ddphi and xref yref zref phiref, as
+        far as the machine has them; its joints (rho1, theta2) and their rates (drho1, dtheta2);
+        forces (force1, torque2); and payload. Joints and forces are in the drives' units of
+        reading: if a transmission is elastic and its encoder is at the motor, the joint's columns
+        are the motor's. With elastic transmissions motor_rho1, ..., dmotor_rho1, ... are the
+        motors' coordinates.
         """
         import polars as pl
 

@@ -31,11 +31,11 @@ _SHORTEST = 1e-8
 def longest_step(robot: RobotLike, poses: PoseLike, machines: Machines | None = None) -> float:
     """Return the longest stable step of the simulation, s; infinite if nothing limits it.
 
-    The fastest of these limits it: the decay of rates by viscous friction or by a winding at its
-    supply's limit, the vibration of motors and joints on transmissions that bend, and the lag of
-    currents. Dry friction needs no short steps. The poses, (..., m), are those where the machine
-    may be. For several machines the step is stable for all of them, at the pose where the mass at
-    the joints is least.
+    It is limited by the fastest of these: the decay of rates by viscous friction or by a winding at
+    its supply's limit, the vibration of motors and joints on elastic transmissions, and the lag of
+    currents. Dry friction needs no short steps. `poses` (..., m) are those where the machine may
+    be. For several machines the step is stable for all of them, at the pose with the least mass at
+    the joints.
     """
     return _longest_stable_step(as_manipulator(robot), poses, machines)[0]
 
@@ -116,8 +116,8 @@ def modes(robot: RobotLike, poses: PoseLike) -> tuple[Array, Array]:
     """Return the eigenvalues of the machine with its drives, linearised about rest at poses.
 
     The linear machine is M x'' = J^T (k d + c d') and I w' = -k d - c d' - b w, with d the
-    deflection of each transmission; play, dry friction and the change of gravity forces with the
-    pose are left out.
+    deflection of each transmission; backlash, dry friction and the change of gravity forces with
+    the pose are neglected.
 
     Parameters
     ----------
@@ -162,7 +162,7 @@ def _linear_machine(
 ) -> tuple[Array, Array]:
     """Return the linear machine's matrix (..., 2 K, 2 K) and the deflections (..., n, K).
 
-    The K coordinates are those of the pose, then the motors behind transmissions that bend.
+    The K coordinates are those of the pose, then those of the motors behind elastic transmissions.
     """
     bends = [leg.drive and leg.drive.elastic for leg in robot.legs]
     stiffness, damping = (

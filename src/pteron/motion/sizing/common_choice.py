@@ -19,7 +19,8 @@ have when they are built and measured."""
 def alike_legs(robot: RobotLike) -> tuple[tuple[int, ...], ...]:
     """Return groups of identical legs, as leg numbers from 1; groups have two or more.
 
-    They are of one kind and have links of the same lengths: what makes one drive fit all of them.
+    Identical legs are of one kind with links of the same lengths, so that one drive fits all of
+    them.
 
     Parameters
     ----------
@@ -64,8 +65,8 @@ def choose_common(
 ) -> tuple[CommonFit, ...]:
     """Return how each motor suits each group of identical legs, with a common gear ratio.
 
-    A machine is built with the same drive at legs that are alike, though its cycle does not ask
-    the same of each. The best is first, as `choose` has it.
+    A machine is built with the same drive at identical legs, though its cycle loads them
+    differently. The best motor is first, in the order of `choose`.
 
     Parameters
     ----------

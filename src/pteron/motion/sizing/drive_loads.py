@@ -215,7 +215,8 @@ class Sizing(Result):
     def net_energy(self) -> float:
         """Energy that all drives deliver over the cycle, less the energy they absorb, J.
 
-        It is what friction takes, and the motion leaves; 0 where it is none but for rounding.
+        It is the energy that friction dissipates plus what the motion keeps; 0 if it is zero up to
+        rounding.
         """
         driving, braking = (
             self._quantities_at_places[f"{key}_energy"].sum(axis=1) for key in ("given", "braked")
@@ -263,7 +264,7 @@ class Sizing(Result):
     def squares(self, leg: int) -> tuple[Array, Array, Array]:
         """Return the cycle means of f^2, f q'' and q''^2, f being the load force of a leg.
 
-        Each is (), or (W,) of several places.
+        Each has the shape (), or (W,) for W places.
         """
         force, mixed, acceleration = (part[..., leg - 1] for part in self._squares)
         return force, mixed, acceleration
@@ -290,7 +291,7 @@ class Sizing(Result):
     def place_text(self, margin: DriveMargin) -> str:
         """Return in words the place of the cycle where a drive margin is least.
 
-        '' without places.
+        The text is empty without places.
         """
         if not self.places:
             return ""
@@ -303,7 +304,7 @@ class Sizing(Result):
     def table(self) -> pl.DataFrame:
         """Return a table of drive loads with a row for each leg, SI units at the joint.
 
-        What a drive has not is empty.
+        Cells of quantities that a drive does not have are empty.
         """
         import polars as pl
 

@@ -61,8 +61,8 @@ def drive_margins(
 ) -> tuple[DriveMargin, ...]:
     """Return the margins (limit over load) of all drive limits in the machine's file.
 
-    `needed` has what a cycle takes of each joint (n,), by quantity: of some or of all. `forces` and
-    `speeds` (..., n) are those of its moments.
+    `needed` has the loads of a cycle at each joint (n,), by quantity; quantities may be missing.
+    `forces` and `speeds` (..., n) are those at the samples of the cycle.
     """
     margins = []
     for i, leg in enumerate(robot.legs):

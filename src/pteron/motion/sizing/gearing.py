@@ -45,7 +45,7 @@ NONE = Span(math.inf, 0.0)
 def torques(sizing: Sizing, leg: int, ratio: float, rotor_inertia: float) -> tuple[float, float]:
     """Return root mean square and peak torque, N m, of a motor over the cycle at a gear ratio.
 
-    N m, at a ratio in rad/m or rad/rad, of a motor with this inertia of its rotor, kg m^2.
+    The ratio is in rad/m or rad/rad, `rotor_inertia` in kg m^2.
     """
     rms = math.sqrt(float(mean_squares(sizing, leg, ratio, rotor_inertia).max()))
     loads, accelerations = sizing.loads[..., leg - 1], sizing.accelerations[..., leg - 1]
@@ -76,7 +76,8 @@ def rated_span(sizing: Sizing, leg: int, rotor_inertia: float, rated_torque: flo
 def peak_span(sizing: Sizing, leg: int, rotor_inertia: float, peak_torque: float) -> Span:
     """Return the span of gear ratios at which the torque never exceeds `peak_torque`, N m.
 
-    At each sample |f / i + J i q''| <= T holds between the roots of two parabolas, an interval.
+    At each sample |f / i + J i q''| <= T holds for ratios i between the roots of two parabolas,
+    which is an interval.
     """
     loads, accelerations = sizing.loads[..., leg - 1], sizing.accelerations[..., leg - 1]
     rotor_loads = rotor_inertia * accelerations

@@ -110,12 +110,11 @@ class CommonFit(Result):
 def choose(sizing: Sizing, motors: Sequence[Motor], *, margin: float = 1.0) -> tuple[MotorFit, ...]:
     """Return how each motor suits each joint: feasible motors first, by size, then others.
 
-    A motor serves at a ratio if, times the margin, its root mean square torque over the cycle, the
-    rest included, is no more than its rated torque, its greatest torque no more than its peak
-    torque, and its greatest speed no more than its own. All ratios that serve are found, in closed
-    form; what the transmission loses is the joint's friction in the machine's file. Of two motors
-    the smaller has less rated torque times speed; those that do not serve follow, by how near they
-    come.
+    A motor is feasible at a ratio if, times the margin, its root mean square torque over the cycle
+    (rests included) is at most its rated torque, its greatest torque at most its peak torque, and
+    its greatest speed at most its maximum speed. All feasible ratios are computed in closed form;
+    losses of the transmission count as the joint's friction in the machine's file. Motors are
+    ordered by rated torque times speed; infeasible motors follow, by their margin.
 
     Parameters
     ----------
@@ -155,7 +154,8 @@ def rank_motors(
 ) -> list[CommonFit]:
     """Return how each motor suits each group of legs (one gear ratio per group), best first.
 
-    What serves comes first in a group, the smallest motor before others; then what comes nearest.
+    In each group feasible motors come first, the smallest before others; then the infeasible ones,
+    by margin.
     """
     expect(1.0 <= margin < math.inf, "margin", margin, "a number of 1 or more")
     fits: list[CommonFit] = []

@@ -137,9 +137,9 @@ Fits = Callable[[Array], bool]
 def region_fits(course: Course, region: Region | None) -> tuple[Array, Fits]:
     """Return a region's box (2, m), and a function that tests whether poses lie in the region.
 
-    Without a region it is the workspace: poses that keep `least_margin` to singularities and the
-    joints within their limits, about the home pose's angles: its box has room for those that the
-    course goes through. Of a platform that moves along fewer than two directions they vary, too.
+    Without a region the workspace is used: poses with singularity margins of at least
+    `least_margin` and joints within their limits, at the home pose's angles, in a box wide enough
+    for the angles of the course. For a platform with fewer than two lengths the angles vary, too.
     """
     robot = course.robot
     if region is not None:
@@ -159,9 +159,10 @@ def region_fits(course: Course, region: Region | None) -> tuple[Array, Fits]:
 def places_in(course: Course, box: Array, fits: Fits) -> tuple[CyclePlace, ...]:
     """Return places in a region's box at which the complete course lies in the region.
 
-    They are on a grid that goes to the ends of the region's box, for turns by 30 degrees; the
-    platform is turned as the path is, too, unless the box has a range of that. Where the region
-    leaves out some of them, others are spread over all of the box.
+    Places are on a grid that includes the ends of the region's box, with turns in steps of 30
+    degrees; the platform is turned with the path, and also not turned, unless the box has a range
+    of that angle. If the course leaves the region at some of them, further places are spread over
+    the box.
     """
     turns = np.linspace(0.0, 2.0 * np.pi, TURNS, endpoint=False) if course.axis is not None else [0]
     candidates = []
@@ -184,7 +185,7 @@ def places_in(course: Course, box: Array, fits: Fits) -> tuple[CyclePlace, ...]:
 def _quasirandom_places(course: Course, box: Array) -> Iterator[CyclePlace]:
     """Yield quasi-random places of a course in a box (2, m), with turns in all directions.
 
-    They are the quasirandom sequence of M. Roberts, "The unreasonable effectiveness of quasirandom
+    They are a quasirandom sequence of M. Roberts, "The unreasonable effectiveness of quasirandom
     sequences" (2018): multiples of powers of a generalised golden ratio.
     """
     count = len(box[0]) + 1
@@ -217,8 +218,8 @@ def neighbours(
 ) -> Iterator[CyclePlace]:
     """Yield neighbours of a cycle's place at +- `steps` (m,) in coordinates and +- `turn`, rad.
 
-    A turn is that of the path alone, and that of the platform, too. In a region whose boundary is
-    oblique come steps along all coordinates and turns at once.
+    A turn is one of the path alone, and one of path and platform. For regions with an oblique
+    boundary there are steps in all coordinates and turns at once, too.
     """
     for side in (1.0, -1.0):
         if turn:

@@ -36,7 +36,7 @@ class Profile(NamedTuple):
     def smooth(self, h: float) -> Callable[[Array], tuple[Array, Array, Array]]:
         """Return a function of tau (0 to 1): s averaged over +-h by a triangular weight.
 
-        Its acceleration is continuous, and its jerk too but for steps.
+        The acceleration is continuous; the jerk is continuous except for steps.
         """
         stretched_duration = self.duration + 2.0 * h
 
@@ -64,8 +64,8 @@ class Profile(NamedTuple):
     def _moments(self, t: Array, h: float) -> tuple[Array, Array, Array]:
         """Return integrals (T,) of s'' from t to t + h, weighted by (h - r)^k / k!, k = 1, 2, 3.
 
-        The integrals of (h - r)^k / k! s''(t + r) over r, k = 1, 2 and 3: small where h is, so that
-        averages are exact to rounding however little they take in.
+        The integrals of (h - r)^k / k! s''(t + r) over r, k = 1, 2, 3, vanish with h, so that
+        averages over any h are exact to rounding.
         """
         edges = np.concatenate([[-np.inf], self.time, [np.inf]])
         gain = np.concatenate([[0.0], self.gain, [0.0]])

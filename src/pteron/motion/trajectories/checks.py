@@ -99,7 +99,7 @@ def check_curve(
 ) -> None:
     """Raise the error of the first pose of a curve that is out of reach, limits, or singular.
 
-    `marks` are the parameters checked first, and `place` says in words where a parameter is.
+    `marks` are the parameters checked first, and `place` returns as text where a parameter is.
     """
     expect_regular(robot)
     curve = _Curve(robot, poses, place)

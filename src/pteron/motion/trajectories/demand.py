@@ -67,7 +67,7 @@ class Demand(NamedTuple):
     def drive_forces(self, rate: Array, gain: Array) -> Array:
         """Return drive forces (2, K, n) at p' and p'' (K,), with least and greatest dry friction.
 
-        What the drives give is between the two.
+        The actual drive forces lie between the two.
         """
         moving = np.sign(self.first * rate[:, None])
         rigid = self.static + self.growth * gain[:, None] + self.square * rate[:, None] ** 2
@@ -103,8 +103,9 @@ def demand_between(
 ) -> tuple[Array, Demand, Array]:
     """Return curve parameters, the `Demand` and poses (K, m) there, joint reversals inserted.
 
-    `states` gives the curve at places, which ascend. Where a joint reverses between two of them dry
-    friction changes its sign, and a force jumps: that place is there twice, moving either way.
+    `states` returns the curve at ascending parameters. Where a joint reverses between two of them,
+    dry friction changes its sign and a force jumps: that parameter is inserted twice, with either
+    sign of the rate.
     """
     turns, joints = _reversals(robot, states, at)
     all_places = np.concatenate([at, turns, turns])
@@ -150,7 +151,7 @@ def most_rate(
 ) -> float:
     """Return the largest constant p' <= `most` at which the demand keeps the limits at all poses.
 
-    Infinite where it meets none.
+    It is infinite if no limit is reached.
     """
     with np.errstate(divide="ignore", invalid="ignore"):
         rates = [

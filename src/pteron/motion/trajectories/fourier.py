@@ -98,7 +98,7 @@ def fourier_curve(coefficients: Array, period: float, times: Array) -> Curve:
 def fourier_basis(times: Array, harmonics: int, period: float) -> Array:
     """Return 1, the cosine and the sine of each harmonic at times (T,), s: (T, 2 H + 1).
 
-    The columns are those of 1, then of all cosines, then of all sines.
+    The columns are 1, then all cosines, then all sines.
     """
     return next(fourier_bases(times, harmonics, period))
 

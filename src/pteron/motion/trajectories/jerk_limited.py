@@ -40,8 +40,8 @@ def jerk_limited(
 ) -> Motion:
     """Return the motion of the joints from rest in one pose to rest in another, with limited jerk.
 
-    The joints start and arrive together; where forces of the drives are limited too, or the tool,
-    the motion is slowed as a whole. The path of the tool follows from them and is no line.
+    The joints start and arrive together; if drive forces or the tool are limited too, the motion is
+    slowed as a whole. The tool's path follows from the joints' motion and is not a straight line.
 
     Parameters
     ----------

@@ -36,7 +36,7 @@ class LimitRows(NamedTuple):
 def limit_rows(needs: Demand, limits: MotionLimits, unit: float) -> LimitRows:
     """Return the motion limits as linear constraints on s'' and s'^2 at K points of a path.
 
-    Times are in units of `unit`, s.
+    Times are in units of `unit` seconds.
     """
     count = len(needs.first)
     none = np.zeros((count, 0))

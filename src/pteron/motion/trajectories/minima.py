@@ -27,8 +27,9 @@ def least_along(
 ) -> tuple[Array, Array]:
     """Return place and value of the minimum of each column of measure(marks) (K, c), (c,) each.
 
-    Its lowest valleys among the marks are looked into, finer and finer, if it may go below
-    `enough` there: between two marks it changes by no more than twice what it does elsewhere.
+    The lowest valleys among the marks are sampled finer and finer if the measure may be below
+    `enough` there, assuming that between two marks it changes by at most twice as much as between
+    others.
     """
     samples = measure(marks)
     places, least = marks[samples.argmin(axis=0)], samples.min(axis=0)

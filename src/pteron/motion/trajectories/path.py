@@ -111,10 +111,10 @@ def _bezier(points: Array, u: Array) -> Array:
 def line_path(robot: RobotLike, poses: ArrayLike, corner: float = 0.0) -> LinePath:
     """Return the path of the tool's centre point along straight lines through poses.
 
-    The pose's angles change evenly along a line; where there is one of them, the platform turns
-    evenly. A corner is rounded by a Bezier curve of the fifth
-    degree whose ends are `corner` metres before and after it, on both lines, without curvature: the
-    path is twice continuously differentiable. It passes a right angle at 0.27 times that distance.
+    The pose's angles change linearly along a line; a single angle makes the platform turn evenly. A
+    corner is rounded by a Bezier curve of the fifth degree whose ends lie `corner` metres before
+    and after it, on both lines, without curvature: the path is twice continuously differentiable.
+    At a right angle it passes the corner at 0.27 times that distance.
 
     Parameters
     ----------

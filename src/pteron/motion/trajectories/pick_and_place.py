@@ -64,11 +64,11 @@ def pick_and_place(
 ) -> PickAndPlace:
     """Return the standard pick-and-place cycle: 25 mm up, 305 mm across, 25 mm down, and back.
 
-    It is the path of the tool's centre point, `platform.tool`; P follows where that needs it. Up
-    is against gravity, or along the platform's axis where there is none. A planar machine goes the
-    cycle in its plane: up is then against what gravity does there or, in a horizontal plane, at a
-    right angle to across. Each move is a quintic in time; they overlap, so that the corners are
-    round. The platform rests at both ends.
+    It is the path of the tool's centre point, `platform.tool`; P moves accordingly. Up is opposite
+    to gravity, or along the platform's axis without gravity. A planar machine performs the cycle in
+    its plane: up is then opposite to gravity's component there or, in a horizontal plane,
+    perpendicular to across. Each move is a quintic in time; the moves overlap, so that the corners
+    are round. The platform rests at both ends.
 
     Parameters
     ----------

@@ -26,7 +26,7 @@ def point_to_point(
 ) -> Motion:
     """Return the straight motion of the tool from rest in one pose to rest in another.
 
-    The tool's centre point goes along a line, and the pose's angles change in proportion with it.
+    The tool's centre point moves on a straight line, and the pose's angles change in proportion.
 
     Parameters
     ----------

@@ -47,7 +47,7 @@ _WORTH = 1.01
 def least_margin(robot: RobotLike, around: PoseLike) -> float:
     """Return the default least singularity margin (no unit) for a cycle about a pose.
 
-    It is 0.2; a machine with little margin moves where it has half of what the pose has.
+    It is 0.2, or half of the margin at the pose if that is less.
 
     Parameters
     ----------
@@ -76,9 +76,9 @@ def scaled_to_reach(
 ) -> tuple[float, Array]:
     """Return the scale of the largest pick-and-place cycle about a pose, and its direction.
 
-    The whole cycle stays in reach, keeps the margins of type I and type II (see
+    The complete cycle stays in reach, keeps the margins of type I and type II (see
     `pteron.workspace.PoseMargins`) at `least` or above, and the joints within their limits. The
-    scale is found by bisection: a smaller cycle stays nearer to the pose in its middle.
+    scale is found by bisection, since a smaller cycle stays nearer to the pose in its middle.
 
     Parameters
     ----------

@@ -207,9 +207,10 @@ def _expect_kept(
 def limit_motion(robot: Manipulator, course: Timed, limits: MotionLimits, step: float) -> Motion:
     """Return the motion along a timed curve, slowed down until it keeps the limits everywhere.
 
-    And where a joint reverses between them.
+    The limits are checked at ten times as many samples as the motion has, and where joints reverse.
 
-    Its duration is a multiple of the step; the course is slowed by what it exceeds a limit.
+    The duration is a multiple of the step; the course is slowed by the factor by which it exceeds a
+    limit.
     """
     for _ in range(_TRIES):
         count = max(1, int(np.ceil(course.duration / _expect_time("step", step) - 1e-9)))

@@ -98,8 +98,8 @@ def time_optimal(
 ) -> TimeOptimal:
     """Return the fastest motion along a path that keeps the limits.
 
-    It rests where the path does. The acceleration is continuous: its jumps are spread over a few
-    samples. The limits are kept at ten times as many samples too.
+    The motion rests where the path does. The acceleration is continuous: its jumps are spread over
+    a few samples. The limits are also checked at ten times as many samples.
 
     Parameters
     ----------
@@ -264,7 +264,8 @@ def _solve_pass(
 ) -> Array:
     """Return x = s'^2 (K,) on the grid of s, by TOPP-RA, from the previous pass's solution.
 
-    With viscous friction it is at most `ahead` times as large: there the chord ends.
+    With viscous friction x is at most `ahead` times its previous value: there the linearisation
+    ends.
     """
     most = np.minimum(rows.most, _FASTEST)
     a, b, c = rows.a.copy(), rows.b.copy(), rows.c.copy()

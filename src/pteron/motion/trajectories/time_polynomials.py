@@ -24,8 +24,8 @@ class Progress(Protocol):
 def polynomial(law: PolynomialLaw) -> Progress:
     """Return the time law: the polynomial from 0 to 1 whose derivatives vanish at both ends.
 
-    The quintic, 10 t^3 - 15 t^4 + 6 t^5, has two such derivatives; the seventh degree's, 35 t^4 -
-    84 t^5 + 70 t^6 - 20 t^7, has three: the jerk begins and ends at zero too.
+    The quintic, 10 t^3 - 15 t^4 + 6 t^5, has two such derivatives; the polynomial of the seventh
+    degree, 35 t^4 - 84 t^5 + 70 t^6 - 20 t^7, has three, so that the jerk is zero at both ends too.
 
     Examples
     --------

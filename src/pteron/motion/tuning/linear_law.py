@@ -38,7 +38,7 @@ class LinearLaw:
 def linearised_law(law: Law, pose: Array, velocity: Array, acceleration: Array) -> LinearLaw:
     """Return a control law linearised at a reference state, (m,) each, measured without error.
 
-    The derivatives are exact. Its model has no dry friction there, as the plant has none.
+    The derivatives are exact. Dry friction is neglected, as in the linear plant.
     """
     model, size = law.model, law.model.freedom
     memory = law.memory(pose, velocity)

@@ -81,12 +81,12 @@ def linearise(
 ) -> LinearPlant:
     """Return a machine with its drives, linearised at a pose at rest or a moment of a motion.
 
-    The drives' forces are those that hold the machine there, or that the motion needs. The closed
-    chain is kept whole: at rest A has (J M^-1 J^T) times the change of the forces of gravity, and B
-    is J M^-1 J^T, with the motors' inertia in M. A moment of a motion is frozen: A and B are those
-    of this moment. The derivatives are exact, of the equations of `simulate`: transmissions that
-    bend and currents that lag are states of their own. Viscous friction counts; dry friction does
-    not, as it only damps, and least where a joint moves, nor do backlash, ripple and limits.
+    The drive forces are those that hold the machine there, or that the motion needs. The closed
+    chain is fully included: at rest A contains J M^-1 J^T times the derivative of the gravity
+    forces, and B is J M^-1 J^T, with the motors' inertia in M. For a moment of a motion A and B are
+    those of that moment (frozen). The derivatives of the equations of `simulate` are exact: elastic
+    transmissions and lagging currents have states of their own. Viscous friction is included; dry
+    friction, which only adds damping, is not, nor are backlash, ripple and limits.
 
     Parameters
     ----------

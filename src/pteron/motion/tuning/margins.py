@@ -98,9 +98,9 @@ class LoopMargins(Result):
     def disk(self) -> float:
         """The disk margin d at all drives at once.
 
-        The loop stays stable though each force is multiplied by a complex number of its own, within
-        the disk on whose rim (1 + d / 2) / (1 - d / 2) and its inverse are. It is a lower bound, by
-        the greatest singular value and by Perron's bound, of which the better.
+        The loop stays stable if each force is multiplied by any complex number in the disk whose
+        diameter ends at (1 + d / 2) / (1 - d / 2) and its inverse. It is a lower bound, the better
+        of one by the greatest singular value and one by Perron's theorem.
         """
         identity = np.eye(len(self._response[0]))
         middle = np.linalg.inv(identity + self._response) - 0.5 * identity

@@ -81,7 +81,7 @@ def trial(
 ) -> GainTrial:
     """Simulate a motion and the rest at its end; return errors, forces and energy as a trial.
 
-    Parameters are those of `simulate`, and so is what it raises.
+    The parameters, and the errors raised, are those of `simulate`.
     """
     robot = as_manipulator(robot)
     simulation = simulate(
@@ -200,7 +200,7 @@ def _stiffer(robot: Manipulator, factor: float) -> Manipulator:
     def stiffen(drive: Drive | None) -> Drive | None:
         """Return a drive with its stiffness multiplied by `factor`.
 
-        Unchanged if it is not elastic.
+        A drive without elastic transmission is unchanged.
         """
         if drive is None or drive.elastic is None:
             return drive

@@ -140,8 +140,9 @@ class Tuning(Result):
     def table(self) -> pl.DataFrame:
         """Return the stability margins as a table, a row for each state.
 
-        Columns: t (of the motion; empty in the workspace), the pose, gain, phase and delay margin
-        of each drive, those of all at once, the disk margin, and the slowest pole's rate.
+        The columns are t (of the motion; empty in the workspace), the pose, the gain, phase and
+        delay margin of each drive, those of all drives together, the disk margin, and the decay
+        rate of the slowest pole.
         """
         import polars as pl
 
@@ -171,8 +172,8 @@ def tune(
     """Return the controller of the greatest bandwidth that keeps the required stability margins.
 
     The loop of machine, drives, encoders, controller and delay is linearised at moments of the
-    motion, frozen there, and at poses of the workspace, at rest. All coupling of the closed chain
-    counts. From one sample to the next it is exact: forces are held, and act after the delay.
+    motion, and at poses of the workspace at rest, with all coupling of the closed chain. Its
+    sampling is exact: forces are held from one sample to the next, and act after the delay.
 
     Parameters
     ----------
@@ -332,7 +333,8 @@ class _Search:
     ) -> Controller | None:
         """Return the controller of greatest bandwidth with sufficient margins, or None if none has.
 
-        `few` are the states that decided so far, `tried` what was tried, with its share.
+        `few` are the states that limited the bandwidth so far, `tried` the controllers tried, with
+        their least ratio.
         """
 
         def share(bandwidth: float) -> float:
