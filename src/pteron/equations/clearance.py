@@ -52,7 +52,7 @@ class Body:
 def bodies(robot: Manipulator) -> list[Body]:
     """Return the bodies of a machine: each leg's guide, upper and lower link, then the platform.
 
-    A guide without limits has no ends, and is left out.
+    A guide without limits has no ends and is left out.
     """
     machine = Machine.numeric(robot)
     state = machine.state(ca.SX.sym("pose", machine.freedom))

@@ -106,7 +106,7 @@ def _component_in_plane(
 def held_spheres(machine: Machine, joints: Expression) -> tuple[Expression, Expression]:
     """Return centres (n, 3) and squared radii (n, 1) of the spheres that hold platform points.
 
-    The center lies in the plane that the leg keeps its point in, if there is one.
+    If the leg keeps its point in a plane, the centre is projected into that plane.
     """
     centers, squares = [], []
     for leg, q in zip(machine.legs, ca.vertsplit(joints), strict=True):
@@ -234,10 +234,10 @@ def direct_step(
 ) -> tuple[Expression, Expression, Expression]:
     """Return the pose of joints near a start pose, its type-II measure, leg that changed branch.
 
-    The pose is NaN where `converged_step` has it, where a leg does not reach the start pose, and
-    beyond a singularity of the robot's working mode: the type-II measure changes its sign, or a leg
-    bends the other way. That leg is the last result, from 1; 0 where there is none, or Newton's
-    steps do not converge.
+    The pose is NaN where that of `converged_step` is, where a leg does not reach the start pose,
+    and beyond a singularity of the robot's working mode: the type-II measure changes its sign, or a
+    leg bends the other way. The last result is that leg's number, from 1; 0 if there is none, or if
+    Newton's method does not converge.
     """
     end = converged_step(machine, joints, pose, least)
     # At the start pose the loci are those of the joints there, not of the given joints.

@@ -40,9 +40,9 @@ def homogeneous(machine: Machine, state: State) -> Homogeneous:
     """Return the Jacobian in homogeneous units (m/m), and the characteristic length L, m.
 
     L is the root mean square distance of the moving platform points from the axis through P, or
-    from all axes through P; 1 m where none moves. The joint of a leg that follows the angle is that
-    angle times L, without its gear. Where the platform tilts, the turns are those about the base
-    frame's axes, or of a tripod roll and pitch.
+    from all axes through P; 1 m where no point moves. The joint of a leg that follows the
+    platform's angle counts as that angle times L, without its gear. If the platform tilts,
+    rotations are those about the base axes, or for a tripod roll and pitch.
     """
     if not machine.platform.angles():
         return Homogeneous(_with_joints_in_metres(machine, _jacobian(state), ca.SX(1)), ca.SX(1))
@@ -57,8 +57,9 @@ def homogeneous(machine: Machine, state: State) -> Homogeneous:
 def point_jacobian(machine: Machine, state: State) -> Expression:
     """Return the Jacobian (n, m) from normalised velocities of all platform points to joints.
 
-    With V = S x' these velocities and S^T S = n R^T R it is J R^-1: that of the points' centroid,
-    with their root mean square distance from it for L. It depends on no chosen length or point P.
+    With V = S x' these velocities and S^T S = n R^T R, the matrix is J R^-1: the Jacobian at the
+    points' centroid, with their root mean square distance from it as L. It depends on no chosen
+    length or point P.
     """
     if not machine.platform.angles():
         return homogeneous(machine, state).matrix
@@ -239,8 +240,8 @@ def _inverse(rows: Expression) -> tuple[Expression, Expression]:
 def pressure_angle(machine: Machine, state: State) -> Expression:
     """Return the greatest angle between a leg's force and the motion of its joint, rad.
 
-    The force that a leg passes on acts along its dq/dc; the joint moves along its axis or, a
-    crank's end, across it.
+    The force that a leg transmits acts along the derivative dq/dc of its joint coordinate; the
+    joint moves along its axis or, at a crank's end, perpendicular to the crank.
     """
     angles = [ca.SX(0)]
     for leg in state.legs:
@@ -258,7 +259,7 @@ def pressure_angle(machine: Machine, state: State) -> Expression:
 def output_pressure_angle(machine: Machine, state: State) -> Expression:
     """Return the greatest angle between a leg's force and its point's motion, rad.
 
-    It is the motion while the other joints are held: that of a column of J^-1.
+    The motion is that with the other joints held: a column of J^-1.
     """
     adj, angles = adjugate(plain_rows(state.platform, state.legs)), [ca.SX(0)]
     for i, (leg, matrix) in enumerate(zip(state.legs, state.platform.matrices, strict=True)):

@@ -63,8 +63,9 @@ def _platform_radius(machine: Machine) -> Expression:
 def passive_margins(machine: Machine, pose: Expression) -> tuple[Expression, Expression]:
     """Return each leg's least margin to its passive limits (n, 1): relative, and in m.
 
-    First relative to half the joint's range, then in metres of the leg's motion; negative beyond a
-    limit, 1 and `FAR` for a leg without such limits. The platform's angles count for every leg.
+    The first is relative to half the joint's range, the second in metres of the leg's motion;
+    negative beyond a limit, 1 and `FAR` for a leg without such limits. The platform's angles count
+    for every leg.
     """
     shares, metres = [], []
     angles, *legs = passive_joints(machine, pose)
@@ -82,10 +83,10 @@ def passive_margins(machine: Machine, pose: Expression) -> tuple[Expression, Exp
 def pose_status(machine: Machine, pose: Expression) -> tuple[Expression, Expression]:
     """Return a pose's status (0 inside, leg number, or -1) and margin to the workspace boundary, m.
 
-    The status is 0 in the workspace, else the leg, from 1, that misses the pose by most, or -1
-    where all legs reach it but a joint exceeds its limit. The margin is the least of the legs'
-    margins of reach and, where all reach, of the travel left to each joint's limit, at most `FAR`;
-    it is negative outside.
+    The status is 0 in the workspace, else the number, from 1, of the leg that is most out of reach,
+    or -1 if all legs reach the pose but a joint exceeds its limit. The margin is the least of the
+    legs' reach margins and, if all legs reach the pose, of the distances to the joints' limits, at
+    most `FAR`; it is negative outside.
     """
     reaches = reach(machine, pose)
     joints = ca.vertsplit(inverse_position(machine, pose))
@@ -115,7 +116,7 @@ def pose_status(machine: Machine, pose: Expression) -> tuple[Expression, Express
 def direct_position(machine: Machine, joints: Expression, *, reached: bool = True) -> Expression:
     """Return all poses of joint coordinates (n, 1) as columns (m, k), NaN where not real.
 
-    NaN where it is not real or, with `reached`, where a leg does not reach it.
+    With `reached`, a pose is also NaN where a leg does not reach it.
     """
     poses = machine.closure.poses(joints)
     if not reached:
@@ -174,7 +175,8 @@ def link_vectors(state: State) -> tuple[Expression, Expression]:
 def link_turning(state: State, order: int) -> Expression:
     """Return, for every leg (n, 2), the rates of theta_u and theta_l, or their accelerations.
 
-    NaN where these angles do not describe a link's motion. `order` is 0 for rates.
+    NaN stands for links whose motion these angles do not describe. `order` is 0 for rates, 1 for
+    accelerations.
     """
     rows = [
         ca.horzcat(*(ca.SX.nan() if angle is None else angle[order] for angle in leg.turning))
@@ -216,7 +218,7 @@ def platform_rates(
 ) -> tuple[Expression, Expression]:
     """Return pose rates x' and accelerations x'' (m, 1) for joint rates and accelerations (n, 1).
 
-    J x' = q' and J x'' = q'' - J' x', whose last term is the joints' acceleration at x'' = 0.
+    J x' = q' and J x'' = q'' - J' x'; J' x' is the joints' acceleration at x'' = 0.
     """
     at_rest = machine.state(pose)
     velocity = machine.closure.rates(rates, at_rest.platform, at_rest.legs)

@@ -38,7 +38,8 @@ def feed_forward_pd(s: Sample) -> Answer:
 def computed_torque(s: Sample) -> Answer:
     """Return drive forces for q'' = q''_d + K_p e + K_d e' (computed torque), and next memory.
 
-    Friction is that of the desired rates: the measured rate of a resting joint changes its sign.
+    Friction is evaluated at the desired rates, since the measured rate of a resting joint changes
+    its sign.
     """
     pose, (desired_rates, desired_accelerations) = s.middle_pose, joint_motion(s.middle)
     accelerations = desired_accelerations + s.feedback

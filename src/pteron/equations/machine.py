@@ -108,8 +108,8 @@ class Machine:
     def move_to_platform_frame(self, pose: Expression) -> tuple[Machine, Expression] | None:
         """Return the machine in the platform's axes, and these axes (3, 3); None if not cheaper.
 
-        Joint forces are the same; the platform's points are constant, which saves operations. None
-        where it saves none.
+        Joint forces are the same; the platform's points become constants, which saves operations.
+        The result is None if no operation is saved.
         """
         platform_in_axes = self.platform.change_to_platform_axes(pose)
         if platform_in_axes is None:

@@ -146,8 +146,8 @@ def advance_path(
     """Return a path's state after a predictor-corrector step, and the last correction's size.
 
     `start` and `target` are the machines at t = 0 and 1: for each equation a or n, b and r^2 or h,
-    seven numbers. Where the cubic through the last two poses and their rates predicts too badly the
-    step is rejected: the state stays, with a shorter step.
+    seven numbers. If the cubic through the last two poses and their rates predicts too badly, the
+    step is rejected: the state is unchanged except for a shorter step.
     """
     slope = [there - here for here, there in zip(start, target, strict=True)]
     t = ca.if_else(at.step < 1 - at.t, at.t + at.step, 1)
@@ -223,7 +223,7 @@ def rows(
 ) -> tuple[Expression, Expression]:
     """Return the closure equations' Jacobian (k, size) and residuals (k, 1) at a real z.
 
-    x.y = 0 is the first closure where P moves.
+    If P moves, x.y = 0 is the first closure equation.
     """
     closures = _closures(closed, machine, None, z)
     slopes = ca.vertcat(*(ca.horzcat(*(v.re for v in row[:-1])) for row in closures))

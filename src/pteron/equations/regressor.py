@@ -80,7 +80,8 @@ def terms(machine: Machine, state: State) -> RegressorTerms:
 def paper_regressor(machine: Machine, state: State) -> Expression:
     """Return the regressor D (n, N) of Eq. (15): drive forces F_a = D P for parameters P.
 
-    Omega holds what acts on the bodies, so that the forces which balance it carry a minus sign.
+    Omega contains the forces that act on the bodies, so that the forces that balance them have a
+    minus sign.
     """
     bracket = state.platform.quasi_forces(terms(machine, state).bracket)
     return -machine.closure.forces(bracket, state.platform, state.legs)  # J^-T of Eq. (15)

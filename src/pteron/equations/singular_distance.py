@@ -21,8 +21,8 @@ _TINY = 1e-30
 def type_ii_distances(machine: Machine, pose: Expression) -> dict[str, Expression]:
     """Return first-order distance to type II: by translation alone, m; by rotation alone, rad.
 
-    They are at most `FAR` and pi; a platform that does not turn has no angle. For a platform that
-    tilts the angle is the least over all rotation axes that its angles span.
+    The values are at most `FAR` and pi; there is no angle for a platform that does not turn. If the
+    platform tilts, the angle is the least over all rotation axes that its angles span.
     """
     state = machine.state(pose)
     measure = machine.closure.measure(state.platform, state.legs)

@@ -101,8 +101,8 @@ def stick_slip_rates(
 ) -> dict[str, Expression]:
     """Return accelerations and drive states' rates by name, under commanded drive forces.
 
-    (M + J^T D J) x'' = J^T (F + tau - b q' - F_0 - D J' x') + wrench - h; tau is dry friction,
-    zero without `sides`. Where a transmission bends, friction and D are the motor's, and the
+    (M + J^T D J) x'' = J^T (F + tau - b q' - F_0 - D J' x') + wrench - h; tau is dry friction, zero
+    without `sides`. With an elastic transmission, friction and D are those of the motor, and the
     transmission's force acts on the joint.
 
     Returns

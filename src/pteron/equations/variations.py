@@ -200,8 +200,9 @@ def _keep_perpendicular(leg: LegKind, fields: dict[str, Any], turned: Collection
 def varied_numbers(robot: Manipulator, changes: Sequence[Variation], amounts: Array) -> Array:
     """Return the geometric numbers (B, G) of machines varied by amounts (B, K), m and rad.
 
-    Each is that of `vary_geometry`, in the order of `equations.machine.numbers`, except that a
-    derived axis may be another one in its plane. None is checked; axial variations are excluded.
+    Each row is the geometry of `vary_geometry`, in the order of `equations.machine.numbers`, except
+    that derived axes may be rotated in their plane. The geometry is not checked; axial variations
+    are excluded.
     """
     places, frame = number_places(robot), np.array(robot.platform.frame)
     geometry = np.tile(numbers(robot), (len(amounts), 1))

@@ -26,9 +26,9 @@ def inverse_dynamics(
 ) -> Expression:
     """Return the actuator forces F_a (n, K) of a state for parameter columns (N, K), Eq. (13).
 
-    `wrench` acts on the platform at P: a force and, where it turns, a moment about k, (m, K); where
-    it tilts force and moment, (6, K). A mass on a platform point moves with leg and platform: with
-    `carried` it counts as the platform's.
+    `wrench` acts on the platform at P: a force and, if it turns, a moment about k, (m, K); force
+    and moment, (6, K), if it tilts. With `carried`, masses at platform points, which move with leg
+    and platform, are computed with the platform.
     """
     joints, load = needed_forces(machine, state, parameters, carried)
     if wrench is not None:
@@ -52,7 +52,8 @@ def needed_forces(
 ) -> tuple[Expression, Expression]:
     """Return the forces required at the joints (n, K) and at the platform (m, K) of a state.
 
-    The platform's are along its quasi-velocities, which are the pose's rates unless it tilts.
+    The platform's forces are along its quasi-velocities, which are the pose's rates unless it
+    tilts.
     """
     legs, inertia = machine.moments(parameters)
     platform = state.platform

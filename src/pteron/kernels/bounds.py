@@ -71,7 +71,7 @@ class Bounded:
     ) -> tuple[Array, Array, NDArray[np.bool_]]:
         """Return bounds low, high and whether defined (B, R) of output elements, in B boxes.
 
-        low and high are NaN where the element is defined nowhere in the box.
+        low and high are NaN for an element that is undefined in all of the box.
         """
         graph, size = self._graph, low.shape[1]
         elements = [k for nodes in graph.outputs[:-1] for k in nodes]
@@ -103,7 +103,7 @@ def _mean_values(
 ) -> Interval:
     """Return mean-value bounds f(m) + f'(X) (X - m) of graph nodes (B, N).
 
-    NaN if f' is undefined.
+    The bounds are NaN if f' may be undefined in the box.
     """
     count = len(low)
     with np.errstate(all="ignore"):  # of boxes without an end
@@ -158,9 +158,10 @@ def _cached_bounded_function(robot: Manipulator, what: str) -> Bounded:
 def bounds(robot: RobotLike, what: str, boxes: ArrayLike) -> dict[str, Enclosure]:
     """Return proved lower and upper bounds of a function of the pose in boxes of poses.
 
-    Every function of the pose alone has them. Of those that are made of singular values
-    (`UNBOUNDED`) they may be infinite and undefined in every box that is more than a pose: the
-    rotations that make them turn by any angle where two singular values may be equal.
+    All functions of the pose alone have bounds. For functions that use singular values
+    (`UNBOUNDED`) they may be infinite and undefined in every box larger than a single pose: the
+    Jacobi rotations that compute the singular values are undetermined where two of them may be
+    equal.
 
     Parameters
     ----------

@@ -69,7 +69,8 @@ _LIBRARY = "pteron_kernel" + SUFFIX
 def c_compiler() -> tuple[str, ...] | None:
     """Return the C compiler's command as a tuple of words; None without a compiler.
 
-    The environment variable CC names another than `cc` and `gcc`, with options: `CC="gcc -m64"`.
+    The environment variable CC names a compiler other than `cc` and `gcc`, with options: `CC="gcc
+    -m64"`.
     """
     return _command(os.environ.get("CC", ""), os.environ.get("PATH", ""))
 
@@ -107,7 +108,7 @@ def module_source(
 ) -> str:
     """Return the C source of a module that evaluates a graph, in blocks of states.
 
-    The arrays of the caller are read as they lie in memory.
+    The module reads the caller's arrays in place, without copies.
     """
     variables = module_values(name, graph, inputs, outputs, c_language(dtype))
     return module_of("module.c.j2", variables, dtype, block)
@@ -197,8 +198,8 @@ class Code:
     def module(self) -> ModuleType:
         """The Python module of the compiled C code, loaded on first use.
 
-        Not a `cached_property`, whose lock a forked process would wait for if another thread had
-        been at it.
+        It is not a `cached_property`, on whose lock a forked process could wait for ever if another
+        thread held it.
         """
         if self._module is None:
             self._module = self._load_module()
@@ -234,8 +235,8 @@ class Code:
     ) -> Callable[..., Any]:
         """Return a fast callable of the compiled code with the inputs in `fixed` bound.
 
-        Inputs that need conversion or checks, and batches of `most` states or more, go to
-        `otherwise`.
+        Calls with inputs that need conversion or checks, and batches of `most` states or more, are
+        passed to `otherwise`.
         """
         fixed_arrays = (
             np.array(fixed[port.name], self.dtype).reshape(port.shape)

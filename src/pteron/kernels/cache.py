@@ -147,7 +147,7 @@ def find_text(name: str) -> str | None:
 def store_text(name: str, text: str, most: int = MOST) -> None:
     """Store a text in the cache under a name, if possible.
 
-    Oldest texts beyond `most` are removed.
+    If there are more than `most` texts, the oldest are removed.
     """
     content = zlib.compress(text.encode(), 1)
     folder = _root() / TEXTS

@@ -58,14 +58,14 @@ def numeric(
     """Return the kernel that evaluates the function `what` of a machine, compiled when worthwhile.
 
     A first call runs at once, on CasADi's virtual machine: about 1 us a state, nothing to compile.
-    Once it has spent 0.1 s on a function of a machine's layout, C code for it is read from the
-    cache or, where there is a compiler, compiled in the background, which takes half a second or
-    so and lets no call wait. From then on calls, and the rest of a large batch, run that code, at
-    some tens of nanoseconds a state. It returns the same bits, so that a result does not depend on
-    when it is computed. Nothing is compiled at import. A process that ends during a compilation
-    waits for it, three seconds at most, so that the next process has the code. With
-    `PTERON_KERNELS=vm` in the environment only the virtual machine is used; `compile` returns a
-    kernel of any target, compiled at once.
+    After 0.1 s of work on a function of a machine's layout, C code for it is read from the cache
+    or, if there is a compiler, compiled in the background, which takes half a second or so and
+    delays no call. Later calls, and the rest of a large batch, run that code, at some tens of
+    nanoseconds a state. It returns the same bits, so that a result does not depend on when it is
+    computed. Nothing is compiled at import. A process that ends during a compilation waits for it,
+    three seconds at most, so that the next process has the code. With `PTERON_KERNELS=vm` in the
+    environment only the virtual machine is used; `compile` returns a kernel of any target, compiled
+    at once.
     """
     columns = None if base is None else columns_of(base)
     # Kernels are kept by machine, not by a name, whose file may change.
@@ -136,7 +136,7 @@ class SharedCode:
     def fetch(self, *, at_any_cost: bool) -> None:
         """Load the C code if it is cached; otherwise compile it if `at_any_cost`.
 
-        A batch of millions of states is worth the wait.
+        A batch of millions of states justifies waiting for the compiler.
         """
         if self.ready or os.environ.get(VARIABLE) == "vm" or compiler() is None:
             return

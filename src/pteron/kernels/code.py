@@ -137,8 +137,8 @@ def module_values(
 ) -> dict[str, Any]:
     """Return the template values of a module's code: statements for a state and a block.
 
-    In a block the inputs' elements have a row each, followed by each angle's sine and cosine, which
-    are computed ahead of the long loop; statements of shared inputs alone run once.
+    In a block each input element has a row, followed by rows for each angle's sine and cosine,
+    computed before the main loop; statements that depend on shared inputs alone run once.
     """
     nodes, operations = graph.nodes, graph.operations()
     printed, form = language.printed, language.form

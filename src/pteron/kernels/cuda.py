@@ -126,7 +126,7 @@ def run_loop(
 ) -> None:
     """Run a number of samples of a simulation loop on the GPU; results are copied back.
 
-    Arrays of NumPy are copied there, and what the loop changes is copied back.
+    NumPy arrays are copied to the GPU, and arrays that the loop changes are copied back.
     """
     cupy = device_library()
     present = {

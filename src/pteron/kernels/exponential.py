@@ -32,8 +32,8 @@ _MOST = 709.0
 def exponential(x: Expression) -> Expression:
     """Return exp(x) in plain arithmetic, accurate to 3e-16 absolutely for x <= 0.
 
-    Where x is positive the relative error grows, to 1e-12 at 700. NaN counts as x = -709: a law of
-    friction has its speed in other terms too, and these make it NaN.
+    For positive x the relative error grows, to 1e-12 at 700. NaN counts as x = -709: in friction
+    laws other terms contain the speed too, and make the result NaN.
     """
     r = ca.fmin(ca.fmax(x, -_MOST), _MOST) * 0.5**_DOUBLINGS
     total: Expression = 1.0 / factorial(_DEGREE)

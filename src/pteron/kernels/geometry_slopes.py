@@ -22,12 +22,12 @@ from pteron.manipulator import Manipulator, RobotLike
 def slopes_program(robot: RobotLike) -> Program:
     """Return the program of joint coordinates' derivatives by geometry, for a topology.
 
-    Its outputs: `joints` (n,); `jacobian` (n, m), their slopes against the pose; `slopes` (n, k),
-    each leg's against those numbers of the geometry that `slope_columns` names; `twists` (6, m),
-    the platform's twist against the pose's rates; `place` (3,), where its point P is; `axes`
-    (3, 3), the columns of its rotation. Where planes hold the platform, or it turns about a point
-    or axes that are part of the geometry, also `shifts` (6, k): its twist, at a given pose, against
-    the geometry.
+    The inputs are `geometry` and `pose`. The outputs are `joints` (n,); `jacobian` (n, m), their
+    derivatives by the pose; `slopes` (n, k), each leg's derivatives by the numbers of the geometry
+    that `slope_columns` returns; `twists` (6, m), the platform's twist per pose rate; `place` (3,),
+    the position of P; `axes` (3, 3), the columns of the platform's rotation. If planes hold the
+    platform, or it turns about a point or axes that are part of the geometry, a further output is
+    `shifts` (6, k): its twist at a fixed pose per change of the geometry.
     """
     layout = geometry_only(robot)
     return cached_program(_key(layout), lambda: _build_program(layout))
@@ -41,9 +41,10 @@ def slopes_kernel(robot: RobotLike) -> TieredKernel:
 def slope_columns(robot: Manipulator) -> list[range]:
     """Return, for each leg, the geometry indices by which its coordinate is differentiated.
 
-    All legs have as many: those of a shorter leg include some of its neighbour's, whose slopes are
-    zero. Where planes hold the platform every leg's coordinate hangs on all legs; and on what the
-    platform turns about, where that is part of the geometry.
+    All legs have equally many indices: those of a shorter leg include some of its neighbour's,
+    whose derivatives are zero. If planes hold the platform, every leg's coordinate depends on all
+    legs; it also depends on the point or axes about which the platform turns, if these are part of
+    the geometry.
     """
     sizes = [sum(len(q.value) for q in leg.quantities) + 6 for leg in robot.legs]
     total, most = sum(sizes), max(sizes)

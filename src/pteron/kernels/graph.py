@@ -85,7 +85,7 @@ class Graph:
     ) -> list[Value]:
         """Return a value for each node: from `inputs`, or by `rule` from its arguments' values.
 
-        `inputs` gives those of the inputs, by port and element.
+        `inputs` returns the value of an input element, by port and element number.
         """
         computed: list[Value] = []
         for node in self.nodes:

@@ -14,8 +14,9 @@ from pteron.kernels.program_cache import Program
 def hoist_invariants(program: Program, name: str) -> tuple[Program, ca.Function]:
     """Return a program without the operations on the input `name` alone, and their function.
 
-    They are functions `first` and `second` with function(..., x, ...) = first(..., second(x), ...):
-    second(x) has the largest subexpressions of x. Inputs and outputs keep their names and order.
+    The two functions `first` and `second` satisfy function(..., x, ...) = first(..., second(x),
+    ...), where x is the input: second(x) has the largest subexpressions of x alone. Inputs and
+    outputs keep their names and order.
     """
     function = program.function
     place = function.name_in().index(name)

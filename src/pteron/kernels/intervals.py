@@ -180,7 +180,8 @@ def dependencies_of(graph: Graph, nodes: Sequence[int]) -> list[int]:
 def occurs_once(graph: Graph, node: int, moving: Collection[int]) -> bool:
     """Return whether a graph node depends on each `moving` input element only once.
 
-    Of the first input only the elements in `moving` are intervals; the others are numbers.
+    Then its natural interval is exact up to rounding. Elements of the first input that are not in
+    `moving` are numbers, not intervals.
     """
     uses: dict[int, int] = {}
     fixed: set[int] = set()

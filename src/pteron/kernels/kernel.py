@@ -269,7 +269,7 @@ def as_array(
 ) -> Array:
     """Return `value` as an array of floats with last axes `shape`; raise if it has others.
 
-    Of a table they are its columns of the names `columns`.
+    For a table they are its columns of the names `columns`.
     """
     array: Array
     if type(value) is np.ndarray and value.dtype == np.dtype(dtype) and value.flags.aligned:

@@ -157,7 +157,7 @@ class Loop:
     def idle(self, robot: Manipulator, state: Array, late: int = 0, behind: int = 0) -> Arrays:
         """Return the arrays of `run` for states (B, 1, Y) without loads, limits or encoders.
 
-        Commands are so many samples late, and readings so many behind.
+        Commands are delayed by `late` samples, and readings by `behind` samples.
         """
         batch, n = len(state), robot.joint_count
         encoders = n * (2 if self.kind.bends else 1)

@@ -40,8 +40,8 @@ from pteron.kernels.translation import to_function, to_term_graph
 def optimise_function(function: ca.Function) -> ca.Function:
     """Return a function of the same inputs, outputs and values that takes less time.
 
-    It has fewer operations, but for one more for each division that is saved: a division takes as
-    long as several products. Where nothing is saved it is the function given.
+    It has fewer operations, except that saving a division, which takes as long as several products,
+    may cost one more. If nothing is saved, the given function is returned.
 
     Examples
     --------

@@ -28,9 +28,9 @@ Parts = tuple[tuple[float, ...], tuple[float, ...]]
 def path_kernel(closed: Closed, start: Parts | None) -> TieredKernel:
     """Return the kernel of one step of the path tracker between machines of a closure kind.
 
-    It maps a path's `PathState` to the next one. A start machine is fixed in the kernel, as complex
-    constants; the target machine is then an input and real. With start None both are inputs and
-    complex: real parts first.
+    It maps a `PathState` to the next one. With a start machine, its numbers are constants in the
+    kernel, and the target machine is a real input. With start None both machines are complex
+    inputs: real parts first.
     """
     count = closed.numbers
 

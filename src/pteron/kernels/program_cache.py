@@ -108,9 +108,9 @@ def cached_result(
 ) -> _Result:
     """Return the result stored on disk under a key; compute it by `find` and store it if absent.
 
-    It depends on the source of `packages`, or of top-level modules, and of all equations. It is
-    pickled: the cache is private to the user and holds executable code. Results for which `keeps`
-    is false are not stored.
+    The key is complemented by the sources of `packages` (or top-level modules) and of all
+    equations. Results are pickled: the cache is private to the user and holds executable code.
+    Results for which `keeps` is false are not stored.
     """
     name = name_of(*key, sources=(*EQUATIONS, *packages))
     text = None if name is None else cache.find_text(name)
@@ -133,7 +133,7 @@ def is_stored(key: tuple[Any, ...], packages: tuple[str, ...]) -> bool:
 def name_of(*key: Any, sources: tuple[str, ...] = EQUATIONS) -> str | None:
     """Return the file name of a cache key, with a digest of sources; None if it has none.
 
-    It changes with the source of each of the packages, or top-level modules, `sources`.
+    The name changes with the sources of the packages, or top-level modules, in `sources`.
     """
     canonical_key = _canonical_key(key)
     return (

@@ -99,11 +99,11 @@ def program(
 ) -> Program:
     """Return the program of the function `what` of a machine, its geometry folded in.
 
-    With `columns` the dynamics are those of base parameters, which are then the input; with
-    `wrench` a wrench on the platform is an input too; with `guarded` a last output, `status`, is 1
-    where the result is valid and 0 where the pose is out of reach or singular, or a number is not
-    finite; with `plain` the equations are as they are written, without the pass that saves
-    operations; with `named` vectors are along the base's axes, as the names of exported code say.
+    Inertial parameters are inputs. With `columns` the dynamics are those of base parameters, which
+    are then the input; with `wrench` a wrench on the platform is a further input; with `guarded` a
+    last output, `status`, is 1 where the result is valid and 0 where the pose is out of reach or
+    singular, or a number is not finite; with `plain` the equations are not optimised; with `named`
+    vectors are along the base axes, as the names in exported code say.
 
     Raises
     ------
@@ -146,9 +146,10 @@ def numeric_program(
 def sharing_programs(robot: RobotLike | None = None) -> Iterator[None]:
     """In this context, evaluate many machines of a topology by shared programs.
 
-    In this context they evaluate programs whose geometry is an input, so that nothing is built for
-    a machine that differs from `robot` in its numbers alone, nor, without a `robot`, for any whose
-    topology has been used before, in another process too. Results are the same but for rounding.
+    Within it the public functions evaluate programs whose geometry is an input, so that nothing is
+    built for a machine that differs from `robot` only in its numbers nor, without a `robot`, for a
+    machine whose topology has been used before, even in another process. Results are the same up to
+    rounding.
 
     Examples
     --------
@@ -324,8 +325,9 @@ def _program(
 ) -> Program:
     """Build the program of a function of the table, from a machine's equations.
 
-    `vectors` are the machine's numbers, as symbols: those that the results depend on, and the
-    geometry, become inputs.
+    `vectors` are the machine's numbers as symbols: those that the results depend on, and the
+    geometry, become inputs. `constants` replace inputs of the table, and `extra` are further
+    inputs.
     """
     what, definition = form.what, TABLE[form.what]
     symbols = _input_symbols(machine, form, constants or {}, extra or {})
@@ -407,7 +409,7 @@ def _statuses(
 ) -> list[Expression]:
     """Return candidate expressions of the validity flag (1 valid, 0 invalid or NaN).
 
-    The one that shares most subexpressions with the results is the cheapest.
+    The candidate that shares most subexpressions with the results is the cheapest.
     """
     states = [symbol for name, symbol in symbols.items() if name not in _SHARED]
     sums = [

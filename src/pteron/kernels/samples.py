@@ -127,7 +127,7 @@ class Plant:
     ) -> None:
         """Advance the states by Runge-Kutta steps of `step` s.
 
-        Invalid machines stay as they are.
+        Machines whose motion is invalid are not advanced.
         """
         y, side, clock = (arrays[name][:, 0] for name in ("state", "side", "clock"))
         m = self.split(y)["pose"].shape[1]
@@ -283,7 +283,7 @@ def _encoder_readings(
 ) -> Array:
     """Return encoder positions and rates (B, 2 E), and update the encoders' memory.
 
-    Where a transmission bends, motors have encoders too, after those of all joints.
+    With elastic transmissions, motors have encoders too, after those of all joints.
     """
     exact = [motion["joints"], motion["rates"]]
     if "motor" in state:

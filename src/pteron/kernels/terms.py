@@ -61,7 +61,7 @@ class TermGraph:
     def constant_of(self, operand: int) -> float | None:
         """Return the constant that a signed node is.
 
-        None if it depends on inputs or is not finite.
+        The result is None if the node depends on inputs or is not finite.
         """
         c = self._constants.get(abs(operand))
         return c if c is None or operand > 0 else -c

@@ -104,8 +104,8 @@ class BatchInterpreter:
 def _places(graph: Graph) -> dict[int, Array]:
     """Return the storage array of each graph node that the outputs depend on, rows reused.
 
-    A shared value has its own scalar, others a row, which is reused after its last use; rows of
-    inputs are not reused before.
+    A shared value has a scalar of its own, others a row, which is reused after its last use; rows
+    of inputs are not reused before the end.
     """
     count = len(graph.nodes)
     last = {k: count for nodes in graph.outputs for k in nodes}

@@ -35,9 +35,9 @@ def ball_cone(
 ) -> list[Passive]:
     """Return the limit of the ball joint at the platform as a list; [] if `cone` is None.
 
-    It is the angle, rad, between the link that ends at the platform (`length`, m) and the axis of
-    `cone`, in the platform's frame. The columns of `socket` (3, 3) are the platform's axes in the
-    base frame.
+    The limit is on the angle, rad, between the link that ends at the platform (`length`, m) and the
+    axis of `cone`, in the platform's frame. The columns of `socket` (3, 3) are the platform's axes
+    in the base frame.
     """
     link = motion.links[1]
     assert link is not None
@@ -53,9 +53,9 @@ def ball_joint(
 ) -> list[Joint]:
     """Return hinges that together equal a ball joint at c (3, 1), m, one for each platform turn.
 
-    One for each turn of the platform's rotation, about that turn's axis; its rate is the platform's
-    turn relative to the leg's last link. `rate` (3, 1), rad/s, and `acceleration` (3, 1), rad/s^2,
-    are the link's angular velocity and acceleration; `row` (3, 6) are the velocity's derivatives by
+    Each hinge is about the axis of one of the platform's turns; its rate is that turn's relative to
+    the leg's last link. `rate` (3, 1), rad/s, and `acceleration` (3, 1), rad/s^2, are the link's
+    angular velocity and acceleration; `row` (3, 6) are the derivatives of the angular velocity by
     (c', omega).
     """
     return [

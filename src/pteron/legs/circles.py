@@ -73,8 +73,8 @@ def pole(direction: Sequence[float]) -> tuple[int, int]:
 def plane_axis(d: Expression, i: int, sign: int) -> Expression:
     """Return a unit vector (3, 1) perpendicular to d, by a formula without a square root.
 
-    It is the image of axis i + 1 under the reflection that takes axis i to -sign d. `sign` is that
-    of d's component i, so that the denominator is at least 1.
+    It is axis i + 1 reflected by the reflection that maps axis i to -sign d. `sign` is the sign of
+    d's component i, so that the denominator is at least 1.
     """
     unit = ca.DM.eye(3)
     v = d + sign * unit[:, i]

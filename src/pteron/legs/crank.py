@@ -292,8 +292,8 @@ class CrankEquations(LegEquations):
     ) -> dict[str, Expression]:
         """Return margins of the crank's limits, by name, not negative within; low, high in rad.
 
-        They avoid the angle, which jumps at half a turn. Limits more than that apart are one
-        condition: that the crank is no farther from their middle than they are.
+        They avoid the angle, which jumps at half a turn. Limits more than half a turn apart are one
+        condition: the crank's distance from their middle.
         """
         w = c - self.r
         u, h, quarter = self._triangle(w)
@@ -333,9 +333,9 @@ class CrankEquations(LegEquations):
         """Return the forces that crank and last link require at joint and platform point.
 
         With eta = m gamma_x / ll, nu = m gamma_y / ll and mu = I / ll^2 of the last link, alpha =
-        eta + mu, t the tip and z = d, the tip needs mu t'' - alpha c'' + eta g + nu z x (c'' - g)
-        and the platform point alpha (g - t'') - nu z x (t'' - g) beside a mass m + eta + alpha
-        that rides. A rod has no m gamma_y.
+        eta + mu, t the tip and z = d, the tip needs mu t'' - alpha c'' + eta g + nu z x (c'' - g);
+        the platform point needs alpha (g - t'') - nu z x (t'' - g), besides a point mass m + eta +
+        alpha. A rod has no m gamma_y.
         """
         at, upper, lower = self.state(point), inertia["u"], inertia["l"]
         lu2, weight = self.lu * self.lu, ca.mtimes(self.plane.T, gravity)

@@ -31,7 +31,7 @@ _QUANTITIES = (
 def drive_rows(legs: Sequence[LegKind]) -> list[tuple[str, list[str]]]:
     """Return table rows of the drives' quantities: (name, a text for each leg).
 
-    A unit that all legs share stands with the name.
+    A unit that all legs share is part of the quantity's name.
 
     Examples
     --------

@@ -183,7 +183,7 @@ class LegKind(ABC):
     def with_length(self, body: str, length: float) -> Self | None:
         """Return the leg with its "upper" or "lower" link of another length, m.
 
-        None without one.
+        The result is None if the leg has no such link.
         """
         key = f"{body}_length"
         return replace(self, **{key: length}) if key in self.every_key() else None
@@ -191,8 +191,8 @@ class LegKind(ABC):
     def with_zero(self, zero: float) -> Self | None:
         """Return the leg with its coordinate counted from `zero`, m or rad, or None.
 
-        Limits and a `reading` are shifted with it, so that the drive's readings stay the same. None
-        where the geometry cannot represent a zero, such as a ram's length.
+        Limits and `reading` are shifted too, so that the drive's readings are unchanged. The result
+        is None for coordinates whose zero is fixed, such as a ram's length.
         """
         changed = self.zero_at(zero)
         if changed is None:
@@ -229,14 +229,15 @@ class LegKind(ABC):
     def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
         """Return axes that span the platform rotations that the leg does not constrain.
 
-        `axis` is k of a platform that turns about it, or None.
+        `axis` is the axis k about which the platform turns, or None.
         """
 
     def couples(self, motion: LegMotion, axis: Vector | None) -> Sequence[Expression] | None:
         """Return the leg's constraint couples (3, 1) on the platform, each of length 1 or less.
 
-        They constrain rotations of the part of the platform that it carries; each vanishes where it
-        loses its effect. `axis` is as in `free_axes`. None where the file does not define them.
+        They constrain rotations of the part of the platform that the leg carries; each vanishes
+        where it loses its effect. `axis` is that of `free_axes`. The result is None if the file
+        does not define the couples.
         """
         return [ca.SX(row) for row in complement(self.free_axes(axis))]
 
@@ -365,7 +366,7 @@ class LegKind(ABC):
     def rod_couple(self, motion: LegMotion) -> Expression | None:
         """Return the couple (3, 1) that parallel rods transmit beside the axial force, or None.
 
-        It is zero for a single rod; None for a leg whose chain of joints determines its wrench.
+        It is zero for a single rod; None for a leg whose joints determine its wrench.
         """
         return None
 
@@ -392,7 +393,7 @@ class LegKind(ABC):
     ) -> tuple[list[Fraction], int] | None:
         """Return a random rational platform point that the leg reaches, and the elbow; or None.
 
-        With it base parameters are proved over the rationals as well as modulo a prime.
+        Base parameters are proved by it over the rationals, as well as modulo a prime.
         """
         return None
 

@@ -166,7 +166,7 @@ class Reach(NamedTuple):
     def type_i(self) -> Expression:
         """The type-I measure, no unit: 0 where the leg is singular, 1 at best, NaN out of reach.
 
-        A quotient by it loses as many digits as it has leading zeros.
+        A division by it loses as many digits as it has leading zeros.
         """
         return ca.sqrt(self.discriminant / self.scale)
 
@@ -238,7 +238,7 @@ class LegEquations(ABC):
     def change_frame(self, axes: Expression, origin: Expression) -> LegEquations | None:
         """Return the leg's equations in other axes, the columns of (3, 3), or None if dearer there.
 
-        None where the leg has directions, which are cheaper in the base frame.
+        The result is None for legs with directions, whose equations are cheaper in the base frame.
         """
         return None
 
@@ -261,7 +261,7 @@ class LegEquations(ABC):
     ) -> dict[str, Expression]:
         """Return expressions, by name, that are not negative where the joint at q keeps its limits.
 
-        The joint is at q, the pose in reach. They need not be distances.
+        The joint coordinate at c, which is in reach, is q. The expressions need not be distances.
         """
         return {"least": q - low, "most": high - q}
 
@@ -282,9 +282,9 @@ class LegEquations(ABC):
     ) -> Needs:
         """Return the forces at joint and platform point required to move the leg's bodies.
 
-        A kind of leg may override it with a cheaper form of `needs_of_bodies`, with the forces at
-        its joint in `Needs.joint` and masses at its platform point in `Needs.mass`; the conformance
-        test compares the two.
+        A kind of leg may override it with a cheaper form of `needs_of_bodies`, with forces at its
+        joint in `Needs.joint` and masses at its platform point in `Needs.mass`; the conformance
+        test compares both.
         """
         return self.needs_of_bodies(point, rotation, gravity, inertia)
 
@@ -297,8 +297,8 @@ class LegEquations(ABC):
     ) -> Needs:
         """Return the forces required to move the leg's bodies, summed body by body, Eq. (13).
 
-        F_b is the wrench on a body of its weight and inertia; the required wrench is -F_b. Eq. (13)
-        sums J_b^T F_b, J_b being the body's rows in (c', omega).
+        F_b is the wrench of weight and inertia on a body; the required wrench is -F_b. Eq. (13)
+        sums J_b^T F_b, J_b being the body's Jacobian by (c', omega).
         """
         if not inertia:
             return Needs.zeros(1)

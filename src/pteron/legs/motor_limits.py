@@ -78,8 +78,9 @@ def motor_peak(drive: Drive, forces: NDArray[np.float64], rates: NDArray[np.floa
 def speed_lines(drive: Drive) -> tuple[SpeedLine, ...]:
     """Return linear force limits that fall with speed, within the motor's curve and winding.
 
-    They are the winding's and, while each piece of the curve is steeper than the one before, the
-    curve's. Where the curve becomes flatter again, the steeper line continues (conservative).
+    They include the winding's limits and those of the motor's curve as long as each piece is
+    steeper than the one before. Where the curve becomes flatter again, the steeper line continues
+    (conservative).
     """
     lines: list[SpeedLine] = []
     if drive.curve:

@@ -59,8 +59,8 @@ def last_joints(
 ) -> list[Joint]:
     """Return the revolute joint at the platform point, then one for each platform rotation axis.
 
-    Two joints about one axis are one: the first has its motion, the second none. Where the platform
-    tilts all of them are a ball joint.
+    Two joints about one axis count as one: the first has its motion, the second none. If the
+    platform tilts, all of them are a ball joint.
     """
     if rotation.tilts:
         link = ca.mtimes(d, lower.row), d * lower.rate, d * lower.acceleration

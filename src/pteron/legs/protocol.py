@@ -23,7 +23,8 @@ _TRIAL_POINTS = 200
 def breaches(leg: LegKind, axes: Sequence[Vector]) -> tuple[str, ...]:
     """Return how a leg breaches the protocol of legs, one line each; () where it conforms.
 
-    `axes` are those about which the platform turns against the leg, perpendicular to each other.
+    `axes` are the axes, perpendicular to each other, about which the platform turns relative to the
+    leg.
     """
     if not leg.size > 0.0 and not leg.follows_angle:
         return (

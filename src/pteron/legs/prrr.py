@@ -342,7 +342,7 @@ class PRRREquations(LegEquations):
     def point_mass_needs(self, point: PointMotion, gravity: Expression, mass: Expression) -> Needs:
         """Return the force required to move masses (1, K) at the platform point.
 
-        The slider's part too.
+        The slider exerts the component along d.
         """
         a_g = point.acceleration - gravity
         slope = 1 if self.aligned else ca.dot(self.d, self.e)
@@ -355,7 +355,7 @@ class PRRREquations(LegEquations):
     ) -> tuple[Expression, Expression]:
         """Return the links' required forces along the slider, (1, K), and at joint R3, (2, K).
 
-        `on_r1` is a - g in the leg's plane on R1; on R3 it is u'' more.
+        `on_r1` is the acceleration a - g of R1 in the leg's plane; that of R3 is larger by u''.
         """
         h, dh = first_moment(at.l_u, upper.hx / self.lu, upper.hy / self.lu)
         upper_force = at.upper.acceleration * dh - at.upper.rate**2 * h  # h'' of a turning vector

@@ -56,8 +56,8 @@ class PSS(RodLeg, SlideLeg):
     def _counting_axis(self) -> Vector:
         """The unit vector of the first axis of the rod's universal joints: that of the rods' bar.
 
-        A single rod's is across the guide: universal joints about it are singular where the rod
-        lies along it, and there the leg is singular anyway (type I).
+        For a single rod the axis is perpendicular to the guide: universal joints about it are
+        singular where the rod lies along it, and there the leg is singular anyway (type I).
         """
         if self.bar_direction is not None:
             return self.bar_direction

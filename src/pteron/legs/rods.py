@@ -47,8 +47,6 @@ class RodLeg(LegKind):
     def couples(self, motion: LegMotion, axis: Vector | None) -> list[Expression] | None:
         """Return, in a list, the couple that parallel rods transmit (3, 1), 1 or less.
 
-        None if unknown.
-
         Its length is the sine of the angle between bar and rod, 0 where the parallelogram is flat.
         The rods transmit no couple about themselves. None where the bar's direction is not known.
         """
@@ -61,8 +59,8 @@ class RodLeg(LegKind):
     ) -> list[Passive]:
         """Return the ball joints at the rod's ends that have limit cones.
 
-        The columns of `axes` are the platform's axes, of `zero_axes` at phi = 0. The bars of
-        parallel rods do not turn, nor do parts with a fixed offset.
+        The columns of `axes` are the platform's axes, those of `zero_axes` the axes at phi = 0. The
+        bars of parallel rods do not turn, nor do platform parts with a fixed offset.
         """
         rod, length = motion.links[1], self.lower_length
         assert rod is not None
@@ -121,8 +119,8 @@ def universal_joints(
 ) -> list[Joint]:
     """Return the universal joints at a rod's two ends, then hinges of the platform's rotation.
 
-    A hinge about each axis of the platform's rotation follows; where the platform tilts the joint
-    at c is a ball joint.
+    The joints are about d, and about d x n, at both ends. Hinges about each axis of the platform's
+    rotation follow; if the platform tilts, the joint at c is a ball joint.
 
     With n' = omega x n and omega = alpha' d + beta' e, e = d x n / |d x n|: alpha' = n'.(d x n) /
     |d x n|^2 and beta' = - n'.d / |d x n|. `direction` is n, n' and n''; `swing` (3, 6) is

@@ -193,8 +193,8 @@ class RPREquations(LegEquations):
     ) -> Needs:
         """Return the forces that cylinder and piston require, all at the platform point.
 
-        With h and dh = d x h their first moments, it is the force h_l'' of the piston and y / L
-        times (I_u + I_l) theta'' - g.dh_u + (c'' - g).dh_l, beside that of the mass at the point.
+        With h and dh = d x h their first moments, the force is h_l'' of the piston plus y / L times
+        (I_u + I_l) theta'' - g.dh_u + (c'' - g).dh_l, besides a point mass at the platform point.
         """
         at, upper, lower = self._ram(point), inertia["u"], inertia["l"]
         ddc, weight = (ca.mtimes(self.plane.T, v) for v in (point.acceleration, gravity))

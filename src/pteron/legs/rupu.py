@@ -247,8 +247,8 @@ class RUPUEquations(LegEquations):
         """Return the forces that both parts of the shaft require, all at the platform point.
 
         With mu = (I_u + I_l) / L^2, eta = m gamma_x / L of the lower part and nu that of the upper,
-        kappa = L' / L and P = 1 - n n^T, they are P v - 2 kappa (mu + eta) P c' - eta (n'.n') w
-        beside the mass that rides, v = (mu + 2 eta) c'' - (eta + nu) g.
+        kappa = L' / L and P = 1 - n n^T, the force is P v - 2 kappa (mu + eta) P c' - eta (n'.n')
+        w, with v = (mu + 2 eta) c'' - (eta + nu) g, besides a point mass at the platform point.
         """
         dc, ddc, w = point.velocity, point.acceleration, point.position - self.r
         square, forward = ca.dot(w, w), ca.dot(w, dc)

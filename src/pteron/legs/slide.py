@@ -216,8 +216,8 @@ class SlideEquations(LegEquations):
         """Return the forces that slider and link require at joint and platform point.
 
         With eta = m gamma_x / ll and mu = I / ll^2 of the link, alpha = eta + mu and t the tip, the
-        tip needs mu t'' - alpha c'' + eta g and the platform point alpha (g - t'') beside a mass
-        m + eta + alpha that rides.
+        tip needs mu t'' - alpha c'' + eta g; the platform point needs alpha (g - t''), besides a
+        point mass m + eta + alpha.
         """
         at, slider, lower = self.state(point), inertia["p"], inertia["l"]
         e, ddc, weight = (self.to_link_space(v) for v in (self.e, point.acceleration, gravity))

@@ -211,9 +211,10 @@ class UPSEquations(LegEquations):
     ) -> Needs:
         """Return the forces that cylinder and piston require, axial ones at the joint.
 
-        With P_n = 1 - n n^T, beside the mass that rides: m gamma_l n'' + P_n ((I_u + I_l) n'' - m
-        gamma_u g + m gamma_l (c'' - g)) / L. As P_n n'' = P_n (c'' - 2 L'/L c') / L that is P_n x -
-        m gamma_l (n'.n') n, with x of c'', c' and g alone; what of x is along n the ram bears.
+        With P_n = 1 - n n^T, besides a point mass at the platform point, the force is m gamma_l n''
+        + P_n ((I_u + I_l) n'' - m gamma_u g + m gamma_l (c'' - g)) / L. As P_n n'' = P_n (c'' - 2
+        L'/L c') / L, it is P_n x - m gamma_l (n'.n') n, where x depends on c'', c' and g alone; the
+        ram itself bears the component of x along n.
         """
         w, inverse = point.position - self.r, 1 / ca.norm_2(point.position - self.r)
         upper, lower, n = inertia["u"], inertia["l"], w * inverse
