@@ -63,7 +63,7 @@ def with_checked_arguments(function: types.FunctionType) -> types.FunctionType:
 def checked_arguments(decorated: type[_Class]) -> type[_Class]:
     """Decorate a class so that its constructor checks arguments against their type hints.
 
-    It is for classes that are made from what a user gives, and have no check of their own.
+    It is for classes that users construct and that have no checks of their own.
     """
     any_class: Any = decorated
     any_class.__init__ = _add_check(any_class.__init__)

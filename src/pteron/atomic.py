@@ -46,9 +46,9 @@ def write_bytes(path: str | Path, content: bytes) -> Path:
 def write_files(files: Mapping[Path, bytes]) -> list[Path]:
     """Write files, all of them or none; return their paths.
 
-    Every file is first written under a temporary name in its folder, and to the disk, then all are
-    renamed: a full disk loses nothing. Former files keep their permissions, and come back if a
-    rename fails.
+    Every file is first written under a temporary name in its folder, and flushed to the disk; then
+    all are renamed, so that a full disk loses nothing. Replaced files keep their permissions, and
+    are restored if a rename fails.
 
     Raises
     ------

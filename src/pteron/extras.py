@@ -48,7 +48,7 @@ def expect_extra(extra: str, module: str, need: str) -> None:
 def install_command(extra: str) -> str:
     """Return the shell command that installs an optional extra of Pteron.
 
-    Pteron may come from a folder of sources, a wheel, a repository or a registry; pip keeps which
+    Pteron may come from a source folder, a wheel, a repository or a registry; pip records which
     (PEP 610, direct_url.json).
     """
     return f"{_quote_path(sys.executable or 'python')} -m pip install {_requirement(extra)}"

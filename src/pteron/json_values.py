@@ -26,8 +26,8 @@ def json_text(data: Any) -> str:
 def fields_as_json(owner: object, *names: str) -> dict[str, Any]:
     """Return an object's attributes of these names as a dictionary of plain data.
 
-    A name may hold several words, each "attribute" or "key=attribute", where the key is another.
-    Arrays and tuples become lists; what has an `as_dict` is asked for it.
+    A name may hold several words, each "attribute" or "key=attribute", where the key replaces the
+    attribute's name. Arrays and tuples become lists; objects with `as_dict` are converted by it.
     """
     pairs = (name.rpartition("=") for name in " ".join(names).split())
     return {key or name: _data(getattr(owner, name)) for key, _, name in pairs}

@@ -159,7 +159,7 @@ def read_content(robot: Manipulator, data: bytes, source: str) -> Table | Log:
 def is_table(robot: Manipulator, columns: Sequence[str]) -> bool:
     """Return whether columns are those of a motion's table, rather than of a controller's log.
 
-    A log has joints and forces, but no rates of the pose; or it calls everything by other names.
+    A log has joints and forces, but no rates of the pose; or all of its columns have other names.
     """
     has = set(columns)
     if has.issuperset((*robot.joint_names, *robot.force_names)):

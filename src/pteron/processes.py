@@ -81,7 +81,7 @@ class WorkerPool(ProcessPoolExecutor):
     ) -> Iterator[tuple[int, Any]]:
         """Yield (job index, message) as workers send messages; a job's result is its last.
 
-        `function` takes a job and a callable that sends a message; its result comes last.
+        `function` is called with a job and a callable that sends a message.
         """
         pending = {self.submit(_call, function, k, job): k for k, job in enumerate(jobs)}
         while pending:
@@ -187,9 +187,9 @@ def _environment(variables: Mapping[str, str]) -> Iterator[None]:
 def held_interrupts() -> Iterator[None]:
     """In this context, defer SIGINT (Ctrl-C); processes started here ignore it.
 
-    A process imports for seconds before it can be told to ignore it, and one that is broken off
-    while it is started complains. Python's tracker of resources unblocks signals as it starts: it
-    must run before, as it does once there is a pool of processes.
+    A new process imports for seconds before it can ignore SIGINT, and prints an error if it is
+    interrupted meanwhile. Python's resource tracker unblocks signals when it starts: it must have
+    started before, as it has once there is a pool of processes.
     """
     heard: list[int] = []
     usual = signal.getsignal(signal.SIGINT)

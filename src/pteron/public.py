@@ -41,10 +41,10 @@ def publish(
 ) -> None:
     """Define a package's public names, for completion and ``import *``.
 
-    These are the names that the file imports or defines, and those that its stub `__init__.pyi`
-    imports, which are imported at their first use. An import that hands a name on says so to
-    readers and type checkers alike: ``import size as size``. A name with an underscore is the
-    file's own.
+    Public are the names that the file imports or defines, and those that its stub `__init__.pyi`
+    imports, which are imported at their first use. Imports of names to be published have the form
+    ``import size as size``, which readers and type checkers understand. Names with an underscore
+    are private.
 
     Parameters
     ----------

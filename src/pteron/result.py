@@ -63,7 +63,7 @@ class Result:
     def table(self) -> pl.DataFrame:
         """Return the result as a table whose columns functions accept instead of arrays.
 
-        Columns of poses and joints are called as `Manipulator.column_names` has them, SI units and
+        Columns of poses and joints have the names of `Manipulator.column_names`, SI units and
         radians; those of a result without a machine are numbered, see `table_for`.
         """
         proof = getattr(self, "proof", None)

@@ -234,7 +234,8 @@ def keep_checked(
 ) -> None:
     """Replace a frozen dataclass's fields by their checked values; raise with all faults.
 
-    A check takes a field's value and name. `faults` are told with those that the checks find.
+    A check is called with a field's value and name. `faults` are reported with those that the
+    checks find.
 
     Raises
     ------
@@ -255,10 +256,10 @@ def fault_lines(
 ) -> list[str]:
     r"""Return a line for every pydantic fault: the key, the value, and what is expected.
 
-    `model` is the pydantic model or dataclass that refused a file's content. Aliases with a dot,
-    such as ``"time.unit"``, are understood as keys of tables. A key that is missing is not told
-    where an unknown one is nearest to it. `listed` takes the lists of valid keys that are told, so
-    that a file of several tables tells each list once.
+    `model` is the pydantic model or dataclass that rejected a file's content. Aliases with a dot,
+    such as ``"time.unit"``, are understood as keys of tables. A missing key is not reported if an
+    unknown key is most similar to it. `listed` collects the lists of valid keys in messages, so
+    that a file of several tables has each list once.
 
     Examples
     --------

@@ -26,7 +26,7 @@ class Inertia(Protocol):
     def values(self) -> tuple[float, ...]:
         """The values of the body's inertial parameters, in the order of `kinds`.
 
-        Kg, kg m, kg m^2.
+        The units are kg, kg m and kg m^2.
         """
 
     @classmethod
@@ -244,7 +244,7 @@ class SpatialInertia:
     def second_moments(cls, values: Mapping[str, Any]) -> list[list[Any]]:
         """Return [[S, h], [h^T, m]] (4, 4) of parameters by kind, S the integral of r r^T dm.
 
-        It is linear in the ten parameters, and positive semidefinite for a real body.
+        The matrix is linear in the ten parameters, and positive semidefinite for a real body.
         """
         x, y, z = values["Ixx"], values["Iyy"], values["Izz"]
         xy, xz, yz = -values["Ixy"], -values["Ixz"], -values["Iyz"]
@@ -311,7 +311,7 @@ def carried_values(
     """Return what a carried body adds to a platform's parameters, in the order of its kinds.
 
     `center` is the body's centre of mass in the platform's frame, m; `inertia` is about that
-    centre: of a planar kind I about the platform's axis, of a spatial one Ixx, Ixy, Ixz, Iyy, Iyz
+    centre: for a planar kind I about the platform's axis, for a spatial one Ixx, Ixy, Ixz, Iyy, Iyz
     and Izz. All may be expressions.
     """
     shares = kind.shares_of_point(*center).values()

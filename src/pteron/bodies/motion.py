@@ -133,8 +133,9 @@ def needed_wrench(
 ) -> tuple[Expression, Expression]:
     """Return force and moment, (3, K) each, required at a body's reference point.
 
-    With h = hx x + hy y: force m (a - g) + h'' and moment h x (a - g) + I x x x''. For a body in a
-    plane the last is I theta'' z. The paper's F is what acts on the body, minus this.
+    With h = hx x + hy y, the force is m (a - g) + h'' and the moment h x (a - g) + I x x x''; for a
+    planar body the last term is I theta'' z. The paper's F acts on the body and is the negative of
+    this.
     """
     a_g = body.acceleration - gravity
     force = ca.mtimes(a_g, inertia.m)

@@ -89,8 +89,8 @@ def vector(values: Sequence[object], key: str) -> Vector:
 def unit_vector(values: Sequence[object], key: str) -> Vector:
     """Return `values` normalised; raise where the length differs from 1 by over `UNIT_TOLERANCE`.
 
-    A vector that is a unit vector to rounding is kept bit for bit, so that a file that is read and
-    written again does not drift.
+    A vector of unit length up to rounding is returned bit for bit, so that a file does not drift
+    when it is read and written repeatedly.
     """
     raw = vector(values, key)
     length = norm(raw)
@@ -188,7 +188,8 @@ def complement(axes: ArrayLike) -> NDArray[np.float64]:
 def rotation_matrices(vectors: ArrayLike) -> NDArray[np.float64]:
     """Return rotation matrices (..., 3, 3) of rotation vectors (..., 3), rad.
 
-    By the quaternions (x, y, z, w) and to the bits of SciPy's `Rotation`, which is slow to import.
+    They are computed by quaternions (x, y, z, w), equal to the bit to SciPy's `Rotation`, which is
+    slow to import.
     """
     x, y, z = np.moveaxis(np.asarray(vectors, dtype=float), -1, 0)
     angle = np.sqrt(x * x + y * y + z * z)

@@ -74,12 +74,12 @@ class Closure(ABC):
     def measure(self, platform: PlatformMotion, legs: Sequence[LegMotion]) -> Expression:
         """Return the type-II measure, no unit: at most 1 in size, 0 where J is singular.
 
-        It is det A, J = B^-1 A, with each leg's force on its platform point, or moment on the
-        platform, made one of unit size in space, over Hadamard's bound of the determinant of so
-        many unit forces on these points. The size is 1 only where the forces are isotropic and
-        their moments balanced, which the points need not allow: a Quadrupteron with the platform
-        points of Table 1 reaches 27/32. So it is the same in any units and frame, for every kind
-        of leg; a force across a planar machine counts as the little that it does in the plane.
+        It is det A of J = B^-1 A, with each leg's force on its platform point, or moment on the
+        platform, scaled to unit size, divided by Hadamard's bound of the determinant of as many
+        unit forces on these points. Its size is 1 only if the forces are isotropic and their
+        moments balanced, which the points may not allow: a Quadrupteron with the platform points of
+        Table 1 reaches 27/32. So it does not depend on units, frame or kind of leg; a force across
+        a planar machine counts only with its component in the plane.
         """
         if any(leg.row.is_zero() for leg in legs):
             return ca.SX(0)  # a leg that moves nothing
@@ -94,9 +94,9 @@ class Closure(ABC):
     ) -> Expression:
         """Return the type-II measure of Jacobian rows (1, 6) of the legs, no unit.
 
-        `sizes` are those of the legs' forces in space, or of their moments. Without them the rows
-        are those of the legs' loci: unit forces on spheres and circles, unit moments, and the
-        planes' normals as they are.
+        `sizes` are the norms of the legs' forces in space, or of their moments. Without them the
+        rows are those of the legs' loci: unit forces on spheres and circles, unit moments, and the
+        planes' normals unscaled.
         """
         lengths = self.platform.directions.shape[1]
         loci = [leg.locus(ca.SX(0)) for leg in self.legs]
@@ -115,7 +115,7 @@ class Closure(ABC):
     ) -> list[Expression]:
         """Return equivalent expressions of the squared type-II measure, to choose the cheapest.
 
-        Which of them is the cheapest depends on what else a program computes.
+        Which one is the cheapest depends on the other outputs of a program.
         """
         measure = self.measure(platform, legs)
         return [measure * measure]
@@ -124,8 +124,8 @@ class Closure(ABC):
     def _moment_bound(self) -> Expression:
         """An upper bound, m, of the norm of the moments of unit forces on the platform points.
 
-        It is the root of the sum of squares of the platform points' distances from the axis along
-        k through their mean.
+        It is the root of the sum of the squared distances of the platform points from the axis
+        along k through their mean.
         """
         # From the first point, so that points that coincide do so to the last bit.
         first = self.platform.offsets[0].a

@@ -93,7 +93,8 @@ class ConstantRows(Closure):
     ) -> Expression:
         """Return the type-II measure of the legs' rows; 0 for a machine singular everywhere.
 
-        It is 0 for a machine that is singular everywhere, where N . j is rounding alone.
+        Its sign is that of N . j, as in the columns of `poses`. It is exactly 0 for a machine that
+        is singular everywhere, where N . j is mere rounding.
         """
         if self.rows.is_constant() and self.vanishes():
             return ca.SX(0)
@@ -129,10 +130,10 @@ class ConstantRows(Closure):
     def poses(self, joints: Expression) -> Expression:
         """Return every pose with joint coordinates (n, 1), as columns (m, 1 or 2); NaN if not real.
 
-        For 3T they give one pose. For 3T1R their left null vector leaves A' cos(phi) + B' sin(phi)
-        = C, with two angles, in which a platform point counts as it is at phi = 0, in base axes.
-        The first column has N . j > 0, the second N . j < 0, so that each column is one assembly
-        mode throughout. NaN where it is not real, C^2 > A'^2 + B'^2.
+        A 3T machine has one pose. For 3T1R the left null vector of the closure equations gives A'
+        cos(phi) + B' sin(phi) = C, with two angles, where platform points are taken at phi = 0, in
+        base axes. The first column has N . j > 0, the second N . j < 0, so that each column is one
+        assembly mode. Poses are NaN if C^2 > A'^2 + B'^2.
         """
         constants, sizes = [], []
         for leg, offset, q in zip(

@@ -34,7 +34,7 @@ def determinant(m: Expression) -> Expression:
 def solve(m: Expression, right: Expression) -> tuple[Expression, Expression]:
     """Return x (m, K) and d = det A with A x = d right, for A (n, m).
 
-    With n > m x is the solution of least squares, and d = 1.
+    If n > m, x is the least-squares solution, and d = 1.
     """
     if m.shape[0] > m.shape[1]:
         return _LQFactors.factorise(m).solve(right), ca.SX(1)
@@ -61,7 +61,7 @@ def adjugate(m: Expression) -> Expression:
 def solve_transposed(rows: Expression, right: Expression) -> tuple[Expression, Expression]:
     """Return x (n, K) and d with A^T x = d right, from A (n, m); least norm if n > m.
 
-    d is det A, or 1 where the solution needs no determinant; x is not finite where A has rank < m.
+    d is det A, or 1 if the solution needs no determinant; x is not finite if A has a rank below m.
     """
     n, columns = rows.shape
     if n > columns or (n > 4 and right.shape[1] == 1):

@@ -30,8 +30,9 @@ def meeting_points(
 ) -> tuple[Expression, Expression]:
     """Return the points, as columns, in which loci meet, and the validity (0, else NaN).
 
-    Two points, mirrored in a plane or a line; planes alone meet in one. The second value is the
-    validity, 0, or NaN where the points are not real, as they then are themselves.
+    There are as many loci as the platform has lengths. There are two points, mirrored in a plane or
+    a line, or one if all loci are planes. If the points are not real, they are NaN, and so is the
+    validity.
     """
     if platform.directions.shape[1] == 2:
         return _meeting_in_plane(loci, platform)

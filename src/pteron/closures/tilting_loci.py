@@ -52,10 +52,11 @@ class TiltingLoci(Closure):
     ) -> Expression:
         """Return the type-II measure, no unit, of the legs' rows (1, 6) and the platform's planes.
 
-        It is the determinant of their rows in (v, omega) of P, or omega where P stays, each row a
-        unit force, over an upper bound of the determinant of as many unit forces on these points.
-        The moments' unit of length is the root of a third of the sum of squares of the points'
-        distances from their mean, or from P. `stewart` reaches 0.84 of the bound.
+        It is the determinant of their rows by the twist (v, omega) of P, or by omega if P is fixed,
+        each row a unit force, divided by an upper bound of the determinant of as many unit forces
+        on these points. The moments' unit of length is the root of a third of the sum of the
+        squared distances of the points from their mean, or from P. `stewart` reaches 0.84 of the
+        bound.
         """
         constraint_rows, size = (
             self.platform.plane_wrenches(platform),
@@ -80,7 +81,7 @@ class TiltingLoci(Closure):
     def _bound(self, forces: int) -> Expression:
         """Return an upper bound of the determinant of `forces` unit forces at each point.
 
-        It follows from Fischer's inequality and that of the arithmetic and geometric means.
+        It follows from Fischer's inequality and that of arithmetic and geometric means.
         """
         points, centred = self.platform.points, "z" not in self.platform.coordinates
         center = ca.SX(3, 1) if centred else sum(points) / len(points)

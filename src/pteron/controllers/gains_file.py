@@ -82,8 +82,9 @@ def write_gains(robot: RobotLike, controller: Controller, path: str | Path) -> P
 def read_gains(robot: RobotLike, path: str | Path) -> Controller:
     """Return the controller stored in a file of gains; raise if it is for another machine.
 
-    Its keys are `controller`, one of pd, feed-forward, computed-torque and adaptive, and what the
-    class takes: `period`, `bandwidth`, `damping`, `proportional`, `derivative`.
+    `pteron tune`, `write_gains` or a person may have written it. Its keys are `controller`, one of
+    pd, feed-forward, computed-torque and adaptive, and the fields of the controller's class:
+    `period`, `bandwidth`, `damping`, `proportional`, `derivative`.
 
     Parameters
     ----------

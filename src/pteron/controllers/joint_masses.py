@@ -28,9 +28,9 @@ _SHARE = 0.1
 def joint_masses(robot: RobotLike) -> Array:
     """Return the effective mass (n,) that each joint's force moves while other joints are free.
 
-    It is 1 / (J M^-1 J^T)_ii with the motors' inertia in M. If n joints have stiffness w^2 times
-    it, the squares of the natural frequencies have the mean w^2, so that none is above sqrt(n) w.
-    It depends on the pose: the value returned is exceeded at nine of ten random poses.
+    It is 1 / (J M^-1 J^T)_ii with the motors' inertia in M. If n joints have a stiffness of w^2
+    times it, the squared natural frequencies have the mean w^2, so that none is above sqrt(n) w. It
+    depends on the pose: at nine of ten random poses it is greater than the value returned.
 
     Parameters
     ----------

@@ -71,7 +71,8 @@ def forward_dynamics(
 ) -> PerCoordinate:
     """Return the platform's acceleration (..., m) under actuator forces, without friction.
 
-    It needs no J^-1, so that it is defined at type-II singularities too.
+    M x'' = J^T F + wrench - h. It needs no J^-1, so that it is defined at type-II singularities
+    too.
 
     Parameters
     ----------
@@ -185,8 +186,7 @@ def drive_accelerations(
 ) -> PerCoordinate:
     """Return the platform's acceleration under drive forces, with friction and motor inertia.
 
-    The inverse of `drive_forces` with ``smooth=True``: friction and the motors' inertia take their
-    part of the forces.
+    It is the inverse of `drive_forces` with ``smooth=True``.
 
     Parameters
     ----------

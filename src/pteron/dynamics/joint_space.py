@@ -16,7 +16,7 @@ def mass_with_rotors(rows: _Array, mass: _Array, rotors: _Array) -> _Array:
 def joint_mobilities(rows: _Array, mass: _Array) -> _Array:
     """Return the diagonal (..., n) of J M^-1 J^T, 1/kg or 1/(kg m^2).
 
-    It is the acceleration of a joint for a unit of its force, the other joints being free.
+    It is the acceleration of each joint per unit of its force, the other joints being free.
     """
     return np.asarray(np.einsum("...ij,...ji->...i", rows, np.linalg.solve(mass, rows.mT)))
 

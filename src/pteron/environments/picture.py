@@ -35,7 +35,7 @@ class EnvironmentPicture:
     def render(self, state: EpisodeState) -> NDArray[np.uint8]:
         """Return pixels (height, width, 3) of the machine in a state, with a line to its target.
 
-        All pictures have the size of the one in which the machine is at home.
+        All pictures have the size of the picture with the machine at home.
         """
         figure = self._drawn(state.pose, self._world.target(state)[0])
         figure.set_size_inches(self._size)

@@ -112,7 +112,8 @@ class PteronVectorEnv(VectorEnv[Numbers, Numbers, Numbers]):
     ) -> tuple[Numbers, dict[str, Any]]:
         """Start all episodes, or those of a mask; return observations (E, 4 m) and infos.
 
-        An option "reset_mask", an array of bool, chooses which environments start anew.
+        The option "reset_mask", a bool array, chooses the environments to reset; other options are
+        those of `PteronEnv.reset`, the same for all.
         """
         options = dict(options or {})
         chosen = self._mask(options.pop("reset_mask", None))
@@ -162,7 +163,8 @@ class PteronVectorEnv(VectorEnv[Numbers, Numbers, Numbers]):
     def step(self, actions: Numbers) -> tuple[Numbers, Numbers, Numbers, Numbers, dict[str, Any]]:
         """Apply actions (E, n) for one period.
 
-        Return observations, rewards, end flags and infos.
+        Return observations, rewards, end flags and infos. Environments that start a new episode are
+        not advanced.
         """
         if self._state is None:
             raise DataError("step before reset; call reset first")

@@ -101,7 +101,7 @@ class World:
     def bounds(self) -> Array:
         """Greatest absolute value of each number of an observation, (4 m,).
 
-        Coordinates whose joints have no limits, angles without limits and speeds have none.
+        Coordinates whose joints have no limits, angles without limits and speeds are unbounded.
         """
         robot = self.robot
         reach = []
@@ -151,7 +151,7 @@ class World:
     def travel(self, spread: float) -> Array:
         """Return how far each coordinate can go down and up from home, (2, m), with margin left.
 
-        They are at most `spread` or, of angles, `_ANGLE`.
+        The values are at most `spread` or, for angles, `_ANGLE`.
         """
         most = np.where(self.robot.platform.angular, _ANGLE, spread)
         shares = np.concatenate([[0.0], 0.5 ** np.arange(_HALVINGS, -1, -1.0)])
@@ -193,8 +193,8 @@ class World:
     ) -> Array:
         """Return a random pose (m,) with sufficient margin for each generator; home if none.
 
-        It is apart from the other poses (m,) or (B, m). Where all draws are too far from home they
-        are brought nearer.
+        The pose is apart from the other poses (m,) or (B, m). If all draws lack margin, they are
+        moved nearer to home.
         """
         shape = (_DRAWS, self.robot.freedom)
         draws = np.stack([rng.uniform(-1.0, 1.0, shape) for rng in generators])

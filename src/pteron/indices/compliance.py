@@ -123,14 +123,15 @@ def stiffness(
 ) -> Stiffness:
     """Return the stiffness at the tool, due to elastic actuators and links.
 
-    By Castigliano: C = X^T W X, W being the energy of the internal forces w, and X those of unit
-    loads. Actuators are springs at their joints (C. Gosselin, IEEE Transactions on Robotics and
-    Automation 6 (1990) 377-382: K = J^T K_q J where nothing else gives way), links slender beams
-    with tension, bending and torsion, rods tension alone with, where their distance is given, the
-    couple of a pair (the virtual joints of A. Pashkevich, D. Chablat and P. Wenger, Mechanism and
-    Machine Theory 44 (2009) 966-982, summed up along a link). Of an overconstrained machine the
-    self-stress is that of the least energy. Joints, guides and the platform are rigid; preloads
-    are left out, and so is what legs that leave the platform free to tilt cannot hold.
+    By Castigliano's theorem C = X^T W X, where W is the energy matrix of the internal forces w, and
+    X are the internal forces of unit loads. Actuators are springs at their joints (C. Gosselin,
+    IEEE Transactions on Robotics and Automation 6 (1990) 377-382: K = J^T K_q J if nothing else is
+    elastic); links are slender beams with tension, bending and torsion; rods have tension only and,
+    if their distance is given, the couple of a pair (the virtual joints of A. Pashkevich, D.
+    Chablat and P. Wenger, Mechanism and Machine Theory 44 (2009) 966-982, integrated along a link).
+    In an overconstrained machine the self-stress minimises the energy. Joints, guides and the
+    platform are rigid; preloads are neglected, and so are loads that the legs of a platform free to
+    tilt cannot bear.
 
     Parameters
     ----------
@@ -305,7 +306,7 @@ def _rod_energy(section: Section, way: Array, couple: Array, distance: float | N
 def _beam_energy(section: Section, arm: Array, way: Array, axis: Array) -> Array:
     """Return the energy matrix (B, 6, 6) of a beam, for the wrench at c, `arm` from its start.
 
-    It bends in its leg's plane about `axis`.
+    The beam bends in its leg's plane about `axis`, and across it.
     """
     length = np.linalg.norm(way, axis=-1)
     x = way / length[:, None]
@@ -338,9 +339,9 @@ def _square(rows: Array) -> Array:
 def _constrained_compliance(compliance: Array, twists: Array, length: float) -> Array:
     """Return the compliance (m, m) along a pose's coordinates, other motions constrained.
 
-    The platform moves by twists x' alone, `twists` (6, m), so that its stiffness is T^T C^-1 T. A
-    direction in which nothing gives way (C is singular where links are rigid) allows no x' that
-    moves along it; `length` balances moments and forces in the decision which those are.
+    The platform moves only by twists T x', T being `twists` (6, m), so that its stiffness is T^T
+    C^-1 T. A direction in which the machine is rigid (C is singular) allows no x' that moves along
+    it; `length` makes moments and forces comparable in deciding which directions are rigid.
     """
     scale = np.array([1.0, 1.0, 1.0, length, length, length])
     compliances, axes = np.linalg.eigh(scale[:, None] * compliance * scale)

@@ -90,7 +90,8 @@ class Section:
     def square_tube(cls, side: float, wall: float, material: Material) -> Section:
         """Return the cross-section of a square tube of outer side and wall thickness, m.
 
-        Its torsion is Bredt's, J = t (a - t)^3: for walls that are thin beside the side.
+        The torsional stiffness is Bredt's, J = t (a - t)^3, for walls that are thin compared to the
+        side.
         """
         outer, inner = _hollow("side", side, wall)
         e_i = material.young * (outer**4 - inner**4) / 12
@@ -158,7 +159,7 @@ class Elasticity:
     def _repeat_for_legs(self, robot: Manipulator, name: str) -> tuple[Any, ...]:
         """Return the setting `name` for each leg.
 
-        Raise if a tuple has not one value for each leg.
+        A tuple must have one value for each leg.
         """
         setting = getattr(self, name)
         if not isinstance(setting, tuple):

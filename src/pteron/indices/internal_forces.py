@@ -69,8 +69,8 @@ def balance_loads(
 ) -> BalancedLoads:
     """Return the leg forces, self-stresses and residuals that balance loads (B, R, K).
 
-    The necessary equations hold exactly; among their solutions the one nearest to the presumed
-    equations is taken. Moments count as forces at the machine's size, so that no rank depends on a
+    The necessary equations hold exactly; of their solutions the one nearest to the presumed
+    equations is taken. Moments are divided by the machine's size, so that no rank depends on a
     unit.
     """
     count, length = equations.rows.shape[-1], size_of(robot)

@@ -61,13 +61,13 @@ def geometric_sensitivities(
 ) -> Sensitivities:
     """Return the derivatives of the pose by every geometric dimension, joints held fixed.
 
-    The joint coordinates are q(x, g), g the dimensions; held, J dx + (dq/dg) dg = 0. A direction
-    has two angles by which it may be tilted, about axes of the base frame made perpendicular to it;
-    directions of the leg perpendicular to it are tilted with it, and may be turned about it. Angles
-    out of a planar machine's plane and between a leg's parallel axes are left out: they would
-    strain the machine or tilt its platform, which a pose cannot express. The point and the axes
-    about which a platform turns count too, as for `calibrate`: turns of its axes are about those of
-    its frame.
+    With joint coordinates q(x, g) and dimensions g, held joints give J dx + (dq/dg) dg = 0. A
+    direction has two tilt angles, about base axes made perpendicular to it; other directions of the
+    leg that are perpendicular to it are tilted with it, and may be turned about it. Angles out of a
+    planar machine's plane and between a leg's parallel axes are left out: they would strain the
+    machine or tilt its platform, which a pose cannot express. The point and the axes about which a
+    platform turns are included, as in `calibrate`: turns of these axes are about those of the
+    platform's frame.
 
     Parameters
     ----------

@@ -22,7 +22,7 @@ def random_poses(
     type_ii: float | None = None,
     limits: bool = True,
 ) -> Poses:
-    """Return `count` random poses in reach and away from singularities, (count, m).
+    """Return poses drawn at random, in reach and away from singularities, (count, m).
 
     Poses are uniform in position and orientation, within a box that holds nearly all poses in
     reach. Passive joints and the platform's angle keep their limits; the actuated joints need not.

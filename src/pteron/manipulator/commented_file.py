@@ -64,8 +64,8 @@ def commented_text(name_or_path: str | Path, dimensions: Mapping[str, Any] | Non
 def _with_centers(table: Any) -> Any:
     """Return a file's tables with each body's centre of mass instead of its first moment.
 
-    An edit of the mass alone then keeps the centre of mass. A body without mass keeps its first
-    moment.
+    If a user then edits the mass alone, the centre of mass stays. A body without mass keeps its
+    first moment.
     """
     if isinstance(table, list | tuple):
         return [_with_centers(content) for content in table]
@@ -84,7 +84,7 @@ def _with_centers(table: Any) -> Any:
 def kept_numbers_sentence(robot: Manipulator, dimensions: Mapping[str, Any]) -> list[str]:
     """Return a sentence, or [], on masses and angles that changed dimensions leave as they were.
 
-    The list is empty where nothing is changed, or nothing independent.
+    The list is empty if no dimension is changed, or all numbers depend on those changed.
     """
     if not dimensions:
         return []
@@ -114,7 +114,7 @@ def _masses(robot: Manipulator, stock: Mapping[str, Any]) -> str:
 def crank_direction_text(robot: Manipulator) -> str:
     """Return as text the direction of cranks at angle 0: "5.33 deg below horizontal"; '' without.
 
-    It is "" without gravity, too.
+    The text is empty without gravity, too.
     """
     down = np.array(robot.gravity)
     zeros = [leg.crank_at_zero for leg in robot.legs if leg.crank_at_zero is not None]

@@ -83,9 +83,9 @@ def with_dimensions(
 ) -> Manipulator:
     """Return a machine of the same kind with other dimensions, equal for all legs.
 
-    Links of another length keep their section unless `stock` is given; so do a ram's cylinder and
-    piston, which are as long as its shortest length. Limits of joints, and the platform's mass and
-    inertia, are unchanged unless given. The file's home is omitted where lengths or limits change.
+    Links of changed length keep their cross-section unless `stock` is given; so do a ram's cylinder
+    and piston, which are as long as its shortest length. Joint limits, and the platform's mass and
+    inertia, are unchanged unless given. The file's home is omitted if lengths or limits change.
 
     Parameters
     ----------

@@ -98,7 +98,7 @@ def leg_of(
 ) -> tuple[LegKind | None, list[str]]:
     """Build a leg from its table, in which required keys may be None; collect its faults.
 
-    `tilts` is whether its platform tilts.
+    `tilts` is whether the leg's platform tilts.
 
     Returns
     -------

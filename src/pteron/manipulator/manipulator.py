@@ -133,7 +133,8 @@ class Manipulator:
     def wraps(self) -> NDArray[np.bool_]:
         """Mask (m,) of pose coordinates that are angles whose full turn changes no joint.
 
-        A platform's angle does, unless it slides the platform's halves or a joint follows it.
+        The platform's angles are such, unless they slide the platform's halves or a joint follows
+        them.
         """
         around = bool(self.platform.rotation_axes)
         return self.platform.angular & (around and not any(leg.follows_angle for leg in self.legs))
@@ -158,7 +159,7 @@ class Manipulator:
         """Names of table columns, by quantity: "pose", "velocity", "joints", "forces" and so on.
 
         A pose is x y z phi, a velocity dx dy dz dphi, an acceleration ddx ddy ddz ddphi, a wrench
-        fx fy fz mk: those that the machine has; where its platform tilts a pose has other angles,
+        fx fy fz mk, as far as the machine has them; if its platform tilts, a pose has other angles,
         and a wrench is fx fy fz mx my mz. Joints are rho1 or theta1, their rates drho1 or dtheta1,
         forces force1 or torque1.
         """
@@ -342,7 +343,8 @@ def _with_held_points(platform: Platform, legs: Sequence[LegKind]) -> Platform:
 def unheld_axes(platform: Platform, legs: Sequence[LegKind]) -> NDArray[np.float64]:
     """Return axes (k, 3) about which no leg prevents a non-tilting platform from rotating.
 
-    Only the points where both legs meet may carry anything there, as of a five-bar.
+    Such axes are allowed only for a five-bar, whose legs meet in one point: only that point may
+    carry anything.
     """
     axis = platform.turning_axis
     # What one leg withholds is perpendicular to the axes about which it lets the platform turn.

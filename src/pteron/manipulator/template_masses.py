@@ -14,8 +14,9 @@ from pteron.tolerances import SAME
 def template_masses(robot: Manipulator) -> str:
     """Return a warning that masses equal those of a catalog machine; '' if none do.
 
-    All links of the first leg have its masses or its sections (kg/m), and perhaps the platform.
-    Machines with a name of the catalog count as the catalog's; `pteron new` gives other names.
+    All links of the first leg, and perhaps the platform, must have the masses or the mass per
+    length of a machine of the catalog. Machines with a name of the catalog are exempt; `pteron new`
+    gives other names.
     """
     if robot.name in catalog():
         return ""

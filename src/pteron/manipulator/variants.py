@@ -44,7 +44,7 @@ def working_modes(robot: RobotLike) -> tuple[Manipulator, ...]:
 def with_elbows(robot: Manipulator, signs: Sequence[int]) -> Manipulator:
     """Return the machine in the working mode with these elbows, +1 or -1 for each leg.
 
-    The home that its file names is that of the file's working mode alone.
+    The home in the machine's file applies to the file's working mode only.
     """
     legs = tuple(replace(leg, elbow=sign) for leg, sign in zip(robot.legs, signs, strict=True))
     return replace(robot, legs=legs, home=robot.home if legs == robot.legs else None)

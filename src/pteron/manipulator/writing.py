@@ -35,8 +35,8 @@ def robot_text(
 ) -> str:
     """Return the TOML text of a machine's file from its tables, with comments if `explained`.
 
-    With `explained`, comments describe every key, also absent ones; for legs of one kind at the
-    first. `about` are comments at its head.
+    With `explained`, comments describe every key, also absent ones; for legs of one kind only at
+    the first. `about` are comments at the top of the file.
     """
     head = [*about, *([*_CONVENTIONS, _bodies()] if explained else [f"For Pteron. {_UNITS}"])]
     lines = [f"# {line}" for text in head for line in wrap(text, _WIDTH - 2)]

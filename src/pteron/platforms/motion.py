@@ -90,7 +90,7 @@ class PlatformMotion(NamedTuple):
     def velocity_of(self, twist: Expression) -> tuple[Expression, Expression]:
         """Return the pose rates (m, 1) nearest to a twist (6, 1), and the twist left over.
 
-        The solution is that of least squares; the remaining part is infeasible for the platform.
+        The solution is that of least squares; the twist left over is infeasible for the platform.
         """
         square, projection = ca.mtimes(self.matrix.T, self.matrix), ca.mtimes(self.matrix.T, twist)
         quasi = projection if square.is_constant() else ca.mtimes(ca.inv_minor(square), projection)
@@ -205,7 +205,7 @@ class PlatformEquations(ABC):
     ) -> tuple[PlatformEquations, Expression] | None:
         """Return the platform in its own axes, and these axes (3, 3); None if not cheaper.
 
-        None where that saves no operations.
+        The result is None if that saves no operations.
         """
         return None
 
@@ -250,7 +250,8 @@ class PlatformEquations(ABC):
     def constraint(self, motion: PlatformMotion) -> Expression | None:
         """Return a measure, 1 at best, of constraints by the platform itself; None without.
 
-        It is 1 at best, 0 where a freedom is unconstrained; None where the legs' couples do it.
+        It is 1 at best, 0 where a freedom is unconstrained; None if the legs' couples constrain
+        them.
         """
         return None
 

@@ -31,8 +31,8 @@ _SINGULAR = 1e-12
 def nearest_pose(platform: Platform, position: Array, rotation: Array) -> Array:
     """Return the pose (..., m) nearest to a position of P (..., 3) and a rotation (..., 3, 3).
 
-    Where the motion cannot have them it is a pose near to them. Roll, or rz, is 0 where the angles
-    are singular.
+    If the platform can have both, the pose is exact. Roll, or rz, is 0 where the angles are
+    singular.
     """
     named = dict(zip(platform.angles, _angles(platform, rotation), strict=True))
     lengths = np.moveaxis(position @ platform.directions.T, -1, 0)
@@ -44,8 +44,8 @@ def nearest_pose(platform: Platform, position: Array, rotation: Array) -> Array:
 def pose_nearest_frame(platform: Platform, pose: Array, axes: Array) -> Array:
     """Return the pose (m,) near `pose` whose platform axes are nearest to `axes` (3, 3).
 
-    `axes` (3, 3) are the frame's, one a row, not necessarily feasible for the platform; the sum of
-    squared differences is minimised by Gauss-Newton; a single angle turns x to the frame's.
+    `axes` (3, 3) are one a row, and need not be feasible for the platform; the sum of squared
+    differences is minimised by the Gauss-Newton method; a single angle aligns the x axes.
     """
     nearest, turns = np.array(pose, dtype=float), np.flatnonzero(platform.angular)
     if platform.axis_angle is not None:

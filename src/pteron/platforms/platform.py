@@ -217,7 +217,8 @@ class Platform:
     def payload_axes(self) -> str:
         """Platform axes, such as "xy", along which a payload's centre of mass changes forces.
 
-        "" where it does not turn, or where a payload is on its axis, as on one that slides.
+        The text is empty if the platform does not turn, or if payloads count as on its axis, as on
+        a platform that slides.
         """
         return self.arm_axes if self.rotation_axes else ""
 
@@ -260,7 +261,7 @@ class Platform:
     def axis_angle(self) -> str | None:
         """The name of the single angle, "phi", about or along the axis.
 
-        None for other platforms.
+        It is None for other platforms.
         """
         return self.kind.axis_angle
 
@@ -273,7 +274,7 @@ class Platform:
     def spin_axis(self) -> Vector | None:
         """The axis about which `spin_angle` turns the platform at every pose, or None.
 
-        None if it is not fixed.
+        It is None if the axis is not fixed to the base.
         """
         return self.axis if self.spin_angle in ("phi", "yaw") else None
 
@@ -325,7 +326,7 @@ class Platform:
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return P (..., 3), m, and the platform's axes (..., 3, 3), one a row, in the base frame.
 
-        For a platform that slides the axes are the tool's.
+        For a platform with sliding halves the axes are the tool's.
         """
         if self.tilts:
             return self._place_tilting(poses)
@@ -395,7 +396,7 @@ class Platform:
     def turning_keys(self) -> tuple[str, ...]:
         """Names of the points and directions about which the platform turns, if legs fix none.
 
-        The legs determine those of a planar platform.
+        For a planar platform the legs determine the axis.
         """
         if self.second_axis is not None:
             return ("center", "axis", "second_axis")
@@ -427,8 +428,8 @@ class Platform:
     def map_vectors(self, turn: Callable[[Vector], Vector]) -> Platform:
         """Return the platform with every base-frame vector v replaced by `turn(v)`.
 
-        The frame of a 2R platform is the base frame at angles zero: its tool, inertia and platform
-        points are converted to the new frame.
+        The frame of a 2R platform is the base frame at angles zero: the platform's tool, inertia
+        and points are converted to the new frame.
         """
         x, _, axis = self.frame
         center = self.center and turn(self.center)

@@ -63,7 +63,7 @@ class Sliding(PlatformEquations):
     def _matrix(self, way: Expression) -> Expression:
         """Return the matrix (6, 4) from pose rates to a point's velocity.
 
-        It slides by `way` per rad.
+        The point slides by `way` (3, 1), m, per rad of phi.
         """
         return ca.blockcat([[ca.SX.eye(3), way], [ca.SX(3, 3), ca.SX(3, 1)]])
 

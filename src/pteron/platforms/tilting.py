@@ -102,7 +102,7 @@ class Tilting(PlatformEquations):
     ) -> Rotation:
         """Return the platform's rotation at a pose, with angular velocity and acceleration.
 
-        With sign -1 it is the inverse rotation, by -angles in reverse order.
+        With `sign` -1 it is the inverse rotation, by the negative angles in reverse order.
         """
         places = [self.coordinates.index(name) for name in self.order][::sign]
         axes = self.axes_by_angle()
@@ -133,7 +133,7 @@ class Tilting(PlatformEquations):
     ) -> tuple[PlatformEquations, Expression] | None:
         """Return the platform in its own axes, and these axes (3, 3).
 
-        None if P does not translate.
+        The result is None if P does not translate.
         """
         if "x" not in self.coordinates:
             return None
@@ -275,7 +275,7 @@ class _Centred(Tilting):
     def basis(self, turned: Rotation) -> tuple[Expression, Expression | None]:
         """Return the twists (6, k) of unit quasi-velocities.
 
-        The matrix from angle rates to them.
+        The second result is the matrix from angle rates to quasi-velocities.
         """
         return ca.vertcat(ca.SX(3, 3), ca.SX.eye(3)), turned.axes
 

@@ -117,7 +117,7 @@ class Tripod(Tilting):
     def constraint(self, motion: PlatformMotion) -> Expression:
         """Return the constraint measure of x, y and yaw, 1 at best: 0 at a constraint singularity.
 
-        It is the determinant of the planes' forces and moments about k over its upper bound.
+        It is the determinant of the planes' forces and moments about k, divided by its upper bound.
         """
         x, y, k = self.frame
         rows = self.plane_wrenches(motion)

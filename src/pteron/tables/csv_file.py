@@ -146,7 +146,8 @@ class CsvFile:
     def _text(self, size: int, start: int = 0) -> Iterator[bytes]:
         """Yield the file's text from `start` on, as UTF-8 in pieces with Unix line ends.
 
-        Where blanks separate the cells, each line has single ones, and none at its ends.
+        If blanks separate the cells, runs of blanks are made single, and removed at the ends of
+        lines.
         """
         decoder = codecs.getincrementaldecoder(self._encoding)()
         decode = io.IncrementalNewlineDecoder(decoder, translate=True).decode
@@ -203,8 +204,8 @@ class CsvFile:
     def _read_by_polars(self, block: bytes, names: Sequence[str]) -> pl.DataFrame | None:
         """Return a block's cells as read by Polars; None where Polars might misread them.
 
-        Polars fills short rows and takes blank lines for rows, which separators that are not there
-        tell; and it is lenient with quotes.
+        Polars pads short rows and reads blank lines as rows, which a count of separators reveals;
+        it also tolerates wrong quotes.
         """
         separator, last = self._separator, len(self.columns) - 1
         if not last or b'"' in block:

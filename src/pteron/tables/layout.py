@@ -93,7 +93,8 @@ def find_encoding(head: bytes, declared: str | None, source: str) -> str:
 def find_layout(head: bytes, declared: Dialect, encoding: str, source: str) -> Layout:
     """Return the layout of a CSV file: dialect, names, units and where its rows begin.
 
-    `head` is the beginning of its text, in UTF-8; `declared` has the parts that are declared.
+    `head` is the beginning of the file's text, in UTF-8; `declared` has the parts of the dialect
+    that are declared.
     """
     lines = io.BytesIO(head).readlines()
     text = [line.decode() for line in lines[:_LINES]]

@@ -37,7 +37,7 @@ _Columns = dict[str, list[tuple[str, str]]]
 def side_by_side(file: Path, encoding: str | None, source: str) -> bytes | None:
     """Return as plain CSV a log that lists one variable below another; None for other files.
 
-    `encoding` is what was declared. None for any other file.
+    `encoding` is the declared encoding, if any. The time column is called t.
     """
     with file.open("rb") as opened:
         head = opened.read(_HEAD)
