@@ -91,7 +91,7 @@ class Places:
         return replace(self, shifts=self.shifts[indices], turns=self.turns[indices])
 
     def both_ways(self) -> Places:
-        """Return the cycle with more time samples, and each place also mirrored (turned by pi)."""
+        """Return these places with their mirror images (turned by pi) and more time samples."""
         fine = replace(self, samples=_IN_CYCLE_LAST)
         if not self.anywhere:
             return fine

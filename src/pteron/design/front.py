@@ -197,7 +197,10 @@ def front_of_parts(task: Task, parts: Iterable[pl.DataFrame]) -> Front:
 
 
 def _misses_of(task: Task, designs: pl.DataFrame) -> Array:
-    """Return the sum of each design's violations (N,); an undefined objective adds to it."""
+    """Return by how much each design violates the task's requirements, summed, (N,).
+
+    Each undefined objective adds the constant `FAILED`.
+    """
     missed = violations(designs).sum(axis=1)
     return np.asarray(missed + FAILED * (~np.isfinite(task.costs(designs))).sum(axis=1))
 

@@ -114,8 +114,7 @@ def drive_accelerations(
 ) -> Expression:
     """Return the platform's acceleration x'' (m, 1) under drive forces (n, 1) and a wrench.
 
-    D is the motors' inertia at the joints, f the drives' own forces at x'' = 0: friction, offset
-    and D q''.
+    The drives' friction, offsets and the motors' inertia, reflected to the joints, are included.
     """
     state = machine.state(pose, velocity)
     rows = jacobian(state)

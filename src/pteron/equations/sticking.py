@@ -172,7 +172,10 @@ def _drive_outputs(
     coordinates: list[Expression],
     joint_rates: Expression,
 ) -> _DriveOutputs:
-    """Return drive forces and rates of drive states; `sliding` is dry friction (n, 1), N or N m."""
+    """Return each drive's motor and transmission forces and the rates of its extra states.
+
+    `sliding` is the dry friction (n, 1), N or N m, that a joint has while it slides.
+    """
     kind, outputs = motors.kind, _DriveOutputs([], [], [], [])
     for i in range(len(coordinates)):
         numbers = kind, motors.numbers, i

@@ -322,7 +322,10 @@ def _invert(matrices: Array) -> Array:
 
 
 def _are_duplicates(which: NDArray[np.int64], z: Array, radius: Array) -> NDArray[np.bool_]:
-    """Return which poses (K, d) repeat an earlier pose of the same machine."""
+    """Return which of the poses z (K, d) repeat an earlier pose of the same machine, (K,).
+
+    `which` (K,) is each pose's machine, ascending; `radius` (K,) that of a proof, 0 without one.
+    """
     count = np.arange(len(which)) - np.searchsorted(which, which)
     is_duplicate = np.zeros(len(which), dtype=bool)
     for back in range(1, int(count.max(initial=0)) + 1):

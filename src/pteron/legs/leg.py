@@ -259,9 +259,10 @@ class LegEquations(ABC):
     def limit_margins(
         self, c: Expression, q: Expression, low: float, high: float
     ) -> dict[str, Expression]:
-        """Return expressions, by name, that are not negative where the joint at q keeps its limits.
+        """Return expressions, by name, that are not negative while the joint's q is in its limits.
 
-        The joint coordinate at c, which is in reach, is q. The expressions need not be distances.
+        `low` and `high` are the limits, q the joint coordinate (m or rad) at the platform point c,
+        which the leg reaches. The expressions need not be distances.
         """
         return {"least": q - low, "most": high - q}
 

@@ -245,7 +245,10 @@ def _first_pass(toppra: Any, rows: LimitRows, grid: Array) -> Array:
 
 
 def _ranges_near(times: Array, nodes: Array, span: float) -> Array:
-    """Return index ranges (2, K), first and last + 1, of the times (T,) near nodes (K,)."""
+    """Return for each node (K,) the index range (2, K) of the times (T,) within `span` of it.
+
+    A range is the first index and the last one + 1; all times count between distant nodes.
+    """
     first = np.searchsorted(times, nodes - span)
     last = np.searchsorted(times, nodes + span)
     # Between distant nodes all times count.
