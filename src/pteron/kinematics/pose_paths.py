@@ -324,7 +324,7 @@ def _invert(matrices: Array) -> Array:
 def _are_duplicates(which: NDArray[np.int64], z: Array, radius: Array) -> NDArray[np.bool_]:
     """Return which of the poses z (K, d) repeat an earlier pose of the same machine, (K,).
 
-    `which` (K,) is each pose's machine, ascending; within `radius` (K,) it is proved unique, if > 0.
+    `which` (K,) is each pose's machine, ascending; `radius` (K,) proves it unique within, if > 0.
     """
     count = np.arange(len(which)) - np.searchsorted(which, which)
     is_duplicate = np.zeros(len(which), dtype=bool)
