@@ -1,6 +1,7 @@
 """Limits of passive joints: where the joints are, and that whatever asks for reach keeps them."""
 
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -204,8 +205,7 @@ def test_the_platform_s_angle_has_limits_too():
 def test_check_tells_where_they_are_at_home(tmp_path):
     file = str(pteron.save(limited("3-rrr", elbow_limits=(0.2, 3.0)), tmp_path / "robot.toml"))
     text = CliRunner().invoke(app, ["check", file]).stdout
-    assert text.count(" elbow ") == 3
-    assert text.count("0.2 to 3 rad") == 3
+    assert re.search(r" 1, 2, 3  elbow +[\d.]+ rad  0.2 to 3 rad", text)
     found = json.loads(CliRunner().invoke(app, ["check", file, "--json"]).stdout)
     joints = [joint for joint in found["limited_joints"] if not joint["actuated"]]
     assert [joint["leg"] for joint in joints] == [1, 2, 3]
@@ -214,7 +214,7 @@ def test_check_tells_where_they_are_at_home(tmp_path):
     # An angle to a cone's axis is never below zero.
     cone = Cone((0.0, 0.0, 1.0), 1.5)
     pteron.save(limited("delta", platform_cone=cone), file)
-    assert CliRunner().invoke(app, ["check", file]).stdout.count("at most 1.5 rad") == 3
+    assert CliRunner().invoke(app, ["check", file]).stdout.count("at most 1.5 rad") == 1
 
 
 def test_inverse_kinematics_does_not_apply_them():

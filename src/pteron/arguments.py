@@ -55,15 +55,15 @@ class _Kind(NamedTuple):
 
 
 def with_checked_arguments(function: types.FunctionType) -> types.FunctionType:
-    """Return a function that first refuses arguments that do not match its type hints."""
+    """Return the function with a check of its arguments against its type hints before each call."""
     hints = {hint for key, hint in function.__annotations__.items() if key != "return"}
     return _add_check(function) if hints - _CHECKED_LATER - {"bool"} else function
 
 
 def checked_arguments(decorated: type[_Class]) -> type[_Class]:
-    """Return a class, as a decorator, that refuses arguments that do not match its type hints.
+    """Decorate a class so that its constructor checks arguments against their type hints.
 
-    It is for classes that are made from what a user gives, and have no check of their own.
+    It is for classes that users construct and that have no checks of their own.
     """
     any_class: Any = decorated
     any_class.__init__ = _add_check(any_class.__init__)
@@ -73,7 +73,7 @@ def checked_arguments(decorated: type[_Class]) -> type[_Class]:
 def expect_kinds(
     function: Callable[..., Any], args: tuple[Any, ...], named: Mapping[str, Any]
 ) -> None:
-    """Refuse arguments that do not match the type hints, all in a single message.
+    """Raise one `DataError` for all arguments that do not match the function's type hints.
 
     Raises
     ------
@@ -93,7 +93,7 @@ def expect_kinds(
 
 
 def expect(holds: object, name: str, actual: object, expected: object) -> None:
-    """Raise a `DataError` in the common format if an argument's condition does not hold.
+    """Raise a `DataError` ("name: actual given, expected expected") unless `holds` is true.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ def expect(holds: object, name: str, actual: object, expected: object) -> None:
 
 
 def expect_share(name: str, share: float) -> None:
-    """Refuse a number that is no fraction: it must be above 0 and below 1.
+    """Raise a `DataError` unless a number is above 0 and below 1.
 
     Raises
     ------
@@ -130,7 +130,7 @@ def expect_share(name: str, share: float) -> None:
 
 
 def number_or_nan(argument: object) -> float:
-    """Return `float` of a value; NaN if it is no number.
+    """Return the value converted to float; NaN if it is not a number.
 
     Examples
     --------
@@ -147,14 +147,14 @@ def number_or_nan(argument: object) -> float:
 def expect_one_of(
     choices: Sequence[str], error: type[PteronError] = DataError, **arguments: object
 ) -> None:
-    """Refuse values, by the names of their arguments, that are not among the choices."""
+    """Raise an error for each named argument whose value is not among the choices."""
     for name, argument in arguments.items():
         if argument not in choices:
             raise error(f"{name}: {argument!r} is not one of {', '.join(choices)}")
 
 
 def expect_to_fit(name: str, count: object, numbers: float) -> None:
-    """Refuse a size whose arrays exceed this computer's memory, before their allocation.
+    """Raise a `DataError` if `numbers` floats exceed this computer's memory.
 
     Parameters
     ----------
@@ -185,11 +185,11 @@ def _memory() -> float:
 
 
 def _add_check(function: types.FunctionType) -> types.FunctionType:
-    """Return a function that checks its arguments against the type hints before it runs."""
+    """Return the function with a check of its arguments against its type hints before each call."""
     expect = expect_kinds
 
     def call(*args: Any, **named: Any) -> Any:
-        """Call the function, after its arguments are checked against its type hints."""
+        """Call the function after a check of its arguments."""
         expect(function, args, named)
         return function(*args, **named)
 
@@ -204,7 +204,7 @@ def _add_check(function: types.FunctionType) -> types.FunctionType:
 def _kinds_of(
     function: Callable[..., Any],
 ) -> tuple[dict[str, tuple[_Kind | None, Any]], list[str], str]:
-    """Return kind and default of each argument, positional names, and the name of *args."""
+    """Return the kind and default of each argument, positional names, and the name of *args."""
     kinds, order, others = {}, [], ""
     for name, argument in inspect.signature(function).parameters.items():
         if argument.kind is argument.VAR_POSITIONAL:
@@ -218,7 +218,7 @@ def _kinds_of(
 
 
 def _hint(function: Callable[..., Any], annotation: Any) -> Any:
-    """Return the value of a type hint; `Any` if its names exist for type checkers only."""
+    """Return the object of a type hint; `Any` if its names exist for type checkers only."""
     try:
         return eval(annotation, function.__globals__) if isinstance(annotation, str) else annotation
     except NameError:
@@ -226,7 +226,7 @@ def _hint(function: Callable[..., Any], annotation: Any) -> Any:
 
 
 def _kind(hint: Any) -> _Kind | None:
-    """Return the kind of argument of a type hint; None if it allows any value."""
+    """Return the check for values of a type hint; None if the hint allows any value."""
     if hint in _PLAIN:
         return _PLAIN[hint]
     origin, inner = typing.get_origin(hint), typing.get_args(hint)
@@ -269,7 +269,7 @@ def _kind(hint: Any) -> _Kind | None:
 
 
 def _has_shape(hint: Any) -> bool:
-    """Return whether a type hint is an array of jaxtyping, which is then imported."""
+    """Return whether a type hint is an array type of jaxtyping."""
     jaxtyping = sys.modules.get("jaxtyping")
     return (
         jaxtyping is not None
@@ -279,7 +279,7 @@ def _has_shape(hint: Any) -> bool:
 
 
 def _alternative(hint: Any) -> _Kind | None:
-    """Return the kind of a member of a union; a literal is compared with its choices."""
+    """Return the check for a member of a union type; a literal allows its choices only."""
     kind = _kind(hint)
     if kind is None or typing.get_origin(hint) is not typing.Literal:
         return kind
@@ -291,7 +291,7 @@ def _alternative(hint: Any) -> _Kind | None:
 
 
 def _either(kinds: list[_Kind | None]) -> _Kind | None:
-    """Return the union of argument kinds; None, which accepts anything, if any of them is None."""
+    """Return the check that accepts what any of the kinds accepts; None if one is None."""
     known = [kind for kind in kinds if kind is not None]
     if len(known) < len(kinds):
         return None
@@ -305,7 +305,7 @@ def join_words(words: Sequence[str], last: str = "or") -> str:
 
 
 def _with_bounds(kind: _Kind | None, bounds: Between) -> _Kind | None:
-    """Return a kind of number restricted to bounds, which its words state; None for None."""
+    """Return a check for numbers restricted to bounds, also in its words; None for None."""
     if kind is None:
         return None
     least, most = bounds
@@ -316,10 +316,10 @@ def _with_bounds(kind: _Kind | None, bounds: Between) -> _Kind | None:
 
 
 def _sequence(every: _Kind | None, *, lazy: bool = False, count: int | None = None) -> _Kind:
-    """Return the kind of a sequence with elements of a kind; `lazy` accepts iterators too."""
+    """Return the check for a sequence of elements of a kind; `lazy` accepts iterators too."""
 
     def holds(argument: Any) -> bool:
-        """Return whether an argument is a sequence of the right length and kind of elements."""
+        """Return whether an argument is a sequence of the right length with valid elements."""
         if isinstance(argument, str | bytes | Mapping) or not hasattr(argument, "__iter__"):
             return False
         if np.ndim(argument) == 0 if isinstance(argument, np.ndarray) else lazy:
@@ -348,7 +348,7 @@ def _is_array(argument: Any) -> bool:
 
 
 def _is_whole(argument: Any) -> bool:
-    """Return whether an argument is an integer of less than 64 bits; a bool is none."""
+    """Return whether an argument is an integer of less than 64 bits, and not a bool."""
     if isinstance(argument, bool | np.bool_):
         return False
     try:
@@ -358,7 +358,7 @@ def _is_whole(argument: Any) -> bool:
 
 
 def _are_numbers(argument: Any) -> bool:
-    """Return whether NumPy converts an argument to real numbers or booleans; text is refused."""
+    """Return whether NumPy can convert an argument to real numbers; text is refused."""
     if isinstance(argument, str | bytes) or argument is None:
         return False
     try:
@@ -371,7 +371,7 @@ def _are_numbers(argument: Any) -> bool:
 
 
 def _has_text(array: np.ndarray[Any, Any]) -> bool:
-    """Return whether an array of objects has elements of text."""
+    """Return whether an array of objects has text elements."""
     return any(isinstance(element, str | bytes) for element in array.flat)
 
 

@@ -13,7 +13,7 @@ from pteron.errors import OutputError
 
 
 def write_texts(folder: str | Path, texts: Mapping[str, str]) -> list[Path]:
-    """Write texts in UTF-8 to files of a folder, by their names: all of them, or none.
+    """Write texts as UTF-8 files into a folder, all or none; return their paths.
 
     Raises
     ------
@@ -28,12 +28,12 @@ def write_texts(folder: str | Path, texts: Mapping[str, str]) -> list[Path]:
 
 
 def write_text(path: str | Path, text: str) -> Path:
-    """Write `text` to `path` in UTF-8, through a temporary file beside it and a rename."""
+    """Write a text to a file in UTF-8, atomically; return its path."""
     return write_bytes(path, _encode(path, text))
 
 
 def write_bytes(path: str | Path, content: bytes) -> Path:
-    """Write `data` to `path`, through a temporary file beside it and a rename.
+    """Write bytes to a file, atomically; return its path.
 
     Raises
     ------
@@ -44,11 +44,11 @@ def write_bytes(path: str | Path, content: bytes) -> Path:
 
 
 def write_files(files: Mapping[Path, bytes]) -> list[Path]:
-    """Write files, all of them or none, and return their paths.
+    """Write files, all of them or none; return their paths.
 
-    Every file is first written under a temporary name in its folder, and to the disk, then all are
-    renamed: a full disk loses nothing. Former files keep their permissions, and come back if a
-    rename fails.
+    Every file is first written under a temporary name in its folder, and flushed to the disk; then
+    all are renamed, so that a full disk loses nothing. Replaced files keep their permissions, and
+    are restored if a rename fails.
 
     Raises
     ------
@@ -78,7 +78,7 @@ def write_files(files: Mapping[Path, bytes]) -> list[Path]:
 
 
 def _mode_of(target: Path) -> int:
-    """Return the permissions of an existing file, or the default ones of a new file."""
+    """Return the permission bits of an existing file, or the defaults of a new file."""
     try:
         return stat.S_IMODE(target.stat().st_mode)
     except FileNotFoundError:
@@ -106,7 +106,7 @@ def _replace_all(written: Mapping[Path, Path]) -> None:
 
 
 def _copy_beside(target: Path) -> Path:
-    """Copy an existing file, and return the path of the copy."""
+    """Copy an existing file beside itself under a temporary name; return the copy's path."""
     handle, name = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
     os.close(handle)
     shutil.copy2(target, name)
@@ -114,7 +114,7 @@ def _copy_beside(target: Path) -> Path:
 
 
 def checked_file(path: str | Path, example: str = "") -> Path:
-    """Return a path, checked beforehand for whether a file can be there.
+    """Return the path of an output file; raise if it is a folder or its folder is missing.
 
     Raises
     ------
@@ -130,7 +130,7 @@ def checked_file(path: str | Path, example: str = "") -> Path:
 
 
 def make_folder(path: str | Path) -> Path:
-    """Return the folder `path`, created if missing, after a check that it is writable.
+    """Create the folder if it is missing and check that it is writable; return its path.
 
     Raises
     ------
@@ -148,7 +148,7 @@ def make_folder(path: str | Path) -> Path:
 
 
 def _encode(path: str | Path, text: str) -> bytes:
-    """Return a text in UTF-8; a surrogate that UTF-8 cannot represent raises an `OutputError`."""
+    """Return a text encoded in UTF-8; raise an `OutputError` if it cannot be encoded."""
     try:
         return text.encode("utf-8")
     except UnicodeEncodeError as error:
@@ -156,7 +156,7 @@ def _encode(path: str | Path, text: str) -> bytes:
 
 
 def _umask() -> int:
-    """Return the process's umask, which the system shows only while it is set."""
+    """Return the process's umask (permission bits that new files lack)."""
     mask = os.umask(0)
     os.umask(mask)
     return mask

@@ -40,7 +40,7 @@ class PteronError(ValueError):
 def _restore_error(
     kind: type[PteronError], args: tuple[Any, ...], state: dict[str, Any]
 ) -> PteronError:
-    """Return an unpickled error with its attributes, without a call of its constructor."""
+    """Return an error rebuilt from pickled class, arguments and attributes."""
     error = kind.__new__(kind, *args)
     error.__dict__.update(state)
     return error
@@ -147,7 +147,7 @@ class SingularPose(PteronError):
 
 
 def shorten(value: object, *, bare: bool = False, longest: int = _LONGEST) -> str:
-    r"""Return a value's text for messages: short, on a single line, without control characters.
+    r"""Return a value as short text for messages, on one line, without control characters.
 
     Parameters
     ----------

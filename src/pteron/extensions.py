@@ -23,12 +23,12 @@ EXTENSION_GROUPS = {
 
 
 def extension_names(group: str) -> tuple[str, ...]:
-    """Return the names that installed packages have in a group, sorted."""
+    """Return the names of all entry points that installed packages have in a group, sorted."""
     return tuple(sorted({entry_point.name for entry_point in _entry_points(group)}))
 
 
 def load_extension(group: str, name: str) -> Any:
-    """Return the object of a name in a group from an installed package; None without one.
+    """Return the object of an entry point by group and name; None if no package has it.
 
     Raises
     ------
@@ -45,18 +45,18 @@ def load_extension(group: str, name: str) -> Any:
 
 
 def extension_value(group: str, name: str) -> str:
-    """Return the location of an entry point's object, such as "my_legs:SliderRod"."""
+    """Return where an entry point's object is, such as "my_legs:SliderRod"; '' if there is none."""
     entry_point = _entry_point(group, name)
     return "" if entry_point is None else entry_point.value
 
 
 def _entry_point(group: str, name: str) -> EntryPoint | None:
-    """Return the entry point of a name in a group; None if no package has it."""
+    """Return the entry point with this group and name; None if no package has it."""
     return next((point for point in _entry_points(group) if point.name == name), None)
 
 
 def _entry_points(group: str) -> tuple[EntryPoint, ...]:
-    """Return the entry points of a group that installed packages declare."""
+    """Return all entry points that installed packages declare in a group."""
     from importlib.metadata import entry_points
 
     return tuple(entry_points(group=group))

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def import_extra(extra: str, module: str, need: str, error: type[PteronError] | None = None) -> Any:
-    """Return a module of an extra, or raise an error that says how to install it.
+    """Import a module of an optional extra; raise an error with the install command if missing.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ def import_extra(extra: str, module: str, need: str, error: type[PteronError] | 
 
 
 def expect_extra(extra: str, module: str, need: str) -> None:
-    """Raise an error, before slow imports, if a module of an extra is missing.
+    """Raise an error with the install command if a module of an optional extra is missing.
 
     The parameters are those of `import_extra`; the module's name has no dots.
     """
@@ -46,16 +46,16 @@ def expect_extra(extra: str, module: str, need: str) -> None:
 
 
 def install_command(extra: str) -> str:
-    """Return the command that installs an extra: it works in any folder and environment.
+    """Return the shell command that installs an optional extra of Pteron.
 
-    Pteron may come from a folder of sources, a wheel, a repository or a registry; pip keeps which
+    Pteron may come from a source folder, a wheel, a repository or a registry; pip records which
     (PEP 610, direct_url.json).
     """
     return f"{_quote_path(sys.executable or 'python')} -m pip install {_requirement(extra)}"
 
 
 def _requirement(extra: str) -> str:
-    """Return pip's requirement for an extra, from the origin that Pteron was installed from."""
+    """Return pip's requirement text for an extra, by where Pteron was installed from."""
     # Only where something is missing: these are slow to import.
     import json
     from importlib.metadata import PackageNotFoundError, distribution
@@ -80,5 +80,5 @@ def _requirement(extra: str) -> str:
 
 
 def _quote_path(path: str) -> str:
-    """Return a path in quotation marks if it has blanks."""
+    """Return a path in quotation marks if it contains blanks, else unchanged."""
     return f'"{path}"' if " " in path else path

@@ -44,7 +44,7 @@ class Overview(NamedTuple):
 
     @property
     def text(self) -> str:
-        """The overview as lines of text: a line for each row and each note.
+        """The overview as text: a line for each row of the table and each note.
 
         Examples
         --------
@@ -100,7 +100,7 @@ def html_table(
 def frame_overview(
     title: str, about: str, frame: pl.DataFrame, notes: Iterable[str] = ()
 ) -> Overview:
-    """Return the first rows of a table for `html_table`, with a note on omitted rows."""
+    """Return the first rows of a table as an `Overview`, with a note on omitted rows."""
     columns = [Column(c.name, "number" if c.dtype.is_numeric() else "") for c in frame]
     hidden = len(frame) - _ROWS
     hint = [f"{hidden} more rows: see table()"] if hidden > 0 else []
@@ -108,12 +108,12 @@ def frame_overview(
 
 
 def _kind(kind: str) -> Markup:
-    """Return the class attribute of a column's kind, with a leading blank; empty if it has none."""
+    """Return the HTML attribute `class` for a column's kind, with a leading blank, or ''."""
     return Markup(f' class="{kind}"') if kind else Markup("")
 
 
 def _cell(cell: Cell) -> str:
-    """Return a cell's text: numbers rounded, with a true minus sign; None and NaN empty."""
+    """Return a table cell as text: numbers rounded, None and NaN empty."""
     if cell is None or isinstance(cell, str):
         return cell or ""
     text = f"{cell:.{_DIGITS}g}" if isinstance(cell, float) else str(cell)

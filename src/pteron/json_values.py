@@ -9,7 +9,7 @@ from typing import Any
 
 
 def json_ready(data: Any) -> Any:
-    """Return data for JSON: NumPy's numbers as Python's, None (null) for non-finite ones."""
+    """Return data with NumPy numbers as Python's, and None for non-finite numbers."""
     if isinstance(data, dict):
         return {key: json_ready(value) for key, value in data.items()}
     if isinstance(data, list | tuple):
@@ -19,27 +19,27 @@ def json_ready(data: Any) -> Any:
 
 
 def json_text(data: Any) -> str:
-    """Return data as the text of a JSON file."""
+    """Return data as JSON text; non-finite numbers become null."""
     return json.dumps(json_ready(data), indent=1, allow_nan=False) + "\n"
 
 
 def fields_as_json(owner: object, *names: str) -> dict[str, Any]:
-    """Return attributes of an object as plain data, by their names.
+    """Return an object's attributes of these names as a dictionary of plain data.
 
-    A name may hold several words, each "attribute" or "key=attribute", where the key is another.
-    Arrays and tuples become lists; what has an `as_dict` is asked for it.
+    A name may hold several words, each "attribute" or "key=attribute", where the key replaces the
+    attribute's name. Arrays and tuples become lists; objects with `as_dict` are converted by it.
     """
     pairs = (name.rpartition("=") for name in " ".join(names).split())
     return {key or name: _data(getattr(owner, name)) for key, _, name in pairs}
 
 
 def json_fields(**fields: object) -> dict[str, Any]:
-    """Return values as plain data, by their keys; see `fields_as_json` for what becomes of them."""
+    """Return keyword arguments as a dictionary of plain data: arrays become lists."""
     return {key: _data(value) for key, value in fields.items()}
 
 
 def _data(value: Any) -> Any:
-    """Return a value as JSON can hold it: arrays as lists, objects by their fields."""
+    """Return a value as JSON can hold it: arrays as lists, dataclasses as dictionaries."""
     if hasattr(value, "tolist") or hasattr(value, "as_dict"):
         return value.tolist() if hasattr(value, "tolist") else value.as_dict()
     if isinstance(value, list | tuple):

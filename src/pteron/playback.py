@@ -67,7 +67,7 @@ Given = Motion | Simulation | Playback | Table | Log | str | Path
 
 
 def playback(robot: Manipulator, motion: Given, start: PoseLike | None = None) -> Playback:
-    """Return a motion for display, after a check that the machine can do it.
+    """Return a motion, simulation, table, log or file as a `Playback` that the machine can do.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ def playback(robot: Manipulator, motion: Given, start: PoseLike | None = None) -
 
 
 def read_motion(robot: Manipulator, path: str | Path) -> Table | Log:
-    """Return the table or log in a file; ``-`` is a table on standard input."""
+    """Return the table or the log in a file; "-" is a table on standard input."""
     if find_description(path) is not None:
         return read_log(path, robot)
     if not Path(path).is_file():
@@ -138,7 +138,7 @@ def read_motion(robot: Manipulator, path: str | Path) -> Table | Log:
 
 
 def read_content(robot: Manipulator, data: bytes, source: str) -> Table | Log:
-    """Return the table or log in the content of a file with a name."""
+    """Return the table or the log in a file's bytes; `source` is the file's name."""
     if Path(source).suffix.lower() == ".csv":
         plain = CsvFile(data, source)
         if is_table(robot, plain.columns):
@@ -157,9 +157,9 @@ def read_content(robot: Manipulator, data: bytes, source: str) -> Table | Log:
 
 
 def is_table(robot: Manipulator, columns: Sequence[str]) -> bool:
-    """Return whether columns are those of a motion's table, rather than of a log.
+    """Return whether columns are those of a motion's table, rather than of a controller's log.
 
-    A log has joints and forces, but no rates of the pose; or it calls everything by other names.
+    A log has joints and forces, but no rates of the pose; or all of its columns have other names.
     """
     has = set(columns)
     if has.issuperset((*robot.joint_names, *robot.force_names)):
@@ -171,7 +171,7 @@ def is_table(robot: Manipulator, columns: Sequence[str]) -> bool:
 
 
 def playback_of_table(robot: Manipulator, rows: Table, start: PoseLike | None = None) -> Playback:
-    """Return the motion of a table, with its forces if all are there."""
+    """Return the motion in a table as a `Playback`, with drive forces if all are there."""
     rows = convert_to_si(rows, {**robot.column_units, "t": "s"})
     if start is None and not set(rows.columns) >= set(robot.coordinates):
         start = home_pose(robot)
@@ -188,7 +188,7 @@ def playback_of_table(robot: Manipulator, rows: Table, start: PoseLike | None = 
 
 
 def playback_of_log(robot: Manipulator, log: Log) -> Playback:
-    """Return the motion of a log's joints, smoothed, with its forces if in N or N m."""
+    """Return the smoothed motion of a log's joints as a `Playback`, with forces if in N or N m."""
     # All of it is to be seen, and not the part alone that repeats.
     whole_log = replace(
         log, description=replace(log.description, period=None, start=None, end=None)
@@ -205,7 +205,7 @@ def playback_of_log(robot: Manipulator, log: Log) -> Playback:
         forces = np.concatenate([part.forces for part in parts])
 
     def join_columns(name: str) -> Array:
-        """Return a column of the log's pieces by its name, joined (T, ...)."""
+        """Return the column `name` of all segments of the log, joined, (T, ...)."""
         return np.concatenate([getattr(state, name) for state in states])
 
     time = join_columns("time")
@@ -219,6 +219,6 @@ def playback_of_log(robot: Manipulator, log: Log) -> Playback:
 
 
 def _check_motion_of(robot: Manipulator, motion: Motion) -> Motion:
-    """Return a motion after a check that it fits the machine."""
+    """Return the motion; raise if the machine cannot do it."""
     check_motion(robot, motion)
     return motion

@@ -60,7 +60,7 @@ class WorkerPool(ProcessPoolExecutor):
         self._others = set(active_children())
 
     def submit(self, function: Any, /, *arguments: Any, **options: Any) -> Future[Any]:
-        """Submit a call to the processes; start another process if none is free."""
+        """Submit a call to the worker processes; return its future."""
         main = sys.modules["__main__"]
         with held_interrupts(), _environment(_ONE_THREAD):
             try:
@@ -73,15 +73,15 @@ class WorkerPool(ProcessPoolExecutor):
                 sys.modules["__main__"] = main
 
     def start(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
-        """Call a function in a worker, with the shared object as its first argument."""
+        """Call a function in a worker, with the pool's shared object first; return the future."""
         return self.submit(_call_with_shared, function, *arguments)
 
     def messages(
         self, function: Callable[[_Job, Callable[[Any], None]], Any], jobs: Sequence[_Job]
     ) -> Iterator[tuple[int, Any]]:
-        """Yield the messages and the result of each call, as (index of the job, message).
+        """Yield (job index, message) as workers send messages; a job's result is its last.
 
-        `function` takes a job and a callable that sends a message; its result comes last.
+        `function` is called with a job and a callable that sends a message.
         """
         pending = {self.submit(_call, function, k, job): k for k, job in enumerate(jobs)}
         while pending:
@@ -92,7 +92,7 @@ class WorkerPool(ProcessPoolExecutor):
                 yield pending.pop(future), result_of(future)
 
     def __exit__(self, kind: Any, *error: Any) -> bool | None:
-        """End the processes, at once where the work is broken off."""
+        """End the worker processes: at once after an exception, else when they are done."""
         if kind is not None:
             for process in set(active_children()) - self._others:
                 process.terminate()
@@ -100,7 +100,7 @@ class WorkerPool(ProcessPoolExecutor):
 
 
 def result_of(future: Future[Any]) -> Any:
-    """Return the result of a call when it is done, or raise its error.
+    """Wait for a call and return its result, or raise its error.
 
     Raises
     ------
@@ -157,20 +157,20 @@ def _exit_with_parent() -> None:
 
 
 def _call_with_shared(function: Callable[..., Any], *arguments: Any) -> Any:
-    """Return a function's result with the worker's shared object as its first argument."""
+    """Return the result of a function called with the worker's shared object first."""
     if isinstance(_shared, PteronError):
         raise _shared
     return function(_shared, *arguments)
 
 
 def _call(function: Callable[[Any, Callable[[Any], None]], Any], k: int, job: Any) -> Any:
-    """Return a function's result on a job, with a callback that sends messages of job `k`."""
+    """Return a function's result on job number k; it can send messages by a callback."""
     return function(job, lambda message: _queue.put((k, message)))
 
 
 @contextmanager
 def _environment(variables: Mapping[str, str]) -> Iterator[None]:
-    """Set environment variables for processes started in a block."""
+    """In this context, set environment variables, for processes that are started."""
     before = {name: os.environ.get(name) for name in variables}
     os.environ.update(variables)
     try:
@@ -185,11 +185,11 @@ def _environment(variables: Mapping[str, str]) -> Iterator[None]:
 
 @contextmanager
 def held_interrupts() -> Iterator[None]:
-    """Defer SIGINT in a block; processes started meanwhile ignore it for good.
+    """In this context, defer SIGINT (Ctrl-C); processes started here ignore it.
 
-    A process imports for seconds before it can be told to ignore it, and one that is broken off
-    while it is started complains. Python's tracker of resources unblocks signals as it starts: it
-    must run before, as it does once there is a pool of processes.
+    A new process imports for seconds before it can ignore SIGINT, and prints an error if it is
+    interrupted meanwhile. Python's resource tracker unblocks signals when it starts: it must have
+    started before, as it has once there is a pool of processes.
     """
     heard: list[int] = []
     usual = signal.getsignal(signal.SIGINT)

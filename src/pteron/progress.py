@@ -17,7 +17,7 @@ class Share(float):
     step: str
 
     def __new__(cls, share: float, step: str = "") -> Share:
-        """Return a share of work, with the name of its step."""
+        """Return a share of finished work, 0 to 1, with the name of the current step."""
         number = super().__new__(cls, min(max(share, 0.0), 1.0))
         number.step = step
         return number
@@ -47,17 +47,17 @@ class Steps:
         self._share = 0.0
 
     def report(self, step: str, share: float = 0.0) -> None:
-        """Report which share of a step is done."""
+        """Report that a share (0 to 1) of a step is finished."""
         start, end = self._ends[step]
         self._share = max(self._share, start + (end - start) * min(share, 1.0))
         if self._progress is not None:
             self._progress(Share(self._share, step))
 
     def end(self) -> None:
-        """Report that all is done."""
+        """Report that all steps are finished."""
         if self._progress is not None:
             self._progress(Share(1.0))
 
     def within(self, step: str) -> Progress:
-        """Return the callable of `progress` for a function that is a step of the work."""
+        """Return a progress callback for a function that does one step of the work."""
         return lambda share: self.report(step, share)

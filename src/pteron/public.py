@@ -29,7 +29,7 @@ class _Package(ModuleType):
             super().__setattr__(name, value)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle it by its name, as cloudpickle does with plain modules."""
+        """Return how to pickle the package module: by importing it by name."""
         return import_module, (self.__name__,)
 
 
@@ -39,12 +39,12 @@ def publish(
     checked: bool | Collection[str] = False,
     extras: Mapping[str, str] | None = None,
 ) -> None:
-    """List a package's public names, for completion and ``import *``.
+    """Define a package's public names, for completion and ``import *``.
 
-    These are the names that the file imports or defines, and those that its stub `__init__.pyi`
-    imports, which are imported at their first use. An import that hands a name on says so to
-    readers and type checkers alike: ``import size as size``. A name with an underscore is the
-    file's own.
+    Public are the names that the file imports or defines, and those that its stub `__init__.pyi`
+    imports, which are imported at their first use. Imports of names to be published have the form
+    ``import size as size``, which readers and type checkers understand. Names with an underscore
+    are private.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def publish(
     listed = names.setdefault("__all__", sorted({*listed, *places} - lacking))
 
     def public(name: str, value: Any) -> Any:
-        """Return a value under its public name; functions check their arguments if they are to."""
+        """Publish a value under a name and return it; functions get argument checks if asked."""
         if isinstance(value, FunctionType) and (checked is True or name in (checked or ())):
             from pteron.arguments import with_checked_arguments  # NumPy
 
@@ -97,7 +97,7 @@ def publish(
 
 
 def _places(names: Mapping[str, Any]) -> dict[str, tuple[str, str]]:
-    """Return module and original name of each name that a package's stub imports."""
+    """Return (module, original name) of each name that a package's stub imports."""
     stub = PurePath(names["__file__"]).with_suffix(".pyi")
     try:
         text = names["__loader__"].get_data(str(stub))

@@ -131,7 +131,7 @@ UNTIL = "0.4"
 
 
 def former_name(package: str, name: str) -> Any:
-    """Return the object of a package's former name, for the package's ``__getattr__``.
+    """Return the object that a package had under a former name, with a deprecation warning.
 
     A `DeprecationWarning` has the line to write instead; any other name is an AttributeError.
 
@@ -169,7 +169,7 @@ def former_name(package: str, name: str) -> Any:
 
 
 def warn_former(former: str, present: str, *, depth: int = 3) -> None:
-    """Warn that a former usage is deprecated, with the line to write; `depth` calls up."""
+    """Issue a deprecation warning that names what to write instead of a former name."""
     text = f"{former} goes with version {UNTIL}; write {present}"
     warnings.warn(text, DeprecationWarning, stacklevel=depth)
 
@@ -178,13 +178,13 @@ class FormerAttribute(property):
     """A property of a class and its objects: an attribute under its former name."""
 
     def __get__(self, own: Any, owner: Any = None) -> Any:
-        """Return the attribute of an object, or of the class."""
+        """Return the attribute of an object, or of its class, that was renamed."""
         assert self.fget is not None
         return self.fget(owner if own is None else own)
 
 
 def former_attribute(former: str, present: str) -> property:
-    """Return a property for a class's body: an attribute under its former name.
+    """Return a property that gives a renamed attribute under its former name, with a warning.
 
     Parameters
     ----------
@@ -207,7 +207,7 @@ def former_attribute(former: str, present: str) -> property:
 
 
 def adopt_former_methods(owner: type, **former: str) -> None:
-    """Adopt methods that a user's subclass defines under former names, with a warning.
+    """Adopt methods that a user's subclass still defines under former names, with a warning.
 
     Parameters
     ----------
@@ -232,7 +232,7 @@ class FormerTable:
         self._owner, self._frame, self._table = owner, frame, table
 
     def __call__(self) -> Any:
-        """Return the table."""
+        """Return the table, as the present method does."""
         return self._table()
 
     def _former(self) -> Any:

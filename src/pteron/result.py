@@ -32,7 +32,7 @@ class NamedColumns(Protocol):
 
     @property
     def column_names(self) -> dict[str, tuple[str, ...]]:
-        """Names of the columns of poses, joints and so on."""
+        """Names of table columns by quantity: "pose", "joints" and so on."""
 
 
 class Result:
@@ -52,25 +52,25 @@ class Result:
     one's table is this one's."""
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the result as plain data in SI units; a machine becomes its name."""
+        """Return the result's fields as plain data in SI units; a machine becomes its name."""
         return {name: _plain(part) for name, part in _shown_parts(self)}
 
     def summary(self) -> str:
-        """Return the result as lines of text."""
+        """Return the result's fields as lines of text."""
         parts = [(name.replace("_", " "), part) for name, part in _shown_parts(self)]
         return "\n".join(line for name, part in parts for line in _lines(name, part))
 
     def table(self) -> pl.DataFrame:
         """Return the result as a table whose columns functions accept instead of arrays.
 
-        Columns of poses and joints are called as `Manipulator.column_names` has them, SI units and
+        Columns of poses and joints have the names of `Manipulator.column_names`, SI units and
         radians; those of a result without a machine are numbered, see `table_for`.
         """
         proof = getattr(self, "proof", None)
         return self.table_for(getattr(self, "robot", None) or getattr(proof, "robot", None))
 
     def table_for(self, robot: NamedColumns | None) -> pl.DataFrame:
-        """Return the table with a machine's column names.
+        """Return the result as a table with the column names of a machine.
 
         Parameters
         ----------
@@ -96,20 +96,20 @@ class Result:
         return pl.DataFrame(columns).with_columns(pl.selectors.float().fill_nan(None))
 
     def _repr_html_(self) -> str:
-        """Return the result's table as HTML, for notebooks."""
+        """Return the result as an HTML table, for notebooks."""
         from pteron.html_table import html_table  # Jinja
 
         return html_table(*self._overview())
 
     def _overview(self) -> Overview:
-        """Return the table of the result for notebooks."""
+        """Return the result's table as an `Overview`, for notebooks."""
         from pteron.html_table import frame_overview
 
         title, _, about = repr(self)[1:-1].partition(": ")
         return frame_overview(title, about, self.table())
 
     def __repr__(self) -> str:
-        """Return the result in a line."""
+        """Return the result's class, machine and main values in one line."""
         robot = getattr(self, "robot", None)
         name = getattr(robot, "name", robot)
         title = f"<{type(self).__name__}" + (f" of {name!r}" if isinstance(name, str) else "")
@@ -122,7 +122,7 @@ class Result:
         return f"{line if len(line) < _LINE else f'{line[: _LINE - 3]}...'}>"
 
     def __eq__(self, other: object) -> bool:
-        """Return whether another result is of this class, and has equal fields."""
+        """Return whether another result has the same class and equal fields."""
         return _equal_fields(self, other) if type(self) is type(other) else NotImplemented
 
     def __hash__(self) -> int:
@@ -132,13 +132,13 @@ class Result:
 
 
 def _shown_parts(result: Result) -> Iterator[tuple[str, Any]]:
-    """Yield names and values of the attributes that a result shows."""
+    """Yield the names and values of the attributes that a result shows."""
     names = result.SHOWN.split() or [field.name for field in fields(result)]  # type: ignore[arg-type]
     return ((name, getattr(result, name)) for name in names)
 
 
 def _compared_fields(result: object) -> Iterator[tuple[str, Any]]:
-    """Yield name and value of each field that equality compares."""
+    """Yield the name and value of each field that equality compares."""
     for field in fields(result):  # type: ignore[arg-type]
         if field.compare:
             yield field.name, getattr(result, field.name)
@@ -150,7 +150,7 @@ def _equal_fields(first: object, second: object) -> bool:
 
 
 def _equal(first: Any, second: Any) -> bool:
-    """Return whether two parts of results are equal: NaN equals NaN, arrays element by element."""
+    """Return whether two field values are equal: NaN equals NaN, arrays by elements."""
     if isinstance(first, np.ndarray) or isinstance(second, np.ndarray):
         first, second = np.asarray(first), np.asarray(second)
         both_nan = (first != first) & (second != second) if first.shape == second.shape else False
@@ -169,7 +169,7 @@ def _equal(first: Any, second: Any) -> bool:
 
 
 def _hashable(part: Any) -> Any:
-    """Return a hashable key, equal for equal parts; of arrays shape and first number."""
+    """Return a hashable key of a field value; equal values have equal keys."""
     if isinstance(part, np.ndarray):
         return part.shape, _hashable(part.flat[0].item()) if part.size else None
     if isinstance(part, list | tuple):
@@ -186,7 +186,7 @@ def _hashable(part: Any) -> Any:
 
 
 def _plain(part: Any) -> Any:
-    """Return a part of a result as plain data: dictionaries, lists, numbers and texts."""
+    """Return a field value as plain data: dictionaries, lists, numbers and texts."""
     if hasattr(part, "as_dict"):
         return part.as_dict()
     if hasattr(part, "column_names"):  # a machine
@@ -205,7 +205,7 @@ def _plain(part: Any) -> Any:
 
 
 def _short(part: Any) -> str:
-    """Return a short text of a part of a result; empty if it has none."""
+    """Return a field value as short text; '' if it has none."""
     if isinstance(part, bool | np.bool_ | str | int | np.integer):
         return str(part)
     if isinstance(part, float | np.floating) or (isinstance(part, np.ndarray) and part.ndim == 0):
@@ -219,7 +219,7 @@ def _short(part: Any) -> str:
 
 
 def _lines(name: str, part: Any) -> list[str]:
-    """Return a summary's lines on a part of a result; empty if there is nothing to report."""
+    """Return the summary's lines on a field; [] if there is nothing to report."""
     if isinstance(part, Mapping):
         return [line for key, each in part.items() for line in _lines(f"{name}, {key}", each)]
     if isinstance(part, tuple) and part and all(isinstance(text, str) for text in part):
@@ -229,7 +229,7 @@ def _lines(name: str, part: Any) -> list[str]:
 
 
 def _row(result: Result, names: Mapping[str, Sequence[str]]) -> Iterator[tuple[str, Any]]:
-    """Yield a result's columns as a row: numbers, texts, and numbers of short arrays."""
+    """Yield (heading, value) cells of a result as one table row."""
     for name, part in _shown_parts(result):
         heading = _HEADINGS.get(name, name)
         if part is None or isinstance(part, bool | str | int | float):
@@ -249,7 +249,7 @@ def _row(result: Result, names: Mapping[str, Sequence[str]]) -> Iterator[tuple[s
 def _columns(
     name: str, part: NDArray[Any], axes: int, names: Mapping[str, Sequence[str]]
 ) -> dict[str, Any]:
-    """Return the columns of an array, with its last `axes` axes flattened."""
+    """Return table columns of an array by name, with its last `axes` axes flattened."""
     if axes == 0:
         return {_HEADINGS.get(name, name): part.ravel()}
     width = int(np.prod(part.shape[part.ndim - axes :]))
@@ -258,6 +258,6 @@ def _columns(
 
 
 def _headings(name: str, count: int, names: Mapping[str, Sequence[str]]) -> Sequence[str]:
-    """Return the headings of the columns of a field with several numbers."""
+    """Return `count` column headings for a field: the machine's names, or numbered ones."""
     named = names.get("pose" if name in _POSES else "joints" if name == "readings" else name, ())
     return named if len(named) == count else [f"{name}_{k}" for k in range(1, count + 1)]

@@ -39,7 +39,7 @@ Seed = Annotated[int, Between(0)] | None
 
 
 def seed_number(seed: Seed) -> int:
-    """Return a seed as a number, for None one that the system draws."""
+    """Return a seed as an integer; a random one for None."""
     return int(np.random.SeedSequence().generate_state(1)[0]) if seed is None else seed
 
 
@@ -53,7 +53,7 @@ class HasColumns(Protocol):
 
     @property
     def columns(self) -> Any:
-        """Names of the columns."""
+        """Names of the table's columns."""
 
 
 Columns = HasColumns | Mapping[str, Any]

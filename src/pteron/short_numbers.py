@@ -7,7 +7,7 @@ _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def power_of_ten(power: int) -> str:
-    """Return a power of ten.
+    """Return a power of ten as text: "10⁻¹²" for -12.
 
     Examples
     --------

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 
 def template(folder: str, name: str, **filters: Callable[..., Any]) -> jinja2.Template:
-    """Return a template of a folder inside the package, with filters of its own.
+    """Return the Jinja template `name` of a folder inside the package, with extra filters.
 
     A template may extend or include others of its folder.
     """

@@ -58,5 +58,5 @@ platform that is heavier."""
 
 
 def rounding_tolerance(length: float) -> float:
-    """Return the rounding of coordinates, m, of a machine whose unit rows have a length, m."""
+    """Return the rounding error of coordinates, m, in a machine of this characteristic length."""
     return min(ROUNDING_OF_FILES, SMALL_MACHINES * length)

@@ -79,7 +79,7 @@ _LONG_KEY = re.compile(rf"(?<![\w-])(?:[\w-]++[ \t]*+\.[ \t]*+){{{_PARTS}}}")
 
 
 def read_toml(path: str | Path, error: type[PteronError], absent: str) -> dict[str, Any]:
-    """Return the content of a TOML file.
+    """Return the content of a TOML file as a dictionary.
 
     `error` is the class of error to raise, `absent` its message if there is no such file.
 
@@ -92,7 +92,7 @@ def read_toml(path: str | Path, error: type[PteronError], absent: str) -> dict[s
 
 
 def toml_bytes(path: str | Path, error: type[PteronError], absent: str) -> tuple[bytes, str]:
-    """Return the bytes of a TOML file, up to its maximum size, and its name in messages.
+    """Return the bytes of a TOML file (up to a maximum size), and its name for messages.
 
     Raises
     ------
@@ -111,7 +111,7 @@ def toml_bytes(path: str | Path, error: type[PteronError], absent: str) -> tuple
 
 
 def expect_regular(path: Path) -> None:
-    """Refuse a FIFO or device, whose reading may never end, before opening it.
+    """Raise if a path is a FIFO or device, whose reading may never end.
 
     Raises
     ------
@@ -123,7 +123,7 @@ def expect_regular(path: Path) -> None:
 
 
 def language_of(text: str) -> str:
-    """Return the name of another language of robot descriptions or data, or "".
+    """Return which other language (URDF, JSON, YAML ...) a text is written in, or ''.
 
     Examples
     --------
@@ -141,7 +141,7 @@ def language_of(text: str) -> str:
 
 
 def _integers(node: Any) -> Iterator[int]:
-    """Yield the integers of a document."""
+    """Yield all integers in a nested document."""
     if isinstance(node, bool):
         return
     if isinstance(node, int):
@@ -152,7 +152,7 @@ def _integers(node: Any) -> Iterator[int]:
 
 
 def parsed_toml(content: bytes, source: str, error: type[PteronError]) -> dict[str, Any]:
-    """Return the content of a TOML text in UTF-8; messages call it `source`.
+    """Return the content of a TOML text as a dictionary; messages call it `source`.
 
     Raises
     ------
@@ -200,7 +200,7 @@ def parsed_toml(content: bytes, source: str, error: type[PteronError]) -> dict[s
 def to_model(
     model: type[_Model], document: dict[str, Any], source: str, error: type[PteronError]
 ) -> _Model:
-    """Return a document as an instance of a pydantic model or dataclass.
+    """Return a document validated as a pydantic model or dataclass; raise with all faults.
 
     Raises
     ------
@@ -216,7 +216,7 @@ def to_model(
 
 
 def joined_faults(lines: Sequence[str]) -> str:
-    """Return a file's faults as text for an error: a line each, `_MANY` at most."""
+    """Return a file's faults as text for an error, one line each, at most `_MANY`."""
     if len(lines) == 1:
         return lines[0]
     remainder = [f"and {len(lines) - _MANY} more"] if len(lines) > _MANY else []
@@ -224,7 +224,7 @@ def joined_faults(lines: Sequence[str]) -> str:
 
 
 def raise_faults(faults: Sequence[str]) -> None:
-    """Raise a single `ModelError` of all faults, if there are any."""
+    """Raise a `ModelError` that lists all faults, if there are any."""
     if faults:
         raise ModelError(joined_faults(faults), faults=faults)
 
@@ -232,9 +232,10 @@ def raise_faults(faults: Sequence[str]) -> None:
 def keep_checked(
     part: object, checks: Mapping[str, Callable[[Any, str], object]], faults: Iterable[str] = ()
 ) -> None:
-    """Replace fields of a frozen dataclass by the results of their checks.
+    """Replace a frozen dataclass's fields by their checked values; raise with all faults.
 
-    A check takes a field's value and name. `faults` are told with those that the checks find.
+    A check is called with a field's value and name. `faults` are reported with those that the
+    checks find.
 
     Raises
     ------
@@ -255,10 +256,10 @@ def fault_lines(
 ) -> list[str]:
     r"""Return a line for every pydantic fault: the key, the value, and what is expected.
 
-    `model` is the pydantic model or dataclass that refused a file's content. Aliases with a dot,
-    such as ``"time.unit"``, are understood as keys of tables. A key that is missing is not told
-    where an unknown one is nearest to it. `listed` takes the lists of valid keys that are told, so
-    that a file of several tables tells each list once.
+    `model` is the pydantic model or dataclass that rejected a file's content. Aliases with a dot,
+    such as ``"time.unit"``, are understood as keys of tables. A missing key is not reported if an
+    unknown key is most similar to it. `listed` collects the lists of valid keys in messages, so
+    that a file of several tables has each list once.
 
     Examples
     --------
@@ -294,12 +295,12 @@ def fault_lines(
 
 
 def table_keys(model: Any) -> tuple[str, ...]:
-    """Return the top-level keys of a model's file: an alias `time.unit` gives `time`."""
+    """Return the top-level keys of the files that a pydantic model describes."""
     return _keys(_schema(model), "")
 
 
 def _key(location: tuple[int | str, ...]) -> str:
-    """Return the location of a value as text: keys with dots, items by their numbers from 1."""
+    """Return a value's location in a document as text: "legs, item 2: mass"."""
     key, link = "", ""
     for part in location:
         if isinstance(part, int):
@@ -312,13 +313,13 @@ def _key(location: tuple[int | str, ...]) -> str:
 
 
 def _valid(location: tuple[int | str, ...], schema: _Node) -> tuple[str, tuple[str, ...]]:
-    """Return the prefix of aliases in an unknown key's table, and the table's valid keys."""
+    """Return the alias prefix of an unknown key's table, and the table's valid keys."""
     table, dot, _ = str(location[-1]).rpartition(".")
     return table + dot, _keys(_subschema(schema, location[:-1]), table + dot)
 
 
 def _nearest_key(location: tuple[int | str, ...], schema: _Node) -> tuple[int | str, ...]:
-    """Return the location of the valid key most similar to an unknown one; empty without."""
+    """Return the location of the valid key most similar to an unknown one; () if none is."""
     table, valid = _valid(location, schema)
     close = get_close_matches(str(location[-1]).removeprefix(table), valid, n=1)
     return (*location[:-1], table + close[0]) if close else ()
@@ -327,7 +328,7 @@ def _nearest_key(location: tuple[int | str, ...], schema: _Node) -> tuple[int | 
 def _fault(
     fault: Any, schema: _Node, location: tuple[int | str, ...], listed: set[tuple[str, ...]]
 ) -> str:
-    """Return the text of pydantic's fault at a location: the value, and what is expected.
+    """Return the message of a pydantic fault: the value, and what is expected.
 
     `listed` has the lists of valid keys that an earlier fault of the file named.
     """
@@ -373,13 +374,13 @@ def _fault(
 
 
 def _schema(model: Any) -> _Node:
-    """Return the JSON schema of a model, with all references resolved."""
+    """Return the JSON schema of a pydantic model, with all references resolved."""
     from pydantic import TypeAdapter
 
     schema = TypeAdapter(model).json_schema(by_alias=True)
 
     def resolve_reference(node: Any) -> Any:
-        """Return a schema's node with references resolved and choices of null dropped."""
+        """Return a JSON schema node with references resolved and null alternatives dropped."""
         if isinstance(node, list):
             return [resolve_reference(member) for member in node]
         if not isinstance(node, dict):
@@ -396,7 +397,7 @@ def _schema(model: Any) -> _Node:
 
 
 def _subschema(node: _Node, location: tuple[int | str, ...]) -> _Node:
-    """Return the schema at a location."""
+    """Return the part of a JSON schema that describes the value at a location."""
     for part in location:
         inner: Any
         if isinstance(part, int):
@@ -409,13 +410,13 @@ def _subschema(node: _Node, location: tuple[int | str, ...]) -> _Node:
 
 
 def _keys(node: _Node, table: str) -> tuple[str, ...]:
-    """Return the valid keys of a table; `table` is the prefix of aliases."""
+    """Return the valid keys of a table in a JSON schema, without their alias prefix `table`."""
     inner = (k.removeprefix(table) for k in node.get("properties", {}) if k.startswith(table))
     return tuple(dict.fromkeys(name.partition(".")[0] for name in inner))
 
 
 def _words(node: _Node) -> str:
-    """Return the description of a schema's values for messages; empty without one."""
+    """Return a phrase for the values that a JSON schema allows ("a list of 3 numbers"), or ''."""
     if node.get("type") != "array":
         return _WORDS.get(node.get("type", ""), "")
     several = node.get("prefixItems", [])

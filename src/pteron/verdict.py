@@ -39,7 +39,7 @@ class Verdict(Result):
     next_steps: tuple[str, ...] = ()
 
     def summary(self) -> str:
-        """Return the grade, the reasons and the advice, for people, as lines of text."""
+        """Return the grade, the reasons and the advice as lines of text."""
         return "\n".join([self.grade, *self.reasons, *self.next_steps])
 
 
@@ -52,15 +52,15 @@ class Opinion:
     steps: list[str] = field(default_factory=list)
 
     def lower(self, grade: Grade) -> None:
-        """Lower the grade to another one, if that is worse."""
+        """Lower the grade of the opinion to another one, if that is worse."""
         self.grade = max(self.grade, grade, key=get_args(Grade).index)
 
     def add(self, reason: str, step: str = "", *, grade: Grade = "trustworthy") -> None:
-        """Add a reason, with the grade that it allows at best and a step that would help."""
+        """Add a reason, the best grade that it allows, and advice, to the opinion."""
         self.lower(grade)
         self.reasons.append(reason)
         self.steps += [step] * bool(step)
 
     def verdict(self) -> Verdict:
-        """Return the verdict."""
+        """Return the grade, reasons and advice as a `Verdict`."""
         return Verdict(self.grade, tuple(self.reasons), tuple(dict.fromkeys(self.steps)))

@@ -21,12 +21,12 @@ TIME = ca.SX.sym("t")
 
 
 def rate_of(expression: Expression) -> Expression:
-    """Return the derivative of an expression with respect to `TIME`."""
+    """Return the derivative of an expression by the time symbol `TIME`."""
     return ca.jtimes(expression, TIME, ca.SX(1))
 
 
 def mismatched_names(pairs: Mapping[str, tuple[Expression, Expression]]) -> Iterator[str]:
-    """Yield the names of pairs whose two expressions differ at t = 0."""
+    """Yield the names of the pairs of expressions that differ at time 0."""
     for name, (actual, expected) in pairs.items():
         value_now, expected_now = _evaluate_at_zero(actual), _evaluate_at_zero(expected)
         size = max(
@@ -39,7 +39,7 @@ def mismatched_names(pairs: Mapping[str, tuple[Expression, Expression]]) -> Iter
 
 
 def _evaluate_at_zero(expression: Expression) -> NDArray[np.float64]:
-    """Return the elements of an expression at time 0, as a vector (n,) of floats."""
+    """Return an expression's elements at time 0 as floats (n,)."""
     return np.asarray(
         ca.DM(ca.evalf(ca.substitute(ca.densify(ca.SX(expression)), TIME, 0)))
     ).ravel()

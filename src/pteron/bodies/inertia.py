@@ -20,15 +20,18 @@ class Inertia(Protocol):
 
     @property
     def kinds(self) -> tuple[str, ...]:
-        """The kinds of its parameters, in order: some of `bodies.parameters.LENGTH_POWERS`."""
+        """The kinds of the body's inertial parameters, in order, such as "m", "mgx", "I"."""
 
     @property
     def values(self) -> tuple[float, ...]:
-        """Their values; kg, kg m and kg m^2."""
+        """The values of the body's inertial parameters, in the order of `kinds`.
+
+        The units are kg, kg m and kg m^2.
+        """
 
     @classmethod
     def of_values(cls, values: Sequence[float]) -> Self:
-        """Build the inertia from the values of its parameters.
+        """Build the inertia from its parameters' values, in the order of `kinds`.
 
         Raises
         ------
@@ -56,12 +59,12 @@ class PointMass:
 
     @classmethod
     def of_values(cls, values: Sequence[float]) -> PointMass:
-        """Build it from (m,)."""
+        """Build the point mass from its mass, kg, the only value."""
         return cls(*values)
 
     @property
     def values(self) -> tuple[float, ...]:
-        """(m,)."""
+        """The mass, kg, as the only value."""
         return (self.mass,)
 
 
@@ -92,14 +95,14 @@ class _TurningInertia:
 
     @classmethod
     def of_body(cls, mass: float, center_of_mass: Sequence[float], inertia: float) -> Self:
-        """Build the inertia from the centre of mass (m) instead of the first moment (kg m)."""
+        """Build the inertia from mass, kg, centre of mass, m, and moment of inertia, kg m^2."""
         mass = positive(mass, "mass", "kg")
         center = numbers(center_of_mass, "center_of_mass", len(cls.kinds) - 2)
         return cls(mass, tuple(mass * x for x in center), inertia)
 
     @classmethod
     def of_values(cls, values: Sequence[float]) -> Self:
-        """Build it from m, m gamma_x, ... and I, in the order of its kinds."""
+        """Build the inertia from m, m gamma_x, ... and I, in the order of `kinds`."""
         mass, *moment, inertia = values
         return cls(mass, tuple(moment), inertia)
 
@@ -110,7 +113,7 @@ class _TurningInertia:
 
     @property
     def values(self) -> tuple[float, ...]:
-        """m, m gamma_x, ... and I, in the order of its kinds."""
+        """The values m, m gamma_x, ... and I, in the order of `kinds`."""
         return (self.mass, *self.first_moment, self.inertia)  # Eq. (16), p_u, p_l or p_e
 
 
@@ -173,7 +176,7 @@ class PlanarInertia(_TurningInertia):
 
     @classmethod
     def shares_of_point(cls, x: Any, y: Any, z: Any) -> dict[str, Any]:
-        """Return the parameters, by kind, of a unit mass at a point of its frame."""
+        """Return the parameters, by kind, of 1 kg at the point (x, y, z) of the body's frame."""
         return dict(zip(cls.kinds, (1, x, y, x * x + y * y), strict=True))
 
 
@@ -239,9 +242,9 @@ class SpatialInertia:
 
     @classmethod
     def second_moments(cls, values: Mapping[str, Any]) -> list[list[Any]]:
-        """Return [[S, h], [h^T, m]] (4, 4), S being the integral of r r^T dm, of values by kind.
+        """Return [[S, h], [h^T, m]] (4, 4) of parameters by kind, S the integral of r r^T dm.
 
-        It is linear in the ten parameters, and positive semidefinite for a real body.
+        The matrix is linear in the ten parameters, and positive semidefinite for a real body.
         """
         x, y, z = values["Ixx"], values["Iyy"], values["Izz"]
         xy, xz, yz = -values["Ixy"], -values["Ixz"], -values["Iyz"]
@@ -258,7 +261,7 @@ class SpatialInertia:
     def of_body(
         cls, mass: float, center_of_mass: Sequence[float], inertia: Sequence[float]
     ) -> SpatialInertia:
-        """Build the inertia from the centre of mass (m) instead of the first moment (kg m)."""
+        """Build the inertia from mass, kg, centre of mass, m, and inertia tensor, kg m^2."""
         mass = positive(mass, "mass", "kg")
         x, y, z = numbers(center_of_mass, "center_of_mass", 3)
         xx, xy, xz, yy, yz, zz = numbers(inertia, "inertia", 6)
@@ -266,13 +269,13 @@ class SpatialInertia:
 
     @classmethod
     def shares_of_point(cls, x: Any, y: Any, z: Any) -> dict[str, Any]:
-        """Return the parameters, by kind, of a unit mass at a point of its frame."""
+        """Return the parameters, by kind, of 1 kg at the point (x, y, z) of the body's frame."""
         tensor = y * y + z * z, -x * y, -x * z, x * x + z * z, -y * z, x * x + y * y
         return dict(zip(cls.kinds, (1, x, y, z, *tensor), strict=True))
 
     @classmethod
     def of_values(cls, values: Sequence[float]) -> SpatialInertia:
-        """Build it from its ten parameters, in the order of its kinds."""
+        """Build the inertia from its ten parameters, in the order of `kinds`."""
         m, x, y, z, xx, xy, xz, yy, yz, zz = values
         return cls(m, (x, y, z), (xx, xy, xz, yy, yz, zz))
 
@@ -283,11 +286,11 @@ class SpatialInertia:
 
     @property
     def values(self) -> tuple[float, ...]:
-        """The ten parameters, in the order of its kinds."""
+        """The ten inertial parameters, in the order of `kinds`."""
         return (self.mass, *self.first_moment, *self.inertia)
 
     def turned(self, rotation: NDArray[np.float64]) -> SpatialInertia:
-        """Return the inertia in a rotated frame, in which a vector v of this one is R v."""
+        """Return the inertia in a rotated frame, in which a vector v becomes R v."""
         tensor = rotation @ self.tensor @ rotation.T
         x, y, z = (rotation @ self.first_moment).tolist()
         xx, xy, xz, yy, yz, zz = tensor[np.triu_indices(3)].tolist()
@@ -295,7 +298,7 @@ class SpatialInertia:
 
 
 def inertia_count(kinds: Sequence[str]) -> int:
-    """Return the number of a body's parameters that belong to its inertia tensor."""
+    """Return how many of these kinds of parameters belong to the inertia tensor."""
     return sum(kind.startswith("I") for kind in kinds)
 
 
@@ -305,10 +308,10 @@ def carried_values(
     center: Sequence[Any],
     inertia: Sequence[Any],
 ) -> list[Any]:
-    """Return the parameters, in the order of a platform's kinds, of a body that it carries.
+    """Return what a carried body adds to a platform's parameters, in the order of its kinds.
 
     `center` is the body's centre of mass in the platform's frame, m; `inertia` is about that
-    centre: of a planar kind I about the platform's axis, of a spatial one Ixx, Ixy, Ixz, Iyy, Iyz
+    centre: for a planar kind I about the platform's axis, for a spatial one Ixx, Ixy, Ixz, Iyy, Iyz
     and Izz. All may be expressions.
     """
     shares = kind.shares_of_point(*center).values()

@@ -25,7 +25,7 @@ class PointMotion(NamedTuple):
 
 
 def point_rows(rows: Expression) -> Expression:
-    """Return rows (k, 6) in (c', omega) from rows (k, 3) in c' alone."""
+    """Return derivatives (k, 6) by (c', omega), from those (k, 3) by the velocity c' alone."""
     return ca.horzcat(rows, ca.SX(rows.shape[0], 3))
 
 
@@ -48,7 +48,7 @@ class Turn(NamedTuple):
 
     @property
     def row(self) -> Expression:
-        """(1, 6): d rate / d (c', omega), the axes of all turns being perpendicular."""
+        """The derivative (1, 6) of the turn's rate by (c', omega)."""
         return ca.horzcat(ca.SX(1, 3), self.axis.T)
 
 
@@ -67,11 +67,11 @@ class RotationMotion(NamedTuple):
 
     @property
     def tilts(self) -> bool:
-        """Whether the platform turns about more axes than one."""
+        """Whether the platform turns about more than one axis."""
         return len(self.turns) > 1
 
     def center(self, point: PointMotion) -> Expression:
-        """Return the point about which the platform turns against the leg at a platform point."""
+        """Return the point (3, 1), m, about which the platform turns at a leg's platform point."""
         return point.position if self.hinge is None else self.hinge
 
 
@@ -109,20 +109,20 @@ class BodyMotion(NamedTuple):
 
     @property
     def turning_row(self) -> Expression:
-        """(3, 6): d (the body's angular velocity) / d (c', omega)."""
+        """The derivative (3, 6) of the body's angular velocity by (c', omega)."""
         if self.axes is None:
             return ca.SX(3, 6)
         return ca.mtimes(self.axes, self.rates_row)
 
     @property
     def kinds(self) -> tuple[str, ...]:
-        """The kinds of its parameters."""
+        """The kinds of the body's inertial parameters: of "m", "mgx", "mgy" and "I"."""
         owners = {"m": self.position, "mgx": self.x, "mgy": self.y, "I": self.x}
         return tuple(kind for kind, owner in owners.items() if owner is not None)
 
 
 def moments_of(kinds: tuple[str, ...], rows: list[Expression]) -> Moments:
-    """Return the parameters of a body from its rows, which are in the order of its kinds."""
+    """Return a body's mass moments from rows (1, K) of its parameters, in the order of `kinds`."""
     by_kind = dict(zip(kinds, rows, strict=True))
     zero = ca.SX(1, rows[0].shape[1])
     return Moments(*(by_kind.get(kind, zero) for kind in ("m", "mgx", "mgy", "I")))
@@ -131,10 +131,11 @@ def moments_of(kinds: tuple[str, ...], rows: list[Expression]) -> Moments:
 def needed_wrench(
     body: BodyMotion, inertia: Moments, gravity: Expression
 ) -> tuple[Expression, Expression]:
-    """Return the force and the moment, each (3, K), required at a body's reference point.
+    """Return force and moment, (3, K) each, required at a body's reference point.
 
-    With h = hx x + hy y: force m (a - g) + h'' and moment h x (a - g) + I x x x''. For a body in a
-    plane the last is I theta'' z. The paper's F is what acts on the body, minus this.
+    With h = hx x + hy y, the force is m (a - g) + h'' and the moment h x (a - g) + I x x x''; for a
+    planar body the last term is I theta'' z. The paper's F acts on the body and is the negative of
+    this.
     """
     a_g = body.acceleration - gravity
     force = ca.mtimes(a_g, inertia.m)
@@ -150,7 +151,7 @@ def needed_wrench(
 
 
 def wrench_matrix(body: BodyMotion, gravity: Expression) -> Expression:
-    """Return Om (6, k) of Eq. (15): the wrench on a body per unit of each of its k parameters."""
+    """Return Om (6, k) of Eq. (15): the wrench on a body per unit of each parameter."""
     unit = ca.SX.eye(len(body.kinds))
     inertia = moments_of(body.kinds, ca.vertsplit(unit))
     return -ca.vertcat(*needed_wrench(body, inertia, gravity))  # Eq. (15), Omega of one body

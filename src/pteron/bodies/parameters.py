@@ -42,7 +42,7 @@ _UNITS = ("kg", "kg m", "kg m^2")
 
 
 def unit_of(kind: str) -> str:
-    """Return the SI unit of a kind of parameter."""
+    """Return the SI unit of a kind of inertial parameter: "kg", "kg m" or "kg m^2"."""
     return _UNITS[LENGTH_POWERS[kind]]
 
 
@@ -74,29 +74,29 @@ class Parameter:
 
     @property
     def name(self) -> str:
-        """Its name: ``mgx_u1`` is m gamma_x of leg 1's upper link, ``m_l(2,4)`` is shared."""
+        """The parameter's name: ``mgx_u1`` is m gamma_x of leg 1's upper link."""
         return f"{self.kind}_{self.body}{self.suffix}"
 
     @property
     def owner(self) -> str:
-        """The name of its body: ``u1``, ``l(2,4)``, ``e``."""
+        """The name of the parameter's body: ``u1``, ``l(2,4)``, ``e``."""
         return f"{self.body}{self.suffix}"
 
     @property
     def suffix(self) -> str:
-        """The end of its name: the numbers of its legs."""
+        """The leg numbers at the end of the parameter's name: "1", "(2,4)" or ""."""
         if self.everyone or not self.legs:
             return ""
         return str(self.legs[0]) if len(self.legs) == 1 else f"({','.join(map(str, self.legs))})"
 
     @property
     def length_power(self) -> int:
-        """The power of length in its unit: 0, 1 or 2."""
+        """The power of length in the parameter's unit: 0, 1 or 2."""
         return LENGTH_POWERS[self.kind]
 
 
 def body_places(parameters: Iterable[Parameter]) -> dict[str, dict[str, int]]:
-    """Return the index of each parameter, by its body's name and its kind."""
+    """Return the index of each parameter, by its body's name and then its kind."""
     places: dict[str, dict[str, int]] = {}
     for k, parameter in enumerate(parameters):
         places.setdefault(parameter.owner, {})[parameter.kind] = k

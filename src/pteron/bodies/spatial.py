@@ -26,7 +26,7 @@ class SpatialMoments(NamedTuple):
     def with_points(
         self, points: Sequence[Expression], masses: Sequence[Expression]
     ) -> SpatialMoments:
-        """Return the parameters with masses (1, K) added at points (3, 1) of the body's frame."""
+        """Return the mass moments with point masses (1, K) added at `points` (3, 1)."""
         m, h, i = self
         for s, mass in zip(points, masses, strict=True):
             x, y, z = ca.vertsplit(s)
@@ -36,7 +36,7 @@ class SpatialMoments(NamedTuple):
 
 
 def spatial_moments(rows: Sequence[Expression]) -> SpatialMoments:
-    """Return the parameters of a body from its ten rows (1, K), in the order of its kinds."""
+    """Return a spatial body's mass moments from its ten parameter rows (1, K)."""
     return SpatialMoments(rows[0], ca.vertcat(*rows[1:4]), ca.vertcat(*rows[4:]))
 
 
@@ -56,7 +56,7 @@ class SpatialMotion(NamedTuple):
 def needed_twist_wrench(
     body: SpatialMotion, inertia: SpatialMoments, gravity: Expression
 ) -> tuple[Expression, Expression]:
-    """Return the force and the moment, each (3, K), required at a body's reference point.
+    """Return force and moment, (3, K) each, required at a spatial body's reference point.
 
     With h = R m gamma and I = R I_P R^T: m (a - g) + alpha x h + omega x (omega x h), and I alpha +
     omega x I omega + h x (a - g).
@@ -72,7 +72,7 @@ def needed_twist_wrench(
 
 
 def twist_mass_matrix(axes: Expression, inertia: SpatialMoments) -> Expression:
-    """Return the mass matrix (6, 6) in (v, omega), for one column of parameters."""
+    """Return the mass matrix (6, 6) of a spatial body in (v, omega)."""
     xx, xy, xz, yy, yz, zz = ca.vertsplit(inertia.i)
     tensor = ca.blockcat([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     h = ca.skew(ca.mtimes(axes, inertia.h))

@@ -19,7 +19,7 @@ Count = Annotated[int, Field(ge=1, strict=True)]
 
 
 def _only_x(entries: Any) -> Any:
-    """Return the entries after a check that a rod's centre of mass has x only."""
+    """Return a rod's centre-of-mass entries; raise unless they have x only."""
     if isinstance(entries, list) and len(entries) > 1:
         raise ValueError(f"{shorten(entries)} given, a list of 1 number expected: a rod has x only")
     return entries
@@ -32,7 +32,7 @@ Six = tuple[Number, Number, Number, Number, Number, Number]
 
 
 def key(about: str, default: Any = ..., *example: Any) -> Any:
-    """Return the field of a table's key, from its description, default and example."""
+    """Return the pydantic field of a table's key, from description, default and example."""
     return Field(default, description=about, examples=list(example) or None)
 
 
@@ -78,13 +78,13 @@ class _Body(TomlTable):
 
     @property
     def unit(self) -> Any:
-        """A body with mass and inertia 1, which replaces an invalid one."""
+        """A body with mass and inertia 1, to replace an invalid one in further checks."""
         kinds = self.kind.kinds
         ones = ("m", "I", "Ixx", "Iyy", "Izz")
         return self.kind.of_values([float(kind in ones) for kind in kinds])
 
     def inertia_of(self, key: str) -> Any:
-        """Build the inertia; `key` is the prefix of an error's key."""
+        """Build the inertia from the table; errors name keys with the prefix `key`."""
         try:
             if (self.center_of_mass is None) == (self.first_moment is None):
                 present = "neither" if self.first_moment is None else "both"
@@ -98,7 +98,7 @@ class _Body(TomlTable):
             raise ModelError(f"{key}.{error}" if key else str(error)) from None
 
     def _build_from_first_moment(self) -> Any:
-        """Return the inertia of a first moment; ModelError with advice if that is too large."""
+        """Build the inertia from the first moment; raise with advice if that is too large."""
         try:
             return self.kind(self.mass, self.first_moment, self.inertia)
         except ModelError as error:

@@ -44,7 +44,7 @@ def number(value: object, key: str) -> float:
 
 
 def positive(value: object, key: str, unit: str) -> float:
-    """Return `value` as a float above zero."""
+    """Return `value` as a float; raise an error that names its `key` unless it is above zero."""
     converted = number(value, key)
     if converted <= 0.0:
         raise ModelError(
@@ -54,7 +54,7 @@ def positive(value: object, key: str, unit: str) -> float:
 
 
 def not_negative(value: object, key: str, unit: str) -> float:
-    """Return `value` as a float of zero or more."""
+    """Return `value` as a float; raise an error that names its `key` if it is negative."""
     converted = number(value, key)
     if converted < 0.0:
         raise ModelError(f"{key}: {converted:g} {unit} is negative; give 0 or more")
@@ -62,7 +62,7 @@ def not_negative(value: object, key: str, unit: str) -> float:
 
 
 def numbers(values: Sequence[object], key: str, count: int) -> tuple[float, ...]:
-    """Return `values` as a tuple of `count` finite floats."""
+    """Return `values` as `count` finite floats; raise an error that names their `key`."""
     try:
         components = list(values)
     except TypeError:
@@ -73,7 +73,7 @@ def numbers(values: Sequence[object], key: str, count: int) -> tuple[float, ...]
 
 
 def interval(values: Sequence[object], key: str) -> tuple[float, float]:
-    """Return `values` as least and most, finite floats in this order."""
+    """Return `values` as (least, most) floats; raise an error unless least is below most."""
     low, high = numbers(values, key, 2)
     if low >= high:
         raise ModelError(f"{key}: {low:g} is not below {high:g}; give [least, most]")
@@ -81,7 +81,7 @@ def interval(values: Sequence[object], key: str) -> tuple[float, float]:
 
 
 def vector(values: Sequence[object], key: str) -> Vector:
-    """Return `values` as a vector of three finite floats."""
+    """Return `values` as a vector of three finite floats; raise an error that names its `key`."""
     x, y, z = numbers(values, key, 3)
     return (x, y, z)
 
@@ -89,8 +89,8 @@ def vector(values: Sequence[object], key: str) -> Vector:
 def unit_vector(values: Sequence[object], key: str) -> Vector:
     """Return `values` normalised; raise where the length differs from 1 by over `UNIT_TOLERANCE`.
 
-    A vector that is a unit vector to rounding is kept bit for bit, so that a file that is read and
-    written again does not drift.
+    A vector of unit length up to rounding is returned bit for bit, so that a file does not drift
+    when it is read and written repeatedly.
     """
     raw = vector(values, key)
     length = norm(raw)
@@ -107,7 +107,7 @@ def unit_vector(values: Sequence[object], key: str) -> Vector:
 
 
 def perpendicular(values: Sequence[object], axis: Vector, key: str, other: str) -> Vector:
-    """Return `values` normalised, after a check, and perpendicular to `axis` up to rounding.
+    """Return `values` as a unit vector perpendicular to `axis`; raise if they are far from it.
 
     Perpendicularity is checked before the length, so that the message can propose a vector that
     satisfies both.
@@ -138,27 +138,27 @@ def _perpendicular_part(v: Vector, axis: Vector) -> Vector:
 
 
 def dot(a: Vector, b: Vector) -> float:
-    """Return the scalar product."""
+    """Return the scalar product of two vectors."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 def cross(a: Sequence[Any], b: Sequence[Any]) -> tuple[Any, Any, Any]:
-    """Return the vector product."""
+    """Return the vector product of two vectors (3)."""
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
 def norm(a: Vector) -> float:
-    """Return the Euclidean length."""
+    """Return the Euclidean length of a vector."""
     return math.hypot(*a)
 
 
 def scale_vector(a: Vector, factor: float) -> Vector:
-    """Return `factor` times `a`."""
+    """Return a vector multiplied by `factor`."""
     return (factor * a[0], factor * a[1], factor * a[2])
 
 
 def shift_point(point: Vector, direction: Vector, way: float) -> Vector:
-    """Return a point shifted by `way`, m, along a direction."""
+    """Return a point shifted by `way`, m, along a unit vector."""
     return (
         point[0] + way * direction[0],
         point[1] + way * direction[1],
@@ -172,13 +172,13 @@ def parallel(a: Vector, b: Vector) -> bool:
 
 
 def vertical(d: Vector, gravity: Vector) -> bool:
-    """Return whether gravity has no component perpendicular to a unit vector."""
+    """Return whether a unit vector is vertical: gravity is along it, or zero."""
     size = norm(gravity)
     return size == 0.0 or parallel(d, scale_vector(gravity, 1.0 / size))
 
 
 def complement(axes: ArrayLike) -> NDArray[np.float64]:
-    """Return orthonormal rows (k, 3) that span the complement of vectors (n, 3)."""
+    """Return orthonormal rows (k, 3) perpendicular to all vectors (n, 3)."""
     matrix = np.asarray(axes, dtype=float).reshape(-1, 3)
     _, sizes, rows = np.linalg.svd(matrix) if len(matrix) else (None, np.zeros(0), np.eye(3))
     spanning: NDArray[np.float64] = rows[int((sizes > ROUNDING).sum()) :]
@@ -186,9 +186,10 @@ def complement(axes: ArrayLike) -> NDArray[np.float64]:
 
 
 def rotation_matrices(vectors: ArrayLike) -> NDArray[np.float64]:
-    """Return the matrices (..., 3, 3) of rotations about vectors (..., 3), by their lengths, rad.
+    """Return rotation matrices (..., 3, 3) of rotation vectors (..., 3), rad.
 
-    By the quaternions (x, y, z, w) and to the bits of SciPy's `Rotation`, which is slow to import.
+    They are computed by quaternions (x, y, z, w), equal to the bit to SciPy's `Rotation`, which is
+    slow to import.
     """
     x, y, z = np.moveaxis(np.asarray(vectors, dtype=float), -1, 0)
     angle = np.sqrt(x * x + y * y + z * z)

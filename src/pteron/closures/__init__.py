@@ -19,7 +19,7 @@ KINDS: tuple[type[Closure], ...] = (ConstantRows, ThreeLoci, TwoLoci, TurningLoc
 def kind_for(
     legs: Sequence[type[LegEquations]], platform: type[PlatformEquations]
 ) -> type[Closure] | None:
-    """Return the first kind of closure that fits these legs and platform; None if none fits."""
+    """Return the first closure class that fits these legs and platform; None if none fits."""
     return next((kind for kind in KINDS if kind.fits(legs, platform)), None)
 
 

@@ -38,17 +38,17 @@ class Closure(ABC):
     @classmethod
     @abstractmethod
     def fits(cls, legs: Sequence[type[LegEquations]], platform: type[PlatformEquations]) -> bool:
-        """Return whether this kind of closure fits machines with these legs and platform."""
+        """Return whether this class of closure fits machines with these legs and platform."""
 
     @property
     @abstractmethod
     def modes(self) -> int:
-        """The greatest number of poses of joint coordinates: the columns of `poses`."""
+        """The greatest number of poses with the same joint coordinates."""
 
     def forces(
         self, wrench: Expression, platform: PlatformMotion, legs: Sequence[LegMotion]
     ) -> Expression:
-        """Return F (n, K) with J^T F = wrench (m, K), along the platform's quasi-velocities.
+        """Return drive forces F (n, K) with J^T F = wrench (m, K) along the quasi-velocities.
 
         With J = B^-1 A, B being the divisors: F = B A^-T wrench.
         """
@@ -59,27 +59,27 @@ class Closure(ABC):
     def rates(
         self, joints: Expression, platform: PlatformMotion, legs: Sequence[LegMotion]
     ) -> Expression:
-        """Return x (m, K) with J x = joints (n, K)."""
+        """Return pose rates x (m, K) with J x = joints (n, K)."""
         right = ca.vertcat(*(leg.divisor * joints[i, :] for i, leg in enumerate(legs)))
         quasi, volume = solve(plain_rows(platform, legs), right)
         return platform.pose_rates(quasi / volume)
 
     @abstractmethod
     def poses(self, joints: Expression) -> Expression:
-        """Return every pose that joint coordinates allow, as columns (m, k); NaN if not real."""
+        """Return every pose with joint coordinates (n, 1), as columns (m, k); NaN if not real."""
 
     closed_form: bool = True
     """Whether `poses` is a closed form; if not, `kinematics.assembly` computes the poses."""
 
     def measure(self, platform: PlatformMotion, legs: Sequence[LegMotion]) -> Expression:
-        """Return the type-II measure: 1 in size at most, 0 where J is singular, without unit.
+        """Return the type-II measure, no unit: at most 1 in size, 0 where J is singular.
 
-        It is det A, J = B^-1 A, with each leg's force on its platform point, or moment on the
-        platform, made one of unit size in space, over Hadamard's bound of the determinant of so
-        many unit forces on these points. The size is 1 only where the forces are isotropic and
-        their moments balanced, which the points need not allow: a Quadrupteron with the platform
-        points of Table 1 reaches 27/32. So it is the same in any units and frame, for every kind
-        of leg; a force across a planar machine counts as the little that it does in the plane.
+        It is det A of J = B^-1 A, with each leg's force on its platform point, or moment on the
+        platform, scaled to unit size, divided by Hadamard's bound of the determinant of as many
+        unit forces on these points. Its size is 1 only if the forces are isotropic and their
+        moments balanced, which the points may not allow: a Quadrupteron with the platform points of
+        Table 1 reaches 27/32. So it does not depend on units, frame or kind of leg; a force across
+        a planar machine counts only with its component in the plane.
         """
         if any(leg.row.is_zero() for leg in legs):
             return ca.SX(0)  # a leg that moves nothing
@@ -92,11 +92,11 @@ class Closure(ABC):
         rows: Sequence[Expression],
         sizes: Sequence[Expression] | None = None,
     ) -> Expression:
-        """Return the type-II measure of the legs' rows (1, 6) against (c', omega).
+        """Return the type-II measure of Jacobian rows (1, 6) of the legs, no unit.
 
-        `sizes` are those of the legs' forces in space, or of their moments. Without them the rows
-        are those of the legs' loci: unit forces on spheres and circles, unit moments, and the
-        planes' normals as they are.
+        `sizes` are the norms of the legs' forces in space, or of their moments. Without them the
+        rows are those of the legs' loci: unit forces on spheres and circles, unit moments, and the
+        planes' normals unscaled.
         """
         lengths = self.platform.directions.shape[1]
         loci = [leg.locus(ca.SX(0)) for leg in self.legs]
@@ -113,19 +113,19 @@ class Closure(ABC):
     def measure_squares(
         self, platform: PlatformMotion, legs: Sequence[LegMotion]
     ) -> list[Expression]:
-        """Return equivalent expressions of the type-II measure's square.
+        """Return equivalent expressions of the squared type-II measure, to choose the cheapest.
 
-        Which of them is the cheapest depends on what else a program computes.
+        Which one is the cheapest depends on the other outputs of a program.
         """
         measure = self.measure(platform, legs)
         return [measure * measure]
 
     @property
     def _moment_bound(self) -> Expression:
-        """Return an upper bound of the norm of the moments (n,) of unit forces on the points, m.
+        """An upper bound, m, of the norm of the moments of unit forces on the platform points.
 
-        It is the root of the sum of squares of the platform points' distances from the axis along
-        k through their mean.
+        It is the root of the sum of the squared distances of the platform points from the axis
+        along k through their mean.
         """
         # From the first point, so that points that coincide do so to the last bit.
         first = self.platform.offsets[0].a
@@ -145,7 +145,7 @@ class Closure(ABC):
     """Whether each column of `poses` belongs to one assembly mode for all joint coordinates."""
 
     def vanishes(self) -> bool | None:
-        """Return whether J is singular at every pose of a numerical machine; None if unknown."""
+        """Return whether J is singular at every pose of this machine; None if unknown."""
         return None
 
     orientation: tuple[Expression, Expression] | None = None
@@ -154,15 +154,15 @@ class Closure(ABC):
 
 
 def nan_below_zero(radicand: Expression) -> Expression:
-    """Return the validity of a square root: NaN where the radicand is below zero, else 0."""
+    """Return NaN where the radicand is below zero, else 0."""
     return ca.if_else(radicand < 0, ca.SX.nan(), 0)
 
 
 def plain_rows(platform: PlatformMotion, legs: Sequence[LegMotion]) -> Expression:
-    """Return A (n, m), the rows of J in the platform's quasi-velocities, times their divisors."""
+    """Return A (n, m): J's rows in quasi-velocities, times their divisors."""
     return rows_in_quasi_velocities(platform, [leg.row for leg in legs])
 
 
 def rows_in_quasi_velocities(platform: PlatformMotion, rows: Sequence[Expression]) -> Expression:
-    """Return the legs' rows (1, 6) in (c', omega) as rows (n, m) in the quasi-velocities."""
+    """Return the legs' Jacobian rows (n, m) by quasi-velocities, from those by (c', omega)."""
     return ca.vertcat(*(ca.mtimes(*pair) for pair in zip(rows, platform.matrices, strict=True)))

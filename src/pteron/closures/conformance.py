@@ -19,7 +19,7 @@ from pteron.platforms import Platform
 def faults(
     legs: Sequence[LegKind], platform: Platform, pose: ArrayLike, seed: int = 0
 ) -> tuple[str, ...]:
-    """Return the faults of the closure of legs under a platform, a line each; () without.
+    """Return the faults of the closure of legs and platform, one line each; () if none.
 
     Parameters
     ----------

@@ -35,7 +35,7 @@ class ConstantRows(Closure):
 
     @classmethod
     def fits(cls, legs: Sequence[type[LegEquations]], platform: type[PlatformEquations]) -> bool:
-        """Return whether all rows are constant under a platform with z that does not tilt."""
+        """Return whether all legs have constant Jacobian rows and the platform moves along z."""
         constant = all(leg.row_is_constant for leg in legs)
         return (
             constant and issubclass(platform, Translating | Turning) and "z" in platform.coordinates
@@ -63,12 +63,12 @@ class ConstantRows(Closure):
     keeps_modes = True
 
     def vanishes(self) -> bool:
-        """Return whether all rows lie in a plane, or the layout has fourfold symmetry about k."""
+        """Return whether J is singular at every pose of this machine."""
         return self._vanishes
 
     @cached_property
     def _vanishes(self) -> bool:
-        """Whether det J vanishes at every pose, relative to its factors; of a numerical machine."""
+        """Whether J is singular at every pose of this machine, up to rounding."""
         sizes = np.linalg.svd(np.array(ca.evalf(self.rows)), compute_uv=False)
         if sizes[-1] <= _VANISHING * sizes[0] or self.orientation is None:
             return bool(sizes[-1] <= _VANISHING * sizes[0])
@@ -91,9 +91,10 @@ class ConstantRows(Closure):
         rows: Sequence[Expression],
         sizes: Sequence[Expression] | None = None,
     ) -> Expression:
-        """Return the type-II measure, with the sign of N . j, which the columns of `poses` have.
+        """Return the type-II measure of the legs' rows; 0 for a machine singular everywhere.
 
-        It is 0 for a machine that is singular everywhere, where N . j is rounding alone.
+        Its sign is that of N . j, as in the columns of `poses`. It is exactly 0 for a machine that
+        is singular everywhere, where N . j is mere rounding.
         """
         if self.rows.is_constant() and self.vanishes():
             return ca.SX(0)
@@ -102,7 +103,7 @@ class ConstantRows(Closure):
     def forces(
         self, wrench: Expression, platform: PlatformMotion, legs: Sequence[LegMotion]
     ) -> Expression:
-        """Return P f + lambda N, lambda from the moment that P f leaves unbalanced."""
+        """Return drive forces (n, K) with J^T F = wrench (m, K), from constant inverses."""
         force = wrench[:3, :]
         if self.orientation is None:
             return ca.mtimes(self.right_inverse, force)
@@ -112,14 +113,14 @@ class ConstantRows(Closure):
         return particular + ca.mtimes(self.null, unbalanced / ca.dot(self.null, column))
 
     def _column(self, platform: PlatformMotion) -> Expression:
-        """Return j, the Jacobian's fourth column."""
+        """Return the Jacobian's fourth column (n, 1), by the angle phi."""
         phi = platform.rotation.angle
         return self.cosines * ca.cos(phi) + self.sines * ca.sin(phi)
 
     def rates(
         self, joints: Expression, platform: PlatformMotion, legs: Sequence[LegMotion]
     ) -> Expression:
-        """Return x' (m, K) of joint rates (n, K), the angle's rate first, by the null vector N."""
+        """Return pose rates x' (m, K) for joint rates (n, K), from constant inverses."""
         if self.orientation is None:
             return ca.mtimes(self.right_inverse.T, joints)
         column = self._column(platform)
@@ -127,12 +128,12 @@ class ConstantRows(Closure):
         return ca.vertcat(ca.mtimes(self.right_inverse.T, joints - ca.mtimes(column, angle)), angle)
 
     def poses(self, joints: Expression) -> Expression:
-        """Solve the closures, which are linear in (p, cos phi, sin phi).
+        """Return every pose with joint coordinates (n, 1), as columns (m, 1 or 2); NaN if not real.
 
-        For 3T they give one pose. For 3T1R their left null vector leaves A' cos(phi) + B' sin(phi)
-        = C, with two angles, in which a platform point counts as it is at phi = 0, in base axes.
-        The first column has N . j > 0, the second N . j < 0, so that each column is one assembly
-        mode throughout. NaN where it is not real, C^2 > A'^2 + B'^2.
+        A 3T machine has one pose. For 3T1R the left null vector of the closure equations gives A'
+        cos(phi) + B' sin(phi) = C, with two angles, where platform points are taken at phi = 0, in
+        base axes. The first column has N . j > 0, the second N . j < 0, so that each column is one
+        assembly mode. Poses are NaN if C^2 > A'^2 + B'^2.
         """
         constants, sizes = [], []
         for leg, offset, q in zip(
@@ -168,7 +169,7 @@ class ConstantRows(Closure):
 
 
 def _sparse_inverse(rows: Expression) -> Expression:
-    """Return a P with D^T P = 1 whose forces act on three legs, those of the largest minor of D."""
+    """Return P (4, 3) with D^T P = 1 for D (4, 3), one row zero: forces act on three legs."""
     best = max(range(4), key=lambda i: abs(float(determinant(_delete_row(rows, i)))))
     three_rows = _delete_row(rows, best)
     inverse = ca.vertsplit(adjugate(three_rows).T / determinant(three_rows))

@@ -21,7 +21,7 @@ _Minors = dict[tuple[int, ...], Expression]
 
 
 def determinant(m: Expression) -> Expression:
-    """Return the determinant of a square matrix; of one with more rows the root of det(m^T m)."""
+    """Return a square matrix's determinant; with more rows than columns sqrt(det(m^T m))."""
     n, columns = m.shape
     if n > columns:  # Cauchy and Binet; accurate near 0, too
         return ca.norm_2(ca.vertcat(*_minors(m.T).values()))
@@ -32,9 +32,9 @@ def determinant(m: Expression) -> Expression:
 
 
 def solve(m: Expression, right: Expression) -> tuple[Expression, Expression]:
-    """Return x (m, K) and d with A x = d right, d = det A, for A (n, m).
+    """Return x (m, K) and d = det A with A x = d right, for A (n, m).
 
-    With n > m x is the solution of least squares, and d = 1.
+    If n > m, x is the least-squares solution, and d = 1.
     """
     if m.shape[0] > m.shape[1]:
         return _LQFactors.factorise(m).solve(right), ca.SX(1)
@@ -43,7 +43,7 @@ def solve(m: Expression, right: Expression) -> tuple[Expression, Expression]:
 
 
 def adjugate(m: Expression) -> Expression:
-    """Return the adjugate, det(m) m^-1, of a square matrix."""
+    """Return the adjugate, det(m) m^-1, of a square matrix, without division."""
     n = m.shape[0]
     if n == 2:
         return ca.vertcat(ca.horzcat(m[1, 1], -m[0, 1]), ca.horzcat(-m[1, 0], m[0, 0]))
@@ -59,9 +59,9 @@ def adjugate(m: Expression) -> Expression:
 
 
 def solve_transposed(rows: Expression, right: Expression) -> tuple[Expression, Expression]:
-    """Return x (n, K) and d with A^T x = d w, from the rows of A (n, m); of least norm for n > m.
+    """Return x (n, K) and d with A^T x = d right, from A (n, m); least norm if n > m.
 
-    d is det A, or 1 where the solution needs no determinant; x is not finite where A has rank < m.
+    d is det A, or 1 if the solution needs no determinant; x is not finite if A has a rank below m.
     """
     n, columns = rows.shape
     if n > columns or (n > 4 and right.shape[1] == 1):
@@ -79,7 +79,7 @@ def solve_transposed(rows: Expression, right: Expression) -> tuple[Expression, E
     upper, lower = _minors(vectors[:2, :]), _minors(vectors[2:, :])
 
     def volume(i: int, j: int, k: int, m: int) -> Expression:
-        """Return the determinant of four of the vectors."""
+        """Return the determinant of four of the vectors, chosen by their indices."""
         terms = ((i, j), (k, m), 1), ((i, k), (j, m), -1), ((i, m), (j, k), 1)
         return sum(s * (upper[a] * lower[b] + upper[b] * lower[a]) for a, b, s in terms)
 
@@ -89,12 +89,12 @@ def solve_transposed(rows: Expression, right: Expression) -> tuple[Expression, E
 
 
 def determinant_square(rows: Expression) -> Expression:
-    """Return det(A^T A) of the rows of A, at no cost beside `solve_transposed` by reflections."""
+    """Return det(A^T A) of A (n, m), from the factors that `solve_transposed` computes."""
     return reduce(mul, _LQFactors.factorise(rows).squares)
 
 
 def _minors(rows: Expression) -> _Minors:
-    """Return the minors of all rows: row by row, each from those of the rows above it."""
+    """Return the minors of all rows of a matrix, by the tuple of their columns."""
     minors: _Minors = {(i,): entry for i, entry in enumerate(ca.horzsplit(rows[0, :]))}
     for row in ca.vertsplit(rows)[1:]:
         last: _Minors = {(i,): entry for i, entry in enumerate(ca.horzsplit(row))}
@@ -105,7 +105,7 @@ def _minors(rows: Expression) -> _Minors:
 
 
 def _expanded(upper: _Minors, lower: _Minors, columns: Sequence[int]) -> Expression:
-    """Return a determinant of columns by Laplace's expansion in the minors of its rows' halves."""
+    """Return a determinant of these columns by Laplace's expansion in two sets of minors."""
     total = ca.SX(0)
     for subset in combinations(columns, len(next(iter(upper)))):
         complement = tuple(column for column in columns if column not in subset)
@@ -115,7 +115,7 @@ def _expanded(upper: _Minors, lower: _Minors, columns: Sequence[int]) -> Express
 
 
 def _cofactors(m: Expression, row: int, half: Sequence[int], minors: _Minors) -> Expression:
-    """Return the cofactors of a row (n, 1), from the minors of the half of rows it is not in."""
+    """Return the cofactors (n, 1) of a row, from minors of the half of rows without it."""
     n, others = m.shape[0], [k for k in half if k != row]
     own = _minors(m[others, :])
     # The other rows of its half go first.
@@ -145,7 +145,7 @@ class _LQFactors(NamedTuple):
 
     @classmethod
     def factorise(cls, rows: Expression) -> _LQFactors:
-        """Return the factors for the rows of A (n, m)."""
+        """Return the LQ factors of A (n, m) by Householder reflections."""
         n = rows.shape[0]
         lower, squares, mirrors, _ = factors = cls([], [], [], n)
         for k, row in enumerate(ca.horzsplit(rows)):
@@ -162,7 +162,7 @@ class _LQFactors(NamedTuple):
         return factors
 
     def solve_transposed(self, right: Expression) -> Expression:
-        """Return x (n, K) of least norm with A^T x = right: L Q x = right."""
+        """Return x (n, K) of least norm with A^T x = right (m, K), from the factors."""
         components: list[Expression] = []
         for row, residual in zip(self.lower, ca.vertsplit(right), strict=True):
             for component, coefficient in zip(components, row, strict=False):
@@ -172,7 +172,7 @@ class _LQFactors(NamedTuple):
         return reduce(_reflect, reversed(self.mirrors), ca.vertcat(*components, zeros))
 
     def solve(self, right: Expression) -> Expression:
-        """Return x (m, K) of least squares with A x = right (n, K): L^T x = Q right."""
+        """Return the least-squares x (m, K) with A x = right (n, K), from the factors."""
         rotated = ca.vertsplit(reduce(_reflect, self.mirrors, right))
         components: dict[int, Expression] = {}
         for k in reversed(range(len(self.lower))):
@@ -182,6 +182,6 @@ class _LQFactors(NamedTuple):
 
 
 def _reflect(x: Expression, mirror: tuple[Expression, Expression]) -> Expression:
-    """Return x (n, K) reflected by a Householder mirror, its vector and factor."""
+    """Return x (n, K) reflected by a Householder mirror (vector, factor)."""
     v, factor = mirror
     return x - ca.mtimes(v, ca.mtimes(v.T, x) * factor)

@@ -18,7 +18,7 @@ _ROUNDING = 1e-14
 
 
 def shift_locus(locus: Locus, offset: Expression) -> Locus:
-    """Return the locus of the platform's point P from that of P + offset."""
+    """Return the locus of P, given the locus of the point P + offset."""
     assert not isinstance(locus, AngleLocus)
     if isinstance(locus, PlaneLocus):
         return locus._replace(offset=locus.offset - ca.dot(locus.normal, offset))
@@ -28,10 +28,11 @@ def shift_locus(locus: Locus, offset: Expression) -> Locus:
 def meeting_points(
     loci: Sequence[Locus], platform: PlatformEquations
 ) -> tuple[Expression, Expression]:
-    """Return the points, as columns, in which as many loci meet as the platform has lengths.
+    """Return the points, as columns, in which loci meet, and the validity (0, else NaN).
 
-    Two points, mirrored in a plane or a line; planes alone meet in one. The second value is the
-    validity, 0, or NaN where the points are not real, as they then are themselves.
+    There are as many loci as the platform has lengths. There are two points, mirrored in a plane or
+    a line, or one if all loci are planes. If the points are not real, they are NaN, and so is the
+    validity.
     """
     if platform.directions.shape[1] == 2:
         return _meeting_in_plane(loci, platform)
@@ -39,7 +40,7 @@ def meeting_points(
 
 
 def _meeting_in_space(loci: Sequence[Locus]) -> tuple[Expression, Expression]:
-    """Return the common points (3, 1 or 2) of three planes and spheres, and their validity."""
+    """Return the common points (3, 1 or 2) of three planes or spheres, and their validity."""
     spheres = [locus for locus in loci if isinstance(locus, SphereLocus)]
     planes = [(locus.normal, locus.offset) for locus in loci if isinstance(locus, PlaneLocus)]
     if not spheres:
@@ -65,7 +66,7 @@ def _meeting_in_space(loci: Sequence[Locus]) -> tuple[Expression, Expression]:
 def _meeting_in_plane(
     loci: Sequence[Locus], platform: PlatformEquations
 ) -> tuple[Expression, Expression]:
-    """Return the common points (2, 2) of two circles and lines in the plane; the validity."""
+    """Return the common points (2, 2) of two circles or lines in a plane, and their validity."""
     circles, lines = [], []
     for locus in loci:
         assert not isinstance(locus, AngleLocus)
@@ -92,14 +93,14 @@ def _meeting_in_plane(
 def _mirrored_points(
     middle: Expression, step: Expression, validity: Expression
 ) -> tuple[Expression, Expression]:
-    """Return the points on both sides of a middle, as columns, NaN if invalid; the validity."""
+    """Return middle -+ step as columns, NaN if invalid, and the validity (0 or NaN)."""
     return ca.horzcat(*(middle + side * step + validity for side in (-1, 1))), validity
 
 
 def _half_chord(
     radius2: Expression, distance2: Expression, square: Expression
 ) -> tuple[Expression, Expression]:
-    """Return half a chord over the length of a vector of this square, and the validity (0, NaN)."""
+    """Return half a chord over sqrt(square), and the validity (0, NaN if there is no chord)."""
     # Where both points meet the radicand is all rounding: barely below zero counts as zero.
     square_difference = radius2 - distance2
     radicand = ca.fmax(

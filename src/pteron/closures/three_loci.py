@@ -25,11 +25,11 @@ class ThreeLoci(Closure):
 
     @classmethod
     def fits(cls, legs: Sequence[type[LegEquations]], platform: type[PlatformEquations]) -> bool:
-        """Return whether the platform only translates in space."""
+        """Return whether the platform translates in space and does not turn."""
         return platform.coordinates == ("x", "y", "z")
 
     def poses(self, joints: Expression) -> Expression:
-        """Return the points in which the three loci meet, as columns (3, k)."""
+        """Return every position with joint coordinates (3, 1), as columns (3, k)."""
         pairs = zip(self.legs, ca.vertsplit(joints), self.platform.offsets, strict=True)
         loci = [shift_locus(leg.locus(q), offset.a + offset.constant) for leg, q, offset in pairs]
         return meeting_points(loci, self.platform)[0]

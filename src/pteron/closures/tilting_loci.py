@@ -32,13 +32,13 @@ class TiltingLoci(Closure):
 
     @property
     def modes(self) -> int:
-        """The most poses of joint coordinates: 40 of six legs, 16 of a tripod, 8 where P stays."""
+        """The greatest number of poses of joint coordinates: 40 (six legs), 16 (tripod) or 8."""
         if len(self.legs) == 6:
             return 40
         return 16 if "z" in self.platform.coordinates else 8
 
     def poses(self, joints: Expression) -> Expression:
-        """Raise ModelError: there is no closed form."""
+        """Raise ModelError: these machines have no closed-form direct kinematics."""
         raise ModelError(
             "direct_kinematics: these legs have no closed form of it under a platform that tilts; "
             '"direct_step" follows the pose from one that is near'
@@ -50,12 +50,13 @@ class TiltingLoci(Closure):
         rows: Sequence[Expression],
         sizes: Sequence[Expression] | None = None,
     ) -> Expression:
-        """Return the type-II measure of the forces that the legs and the platform's planes exert.
+        """Return the type-II measure, no unit, of the legs' rows (1, 6) and the platform's planes.
 
-        It is the determinant of their rows in (v, omega) of P, or omega where P stays, each row a
-        unit force, over an upper bound of the determinant of as many unit forces on these points.
-        The moments' unit of length is the root of a third of the sum of squares of the points'
-        distances from their mean, or from P. `stewart` reaches 0.84 of the bound.
+        It is the determinant of their rows by the twist (v, omega) of P, or by omega if P is fixed,
+        each row a unit force, divided by an upper bound of the determinant of as many unit forces
+        on these points. The moments' unit of length is the root of a third of the sum of the
+        squared distances of the points from their mean, or from P. `stewart` reaches 0.84 of the
+        bound.
         """
         constraint_rows, size = (
             self.platform.plane_wrenches(platform),
@@ -70,7 +71,7 @@ class TiltingLoci(Closure):
     def measure_squares(
         self, platform: PlatformMotion, legs: Sequence[LegMotion]
     ) -> list[Expression]:
-        """Return the measure's square by the determinant, and by the LQ factors of `forces`."""
+        """Return equivalent expressions of the squared type-II measure, to choose the cheapest."""
         squares = super().measure_squares(platform, legs)
         if len(legs) == 6:
             bound = reduce(mul, (leg.wrench_size for leg in legs), self._bound(1))
@@ -80,7 +81,7 @@ class TiltingLoci(Closure):
     def _bound(self, forces: int) -> Expression:
         """Return an upper bound of the determinant of `forces` unit forces at each point.
 
-        It follows from Fischer's inequality and that of the arithmetic and geometric means.
+        It follows from Fischer's inequality and that of arithmetic and geometric means.
         """
         points, centred = self.platform.points, "z" not in self.platform.coordinates
         center = ca.SX(3, 1) if centred else sum(points) / len(points)

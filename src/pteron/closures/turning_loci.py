@@ -45,11 +45,11 @@ class TurningLoci(Closure):
 
     @property
     def modes(self) -> int:
-        """The degree of the polynomial that elimination leaves."""
+        """The greatest number of poses with the same joint coordinates."""
         return self._mode_count
 
     def poses(self, joints: Expression) -> Expression:
-        """Return the poses as columns (m, k), if a leg determines phi or all loci are planes."""
+        """Return every pose of joint coordinates as columns (m, k); closed-form layouts only."""
         loci = [leg.locus(q) for leg, q in zip(self.legs, ca.vertsplit(joints), strict=True)]
         offsets = self.platform.offsets
         for angle_locus in loci:

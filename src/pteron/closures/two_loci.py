@@ -23,11 +23,11 @@ class TwoLoci(Closure):
 
     @classmethod
     def fits(cls, legs: Sequence[type[LegEquations]], platform: type[PlatformEquations]) -> bool:
-        """Return whether the platform only translates in a plane."""
+        """Return whether the platform translates in a plane and does not turn."""
         return platform.coordinates == ("x", "y")
 
     def poses(self, joints: Expression) -> Expression:
-        """Return the points in which the two loci meet, as columns (2, 2)."""
+        """Return every position with joint coordinates (2, 1), as columns (2, 2)."""
         pairs = zip(self.legs, ca.vertsplit(joints), self.platform.offsets, strict=True)
         loci = [shift_locus(leg.locus(q), offset.a + offset.constant) for leg, q, offset in pairs]
         return meeting_points(loci, self.platform)[0]

@@ -52,7 +52,7 @@ class AdaptationScales:
 
     @cached_property
     def columns(self) -> Array:
-        """(B, n, K): forces at the joints per unit of every estimate."""
+        """Drive forces (B, n, K) per unit of every estimated parameter, at B states."""
         n = self.robot.joint_count
         rates = joint_rates(self.robot, *self.motion[:2]).actuated
         seconds = joint_accelerations(self.robot, *self.motion).actuated
@@ -62,10 +62,10 @@ class AdaptationScales:
 
     @cached_property
     def scales(self) -> Array:
-        """(K,): the size of every estimate, from the parameters in it, in its own unit.
+        """The magnitude (K,) of every estimated parameter, in its own unit.
 
-        First moments count as the mass times the body's radius of gyration, also where they are
-        zero; drives' estimates are at least `_DRIVES` of what their joint takes.
+        First moments count as the mass times the body's radius of gyration, even if they are zero;
+        the drives' parameters are at least `_DRIVES` of what their joint needs.
         """
         nominal, sizes = parameters(self.robot), np.abs(parameters(self.robot))
         for places in body_places(parameter_data(self.robot)).values():
@@ -85,13 +85,13 @@ class AdaptationScales:
     def adaptation_matrix(
         self, damping: Array, count: int, rate: float, most: float
     ) -> tuple[Array, float]:
-        """Return L (count, count), with which the first estimates learn at one rate, rad/s.
+        """Return the learning matrix L (count, count), and the usual size of eta in L eta.
 
-        An estimate's error x acts as Y x, the joints of damping K (n,) answer with K^-1 Y x, and
-        Gamma Y^T of that changes it. So Gamma = L L^T is `rate` times the inverse of the mean of
-        Y^T K^-1 Y; less where something would be learnt faster than at `most` somewhere in the
-        motion. The second result is the size of eta where the estimates are off by their
-        `scales`, theta - theta_0 = L eta, on average over signs.
+        An estimate's error x acts as the force Y x; the joints with damping K (n,) respond by K^-1
+        Y x, and the estimate changes by Gamma Y^T times that. So Gamma = L L^T is `rate` times the
+        inverse of the mean of Y^T K^-1 Y, reduced where a parameter would be learnt faster than
+        `most` somewhere in the motion. The second result is the norm of eta if the estimates are
+        wrong by their `scales`, theta - theta_0 = L eta, averaged over signs.
         """
         scales = self.scales[:count]
         effects = self.columns[..., :count] * (scales / np.sqrt(damping)[:, None])
@@ -111,19 +111,19 @@ class Moves(Protocol):
 
     @property
     def pose(self) -> Array:
-        """Poses."""
+        """Poses of the motion (T, m), m and rad."""
 
     @property
     def velocity(self) -> Array:
-        """Their rates."""
+        """Velocities of the motion (T, m), m/s and rad/s."""
 
     @property
     def acceleration(self) -> Array:
-        """Their accelerations."""
+        """Accelerations of the motion (T, m), m/s^2 and rad/s^2."""
 
 
 def scales_of(robot: Manipulator, motion: Moves | None) -> AdaptationScales:
-    """Return the excitation by a motion, or by the typical one."""
+    """Return states of a motion, or of a typical one, with the parameters to be estimated."""
     if motion is None:
         return typical_scales(robot)
     if np.shape(motion.pose)[-1:] != (robot.freedom,):
@@ -151,9 +151,10 @@ def scales_of(robot: Manipulator, motion: Moves | None) -> AdaptationScales:
 
 @lru_cache(maxsize=32)
 def typical_scales(robot: Manipulator) -> AdaptationScales:
-    """Return the excitation by a typical random motion, reproducible for a machine.
+    """Return states of a typical random motion with a machine's base parameters, reproducible.
 
-    It is random: the poses among many in which the legs are bent best, at 0.5 m/s and 5 m/s^2.
+    The poses are those of many random ones in which the legs are farthest from singular (type I),
+    moved at 0.5 m/s and 5 m/s^2 in random directions.
     """
     poses, rng, unit = light_poses(robot), np.random.default_rng(0), _units(robot)
     bent = numeric(robot, "reach")(poses)[1].min(axis=-1)

@@ -81,15 +81,15 @@ class Adaptive(Controller):
 
     @property
     def law_name(self) -> str:
-        """The name of its law."""
+        """The name of the control law: "adaptive_drives" with friction, else "adaptive"."""
         return "adaptive_drives" if self.friction else "adaptive"
 
     def base(self, model: Manipulator) -> BaseParameters:
-        """Return the base parameters that it estimates of a machine."""
+        """Return the base parameters of a machine that the controller estimates."""
         return typical_scales(model).base
 
     def gains(self, model: Manipulator) -> Array:
-        """Return its gains (G,) for a machine; see `Controller.gains`."""
+        """Return the controller's gain vector (G,) for a machine; see `Controller.gains`."""
         # As Euler's method sees it, so that the error's poles are those of the bandwidth.
         slope = -np.expm1(-self.bandwidths(model) * self.period) / self.period
         derivative = slope * joint_masses(model)

@@ -44,7 +44,7 @@ class ComputedTorque(Feedback):
 
     @property
     def law_name(self) -> str:
-        """The name of the law."""
+        """The name of the control law, "computed_torque"."""
         return "computed_torque"
 
     of_accelerations: ClassVar[bool] = True

@@ -32,7 +32,7 @@ class Controller(ABC):
     @property
     @abstractmethod
     def law_name(self) -> str:
-        """The name of its law, among `pteron.kernels.FUNCTIONS`."""
+        """The name of the control law, among `pteron.kernels.FUNCTIONS`."""
 
     what = former_attribute("what", "law_name")
 
@@ -52,7 +52,7 @@ class Controller(ABC):
     """The fields that are numbers above 0, one or one for each joint, or None."""
 
     def base(self, model: Manipulator) -> BaseParameters | None:
-        """Return the base parameters that it estimates of a machine; None where it does not."""
+        """Return the base parameters of a machine that the controller estimates; None if none."""
         return None
 
     def bandwidths(self, model: Manipulator) -> Array:
@@ -62,7 +62,7 @@ class Controller(ABC):
 
     @abstractmethod
     def gains(self, model: Manipulator) -> Array:
-        """Return its gains for a machine, as its law takes them.
+        """Return the controller's gain vector (G,) for a machine, as its law takes it.
 
         Parameters
         ----------
@@ -81,7 +81,7 @@ class Controller(ABC):
         """
 
     def law(self, model: RobotLike) -> Law:
-        """Return its law for a machine.
+        """Return the control law of this controller for a machine.
 
         Parameters
         ----------

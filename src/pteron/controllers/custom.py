@@ -101,11 +101,11 @@ class Custom:
 
     @property
     def law_name(self) -> str:
-        """The function's name."""
+        """The name of the user's CasADi function."""
         return str(self.function.name())
 
     def law(self, model: RobotLike) -> CustomLaw:
-        """Return its law for a machine.
+        """Return the control law of this controller for a machine, after checks of sizes.
 
         Raises
         ------
@@ -130,7 +130,7 @@ class Custom:
 
     @cached_property
     def _program(self) -> Program:
-        """The law as a program of columns, outputs sorted by name; DataError if C lacks a part."""
+        """The user's function as a program with inputs as columns and outputs sorted by name."""
         try:
             function = self.function.expand()
         except RuntimeError:
@@ -178,12 +178,12 @@ class CustomLaw:
 
     @property
     def program(self) -> Program:
-        """The law as a program, for `pteron.kernels.loops.Loop`."""
+        """The control law as a program, for `pteron.kernels.loops.Loop`."""
         return self.controller._program
 
     @property
     def numbers(self) -> dict[str, Array]:
-        """Its parameters, as `pteron.kernels.loops.Loop.run` takes them."""
+        """The law's parameters as arrays by name, for `pteron.kernels.loops.Loop.run`."""
         return {
             f"law_{port.name}": _port_numbers(self.controller.parameters[port.name], port)
             for port in self.program.inputs
@@ -191,7 +191,7 @@ class CustomLaw:
         }
 
     def memory(self, pose: Array, velocity: Array) -> Array:
-        """Return the initial memory (K,), before the first sample."""
+        """Return the controller's initial memory (K,) at a pose and velocity of the platform."""
         initial = self.controller.memory
         numbers = initial(pose, velocity) if callable(initial) else initial
         size = sum(port.size for port in self.program.inputs if port.name == _MEMORY[0])
@@ -199,7 +199,7 @@ class CustomLaw:
 
 
 def _port_numbers(array: ArrayLike, port: Port) -> Array:
-    """Return a port's numbers, (1, 1, size), by columns where they are a matrix, after a check."""
+    """Return an input's numbers as (1, 1, size), matrices by columns; raise if of wrong size."""
     column = as_array(array, port.name, ()).ravel("F")
     if column.size != port.size or not np.isfinite(column).all():
         raise DataError(

@@ -41,5 +41,5 @@ class FeedForwardPD(Feedback):
 
     @property
     def law_name(self) -> str:
-        """The name of its law."""
+        """The name of the control law, "feed_forward_pd"."""
         return "feed_forward_pd"

@@ -54,7 +54,7 @@ class Feedback(Controller):
             )
 
     def gains(self, model: Manipulator) -> Array:
-        """Return its gains (G,) for a machine; see `Controller.gains`."""
+        """Return the controller's gain vector (G,) for a machine; see `Controller.gains`."""
         if self.proportional is not None and self.derivative is not None:
             pair = [
                 joint_array(model, name, setting)

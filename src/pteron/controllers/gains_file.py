@@ -36,7 +36,7 @@ _IDENTITY = ("name", "layout", "topology", "geometry")
 def gains_text(
     robot: RobotLike, controller: Controller, margins: Mapping[str, float] | None = None
 ) -> str:
-    """Return a controller for a machine as TOML, for `read_gains`; margins are for the reader."""
+    """Return a controller for a machine as TOML text, with margins as comments."""
     import tomlkit  # slow to load
 
     robot = as_manipulator(robot)
@@ -80,10 +80,11 @@ def write_gains(robot: RobotLike, controller: Controller, path: str | Path) -> P
 
 
 def read_gains(robot: RobotLike, path: str | Path) -> Controller:
-    """Return the controller of a file that `pteron tune`, `write_gains` or a person wrote.
+    """Return the controller stored in a file of gains; raise if it is for another machine.
 
-    Its keys are `controller`, one of pd, feed-forward, computed-torque and adaptive, and what the
-    class takes: `period`, `bandwidth`, `damping`, `proportional`, `derivative`.
+    `pteron tune`, `write_gains` or a person may have written it. Its keys are `controller`, one of
+    pd, feed-forward, computed-torque and adaptive, and the fields of the controller's class:
+    `period`, `bandwidth`, `damping`, `proportional`, `derivative`.
 
     Parameters
     ----------
@@ -131,5 +132,5 @@ def read_gains(robot: RobotLike, path: str | Path) -> Controller:
 
 
 def _numbers(kind: type[Controller]) -> list[str]:
-    """Return the names of a controller's fields that a file holds: all but its motion."""
+    """Return the names of a controller class's fields that a file of gains holds."""
     return [field.name for field in fields(kind) if field.name != "motion"]

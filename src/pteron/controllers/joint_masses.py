@@ -26,11 +26,11 @@ _SHARE = 0.1
 
 
 def joint_masses(robot: RobotLike) -> Array:
-    """Return the effective mass that each joint's force moves while the other joints are free.
+    """Return the effective mass (n,) that each joint's force moves while other joints are free.
 
-    It is 1 / (J M^-1 J^T)_ii with the motors' inertia in M. If n joints have stiffness w^2 times
-    it, the squares of the natural frequencies have the mean w^2, so that none is above sqrt(n) w.
-    It depends on the pose: the value returned is exceeded at nine of ten random poses.
+    It is 1 / (J M^-1 J^T)_ii with the motors' inertia in M. If n joints have a stiffness of w^2
+    times it, the squared natural frequencies have the mean w^2, so that none is above sqrt(n) w. It
+    depends on the pose: at nine of ten random poses it is greater than the value returned.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def joint_masses(robot: RobotLike) -> Array:
 
 @lru_cache(maxsize=64)
 def _joint_masses(robot: Manipulator) -> Array:
-    """Return the effective masses (n,) over light poses, read-only and cached."""
+    """Return the effective mass at each joint (n,), kg or kg m^2, read-only and cached."""
     poses = light_poses(robot)
     rows = jacobian(robot, poses)
     masses = mass_with_rotors(rows, mass_matrix(robot, poses), drives_of(robot).inertia)
@@ -69,7 +69,7 @@ def _joint_masses(robot: Manipulator) -> Array:
 
 
 def light_poses(robot: Manipulator) -> Array:
-    """Return random poses, away from singularities where there are such."""
+    """Return random poses (K, m), away from singularities if possible."""
     for least in _LEAST:
         with suppress(ModelError):
             return random_poses(robot, _POSES, type_i=least, type_ii=least)

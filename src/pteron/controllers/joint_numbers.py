@@ -19,7 +19,7 @@ _SLOWEST = 0.1
 
 
 def positive_numbers(name: str, numbers: PerJoint | None) -> float | tuple[float, ...] | None:
-    """Return a number, or one for each joint, after a check that each is above zero."""
+    """Return positive numbers as they are, one or one for each joint; raise for others."""
     if numbers is None:
         return None
     several: object = numbers
@@ -55,7 +55,7 @@ def period_of(seconds: float) -> float:
 
 
 def joint_array(model: Manipulator, name: str, numbers: PerJoint) -> Array:
-    """Return a number for each joint (n,)."""
+    """Return `numbers` as one number for each joint (n,); a single one is repeated."""
     array = np.asarray(numbers, dtype=float)
     if array.ndim and array.shape != (model.joint_count,):
         raise DataError(

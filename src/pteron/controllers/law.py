@@ -51,7 +51,7 @@ class Law:
     base: BaseParameters | None = field(default=None, repr=False)
 
     def memory(self, pose: PoseLike, velocity: PoseLike) -> Array:
-        """Return the law's memory before the first sample, for a state of the machine.
+        """Return the control law's memory (..., K) before the first sample.
 
         Parameters
         ----------
@@ -84,7 +84,7 @@ class Law:
         joint_rates: JointsLike,
         memory: Array,
     ) -> tuple[PerJoint, Array]:
-        """Return the forces until the next sample, and the memory for it.
+        """Return drive forces (..., n) until the next sample, and the memory (..., K) for it.
 
         Parameters
         ----------
@@ -114,23 +114,23 @@ class Law:
 
     @cached_property
     def program(self) -> Program:
-        """The law as a program, for `pteron.kernels.loops.Loop`."""
+        """The control law as a program, for `pteron.kernels.loops.Loop`."""
         columns = None if self.base is None else columns_of(self.base)
         return program(self.model, self.what, columns, guarded=True)
 
     @property
     def numbers(self) -> dict[str, Array]:
-        """The gains and the model's numbers, as `pteron.kernels.loops.Loop.run` takes them."""
+        """The gains and model parameters as arrays by name, for `pteron.kernels.loops.Loop.run`."""
         model_numbers = machine_numbers(self.model, self.program, "law")
         return model_numbers | {"law_gains": self.gains.reshape(1, 1, -1)}
 
     @cached_property
     def _kernel(self) -> TieredKernel:
-        """The kernel of the control law for the model."""
+        """The compiled kernel of the control law."""
         return numeric(self.model, self.what, base=self.base)
 
     def estimates(self, memory: Array) -> Array:
-        """Return the estimates of an adaptive law: base parameters, then those of drives, if any.
+        """Return an adaptive law's estimated parameters (..., E) from its memory (..., K).
 
         Parameters
         ----------
@@ -158,7 +158,7 @@ class Law:
 
     @property
     def gain_names(self) -> tuple[str, ...]:
-        """Names of the gains: "proportional_1" for joint 1, and so on."""
+        """Names of the gain vector's elements: "proportional_1" for joint 1, and so on."""
         joints = range(1, self.model.joint_count + 1)
         estimates: tuple[str, ...] = () if self.base is None else self.base.names
         if self.what == "adaptive_drives":
@@ -177,13 +177,13 @@ class Law:
         return tuple(names)
 
     def _sizes(self, layout: Layout) -> dict[str, int]:
-        """Return the sizes of the parts of a law's gains or memory, by name."""
+        """Return the length of each named part of the law's gain or memory vector."""
         freedom = self.model.freedom
         inertial = 0 if self.base is None else self.base.selection.shape[1]
         return lengths(layout[self.what], freedom, estimate_count(self.what, freedom, inertial))
 
     def _parts(self, layout: Layout, vector: Array) -> dict[str, Array]:
-        """Return the parts of a vector of gains or memory (..., k), by name."""
+        """Return the named parts (..., k) of a gain or memory vector (..., K)."""
         sizes = self._sizes(layout)
         bounds = np.cumsum(list(sizes.values()))[:-1]
         return dict(zip(sizes, np.split(vector, bounds, axis=-1), strict=True))

@@ -44,5 +44,5 @@ class PDGravity(Feedback):
 
     @property
     def law_name(self) -> str:
-        """The name of its law."""
+        """The name of the control law, "pd_gravity"."""
         return "pd_gravity"

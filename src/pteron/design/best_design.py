@@ -33,7 +33,7 @@ _TRIED = 9
 
 
 def prove_best_design(evaluator: KindEvaluator, ratings: list[Rating]) -> Candidate:
-    """Return the best design of a search that can be proved, or why there is none."""
+    """Return the best rated design whose workspace is proved; else a candidate with the reasons."""
     objectives = evaluator.job.objectives
     first, second = shown_objectives(objectives)[:2]
     good = sorted(
@@ -60,7 +60,7 @@ def prove_best_design(evaluator: KindEvaluator, ratings: list[Rating]) -> Candid
 
 
 def _cell_violation(evaluator: KindEvaluator, rating: Rating) -> str:
-    """Return the bound of the cell that a design violates between samples, in words; else empty."""
+    """Return in words the size or keep-out limit that a design violates between samples, or ''."""
     robot = rating.machine
 
     def extents(poses: Array) -> Array:
@@ -73,7 +73,7 @@ def _cell_violation(evaluator: KindEvaluator, rating: Rating) -> str:
 
 
 def _exceeded_limit(evaluator: KindEvaluator, candidate: Candidate) -> str:
-    """Return the limit that a design exceeds between its sample poses, in words; else empty."""
+    """Return in words the error, load or clearance limit that a candidate exceeds, or ''."""
     job, figures = evaluator.job, candidate.figures
     bounds = {"error": job.accuracy, "deflection": job.stiffness}
     for name, limit in bounds.items():
@@ -89,7 +89,7 @@ def _exceeded_limit(evaluator: KindEvaluator, candidate: Candidate) -> str:
 
 
 def shown_objectives(objectives: Sequence[str]) -> list[str]:
-    """Return the objectives; a single objective with a second that decides between equals."""
+    """Return the names of the objectives; a single name is followed by that of a tie-breaker."""
     other = "moving_mass" if objectives[0] != "moving_mass" else "footprint"
     return list(objectives) if len(objectives) > 1 else [objectives[0], other]
 
@@ -101,7 +101,7 @@ def _candidate(
     counts: tuple[int, int],
     best: list[Rating],
 ) -> Candidate:
-    """Return a proved design with its worst figures and margins, refined between sample poses."""
+    """Return the candidate of a proved design: figures, margins, drives, sizes and proof text."""
     robot = rating.machine
     loaded_robot = evaluator.add_payload(robot)
     figures = dict(rating.figures)
@@ -110,7 +110,7 @@ def _candidate(
     figures |= margins.figures
 
     def least(values_of: Callable[[Array], ArrayLike]) -> float:
-        """Return the least value of a quantity over poses, refined between dense samples."""
+        """Return the minimum of `values_of(poses)` over the workspace, refined between samples."""
 
         def column(poses: Array) -> Array:
             """Return the quantity (K, 1) at poses (K, m) about the middle."""
@@ -160,7 +160,7 @@ def _clear_words(evaluator: KindEvaluator, robot: Manipulator, middle: Array) ->
 
 
 def _dimensions(robot: Manipulator) -> dict[str, float]:
-    """Return the radii and lengths of a machine, m."""
+    """Return the base and platform radii, link lengths and stroke of a machine by name, m."""
     axis, frame = np.array(robot.platform.axis), np.array(robot.platform.frame)
     flat = np.eye(3) - np.outer(axis, axis)
     guides = np.array([leg.guide_point for leg in robot.legs])
@@ -178,7 +178,7 @@ def _dimensions(robot: Manipulator) -> dict[str, float]:
 
 
 def _tolerances(evaluator: KindEvaluator, rating: Rating) -> Tolerances:
-    """Return the tolerances of a design with its drives."""
+    """Return the `Tolerances` of a design, with the errors and backlash of its gearboxes."""
     accuracy = evaluator.job.accuracy
     assert accuracy is not None  # who asks has some
     gears = np.array([(o.gearbox.ratio, o.gearbox.backlash) for o in rating.options])
@@ -188,7 +188,7 @@ def _tolerances(evaluator: KindEvaluator, rating: Rating) -> Tolerances:
 def _shortest_times(
     evaluator: KindEvaluator, robot: Manipulator, rating: Rating, place: tuple[Places, int] | None
 ) -> dict[str, float]:
-    """Return the shortest time of the cycle at its worst place with these drives, s."""
+    """Return {"shortest_time": s}: time-optimal duration of the cycle at `place`; {} if none."""
     if place is None:
         return {}
     cycle, k = place
@@ -211,7 +211,7 @@ class _ShiftedPath(Path):
 
     @property
     def length(self) -> float:
-        """The length of the path."""
+        """The length of the path, in units of its parameter."""
         return self._path.length
 
     @property

@@ -76,33 +76,33 @@ class Candidate(Result):
     middle: tuple[float, ...] = ()
 
     def __repr__(self) -> str:
-        """Return the candidate in a line."""
+        """Return the kind of machine and the count of feasible designs in one line."""
         return f"<Candidate of {self.kind!r}: {self.count_text}>"
 
     @property
     def count_text(self) -> str:
-        """How many designs meet all requirements."""
+        """Number of feasible and of evaluated designs, as text: "3 of 200 designs meet ..."."""
         return f"{self.kept} of {self.evaluated} designs meet all requirements"
 
     @property
     def verdict(self) -> str:
-        """How many designs are feasible, or the nearest design's violations, in a line."""
+        """The count of feasible designs as text; if none, the violations of the nearest one."""
         if not self.serves:
             return f"infeasible: the nearest design has {'; '.join(self.why)}"
         return self.count_text
 
     @property
     def least_margin(self) -> float:
-        """The least of the drives' margins."""
+        """The smallest drive margin: limit over load, the least of force, torque and speed."""
         return min(self.figures.get(f"{name}_margin", np.inf) for name in MARGINS)
 
     def summary(self) -> str:
-        """Return in a line how many designs are feasible, or the nearest design's violations."""
+        """Return a line of text: the kind of machine, then `verdict`."""
         return f"{self.kind}: {self.verdict}"
 
     @property
     def figure_texts(self) -> dict[str, str]:
-        """Rounded figures of a machine that serves, by the headings of a table."""
+        """Rounded figures of the machine as text, by table heading (mass, footprint, margin)."""
         row = {"drive margin": _ratio(self.least_margin)}
         for name, (heading, factor) in _FIGURES.items():
             if (figure := self.figures.get(name)) is not None and (name != "cycle_time" or figure):
@@ -113,12 +113,12 @@ class Candidate(Result):
 
     @property
     def drive_text(self) -> str:
-        """Motors and gearboxes in a line."""
+        """Numbers and names of the motors and gearboxes as text: "3 x motor + gearbox"."""
         return ", ".join(f"{count} x {name}" for name, count in Counter(self.drives).items())
 
     @property
     def dimension_text(self) -> str:
-        """The dimensions of the machine in a line, mm."""
+        """The machine's dimensions and the space that it needs as text, mm."""
         lengths = ", ".join(
             f"{name} {1e3 * length:.0f}" for name, length in self.dimensions.items()
         )
@@ -127,7 +127,7 @@ class Candidate(Result):
 
     @property
     def margin_text(self) -> str:
-        """The drives' margins and the place of the least, in a line."""
+        """The drives' margins as text, with the place in the workspace of the smallest."""
         names = {f"{name}_margin": word for name, word in MARGINS.items()}
         known = {word: self.figures[name] for name, word in names.items() if name in self.figures}
         ratios = ", ".join(f"{word} {_ratio(margin)}" for word, margin in known.items())
@@ -137,5 +137,5 @@ class Candidate(Result):
 
 
 def _ratio(margin: float) -> str:
-    """Return a margin with three significant digits."""
+    """Return a drive margin (limit over load) as text with three significant digits."""
     return f"{margin:.{2 if margin < 10.0 else 1 if margin < 100.0 else 0}f}"

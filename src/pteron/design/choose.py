@@ -68,15 +68,15 @@ class Choice(Result):
 
     @property
     def best(self) -> Candidate | None:
-        """The best kind by the first objective; None where none is feasible."""
+        """The best candidate of all kinds by the first objective; None if no kind is feasible."""
         return self.candidates[0] if self.candidates and self.candidates[0].serves else None
 
     def summary(self) -> str:
-        """Return the verdict on each kind, for people, as lines of text."""
+        """Return a text with a line for each kind of machine: feasible designs or violations."""
         return "\n".join(candidate.summary() for candidate in self.candidates)
 
     def table(self) -> pl.DataFrame:
-        """Return a table, a row for each kind: whether it serves, and its figures in SI units."""
+        """Return a table with a row for each kind: whether feasible, and figures in SI units."""
         import polars as pl
 
         rows = [{"kind": c.kind, "serves": c.serves, **c.figures} for c in self.candidates]
@@ -88,7 +88,7 @@ class Choice(Result):
         return frame_overview("Kinds of machines", best, self.table(), self.summary().splitlines())
 
     def robots(self) -> dict[str, str]:
-        """Return the machines' files by their names."""
+        """Return the machines' files as TOML text, by file name ("<kind>.toml")."""
         return {
             f"{candidate.kind}.toml": candidate.robot
             for candidate in self.candidates
@@ -96,7 +96,7 @@ class Choice(Result):
         }
 
     def assumption_lines(self) -> list[str]:
-        """Return the assumptions behind the choice, a line each."""
+        """Return the assumptions behind the choice as sentences, one for each list item."""
         motors, links = self.job.motors, self.job.links
         examples = [] if motors.list else ["The motors are the package's examples, not products."]
         stocks = ", ".join(dict.fromkeys([*links.upper, *links.lower]))
@@ -122,7 +122,7 @@ class Choice(Result):
     data = former_attribute("data", "as_dict")
 
     def as_dict(self) -> dict[str, Any]:
-        """Return everything as plain data, SI units."""
+        """Return objectives, candidates and job as a dictionary of plain data, SI units."""
         contents = {
             "objectives": list(self.job.objectives),
             "kinds": [candidate.as_dict() for candidate in self.candidates],
@@ -143,9 +143,9 @@ def choose_machine(
     """Search all kinds of machines for one that does a job, with its dimensions and drives.
 
     Each kind is a machine of the catalog whose size, proportions, links and place under the
-    workspace vary. A design must keep reach, floors and limits over the workspace, its room, and
-    have drives for all cycles at every place and in every direction; of what is left the best is
-    proved by intervals.
+    workspace vary. A feasible design keeps its reach, singularity thresholds and joint limits over
+    the workspace, fits in the permitted space, and has drives for all cycles at every place and in
+    every direction. The best feasible design is proved by interval arithmetic.
 
     Parameters
     ----------
@@ -205,7 +205,7 @@ def choose_machine(
 
 
 def evaluators_of(job: Job) -> dict[str, KindEvaluator]:
-    """Return the job for each kind that can do the motion."""
+    """Return an evaluator of the job for each kind of machine that can do the motion, by name."""
     space = job.workspace
     names = fitting_kinds(job.kinds, job.lengths, space.turn is not None, space.tilts)
     files = (
@@ -236,7 +236,7 @@ def evaluators_of(job: Job) -> dict[str, KindEvaluator]:
 
 
 def _has_drives(name: str, options: Mapping[str, Options], job: Job) -> bool:
-    """Return whether all joints of a kind have gearboxes; refuse a kind that the task names."""
+    """Return whether gearboxes exist for all joints of a kind; raise if the job names the kind."""
     units = {leg.joint.unit for leg in load(name).legs}
     lacking = [unit for unit in sorted(units) if not options[unit].all]
     if lacking and job.kinds is not None:
@@ -247,7 +247,7 @@ def _has_drives(name: str, options: Mapping[str, Options], job: Job) -> bool:
 
 
 def _candidate(evaluator: KindEvaluator, progress: Progress) -> Candidate:
-    """Return the best provable design of a kind, searched with a single BLAS thread."""
+    """Search a kind of machine with one BLAS thread; return its best provable design."""
     search = evaluator.job.search
     with one_thread():
         return prove_best_design(
@@ -258,7 +258,7 @@ def _candidate(evaluator: KindEvaluator, progress: Progress) -> Candidate:
 def _search_kinds(
     evaluators: Mapping[str, KindEvaluator], workers: int, tell: Callable[[str, float], None]
 ) -> Iterator[tuple[str, Candidate]]:
-    """Yield kinds and candidates in the order in which their searches end."""
+    """Search kinds in `workers` processes; yield (kind, candidate) as each search ends."""
     if workers < 2 or len(evaluators) < 2:
         for name, evaluator in evaluators.items():
             yield name, _candidate(evaluator, partial(tell, name))
@@ -290,7 +290,7 @@ class _CandidateStore:
         return str(name_of("kind", text, sources=_SOURCES))
 
     def find(self, name: str) -> Candidate | None:
-        """Return a kind that an earlier run has finished."""
+        """Return the stored candidate of a kind from an earlier run; None if absent or outdated."""
         if self._folder is None or not (file := self._folder / f"{name}.json").is_file():
             return None
         try:
@@ -303,7 +303,7 @@ class _CandidateStore:
             return None
 
     def keep(self, candidate: Candidate) -> None:
-        """Write the candidate of a kind whose search has ended to the folder."""
+        """Write the candidate of a searched kind to the store's folder as a JSON file."""
         if self._folder is not None:
             record = json_ready(candidate.as_dict() | {"digest": self._digest(candidate.kind)})
             self._folder.mkdir(parents=True, exist_ok=True)

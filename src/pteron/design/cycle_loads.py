@@ -28,8 +28,9 @@ _DECADES = 4.0
 def shortest_time(robot: Manipulator, motion: Motion) -> float:
     """Return the shortest duration, s, of a motion within the drives' limits, by uniform scaling.
 
-    At the rate u the forces are A + B u + C u^2 at each sample, and the first u at which one is at
-    its limit is exact. Stribeck's part of dry friction counts in full at every speed.
+    At a rate of u times the given speed the forces are A + B u + C u^2 at each sample; the first u
+    at which a force reaches its limit is computed exactly. The Stribeck force counts in full at
+    every speed.
 
     Raises
     ------
@@ -70,7 +71,7 @@ def _remove_stribeck(drive: Drive | None) -> Drive | None:
 
 
 def _first_root(square: Array, line: Array, constant: Array) -> Array:
-    """Return the least u > 0 with C u^2 + B u + A = 0, A <= 0; infinite where there is none."""
+    """Return the least u > 0 with square u^2 + line u + constant = 0; inf if none."""
     with np.errstate(invalid="ignore", divide="ignore"):
         root = np.sqrt(line**2 - 4.0 * square * constant)
         falls = (line < 0.0) & (square > 0.0)  # the form without cancellation
@@ -79,14 +80,14 @@ def _first_root(square: Array, line: Array, constant: Array) -> Array:
 
 
 def _best_fit(sizing: Sizing, leg: int, motor: Motor) -> MotorFit:
-    """Return a motor at the ratio where its margin is greatest: from 1 on it serves.
+    """Return the motor's fit at the gear ratio of its greatest margin (limit over load).
 
-    Each limit allows an interval of ratios, so that the least of their margins has one maximum.
+    Each limit allows an interval of ratios, so that the least margin has a single maximum.
     """
     span, fastest = serving_span(sizing, leg, motor, 1.0), float(sizing.peak_speeds[leg - 1])
 
     def fit_at_log(log_ratio: float) -> MotorFit:
-        """Return the fit of the motor at a ratio, rad/m or rad/rad, from the ratio's logarithm."""
+        """Return the motor's fit at the gear ratio exp(log_ratio), rad/m or rad/rad."""
         return fit_at(sizing, leg, motor, span, float(np.exp(log_ratio)))
 
     middle = np.log(motor.max_speed / fastest if fastest else 1.0)
@@ -100,9 +101,9 @@ def _best_fit(sizing: Sizing, leg: int, motor: Motor) -> MotorFit:
 
 
 def best_motors(sizing: Sizing, motors: Sequence[Motor], enough: float = inf) -> list[MotorFit]:
-    """Return the smallest motor of a list with a sufficient margin, for each joint.
+    """Return for each joint the smallest motor of the list with a margin of at least `enough`.
 
-    Where no margin reaches `enough`, it is the motor with the greatest margin.
+    Where no motor has the margin `enough`, it is the motor with the greatest margin.
     """
     best = []
     for leg in range(1, sizing.robot.joint_count + 1):

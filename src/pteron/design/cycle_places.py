@@ -74,7 +74,7 @@ class Places:
     samples: int = _IN_CYCLE
 
     def words(self, k: int) -> str:
-        """Return place k in words."""
+        """Return the cycle's name with place k, its shift in mm and turn in degrees, as text."""
         shift, count = self.shifts[k], len(self.robot.platform.lengths)
         at = ", ".join(f"{1e3 * x:+.0f}" for x in shift[:count])
         angles = zip(self.robot.coordinates[count:], np.degrees(shift[count:]), strict=True)
@@ -82,16 +82,16 @@ class Places:
         return f"{self.name} at ({at}) mm{tilts}, turned by {np.degrees(self.turns[k]):.0f} deg"
 
     def spread_places(self) -> Places:
-        """Return the cycle at the greatest number of places of a search, evenly chosen."""
+        """Return the cycle at `_PLACES` evenly chosen places, as many as a search evaluates."""
         indices = np.unique(np.linspace(0, len(self.turns) - 1, _PLACES).round().astype(int))
         return self.select_places(indices)
 
     def select_places(self, indices: Array) -> Places:
-        """Return the cycle at some of its places."""
+        """Return the cycle restricted to the places with these indices."""
         return replace(self, shifts=self.shifts[indices], turns=self.turns[indices])
 
     def both_ways(self) -> Places:
-        """Return the cycle, finer in time, at its places and, turned by pi, at opposite places."""
+        """Return these places with their mirror images (turned by pi) and more time samples."""
         fine = replace(self, samples=_IN_CYCLE_LAST)
         if not self.anywhere:
             return fine
@@ -102,16 +102,16 @@ class Places:
 
     @cached_property
     def states(self) -> Curve:
-        """Poses from the middle, velocities and accelerations (B, K, m), for a duration of 1 s.
+        """Poses about the middle, velocities, accelerations (B, K, m), for a duration of 1 s.
 
-        It goes from rest to rest by quintics, all of the same greatest acceleration.
+        The tool moves from rest to rest by quintics, all with the same greatest acceleration.
         """
         spans = np.sqrt(np.diff(self.path.rests)).tolist()
         timed = timed_path(self.path, spans, [polynomial("quintic")] * len(spans))
         return self.curves(*timed.curve(np.linspace(0.0, 1.0, self.samples)))
 
     def curves(self, *curve: Array) -> Curve:
-        """Return P's poses and two derivatives (B, K, m) for a curve of the tool, at each place."""
+        """Return poses of P and two derivatives (B, K, m) for a tool curve, at each of B places."""
         parts: list[Array] = []
         for part in curve:
             every = np.tile(part, (len(self.turns), 1, 1))
@@ -122,7 +122,7 @@ class Places:
 
 
 def cycles_of(job: Job, robot: Manipulator) -> list[Places]:
-    """Return the cycles of a job for machines of a kind.
+    """Return each cycle of a job with the places in the workspace where it fits.
 
     Raises
     ------
@@ -133,7 +133,7 @@ def cycles_of(job: Job, robot: Manipulator) -> list[Places]:
 
 
 def _cycle_places(job: Job, robot: Manipulator, cycle: ToolCycleTable, k: int) -> Places:
-    """Return a cycle with the shifts and turns at which it fits; raise where there are none."""
+    """Return a cycle with all shifts and turns at which it fits the workspace; raise if none."""
     name = cycle.name or f"cycle {k}"
     points = np.zeros((len(cycle.points), robot.freedom))
     rows = np.array(cycle.points)
@@ -161,10 +161,10 @@ def _cycle_places(job: Job, robot: Manipulator, cycle: ToolCycleTable, k: int) -
 
 
 def neighbour_places(job: Job, cycle: Places, chosen: Iterable[int], part: float) -> Places:
-    """Return a cycle at neighbours of some of its places, these places included.
+    """Return a cycle at the `chosen` places and at their neighbours in shift and turn.
 
-    A neighbour is turned by a part of the angle between directions, or shifted by that part of
-    half the workspace or of the range of turns.
+    A neighbour is turned by `part` of the angle between directions, or shifted by `part` of half
+    the workspace or of the range of turns.
     """
     half, count = job.workspace.half, len(cycle.robot.platform.lengths)
     poses = cycle.path.at(np.linspace(0.0, cycle.path.length, _IN_CYCLE))[0]
@@ -204,14 +204,14 @@ def _plane(turns: Array) -> Array:
 
 
 def _turn_path(path: Array, turn: float) -> Array:
-    """Return places (K, 3) turned about the vertical axis."""
+    """Return points (K, 3) turned by `turn` rad about the vertical axis."""
     return np.column_stack([path[:, :2] @ _plane(np.array([turn]))[0].T, path[:, 2]])
 
 
 def _fitting_shifts(
     job: Job, robot: Manipulator, poses: Array, anywhere: bool
 ) -> Iterator[tuple[Array, float]]:
-    """Yield shifts (m,) and turns of a path (K, m): its outermost places in the workspace."""
+    """Yield (shift (m,), turn in rad) of the outermost places at which a path (K, m) fits."""
     half, count = job.workspace.half, len(robot.platform.lengths)
     path = pad_to_xyz(poses[:, :count])
     directions = np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS if anywhere else [0.0]
@@ -235,9 +235,9 @@ def _fitting_shifts(
 
 
 def _angles(job: Job, robot: Manipulator, angles: Array) -> Iterator[Array]:
-    """Yield shifts (a,) of a cycle's angles: to the ends of the turn, to each tilt.
+    """Yield shifts (a,), rad, of a cycle's angles: to each end of the turn, to each tilt.
 
-    A cycle that tilts by itself keeps its tilts.
+    A cycle whose poses tilt keeps its own tilts.
     """
     tilted = np.zeros((1, angles.shape[1])) if angles[:, :-1].any() else tilts(job, robot)
     last, ends = angles[:, -1], {0.0}
@@ -248,9 +248,10 @@ def _angles(job: Job, robot: Manipulator, angles: Array) -> Iterator[Array]:
 
 
 def _share(job: Job, path: Array, shift: Array) -> float | None:
-    """Return the share of a shift by which a path (K, 3) fits the workspace; None if nothing.
+    """Return the largest share (0 to 1) of a shift at which a path (K, 3) fits; None if none.
 
-    Of a cylinder the corner of its box is outside: it goes as far towards it as can be.
+    The corners of the box around a cylinder lie outside it; the path is shifted towards them as far
+    as it fits.
     """
     space, half = job.workspace, job.workspace.half
     for share in _SHARES:

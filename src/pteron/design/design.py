@@ -61,7 +61,7 @@ class Design(Result):
     least: float = np.inf
 
     def __repr__(self) -> str:
-        """Return the design in a line, without quantities that are not computed yet."""
+        """Return the names of the task's machine and of the design in one line."""
         return f"<Design of {self.task.robot.name!r}: {self.robot.name}>"
 
     @property
@@ -71,11 +71,11 @@ class Design(Result):
 
     @cached_property
     def geometry(self) -> Array:
-        """Its numbers (G,), in the order of `equations.machine.numbers`."""
+        """The machine's geometric numbers (G,), in the order of `equations.machine.numbers`."""
         return np.array(numbers(self.robot))
 
     def values(self, what: str, poses: Array | None = None) -> Array:
-        """Return a kernel's first output at poses; by default at `self.poses`."""
+        """Return the kernel `what`'s first output at poses (N, m); by default `self.poses`."""
         function = self.task.function(what)
         numbers = {"geometry": self.geometry, "parameters": parameters(self.robot)}
         fixed = {name: part for name, part in numbers.items() if name in function.fixed}
@@ -84,20 +84,20 @@ class Design(Result):
 
     @cached_property
     def cube(self) -> Fit:
-        """The largest cube, or copy of a floating workspace, from a local search or a proof."""
+        """The largest cube (or floating workspace) of feasible poses, by search or proof."""
         if self.known is not None:
             return self.known
         return self.cube_without(np.empty((0, self.robot.freedom)))
 
     def cube_without(self, failing: Array) -> Fit:
-        """Return the largest cube that excludes the poses (F, m), which are infeasible."""
+        """Return the largest cube of feasible poses that excludes the infeasible poses (F, m)."""
         task, ball = self.task, search_ball(self.robot)
         shape, _ = task.shape
         return largest_fit(task.conditions, self.geometry, task.orientations, ball, failing, shape)
 
     @cached_property
     def workspace(self) -> WorkspaceTable | None:
-        """The required workspace; a floating one at its best place in this design."""
+        """The required workspace, None if none; one that floats has its best centre."""
         table = self.task.spec.workspace
         return table.with_center(self.cube.center) if table is not None and table.floats else table
 
@@ -108,7 +108,7 @@ class Design(Result):
 
     @cached_property
     def fine_poses(self) -> Array:
-        """Poses at half the spacing, for quantities with many local extremes."""
+        """Sample poses (N, m) at half the spacing, for quantities with many local extremes."""
         return self.lattice(2 * self._samples - 1)
 
     @property
@@ -117,7 +117,7 @@ class Design(Result):
         return _IN_CUBE if self.workspace is None else self.workspace.samples
 
     def lattice(self, count: int) -> Array:
-        """Return poses (N, m) of the workspace, or the cube, `count` along each side."""
+        """Return a grid of poses (N, m) in the workspace, or the cube, `count` along each side."""
         if self.workspace is not None:
             return workspace_poses(self.workspace, self.task.orientations, count)
         shape = cube(len(self.cube.center))
@@ -126,26 +126,26 @@ class Design(Result):
 
     @cached_property
     def joints(self) -> Array:
-        """Joint coordinates (N, n) over these poses, m or rad."""
+        """Joint coordinates (N, n) at `self.poses`, m or rad."""
         return self.values("joint_coordinates")
 
     @cached_property
     def loaded_robot(self) -> Manipulator:
-        """The machine with the payload."""
+        """The machine with the task's payload on its platform."""
         payload = self.task.spec.payload
         return self.robot if payload is None else payload.add_to(self.robot)
 
     def forces(self, poses: Array) -> Array:
-        """Return the greatest force of each drive (N, n) over all directions, N or N m."""
+        """Return the greatest drive forces (N, n) at poses over all directions, N or N m."""
         motion = self.task.spec.motion
         return worst_forces(self.loaded_robot, poses, motion.speed, motion.acceleration)
 
     def speeds(self, poses: Array) -> Array:
-        """Return the greatest speed of each joint (N, n) over all directions."""
+        """Return the greatest joint speeds (N, n) at poses over all directions, m/s or rad/s."""
         return worst_speeds(self.robot, poses, self.task.spec.motion.speed)
 
     def region(self, pose: Array) -> Region:
-        """Return the workspace, or the cube, at the orientation of a pose."""
+        """Return the region of the workspace, or of the cube, at the orientation of a pose (m,)."""
         if self.workspace is not None:
             return workspace_region(self.workspace, pose)
         half = 0.5 * self.cube.edge
@@ -154,10 +154,10 @@ class Design(Result):
     def worst(
         self, of: Callable[[Design, Array], Array], sign: float, *, fine: bool = False
     ) -> float:
-        """Return the greatest, or for the sign -1 the least, value of a function of poses (N, m).
+        """Return the maximum of `of(design, poses)` over the workspace; the minimum if sign = -1.
 
-        It is taken at the sampled poses, then nearer and nearer about the worst of them; NaN where
-        one of them has none.
+        The function is evaluated at the sampled poses, then at ever closer neighbours of the worst
+        of them; the result is NaN if it is NaN at a sampled pose.
         """
         poses = self.fine_poses if fine else self.poses
         signed = sign * of(self, poses)
@@ -187,7 +187,7 @@ class Design(Result):
 
     @cached_property
     def cycles(self) -> tuple[Motion, ...]:
-        """The motions of the cycles, about the workspace's middle if there is a workspace."""
+        """The motions of the task's cycles, placed about the middle of the workspace."""
         spec, middle = self.task.spec, self.task.orientations[0].copy()
         lengths = len(self.robot.platform.lengths)
         ends = None if self.workspace is None else np.array(self.workspace.ends)
@@ -201,9 +201,9 @@ class Design(Result):
 
     @cached_property
     def cycle_loads(self) -> Sizing:
-        """The loads on the drives over the cycles, one after the other, with the payload.
+        """The loads on the drives (a `Sizing`) over all cycles in sequence, with the payload.
 
-        Where one may be anywhere they are taken at all its places and turns in the workspace.
+        A cycle that may be done anywhere is evaluated at all its places and turns in the workspace.
         """
         cycles, pose = self.task.spec.cycles, self.task.orientations[0]
         anywhere = self.workspace is not None and any(cycle.anywhere for cycle in cycles)
@@ -216,7 +216,7 @@ class Design(Result):
 
     @cached_property
     def _sides(self) -> dict[float, float]:
-        """The least row of the conditions over the required workspace, by the measure's sign."""
+        """The least condition over the workspace (< 0: infeasible), by type-II sign."""
         rows_by_side = {}
         for side in self.task.conditions.sides:
             rows = self.task.conditions.rows(self.geometry, self.poses, side)
@@ -227,21 +227,22 @@ class Design(Result):
 
     @property
     def side(self) -> float:
-        """The sign of the type-II measure in the workspace."""
+        """The sign (1 or -1) of the type-II singularity measure in the workspace."""
         if self.workspace is None or self.task.floats:
             return self.cube.side
         return max(self._sides, key=self._sides.__getitem__)
 
     @property
     def scale(self) -> float:
-        """Largest factor by which the floating workspace can be scaled."""
+        """Largest factor by which the workspace that floats can be scaled in this design."""
         return self.cube.edge / self.task.shape[1]
 
     @property
     def margin(self) -> float:
-        """The least row of the conditions over the workspace; below 0 where one fails.
+        """The least condition over the workspace; below 0 where a pose is infeasible.
 
-        Of a workspace that floats and does not fit, how much of it is left out.
+        If a workspace that floats does not fit, it is the share of the workspace that does not fit,
+        negative.
         """
         if self.workspace is None:
             return self.cube.margin
@@ -258,15 +259,15 @@ class Design(Result):
     start_strokes = former_attribute("start_strokes", "reference_strokes")
 
     def quantity(self, name: str) -> float:
-        """Return a quantity; NaN where it is undefined, see `missing_reason`."""
+        """Return the value of the quantity `name`; NaN where undefined, see `missing_reason`."""
         return self._quantities(name)[0]
 
     def missing_reason(self, name: str) -> str:
-        """Return the reason why a quantity is undefined; empty where it is defined."""
+        """Return the reason why the quantity `name` is undefined; empty where it is defined."""
         return self._quantities(name)[1]
 
     def cover(self, name: str) -> str:
-        """Return the poses or proofs behind a quantity, in words."""
+        """Return in words the number of sample poses, or the proof, that the quantity rests on."""
         kind = self.task.quantities[name].cover
         times, places = 0, str(len(self.fine_poses if kind == "fine" else self.poses))
         if kind == "cycles":
@@ -279,22 +280,22 @@ class Design(Result):
 
     @property
     def is_reachable(self) -> bool:
-        """Whether all poses of the workspace, or the cube, are in reach."""
+        """Whether all sample poses of the workspace, or the cube, are in reach."""
         return bool(np.isfinite(self.joints).all())
 
     @cached_property
     def _known_quantities(self) -> dict[str, tuple[float, str]]:
-        """Quantities with the reason where they are missing, by name; filled lazily."""
+        """Values computed so far, by quantity name: (value, reason if undefined)."""
         return {}
 
     def _quantities(self, name: str) -> tuple[float, str]:
-        """Return a quantity and the reason where it is missing, computed at most once."""
+        """Return (value, reason if undefined) of the quantity `name`, computed at most once."""
         if name not in self._known_quantities:
             self._known_quantities[name] = self._evaluate_quantity(name)
         return self._known_quantities[name]
 
     def _evaluate_quantity(self, name: str) -> tuple[float, str]:
-        """Return a quantity and, where it is undefined, the reason."""
+        """Compute (value, reason if undefined) of the quantity `name`."""
         quantity = self.task.quantities[name]
         if quantity.of_machine is not None:
             return self._evaluate_machine(quantity.of_machine)
@@ -316,7 +317,7 @@ class Design(Result):
         return np.nan, where if out else "it has none at some sampled pose: a singularity"
 
     def _evaluate_machine(self, of_machine: Callable[[Manipulator], float]) -> tuple[float, str]:
-        """Return a function's value for the machine and ''; NaN and the reason on failure."""
+        """Return (`of_machine(robot)`, ''); (NaN, the reason) if it raises or is not finite."""
         try:
             amount = float(of_machine(self.robot))
         except PteronError as error:
@@ -325,12 +326,12 @@ class Design(Result):
 
     @cached_property
     def strokes(self) -> Array:
-        """The travel of each joint (n,) over these poses, m or rad."""
+        """The travel of each joint (n,) over `self.poses`, m or rad."""
         return np.asarray(np.ptp(self.joints, axis=0))
 
     @property
     def reference_strokes(self) -> Array:
-        """Reference travels (n,) of `stroke`: the limits' width, or the start design's travel."""
+        """Reference travels (n,), m or rad: the limits' width, else the initial machine's."""
         widths = np.ptp(joint_limits(self.task.robot), axis=0)
         endless = np.isinf(widths)
         return np.where(endless, _start(self.task).strokes, widths) if endless.any() else widths

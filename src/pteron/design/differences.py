@@ -77,7 +77,7 @@ class Change(Result):
 
 
 def geometry_changes(task: Task, robot: Manipulator) -> list[Change]:
-    """Return the changes of the geometry in a design; legs that change alike as one."""
+    """Return changes of geometric numbers from the task's machine to `robot`, equal legs joined."""
     legs_by_change: dict[tuple[str, float, float, str], list[int]] = {}
     for variable in task.variables:
         for place in variable.places:
@@ -95,7 +95,7 @@ def geometry_changes(task: Task, robot: Manipulator) -> list[Change]:
 
 
 def mass_changes(task: Task, robot: Manipulator) -> list[Change]:
-    """Return the changes of the bodies' masses; legs that change alike as one."""
+    """Return the changes of body masses from the task's machine to `robot`, equal legs joined."""
     legs_by_change: dict[tuple[str, float, float], list[int]] = {}
     for i, (leg, other) in enumerate(zip(task.robot.legs, robot.legs, strict=True), start=1):
         for (letter, body), new in zip(leg.bodies.items(), other.bodies.values(), strict=True):
@@ -111,7 +111,7 @@ def mass_changes(task: Task, robot: Manipulator) -> list[Change]:
 
 
 def quantity_changes(design: Design) -> list[Change]:
-    """Return the changes of objectives and required quantities from the start to a design."""
+    """Return the changes of objectives and required quantities from the initial machine on."""
     task = design.task
     return [
         Change(name, start_design(task).quantity(name), design.quantity(name), task.unit(name))
@@ -120,7 +120,7 @@ def quantity_changes(design: Design) -> list[Change]:
 
 
 def stroke_words(design: Design) -> list[str]:
-    """Return the range of its travel that each joint uses in the workspace, or in the cube."""
+    """Return a line of text for each joint: its travel in the workspace or cube, its limits."""
     low, high = design.joints.min(axis=0), design.joints.max(axis=0)
     lines = []
     for i, (leg, a, b) in enumerate(zip(design.robot.legs, low, high, strict=True), start=1):

@@ -60,7 +60,7 @@ class Gearbox:
 
 
 def read_gearboxes(path: str | Path) -> tuple[Gearbox, ...]:
-    """Return the gearboxes that a CSV file lists, a row each, its columns those of `Gearbox`.
+    """Return the gearboxes of a CSV file: a row each, columns named as fields of `Gearbox`.
 
     Raises
     ------
@@ -100,7 +100,7 @@ def read_gearboxes(path: str | Path) -> tuple[Gearbox, ...]:
 
 
 def prices(path: str | Path, count: int) -> list[float]:
-    """Return the prices of a list of motors, NaN where not stated."""
+    """Return the prices of the `count` motors of a file; NaN where not stated."""
     if Path(path).suffix.lower() == ".toml":
         listed = read_toml(path, DataError, "no such file")["motors"]
         return [_price(path, motor) for motor in listed]
@@ -149,7 +149,7 @@ class Option:
 
     @property
     def name(self) -> str:
-        """Its motor and its gearbox."""
+        """The names of the motor and the gearbox as text: "motor + gearbox"."""
         return f"{self.motor.name} + {self.gearbox.name}"
 
 
@@ -167,7 +167,7 @@ class Options:
         joint: str,
         friction: float,
     ) -> Options:
-        """Return all options by price or, if not all have a price, by rated power."""
+        """Return all motor-gearbox pairs for `joint`, sorted by price, or else by rated power."""
         options = [
             Option(motor, gearbox, price + gearbox.price, friction)
             for motor, price in motors
@@ -181,7 +181,7 @@ class Options:
 
     @cached_property
     def numbers(self) -> Array:
-        """Ratio, inertia, rated and peak torque, speed, backlash, stiffness and price (8, O)."""
+        """Ratio, inertia, rated and peak torque, speed, backlash, stiffness, price (8, O), SI."""
         rows = [
             (
                 option.gearbox.ratio,
@@ -229,7 +229,7 @@ class JointLoads:
     everywhere: Array
 
     def margins(self, options: Options, legs: Sequence[int]) -> Array:
-        """Return margins of rated torque, peak torque and speed of all options, (3, O)."""
+        """Return (3, O) margins (limit over load): rated torque, peak torque and speed."""
         ratio, inertia, rated, peak, speed, *_ = options.numbers
         chosen, i, j = list(legs), ratio[:, None], inertia[:, None]
         worst_squares = []
@@ -250,14 +250,14 @@ class JointLoads:
 
 
 def duty_cycle_mean(worst: Array, shares: Array) -> Array:
-    """Return worst values of cycles (C, ...) as the mean over a duty cycle, or the greatest."""
+    """Return cycles' worst loads (C, ...) averaged by shares (C,); the maximum without shares."""
     if len(shares):
         return np.tensordot(shares / shares.sum(), worst, axes=1)
     return np.asarray(worst.max(axis=0))
 
 
 def _outermost(x: Array, y: Array) -> tuple[Array, Array]:
-    """Return the points of a cloud whose sums a x + b y are largest in size, for all a, b > 0."""
+    """Return a cloud's points that are extreme in a direction of 65 sampled ones, (K,) each."""
     sizes = np.abs(x).max(initial=1e-12), np.abs(y).max(initial=1e-12)
     angles = np.linspace(0.0, np.pi, 65)
     way = np.outer(np.cos(angles), x / sizes[0]) + np.outer(np.sin(angles), y / sizes[1])

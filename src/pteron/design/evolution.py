@@ -12,19 +12,19 @@ from pteron.kernels import Array
 
 
 def _pymoo(module: str) -> Any:
-    """Import a module of pymoo; raise with the extra to install where it is missing."""
+    """Import `pymoo.<module>`; raise with the name of the extra to install where it is missing."""
     return import_extra("design", f"pymoo.{module}", "a search needs pymoo")
 
 
 def pareto_front(costs: Array) -> NDArray[np.int_]:
-    """Return the indices of the distinct rows (N, M) that no other dominates, sorted by costs."""
+    """Return the indices of the distinct non-dominated rows of costs (N, M), sorted by costs."""
     rows, first = np.unique(costs, axis=0, return_index=True)
     dominated = [((rows <= row).all(axis=1) & (rows < row).any(axis=1)).any() for row in rows]
     return np.asarray(first[~np.array(dominated, dtype=bool)])
 
 
 def latin_hypercube(rng: np.random.Generator, count: int, size: int) -> Array:
-    """Return points (count, size) of the unit cube, one in each of `count` strata a coordinate."""
+    """Return Latin hypercube points (count, size) in the unit cube."""
     strata = rng.permuted(np.tile(np.arange(count)[:, None], size), axis=0)
     return np.asarray((strata + rng.random(strata.shape)) / count)
 
@@ -52,7 +52,7 @@ class Evolution:
         self._asked: Any = None
 
     def ask(self) -> Array:
-        """Return the designs (P, V) of the next generation."""
+        """Return the designs (P, V) of the next generation, for evaluation."""
         self._asked = self._algorithm.ask()
         return np.array(self._asked.get("X"), dtype=float)
 

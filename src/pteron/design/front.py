@@ -49,22 +49,22 @@ class Front(Result):
 
     @property
     def table(self) -> FormerTable:
-        """Called, it returns the designs with units in the headings of the columns."""
+        """The table of designs; called, it returns the designs with units in the headings."""
         return FormerTable("Front", self.designs, self._headed_designs)
 
     def _headed_designs(self) -> pl.DataFrame:
-        """Return the designs with units in the headings of the columns."""
+        """Return the table of designs with units in the column headings."""
         return self.designs.select(list(self.headings)).rename(self.headings)
 
     def summary(self) -> str:
-        """Return the counts of designs, for people, in a line."""
+        """Return the counts of evaluated, feasible and Pareto-optimal designs in a line of text."""
         return (
             f"{self.task.robot.name}: {self.evaluated} designs evaluated, {self.kept} meet all "
             f"requirements, {len(self)} Pareto-optimal (no other is better in every objective)"
         )
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the front as plain data, SI units."""
+        """Return the counts, the objectives' names and the designs as plain data, SI units."""
         return {
             "evaluated": self.evaluated,
             "kept": self.kept,
@@ -78,37 +78,37 @@ class Front(Result):
         return frame_overview(title, about, self.table())
 
     def __repr__(self) -> str:
-        """Return the front in a line."""
+        """Return the machine's name and the counts of designs in one line."""
         return (
             f"<Front of {self.task.robot.name!r}: {len(self.designs)} designs of {self.evaluated} "
             "evaluated>"
         )
 
     def __len__(self) -> int:
-        """Return the number of its designs."""
+        """Return the number of designs on the front."""
         return len(self.designs)
 
     @cached_property
     def values(self) -> Array:
-        """The variables (K, V)."""
+        """The design variables (K, V) of the front's K designs."""
         return self.task.points(self.designs)
 
     @cached_property
     def objectives(self) -> Array:
-        """The objectives (K, M), in their units."""
+        """The objectives' values (K, M) of the front's K designs, in their units."""
         names = [o.quantity for o in self.task.spec.objectives]
         return np.asarray(self.designs.select(names).to_numpy())
 
     def robot(self, index: int) -> Manipulator:
-        """Return the machine of a design of the front."""
+        """Return the machine of the design in row `index` of the front."""
         return self.task.machine(self.values[index].tolist())
 
     @cached_property
     def selection(self) -> dict[str, int]:
-        """The designs of a report: the best in each objective, and the compromise.
+        """Row indices of the designs in a report: best in each objective, and the compromise.
 
-        The compromise is nearest to the best of all objectives at once, each measured by its range
-        over the front; of one objective there is none.
+        The compromise is the design nearest to the best value of all objectives at once, each
+        objective scaled by its range over the front; with one objective there is none.
         """
         costs, objectives = self.task.costs(self.designs), self.task.spec.objectives
         best = zip(objectives, costs.argmin(axis=0).tolist(), strict=True)
@@ -123,7 +123,7 @@ class Front(Result):
 
     @property
     def headings(self) -> dict[str, str]:
-        """Headings of the table's columns, with their units."""
+        """Headings of the table of designs, by column name: the name with its unit."""
         headings = {}
         for v in self.task.variables:
             headings[v.name] = f"{v.name} ({v.unit})" if v.unit else v.name
@@ -144,7 +144,7 @@ class ProvedRows:
         self._rows: dict[bytes, tuple[Any, ...]] = {}
 
     def replace_rows(self, designs: pl.DataFrame) -> pl.DataFrame:
-        """Return a table of designs, with the rows of those that were proved."""
+        """Return the table of designs in which proved designs have the values of their proofs."""
         keys = self._keys(designs)
         if self._rows.keys().isdisjoint(keys):
             return designs
@@ -152,9 +152,10 @@ class ProvedRows:
         return type(designs)(rows, schema=designs.schema, orient="row")
 
     def front(self, parts: Callable[[], Iterable[pl.DataFrame]]) -> Front:
-        """Return the front of designs in parts, after proving every design on it.
+        """Return the Pareto front of designs that come in tables, after proving every design on it.
 
-        Where a proof takes something from one, the front is another, and that is proved.
+        A proof can reduce the values of a design, which changes the front; the new front is then
+        proved too.
         """
         while True:
             front = front_of_parts(self._task, map(self.replace_rows, parts()))
@@ -172,7 +173,7 @@ class ProvedRows:
 
 
 def front_of_parts(task: Task, parts: Iterable[pl.DataFrame]) -> Front:
-    """Return the front of designs that come in parts; only the current front stays in memory."""
+    """Return the Pareto front of designs that come in tables; only the front stays in memory."""
     import polars as pl
 
     best: pl.DataFrame | None = None
@@ -196,13 +197,16 @@ def front_of_parts(task: Task, parts: Iterable[pl.DataFrame]) -> Front:
 
 
 def _misses_of(task: Task, designs: pl.DataFrame) -> Array:
-    """Return the sum of each design's violations (N,); an undefined objective adds to it."""
+    """Return by how much each design violates the task's requirements, summed, (N,).
+
+    Each undefined objective adds the constant `FAILED`.
+    """
     missed = violations(designs).sum(axis=1)
     return np.asarray(missed + FAILED * (~np.isfinite(task.costs(designs))).sum(axis=1))
 
 
 def _impossible(task: Task, nearest: pl.DataFrame, evaluated: int) -> ModelError:
-    """Return the error of a search without a feasible design; it has the nearest's violations."""
+    """Return the error for a search without feasible design: what the nearest design violates."""
     row = nearest.row(0, named=True)
     design = Design(task, task.machine([row[v.name] for v in task.variables]))
     reasons = []
@@ -230,14 +234,14 @@ def _impossible(task: Task, nearest: pl.DataFrame, evaluated: int) -> ModelError
 
 
 def _value(design: Design, name: str, row: dict[str, Any]) -> str:
-    """Return the value of a quantity in words, or why there is none."""
+    """Return the value of a design's quantity as text, or the reason why it is undefined."""
     if np.isfinite(row[name]):
         return f"with {row[name]:.4g} {design.task.unit(name)}".rstrip()
     return f"for there is none: {design.missing_reason(name)}"
 
 
 def _worst_condition(design: Design) -> str:
-    """Return the condition that a machine violates most in the workspace, and its pose."""
+    """Return as text the most violated condition of a design in the workspace, and its pose."""
     task = design.task
     if task.spec.workspace is None or task.floats:
         center = design.cube.center

@@ -30,12 +30,12 @@ _FIRST = 5
 
 
 def improve_design(task: Task, point: Sequence[float], objective: int) -> list[float]:
-    """Return a design with a better objective, or the same where none is found.
+    """Return variables (V,) of a design with a better objective; `point` itself if none is found.
 
-    The unknowns are the variables together with the cube's centre and edge. Quantities of the
-    machine alone are held to first order, those of its poses are not: the caller evaluates the
-    design again. Where a proof of the workspace or the cube fails, the design is sought once more,
-    with the counterexample among its conditions.
+    The unknowns are the variables, and the cube's centre and edge. Requirements on quantities of
+    the machine alone are linearised; quantities that depend on poses are not constrained, so the
+    caller evaluates the design again. If the proof of the workspace or the cube fails, the search
+    is repeated with the counterexample among its conditions.
     """
     spec, start = task.spec, np.array(point)
     target = spec.objectives[objective]
@@ -82,7 +82,7 @@ def improve_design(task: Task, point: Sequence[float], objective: int) -> list[f
 
 
 def _condition_samples(design: Design, lengths: int, count: int) -> Samples:
-    """Return sample poses at which the conditions hold: of the workspace, the cube, or both."""
+    """Return sample poses at which conditions are imposed: in the workspace, the cube, or both."""
     task = design.task
     moving = shape_samples(task.shape[0], task.orientations, count)
     if task.spec.workspace is None or task.floats:
@@ -100,7 +100,10 @@ class _Slopes:
     start: Array
 
     def slopes_of_quantity(self, name: str) -> Array | None:
-        """Return a quantity's derivatives (V + k + 1,); None if it is not of geometry alone."""
+        """Return a quantity's derivatives (V + k + 1,).
+
+        None if not a function of geometry alone.
+        """
         task, tail = self.task, len(self.task.robot.platform.lengths) + 1
         if name in ("cube", "scale"):
             edge = task.shape[1] if name == "scale" else 1.0
@@ -114,7 +117,7 @@ class _Slopes:
         return np.append(slopes, np.zeros(tail))
 
     def bounds(self, objective: int, z0: Array) -> list[tuple[Array, float]]:
-        """Return linear bounds on other objectives and requirements with known derivatives."""
+        """Return linear bounds (row, offset) that keep the other objectives and requirements."""
         bounds = []
         for k, target in enumerate(self.task.spec.objectives):
             row = self.slopes_of_quantity(target.quantity)

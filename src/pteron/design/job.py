@@ -45,7 +45,7 @@ OBJECTIVES = {
 
 
 def _expect_names_once(names: list[str], known: Collection[str]) -> list[str]:
-    """Return the names; raise where a name is unknown or occurs twice."""
+    """Return the names; raise where a name is not among `known` or occurs twice."""
     for k, name in enumerate(names):
         if name not in known:
             raise ValueError(f"{shorten(name)} is none of {', '.join(known)}")
@@ -80,25 +80,25 @@ class Job(TomlTable):
     @field_validator("objectives")
     @classmethod
     def _known_objectives(cls, names: list[str]) -> list[str]:
-        """Return the objectives; raise where a name is unknown or occurs twice."""
+        """Return the objectives' names; raise where one is unknown or occurs twice."""
         return _expect_names_once(names, OBJECTIVES)
 
     @field_validator("kinds")
     @classmethod
     def _known_kinds(cls, names: list[str] | None) -> list[str] | None:
-        """Return the kinds; raise where a name is unknown or occurs twice."""
+        """Return the names of kinds of machine; raise where one is unknown or occurs twice."""
         return names and _expect_names_once(names, KINDS)
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
-        """Return the job; raise with every contradiction between its tables."""
+        """Return the job; raise an error that lists every contradiction between its tables."""
         faults = list(self._faults())
         if faults:
             raise ValueError("; ".join(faults))
         return self
 
     def _faults(self) -> Iterator[str]:
-        """Yield the contradictions between the job's tables, in words."""
+        """Yield sentences on the contradictions between the job's tables."""
         if not self.cycles and not self.motion.acceleration:
             yield "no [[cycles]] and no [motion] acceleration: nothing says what the motors must do"
         if self.free and "cycle_time" not in self.objectives and self.most.cycle_time is None:
@@ -125,7 +125,7 @@ class Job(TomlTable):
             yield from self._room_faults()
 
     def _room_faults(self) -> Iterator[str]:
-        """Yield contradictions between the cell and the workspace, in words."""
+        """Yield sentences on contradictions between the permitted space and the workspace."""
         cell, space, sides = self.cell, self.workspace, 2.0 * self.workspace.half
         at = np.array(space.center or (0.0, 0.0, 0.0))
         if cell.footprint is not None and (sides[:2] > cell.footprint).any():
@@ -151,7 +151,7 @@ class Job(TomlTable):
                 yield f"keep_out[{k}]: it is in the workspace, where the tool must be"
 
     def _cycle_faults(self, cycle: ToolCycleTable) -> Iterator[str]:
-        """Yield the contradictions of a cycle with the workspace, in words."""
+        """Yield sentences on contradictions between a tool cycle and the workspace."""
         space, k = self.workspace, self.lengths
         sizes = {len(point) for point in cycle.points}
         known = {2: "x y", 3: "x y z"}[k]
@@ -182,14 +182,14 @@ class Job(TomlTable):
 
     @property
     def lengths(self) -> int:
-        """The number of the workspace's coordinates, 2 or 3."""
+        """The number of the workspace's length coordinates, 2 (x y) or 3 (x y z)."""
         if self.workspace.radius is not None:
             return 3
         return len(self.workspace.size or (self.workspace.poses or [()])[0])
 
     @property
     def free(self) -> bool:
-        """Whether a cycle has no duration, and is to be as fast as the motors can."""
+        """Whether some cycle has no prescribed duration, so that it is run as fast as possible."""
         return any(cycle.duration is None for cycle in self.cycles)
 
     def file(self, name: str) -> Path:
@@ -198,7 +198,7 @@ class Job(TomlTable):
         return beside if beside.exists() else Path(name)
 
     def requirement_lines(self) -> list[str]:
-        """Return the requirements, a line each."""
+        """Return the job's requirements as lines of text."""
         space, lines = self.workspace, []
         lines.append(space.words)
         if space.turn is not None:
@@ -246,7 +246,7 @@ class Job(TomlTable):
 
 
 def read_job(path: str | Path) -> Job:
-    """Read a task for a machine from a TOML file.
+    """Read a job (what a machine must do) from a TOML file.
 
     Raises
     ------
@@ -260,5 +260,5 @@ def read_job(path: str | Path) -> Job:
 
 
 def _box(low: Sequence[float], high: Sequence[float]) -> str:
-    """Return the ranges of a box as text."""
+    """Return the ranges of a box as text: "low..high x low..high"."""
     return " x ".join(f"{a:g}..{b:g}" for a, b in zip(low, high, strict=True))

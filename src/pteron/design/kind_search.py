@@ -32,7 +32,7 @@ def search_kind(
     seed: int,
     progress: Progress | None = None,
 ) -> list[Rating]:
-    """Return all designs that the search rated; each objective gets an equal share of them.
+    """Search designs of a kind, in equal shares for each objective; return all their ratings.
 
     For each objective a Latin hypercube of designs gives the first population of differential
     evolution (Storn and Price, Journal of Global Optimization 11, 1997); then every stock of the
@@ -45,7 +45,7 @@ def search_kind(
     objectives = evaluator.job.objectives
 
     def rate(units: Array) -> Rating:
-        """Rate a design (v,), scaled to 0 to 1 by its bounds; record it and report progress."""
+        """Rate a design given by unit coordinates (V,) within its bounds; record the rating."""
         ratings.append(evaluator.rate(low + np.clip(units, 0.0, 1.0) * (high - low)))
         if progress is not None:
             progress(len(ratings) / evaluations)
@@ -69,9 +69,9 @@ def _evolve(
     objective: str,
     ranges: tuple[Array, Array],
 ) -> None:
-    """Rate designs by differential evolution, until `_REFINED` of those up to `end` are left.
+    """Rate designs by differential evolution, leaving `_REFINED` of the `end` evaluations.
 
-    The population begins with the best designs rated so far, whatever they were rated for.
+    The population begins with the best designs rated so far, also for other objectives.
     """
     size = len(ranges[0])
     count = _POPULATION * size
@@ -106,13 +106,13 @@ def _refine(
     objective: str,
     counts: Array,
 ) -> None:
-    """Improve a design from `start` until `end` designs are rated.
+    """Improve the design `start` by stock choices and Nelder-Mead until `end` designs are rated.
 
-    `counts` are the numbers of choices of each of its values, 0 for one that varies freely.
+    `counts` are the numbers of choices of the coordinates of a design, 0 for continuous ones.
     """
 
     def cost(units: Array) -> float:
-        """Return the objective's cost of a design (v,), scaled to 0 to 1 by its bounds."""
+        """Rate a design given by unit coordinates (V,); return its cost for the objective."""
         return rate(units).cost(objective)
 
     free = counts == 0
@@ -132,7 +132,7 @@ def _refine(
         )
 
         def with_choices(units: Array, best: Array = best) -> Array:
-            """Return the best design's unit coordinates with the free ones replaced, in 0 .. 1."""
+            """Return the unit coordinates (V,) of `best`, its continuous ones set to `units`."""
             trial = best.copy()
             trial[free] = np.clip(units, 0.0, 1.0)
             return trial
@@ -148,7 +148,7 @@ def _refine(
 
 
 def pareto_ratings(ratings: list[Rating], objectives: list[str]) -> list[Rating]:
-    """Return the feasible designs that no other feasible design dominates."""
+    """Return the ratings of the feasible designs that are Pareto-optimal in the objectives."""
     good = [rating for rating in ratings if not rating.misses]
     costs = np.array([[rating.figures[name] for name in objectives] for rating in good])
     return [good[k] for k in pareto_front(costs)]

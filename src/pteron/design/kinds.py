@@ -78,9 +78,10 @@ class Kind:
 
     @cached_property
     def robot(self) -> Manipulator:
-        """The catalog's machine; sliders have no limits, as these follow from the task.
+        """The catalog's machine of this kind, without limits of sliders.
 
-        So are ball joints, whose cones follow from a machine's proportions.
+        Sliders' limits follow from the task, and the cones of ball joints, also left out, from a
+        machine's proportions.
         """
         template = load(self.name)
         legs = []
@@ -93,7 +94,7 @@ class Kind:
 
     @cached_property
     def like(self) -> Manipulator:
-        """The machine whose programs serve all machines of the kind."""
+        """The machine whose compiled programs serve all machines of the kind."""
         return replace(self.robot, name="any")
 
     @cached_property
@@ -104,7 +105,7 @@ class Kind:
 
     @cached_property
     def variables(self) -> dict[str, tuple[float, float]]:
-        """The numbers by name, with the least and the greatest value; sizes and times as logs."""
+        """Lower and upper bound of each design variable, by name; sizes and times as logarithms."""
         dimensions, places = KINDS[self.name]
         size = self.needed / self.reach[1]
         ranges = {"size": (np.log(_SIZE[0] * size), np.log(_SIZE[1] * size))}
@@ -115,34 +116,34 @@ class Kind:
 
     @property
     def stocks(self) -> dict[str, list[str]]:
-        """The stock that upper and lower links may be cut from."""
+        """The names of the bar stock that upper and lower links may be cut from, by link."""
         return {"upper": self.links.upper, "lower": self.links.lower}
 
     @cached_property
     def _choices(self) -> dict[str, Sequence[str]]:
-        """The stock by link, for links of this kind that have a choice of stock."""
+        """The names of the bar stock by link, for links with more than one choice."""
         keys = {part_key for leg in self.robot.legs for part_key, *_ in leg.extents.values()}
         return {key: stock for key, stock in self.stocks.items() if key in keys and len(stock) > 1}
 
     @property
     def ranges(self) -> Array:
-        """Least and greatest value of each number (2, V)."""
+        """Lower and upper bounds of the design variables (2, V)."""
         return np.array(list(self.variables.values())).T
 
     @property
     def counts(self) -> Array:
-        """Numbers of choices of discrete variables (V,); 0 for continuous variables."""
+        """Number of choices of each discrete design variable (V,); 0 for continuous variables."""
         return np.array([len(self._choices.get(name, ())) for name in self.variables])
 
     def numbers(self, point: Array) -> dict[str, float]:
-        """Return the numbers by name: sizes relative to the catalog's, times in s."""
+        """Return design variables (V,) by name, logarithms undone: size factors, times in s."""
         return {
             name: float(setting if name in "xyz" or name in self._choices else np.exp(setting))
             for name, setting in zip(self.variables, point, strict=True)
         }
 
     def machine(self, point: Array) -> tuple[Manipulator, Array]:
-        """Return the machine of a design, and the pose in the middle of its workspace.
+        """Return the machine of design variables (V,), and the pose in its workspace's middle (m,).
 
         Raises
         ------
@@ -160,16 +161,16 @@ class Kind:
         return _build_machine(self.robot, numbers, self._stock(point), self.links), middle
 
     def link_stocks(self, point: Array) -> dict[str, str]:
-        """Return the names of the stock of upper and lower links."""
+        """Return the names of the bar stock of upper and lower links of design variables (V,)."""
         numbers = self.numbers(point)
         return {key: names[int(numbers.get(key, 0.0))] for key, names in self.stocks.items()}
 
     def _stock(self, point: Array) -> dict[str, Stock]:
-        """Return the stock of each link in a design, parsed."""
+        """Return the stock of each link, parsed from its name, for design variables (V,)."""
         return {key: Stock.parse(name) for key, name in self.link_stocks(point).items()}
 
     def with_travel(self, leg: Any, travel: tuple[float, float], point: Array) -> Any:
-        """Return a leg with limits of its travel, m; a ram with tubes of that length."""
+        """Return a leg with travel limits (low, high), m; a ram with tubes of that length."""
         limited = replace(leg, limits=travel)
         if slides(leg):
             return limited
@@ -182,7 +183,7 @@ def slides(leg: Any) -> bool:
 
 
 def _lengths(leg: Any) -> set[str]:
-    """Return the names of a leg's lengths that have a value."""
+    """Return the names of the length parameters that a leg has a value for."""
     keys = leg.every_key().items()
     return {name for name, key in keys if key.role == "length" and getattr(leg, name) is not None}
 
@@ -190,10 +191,10 @@ def _lengths(leg: Any) -> set[str]:
 def _build_machine(
     robot: Manipulator, numbers: Mapping[str, float], stocks: Mapping[str, Stock], links: LinksTable
 ) -> Manipulator:
-    """Return a machine of another size, proportions and parts.
+    """Return the machine scaled by the design `numbers`, with links cut from the given stock.
 
-    Lengths grow with the size, other inertias than those of links, platform and carriages with
-    its powers.
+    Lengths grow with the size; inertias, except those of links, platform and carriages, grow with
+    powers of it.
     """
     size, platform = numbers["size"], robot.platform
     axis, frame = np.array(platform.axis), np.array(platform.frame)
@@ -237,7 +238,7 @@ def _build_machine(
 def _bodies(
     leg: Any, size: float, stocks: Mapping[str, Stock], links: LinksTable
 ) -> dict[str, Any]:
-    """Return the bodies of a leg: links cut from stock, a carriage, or grown with the size."""
+    """Return the bodies of a leg by name: links of stock, a carriage, others scaled with `size`."""
     bodies = {}
     for letter, body in leg.bodies.items():
         powers = (_POWERS["I" if k[0] == "I" else "g" if "g" in k else "m"] for k in body.kinds)
@@ -249,7 +250,7 @@ def _bodies(
 
 
 def fitting_kinds(names: Sequence[str] | None, lengths: int, turn: bool, tilt: bool) -> list[str]:
-    """Return the kinds that have the freedoms of a task; all that the task names must have them.
+    """Return the names of the kinds of machine with a task's degrees of freedom; raise if none.
 
     Raises
     ------

@@ -49,19 +49,19 @@ class LoadMargins:
     place: tuple[Places, int] | None = None
 
     def take(self, name: str, limits: Array, loads: Array) -> Array:
-        """Return the least margins (B,) of limits (n,) to loads (B, n), and record the least."""
+        """Return the least ratio limit / load (B,) over joints, and record the least as `name`."""
         margins = np.asarray((limits / np.maximum(loads, _NOTHING)).min(axis=-1))
         self.note(name, float(margins.min()))
         return margins
 
     def note(self, name: str, margin: float) -> None:
-        """Record a margin if it is the least of its name."""
+        """Record a margin (limit over load) if it is the least so far under this name."""
         self.figures[name] = min(self.figures.get(name, np.inf), margin)
 
     def note_place(
         self, margin: float, words: str, place: tuple[Places, int] | None = None
     ) -> None:
-        """Record the motion and the place of a margin if it is the least of all."""
+        """Record the motion and place of a margin if it is the least so far of all names."""
         if margin < self.least:
             self.least, self.worst, self.place = margin, words, place or self.place
 
@@ -69,11 +69,11 @@ class LoadMargins:
 def margins_of(
     evaluator: KindEvaluator, robot: Manipulator, middle: Array, time: float | None
 ) -> LoadMargins:
-    """Return the margins of the drives of a machine that carries the job's payload.
+    """Return the drives' margins (limit over load) for all cycles and motions of the job.
 
-    Friction and rotors count, and cycles that may be anywhere are taken at all their outermost
-    places. `middle` (m,) is the pose in the middle of the workspace; `time`, s, is the duration of
-    cycles that are given none.
+    Friction and rotor inertia are included; cycles that may be anywhere are evaluated at all their
+    outermost places. `middle` (m,) is the pose in the middle of the workspace; `time`, s, is the
+    duration of cycles without one.
     """
     drives = [leg.drive for leg in robot.legs if leg.drive is not None]
     most, rated, fastest = (
@@ -111,7 +111,7 @@ def margins_of(
         speed = max(required.speed, _NOTHING)
 
         def motion_margins(places: Array) -> Array:
-            """Return ratios (N, 2 n) of force and speed limits to the worst loads at places."""
+            """Return ratios (N, 2 n) of force and speed limits to the worst loads at N poses."""
             poses = middle + places
             forces = worst_forces(robot, poses, speed, required.acceleration)
             loads = np.hstack([forces, worst_speeds(robot, poses, speed)])

@@ -21,7 +21,7 @@ from pteron.motion.trajectories.timed_path import timed_path
 
 
 def default_table(table: type[TomlTable]) -> Any:
-    """Return the field of a table that may be left out: all its keys have defaults."""
+    """Return a pydantic field whose default is an empty `table`, so that it may be left out."""
     return Field(default_factory=lambda: table.model_validate({}))
 
 
@@ -50,12 +50,12 @@ _PEAK = 10.0 / sqrt(3.0)
 
 
 def _numbers(numbers: Any) -> Any:
-    """Return a single number as a list; anything else unchanged."""
+    """Return a single number as a list with one item; anything else unchanged."""
     return [numbers] if isinstance(numbers, int | float) else numbers
 
 
 def _one_or_six(numbers: Any) -> Any:
-    """Return the numbers of an inertia; raise on a list whose length is not 6."""
+    """Return the inertia's one or six numbers; raise on a list whose length is not 6."""
     if isinstance(numbers, list | tuple) and len(numbers) != 6:
         raise ValueError(f"{len(numbers)} numbers given, 1 or 6 expected: Ixx Ixy Ixz Iyy Iyz Izz")
     return numbers
@@ -77,7 +77,7 @@ class PayloadTable(TomlTable):
     )
 
     def add_to(self, robot: Manipulator) -> Manipulator:
-        """Return a machine with the payload; a scalar inertia counts about all axes if it tilts."""
+        """Return the machine with the payload added to its platform."""
         inertia = self.inertia
         tensor = (
             inertia if isinstance(inertia, tuple) else (inertia, 0.0, 0.0, inertia, 0.0, inertia)
@@ -104,7 +104,7 @@ class CycleTable(TomlTable):
 
     @model_validator(mode="after")
     def _one_kind(self) -> Self:
-        """Return the cycle; raise unless it has points or a scale, and times that fit."""
+        """Return the cycle; raise unless it has either points or a scale, and consistent times."""
         if (self.points is None) == (self.scale is None):
             raise ValueError("give either points, or the scale of the standard pick-and-place")
         if self.times is not None:
@@ -133,7 +133,7 @@ class CycleTable(TomlTable):
         return f"{what} {time}{dwell}{', anywhere in the workspace' if self.anywhere else ''}"
 
     def motion(self, robot: Manipulator, middle: Array, acceleration: float) -> Motion:
-        """Return the motion about a pose; without a duration at the given acceleration."""
+        """Return the cycle's motion of `robot` about the pose `middle` (m,)."""
         if self.points is None:
             return pick_and_place(
                 robot,
@@ -170,7 +170,7 @@ class ErrorsTable(TomlTable):
 
     @property
     def tolerances(self) -> Tolerances:
-        """The tolerances for `pose_error`."""
+        """The table's values as `Tolerances` for `pose_error`."""
         joints, backlash = (v[0] if len(v) == 1 else v for v in (self.encoder, self.backlash))
         return Tolerances(joints, backlash, self.point, self.length, self.angle)
 
@@ -185,7 +185,7 @@ class SectionTable(TomlTable):
 
     @model_validator(mode="after")
     def _one_shape(self) -> Self:
-        """Return the section; raise unless it has a diameter, or a side and a wall that fit."""
+        """Return the section; raise unless it has a diameter, or a side and wall, that fit."""
         if (self.diameter is None) == (self.side is None) or (self.side and self.wall is None):
             raise ValueError("give a diameter, or a side and a wall")
         outer = self.diameter or self.side or 0.0
@@ -195,7 +195,7 @@ class SectionTable(TomlTable):
 
     @property
     def section(self) -> Section:
-        """The section with its material, for stiffnesses."""
+        """The cross-section as a `Section` with its material, for stiffnesses."""
         material = {"steel": STEEL, "aluminium": ALUMINIUM}[self.material]
         if self.side is not None:
             return Section.square_tube(self.side, self.wall or 0.0, material)
@@ -216,14 +216,14 @@ class ElasticityTable(TomlTable):
 
     @model_validator(mode="after")
     def _expect_some(self) -> Self:
-        """Return the table; raise where no part is elastic."""
+        """Return the table; raise if it names no elastic part."""
         if self.actuators is None and self.upper is None and self.lower is None:
             raise ValueError("nothing gives way; give actuators, upper or lower")
         return self
 
     @property
     def elasticity(self) -> Elasticity:
-        """The elasticity for `stiffness`."""
+        """The table's values as `Elasticity` for `stiffness`."""
         stiffnesses = (inf,) if self.actuators is None else self.actuators
         upper, lower = (None if t is None else t.section for t in (self.upper, self.lower))
         return Elasticity(

@@ -40,7 +40,7 @@ class MachineSpace:
     def evaluate(
         self, robot: Manipulator, poses: Array, middle: Array
     ) -> tuple[dict[str, float], Misses]:
-        """Return the sizes of a machine over poses (N, m), m, and the bounds it violates.
+        """Return a machine's extents at poses (N, m), m, by name, and the space limits it exceeds.
 
         `middle` is the pose with the tool in the middle of the workspace.
         """
@@ -59,7 +59,8 @@ class MachineSpace:
     def extents(self, robot: Manipulator, poses: Array, middle: Array) -> Array:
         """Return a machine's extents at poses (N, 6 + boxes), from the tool's middle, m.
 
-        The least coordinates, minus the greatest, and how far it stays outside each keep-out box.
+        The columns are the least coordinates, the negated greatest ones, and the distance to each
+        keep-out box.
         """
         points = np.asarray(numeric(robot, "joint_points")(poses)[0])
         return self._extents_of_points(robot, poses, points, middle)
@@ -82,9 +83,9 @@ class MachineSpace:
         return np.column_stack([low, -high, *(-depth - margin for depth in depths)])
 
     def judge_extents(self, extents: Array, tight: float = 0.0) -> tuple[dict[str, float], Misses]:
-        """Return the sizes of a machine with extents (6 + boxes,), and the bounds it violates.
+        """Return sizes in m by name from extents (6 + boxes,), and the space limits they exceed.
 
-        Bounds are tighter by a length, m.
+        The limits are tightened by `tight`, m.
         """
         cell, (low, high, outside) = self._job.cell, np.split(extents, [3, 6])
         high = -high
@@ -112,10 +113,10 @@ class MachineSpace:
         return figures, misses
 
     def _clearance(self, robot: Manipulator, poses: Array, points: Array) -> float:
-        """Return the least distance of bodies, m; `points` are those of the joints at the poses.
+        """Return the least distance between bodies, m, at poses with the given joint points.
 
-        Guides, whose ends a program of many machines does not know, are measured to the links of
-        other legs.
+        The distances between guides and links of other legs are computed apart, as shared programs
+        do not know the guides' ends.
         """
         radii, distances = robot.radii, [np.inf]
         assert radii is not None  # every design has them
@@ -133,12 +134,12 @@ class MachineSpace:
 
     @cached_property
     def _meetings(self) -> list[tuple[Any, Any]]:
-        """Pairs of kinds of bodies that may collide; guides are not among them."""
+        """Pairs of kinds of bodies that may collide, guides excluded."""
         return meetings(self._robot)
 
 
 def _parts(beyond: float) -> str:
-    """Return the beginning of a sentence on parts that go beyond a bound by a distance, m."""
+    """Return the start of a message: parts go beyond a limit by `beyond` m."""
     return f"parts {beyond:.3g} m" if beyond > 0.0 else "parts nearly"
 
 
@@ -149,7 +150,7 @@ def tool_places(robot: Manipulator, poses: Array) -> Array:
 
 
 def _lines(robot: Manipulator, poses: Array, points: Array) -> tuple[Array, Array]:
-    """Return ends (N, L, 3) of links, guides and the lines from P to legs and tool."""
+    """Return start and end points (N, L, 3) of links, guides and lines from P to legs and tool."""
     count, place = len(poses), robot.platform.placement(poses)[0]
     legs = points.reshape(count, -1, *points.shape[-2:])
     tips = np.concatenate([legs[:, :, -1], tool_places(robot, poses)[:, None]], axis=1)
@@ -163,13 +164,13 @@ def _lines(robot: Manipulator, poses: Array, points: Array) -> tuple[Array, Arra
 
 
 def _depths(starts: Array, ends: Array, low: Array, high: Array) -> Array:
-    """Return the greatest depth of lines (..., 3) in a box: the distance to its nearest face.
+    """Return the greatest depth of line segments (..., 3) inside a box, m; negative outside.
 
-    Along a line it is concave, so that thirds find its most.
+    Along a line the depth is concave, so that ternary search finds its maximum.
     """
 
     def depth(share: Array) -> Array:
-        """Return the depths (...), m, of the lines' points at shares (...) from 0 to 1."""
+        """Return the depths (...) of segment points in the box, m, at line parameters 0 to 1."""
         at = starts + share[..., None] * (ends - starts)
         return np.asarray(np.minimum(at - low, high - at).min(axis=-1))
 
@@ -182,7 +183,7 @@ def _depths(starts: Array, ends: Array, low: Array, high: Array) -> Array:
 
 
 def _guides(robot: Manipulator) -> Iterator[tuple[int, Array, Array]]:
-    """Yield the legs whose joints slide on guides, and the guides' ends."""
+    """Yield (leg index, guide start (3,), guide end (3,)) of each leg that slides on a guide."""
     for i, leg in enumerate(robot.legs):
         if slides(leg) and leg.limits is not None and leg.joint_axis is not None:
             r, e = np.array(leg.guide_point), np.array(leg.joint_axis)
@@ -191,7 +192,7 @@ def _guides(robot: Manipulator) -> Iterator[tuple[int, Array, Array]]:
 
 @lru_cache(maxsize=1)
 def _squared_distances() -> ca.Function:
-    """Return a CasADi function: squared distance of two segments, from their ends."""
+    """Return the CasADi function of two segments' four end points: their squared distance."""
     p, p_end, q, q_end = (ca.SX.sym(name, 3) for name in ("p", "p_end", "q", "q_end"))
     square = squared_distance((p, p_end), (q, q_end))
     return ca.Function("squared_distance", [p, p_end, q, q_end], [square])

@@ -47,18 +47,18 @@ class GeometryNumber:
 
     @property
     def path(self) -> str:
-        """The path to it."""
+        """The path that names the number in a task's file: "legs[1].key.x"."""
         part = "" if self.part is None else f".{'xyz'[self.part]}"
         return f"legs[{self.leg}].{self.key}{part}"
 
     def read(self, robot: Manipulator) -> float:
-        """Return the number's value in a machine."""
+        """Return the value of this geometric number in the machine `robot`."""
         numbers = getattr(robot.legs[self.leg - 1], self.key)
         return float(numbers if self.part is None else numbers[self.part])
 
 
 def named_numbers(robot: Manipulator, path: str) -> list[GeometryNumber]:
-    """Return the numbers that a path names."""
+    """Return the geometric numbers of a machine that a path such as "legs[1, 2].key.x" names."""
     match = _WRITTEN.fullmatch(path.strip())
     if match is None:
         raise ModelError(f"{shorten(path)} is not {_SHAPE}")
@@ -87,7 +87,7 @@ def named_numbers(robot: Manipulator, path: str) -> list[GeometryNumber]:
 
 
 def geometric_keys(leg: LegKind) -> list[str]:
-    """Return the keys of a leg that hold geometric numbers."""
+    """Return the names of a leg's parameters that hold geometric numbers."""
     return [
         name
         for name, key in leg.every_key().items()
@@ -98,7 +98,7 @@ def geometric_keys(leg: LegKind) -> list[str]:
 def _places_in_leg(
     robot: Manipulator, path: str, i: int, key: str, part: str | None, sign: int
 ) -> Iterator[GeometryNumber]:
-    """Yield the geometric numbers of a leg that a path names; raise where the leg has none."""
+    """Yield the geometric numbers of leg i that a parsed path names; raise where it has none."""
     leg = robot.legs[i - 1]
     known = geometric_keys(leg)
     if key not in known:

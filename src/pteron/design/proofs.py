@@ -70,7 +70,7 @@ class ProvedCube(Result):
 
     @property
     def words(self) -> str:
-        """The statement that is proved, in a sentence."""
+        """The proved statement about the cube, as a sentence."""
         boxes = sum(proof.boxes for proof in self.proofs)
         return (
             f"proved: every position in the cube with edge {1000.0 * self.edge:.1f} mm about "
@@ -80,7 +80,7 @@ class ProvedCube(Result):
 
 
 def place_words(center: Array) -> str:
-    """Return a place in words: "(0, 0, -812.4) mm"."""
+    """Return a place (k,) in m as text in mm: "(0, 0, -812.4) mm"."""
     numbers = ", ".join(f"{round(1000.0 * x, 1) + 0.0:g}" for x in center)
     return f"({numbers}) mm" if len(center) > 1 else f"{numbers} mm"
 
@@ -107,7 +107,7 @@ class Proved(Result):
 
 
 def prove_design(design: Design) -> Proved:
-    """Return a design with its proofs, and its largest cube reduced to what is proved."""
+    """Prove a design's workspace and cube; return the proofs and the design as far as proved."""
     task, cube = design.task, None
     workspace: tuple[Proof, ...] = ()
     if task.seeks_place:
@@ -129,22 +129,25 @@ def prove_design(design: Design) -> Proved:
 
 @lru_cache(maxsize=8)
 def start_design(task: Task) -> Design:
-    """Return the machine that a search begins with, with its proofs."""
+    """Return the initial machine of the task as a proved design."""
     return prove_design(Design(task, task.robot)).design
 
 
 def proved_cube(design: Design) -> ProvedCube | None:
-    """Return the largest cube of a design that is found and proved; None where none is.
+    """Return the largest cube of a design that can be proved feasible; None if there is none.
 
-    Of a workspace that floats the place that is found, at the size that is required or, where its
-    `scale` is asked for, the largest.
+    For a workspace that floats, it is the place found for it, at the required size or, if `scale`
+    is a quantity of the search, at the largest size.
     """
     task = design.task
     shape, least = task.shape
     capped = task.floats and "scale" not in task.quantity_names
 
     def search(failing: Array) -> Fit:
-        """Return the largest cube without failing positions (F, k); at most `least` if capped."""
+        """Return the largest feasible cube without the positions (F, k).
+
+        If the size is capped, the edge is `least` at most.
+        """
         fit = design.cube_without(failing) if len(failing) else design.cube
         if not capped:
             return fit
@@ -152,7 +155,7 @@ def proved_cube(design: Design) -> ProvedCube | None:
         return replace(fit, edge=min(fit.edge, least) if fits else 0.0)
 
     def proofs(fit: Fit) -> tuple[Proof, ...]:
-        """Return the proofs that a fitted cube keeps the design's requirements."""
+        """Return the proofs that all poses of a fitted cube are feasible."""
         return cube_proofs(design, fit.center, fit.edge)
 
     shares = _PLACED if capped else _SHARES
@@ -164,9 +167,10 @@ def proved_cube(design: Design) -> ProvedCube | None:
 
 
 def cube_proofs(design: Design, center: Array, edge: float) -> tuple[Proof, ...]:
-    """Return the proofs of a cube, one for each orientation up to the first that does not hold.
+    """Return proofs that a cube is feasible, one an orientation, up to the first that fails.
 
-    Of a workspace that floats, at this place, its greatest side being `edge`.
+    If the workspace floats, the proofs are for the workspace at this centre, with `edge` its
+    greatest side.
     """
     proofs = []
     floating = design.task.spec.workspace if design.task.floats else None
@@ -184,10 +188,10 @@ def cube_proofs(design: Design, center: Array, edge: float) -> tuple[Proof, ...]
 
 
 def workspace_proofs(design: Design) -> tuple[Proof, ...]:
-    """Return the proofs of the required workspace, one for each orientation.
+    """Return proofs that the required workspace is feasible, one for each orientation.
 
-    Where it touches the boundary it is undecided; the proof is then of 0.9999 of it, about its
-    middle, if that can be proved: its region tells, and `workspace_share`.
+    A workspace that touches the boundary of the feasible poses is undecided; the proof is then for
+    0.9999 of it, about its middle, if that can be proved. `workspace_share` returns this share.
     """
     proofs: list[Proof] = []
     required = design.workspace
@@ -204,7 +208,7 @@ def workspace_proofs(design: Design) -> tuple[Proof, ...]:
 
 
 def counterexamples(design: Design, center: Array, edge: float) -> Samples:
-    """Return points of a cube, and of the required workspace, that proofs have shown to fail."""
+    """Return the counterexamples of failed proofs, in a cube and in the required workspace."""
     edge = min(edge, design.task.shape[1]) if design.task.floats else _SHARES[0] * edge
     cube = cube_proofs(design, center, edge) if edge > 0.0 else ()
     inside, fixed = (
@@ -219,7 +223,7 @@ def counterexamples(design: Design, center: Array, edge: float) -> Samples:
 
 
 def workspace_share(design: Design, proof: Proof) -> float:
-    """Return the share of the required workspace that a proof covers."""
+    """Return the share (0 to 1) of the required workspace that a proof covers."""
     required = design.workspace
     assert required is not None  # who asks has one
     if design.task.floats:
@@ -230,14 +234,14 @@ def workspace_share(design: Design, proof: Proof) -> float:
 
 
 def _proof(design: Design, region: Region) -> Proof:
-    """Return the proof that a design's region meets the task's floors, with shared programs."""
+    """Return the proof attempt that a design is feasible in a region, with shared programs."""
     floors = design.task.floors
     with sharing_programs(design.task.robot):
         return prove(design.robot, region, type_i=floors.type_i, type_ii=floors.type_ii, most=_MOST)
 
 
 def _least(design: Design, proof: Proof) -> float:
-    """Return the least condition, below 0, at the counterexample of a proof."""
+    """Return the least condition (below 0) at a failed proof's counterexample."""
     if proof.counterexample is None:
         return UNKNOWN
     rows = design.task.conditions.rows(design.geometry, proof.counterexample, design.side)
@@ -245,7 +249,7 @@ def _least(design: Design, proof: Proof) -> float:
 
 
 def kind_proofs(evaluator: KindEvaluator, rating: Rating) -> tuple[list[Proof], Manipulator]:
-    """Return proofs of the workspace, and the machine, its guides and rams lengthened if needed."""
+    """Return proofs of the workspace, and the machine with guides and rams lengthened to fit."""
     robot, floors = rating.machine, evaluator.job.floors
     proofs: list[Proof] = []
     for _ in range(4):
@@ -268,7 +272,7 @@ def kind_proofs(evaluator: KindEvaluator, rating: Rating) -> tuple[list[Proof], 
 
 
 def proof_sentence(evaluator: KindEvaluator, proofs: Sequence[Proof]) -> str:
-    """Return the proved statement about the workspace, a sentence."""
+    """Return a sentence: what is proved about the workspace, or that it is only sampled."""
     space, boxes = evaluator.job.workspace, sum(proof.boxes for proof in proofs)
     if not all(proof.holds for proof in proofs):
         return (
@@ -293,7 +297,7 @@ def proof_sentence(evaluator: KindEvaluator, proofs: Sequence[Proof]) -> str:
 
 
 def is_clear(evaluator: KindEvaluator, robot: Manipulator, middle: Array) -> bool:
-    """Return whether the least clearance of all bodies is proved."""
+    """Return whether the required clearance between all bodies is proved over the workspace."""
     radii, least = robot.radii or Radii(), evaluator.job.floors.clearance / 2.0
     parts = (radii.guide, radii.upper, radii.lower, radii.platform)
     required = interference(robot, Radii(*(part + least for part in parts)))

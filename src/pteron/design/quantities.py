@@ -81,7 +81,7 @@ def _sample_cover(
     least: bool = False,
     cover: Cover = "places",
 ) -> DesignQuantity:
-    """Return the greatest or least of a function of a design and poses (N, m) in the workspace."""
+    """Return a design quantity: the extreme over the workspace of `at(design, poses)` (N,)."""
     sign = -1.0 if least else 1.0
     fine = cover == "fine"
     return DesignQuantity(unit, about, lambda d: d.worst(at, sign, fine=fine), cover=cover)
@@ -90,34 +90,34 @@ def _sample_cover(
 def machine_quantity(
     unit: str, about: str, of_machine: Callable[[Manipulator], float], name: str = ""
 ) -> DesignQuantity:
-    """Return the quantity of a design that is a function of its machine alone."""
+    """Return a design quantity whose value is `of_machine(robot)`."""
     of = partial(_evaluate_machine, of_machine)
     return DesignQuantity(unit, about, of, of_machine, "machine", name)
 
 
 def _evaluate_machine(of_machine: Callable[[Manipulator], float], design: Any) -> float:
-    """Return a machine's function evaluated for a design."""
+    """Return `of_machine` evaluated for the machine of a design."""
     return of_machine(design.robot)
 
 
 def quantity_of(
     quantity: DesignQuantity | Callable[[Manipulator], float], name: str
 ) -> DesignQuantity:
-    """Return the quantity that a function of the machine gives; a quantity as it is."""
+    """Return a design quantity as it is; a function of a machine wrapped as one."""
     if isinstance(quantity, DesignQuantity):
         return quantity
     return machine_quantity("", (getdoc(quantity) or "").partition("\n")[0], quantity, name)
 
 
 def _links(robot: Manipulator) -> float:
-    """Return the sum of the legs' lengths, m."""
+    """Return the sum of all link lengths of the legs, m."""
     return float(
         sum(q.value[0] for leg in robot.legs for q in leg.quantities if q.role == "length")
     )
 
 
 def moving_mass(robot: Manipulator) -> float:
-    """Return the mass of all that moves, kg."""
+    """Return the mass of all moving bodies, kg."""
     legs = sum(body.values[0] for leg in robot.legs for body in leg.bodies.values())
     carried = sum(bar.mass for bar in robot.platform.bars)
     return float(legs + robot.platform.inertia.mass + carried)
@@ -140,17 +140,17 @@ def _type_i(design: Any, poses: Array) -> Array:
 
 
 def _type_ii(design: Any, poses: Array) -> Array:
-    """Return the type-II index at poses (N, m): (N,), 0 beyond the singularity."""
+    """Return the type-II index (N,) at poses (N, m), >= 0; 0 beyond the singularity."""
     return np.asarray(np.maximum(design.side * design.values("type_ii", poses), 0.0))
 
 
 def _stroke(design: Any) -> float:
-    """Return the largest stroke of a drive, relative to that of the initial machine."""
+    """Return the largest joint travel relative to that of the initial machine (no unit)."""
     return float((design.strokes / design.reference_strokes).max())
 
 
 def _drive_load(design: Any, poses: Array) -> Array:
-    """Return the greatest ratio of a drive's force or speed to its limit (N,)."""
+    """Return the greatest ratio of drive force or speed to its limit at poses (N, m): (N,)."""
     limits = limits_of(design.robot)
     shares = design.forces(poses) / limits.force, design.speeds(poses) / limits.speed
     return np.asarray(np.maximum(*shares).max(axis=-1))
@@ -277,10 +277,10 @@ _BUILT_IN = {
 
 @lru_cache(maxsize=1)
 def quantities() -> dict[str, DesignQuantity]:
-    """Return the quantities by name: those of this page, the worst of each index, and packages'.
+    """Return all design quantities by name: built-in, worst values of indices, and extensions'.
 
-    A package names its own as entry points of the group `pteron.design`: a function of the machine
-    or a `DesignQuantity`.
+    Packages register quantities as entry points of the group `pteron.design`: a function of the
+    machine or a `DesignQuantity`.
     """
     known = _BUILT_IN | {name: _worst(index) for name, index in INDICES.items()}
     for name in extension_names(GROUP):
@@ -289,7 +289,7 @@ def quantities() -> dict[str, DesignQuantity]:
 
 
 def _worst(index: Index) -> DesignQuantity:
-    """Return the worst value of an index over the workspace."""
+    """Return the design quantity that is an index's worst value over the workspace."""
     word = "least" if index.better == "more" else "greatest"
     return _sample_cover(
         index.unit,
@@ -300,7 +300,7 @@ def _worst(index: Index) -> DesignQuantity:
 
 
 def expect_quantity(name: str) -> str:
-    """Return the name of a quantity."""
+    """Return `name`; raise ValueError if no design quantity is called so."""
     names = quantities()
     if name in names:
         return name

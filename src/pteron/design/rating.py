@@ -88,23 +88,23 @@ class Rating:
 
     @property
     def machine(self) -> Manipulator:
-        """The machine of a design that has one: it did not fail at the first stage."""
+        """The machine of the rated design; only defined if the first stage of rating passed."""
         assert self.robot is not None
         return self.robot
 
     def miss(self, name: str, share: float, words: str) -> None:
-        """Record the violation of a bound, relative to the bound, with its words."""
+        """Record the violation of limit `name` as a share of the limit, with a text."""
         if share > self.misses.get(name, 0.0):
             self.misses[name], self.shortfalls[name] = float(share), words
 
     def expect_least(self, name: str, figure: float, least: float) -> None:
-        """Record a violation of a lower bound."""
+        """Record a violation if `figure` is below `least`."""
         if not figure >= least:
             share = least - figure if np.isfinite(figure) else 1.0
             self.miss(name, share, f"{name} {figure:.3g}, at least {least:.3g} asked")
 
     def cost(self, objective: str) -> float:
-        """Return the cost that a search minimises."""
+        """Return the scalar cost of the design in a search: objective, or penalty of violations."""
         if self.misses:
             return _BY_STAGE * (6 - self.stage) + min(sum(self.misses.values()), 0.9 * _BY_STAGE)
         cost = self.figures[objective]
@@ -141,13 +141,13 @@ class KindEvaluator:
 
     @cached_property
     def groups(self) -> list[list[int]]:
-        """Legs of one type, which have the same drive."""
+        """Groups of leg indices that share a drive: legs of the same type."""
         legs = self.kind.robot.legs
         kinds = dict.fromkeys((leg.type, leg.joint.unit) for leg in legs)
         return [[i for i, g in enumerate(legs) if (g.type, g.joint.unit) == k] for k in kinds]
 
     def rate(self, point: Array) -> Rating:
-        """Return the rating of a design for the job; call it within `sharing_programs`."""
+        """Return the rating of design variables (V,): machine, figures and violations by stage."""
         rating = Rating(np.asarray(point, dtype=float))
         try:
             robot, rating.middle = self.kind.machine(point)
@@ -166,14 +166,17 @@ class KindEvaluator:
         return rating
 
     def _judge_reach(self, rating: Rating) -> None:
-        """Judge reach, floors and limits over the workspace; set the travel of guides and rams."""
+        """Rate reach, singularity measures and joint limits over the workspace, in `rating`.
+
+        The travel of guides and rams is set from the poses.
+        """
         robot, poses, floors = rating.machine, rating.middle + self.visited, self.job.floors
         least = float(np.min(numeric(robot, "squared_type_i")(poses)[0]))
         if least >= 0.0:
             sign = np.sign(np.median(numeric(robot, "type_ii")(poses)[0]))
 
             def measures(places: Array) -> Array:
-                """Return type-I (squared), type-II and passive-joint margins (N, k) at places."""
+                """Return type-I (squared), type-II and passive-joint measures (N, k) at N poses."""
                 poses = rating.middle + places
                 squares, determinant, room = (
                     numeric(robot, name)(poses)[0]
@@ -202,7 +205,10 @@ class KindEvaluator:
         if self.job.workspace.tilt is not None:
             # Between the tilts of the samples rams are longer and shorter.
             def ends(places: Array) -> Array:
-                """Return lengths and negated lengths (N, 2 n) of joints; infinity out of reach."""
+                """Return joint coordinates and their negatives (N, 2 n), m or rad.
+
+                They are infinite out of reach.
+                """
                 at = inverse_kinematics(robot, rating.middle + places, on_failure="nan")
                 return np.asarray(np.nan_to_num(np.hstack([at, -at]), nan=np.inf))
 
@@ -226,7 +232,7 @@ class KindEvaluator:
         rating.robot = replace(robot, legs=tuple(legs))
 
     def _judge_room(self, rating: Rating) -> None:
-        """Evaluate footprint, height, keep-out boxes and clearances."""
+        """Record footprint and height, and violations of keep-out boxes and clearances."""
         figures, misses = self.machine_space.evaluate(
             rating.machine, rating.middle + self.visited, rating.middle
         )
@@ -235,7 +241,10 @@ class KindEvaluator:
             rating.miss(name, share, words)
 
     def _choose_drives(self, rating: Rating) -> None:
-        """Choose the drives: the cheapest that serve loads, accuracy and stiffness."""
+        """Choose the cheapest drives that suffice for loads, accuracy and stiffness.
+
+        The figures of the rating (masses, energy, errors) are recorded.
+        """
         robot = self.add_payload(rating.machine)
         numbers = self.kind.numbers(rating.values)
         try:
@@ -300,23 +309,26 @@ class KindEvaluator:
         samples: int | None = None,
         keep: int = 1,
     ) -> tuple[Array, Array]:
-        """Return the least values over workspace and cycles (see `refine_worst_values`)."""
+        """Return the minima of values (B, C) over the workspace (C,), and their poses (C, m)."""
         return refine_worst_values(self.job, robot, values_of, samples, keep, self.between)
 
     def shares(self, time: float | None) -> Array:
-        """Return the durations that weight cycles in a duty cycle, s; empty without shares."""
+        """Return the durations, s, by which a duty cycle weights its cycles.
+
+        The array is empty if no cycle has a share.
+        """
         pairs = [(c.share, (c.duration or time or 1.0) + c.dwell) for c in self.cycles if c.share]
         return np.array([share * duration for share, duration in pairs])
 
     def _energy(self, worst: Sequence[float]) -> float:
-        """Return the energy of a cycle, J: on the mean of a duty cycle, or the greatest."""
+        """Return the energy of a cycle, J: mean weighted by the cycles' shares, or the maximum."""
         shares = [cycle.share for cycle in self.cycles]
         if not any(shares):
             return max(worst, default=0.0)
         return float(np.average(worst, weights=shares))
 
     def _judge_bounds(self, rating: Rating) -> None:
-        """Judge the bounds of `[most]`."""
+        """Record which figures of the design exceed the upper bounds of the job's `[most]`."""
         for name, most in self.job.most.model_dump(exclude_none=True).items():
             figure, unit = rating.figures[name], f" {OBJECTIVES[name]}".rstrip()
             if not figure <= most:
@@ -324,17 +336,17 @@ class KindEvaluator:
                 rating.miss(name, figure / most - 1.0 if np.isfinite(figure) else 1.0, words)
 
     def add_payload(self, robot: Manipulator) -> Manipulator:
-        """Return a machine with the payload."""
+        """Return the machine with the job's payload on its platform."""
         return self.job.payload.add_to(robot)
 
     def sections(self, rating: Rating) -> dict[str, Section]:
-        """Return the sections of a design's links."""
+        """Return the cross-sections of a rated design's upper and lower links, by link."""
         return link_sections(rating.machine, self.kind.link_stocks(rating.values))
 
     def loads(
         self, robot: Manipulator, rating: Rating, time: float | None
     ) -> tuple[JointLoads, list[tuple[Array, Array]]]:
-        """Return the loads of all cycles at all places, and each cycle's work and joint travel."""
+        """Return the loads of all cycles at all places; each cycle's (work, joint travel)."""
         n, middle = robot.joint_count, rating.middle
         squares, forces, rises, work = [], [np.zeros((1, n))], [np.zeros((1, n))], []
         speeds = np.zeros(n)
@@ -378,13 +390,13 @@ class KindEvaluator:
         return loads, work
 
     def states(self, cycle: Places, middle: Array, duration: float) -> tuple[Array, Array, Array]:
-        """Return poses, velocities and accelerations (B, K, m) of a cycle of a duration, s."""
+        """Return poses, velocities and accelerations (B, K, m) of a cycle run in `duration` s."""
         pose, velocity, acceleration = cycle.states
         return middle + pose, velocity / duration, acceleration / duration**2
 
 
 def _expect_share(rating: Rating, name: str, share: float, option: str) -> None:
-    """Record a requirement that the best drive meets only in part."""
+    """Record a violation if the best drive meets only a `share` below 1 of a requirement."""
     if share < 1.0:
         much = f"{share:.0%}" if share >= 0.01 else "less than 1%"
         words = f"{name} {much} of what is asked, with {option}"

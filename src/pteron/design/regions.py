@@ -23,7 +23,7 @@ _RING = 24
 
 
 def workspace_shape(workspace: WorkspaceTable, count: int) -> tuple[Shape, float]:
-    """Return the shape of a workspace in `count` coordinates, and its edge: the greatest side."""
+    """Return a workspace's shape in `count` coordinates, scaled to edge 1, and its edge, m."""
     sides = np.array(workspace.dimensions(count))
     edge = float(sides.max())
     half = sides / edge
@@ -92,7 +92,7 @@ def workspace_region(table: WorkspaceTable, pose: Array, share: float = 1.0) -> 
 
 
 def placed_pose(pose: Array, position: Array) -> tuple[float, ...]:
-    """Return a position with the angle of a pose."""
+    """Return the pose (m,) with the given position and the angles of `pose`."""
     return (*position.tolist(), *pose[len(position) :].tolist())
 
 
@@ -113,7 +113,7 @@ class TurnedTool:
 
     @property
     def box(self) -> Array:
-        """Least and greatest pose (2, m)."""
+        """Least and greatest pose of the box around the region (2, m)."""
         low, high = self.of_tool.box
         at, away = self._arm(low[None], high[None])
         return np.array([low - at[0] - away[0], high - at[0] + away[0]])
@@ -124,14 +124,15 @@ class TurnedTool:
         return self.of_tool.holds(tool_motion(self.platform, poses, zeros, zeros)[0])
 
     def misses(self, low: Array, high: Array) -> NDArray[np.bool_]:
-        """Return which boxes with corners (B, m) certainly have none of these poses."""
+        """Return for boxes with corners (B, m) whether each certainly lies outside the region."""
         at, away = self._arm(low, high)
         return self.of_tool.misses(low + at - away, high + at + away)
 
     def _arm(self, low: Array, high: Array) -> tuple[Array, Array]:
-        """Return the arm (B, m) from P to the tool at a box's middle angle, and its greatest error.
+        """Return the vector (B, m) from P to the tool at each box's middle angle, with its error.
 
-        Over half the box's range of angles the arm's end moves by its length times that at most.
+        Over half the box's range of angles the tool moves by at most this half range times the
+        vector's length, which is the error.
         """
         platform, angular = self.platform, self.platform.angular
         middle, half = 0.5 * (low + high)[:, angular], 0.5 * (high - low)[:, -1:]
@@ -143,7 +144,7 @@ class TurnedTool:
 
 
 def kind_regions(evaluator: KindEvaluator, robot: Manipulator, middle: Array) -> list[Region]:
-    """Return the workspace as regions: each pose of a list, else a box or cylinder an orientation.
+    """Return the workspace as regions of poses: one for each listed pose, or each orientation.
 
     A range of turns without tilts is a coordinate of one box.
     """

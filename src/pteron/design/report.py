@@ -46,14 +46,14 @@ class ReportedDesign(Proved):
 
     @property
     def changes(self) -> list[Change]:
-        """Quantities, geometry and masses that differ from those at the start."""
+        """Quantities, geometric numbers and masses that differ from the initial machine's."""
         task, robot = self.design.task, self.design.robot
         geometry, masses = geometry_changes(task, robot), mass_changes(task, robot)
         return [*quantity_changes(self.design), *geometry, *masses]
 
     @property
     def proofs(self) -> list[str]:
-        """The statements that are proved, a sentence each."""
+        """The proved statements about cube and workspace, a sentence each."""
         lines, task = [], self.design.task
         if task.seeks_cube:
             lines.append("cube: not proved" if self.cube is None else f"cube {self.cube.words}")
@@ -67,7 +67,7 @@ class ReportedDesign(Proved):
 
     @property
     def _place(self) -> str:
-        """The place of a workspace that floats, in words."""
+        """A sentence on where the workspace that floats lies in this design."""
         design = self.design
         if not self.workspace:
             largest = f", at most at {design.scale:.3g} times its size" if design.scale else ""
@@ -82,7 +82,7 @@ class ReportedDesign(Proved):
 
     @property
     def missing_quantities(self) -> list[str]:
-        """The quantities that the machine does not have, with the reason."""
+        """A line for each undefined quantity: its name and the reason."""
         reasons = self._reasons.items()
         return [f"{name}: none, because {reason}" for name, reason in reasons if reason]
 
@@ -90,7 +90,7 @@ class ReportedDesign(Proved):
 
     @property
     def covers(self) -> list[str]:
-        """The quantities of the search by the samples or proofs behind them, and the motors."""
+        """Lines that name, for each quantity, the samples or proof behind it; then the motors."""
         design, task = self.design, self.design.task
         texts: dict[str, list[str]] = {}
         for name in (name for name, reason in self._reasons.items() if not reason):
@@ -105,7 +105,7 @@ class ReportedDesign(Proved):
         return [*self.missing_quantities, *lines]
 
     def lines(self) -> list[str]:
-        """Return the lines on proofs, on the poses behind each quantity, and on strokes."""
+        """Return lines of text on proofs, the poses behind each quantity, and joint travel."""
         design, lines = self.design, [*self.proofs, *self.covers]
         region = "the workspace" if design.task.spec.workspace is not None else "the cube"
         if (design.task.seeks_place and design.cube.edge <= 0.0) or not design.is_reachable:
@@ -134,7 +134,7 @@ class ReportedDesign(Proved):
 
 
 def _motor_words(fit: MotorFit) -> str:
-    """Return a sentence on a motor's margin for a leg's loads."""
+    """Return a sentence: the motor for a leg, its ratio and the margin (limit over need)."""
     return (
         f"drive of leg {fit.leg}: {fit.motor.name} at a ratio of {fit.ratio:.3g} has "
         f"{fit.margin:.3g} times the {fit.scarcest} that it needs, its tightest limit"
@@ -148,17 +148,20 @@ class FrontReport(Result):
     front: Front
 
     def __repr__(self) -> str:
-        """Return the report in a line."""
+        """Return the machine's name and the names of the reported designs in one line."""
         return f"<FrontReport of {self.front.task.robot.name!r}: {', '.join(self.front.selection)}>"
 
     @cached_property
     def start(self) -> ReportedDesign:
-        """The machine to begin with."""
+        """The initial machine of the search as a reported design."""
         return _report_design("start", Design(self.front.task, self.front.task.robot))
 
     @cached_property
     def selection(self) -> list[ReportedDesign]:
-        """The best design of each objective and the compromise; a design of several names once."""
+        """The best design in each objective and the compromise.
+
+        A design that is best in several objectives is listed once, under all names.
+        """
         task, names = self.front.task, dict[int, str]()
         for name, at in self.front.selection.items():
             names[at] = f"{names[at]}, {name}" if at in names else name
@@ -170,7 +173,7 @@ class FrontReport(Result):
     chosen = former_attribute("chosen", "selection")
 
     def robots(self) -> dict[str, str]:
-        """Return the chosen machines as texts of files, by the files' names."""
+        """Return the selected machines as TOML texts, by file name."""
         return {
             f"{name}.toml": text_of(reported.design.robot)
             for reported in self.selection
@@ -178,18 +181,18 @@ class FrontReport(Result):
         }
 
     def table(self) -> pl.DataFrame:
-        """Return the front as a table, with units in the headings."""
+        """Return the Pareto front as a table, a row for each design, with units in the headings."""
         frame: pl.DataFrame = self.front.table()
         return frame
 
     def summary(self) -> str:
-        """Return the report, for people, as lines of text: that of `page`."""
+        """Return the report as Markdown text: the same as `page`."""
         return self.page()
 
     data = former_attribute("data", "as_dict")
 
     def as_dict(self) -> dict[str, Any]:
-        """Return everything as plain data, SI units."""
+        """Return machine, variables, reported designs and front as plain data, SI units."""
         front, task = self.front.as_dict(), self.front.task
         return {
             "robot": task.robot.name,
@@ -204,7 +207,7 @@ class FrontReport(Result):
         }
 
     def page(self) -> str:
-        """Return the report in Markdown: changes with units, proofs, basis of each number."""
+        """Return the report in Markdown: changes with units, proofs, samples of each quantity."""
         front = self.front
         lines = [
             f"# Designs of {front.task.robot.name}",
@@ -235,11 +238,11 @@ class FrontReport(Result):
 
 
 def _design(task: Task, robot: Manipulator, name: str) -> Design:
-    """Return the design of a machine whose name ends in the selection's name."""
+    """Return a design of `robot`, named after the machine and the report's `name`."""
     ending = f"-{name.split(', ')[0]}"
     return Design(task, replace(robot, name=robot.name[: LONGEST_NAME - len(ending)] + ending))
 
 
 def _report_design(name: str, design: Design) -> ReportedDesign:
-    """Return a design with its proofs under a name of the report."""
+    """Prove a design and return it for the report under `name`."""
     return ReportedDesign(**vars(prove_design(design)), name=name)

@@ -67,7 +67,7 @@ class AccuracyTable(TomlTable):
 
     @property
     def has_part_errors(self) -> bool:
-        """Whether any tolerance of the machine's parts is given, beside errors of its drives."""
+        """Whether tolerances of points, lengths or angles are given besides the drives' errors."""
         return bool(self.point or self.length or self.angle)
 
 
@@ -103,7 +103,7 @@ class LinksTable(TomlTable):
     @field_validator("upper", "lower")
     @classmethod
     def _expect_known(cls, names: list[str]) -> list[str]:
-        """Return the names of stock; raise where a name cannot be parsed as a stock."""
+        """Return the names of bar stock; raise where a name cannot be parsed."""
         for name in names:
             try:
                 Stock.parse(name)

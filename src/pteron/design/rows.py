@@ -29,11 +29,11 @@ FAILED = 1e6
 def evaluate_design(
     task: Task, point: Sequence[float], *, proofs: bool = False
 ) -> dict[str, float]:
-    """Return the row of a design: quantities, and violations of the requirements.
+    """Return quantities and violations of a design (V,), by column name.
 
-    "misses workspace" is how far the least condition is below 0, and "misses 1 links" how far
-    the first requirement, of `links`, is missed over its bound; 0 where it is kept. With proofs the
-    cube is the proved one, and a workspace that is not proved is missed.
+    "misses workspace" is by how much the least condition is below 0, and "misses 1 links" the
+    relative violation of the first requirement, on `links`; both are 0 if satisfied. With `proofs`
+    the cube is the proved one, and a workspace that is not proved counts as violated.
     """
     try:
         design = Design(task, task.machine(point))
@@ -53,12 +53,15 @@ def evaluate_design(
 
 
 def places(task: Task) -> list[str]:
-    """Return the columns with the place of a workspace that floats."""
+    """Return names of the columns for the centre of a workspace that floats.
+
+    The list is empty if the workspace is fixed.
+    """
     return [f"center {name}" for name in task.robot.platform.lengths] if task.floats else []
 
 
 def design_table(task: Task, designs: ArrayLike, *, proofs: bool = False) -> pl.DataFrame:
-    """Return a table of designs (N, V), a row each: variables, then quantities and misses."""
+    """Return a table of designs (N, V), a row each: variables, quantities and violations."""
     import polars as pl
 
     points = np.asarray(designs)
@@ -69,6 +72,6 @@ def design_table(task: Task, designs: ArrayLike, *, proofs: bool = False) -> pl.
 
 
 def violations(designs: pl.DataFrame) -> Array:
-    """Return the violations (N, C) in a table of designs: workspace, then each requirement."""
+    """Return a table's violations (N, C) of the workspace (column 0) and of each requirement."""
     names = [name for name in designs.columns if name.startswith(MISSES)]
     return np.asarray(designs.select(names).to_numpy())

@@ -49,11 +49,11 @@ def search(
     scheduler: str | None = None,
     progress: Progress | None = None,
 ) -> Front:
-    """Search for the best designs of a machine.
+    """Search for the Pareto-optimal designs of a machine and return their front.
 
-    The first generation is a Latin hypercube with the machine to begin with; NSGA-II makes the
+    The first generation is a Latin hypercube that includes the initial machine; NSGA-II makes the
     others, and the best designs of each are improved by gradients. The same spec and seed give the
-    same front, whoever computes it and however often the run was ended meanwhile.
+    same front, on any computer, also after interruptions.
 
     Parameters
     ----------
@@ -134,7 +134,10 @@ class DesignRows:
         plan: dict[str, Any],
         progress: Progress | None = None,
     ) -> pl.DataFrame:
-        """Return the rows of `function` for jobs; rows already in the folder are reused."""
+        """Return the table rows that `function` computes for jobs, in order.
+
+        Rows already stored in the folder `name` are reused.
+        """
         store = TableStore(self.folder / name, {**self.task.plan, **plan})
         chunks = [jobs[k : k + _CHUNK] for k in range(0, len(jobs), _CHUNK)]
         if self.pool is None:
@@ -155,13 +158,13 @@ class DesignRows:
         return store.scan().collect()
 
     def prove(self, designs: list[list[float]]) -> pl.DataFrame:
-        """Return the rows of designs after their proofs."""
+        """Return the rows (variables, quantities, violations) of designs after proving them."""
         digest = _digest(np.array(designs))
         return self.rows(proved_table, designs, f"proofs-{digest}", {"designs": digest})
 
 
 def _await_rows(pending: Sequence[Future[pl.DataFrame]]) -> pl.DataFrame:
-    """Return the rows of all pending evaluations in a single table; blocks until they end."""
+    """Wait for all pending evaluations and return their rows in a single table."""
     import polars as pl
 
     rows: pl.DataFrame = pl.concat(map(result_of, pending), rechunk=True)
@@ -169,7 +172,7 @@ def _await_rows(pending: Sequence[Future[pl.DataFrame]]) -> pl.DataFrame:
 
 
 def _generations(evaluation: DesignRows, progress: Progress | None) -> Front:
-    """Return the front of all designs that were evaluated, each design of it proved."""
+    """Run the generations of a search; return the front of all designs, each of it proved."""
     task = evaluation.task
     settings, (low, high) = task.spec.search, task.ranges
     evolution = Evolution(
@@ -201,12 +204,12 @@ def _generations(evaluation: DesignRows, progress: Progress | None) -> Front:
 
 
 def _report(progress: Progress, number: int, settings: SearchTable, share: float) -> None:
-    """Report the finished share of all generations."""
+    """Report to `progress` the finished share of all generations, 0 to 1."""
     progress((number - 1 + share) / settings.generations)
 
 
 def first_designs(task: Task, count: int, seed: int) -> Array:
-    """Return a Latin hypercube of designs (count, V), the first the machine to begin with."""
+    """Return a Latin hypercube of designs (count, V); row 0 is the initial machine's."""
     low, high = task.ranges
     units = latin_hypercube(np.random.default_rng(seed), count, len(low))
     designs: Array = low + units * (high - low)
@@ -215,21 +218,21 @@ def first_designs(task: Task, count: int, seed: int) -> Array:
 
 
 def evaluate_designs(task: Task, jobs: Sequence[tuple[list[float], int]]) -> pl.DataFrame:
-    """Return the rows of designs; those with an objective are improved in it by gradients first."""
+    """Return rows of (point, objective) jobs; unless objective < 0, improved in it by gradients."""
     with one_thread():
         designs = [point if k < 0 else improve_design(task, point, k) for point, k in jobs]
     return design_table(task, designs)
 
 
 def proved_table(task: Task, designs: Sequence[list[float]]) -> pl.DataFrame:
-    """Return the rows of designs after their proofs."""
+    """Return the rows (variables, quantities, violations) of designs after proving them."""
     return design_table(task, designs, proofs=True)
 
 
 def _designs_to_improve(
     front: Front, number: int, used: set[tuple[bytes, int]]
 ) -> list[tuple[list[float], int]]:
-    """Return designs to improve, spread over the current front, each in one objective."""
+    """Return (design, objective) pairs to improve, spread over the front; each is new in `used`."""
     spec = front.task.spec
     settings, objectives = spec.search, len(spec.objectives)
     count = settings.refined

@@ -86,7 +86,7 @@ class ObjectiveTable(TomlTable):
     @field_validator("maximise", "minimise")
     @classmethod
     def _expect_known(cls, name: str | None) -> str | None:
-        """Return the name of a quantity; raise where it is unknown."""
+        """Return the objective's quantity name; raise if no quantity is called so."""
         return name and expect_quantity(name)
 
     @model_validator(mode="after")
@@ -98,12 +98,12 @@ class ObjectiveTable(TomlTable):
 
     @property
     def quantity(self) -> str:
-        """The quantity's name."""
+        """The name of the quantity to maximise or minimise."""
         return self.maximise or self.minimise or ""
 
     @property
     def sign(self) -> float:
-        """1 for a quantity to minimise, -1 for one to maximise."""
+        """1 for a quantity to minimise, -1 for a quantity to maximise."""
         return 1.0 if self.minimise else -1.0
 
 
@@ -117,7 +117,7 @@ class RequirementTable(TomlTable):
     @field_validator("quantity")
     @classmethod
     def _expect_known(cls, name: str) -> str:
-        """Return the name of a quantity; raise where it is unknown."""
+        """Return the required quantity's name; raise if no quantity is called so."""
         return expect_quantity(name)
 
     @model_validator(mode="after")
@@ -133,7 +133,7 @@ class RequirementTable(TomlTable):
         return self
 
     def violation(self, amount: float, failed: float) -> float:
-        """Return the violation by a value over the bound, 0 if met; `failed` for a value of NaN."""
+        """Return by how much `amount` violates the bounds, relative; 0 if met; `failed` if NaN."""
         if math.isnan(amount):
             return failed
         missing = 0.0 if self.least is None else (self.least - amount) / (abs(self.least) or 1.0)
@@ -208,7 +208,7 @@ class Spec(TomlTable):
 
     @property
     def source(self) -> str:
-        """The path of the file that it was read from; empty if there is none."""
+        """The path of the file that the search was read from; empty if there is none."""
         return self._source
 
     @property
@@ -278,7 +278,7 @@ class Spec(TomlTable):
         return self.model_copy(update={"search": self.search.model_copy(update={"seed": seed})})
 
     def requirement_lines(self) -> list[str]:
-        """Return the objectives and requirements, a line each."""
+        """Return the search's objectives and requirements as lines of text."""
         lines = [
             f"{part.quantity} as {'small' if part.minimise else 'large'} as possible"
             for part in self.objectives
@@ -299,9 +299,9 @@ class Spec(TomlTable):
 
 
 def read_spec(path: str | Path) -> Spec:
-    """Read a search for a design from a TOML file.
+    """Read the specification of a design search from a TOML file.
 
-    Files of a machine and of motors that it names are sought in its own folder first.
+    Machine and motor files that it names are sought in its own folder first.
 
     Parameters
     ----------

@@ -16,7 +16,7 @@ from pteron.motion import limits_of
 
 
 def spec_faults(spec: Spec, robot: Manipulator) -> Iterator[str]:
-    """Yield the contradictions between a search and its machine, a line each."""
+    """Yield sentences on contradictions between a search and its machine."""
     if spec.pose is not None and len(spec.pose) != robot.freedom:
         yield f"pose: {len(spec.pose)} numbers given, {' '.join(robot.coordinates)} expected"
     if spec.angles is not None and robot.platform.axis_angle is None:
@@ -47,7 +47,7 @@ def spec_faults(spec: Spec, robot: Manipulator) -> Iterator[str]:
 
 
 def _workspace_faults(spec: Spec, robot: Manipulator) -> Iterator[str]:
-    """Yield the contradictions between a search's workspace and its machine, in words."""
+    """Yield sentences on contradictions between a search's workspace and its machine."""
     lengths, workspace = robot.platform.lengths, spec.workspace
     if workspace is None:
         return
@@ -75,13 +75,13 @@ _NEEDS = {
 
 
 def _has_drive_limits(robot: Manipulator) -> bool:
-    """Return whether a drive of a machine has limits."""
+    """Return whether some drive of the machine has a force or speed limit."""
     limits = limits_of(robot)
     return bool(np.isfinite([limits.force, limits.speed]).any())
 
 
 def _missing_tables(spec: Spec, robot: Manipulator, names: set[str]) -> Iterator[str]:
-    """Yield the tables that quantities need and the file lacks."""
+    """Yield sentences on tables that the named quantities need and the search lacks."""
     for name, table in _NEEDS.items():
         if name in names and getattr(spec, table) is None:
             yield f"{name}: needs a table [{table}]"
@@ -103,7 +103,7 @@ def _missing_tables(spec: Spec, robot: Manipulator, names: set[str]) -> Iterator
 
 
 def _loads(spec: Spec, robot: Manipulator) -> Iterator[str]:
-    """Yield contradictions of payload, cycles and per-leg numbers with the machine, in words."""
+    """Yield sentences on payload, cycles or numbers for each leg that contradict the machine."""
     if spec.payload is not None:
         try:
             spec.payload.add_to(robot)

@@ -37,10 +37,11 @@ def survey(
     scheduler: str | None = None,
     progress: Progress | None = None,
 ) -> Front:
-    """Evaluate many designs, and return the front of them.
+    """Evaluate many designs, spread by a Sobol sequence, and return their Pareto front.
 
-    They are the points of Sobol's sequence, shifted by a vector that the spec's seed gives: they
-    cover the ranges more evenly than random ones, and a larger count continues a smaller one.
+    The designs are points of a Sobol sequence, shifted by a random vector from the spec's seed:
+    they cover the ranges more evenly than random points, and a larger count continues a smaller
+    one.
 
     Parameters
     ----------
@@ -89,12 +90,12 @@ def survey(
 
 
 def _evaluate_chunk(task: Task, first: int) -> pl.DataFrame:
-    """Return the rows of the chunk of designs that begins with number `first`."""
+    """Return the rows of the designs number `first` to `first + _CHUNK` of the survey."""
     return design_table(task, survey_designs(task, first, _CHUNK))
 
 
 def survey_designs(task: Task, first: int, count: int) -> Array:
-    """Return designs (count, V) of the survey's sequence, beginning with number `first`."""
+    """Return designs (count, V) of the shifted Sobol sequence, from number `first` on."""
     low, high = task.ranges
     sequence = scipy.stats.qmc.Sobol(len(low), scramble=False)
     if first:
@@ -104,6 +105,6 @@ def survey_designs(task: Task, first: int, count: int) -> Array:
 
 
 def _parts(store: TableStore, chunks: range) -> Iterable[pl.DataFrame]:
-    """Return the store's rows in tables of a chunk each, read lazily."""
+    """Return the store's rows as tables of one chunk each, read lazily."""
     table = store.scan()
     return (table.slice(first, _CHUNK).collect() for first in chunks)

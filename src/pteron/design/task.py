@@ -62,7 +62,7 @@ class Task:
 
     @classmethod
     def from_spec(cls, spec: Spec) -> Task:
-        """Return the task of a search.
+        """Return the task of a design search: the specification with machine, variables, motors.
 
         Raises
         ------
@@ -101,7 +101,10 @@ class Task:
 
     @property
     def plan(self) -> dict[str, Any]:
-        """All that its results depend on: the spec, the machine, and the version of results."""
+        """Plain data that results depend on: specification, machine, versions.
+
+        Stored rows are reused only while this data is unchanged.
+        """
         spec = self.spec.model_dump(mode="json", exclude={"robot"})
         spec = {key: part for key, part in spec.items() if part or key not in _LATER}
         if spec["workspace"] is not None and spec["workspace"]["sides"] is None:
@@ -118,12 +121,12 @@ class Task:
 
     @cached_property
     def quantities(self) -> dict[str, DesignQuantity]:
-        """The quantities that a search may name, the user's own among them."""
+        """All design quantities by name: the package's and the user's own."""
         return quantities() | self.spec.user_quantities
 
     @cached_property
     def floors(self) -> FloorsTable:
-        """The least measures of every pose: the greater of `[floors]` and requirements."""
+        """Required singularity measures of every pose: the greater of floors and requirements."""
         measures = dict(self.spec.floors)
         for requirement in self.spec.requirements:
             if (
@@ -138,14 +141,14 @@ class Task:
 
     @property
     def floats(self) -> bool:
-        """Whether the required workspace is placed anew for every design."""
+        """Whether the required workspace has no fixed place, but is placed anew in every design."""
         return self.spec.workspace is not None and self.spec.workspace.floats
 
     @cached_property
     def shape(self) -> tuple[Shape, float]:
-        """The shape whose largest copy is sought, and the edge that is required of it, 0 for none.
+        """The shape to be enlarged in each design, and the required edge, m; 0 for none.
 
-        It is the workspace where that floats, else the cube.
+        The shape is the workspace if that floats, else the cube.
         """
         count = len(self.robot.platform.lengths)
         if self.spec.workspace is not None and self.floats:
@@ -154,14 +157,14 @@ class Task:
 
     @cached_property
     def conditions(self) -> SmoothConditions:
-        """The conditions at every pose, as functions of the geometry."""
+        """The feasibility conditions at a pose, as functions of the machine's geometry."""
         floors = self.floors
         required = conditions(self.robot, type_i=floors.type_i, type_ii=floors.type_ii)
         return smooth_conditions(self.robot, required)
 
     @cached_property
     def orientations(self) -> Array:
-        """Poses (A, m) with the angles of the search."""
+        """Poses (A, m) with the orientations of the search; their positions do not count."""
         spec, angular = self.spec, self.robot.platform.angular
         pose = np.zeros(len(angular)) if spec.pose is None else np.array(spec.pose)
         if spec.angles is None:
@@ -178,7 +181,7 @@ class Task:
 
     @property
     def seeks_cube(self) -> bool:
-        """Whether the largest cube of each design is looked for."""
+        """Whether the largest feasible cube of each design is computed."""
         return "cube" in self.quantity_names or self.spec.workspace is None
 
     @property
@@ -188,37 +191,37 @@ class Task:
 
     @property
     def ranges(self) -> Array:
-        """Least and greatest value of each variable, (2, V)."""
+        """Lower and upper bounds of the design variables, (2, V)."""
         return np.array([(v.low, v.high) for v in self.variables]).T
 
     @property
     def start(self) -> Array:
-        """The variables' values in the machine to begin with (V,), moved into their ranges."""
+        """The design variables of the initial machine (V,), clipped to their bounds."""
         return np.clip([v.start for v in self.variables], *self.ranges)
 
     def costs(self, designs: pl.DataFrame) -> Array:
-        """Return the costs of designs (N, M): objectives, negative where they are maximised."""
+        """Return the costs (N, M) of a table of designs: objectives, negated if maximised."""
         signs = [o.sign for o in self.spec.objectives]
         names = [o.quantity for o in self.spec.objectives]
         return np.asarray(designs.select(names).to_numpy() * signs)
 
     def points(self, designs: pl.DataFrame) -> Array:
-        """Return the variables of a table of designs (N, V)."""
+        """Return the design variables (N, V) from a table of designs."""
         return np.asarray(designs.select([v.name for v in self.variables]).to_numpy())
 
     def unit(self, name: str) -> str:
-        """Return the unit of a quantity, for this machine's joints."""
+        """Return the unit of the quantity `name`, for this machine's joints."""
         joint = self.robot.legs[0].joint
         force, speed = joint.force_unit, f"{joint.unit}/s"
         units = {"force": force, "cycle_force": force, "speed": speed, "cycle_speed": speed}
         return units.get(name, self.quantities[name].unit)
 
     def function(self, what: str) -> Kernel:
-        """Return a function for the machines' topology, with geometry as an input."""
+        """Return the compiled kernel `what` of the machine's topology; geometry is an input."""
         return compile(self.robot, what, grade="general")
 
     def machine(self, point: Sequence[float]) -> Manipulator:
-        """Return the machine of a design.
+        """Return the machine with the design variables `point` (V,).
 
         Raises
         ------

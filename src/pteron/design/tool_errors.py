@@ -33,12 +33,12 @@ _SOFT, _HARD = 1e4, 1e7
 
 
 def tolerances(accuracy: AccuracyTable, joints: float | Sequence[float]) -> Tolerances:
-    """Return the tolerances of a task with these errors of the joints, m or rad."""
+    """Return `Tolerances` of the parts in `accuracy`, with these joint errors, m or rad."""
     return Tolerances(joints, 0.0, accuracy.point, accuracy.length, accuracy.angle)
 
 
 def joint_errors(accuracy: AccuracyTable, ratios: Array, backlash: Array) -> Array:
-    """Return errors of joints, m or rad: half a count of the encoder plus half the backlash.
+    """Return joint errors, m or rad: half an encoder count plus half the backlash.
 
     `ratios` are motor radians per joint unit, `backlash` is at the joint, m or rad.
     """
@@ -48,7 +48,7 @@ def joint_errors(accuracy: AccuracyTable, ratios: Array, backlash: Array) -> Arr
 
 
 def unit_errors(accuracy: AccuracyTable, robot: Manipulator, poses: Array) -> tuple[Array, Array]:
-    """Return the tool's errors at poses, (N,) each, m: per unit of joint error, and others."""
+    """Return tool errors (N,) at poses: per unit of joint error, and those of the parts, m."""
     joints = greatest_errors(accuracy, robot, poses, Tolerances(joints=1.0))
     if not accuracy.has_part_errors:
         return joints, np.zeros_like(joints)
@@ -70,9 +70,9 @@ def greatest_errors(
 def errors_with(
     accuracy: AccuracyTable, units: tuple[Array, Array], ratios: Array, backlash: Array
 ) -> Array:
-    """Return the greatest error of the tool with each of O choices of drives, (O,), m.
+    """Return the tool's greatest error, m, for each of O choices of drives: (O,).
 
-    `units` are those of `unit_errors`.
+    `units` are errors as `unit_errors` returns them.
     """
     joint = joint_errors(accuracy, ratios, backlash)[:, None] * units[0]
     total = joint + units[1] if accuracy.counted == "worst" else np.hypot(joint, units[1])
@@ -80,7 +80,7 @@ def errors_with(
 
 
 def link_sections(robot: Manipulator, stocks: Mapping[str, str]) -> dict[str, Section]:
-    """Return the sections of links made of stock; `stocks` has its name for "upper", "lower"."""
+    """Return the cross-sections of links made of bar stock; `stocks` has its name by link."""
     sections = {}
     for key, name in stocks.items():
         stock = Stock.parse(name)
@@ -93,7 +93,7 @@ def link_sections(robot: Manipulator, stocks: Mapping[str, str]) -> dict[str, Se
 
 
 def elasticity(sections: Mapping[str, Section], actuators: float | Sequence[float]) -> Elasticity:
-    """Return the stiffnesses of a machine's drives and links."""
+    """Return the `Elasticity` of links with these sections and drives of stiffness `actuators`."""
     several = actuators if isinstance(actuators, float) else tuple(actuators)
     return Elasticity(several, sections.get("upper"), sections.get("lower"))
 
@@ -101,10 +101,10 @@ def elasticity(sections: Mapping[str, Section], actuators: float | Sequence[floa
 def compliances(
     robot: Manipulator, poses: Array, sections: Mapping[str, Section]
 ) -> tuple[Array, Array]:
-    """Return the greatest compliance at poses in parts, (N,) each.
+    """Return greatest compliances (N,) at poses: with rigid drives, m/N; slope by drives'.
 
-    The first, m/N, is that with rigid drives; the second is the slope by the compliance of the
-    drives.
+    The first result, m/N, is for rigid drives; the second is the derivative by the drives'
+    compliance.
     """
     soft, hard = (
         np.asarray(1.0 / stiffness(robot, poses, elasticity(sections, k)).least)
@@ -115,5 +115,5 @@ def compliances(
 
 
 def compliance_with(compliances: tuple[Array, Array], actuators: Array) -> Array:
-    """Return the greatest compliance with each of O stiffnesses of the drives, (O,), m/N."""
+    """Return the greatest compliance over poses, m/N, for each of O drive stiffnesses: (O,)."""
     return np.asarray((compliances[0] + compliances[1] / actuators[:, None]).max(axis=1))

@@ -13,7 +13,7 @@ from pteron.manipulator import Manipulator
 
 
 def named_quantity(quantity: DesignQuantity | Callable[[Manipulator], float]) -> DesignQuantity:
-    """Return a function of the machine as a quantity with the function's name.
+    """Return a user's function of the machine as a `DesignQuantity` with the function's name.
 
     Raises
     ------
@@ -37,7 +37,7 @@ def function_of(quantity: DesignQuantity) -> Any:
 
 
 def code_digest(quantity: DesignQuantity) -> str:
-    """Return a digest of a user's quantity and its code, by which kept results are recognised."""
+    """Return a digest of a user quantity's name, unit and code, to recognise stored results."""
     code = getattr(function_of(quantity), "__code__", None)
     parts = () if code is None else (code.co_code, code.co_consts, code.co_names)
     text = repr([quantity.name, quantity.unit, parts])

@@ -49,19 +49,19 @@ class Variable:
 
     @property
     def unit(self) -> str:
-        """The value's unit: m of lengths and points; none of factors, directions and numbers."""
+        """The unit of the variable's value: "m" for lengths and points, else ""."""
         scale = {"length", "point"} & {place.role for place in self.places}
         return "m" if scale and self.by != "factor" else ""
 
     def number(self, place: GeometryNumber, start: float, setting: float) -> float:
-        """Return the new value of one of the numbers, from its value at the start."""
+        """Return a geometric number's new value, from its initial one and the variable's value."""
         if self.by == "factor":
             return start * setting
         return place.sign * setting + (start if self.by == "offset" else 0.0)
 
 
 def variables_of(robot: Manipulator, tables: Sequence[VariableTable]) -> tuple[Variable, ...]:
-    """Return the variables of a search that begins with a machine."""
+    """Return the design variables of a search from its tables; raise with all their faults."""
     variables: list[Variable] = []
     faults: list[str] = []
     for i, table in enumerate(tables, start=1):
@@ -82,7 +82,7 @@ def variables_of(robot: Manipulator, tables: Sequence[VariableTable]) -> tuple[V
 
 
 def _variables(robot: Manipulator, table: VariableTable) -> list[Variable]:
-    """Return the variables that a table states: a single variable, or a variable for each leg."""
+    """Return the design variables that a table states: one, or one for each leg."""
     named = [place for path in table.moves for place in named_numbers(robot, path)]
     legs = sorted({place.leg for place in named})
     groups = [[p for p in named if p.leg == leg] for leg in legs] if table.each else [named]
@@ -106,9 +106,9 @@ def _variables(robot: Manipulator, table: VariableTable) -> list[Variable]:
 def move_variables(
     robot: Manipulator, variables: Sequence[Variable], point: Sequence[float], *, stretch: bool
 ) -> Manipulator:
-    """Return a machine with its variables at other values.
+    """Return the machine with the design variables set to `point` (V,).
 
-    `stretch` says whether links of another length have another inertia.
+    With `stretch`, links of changed length change their inertia too.
     """
     legs = list(robot.legs)
     changed: dict[int, dict[str, list[float]]] = {}
@@ -135,13 +135,13 @@ def move_variables(
 def geometry_slopes(
     robot: Manipulator, variables: Sequence[Variable], point: Sequence[float]
 ) -> Array:
-    """Return d geometry / d values (G, V): how `equations.machine.numbers` follow the variables.
+    """Return d geometry / d variables (G, V); rows as in `equations.machine.numbers`.
 
-    Lengths and points are linear in them, so that a difference is exact but for rounding.
+    Lengths and points are linear in the variables, so that differences are exact up to rounding.
     """
 
     def geometry(point: Array) -> Array:
-        """Return the machine's numbers (G,) at variable values (V,)."""
+        """Return the machine's geometric numbers (G,) at design variables (V,)."""
         return np.array(numbers(move_variables(robot, variables, point.tolist(), stretch=False)))
 
     return slopes_of(geometry, variables, point).T

@@ -34,21 +34,21 @@ _ROUNDS = 4
 
 
 def platform_curve(robot: Manipulator, *curve: Array) -> Curve:
-    """Return poses of P and two derivatives for a curve of the tool, from the middle."""
+    """Return poses of P and two derivatives, about the middle, for a tool curve (..., m)."""
     pose, first, second = pose_motion(robot.platform, *curve)
     zeros = np.zeros((1, robot.freedom))
     return pose + tool_motion(robot.platform, zeros, zeros, zeros)[0], first, second
 
 
 def poses_about_tool(robot: Manipulator, angles: Array) -> Array:
-    """Return poses (A, m) that turn about the tool, relative to the workspace's middle."""
+    """Return poses (A, m) with the given angles at which the tool stays in the middle."""
     poses = np.zeros((len(angles), robot.freedom))
     poses[:, len(robot.platform.lengths) :] = angles
     return platform_curve(robot, poses, np.zeros_like(poses), np.zeros_like(poses))[0]
 
 
 def sample_poses(job: Job, robot: Manipulator, count: int | None = None) -> Array:
-    """Return poses (N, m) over the workspace and its orientations, from its middle."""
+    """Return sample poses (N, m) over the workspace and its orientations, about its middle."""
     return _poses_at(job, robot, _places(job, robot, count or _positions_along(job)))
 
 
@@ -62,10 +62,10 @@ def refine_worst_values(
 ) -> tuple[Array, Array]:
     """Return the minimum of each column of values (C,), and its pose (C, m).
 
-    `values_of` gives the values (B, C) at poses (B, m), which are from the middle. They are taken
-    at `sample_poses`, and then ever nearer about those that are worst in a column, `keep` of each:
-    what is worst near a singularity is worst in a valley that samples miss. Poses `besides` those
-    of the workspace count as they are.
+    `values_of` returns values (B, C) at poses (B, m) relative to the workspace's middle. They are
+    evaluated at `sample_poses`, then at ever closer neighbours of the `keep` worst poses of each
+    column, since near a singularity the minimum lies in a valley between samples. Poses `besides`
+    those of the workspace are added as they are.
     """
     samples, space = samples or _positions_along(job), job.workspace
     count = len(robot.platform.lengths)
@@ -93,7 +93,7 @@ def refine_worst_values(
 
 
 def _neighbour_steps(steps: Array, count: int) -> Array:
-    """Return steps (W, m) to the neighbours of a place; not in lengths and tilts at once."""
+    """Return all pose steps (W, m) to neighbours, in positions or in tilts but not both at once."""
     several = [(-1.0, 0.0, 1.0) if step else (0.0,) for step in steps]
     if not steps[count:-1].any():
         return np.array(list(product(*several)))
@@ -103,7 +103,10 @@ def _neighbour_steps(steps: Array, count: int) -> Array:
 
 
 def _clip_to_workspace(job: Job, places: Array, count: int) -> Array:
-    """Return places (N, m) clipped to the workspace."""
+    """Return places (N, m), relative to the middle, clipped to the workspace.
+
+    Duplicates are removed.
+    """
     space, half, clipped = job.workspace, job.workspace.half[:count], places.copy()
     if space.poses is None:
         clipped[:, :count] = np.clip(clipped[:, :count], -half, half)
@@ -117,20 +120,20 @@ def _clip_to_workspace(job: Job, places: Array, count: int) -> Array:
 
 
 def _clip_to_radius(points: Array, radius: float) -> Array:
-    """Return points (N, 2) drawn into a circle."""
+    """Return points (N, 2) moved radially into a circle about the origin."""
     shares = np.minimum(1.0, radius / np.maximum(np.hypot(*points.T), 1e-12))
     return np.asarray(points * shares[:, None])
 
 
 def _positions_along(job: Job) -> int:
-    """Return the number of sample positions along an edge, fewer where the platform tilts."""
+    """Return the number of sample positions along a side; fewer where the platform tilts."""
     return _ALONG_TILTED if job.workspace.tilts else _ALONG
 
 
 def _places(job: Job, robot: Manipulator, count: int) -> Array:
-    """Return places (N, m): of the tool from the middle, and angles of the platform.
+    """Return places (N, m): tool positions relative to the middle, and platform angles.
 
-    Of a cone of tilts the angles are how far the platform leans to x and to y, and its turn.
+    For a cone of tilts the angles are the leans towards x and y, and the turn about z.
     """
     points = _positions(job, count)[:, : len(robot.platform.lengths)]
     angles = orientations(job, robot)
@@ -153,7 +156,7 @@ def _poses_at(job: Job, robot: Manipulator, places: Array) -> Array:
 
 
 def pad_to_xyz(rows: object) -> Array:
-    """Return rows of two or three numbers with three."""
+    """Return rows of two or three numbers as (N, 3), padded with zeros."""
     array = np.asarray(rows, dtype=float)
     return np.pad(array, ((0, 0), (0, 3 - array.shape[1])))
 
@@ -175,18 +178,18 @@ def _positions(job: Job, count: int) -> Array:
 
 
 def orientations(job: Job, robot: Manipulator) -> Array:
-    """Return angles (A, a) of the platform that the workspace asks for; tilts at each turn."""
+    """Return the platform angles (A, a), rad, that the workspace requires: tilts at each turn."""
     return np.concatenate([turn_angles(tilts(job, robot), angle) for angle in _turns(job)])
 
 
 def _turns(job: Job) -> list[float]:
-    """Return the turns at which a workspace is sampled, rad: its ends, and 0 if between them."""
+    """Return the turns about the vertical, rad, at which a workspace is sampled: ends and 0."""
     turn = job.workspace.turn
     return [0.0] if turn is None else [*([0.0] if turn[0] < 0.0 < turn[1] else []), *turn]
 
 
 def tilts(job: Job, robot: Manipulator) -> Array:
-    """Return angles (A, a) of the tilts: of a cone those of its middle and round its rim."""
+    """Return platform angles (A, a), rad, of required tilts; of a cone its middle and rim."""
     space, count = job.workspace, len(robot.platform.angles)
     if space.tilt is not None:
         return _tilted_angles(robot, _leans(space.tilt))
@@ -200,20 +203,20 @@ def tilts(job: Job, robot: Manipulator) -> Array:
 
 
 def _leans(tilt: float) -> Array:
-    """Return leans (L, 2) to x and y, rad: none, and round the rim of a cone."""
+    """Return leans (L, 2) towards x and y, rad: zero, and equally spaced on the rim of a cone."""
     rim = 2.0 * np.pi * np.arange(_RIM) / _RIM
     return np.vstack([np.zeros((1, 2)), tilt * np.c_[np.cos(rim), np.sin(rim)]])
 
 
 def _tilted_angles(robot: Manipulator, leans: Array) -> Array:
-    """Return the angles (L, a) of a platform that leans to x and y (L, 2): the shortest turn."""
+    """Return platform angles (L, a), rad, of leans (L, 2) towards x and y by the shortest turn."""
     vectors = np.c_[-leans[:, 1], leans[:, 0], np.zeros(len(leans))]
     matrices = rotation_matrices(vectors)
     return np.array(pose_of(robot, np.zeros(3), matrices)[:, -len(robot.platform.angles) :])
 
 
 def turn_angles(angles: Array, turn: float) -> Array:
-    """Return angles (A, a) turned further about the vertical axis."""
+    """Return platform angles (A, a) with `turn` rad added about the vertical axis."""
     if not angles.shape[1]:
         return angles
     return np.asarray(angles + turn * np.eye(angles.shape[1])[-1])

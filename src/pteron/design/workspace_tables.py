@@ -26,7 +26,7 @@ _TURNS = 7.0
 
 
 def _expect_near(coordinates: Any) -> Any:
-    """Refuse lengths, m, that are too large for a cell."""
+    """Return coordinates in m; raise if they are too large for a machine's cell."""
     lengths = np.abs(coordinates).ravel()
     if lengths.max() > _FAR:
         raise ValueError(f"{lengths.max():g} m given: are these mm?")
@@ -34,7 +34,7 @@ def _expect_near(coordinates: Any) -> Any:
 
 
 def _fine(error: float) -> float:
-    """Refuse errors, m, that are too large for a machine."""
+    """Return an accuracy (error), m; raise if it is too large for a machine."""
     if error > _COARSE:
         raise ValueError(f"{error:g} m given: is this mm?")
     return error
@@ -48,7 +48,7 @@ def _expect_tilt(angle: float) -> float:
 
 
 def expect_near_points(points: list[tuple[float, ...]]) -> list[tuple[float, ...]]:
-    """Refuse points whose first two coordinates, lengths in m, are too large for a cell."""
+    """Return points; raise if their first two coordinates, m, are too large for a cell."""
     _expect_near([point[:2] for point in points])
     return points
 
@@ -107,22 +107,22 @@ class WorkspaceTable(TomlTable):
 
     @property
     def shape(self) -> Literal["box", "cube", "cylinder"]:
-        """The kind of workspace."""
+        """Whether the workspace is a "box", a "cube" or a "cylinder"."""
         if self.radius is not None:
             return "cylinder"
         return "cube" if self.edge is not None else "box"
 
     @property
     def floats(self) -> bool:
-        """Whether its place is free."""
+        """Whether the workspace has no fixed place, but may be placed anywhere."""
         return self.low is None and self.center is None
 
     def with_center(self, center: Iterable[float]) -> Self:
-        """Return the workspace at another center, m."""
+        """Return a copy of the workspace centred at `center` (k,), m."""
         return self.model_copy(update={"center": tuple(map(float, center))})
 
     def dimensions(self, count: int) -> tuple[float, ...]:
-        """Return the sides (count,) of the box around it, m."""
+        """Return the sides (count,) of the box around the workspace, m."""
         if self.low is not None and self.high is not None:
             return tuple(b - a for a, b in zip(self.low, self.high, strict=True))
         if self.radius is not None and self.height is not None:
@@ -133,7 +133,7 @@ class WorkspaceTable(TomlTable):
 
     @property
     def ends(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """Least and greatest coordinates of the box around a placed workspace, m."""
+        """Lower and upper corner of the box around a placed workspace, m."""
         if self.low is not None and self.high is not None:
             return self.low, self.high
         center = self.center or ()
@@ -145,7 +145,7 @@ class WorkspaceTable(TomlTable):
 
     @property
     def lengths(self) -> int | None:
-        """Number of its coordinates; None if it fits any number."""
+        """Number of the workspace's length coordinates; None if any number fits."""
         return len(self.low or self.sides or self.center or ()) or (3 if self.radius else None)
 
 
@@ -204,7 +204,7 @@ class ToolWorkspaceTable(TomlTable):
         return np.pad(0.5 * sides, (0, 3 - len(sides)))
 
     def meets(self, low: Array, high: Array) -> bool:
-        """Return whether the tool may enter a box, corners (3,) from the workspace's middle, m."""
+        """Return whether the tool's workspace meets a box of corners (3,), m, about its middle."""
         if self.poses is not None:
             poses = np.pad(self.poses, ((0, 0), (0, 3 - len(self.poses[0]))))
             poses = poses - 0.5 * (poses.min(axis=0) + poses.max(axis=0))
@@ -217,12 +217,12 @@ class ToolWorkspaceTable(TomlTable):
 
     @property
     def tilts(self) -> bool:
-        """Whether the platform must tilt."""
+        """Whether the workspace requires the platform to tilt."""
         return self.tilt is not None or self.directions is not None
 
     @property
     def words(self) -> str:
-        """The shape of the workspace in words."""
+        """The workspace's shape and size as text."""
         if self.size is not None:
             return f"workspace {' x '.join(f'{1e3 * x:g}' for x in self.size)} mm"
         if self.poses is not None:

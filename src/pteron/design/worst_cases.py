@@ -30,9 +30,10 @@ overstate it by less than 0.4 % in space, and by less than 0.2 % in a plane."""
 
 
 def worst_speeds(robot: Manipulator, poses: Array, speed: float) -> Array:
-    """Return the greatest speed of each joint (N, n) as P moves at a speed in any direction.
+    """Return the greatest speed of each joint (N, n) as P moves at `speed` in any direction.
 
-    The platform does not turn meanwhile; m/s or rad/s. Exact: the norm of a row of J.
+    The platform does not turn meanwhile; m/s or rad/s. The value is exact: the norm of a row of the
+    Jacobian.
     """
     moving = len(robot.platform.lengths)
     rows = jacobian(robot, poses, on_failure="nan")[..., :moving]
@@ -42,11 +43,12 @@ def worst_speeds(robot: Manipulator, poses: Array, speed: float) -> Array:
 def worst_forces(robot: Manipulator, poses: Array, speed: float, acceleration: float) -> Array:
     """Return the greatest size of each drive's force (N, n), N or N m, over all motions of P.
 
-    Velocities up to a speed, m/s, and accelerations, m/s^2, in any direction, each by itself; the
-    platform does not turn. A force is affine in the acceleration, so that the worst is a row's
-    norm, and quadratic in the velocity: its extreme in a ball is that of the dual problem, which
-    has no gap (the S-lemma; I. Polik and T. Terlaky, SIAM Review 49(3), 2007). Dry friction takes
-    the side that adds to it, with all of Stribeck's part.
+    Velocities are at most `speed`, m/s, and accelerations at most `acceleration`, m/s^2, in any
+    direction, independently; the platform does not turn. A force is affine in the acceleration, so
+    that its maximum is a row's norm, and quadratic in the velocity: its maximum in a ball equals
+    that of the dual problem, without a gap (the S-lemma; I. Polik and T. Terlaky, SIAM Review
+    49(3), 2007). Dry friction has the sign that increases the force, and includes all of the
+    Stribeck force.
     """
     legs = (replace(leg, drive=_frictionless(leg.drive)) for leg in robot.legs)
     static, rows, squares = _force_expansion(replace(robot, legs=tuple(legs)), poses)
@@ -68,12 +70,12 @@ def worst_forces(robot: Manipulator, poses: Array, speed: float, acceleration: f
 
 
 def _frictionless(drive: Drive | None) -> Drive | None:
-    """Return a drive with its rotor's inertia and ratio alone; None without a drive."""
+    """Return a drive with its rotor inertia and ratio only, no friction; None without a drive."""
     return drive and Drive(rotor_inertia=drive.rotor_inertia, ratio=drive.ratio)
 
 
 def _force_expansion(robot: Manipulator, poses: Array) -> tuple[Array, Array, Array]:
-    """Return forces at rest (N, n), by acceleration (N, n, k), and as a form in v (N, n, k, k)."""
+    """Return forces at rest (N, n), by acceleration (N, n, k), by velocities (N, n, k, k)."""
     k = len(robot.platform.lengths)
     axes = np.eye(robot.freedom)[:k]
     pairs = list(combinations(range(k), 2))
@@ -112,11 +114,11 @@ def _greatest_over_directions(eigenvalues: Array, parts: Array, size: float) -> 
 
 
 def worst_position_errors(robot: Manipulator, poses: Array, tolerances: Tolerances) -> Array:
-    """Return how far the tool may be off at each pose (N,), m, if all errors are at their limits.
+    """Return an upper bound of the tool's position error at each pose (N,), m.
 
-    An upper bound, to first order in the errors: for every unit vector u the sum of |u . error| of
-    all sources; the greatest of these, over directions so dense that no other is larger by more
-    than is added.
+    To first order in the errors, it is the maximum over unit vectors u of the sum of |u . error| of
+    all sources. Directions are sampled so densely that dividing by the cosine of their spacing
+    gives an upper bound.
     """
     lengths = len(robot.platform.lengths)
     parts = pose_error(robot, poses, tolerances, on_failure="nan").parts[:, :lengths]
@@ -126,9 +128,9 @@ def worst_position_errors(robot: Manipulator, poses: Array, tolerances: Toleranc
 
 @lru_cache(maxsize=4)
 def _directions(count: int) -> tuple[Array, float]:
-    """Return unit vectors (D, count), and the cosine of their covering angle.
+    """Return unit vectors (D, count) over all directions, and the cosine of their covering angle.
 
-    They lead through the middles of cells on a cube's faces; opposite ones count as one.
+    They point to the middles of cells on a cube's faces; opposite directions count once.
     """
     middles = (np.arange(_CELLS) + 0.5) * 2.0 / _CELLS - 1.0
     points = [

@@ -16,7 +16,7 @@ def inverse_dynamics(
     *,
     on_failure: OnFailure = "raise",
 ) -> PerJoint:
-    """Return the actuator forces of a motion, by virtual work, Eq. (13).
+    """Return the actuator forces (..., n) of a motion, without friction, by virtual work, Eq. (13).
 
     F_a = - F_p - J^-T (sum J_u^T F_u + sum J_l^T F_l + F_e), without friction.
 
@@ -69,9 +69,10 @@ def forward_dynamics(
     *,
     on_failure: OnFailure = "raise",
 ) -> PerCoordinate:
-    """Return the platform's acceleration under actuator forces: M x'' = J^T F + wrench - h.
+    """Return the platform's acceleration (..., m) under actuator forces, without friction.
 
-    It needs no J^-1, so that it is defined at type-II singularities too.
+    M x'' = J^T F + wrench - h. It needs no J^-1, so that it is defined at type-II singularities
+    too.
 
     Parameters
     ----------
@@ -124,7 +125,7 @@ def drive_forces(
     smooth: bool = False,
     on_failure: OnFailure = "raise",
 ) -> PerJoint:
-    """Return the drives' forces: `inverse_dynamics`, friction and the motors' inertia.
+    """Return the drives' forces: `inverse_dynamics` plus friction and the motors' inertia.
 
     F + ratio^2 rotor_inertia q'' + (coulomb + stribeck exp(-(q'/v_s)^2)) s(q') + viscous q' +
     offset, by each leg's `drive`; a leg without one has neither friction nor a rotor.
@@ -183,10 +184,9 @@ def drive_accelerations(
     *,
     on_failure: OnFailure = "raise",
 ) -> PerCoordinate:
-    """Return the platform's acceleration under the drives' forces, with friction and rotors.
+    """Return the platform's acceleration under drive forces, with friction and motor inertia.
 
-    The inverse of `drive_forces` with ``smooth=True``: friction and the motors' inertia take their
-    part of the forces.
+    It is the inverse of `drive_forces` with ``smooth=True``.
 
     Parameters
     ----------
@@ -239,7 +239,7 @@ def regressor(
     *,
     on_failure: OnFailure = "raise",
 ) -> Regressors:
-    """Return the dynamic matrix D of Eq. (15): D @ parameters(robot) = inverse_dynamics(...).
+    """Return the regressor D of Eq. (15): D @ parameters(robot) = inverse_dynamics(...).
 
     Parameters
     ----------

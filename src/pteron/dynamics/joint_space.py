@@ -9,19 +9,19 @@ _Array = NDArray[np.float64]
 
 
 def mass_with_rotors(rows: _Array, mass: _Array, rotors: _Array) -> _Array:
-    """Return M + J^T D J (..., m, m), D being the rotors' inertias (..., n) at the joints."""
+    """Return mass matrices with rotor inertias, M + J^T D J (..., m, m)."""
     return np.asarray(mass + (rows.mT * rotors[..., None, :]) @ rows)
 
 
 def joint_mobilities(rows: _Array, mass: _Array) -> _Array:
     """Return the diagonal (..., n) of J M^-1 J^T, 1/kg or 1/(kg m^2).
 
-    It is the acceleration of a joint for a unit of its force, the other joints being free.
+    It is the acceleration of each joint per unit of its force, the other joints being free.
     """
     return np.asarray(np.einsum("...ij,...ji->...i", rows, np.linalg.solve(mass, rows.mT)))
 
 
 def moved_inertias(rows: _Array, mass: _Array) -> _Array:
-    """Return the inertias (..., n) of joints with the others locked: diag(J^-T M J^-1)."""
+    """Return the inertia (..., n) at each joint, kg or kg m^2, with the other joints locked."""
     inverse = np.linalg.inv(rows)
     return np.asarray(np.einsum("...ai,...ab,...bi->...i", inverse, mass, inverse))

@@ -44,7 +44,7 @@ def world_of(
     tolerance: float | None = None,
     machines: Machines | None = None,
 ) -> World:
-    """Return the world of a machine, or of several about it, after checks."""
+    """Return the simulated world of learning environments for a machine, after checks."""
     machine = as_manipulator(robot)
     sizes = {"period": period, "tolerance": tolerance, "spread": spread}
     for name, size in sizes.items():
@@ -83,14 +83,14 @@ def world_of(
 
 @lru_cache(maxsize=16)
 def _home(robot: Manipulator) -> Array:
-    """Return the home pose, whose search takes a second, for every environment of a machine."""
+    """Return the machine's home pose (m,), read-only and cached."""
     home = home_pose(robot)
     home.setflags(write=False)
     return home
 
 
 def _forces(robot: Manipulator, home: Array) -> Array:
-    """Return the drives' forces (n,) for an action of 1, N or N m."""
+    """Return the drive force (n,), N or N m, that an action of 1 stands for."""
     zero_rates = np.zeros(robot.freedom)
     rows = jacobian(robot, home)
     mass = mass_with_rotors(rows, mass_matrix(robot, home), drives_of(robot).inertia)

@@ -97,13 +97,13 @@ class PteronEnv(gymnasium.Env[Numbers, Numbers]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Numbers, dict[str, Any]]:
-        """Start an episode; `options` may have a "pose" to start in at rest, and a "target"."""
+        """Start an episode; return the observation (4 m,) and infos."""
         super().reset(seed=seed)
         self._state = self.world.start_episodes([self.np_random], options).row(0)
         return self.world.observations(self._state), self._info(self.world.distance(self._state))
 
     def step(self, action: Numbers) -> tuple[Numbers, float, bool, bool, dict[str, Any]]:
-        """Advance the machine by a period under the drives' forces."""
+        """Apply an action (n,) for one period; return observation, reward, end flags and infos."""
         if self._state is None:
             raise DataError("step before reset; call reset first")
         self._state, distance, reward, ended = self.world.advance(self._state, action)
@@ -113,11 +113,11 @@ class PteronEnv(gymnasium.Env[Numbers, Numbers]):
         return self.world.observations(self._state), float(reward), bool(ended), False, info
 
     def _info(self, distance: Any) -> dict[str, Any]:
-        """Return the distance to the target, m, and whether it is within the tolerance."""
+        """Return a dictionary: the distance to the target, m, and if it is within tolerance."""
         return {"distance": float(distance), "is_success": bool(distance < self.world.tolerance)}
 
     def render(self) -> NDArray[np.uint8] | None:
-        """Return a picture of the machine, (height, width, 3), if it is asked for."""
+        """Return a picture of the machine, (height, width, 3); None without a render mode."""
         if self.render_mode is None:
             return None
         if self._state is None:
@@ -126,7 +126,7 @@ class PteronEnv(gymnasium.Env[Numbers, Numbers]):
 
 
 def spaces(bounds: Array, count: int) -> tuple[gymnasium.Space[Any], gymnasium.Space[Any]]:
-    """Return the spaces of observations within bounds and of actions of so many drives."""
+    """Return the gymnasium spaces of observations within +-bounds and of `count` actions."""
     most = bounds.astype(np.float32)
     return (
         gymnasium.spaces.Box(-most, most, dtype=np.float32),
@@ -135,7 +135,7 @@ def spaces(bounds: Array, count: int) -> tuple[gymnasium.Space[Any], gymnasium.S
 
 
 def checked_mode(mode: str | None) -> str | None:
-    """Return a render mode after a check."""
+    """Return a render mode; raise unless it is None or "rgb_array"."""
     if mode not in (None, "rgb_array"):
         raise DataError(f'render_mode: {mode!r} given, None or "rgb_array" expected')
     return mode

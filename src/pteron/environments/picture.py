@@ -28,14 +28,14 @@ class EnvironmentPicture:
 
     @cached_property
     def _guides(self) -> tuple[Guide, ...]:
-        """The guides of the machine's joints, from random poses of the world."""
+        """The paths of the machine's actuated joints, over random poses."""
         generators = [np.random.default_rng(seed) for seed in range(_POSES)]
         return joint_guides(self._world.robot, self._world.start_episodes(generators, None).pose)
 
     def render(self, state: EpisodeState) -> NDArray[np.uint8]:
-        """Return pixels (height, width, 3) of a state (m,), with a line from tool to target.
+        """Return pixels (height, width, 3) of the machine in a state, with a line to its target.
 
-        All pictures have the size of the one in which the machine is at home.
+        All pictures have the size of the picture with the machine at home.
         """
         figure = self._drawn(state.pose, self._world.target(state)[0])
         figure.set_size_inches(self._size)
@@ -43,12 +43,12 @@ class EnvironmentPicture:
 
     @cached_property
     def _size(self) -> tuple[float, float]:
-        """The width and height of the figure of the machine at home, in inches."""
+        """Width and height of the figure with the machine at home, in inches."""
         width, height = self._drawn(self._world.home, self._world.home).get_size_inches()
         return float(width), float(height)
 
     def _drawn(self, pose: Array, target: Array) -> Figure:
-        """Return the figure of the machine in a pose, with a line from its tool to the target."""
+        """Return the figure of the machine at a pose (m,), with a line from tool to target."""
         robot = self._world.robot
         points = joint_points(robot, pose)
         figure = robot_figure(

@@ -27,12 +27,12 @@ class EpisodeState:
     clock: Array
 
     def put(self, chosen: Bools, others: EpisodeState) -> EpisodeState:
-        """Return these states with `others` in place of the chosen ones, a mask (B,)."""
+        """Return the states with those in the mask `chosen` (B,) replaced by `others`."""
         columns = [getattr(self, part.name).copy() for part in fields(self)]
         for column, part in zip(columns, fields(others), strict=True):
             column[chosen] = getattr(others, part.name)
         return EpisodeState(*columns)
 
     def row(self, i: int) -> EpisodeState:
-        """Return the state of one machine."""
+        """Return the state of episode number i."""
         return EpisodeState(*(getattr(self, part.name)[i] for part in fields(self)))

@@ -110,9 +110,10 @@ class PteronVectorEnv(VectorEnv[Numbers, Numbers, Numbers]):
         seed: int | Sequence[int | None] | None = None,
         options: dict[str, Any] | None = None,
     ) -> tuple[Numbers, dict[str, Any]]:
-        """Start all episodes; `options` are those of `PteronEnv.reset`, the same for all.
+        """Start all episodes, or those of a mask; return observations (E, 4 m) and infos.
 
-        An option "reset_mask", an array of bool, chooses which environments start anew.
+        The option "reset_mask", a bool array, chooses the environments to reset; other options are
+        those of `PteronEnv.reset`, the same for all.
         """
         options = dict(options or {})
         chosen = self._mask(options.pop("reset_mask", None))
@@ -127,7 +128,7 @@ class PteronVectorEnv(VectorEnv[Numbers, Numbers, Numbers]):
         )
 
     def _mask(self, mask: Any) -> Bools:
-        """Return the checked mask (E,) of environments to reset; without a mask, all."""
+        """Return the checked mask (E,) of environments to reset; all if `mask` is None."""
         if mask is None:
             return np.ones(self.num_envs, dtype=bool)
         chosen = np.asarray(mask)
@@ -140,7 +141,7 @@ class PteronVectorEnv(VectorEnv[Numbers, Numbers, Numbers]):
         return chosen
 
     def _seeds(self, seed: int | Sequence[int | None] | None) -> list[int | None]:
-        """Return a seed for each environment, consecutive if `seed` is an integer; None: random."""
+        """Return a seed for each environment: consecutive from an integer; None means random."""
         if seed is None:
             return [None] * self.num_envs
         if isinstance(seed, np.ndarray):
@@ -160,7 +161,11 @@ class PteronVectorEnv(VectorEnv[Numbers, Numbers, Numbers]):
         self._steps = np.where(chosen, 0, self._steps)
 
     def step(self, actions: Numbers) -> tuple[Numbers, Numbers, Numbers, Numbers, dict[str, Any]]:
-        """Advance all machines by a period, except those that start a new episode."""
+        """Apply actions (E, n) for one period.
+
+        Return observations, rewards, end flags and infos. Environments that start a new episode are
+        not advanced.
+        """
         if self._state is None:
             raise DataError("step before reset; call reset first")
         starting = self._done
@@ -184,7 +189,7 @@ class PteronVectorEnv(VectorEnv[Numbers, Numbers, Numbers]):
         return self.world.observations(self._state), reward, ended, late, infos
 
     def _infos(self, distance: NDArray[Any], known: Bools) -> dict[str, Any]:
-        """Return the infos of the vector API, with masks of where the values are known."""
+        """Return the infos of gymnasium's vector API: distance, success, and masks where known."""
         return {
             "distance": np.where(known, distance, 0.0),
             "_distance": known.copy(),
@@ -193,7 +198,7 @@ class PteronVectorEnv(VectorEnv[Numbers, Numbers, Numbers]):
         }
 
     def render(self) -> tuple[NDArray[np.uint8], ...] | None:
-        """Return a picture of every machine, if they are asked for."""
+        """Return a picture (height, width, 3) of every machine; None without a render mode."""
         if self.render_mode is None:
             return None
         if self._state is None:

@@ -99,9 +99,9 @@ class World:
 
     @cached_property
     def bounds(self) -> Array:
-        """The greatest size of each number of an observation, (4 m,).
+        """Greatest absolute value of each number of an observation, (4 m,).
 
-        Coordinates whose joints have no limits, angles without limits and speeds have none.
+        Coordinates whose joints have no limits, angles without limits and speeds are unbounded.
         """
         robot = self.robot
         reach = []
@@ -124,31 +124,34 @@ class World:
         return np.concatenate([most, rate, most, rate])
 
     def observations(self, state: EpisodeState) -> NDArray[np.float32]:
-        """Return observations (..., 4 m): pose, velocity, the target's pose and velocity."""
+        """Return observations (..., 4 m): pose and velocity of platform and target."""
         parts = [state.pose, state.velocity, *self.target(state)]
         bounds = self.bounds
         return np.clip(np.concatenate(parts, axis=-1), -bounds, bounds).astype(np.float32)
 
     def target(self, state: EpisodeState) -> tuple[Array, Array]:
-        """Return pose and velocity of the targets (..., m)."""
+        """Return pose and velocity of the targets, (..., m) each."""
         if self.motion is None:
             return state.target, np.zeros_like(state.target)
         time = self.motion.time[0] + np.mod(state.clock, self.motion.duration)
         return self.motion.at(time)[:2]
 
     def distance(self, state: EpisodeState) -> Array:
-        """Return how far machines are from their targets (...), m."""
+        """Return the distance (...), m, of machines from their targets.
+
+        A radian counts `LEVER` m.
+        """
         return self.metres(self.target(state)[0] - state.pose)
 
     def metres(self, differences: Array) -> Array:
-        """Return the sizes (...) of differences of poses (..., m), m: a radian is `LEVER`."""
+        """Return the norms (...), m, of pose differences (..., m); a radian counts `LEVER` m."""
         scaled = differences * np.where(self.robot.platform.angular, LEVER, 1.0)
         return np.asarray(np.sqrt((scaled**2).sum(axis=-1)))
 
     def travel(self, spread: float) -> Array:
-        """Return ways (2, m) from home, down and up each coordinate, whose poses have margin.
+        """Return how far each coordinate can go down and up from home, (2, m), with margin left.
 
-        They are at most `spread` or, of angles, `_ANGLE`.
+        The values are at most `spread` or, for angles, `_ANGLE`.
         """
         most = np.where(self.robot.platform.angular, _ANGLE, spread)
         shares = np.concatenate([[0.0], 0.5 ** np.arange(_HALVINGS, -1, -1.0)])
@@ -161,7 +164,7 @@ class World:
     def start_episodes(
         self, generators: Sequence[np.random.Generator], options: Mapping[str, Any] | None
     ) -> EpisodeState:
-        """Return the states at the start of episodes, (B, m), one for each generator.
+        """Return the initial states (B, m) of episodes, one for each random generator.
 
         Raises
         ------
@@ -188,10 +191,10 @@ class World:
     def _draw_poses(
         self, generators: Sequence[np.random.Generator], others: ArrayLike | None
     ) -> Array:
-        """Return a random pose of each generator with margin enough, or home where it has none.
+        """Return a random pose (m,) with sufficient margin for each generator; home if none.
 
-        It is apart from the other poses (m,) or (B, m). Where all draws are too far from home they
-        are brought nearer.
+        The pose is apart from the other poses (m,) or (B, m). If all draws lack margin, they are
+        moved nearer to home.
         """
         shape = (_DRAWS, self.robot.freedom)
         draws = np.stack([rng.uniform(-1.0, 1.0, shape) for rng in generators])
@@ -214,18 +217,18 @@ class World:
         return poses_found
 
     def margin_of(self, poses: Array) -> Array:
-        """Return the margin of poses, negative beyond a singularity of type II."""
+        """Return the singularity margins (...) of poses, negative beyond a type-II singularity."""
         beyond = numeric(self.robot, "type_ii")(poses)[0] * self._side < 0.0
         smallest = pose_margins(self.robot, poses).least
         return np.where(beyond, -np.abs(smallest), smallest)
 
     @cached_property
     def _side(self) -> float:
-        """The sign of the type-II measure at home, with the size."""
+        """The type-II measure at the home pose, whose sign margins refer to."""
         return float(numeric(self.robot, "type_ii")(self.home)[0])
 
     def _pose(self, key: str, option: Any) -> Array:
-        """Return a pose of the options after a check."""
+        """Return the pose (m,) in the option `key` of a reset; raise if it is not feasible."""
         if key not in ("pose", "target"):
             raise DataError(f"options: {key!r} is unknown; the valid ones are pose, target")
         if key == "target" and self.motion is not None:
@@ -244,7 +247,7 @@ class World:
     def advance(
         self, state: EpisodeState, action: Array
     ) -> tuple[EpisodeState, Array, Array, Bools]:
-        """Return states after an action (..., n), the distances, the rewards, and what has ended.
+        """Apply an action (..., n) for a period; return states, distances, rewards and end flags.
 
         reward = 1 - tanh(2 distance / spread) - 0.01 mean(action^2), at most 1; -1 where the
         episode ends.
@@ -270,11 +273,11 @@ class World:
 
     @property
     def _speeds(self) -> Array:
-        """The speeds (m,) above which an episode ends."""
+        """The platform speeds (m,), m/s and rad/s, above which an episode ends."""
         return np.where(self.robot.platform.angular, TURN, SPEED)
 
     def _action(self, action: Any, shape: tuple[int, ...]) -> Array:
-        """Return an action of machines (..., n) after a check; a machine has as many drives."""
+        """Return an action as an array (..., n); raise for a wrong shape or non-finite numbers."""
         action_array = as_array(action, "action", ())
         if action_array.shape != shape:
             raise DataError(f"action: shape {action_array.shape} given, {shape} expected")
@@ -283,7 +286,7 @@ class World:
         return action_array
 
     def end_reason(self, pose: Array, velocity: Array) -> str:
-        """Return why the episode of a machine ended, in its last state (m,)."""
+        """Return as text why a machine's episode ended in this last state (m,)."""
         if (np.abs(velocity) > self._speeds).any():
             return f"faster than {SPEED:g} m/s or {TURN:g} rad/s"
         margins = pose_margins(self.robot, pose)

@@ -50,9 +50,9 @@ class Body:
 
 
 def bodies(robot: Manipulator) -> list[Body]:
-    """Return the bodies of a machine: of each leg guide, upper and last link, then the platform.
+    """Return the bodies of a machine: each leg's guide, upper and lower link, then the platform.
 
-    A guide without limits has no ends, and is left out.
+    A guide without limits has no ends and is left out.
     """
     machine = Machine.numeric(robot)
     state = machine.state(ca.SX.sym("pose", machine.freedom))
@@ -60,12 +60,12 @@ def bodies(robot: Manipulator) -> list[Body]:
 
 
 def pairs(robot: Manipulator) -> list[tuple[Body, Body]]:
-    """Return the pairs of bodies whose distance counts, in the order of `clearances`."""
+    """Return the pairs of bodies whose distance is computed, in the order of `clearances`."""
     return [pair for pair in combinations(bodies(robot), 2) if not _share_a_joint(robot, *pair)]
 
 
 def clearances(machine: Machine, pose: Expression) -> Expression:
-    """Return the least distance of the centre lines of each of `pairs`, (K, 1), m."""
+    """Return the distance between the centre lines of each pair of `pairs`, (K, 1), m."""
     squares = [square for _, square in _squares(machine, pose)]
     return ca.sqrt(ca.vertcat(*squares)) if squares else ca.SX(0, 1)
 
@@ -76,7 +76,7 @@ def meetings(robot: Manipulator) -> list[tuple[Kind, Kind]]:
 
 
 def least_clearances(machine: Machine, pose: Expression) -> Expression:
-    """Return the least distance of centre lines over the pairs of the same kinds, (k, 1), m."""
+    """Return the least centre-line distance over all pairs of the same kinds, (k, 1), m."""
     squares: dict[tuple[Kind, Kind], Expression] = {}
     for pair, square in _squares(machine, pose):
         kinds = _kinds(*pair)
@@ -85,13 +85,13 @@ def least_clearances(machine: Machine, pose: Expression) -> Expression:
 
 
 def _kinds(a: Body, b: Body) -> tuple[Kind, Kind]:
-    """Return the kinds of two bodies, in the order of `Kind`."""
+    """Return the kinds of two bodies, sorted in the order of `Kind`."""
     first, second = sorted((a.kind, b.kind), key=get_args(Kind).index)
     return first, second
 
 
 def _squares(machine: Machine, pose: Expression) -> Iterator[tuple[tuple[Body, Body], Expression]]:
-    """Yield the pairs of bodies and their least squared distance."""
+    """Yield each pair of bodies and the squared distance of their centre lines, m^2."""
     bodies = list(_segments(machine, machine.state(pose)))
     for (body, first), (other_body, second) in combinations(bodies, 2):
         if not _share_a_joint(machine.robot, body, other_body):
@@ -108,7 +108,7 @@ def squared_distance(first: Segment, second: Segment) -> Expression:
     u_square, v_square = ca.fmax(uu, _TINY), ca.fmax(vv, _TINY)
 
     def square(s: Expression, t: Expression) -> Expression:
-        """Return the squared distance, m^2, of the points at shares s and t of the segments."""
+        """Return the squared distance, m^2, of two points at line parameters s and t (0 to 1)."""
         separation = w + s * u - t * v
         return ca.dot(separation, separation)
 
@@ -161,14 +161,14 @@ def _leg_segments(
 
 
 def _half_bar(leg: LegKind) -> Expression | None:
-    """Return half the bar between parallel rods; None where they are one line."""
+    """Return the vector (3, 1) of half the bar between parallel rods, m; None without a bar."""
     if leg.bar is None or leg.bar_length is None:
         return None
     return ca.SX([0.5 * leg.bar_length * v for v in leg.bar])
 
 
 def _arms(machine: Machine, state: State) -> Iterator[Segment]:
-    """Yield the platform's arms from P to its points, by the hinges of parts that do not turn."""
+    """Yield the segments of the platform's arms from P to its points."""
     robot, p = machine.robot, state.platform.body.position
     seen = set()
     for leg, point in zip(robot.legs, state.platform.points, strict=True):
@@ -208,7 +208,7 @@ def _has_upper(leg: LegKind) -> bool:
 
 
 def _first(robot: Manipulator, body: Body) -> bool:
-    """Return whether a link is the first of its leg: the upper, or the only link."""
+    """Return whether a link is the first one of its leg."""
     return body.kind == "upper" or not _has_upper(robot.legs[body.leg - 1])
 
 
@@ -222,7 +222,7 @@ def _share_platform_point(robot: Manipulator, i: int, j: int) -> bool:
 
 
 def _share_line(robot: Manipulator, i: int, j: int) -> bool:
-    """Return whether two guides lie on one line, as of sliders on one rail."""
+    """Return whether the guides of legs i and j, from 1, lie on one line."""
     first, second = robot.legs[i - 1], robot.legs[j - 1]
     if first.joint_axis is None or second.joint_axis is None:
         return False

@@ -55,7 +55,7 @@ class Rows(NamedTuple):
 
 
 def closure_rows(machine: Machine, joints: Expression) -> Rows:
-    """Return the closures with joints (n, 1) held, in the units of the first sphere or circle.
+    """Return closure equations, linear in lifted coordinates, for joints (n, 1) held fixed.
 
     m.m' - 2 (w h' + w' h) of two rows is the cosine of the angle at which their spheres, circles or
     planes meet, and 1 for a row with itself.
@@ -94,7 +94,7 @@ def closure_rows(machine: Machine, joints: Expression) -> Rows:
 def _component_in_plane(
     machine: Machine, leg: LegEquations, locus: SphereLocus | CircleLocus, v: Expression
 ) -> Expression:
-    """Return a vector from a locus' center; for a circle, its component in the circle's plane."""
+    """Return a vector from a locus's centre, for a circle projected onto the circle's plane."""
     if isinstance(locus, SphereLocus):
         return v
     if leg.holds is not None:
@@ -104,9 +104,9 @@ def _component_in_plane(
 
 
 def held_spheres(machine: Machine, joints: Expression) -> tuple[Expression, Expression]:
-    """Return centers (n, 3) and r^2 (n, 1) of the spheres on which held joints keep their points.
+    """Return centres (n, 3) and squared radii (n, 1) of the spheres that hold platform points.
 
-    The center lies in the plane that the leg keeps its point in, if there is one.
+    If the leg keeps its point in a plane, the centre is projected into that plane.
     """
     centers, squares = [], []
     for leg, q in zip(machine.legs, ca.vertsplit(joints), strict=True):
@@ -140,13 +140,13 @@ class ClosureResiduals(NamedTuple):
 
     @property
     def step(self) -> tuple[Expression, Expression]:
-        """Newton's step (m, 1) times the determinant of the rows, and the determinant."""
+        """Newton's step (m, 1) times the Jacobian's determinant, and that determinant."""
         step, determinant = solve(self.rows, -self.lengths)
         return self.platform.pose_rates(step), determinant
 
 
 def closure_residuals(machine: Machine, joints: Expression, pose: Expression) -> ClosureResiduals:
-    """Return the residuals of the closures of joints (n, 1) at a pose (m, 1)."""
+    """Return the closure errors and their Jacobian for joints (n, 1) at a pose (m, 1)."""
     zero_rates = ca.SX.zeros(machine.freedom)
     platform = machine.platform.motion(pose, zero_rates, zero_rates)
     lengths, rows, angles, sizes = [], [], [ca.SX(0)], [ca.SX(ROUNDING)]
@@ -184,7 +184,7 @@ def closure_residuals(machine: Machine, joints: Expression, pose: Expression) ->
 def newton_step(
     machine: Machine, joints: Expression, pose: Expression
 ) -> tuple[Expression, Expression]:
-    """Return the pose after one Newton step, and `ClosureResiduals.relative` before it."""
+    """Return the pose (m, 1) after one Newton step, and the relative closure error before it."""
     residuals = closure_residuals(machine, joints, pose)
     step, determinant = residuals.step
     # The maximum drops NaN, which a sum propagates.
@@ -208,7 +208,7 @@ class NewtonEnd(NamedTuple):
 def converged_step(
     machine: Machine, joints: Expression, pose: Expression, least: float
 ) -> NewtonEnd:
-    """Return the pose of joints (n, 1), by Newton's method from a pose, across singularities."""
+    """Return the pose of joints (n, 1) by Newton's method from a start pose (m, 1)."""
     residuals = closure_residuals(machine, joints, pose)
     step, divisor = residuals.step
     for _ in range(_STEPS - 1):
@@ -232,12 +232,12 @@ def converged_step(
 def direct_step(
     machine: Machine, joints: Expression, pose: Expression, least: float
 ) -> tuple[Expression, Expression, Expression]:
-    """Return the pose of joints near a pose, its type-II measure, and the leg that changed branch.
+    """Return the pose of joints near a start pose, its type-II measure, leg that changed branch.
 
-    The pose is NaN where `converged_step` has it, where a leg does not reach the start pose, and
-    beyond a singularity of the robot's working mode: the type-II measure changes its sign, or a leg
-    bends the other way. That leg is the last result, from 1; 0 where there is none, or Newton's
-    steps do not converge.
+    The pose is NaN where that of `converged_step` is, where a leg does not reach the start pose,
+    and beyond a singularity of the robot's working mode: the type-II measure changes its sign, or a
+    leg bends the other way. The last result is that leg's number, from 1; 0 if there is none, or if
+    Newton's method does not converge.
     """
     end = converged_step(machine, joints, pose, least)
     # At the start pose the loci are those of the joints there, not of the given joints.

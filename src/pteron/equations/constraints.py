@@ -18,11 +18,11 @@ from pteron.tolerances import ROUNDING
 
 
 def constraint_rows(machine: Machine, state: State) -> Expression | None:
-    """Return the couples' rows (K, u) on the rotations they constrain; None if a leg's is unknown.
+    """Return couples' rows (K, u) on the rotations that they constrain; None if unknown.
 
-    The columns are the turns of the platform: all three where it does not turn, those across its
-    axis k where it does or where the machine is planar. Then come the turns about k of its parts
-    that do not turn with it, such as the side bars of an H4, on which legs' couples about k act.
+    The columns are the platform's rotations: all three if it does not turn, those perpendicular to
+    its axis k if it does or if the machine is planar. Further columns are rotations about k of
+    platform parts that do not turn with it, such as the side bars of an H4.
     """
     robot = machine.robot
     x0, y0, k = machine.platform.frame
@@ -63,10 +63,10 @@ def _may_act_along(couple: Expression, axis: Expression) -> bool:
 
 
 def constraint_measure(machine: Machine, state: State) -> Expression:
-    """Return the constraint measure: 1 in size at best, 0 at a constraint singularity.
+    """Return the constraint measure, no unit: 1 in size at best, 0 at a constraint singularity.
 
-    It is the volume that the couples span, each of length 1 or less, over the largest: det R of as
-    many couples as turns, with its sign, else the root of det R^T R.
+    It is the volume that the couples span, each of length 1 or less, divided by the largest
+    possible volume: det R, signed, for as many couples as rotations, else sqrt(det R^T R).
     """
     measure = machine.platform.constraint(state.platform)
     if measure is not None:

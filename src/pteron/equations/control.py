@@ -72,7 +72,7 @@ all joints: the first of `Drives`, in which forces are linear."""
 
 
 def lengths(parts: Mapping[str, Per], freedom: int, estimates: int) -> dict[str, int]:
-    """Return the length of each part of gains or memory."""
+    """Return the length of each named part of a controller's gains or memory vector."""
     sizes = {
         "joint": freedom,
         "coordinate": freedom,
@@ -84,12 +84,12 @@ def lengths(parts: Mapping[str, Per], freedom: int, estimates: int) -> dict[str,
 
 
 def estimate_count(what: str, freedom: int, inertial: int) -> int:
-    """Return the number of a law's estimates, given that of its inertial or base parameters."""
+    """Return the number of parameters that the law `what` estimates."""
     return inertial + (len(ADAPTED) * freedom if what == "adaptive_drives" else 0)
 
 
 def input_sizes(what: str, freedom: int, inertial: int) -> dict[str, int]:
-    """Return the lengths of a law's gains and memory; an empty dict where `what` is no law."""
+    """Return the lengths of a law's "gains" and "memory"; {} if `what` is no law."""
     estimates = estimate_count(what, freedom, inertial)
     return {
         name: sum(lengths(parts[what], freedom, estimates).values())
@@ -99,7 +99,7 @@ def input_sizes(what: str, freedom: int, inertial: int) -> dict[str, int]:
 
 
 def split_parts(vector: Expression, sizes: Mapping[str, int]) -> dict[str, Expression]:
-    """Return the parts of a vector by name."""
+    """Return the parts of a vector (K, 1) by name, with lengths `sizes` in this order."""
     bounds = [0]
     for size in sizes.values():
         bounds.append(bounds[-1] + size)
@@ -107,7 +107,7 @@ def split_parts(vector: Expression, sizes: Mapping[str, int]) -> dict[str, Expre
 
 
 def estimates(gains: Mapping[str, Expression], learnt: Expression) -> Expression:
-    """Return the estimates theta = theta_0 + L eta (K, 1), from the learnt correction eta."""
+    """Return the estimated parameters theta_0 + L eta (K, 1) for the learnt eta (K, 1)."""
     count = learnt.shape[0]
     return gains["start"] + ca.mtimes(ca.reshape(gains["learning"], count, count), learnt)
 
@@ -120,7 +120,7 @@ class DesiredMotion(NamedTuple):
     acceleration: Expression
 
     def middle(self, period: Expression, last: Expression) -> DesiredMotion:
-        """Return the motion half a period later; `last` is the last sample's acceleration."""
+        """Return the desired motion half a period later, extrapolated with its jerk."""
         t, third = period / 2, (self.acceleration - last) / period
         return DesiredMotion(
             self.pose + t * (self.velocity + t / 2 * (self.acceleration + t / 3 * third)),
@@ -150,18 +150,18 @@ class Sample:
 
     @cached_property
     def now(self) -> State:
-        """The desired motion at the sample."""
+        """The machine's state of the desired motion at the sample."""
         return self.machine.state(*self.desired)
 
     @cached_property
     def middle(self) -> State:
-        """The desired motion in the middle of the period."""
+        """The machine's state of the desired motion half a period after the sample."""
         ahead = self.desired.middle(self.gains["period"], self.memory["acceleration"])
         return self.machine.state(*ahead)
 
     @cached_property
     def error(self) -> Expression:
-        """The joints' errors e (n, 1), m or rad; a crank's is wrapped to [-pi, pi]."""
+        """The joints' position errors e (n, 1), m or rad; a crank's is wrapped to [-pi, pi]."""
         behind = ca.vertsplit(coordinates(self.now) - self.joints)
         legs = self.machine.robot.legs
         return ca.vertcat(
@@ -173,30 +173,30 @@ class Sample:
 
     @cached_property
     def error_rate(self) -> Expression:
-        """Its rate, e' (n, 1)."""
+        """The joints' rate errors e' (n, 1), m/s or rad/s."""
         return joint_motion(self.now)[0] - self.rates
 
     @property
     def feedback(self) -> Expression:
-        """K_p e + K_d e'."""
+        """The feedback force K_p e + K_d e' (n, 1), N or N m."""
         return self.gains["proportional"] * self.error + self.gains["derivative"] * self.error_rate
 
     @cached_property
     def middle_rates(self) -> Expression:
-        """The measured joints' rates in the middle of the period."""
+        """The measured joint rates (n, 1), extrapolated half a period ahead."""
         return joint_motion(self.middle)[0] - self.error_rate
 
     def find_pose(self, joints: Expression) -> Expression:
-        """Return the pose of measured joints, by Newton's method from the last one."""
+        """Return the pose (m, 1) of joints (n, 1), by Newton's method from the last pose."""
         return direct_step(self.machine, joints, self.memory["measured"], self.least)[0]
 
     @cached_property
     def middle_pose(self) -> Expression:
-        """The measured pose in the middle of the period."""
+        """The measured pose (m, 1), extrapolated half a period ahead."""
         joint_motion_to_middle = coordinates(self.middle) - coordinates(self.now)
         return self.find_pose(self.joints + joint_motion_to_middle)
 
 
 def coordinates(state: State) -> Expression:
-    """Return the coordinates (n, 1) of the actuated joints."""
+    """Return the coordinates (n, 1) of the actuated joints, m or rad."""
     return ca.vertcat(*(leg.coordinate for leg in state.legs))

@@ -33,12 +33,12 @@ class Drives(NamedTuple):
 
     @classmethod
     def from_vector(cls, numbers: Expression) -> Drives:
-        """Return the numbers from a vector (7 n, 1), such as `drive_numbers` returns."""
+        """Return drive parameters from a vector (7 n, 1), as `drive_numbers` returns it."""
         return cls(*ca.vertsplit(numbers, numbers.shape[0] // len(cls._fields)))
 
 
 def drive_numbers(robot: Manipulator) -> NDArray[np.float64]:
-    """Return the numbers (7 n,) of a machine's drives for `Drives.from_vector`.
+    """Return the drive parameters (7 n,) of a machine: inertia, friction and so on, each (n,).
 
     A leg without a drive has no friction and no motor inertia.
     """
@@ -56,23 +56,23 @@ def drive_numbers(robot: Manipulator) -> NDArray[np.float64]:
 
 
 def drives_of(robot: Manipulator) -> Drives:
-    """Return the numbers of a machine's drives as arrays, (n,) each."""
+    """Return the drive parameters of a machine as arrays by name, (n,) each."""
     return Drives(*drive_numbers(robot).reshape(len(Drives._fields), -1))
 
 
 def drive_names(robot: Manipulator) -> tuple[str, ...]:
-    """Return the names of `drive_numbers`: "coulomb_1" for leg 1, and so on."""
+    """Return the names of the drive parameters (7 n,): "coulomb_1" for leg 1, and so on."""
     legs = range(1, robot.joint_count + 1)
     return tuple(f"{name}_{i}" for name in Drives._fields for i in legs)
 
 
 def dry_friction(drives: Drives, rates: Expression) -> Expression:
-    """Return the size (n, 1) of dry friction: Coulomb's plus Stribeck's, N or N m."""
+    """Return the magnitude (n, 1) of dry friction at joint rates: Coulomb's plus Stribeck's."""
     return drives.coulomb + drives.stribeck * ca.exp(-((rates / drives.stribeck_speed) ** 2))
 
 
 def friction(drives: Drives, rates: Expression, *, smooth: bool) -> Expression:
-    """Return the force of friction and offset (n, 1), N or N m.
+    """Return friction plus offset forces (n, 1) at joint rates, N or N m.
 
     Dry friction has the sign of the rate, or if `smooth` tanh(q' / rest_speed).
     """
@@ -89,7 +89,7 @@ def _ahead(rates: Expression) -> Expression:
 
 
 def joint_motion(state: State) -> tuple[Expression, Expression]:
-    """Return rates and accelerations (n, 1) of the actuated joints."""
+    """Return rates and accelerations of the actuated joints, (n, 1) each."""
     return (
         ca.vertcat(*(leg.rate for leg in state.legs)),
         ca.vertcat(*(leg.acceleration for leg in state.legs)),
@@ -99,7 +99,7 @@ def joint_motion(state: State) -> tuple[Expression, Expression]:
 def drive_forces(
     drives: Drives, rates: Expression, accelerations: Expression, *, smooth: bool
 ) -> Expression:
-    """Return friction, offset and motor inertia forces at q' and q'' (n, 1), N or N m."""
+    """Return forces (n, 1) of friction, offset and motor inertia at given joint motion."""
     return drives.inertia * accelerations + friction(drives, rates, smooth=smooth)
 
 
@@ -112,10 +112,9 @@ def drive_accelerations(
     wrench: Expression,
     drives: Drives,
 ) -> Expression:
-    """Return x'' under the drives' forces (n, 1): (M + J^T D J) x'' = J^T (F - f) + wrench - h.
+    """Return the platform's acceleration x'' (m, 1) under drive forces (n, 1) and a wrench.
 
-    D is the motors' inertia at the joints, f the drives' own forces at x'' = 0: friction, offset
-    and D q''.
+    The drives' friction, offsets and the motors' inertia, reflected to the joints, are included.
     """
     state = machine.state(pose, velocity)
     rows = jacobian(state)
@@ -133,6 +132,6 @@ def mass_with_rotors(
     rows: Expression,
     rotors: Expression,
 ) -> Expression:
-    """Return M + J^T D J (m, m), D being the rotors' inertias (n, 1) at the joints, J `rows`."""
+    """Return the mass matrix with rotor inertias, M + J^T D J (m, m), at a pose."""
     mass = mass_matrix(machine, pose, parameters)
     return mass + ca.mtimes(rows.T, ca.mtimes(ca.diag(rotors), rows))

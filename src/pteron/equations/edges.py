@@ -27,7 +27,7 @@ class Edge(NamedTuple):
 
 
 def edges(machine: Machine, pose: Expression) -> list[Edge]:
-    """Return the edges of every leg's reach, then the limits of its joint, then of passive ones."""
+    """Return the boundaries of the workspace at a pose: leg reach, joint and passive limits."""
     state = machine.state(pose)
     reach_edges, limits, passive = [], [], []
     legs = zip(machine.robot.legs, machine.legs, state.platform.points, state.legs, strict=True)

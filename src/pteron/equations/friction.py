@@ -23,12 +23,12 @@ class PassiveJoint(NamedTuple):
 
 
 def passive_friction(machine: Machine, state: State) -> Expression:
-    """Return, for a unit coefficient in each passive joint, the actuator forces (n, columns).
+    """Return actuator forces (n, columns) for a unit friction coefficient in each passive joint.
 
-    By virtual work: a joint at the rate q' with the coefficient c needs J^T F = c (dq'/dx')^T q'.
-    Columns are the passive joints of leg 1 that move with its point, of leg 2, ...; where legs have
-    joints that turn with the platform alone, one more column follows for all of them: they have one
-    rate, the platform's, so that only the sum of their coefficients acts.
+    By virtual work, a joint with the rate q' and the coefficient c needs J^T F = c (dq'/dx')^T q'.
+    The columns are the passive joints of leg 1 that move with its platform point, those of leg 2
+    and so on; one last column is for all joints that turn with the platform alone: they share its
+    rate, so that only the sum of their coefficients matters.
     """
     columns = []
     for joint in _moving_passive_joints(state):
@@ -46,13 +46,13 @@ def passive_friction(machine: Machine, state: State) -> Expression:
 
 @lru_cache(maxsize=64)
 def passive_joints(robot: Manipulator) -> tuple[PassiveJoint, ...]:
-    """Return the passive joint of each column of `passive_friction`."""
+    """Return the passive joint that each column of `passive_friction` belongs to."""
     machine = Machine.numeric(robot)
     return _moving_passive_joints(machine.state(ca.SX.sym("pose", machine.freedom)))
 
 
 def _moving_passive_joints(state: State) -> tuple[PassiveJoint, ...]:
-    """Return the moving passive joints; all that turn with the platform alone count as the last."""
+    """Return the passive joints that move; all that turn with the platform alone count as one."""
     passive, turning = [], []
     for i, leg in enumerate(state.legs, start=1):
         for k, joint in enumerate(leg.chain):

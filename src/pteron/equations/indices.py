@@ -30,19 +30,19 @@ class Homogeneous(NamedTuple):
 
 
 def lever_arms(machine: Machine, state: State) -> list[Expression]:
-    """Return the velocities (3, k) of the platform points that legs hold, per unit of each turn."""
+    """Return the derivatives (3, k) of each pushed platform point by the platform's rotations."""
     lengths = _lengths_of(machine)
     pairs = zip(state.legs, state.platform.matrices, strict=True)
     return [matrix[:3, lengths:] for leg, matrix in pairs if leg.pushes]
 
 
 def homogeneous(machine: Machine, state: State) -> Homogeneous:
-    """Return J with a crank's row times its length and the turns' columns over the length L.
+    """Return the Jacobian in homogeneous units (m/m), and the characteristic length L, m.
 
     L is the root mean square distance of the moving platform points from the axis through P, or
-    from all axes through P; 1 m where none moves. The joint of a leg that follows the angle is that
-    angle times L, without its gear. Where the platform tilts, the turns are those about the base
-    frame's axes, or of a tripod roll and pitch.
+    from all axes through P; 1 m where no point moves. The joint of a leg that follows the
+    platform's angle counts as that angle times L, without its gear. If the platform tilts,
+    rotations are those about the base axes, or for a tripod roll and pitch.
     """
     if not machine.platform.angles():
         return Homogeneous(_with_joints_in_metres(machine, _jacobian(state), ca.SX(1)), ca.SX(1))
@@ -55,10 +55,11 @@ def homogeneous(machine: Machine, state: State) -> Homogeneous:
 
 
 def point_jacobian(machine: Machine, state: State) -> Expression:
-    """Return the Jacobian (n, m) in terms of the platform points' velocities, equally weighted.
+    """Return the Jacobian (n, m) from normalised velocities of all platform points to joints.
 
-    With V = S x' these velocities and S^T S = n R^T R it is J R^-1: that of the points' centroid,
-    with their root mean square distance from it for L. It depends on no chosen length or point P.
+    With V = S x' these velocities and S^T S = n R^T R, the matrix is J R^-1: the Jacobian at the
+    points' centroid, with their root mean square distance from it as L. It depends on no chosen
+    length or point P.
     """
     if not machine.platform.angles():
         return homogeneous(machine, state).matrix
@@ -79,7 +80,7 @@ def point_jacobian(machine: Machine, state: State) -> Expression:
 
 
 def _point_jacobian_in_space(machine: Machine, state: State) -> Expression:
-    """Return the Jacobian of the platform points in space, by the Cholesky root of their metric."""
+    """Return `point_jacobian` for a platform that tilts, by a Cholesky root of the metric."""
     matrices = [matrix[:3, :] for matrix in state.platform.matrices]
     lower = _root(sum(ca.mtimes(matrix.T, matrix) for matrix in matrices) / len(matrices))
     rows = _with_joints_in_metres(machine, _jacobian(state), ca.SX(1))
@@ -93,19 +94,19 @@ def _point_jacobian_in_space(machine: Machine, state: State) -> Expression:
 
 
 def _jacobian(state: State) -> Expression:
-    """Return J (n, m) against the platform's quasi-velocities."""
+    """Return the Jacobian (n, m) against the platform's quasi-velocities."""
     return rows_in_quasi_velocities(state.platform, [leg.row / leg.divisor for leg in state.legs])
 
 
 def _lengths_of(machine: Machine) -> int:
-    """Return the number of lengths in the pose."""
+    """Return the number of length coordinates in the pose."""
     return int(machine.platform.directions.shape[1])
 
 
 def _with_joints_in_metres(
     machine: Machine, jacobian: Expression, length: Expression
 ) -> Expression:
-    """Return the Jacobian with the rate of each joint in m/s."""
+    """Return the Jacobian with each joint's row scaled to m/s by its lever."""
     levers = [leg.lever(length) for leg in machine.legs]
     rows = zip(levers, ca.vertsplit(jacobian), strict=True)
     return ca.vertcat(*(lever * row for lever, row in rows))
@@ -127,24 +128,24 @@ def condition_points(machine: Machine, state: State) -> Expression:
 
 
 def _ratio(matrix: Expression) -> Expression:
-    """Return the ratio of a matrix' largest to smallest singular value."""
+    """Return the condition number of a matrix: largest over smallest singular value."""
     sigmas = singular_values(matrix)
     return largest(sigmas) / smallest(sigmas)
 
 
 def manipulability(machine: Machine, state: State) -> Expression:
-    """Return |det J|^-1 of the homogeneous Jacobian: Yoshikawa's volume of the velocities."""
+    """Return the manipulability 1 / |det J| of the homogeneous Jacobian."""
     rows = homogeneous(machine, state).matrix
     return 1 / ca.fabs(ca.mtimes(rows[0, :], adjugate(rows)[:, 0]))
 
 
 def speed_least(machine: Machine, state: State) -> Expression:
-    """Return 1 / sigma_max of J's columns of lengths: |q'| = 1, phi' = 0, the worst direction."""
+    """Return the least speed of P in any direction at |q'| = 1 without rotation."""
     return 1 / largest(singular_values(_lengths(machine, homogeneous(machine, state).matrix)))
 
 
 def speed_most(machine: Machine, state: State) -> Expression:
-    """Return 1 / sigma_min of J's columns of lengths: the best direction."""
+    """Return the greatest speed of P in any direction at |q'| = 1 without rotation."""
     return 1 / smallest(singular_values(_lengths(machine, homogeneous(machine, state).matrix)))
 
 
@@ -155,52 +156,52 @@ def turning_speed(machine: Machine, state: State) -> Expression:
 
 
 def force_least(machine: Machine, state: State) -> Expression:
-    """Return 1 / sigma_max of (J^-1)'s rows of lengths: |F| = 1, no moment, the worst direction."""
+    """Return the least force at P in any direction that drive forces |F| = 1 hold, no moment."""
     adj, volume = _inverse(homogeneous(machine, state).matrix)
     return ca.fabs(volume) / largest(singular_values(_lengths(machine, adj.T)))
 
 
 def force_most(machine: Machine, state: State) -> Expression:
-    """Return 1 / sigma_min of (J^-1)'s rows of lengths: the best direction."""
+    """Return the greatest force at P in any direction that drive forces |F| = 1 hold, no moment."""
     adj, volume = _inverse(homogeneous(machine, state).matrix)
     return ca.fabs(volume) / smallest(singular_values(_lengths(machine, adj.T)))
 
 
 def turning_moment(machine: Machine, state: State) -> Expression:
-    """Return the moment held at |F| = 1 without a force at P, N m per N, about the worst axis."""
+    """Return the least moment that drive forces |F| = 1 hold, no force at P, N m per N."""
     rows, length = homogeneous(machine, state)
     adj, volume = _inverse(rows)
     return length * ca.fabs(volume) / largest(singular_values(_turns(machine, adj.T)))
 
 
 def error(machine: Machine, state: State) -> Expression:
-    """Return the norm of (J^-1)'s rows of lengths: the root sum square of the joints' errors."""
+    """Return the position error of P per joint error, root sum square over the joints, m/m."""
     adj, volume = _inverse(homogeneous(machine, state).matrix)
     return ca.norm_fro(_lengths(machine, adj.T)) / ca.fabs(volume)
 
 
 def error_worst(machine: Machine, state: State) -> Expression:
-    """Return the largest norm of a signed sum of these rows' columns: the joints' worst errors."""
+    """Return the worst position error of P for joint errors of +-1, m/m."""
     adj, volume = _inverse(homogeneous(machine, state).matrix)
     return _worst_signed_sum(_lengths(machine, adj.T).T) / ca.fabs(volume)
 
 
 def turning_error(machine: Machine, state: State) -> Expression:
-    """Return the platform's angular error, rad/m: the root sum square of the joints' errors."""
+    """Return the platform's angular error per joint error, root sum square, rad/m."""
     rows, length = homogeneous(machine, state)
     adj, volume = _inverse(rows)
     return ca.norm_fro(_turns(machine, adj.T)) / (length * ca.fabs(volume))
 
 
 def turning_error_worst(machine: Machine, state: State) -> Expression:
-    """Return the platform's angular error, rad/m, under the joints' worst errors."""
+    """Return the platform's worst angular error for joint errors of +-1, rad/m."""
     rows, length = homogeneous(machine, state)
     adj, volume = _inverse(rows)
     return _worst_signed_sum(_turns(machine, adj.T).T) / (length * ca.fabs(volume))
 
 
 def _worst_signed_sum(columns: Expression) -> Expression:
-    """Return the greatest |sum of +- columns|: at a corner, as a norm is convex."""
+    """Return the greatest norm of any signed sum (+-) of a matrix's columns."""
     first, *others = ca.horzsplit(columns)
     sums = (
         first + sum(sign * column for sign, column in zip(signs, others, strict=True))
@@ -210,17 +211,17 @@ def _worst_signed_sum(columns: Expression) -> Expression:
 
 
 def _lengths(machine: Machine, rows: Expression) -> Expression:
-    """Return the columns of the pose's lengths."""
+    """Return the columns of the pose's length coordinates; raise if there are none."""
     return _require_columns(machine, rows[:, : _lengths_of(machine)], "only turns")
 
 
 def _turns(machine: Machine, rows: Expression) -> Expression:
-    """Return the columns of the platform's turns."""
+    """Return the columns of the platform's rotations; raise if there are none."""
     return _require_columns(machine, rows[:, _lengths_of(machine) :], "does not turn")
 
 
 def _require_columns(machine: Machine, columns: Expression, lacking: str) -> Expression:
-    """Return the columns; raise where the platform has none of them."""
+    """Return the columns; raise a ModelError with `lacking` if there are none."""
     if columns.shape[1] == 0:
         motion = machine.robot.platform.motion
         raise ModelError(
@@ -231,7 +232,7 @@ def _require_columns(machine: Machine, columns: Expression, lacking: str) -> Exp
 
 
 def _inverse(rows: Expression) -> tuple[Expression, Expression]:
-    """Return the adjugate (m, m) and the determinant, whose quotient is the inverse."""
+    """Return adjugate (m, m) and determinant of a square matrix; their quotient is the inverse."""
     adj = adjugate(rows)
     return adj, ca.mtimes(rows[0, :], adj[:, 0])
 
@@ -239,8 +240,8 @@ def _inverse(rows: Expression) -> tuple[Expression, Expression]:
 def pressure_angle(machine: Machine, state: State) -> Expression:
     """Return the greatest angle between a leg's force and the motion of its joint, rad.
 
-    The force that a leg passes on acts along its dq/dc; the joint moves along its axis or, a
-    crank's end, across it.
+    The force that a leg transmits acts along the derivative dq/dc of its joint coordinate; the
+    joint moves along its axis or, at a crank's end, perpendicular to the crank.
     """
     angles = [ca.SX(0)]
     for leg in state.legs:
@@ -258,7 +259,7 @@ def pressure_angle(machine: Machine, state: State) -> Expression:
 def output_pressure_angle(machine: Machine, state: State) -> Expression:
     """Return the greatest angle between a leg's force and its point's motion, rad.
 
-    It is the motion while the other joints are held: that of a column of J^-1.
+    The motion is that with the other joints held: a column of J^-1.
     """
     adj, angles = adjugate(plain_rows(state.platform, state.legs)), [ca.SX(0)]
     for i, (leg, matrix) in enumerate(zip(state.legs, state.platform.matrices, strict=True)):
@@ -275,7 +276,7 @@ def _angle_between_lines(u: Expression, v: Expression) -> Expression:
 
 
 def kappa(machine: Machine, state: State, mass: Expression) -> Expression:
-    """Return the condition number of the mass matrix, rotations times L as in the Jacobian."""
+    """Return the condition number of the mass matrix, rotations scaled by the length L."""
     units = ca.SX.ones(machine.freedom)
     if machine.platform.angles():
         units[_lengths_of(machine) :] = homogeneous(machine, state).length
@@ -286,7 +287,7 @@ def kappa(machine: Machine, state: State, mass: Expression) -> Expression:
 
 
 def _root(matrix: Expression) -> Expression:
-    """Return lower L with L L^T a positive definite matrix (Cholesky)."""
+    """Return the lower Cholesky factor L (n, n) of a positive definite matrix L L^T."""
     n = matrix.shape[0]
     lower = ca.SX(n, n)
     for j in range(n):

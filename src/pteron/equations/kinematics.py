@@ -18,25 +18,25 @@ FAR = 1e3
 
 
 def inverse_position(machine: Machine, pose: Expression) -> Expression:
-    """Return the joint coordinates (n, 1)."""
+    """Return the joint coordinates (n, 1) of a pose (m, 1), m or rad."""
     return ca.vertcat(*(leg.coordinate for leg in machine.state(pose).legs))
 
 
 def reach(machine: Machine, pose: Expression) -> list[Reach]:
-    """Return each leg's discriminant of reach, margin of reach, m, and type-I measure."""
+    """Return each leg's discriminant of reach, reach margin (m) and type-I measure at a pose."""
     zero_rates = ca.SX.zeros(machine.freedom)
     points = machine.platform.motion(pose, zero_rates, zero_rates).points
     return [leg.reach(c.position) for leg, c in zip(machine.legs, points, strict=True)]
 
 
 def reach_validity(machine: Machine, pose: Expression) -> Expression:
-    """Return the validity of each leg (n, 1): 0 where it reaches the pose, NaN where not."""
+    """Return 0 for each leg that reaches the pose, NaN for the others, (n, 1)."""
     reaches = reach(machine, pose)
     return ca.vertcat(*(nan_below_zero(leg.discriminant) for leg in reaches))  # Remark 2
 
 
 def passive_joints(machine: Machine, pose: Expression) -> list[list[Passive]]:
-    """Return the passive joints that have limits: the platform's angles first, then every leg's."""
+    """Return the limited passive joints: the platform's angles first, then every leg's."""
     state, platform = machine.state(pose), machine.robot.platform
     base_axes, platform_axes = ca.horzcat(*machine.platform.frame), state.platform.axes
     radius = _platform_radius(machine)
@@ -61,10 +61,11 @@ def _platform_radius(machine: Machine) -> Expression:
 
 
 def passive_margins(machine: Machine, pose: Expression) -> tuple[Expression, Expression]:
-    """Return each leg's least distance (n, 1) of its passive joints from their limits, twice.
+    """Return each leg's least margin to its passive limits (n, 1): relative, and in m.
 
-    First relative to half the joint's range, then in metres of the leg's motion; negative beyond a
-    limit, 1 and `FAR` for a leg without such limits. The platform's angles count for every leg.
+    The first is relative to half the joint's range, the second in metres of the leg's motion;
+    negative beyond a limit, 1 and `FAR` for a leg without such limits. The platform's angles count
+    for every leg.
     """
     shares, metres = [], []
     angles, *legs = passive_joints(machine, pose)
@@ -80,12 +81,12 @@ def passive_margins(machine: Machine, pose: Expression) -> tuple[Expression, Exp
 
 
 def pose_status(machine: Machine, pose: Expression) -> tuple[Expression, Expression]:
-    """Return the status of a pose, and its margin, m: the distance to the workspace's boundary.
+    """Return a pose's status (0 inside, leg number, or -1) and margin to the workspace boundary, m.
 
-    The status is 0 in the workspace, else the leg, from 1, that misses the pose by most, or -1
-    where all legs reach it but a joint exceeds its limit. The margin is the least of the legs'
-    margins of reach and, where all reach, of the travel left to each joint's limit, at most `FAR`;
-    it is negative outside.
+    The status is 0 in the workspace, else the number, from 1, of the leg that is most out of reach,
+    or -1 if all legs reach the pose but a joint exceeds its limit. The margin is the least of the
+    legs' reach margins and, if all legs reach the pose, of the distances to the joints' limits, at
+    most `FAR`; it is negative outside.
     """
     reaches = reach(machine, pose)
     joints = ca.vertsplit(inverse_position(machine, pose))
@@ -113,9 +114,9 @@ def pose_status(machine: Machine, pose: Expression) -> tuple[Expression, Express
 
 
 def direct_position(machine: Machine, joints: Expression, *, reached: bool = True) -> Expression:
-    """Return every pose that the joint coordinates allow, as columns (m, k).
+    """Return all poses of joint coordinates (n, 1) as columns (m, k), NaN where not real.
 
-    NaN where it is not real or, with `reached`, where a leg does not reach it.
+    With `reached`, a pose is also NaN where a leg does not reach it.
     """
     poses = machine.closure.poses(joints)
     if not reached:
@@ -125,7 +126,7 @@ def direct_position(machine: Machine, joints: Expression, *, reached: bool = Tru
 
 
 def jacobian(state: State) -> Expression:
-    """Return J (n, m), Eq. (10): the legs' rows times their points' matrices."""
+    """Return the Jacobian J (n, m) from pose rates to joint rates, Eq. (10)."""
     pairs = zip(state.legs, state.platform.matrices, strict=True)
     rows = ca.vertcat(*(ca.mtimes(leg.row / leg.divisor, matrix) for leg, matrix in pairs))
     return state.platform.pose_rows(rows)  # Eq. (10)
@@ -141,7 +142,7 @@ def twist_jacobian(state: State) -> Expression:
 
 
 def body_jacobian(state: State, i: int, letter: str) -> Expression | None:
-    """Return J_b (6, m) of a body of a leg: rows v, then omega; Eqs. (11) and (12)."""
+    """Return the Jacobian J_b (6, m) of a leg's body, rows v then omega; None without the body."""
     body = state.legs[i].bodies.get(letter)
     if body is None:
         return None
@@ -150,7 +151,7 @@ def body_jacobian(state: State, i: int, letter: str) -> Expression | None:
 
 
 def link_jacobians(state: State) -> tuple[list[Expression], list[Expression]]:
-    """Return J_u and J_l of every leg, each (6, m); NaN for a link that a leg lacks."""
+    """Return the Jacobians of every leg's upper and lower link, (6, m) each; NaN for no link."""
     n = len(state.legs)
     m = state.platform.matrix.shape[1]
     upper, lower = (
@@ -161,7 +162,7 @@ def link_jacobians(state: State) -> tuple[list[Expression], list[Expression]]:
 
 
 def link_vectors(state: State) -> tuple[Expression, Expression]:
-    """Return l_u and l_l of every leg, each (n, 3), m; NaN where a leg lacks one."""
+    """Return the vectors of every leg's upper and lower link, (n, 3) each, m; NaN for no link."""
 
     def rows(k: int) -> Expression:
         """Return each leg's link k as a row (n, 3), m; NaN where a leg has none."""
@@ -174,7 +175,8 @@ def link_vectors(state: State) -> tuple[Expression, Expression]:
 def link_turning(state: State, order: int) -> Expression:
     """Return, for every leg (n, 2), the rates of theta_u and theta_l, or their accelerations.
 
-    NaN where these angles do not describe a link's motion. `order` is 0 for rates.
+    NaN stands for links whose motion these angles do not describe. `order` is 0 for rates, 1 for
+    accelerations.
     """
     rows = [
         ca.horzcat(*(ca.SX.nan() if angle is None else angle[order] for angle in leg.turning))
@@ -184,12 +186,12 @@ def link_turning(state: State, order: int) -> Expression:
 
 
 def driven_motion(state: State, order: int) -> Expression:
-    """Return rates, or accelerations, (n, 1) of the actuated joints."""
+    """Return rates (`order` 0) or accelerations (1) of the actuated joints, (n, 1)."""
     return ca.vertcat(*((leg.rate, leg.acceleration)[order] for leg in state.legs))
 
 
 def passive_motion(state: State, order: int) -> Expression:
-    """Return rates, or accelerations, (n, j) of the passive joints; NaN where a leg has fewer."""
+    """Return rates (`order` 0) or accelerations (1) of passive joints, (n, j), padded with NaN."""
     passive = [[joint for joint in leg.chain if not joint.driven] for leg in state.legs]
     rows = [[(joint.rate, joint.acceleration)[order] for joint in joints] for joints in passive]
     longest = max(map(len, rows))
@@ -202,7 +204,7 @@ def chain_points(state: State) -> list[Expression]:
 
 
 def _chains(state: State, column: Callable[[Joint], Expression]) -> list[Expression]:
-    """Return a column (k, 1) for every joint of every leg, (k, j); NaN where a leg has fewer."""
+    """Return column(joint) for every joint of every leg, (k, j) each, padded with NaN."""
     longest = max(len(leg.chain) for leg in state.legs)
     chains = [ca.horzcat(*map(column, leg.chain)) for leg in state.legs]
     return [
@@ -214,9 +216,9 @@ def _chains(state: State, column: Callable[[Joint], Expression]) -> list[Express
 def platform_rates(
     machine: Machine, pose: Expression, rates: Expression, accelerations: Expression
 ) -> tuple[Expression, Expression]:
-    """Return x' and x'' (m, 1) of joints that move at q' and q'', (n, 1) each.
+    """Return pose rates x' and accelerations x'' (m, 1) for joint rates and accelerations (n, 1).
 
-    J x' = q' and J x'' = q'' - J' x', whose last term is the joints' acceleration at x'' = 0.
+    J x' = q' and J x'' = q'' - J' x'; J' x' is the joints' acceleration at x'' = 0.
     """
     at_rest = machine.state(pose)
     velocity = machine.closure.rates(rates, at_rest.platform, at_rest.legs)
@@ -225,7 +227,7 @@ def platform_rates(
 
 
 def joint_screws(state: State) -> list[Expression]:
-    """Return the unit screws of every leg's joints about P, from the base to the platform.
+    """Return the unit screws (6, j) of each leg's joints about P, from base to platform.
 
     Each is (6, j), rows omega, then v; NaN where a leg has fewer joints. Where d is parallel to
     k, R4 of a P-R-R-R leg coincides with R3.
@@ -233,7 +235,7 @@ def joint_screws(state: State) -> list[Expression]:
     p = state.platform.body.position
 
     def screw(joint: Joint) -> Expression:
-        """Return a joint's unit screw (6, 1) about P: linear before angular part."""
+        """Return a joint's unit screw (6, 1) about P: angular part, then linear part."""
         if joint.kind == "P":
             return ca.vertcat(ca.SX(3, 1), joint.axis)  # Eq. (8), of P
         return ca.vertcat(joint.axis, ca.cross(joint.point - p, joint.axis))  # Eq. (8), of R

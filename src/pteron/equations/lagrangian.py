@@ -15,7 +15,7 @@ from pteron.equations.virtual_work import generalized_forces
 
 
 def mass_matrix(machine: Machine, pose: Expression, parameters: Expression) -> Expression:
-    """Return M (m, m): the sum of J_b^T M_b J_b over the bodies.
+    """Return the mass matrix M (m, m) at a pose, for inertial parameters (N, 1).
 
     The mass of a body whose reference point is a platform point is added to the platform's.
     """
@@ -37,7 +37,7 @@ def mass_matrix(machine: Machine, pose: Expression, parameters: Expression) -> E
 def coriolis_matrix(
     machine: Machine, pose: Expression, velocity: Expression, parameters: Expression
 ) -> Expression:
-    """Return C (m, m) of Christoffel's symbols, so that dM/dt - 2 C is skew-symmetric."""
+    """Return the Coriolis matrix C (m, m) by Christoffel symbols: dM/dt - 2 C is skew-symmetric."""
     m = machine.freedom
     mass = mass_matrix(machine, pose, parameters)
     slopes = [ca.reshape(ca.jacobian(mass, pose[k]), m, m) for k in range(m)]
@@ -49,12 +49,12 @@ def coriolis_matrix(
 def kinetic_energy(
     machine: Machine, pose: Expression, velocity: Expression, parameters: Expression
 ) -> Expression:
-    """Return T = x'^T M x' / 2."""
+    """Return the kinetic energy x'^T M x' / 2, J."""
     return 0.5 * ca.bilin(mass_matrix(machine, pose, parameters), velocity, velocity)
 
 
 def potential_energy(machine: Machine, pose: Expression, parameters: Expression) -> Expression:
-    """Return V = - sum m g . (centre of mass), zero for bodies at the base frame's origin."""
+    """Return the potential energy in gravity, J; zero for bodies at the base frame's origin."""
     legs, inertia = machine.moments(parameters)
     state = machine.state(pose)
     total = machine.platform.mass_moment(state.platform, inertia)
@@ -71,7 +71,7 @@ def forward_dynamics(
     parameters: Expression,
     wrench: Expression,
 ) -> Expression:
-    """Return x'' with M x'' = J^T F + wrench - h."""
+    """Return the platform acceleration x'' (m, 1) with M x'' = J^T F + wrench - h."""
     state = machine.state(pose, velocity)
     bias = generalized_forces(machine, state, parameters)
     load = ca.mtimes(jacobian(state).T, forces) + generalized_wrench(machine, state, wrench) - bias
@@ -79,12 +79,12 @@ def forward_dynamics(
 
 
 def generalized_wrench(machine: Machine, state: State, wrench: Expression) -> Expression:
-    """Return the generalized forces (m, 1), along the pose, of a wrench on the platform."""
+    """Return the generalized forces (m, 1) along the pose coordinates of a platform wrench."""
     return state.platform.pose_forces(machine.platform.generalized_forces(state.platform, wrench))
 
 
 def solve_positive_definite(matrix: Expression, right: Expression) -> Expression:
-    """Return the solution of a small symmetric positive definite system, by L D L^T.
+    """Return the solution x of A x = b with a symmetric positive definite A, by L D L^T.
 
     CasADi's own `solve` on SX expressions loses two digits on these systems.
     """
@@ -93,7 +93,7 @@ def solve_positive_definite(matrix: Expression, right: Expression) -> Expression
 
 
 def ldl_factors(matrix: Expression) -> tuple[Expression, Expression]:
-    """Return L and the diagonal (n, 1) of D, of L D L^T = a positive definite matrix."""
+    """Return L (n, n) and the diagonal (n, 1) of D with L D L^T = a positive definite matrix."""
     n = matrix.shape[0]
     lower = ca.SX.eye(n)
     pivots: list[Expression] = []
@@ -106,7 +106,7 @@ def ldl_factors(matrix: Expression) -> tuple[Expression, Expression]:
 
 
 def substitute_forward(lower: Expression, right: Expression) -> Expression:
-    """Return L^-1 times a matrix."""
+    """Return L^-1 B for a unit lower triangular L (n, n) and a matrix B."""
     rows: list[Expression] = []
     for i in range(lower.shape[0]):
         rows.append(right[i, :] - sum(lower[i, k] * rows[k] for k in range(i)))
@@ -114,7 +114,7 @@ def substitute_forward(lower: Expression, right: Expression) -> Expression:
 
 
 def substitute_backward(lower: Expression, right: Expression) -> Expression:
-    """Return L^-T times a column."""
+    """Return L^-T b (n, 1) for a unit lower triangular L (n, n) and a column b."""
     n = lower.shape[0]
     solution = [ca.SX(0)] * n
     for i in reversed(range(n)):

@@ -22,23 +22,24 @@ Answer = tuple[Expression, dict[str, Expression]]
 
 
 def pd_gravity(s: Sample) -> Answer:
-    """Return F = K_p e + K_d e' + J^-T g + f_0: gravity and offsets at the measured pose."""
+    """Return drive forces K_p e + K_d e' plus gravity and offsets, and the measured pose."""
     pose = s.find_pose(s.joints)
     gravity_forces = inverse_dynamics(s.machine, s.machine.state(pose), s.parameters)
     return s.feedback + gravity_forces + s.drives.offset, {"measured": pose}
 
 
 def feed_forward_pd(s: Sample) -> Answer:
-    """Return F = K_p e + K_d e' + F_d, F_d the drive forces of the desired motion."""
+    """Return drive forces K_p e + K_d e' plus those of the desired motion, and next memory."""
     needed = inverse_dynamics(s.machine, s.middle, s.parameters)
     needed += drive_forces(s.drives, *joint_motion(s.middle), smooth=True)
     return s.feedback + needed, {"acceleration": s.desired.acceleration}
 
 
 def computed_torque(s: Sample) -> Answer:
-    """Return the drive forces for q'' = q''_d + K_p e + K_d e' in the measured state.
+    """Return drive forces for q'' = q''_d + K_p e + K_d e' (computed torque), and next memory.
 
-    Friction is that of the desired rates: the measured rate of a resting joint changes its sign.
+    Friction is evaluated at the desired rates, since the measured rate of a resting joint changes
+    its sign.
     """
     pose, (desired_rates, desired_accelerations) = s.middle_pose, joint_motion(s.middle)
     accelerations = desired_accelerations + s.feedback
@@ -49,7 +50,7 @@ def computed_torque(s: Sample) -> Answer:
 
 
 def adaptive(s: Sample) -> Answer:
-    """Return the forces and the updated estimates of Slotine and Li's adaptive law.
+    """Return drive forces and updated estimates of Slotine and Li's adaptive law.
 
     With the reference q'_r = q'_d + slope e, and z = q'_r - q' = e' + slope e,
 
@@ -69,7 +70,7 @@ def adaptive(s: Sample) -> Answer:
 
 
 def adaptive_drives(s: Sample) -> Answer:
-    """Return forces and estimates as `adaptive`, which include motors' inertia, friction, offsets.
+    """Return forces and estimates as `adaptive`, friction and motor inertias estimated too.
 
     Dry and viscous friction are monotonic in the rate: evaluated at q'_r they dissipate z.
     """
@@ -80,7 +81,7 @@ def adaptive_drives(s: Sample) -> Answer:
 
 
 def _adaptive_law(s: Sample, estimate: Expression, drives: Drives) -> Answer:
-    """Return forces and memory of Slotine and Li's law; friction and inertia are `drives`'."""
+    """Return forces and memory of Slotine and Li's law for given parameters and drives."""
     slope, pose, learnt = s.gains["slope"], s.middle_pose, s.memory["learnt"]
     z = s.error_rate + slope * s.error
     rates, accelerations = joint_motion(s.middle)

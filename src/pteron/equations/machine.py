@@ -49,13 +49,13 @@ class Machine:
 
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
-        """The inertial parameters in the paper's order."""
+        """The machine's inertial parameters, in the paper's order."""
         return parameter_list([leg.kinds for leg in self.legs], self.platform.kinds)
 
     @classmethod
     @lru_cache(maxsize=64)
     def numeric(cls, robot: Manipulator) -> Machine:
-        """Return the equations of one machine, its dimensions as numbers."""
+        """Return the equations of a machine with its dimensions as constants."""
         legs = tuple(leg.equations() for leg in robot.legs)
         frame = [ca.SX(list(axis)) for axis in robot.platform.frame]
         points, fixed = (
@@ -69,7 +69,7 @@ class Machine:
 
     @classmethod
     def symbolic(cls, robot: Manipulator) -> tuple[Machine, Expression]:
-        """Return the equations of a topology, its dimensions as symbols, and these as a vector.
+        """Return equations with dimensions as symbols, and the vector (G, 1) of these symbols.
 
         The vector holds the quantities of each leg, its platform point and fixed offset; then x0,
         y0, k, the platform's quantities and gravity: the order of `numbers`.
@@ -98,7 +98,7 @@ class Machine:
         quantities: dict[str, Any],
         gravity: Expression,
     ) -> Machine:
-        """Return the equations of a machine from those of its legs and its platform's geometry."""
+        """Return a machine's equations from its legs' equations and its platform's geometry."""
         quantities = {**quantities, "planes": [leg.holds for leg in legs]}
         platform = robot.platform.kind(frame, points, fixed, quantities)
         closure = kind_for([type(leg) for leg in legs], type(platform))
@@ -106,10 +106,10 @@ class Machine:
         return cls(robot, legs, platform, closure(legs, platform), gravity)
 
     def move_to_platform_frame(self, pose: Expression) -> tuple[Machine, Expression] | None:
-        """Return the machine with all vectors in the platform's axes, and these axes (3, 3).
+        """Return the machine in the platform's axes, and these axes (3, 3); None if not cheaper.
 
-        Joint forces are the same; the platform's points are constant, which saves operations. None
-        where it saves none.
+        Joint forces are the same; the platform's points become constants, which saves operations.
+        The result is None if no operation is saved.
         """
         platform_in_axes = self.platform.change_to_platform_axes(pose)
         if platform_in_axes is None:
@@ -131,7 +131,7 @@ class Machine:
         velocity: Expression | None = None,
         acceleration: Expression | None = None,
     ) -> State:
-        """Return the state of platform and legs in motion, or at rest in a pose."""
+        """Return platform and legs in motion at a pose (m, 1), at rest without rates."""
         zero_rates = ca.SX.zeros(self.freedom)
         platform = self.platform.motion(
             pose,
@@ -143,7 +143,7 @@ class Machine:
         return State(platform, legs)
 
     def moments(self, parameters: Expression) -> tuple[list[dict[str, Moments]], Moments]:
-        """Return the moments of mass of the legs' bodies and of the platform, from P (N, K)."""
+        """Return mass moments of each leg's bodies by letter, and of the platform, from (N, K)."""
         blocks: dict[tuple[str, tuple[int, ...]], list[Expression]] = {}
         for p, row in zip(self.parameters, ca.vertsplit(parameters), strict=True):
             blocks.setdefault((p.body, p.legs), []).append(row)
@@ -155,12 +155,12 @@ class Machine:
 
 
 def closure_of(robot: Manipulator) -> Closure:
-    """Return the closure of one machine, its dimensions as numbers."""
+    """Return the closure equations of a machine, its dimensions as constants."""
     return Machine.numeric(robot).closure
 
 
 def numbers(robot: Manipulator) -> list[float]:
-    """Return the geometry (G,) of a machine, in the order of the vector of `Machine.symbolic`."""
+    """Return the geometric numbers (G,) of a machine, in the order of `Machine.symbolic`."""
     geometry: list[float] = []
     for leg in robot.legs:
         for quantity in leg.quantities:

@@ -25,11 +25,11 @@ def mixed_forces(
     reference_accelerations: Expression,
     parameters: Expression,
 ) -> Expression:
-    """Return F (n, K) with J^T F = M a + C(x, v) w + g, for the columns of parameters (N, K).
+    """Return drive forces (n, K) of M a + C(x, v) w + g with different rates v and w.
 
-    J v = `rates`, J w = `reference_rates`, and a is such that the joints' acceleration
-    J a + J'(x, v) w is `reference_accelerations`; these are (n, 1) each. Where the reference rates
-    are the rates it is the inverse dynamics.
+    J v = `rates` and J w = `reference_rates`; the joints' acceleration J a + J'(x, v) w is
+    `reference_accelerations`; these are (n, 1) each. If reference rates and rates are equal, this
+    is inverse dynamics.
     """
     at_rest = machine.state(pose)
     both = machine.closure.rates(ca.horzcat(rates, reference_rates), at_rest.platform, at_rest.legs)

@@ -38,17 +38,17 @@ class Closed(NamedTuple):
 
     @property
     def equations(self) -> int:
-        """The number of equations."""
+        """The number of closure equations."""
         return self.spheres + self.planes
 
     @property
     def numbers(self) -> int:
-        """The number of numbers of a machine: a or n, b, and r^2 or h, for each equation."""
+        """The number of numbers that describe a machine: seven for each equation."""
         return 7 * self.equations
 
     @property
     def size(self) -> int:
-        """The number of coordinates of z."""
+        """The number of coordinates of a lifted pose z: 8 if P moves, else 4."""
         return 8 if self.moves else 4
 
     @property
@@ -75,11 +75,11 @@ class Number(NamedTuple):
         )
 
     def times(self, factor: Expression | float) -> Number:
-        """Return the product with a real number."""
+        """Return the product of this complex number and a real factor."""
         return Number(factor * self.re, factor * self.im)
 
     def inverse(self) -> Number:
-        """Return the reciprocal."""
+        """Return the reciprocal of this complex number."""
         square = self.re * self.re + self.im * self.im
         return Number(self.re / square, -self.im / square)
 
@@ -89,7 +89,7 @@ Quaternion = Sequence[Number]
 
 
 def numbers(re: Expression, im: Expression | None = None) -> list[Number]:
-    """Return the complex numbers of vectors (k, 1)."""
+    """Return complex numbers from vectors (k, 1) of real and imaginary parts."""
     imaginary = ca.SX(re.shape[0], 1) if im is None else im
     return [Number(*pair) for pair in zip(ca.vertsplit(re), ca.vertsplit(imaginary), strict=True)]
 
@@ -122,7 +122,7 @@ class PathState(NamedTuple):
 
     @classmethod
     def from_vector(cls, vector: Expression, closed: Closed) -> PathState:
-        """Return the state from a vector: real and imaginary parts of each in turn."""
+        """Return the path state from its vector: real, then imaginary parts of each component."""
         d = closed.size
         parts = [
             numbers(vector[2 * d * k : 2 * d * k + d], vector[2 * d * k + d : 2 * d * (k + 1)])
@@ -131,7 +131,7 @@ class PathState(NamedTuple):
         return cls(*parts, *ca.vertsplit(vector[8 * d :]))
 
     def vector(self) -> Expression:
-        """Return the state as one vector, see `from_vector`."""
+        """Return the path state as one vector (K, 1), inverse of `from_vector`."""
         parts = [
             part
             for component_numbers in self[:4]
@@ -143,11 +143,11 @@ class PathState(NamedTuple):
 def advance_path(
     closed: Closed, start: Sequence[Number], target: Sequence[Number], at: PathState
 ) -> tuple[PathState, Expression]:
-    """Return a path's state after a predictor-corrector step, and the size of the last correction.
+    """Return a path's state after a predictor-corrector step, and the last correction's size.
 
     `start` and `target` are the machines at t = 0 and 1: for each equation a or n, b and r^2 or h,
-    seven numbers. Where the cubic through the last two poses and their rates predicts too badly the
-    step is rejected: the state stays, with a shorter step.
+    seven numbers. If the cubic through the last two poses and their rates predicts too badly, the
+    step is rejected: the state is unchanged except for a shorter step.
     """
     slope = [there - here for here, there in zip(start, target, strict=True)]
     t = ca.if_else(at.step < 1 - at.t, at.t + at.step, 1)
@@ -184,7 +184,7 @@ def advance_path(
 
 
 def _predict_pose(at: PathState, patch: Sequence[Number], interval: Expression) -> list[Number]:
-    """Return the cubic through the last two poses and their rates, in the patch of the last."""
+    """Return the pose that a cubic through the last two poses and rates predicts."""
     scale = _dot(patch, at.before).inverse()
     previous = [v * scale for v in at.before]
     rates = [v * scale for v in at.rate_before]
@@ -203,7 +203,7 @@ def _predict_pose(at: PathState, patch: Sequence[Number], interval: Expression) 
 def _select(
     is_accepted: Expression, accepted: list[Number], rejected: list[Number]
 ) -> list[Number]:
-    """Return the complex numbers of a step if it is accepted, else the others."""
+    """Return the numbers of `accepted` if the step is accepted, else those of `rejected`."""
     return [
         Number(ca.if_else(is_accepted, a.re, b.re), ca.if_else(is_accepted, a.im, b.im))
         for a, b in zip(accepted, rejected, strict=True)
@@ -221,9 +221,9 @@ def _square(v: Sequence[Number]) -> Expression:
 def rows(
     closed: Closed, machine: Sequence[Number], z: Sequence[Number]
 ) -> tuple[Expression, Expression]:
-    """Return the closures' Jacobian (k, size) at a real z, and their residuals (k, 1).
+    """Return the closure equations' Jacobian (k, size) and residuals (k, 1) at a real z.
 
-    x.y = 0 is the first closure where P moves.
+    If P moves, x.y = 0 is the first closure equation.
     """
     closures = _closures(closed, machine, None, z)
     slopes = ca.vertcat(*(ca.horzcat(*(v.re for v in row[:-1])) for row in closures))
@@ -237,7 +237,7 @@ def _newton(
     z: Sequence[Number],
     patch: Sequence[Number],
 ) -> tuple[list[Number], list[Number]]:
-    """Return Newton's step and, given the machine's slope, dz/dt."""
+    """Return Newton's step (size,) and, if the machine's slope is given, dz/dt."""
     unit, none = Number(ca.SX(1), ca.SX(0)), Number(ca.SX(0), ca.SX(0))
     system = [[*patch, unit - _dot(patch, z), *([none] if slope else [])]]
     solutions = _solve_by_elimination(system + _closures(closed, now, slope, z), closed.size)
@@ -250,7 +250,7 @@ def _closures(
     slope: Sequence[Number] | None,
     z: Sequence[Number],
 ) -> list[list[Number]]:
-    """Return a row for each closure: its derivatives by z, its negated value and t derivative."""
+    """Return a row for each closure equation: its derivatives by z, negated value, d/dt."""
     x, y = z[:4], z[4:]
     square, none = _dot(x, x), Number(ca.SX(0), ca.SX(0))
     closures = []
@@ -287,7 +287,7 @@ def _closures(
 
 
 def _solve_by_elimination(rows: list[list[Number]], size: int) -> list[list[Number]]:
-    """Return the solutions, one a right-hand column, by Gaussian elimination without pivoting.
+    """Return the solution of a linear system for each right-hand column, without pivoting.
 
     The frames are rotated at random, so that no pivot vanishes.
     """
@@ -312,12 +312,12 @@ def _solve_by_elimination(rows: list[list[Number]], size: int) -> list[list[Numb
 
 
 def _plus(p: Quaternion, q: Quaternion) -> list[Number]:
-    """Return the sum of two quaternions or vectors."""
+    """Return the sum of two quaternions or vectors of complex numbers."""
     return [a + b for a, b in zip(p, q, strict=True)]
 
 
 def _minus(p: Quaternion, q: Quaternion) -> list[Number]:
-    """Return the difference of two quaternions or vectors."""
+    """Return the difference of two quaternions or vectors of complex numbers."""
     return [a - b for a, b in zip(p, q, strict=True)]
 
 
@@ -330,7 +330,7 @@ def _dot(u: Sequence[Number], v: Sequence[Number]) -> Number:
 
 
 def _vector_times(v: Sequence[Number], x: Quaternion) -> list[Number]:
-    """Return v x."""
+    """Return the quaternion product v x of a vector v (3) and a quaternion x (4)."""
     (a, b, c), (w, i, j, k) = v, x
     return [
         (a * i + b * j + c * k).times(-1),
@@ -341,7 +341,7 @@ def _vector_times(v: Sequence[Number], x: Quaternion) -> list[Number]:
 
 
 def _times_vector(x: Quaternion, v: Sequence[Number]) -> list[Number]:
-    """Return x v."""
+    """Return the quaternion product x v of a quaternion x (4) and a vector v (3)."""
     (a, b, c), (w, i, j, k) = v, x
     return [
         (a * i + b * j + c * k).times(-1),

@@ -59,7 +59,7 @@ class Equilibrium(NamedTuple):
 
 
 def equilibrium(machine: Machine, state: State, parameters: Expression) -> Equilibrium:
-    """Return the equations of the internal forces of a state."""
+    """Return the linear equilibrium equations of the internal joint forces in a state."""
     inertia, platform_inertia = machine.moments(parameters)
     platform, count = state.platform, len(machine.legs)
     sums, pose_rows, legs, driven = [], [], [], []
@@ -123,7 +123,7 @@ class Beams(NamedTuple):
 
 
 def beams(machine: Machine, state: State) -> Beams:
-    """Return the links of a state's legs."""
+    """Return start point, vector and bending axis of every link of the legs; the rods' couples."""
     links = Beams([], [], [], [])
     for leg, motion in zip(machine.robot.legs, state.legs, strict=True):
         rows = []
@@ -147,7 +147,7 @@ def _leg_forces(
     c: Expression,
     inertia: dict[str, Moments],
 ) -> LegForces:
-    """Return the wrenches that the joints of a leg transmit towards the platform."""
+    """Return, for each joint of a leg, the wrench it transmits towards the platform."""
     eye, points, wrenches = ca.SX.eye(3), [], []
     force, moment = ca.SX(3, 1), ca.SX(3, 1)  # of the bodies beyond the joint, about c
     for k, joint in reversed(list(enumerate(motion.chain))):
@@ -180,7 +180,7 @@ def _embed_row(row: _Row, i: int, count: int) -> _Row:
 
 
 def _freedom_component(motion: LegMotion, leg_forces: LegForces, k: int) -> _Row:
-    """Return the force, or moment, that a joint transmits along its own freedom."""
+    """Return the force or moment that joint k transmits along its own axis, as a linear form."""
     joint, wrench = motion.chain[k], leg_forces.wrenches[k]
     axis = joint.axis.T
     if joint.kind == "P":
@@ -189,7 +189,7 @@ def _freedom_component(motion: LegMotion, leg_forces: LegForces, k: int) -> _Row
 
 
 def _actuator_row(motion: LegMotion, leg_forces: LegForces) -> _Row:
-    """Return the actuator force: that along the driven joint's freedom, over its gear ratio."""
+    """Return the actuator force as a linear form: along the driven joint's axis, over its gear."""
     row, constant = _freedom_component(
         motion, leg_forces, motion.chain.index(motion.actuated_joint)
     )
@@ -199,7 +199,7 @@ def _actuator_row(motion: LegMotion, leg_forces: LegForces) -> _Row:
 def _passive_joint_rows(
     leg: LegKind, motion: LegMotion, leg_forces: LegForces, hinges: int
 ) -> list[_Row]:
-    """Return the forms that vanish: the forces along the freedoms of a leg's passive joints.
+    """Return linear forms that must vanish: forces along the axes of a leg's passive joints.
 
     The last joints are excluded: hinges on the platform's axes, which legs may share, and joints
     geared to the driven joint.

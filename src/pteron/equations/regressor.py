@@ -37,13 +37,13 @@ class RegressorTerms:
 
     @property
     def columns(self) -> list[slice]:
-        """Places of the parameters in P: of the sliders, of each link, of the platform."""
+        """Column ranges in the parameter vector: of sliders, of each link, of the platform."""
         sizes = [len(self.with_slider), *(om.shape[1] for om in (*self.links, self.platform))]
         return [slice(*ends) for ends in pairwise(accumulate(sizes, initial=0))]
 
     @property
     def bracket(self) -> Expression:
-        """The bracket of Eq. (15), (m, N)."""
+        """The bracket of Eq. (15), (m, N): generalized forces per inertial parameter, negated."""
         links = (
             ca.mtimes(jac.T, matrix)
             for jac, matrix in zip(self.link_jacobians, self.links, strict=True)
@@ -53,7 +53,7 @@ class RegressorTerms:
 
 
 def terms(machine: Machine, state: State) -> RegressorTerms:
-    """Return the factors of Eq. (15)."""
+    """Return the factors of the regressor in Eq. (15): link Jacobians and wrench matrices."""
     slider, *links = LEG_BODIES
     n = len(machine.legs)
     with_slider = tuple(i for i in range(n) if slider in state.legs[i].bodies)
@@ -78,9 +78,10 @@ def terms(machine: Machine, state: State) -> RegressorTerms:
 
 
 def paper_regressor(machine: Machine, state: State) -> Expression:
-    """Return the dynamic matrix D (n, N) of Eq. (15): F_a = D P.
+    """Return the regressor D (n, N) of Eq. (15): drive forces F_a = D P for parameters P.
 
-    Omega holds what acts on the bodies, so that the forces which balance it carry a minus sign.
+    Omega contains the forces that act on the bodies, so that the forces that balance them have a
+    minus sign.
     """
     bracket = state.platform.quasi_forces(terms(machine, state).bracket)
     return -machine.closure.forces(bracket, state.platform, state.legs)  # J^-T of Eq. (15)

@@ -19,10 +19,10 @@ _TINY = 1e-30
 
 
 def type_ii_distances(machine: Machine, pose: Expression) -> dict[str, Expression]:
-    """Return the distance, m, under translation alone, and the angle, rad, of a turn alone.
+    """Return first-order distance to type II: by translation alone, m; by rotation alone, rad.
 
-    They are at most `FAR` and pi; a platform that does not turn has no angle. For a platform that
-    tilts the angle is the least over all rotation axes that its angles span.
+    The values are at most `FAR` and pi; there is no angle for a platform that does not turn. If the
+    platform tilts, the angle is the least over all rotation axes that its angles span.
     """
     state = machine.state(pose)
     measure = machine.closure.measure(state.platform, state.legs)
@@ -45,7 +45,7 @@ def type_ii_distances(machine: Machine, pose: Expression) -> dict[str, Expressio
 
 
 def _first_order(measure: Expression, square: Expression, most: float) -> Expression:
-    """Return min(|mu| / slope, most), from the square of the slope."""
+    """Return min(|measure| / slope, most), given the slope's square."""
     size = ca.fabs(measure)
     # `fmin` of the quotient would return `most` for a quotient that is NaN.
     return size / ca.fmax(ca.sqrt(square + _TINY), size / most)

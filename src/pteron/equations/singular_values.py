@@ -57,10 +57,10 @@ def _orthogonalise(u: Expression, v: Expression) -> tuple[Expression, Expression
 
 
 def largest(sigmas: list[Expression]) -> Expression:
-    """Return the largest of singular values."""
+    """Return the largest of a list of singular values."""
     return reduce(ca.fmax, sigmas)
 
 
 def smallest(sigmas: list[Expression]) -> Expression:
-    """Return the smallest of singular values."""
+    """Return the smallest of a list of singular values."""
     return reduce(ca.fmin, sigmas)

@@ -79,7 +79,7 @@ class _DriveOutputs(NamedTuple):
     bristle_rates: list[Expression]
 
     def state_rates(self, kind: DriveKind, motor_growth: Expression) -> dict[str, Expression]:
-        """Return the rates of the drives' own states, except the motors' positions, by name."""
+        """Return the rates of the drives' extra states, by name, except motor positions."""
         rates = {
             "motor_growth": motor_growth,
             "change": ca.vertcat(*self.current_rates),
@@ -99,10 +99,10 @@ def stick_slip_rates(
     motors: Motors,
     sides: Sides | None,
 ) -> dict[str, Expression]:
-    """Return the accelerations and the drives' rates of a state, under commanded drive forces.
+    """Return accelerations and drive states' rates by name, under commanded drive forces.
 
-    (M + J^T D J) x'' = J^T (F + tau - b q' - F_0 - D J' x') + wrench - h; tau is dry friction,
-    zero without `sides`. Where a transmission bends, friction and D are the motor's, and the
+    (M + J^T D J) x'' = J^T (F + tau - b q' - F_0 - D J' x') + wrench - h; tau is dry friction, zero
+    without `sides`. With an elastic transmission, friction and D are those of the motor, and the
     transmission's force acts on the joint.
 
     Returns
@@ -172,7 +172,10 @@ def _drive_outputs(
     coordinates: list[Expression],
     joint_rates: Expression,
 ) -> _DriveOutputs:
-    """Return the drives' forces and state rates; `sliding` is the size of dry friction (n, 1)."""
+    """Return each drive's motor and transmission forces and the rates of its extra states.
+
+    `sliding` is the dry friction (n, 1), N or N m, that a joint has while it slides.
+    """
     kind, outputs = motors.kind, _DriveOutputs([], [], [], [])
     for i in range(len(coordinates)):
         numbers = kind, motors.numbers, i
@@ -199,7 +202,7 @@ def _drive_outputs(
 def _holding_friction(
     mobility: Expression, sides: Sides, rates: Expression, growth: Expression
 ) -> Expression:
-    """Return the friction tau (n, 1) that holds the joints that stick: W tau = q'' - q''_free."""
+    """Return the friction forces (n, 1), N or N m, that keep sticking joints at rest."""
     sticks = 1 - sides.side * sides.side
     needed_growth = sides.hold - sides.brake * rates - growth
     matrix = mobility * ca.mtimes(sticks, sticks.T) + ca.diag(1 - sticks)

@@ -19,25 +19,25 @@ from pteron.manipulator import Manipulator
 
 @lru_cache(maxsize=256)
 def topology_of(robot: Manipulator) -> Manipulator:
-    """Return a machine with NaN for every number, equal for all machines of a topology."""
+    """Return the machine with NaN for every number: equal for all machines of a topology."""
     return with_stored_numbers(robot, iter(lambda: nan, None))
 
 
 def stored_numbers(robot: Manipulator) -> list[float]:
-    """Return all numbers that the fields of a machine hold, but for inertia, drives and tools."""
+    """Return all numbers in a machine's fields except inertia, drives and tools."""
     recorded: list[float] = []
     _replace(robot, recorded.append)
     return recorded
 
 
 def with_stored_numbers(robot: Manipulator, numbers: Iterator[Any]) -> Manipulator:
-    """Return the machine with other numbers in its fields, in order, which may be expressions."""
+    """Return the machine with other numbers, or expressions, in its fields, in order."""
     replaced: Manipulator = _replace(robot, lambda _: next(numbers))
     return replaced
 
 
 def _replace(value: Any, exchange: Callable[[float], Any], is_sign: bool = False) -> Any:
-    """Return a field's value with `exchange(number)` for each number of it; nothing is checked."""
+    """Return a value with each float x in it (recursively) replaced by exchange(x), unchecked."""
     if isinstance(value, float) or (is_sign and isinstance(value, int)):
         return exchange(float(value))
     if isinstance(value, tuple):

@@ -39,7 +39,7 @@ class DriveKind:
 
     @classmethod
     def from_robot(cls, robot: Manipulator) -> DriveKind:
-        """Return the kind of a machine's drives."""
+        """Return which features (friction, elasticity, limits ...) the drives of a machine have."""
         drives = [leg.drive or Drive() for leg in robot.legs]
         return cls(
             any((drive.coulomb or drive.stribeck) and not drive.lugre for drive in drives),
@@ -62,7 +62,7 @@ class DriveKind:
 
     @property
     def extra_states(self) -> tuple[tuple[str, str], ...]:
-        """The states beyond pose and velocity, each (n,), and the names of their rates."""
+        """Names of the drives' extra states, (n,) each, and of their time derivatives."""
         bends = ("motor", "motor_rate"), ("motor_rate", "motor_growth")
         lag_states = [("current", "change")] * any(self.lag) + [("bristle", "yield")] * any(
             self.lugre
@@ -70,7 +70,7 @@ class DriveKind:
         return (*(bends if self.bends else ()), *lag_states)
 
     def parts(self, states: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
-        """Return the parts of states (..., Y) by name: `pose`, `velocity` and `extra_states`."""
+        """Return state vectors (..., Y) split by name: pose, velocity and extra drive states."""
         n, names = len(self.elastic), [name for name, _ in self.extra_states]
         m = (states.shape[-1] - n * len(names)) // 2
         by_name = {"pose": states[..., :m], "velocity": states[..., m : 2 * m]}
@@ -81,7 +81,7 @@ class DriveKind:
 
     @property
     def plain(self) -> bool:
-        """Whether all drives are ideal: rigid, without delay or limits."""
+        """Whether no drive has an elastic transmission, lag, winding, ripple or other extra."""
         return not any(any(getattr(self, f.name)) for f in fields(self)[2:])
 
 
@@ -93,12 +93,12 @@ class Actuators:
         self._at = {name: vector[k] for k, name in enumerate(names)}
 
     def __call__(self, name: str, joint: int, k: int = 0) -> Expression:
-        """Return a number of a joint's drive."""
+        """Return the parameter `name` (with index k) of a joint's drive."""
         return self._at[name, joint, k]
 
 
 def actuator_numbers(robot: Manipulator) -> NDArray[np.float64]:
-    """Return the numbers (k,) of a machine's motors and transmissions, k at least 1."""
+    """Return the parameters (k,) of a machine's motors and transmissions, k >= 1."""
     numbers = []
     for name, joint, k in _names(DriveKind.from_robot(robot)):
         drive = robot.legs[joint].drive or Drive()
@@ -125,12 +125,12 @@ def actuator_numbers(robot: Manipulator) -> NDArray[np.float64]:
 
 
 def actuator_count(kind: DriveKind) -> int:
-    """Return the length of `actuator_numbers`."""
+    """Return the number of parameters that `actuator_numbers` returns for these drives."""
     return max(1, len(_names(kind)))
 
 
 def _names(kind: DriveKind) -> list[tuple[str, int, int]]:
-    """Return name, joint and index of each number."""
+    """Return (name, joint, index) of each parameter of the motors and transmissions."""
     names: list[tuple[str, int, int]] = []
     for i in range(len(kind.elastic)):
         names += [(name, i, 0) for name in ("stiffness", "damping") if kind.elastic[i]]
@@ -148,7 +148,7 @@ def _names(kind: DriveKind) -> list[tuple[str, int, int]]:
 def transmission_force(
     kind: DriveKind, numbers: Actuators, i: int, deflection: Expression, rate: Expression
 ) -> Expression:
-    """Return the force of an elastic transmission on its joint, from deflection and its rate."""
+    """Return the force of joint i's elastic transmission, N or N m, from deflection and rate."""
     stiffness, damping = numbers("stiffness", i), numbers("damping", i)
     if not kind.play[i]:
         return stiffness * deflection + damping * rate
@@ -162,7 +162,7 @@ def transmission_force(
 def limited_motor_force(
     kind: DriveKind, numbers: Actuators, i: int, force: Expression, rate: Expression
 ) -> Expression:
-    """Return the force that a motor's current is set to: the command within its speed limits."""
+    """Return the commanded force limited to what motor i can give at its rate."""
     if kind.curve[i]:
         speed, most = ca.fabs(rate), numbers("force", i)
         for k in range(1, kind.curve[i]):
@@ -184,7 +184,7 @@ def bristles(
     most: Expression,
     pace: Expression,
 ) -> tuple[Expression, Expression]:
-    """Return LuGre's friction and the rate of its bristles; `most` is the friction of sliding.
+    """Return LuGre friction of joint i, N or N m, and the rate of its bristle deflection.
 
     Sliding bristles follow the joint's rate with a rate constant of at most `pace`, 1/s.
     """
@@ -198,7 +198,7 @@ def bristles(
 def motor_force(
     kind: DriveKind, numbers: Actuators, i: int, force: Expression, motor: Expression
 ) -> Expression:
-    """Return a motor's force with ripple and cogging at its coordinate."""
+    """Return the force of motor i with ripple and cogging at its coordinate, N or N m."""
     ripple_factor, cogging_force = ca.SX(1), ca.SX(0)
     for which, total in (("ripple", ripple_factor), ("cogging", cogging_force)):
         for k in range(getattr(kind, which)[i]):

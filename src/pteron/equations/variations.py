@@ -61,7 +61,7 @@ class Variation:
 
     @property
     def name(self) -> str:
-        """Its name: "legs[2].guide_point.x", "legs[2].direction about z"."""
+        """The varied quantity's name: "legs[2].guide_point.x", "legs[2].direction about z"."""
         if self.group == "radius":
             return self.group
         owner = "platform" if self.leg < 0 else f"legs[{self.leg + 1}]"
@@ -72,11 +72,11 @@ class Variation:
 
     @property
     def unit(self) -> str:
-        """Its unit, "m" or "rad"."""
+        """The unit of the variation: "m" or "rad"."""
         return "rad" if self.group in ("directions", "angles") else "m"
 
     def value(self, robot: Manipulator) -> float:
-        """Return the nominal length on a machine, m; 0 for an angle."""
+        """Return the nominal value on a machine, m, of the length that varies; 0 for an angle."""
         if self.group == "radius":
             point, axis = np.array(robot.legs[0].guide_point), np.array(robot.platform.axis)
             return float(np.linalg.norm(np.cross(axis, point)))
@@ -88,7 +88,7 @@ class Variation:
 
 @lru_cache(maxsize=32)
 def variations(robot: Manipulator) -> tuple[Variation, ...]:
-    """Return the variations of a machine's geometry, leg by leg, then the platform's."""
+    """Return all variations of a machine's points, lengths and directions, leg by leg."""
     candidates: list[Variation] = []
     for i, leg in enumerate(robot.legs):
         for quantity in leg.quantities:
@@ -115,7 +115,7 @@ def axial_variations(robot: Manipulator) -> tuple[Variation, ...]:
 
 
 def _turns(robot: Manipulator, leg: int, key: str, direction: Sequence[float]) -> list[Variation]:
-    """Return the rotations of a direction, except one about itself, which changes nothing."""
+    """Return the rotations about base axes that change a direction of a leg or the platform."""
     axis_cosines = np.abs(np.array(robot.platform.frame) @ direction)
     rotations = [Variation(leg, key, axis, "directions") for axis in range(3)]
     turns = [v for v, a in zip(rotations, axis_cosines, strict=True) if a < 1.0 - ROUNDING]
@@ -126,7 +126,7 @@ def _turns(robot: Manipulator, leg: int, key: str, direction: Sequence[float]) -
 
 
 def _possible(robot: Manipulator, variation: Variation) -> bool:
-    """Return whether the geometry admits a variation by the trial amount."""
+    """Return whether the machine with a small trial amount of the variation is valid."""
     try:
         vary_geometry(robot, (variation,), np.array([_TRIAL_AMOUNT]))
     except ModelError:
@@ -135,7 +135,7 @@ def _possible(robot: Manipulator, variation: Variation) -> bool:
 
 
 def vary_geometry(robot: Manipulator, changes: Sequence[Variation], amounts: Array) -> Manipulator:
-    """Return a machine with varied geometry; `amounts` in m and rad.
+    """Return the machine with its geometry varied by `amounts` (K,), m and rad.
 
     Raises
     ------
@@ -186,7 +186,7 @@ def vary_geometry(robot: Manipulator, changes: Sequence[Variation], amounts: Arr
 
 
 def _keep_perpendicular(leg: LegKind, fields: dict[str, Any], turned: Collection[str]) -> None:
-    """Make a leg's directions perpendicular again where both were rotated.
+    """Make directions of a leg perpendicular again, in `fields`, after both were rotated.
 
     Successive rotations keep them perpendicular to first order only.
     """
@@ -198,10 +198,11 @@ def _keep_perpendicular(leg: LegKind, fields: dict[str, Any], turned: Collection
 
 
 def varied_numbers(robot: Manipulator, changes: Sequence[Variation], amounts: Array) -> Array:
-    """Return the geometry (B, G) of machines that differ by amounts (B, K), m and rad.
+    """Return the geometric numbers (B, G) of machines varied by amounts (B, K), m and rad.
 
-    Each is that of `vary_geometry`, in the order of `equations.machine.numbers`, except that a
-    derived axis may be another one in its plane. None is checked; axial variations are excluded.
+    Each row is the geometry of `vary_geometry`, in the order of `equations.machine.numbers`, except
+    that derived axes may be rotated in their plane. The geometry is not checked; axial variations
+    are excluded.
     """
     places, frame = number_places(robot), np.array(robot.platform.frame)
     geometry = np.tile(numbers(robot), (len(amounts), 1))
@@ -236,7 +237,7 @@ def rotating_keys(leg: LegKind, key: str) -> list[str]:
 
 
 def _radial_frame(axis: Array, point: Array) -> tuple[Array, Array]:
-    """Return the unit vector from an axis through the origin to a point, and axis x point."""
+    """Return the unit radial vector from an axis through the origin to a point; axis x point."""
     outward = point - (point @ axis) * axis
     return outward / np.linalg.norm(outward), np.cross(axis, point)
 
@@ -249,7 +250,7 @@ The entry is a product of numbers of the geometry, or 1. The geometry is the vec
 
 
 def slope_terms(robot: Manipulator, changes: Sequence[Variation]) -> list[Term]:
-    """Return the terms of d(geometry)/d(variations) of a machine, except for axial variations."""
+    """Return the non-zero terms of d(geometry)/d(variations), except for axial variations."""
     places = number_places(robot)
     start = places[-1]["frame"]
     terms: list[Term] = []
@@ -269,7 +270,7 @@ def slope_terms(robot: Manipulator, changes: Sequence[Variation]) -> list[Term]:
 
 
 def _rotating_rows(robot: Manipulator, leg: int, key: str, at: Mapping[str, int]) -> list[int]:
-    """Return the first rows of the vectors that rotate with a direction of an owner."""
+    """Return the first rows, in the geometry vector, of vectors that turn with a direction."""
     if leg >= 0:
         return [at[name] for name in _rotating_quantities(robot.legs[leg], key, at)]
     first = {"axis": "first_axis"}.get(key, key)
@@ -278,7 +279,7 @@ def _rotating_rows(robot: Manipulator, leg: int, key: str, at: Mapping[str, int]
 
 
 def _rotating_quantities(leg: LegKind, key: str, known: Collection[str]) -> list[str]:
-    """Return a leg's quantities that rotate with a direction; derived ones with the leg's first."""
+    """Return the names of a leg's quantities that rotate with the direction `key`."""
     names = [name for name in rotating_keys(leg, key) if name in known]
     if key == next(q.name for q in leg.quantities if q.role == "direction"):
         names += [
@@ -298,7 +299,7 @@ def slope_matrix(
     geometry: NDArray[Any],
     radial: Sequence[tuple[NDArray[Any], NDArray[Any]]] | None = None,
 ) -> NDArray[Any]:
-    """Return d(geometry)/d(variations) of a machine, in floats or in the numbers of a field.
+    """Return the matrix (G, K) of d(geometry)/d(variations), in floats or numbers of a field.
 
     In a field, `radial` has for each leg the unit vector from the platform's axis to its guide
     point, and the vector axis x point, along which it moves when it turns about the axis.

@@ -24,11 +24,11 @@ def inverse_dynamics(
     *,
     carried: bool = True,
 ) -> Expression:
-    """Return the actuator forces F_a (n, K) for the columns of parameters (N, K), Eq. (13).
+    """Return the actuator forces F_a (n, K) of a state for parameter columns (N, K), Eq. (13).
 
-    `wrench` acts on the platform at P: a force and, where it turns, a moment about k, (m, K); where
-    it tilts force and moment, (6, K). A mass on a platform point moves with leg and platform: with
-    `carried` it counts as the platform's.
+    `wrench` acts on the platform at P: a force and, if it turns, a moment about k, (m, K); force
+    and moment, (6, K), if it tilts. With `carried`, masses at platform points, which move with leg
+    and platform, are computed with the platform.
     """
     joints, load = needed_forces(machine, state, parameters, carried)
     if wrench is not None:
@@ -38,7 +38,7 @@ def inverse_dynamics(
 
 
 def generalized_forces(machine: Machine, state: State, parameters: Expression) -> Expression:
-    """Return M x'' + h (m, K), the forces of the motion in platform coordinates: J^T F_a."""
+    """Return the generalized inertia, Coriolis and gravity forces M x'' + h (m, K) of a state."""
     joints, total = needed_forces(machine, state, parameters)
     for leg, matrix, force in zip(
         state.legs, state.platform.matrices, ca.vertsplit(joints), strict=True
@@ -50,9 +50,10 @@ def generalized_forces(machine: Machine, state: State, parameters: Expression) -
 def needed_forces(
     machine: Machine, state: State, parameters: Expression, carried: bool = True
 ) -> tuple[Expression, Expression]:
-    """Return the required forces at the joints (n, K) and of the platform (m, K).
+    """Return the forces required at the joints (n, K) and at the platform (m, K) of a state.
 
-    The platform's are along its quasi-velocities, which are the pose's rates unless it tilts.
+    The platform's forces are along its quasi-velocities, which are the pose's rates unless it
+    tilts.
     """
     legs, inertia = machine.moments(parameters)
     platform = state.platform

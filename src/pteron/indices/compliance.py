@@ -58,7 +58,7 @@ class Stiffness(Result):
 
     @property
     def matrix(self) -> Matrices:
-        """K, the inverse of the compliance.
+        """Stiffness matrix at the tool, K, the inverse of the compliance, (..., m, m).
 
         Raises
         ------
@@ -88,7 +88,7 @@ class Stiffness(Result):
 
     @property
     def _principal_compliances(self) -> Array:
-        """The eigenvalues (..., k) of the compliance between forces and displacements, m/N."""
+        """Eigenvalues (..., k) of the tool's compliance, force to displacement, ascending, m/N."""
         k = self.lengths
         part = self.compliance[..., :k, :k]
         known = np.isfinite(part).all(axis=(-2, -1))
@@ -96,7 +96,7 @@ class Stiffness(Result):
         return np.asarray(np.where(known[..., None], eigenvalues, np.nan))
 
     def directional_stiffness(self, direction: ArrayLike) -> Numbers:
-        """Return force over the tool's displacement along a direction (..., k), N/m.
+        """Return the stiffness (...), N/m: force over the tool's displacement along `direction`.
 
         Raises
         ------
@@ -121,16 +121,17 @@ class Stiffness(Result):
 def stiffness(
     robot: RobotLike, pose: PoseLike, elasticity: Elasticity, *, on_failure: OnFailure = "raise"
 ) -> Stiffness:
-    """Return the stiffness at the tool from actuators and links that give way.
+    """Return the stiffness at the tool, due to elastic actuators and links.
 
-    By Castigliano: C = X^T W X, W being the energy of the internal forces w, and X those of unit
-    loads. Actuators are springs at their joints (C. Gosselin, IEEE Transactions on Robotics and
-    Automation 6 (1990) 377-382: K = J^T K_q J where nothing else gives way), links slender beams
-    with tension, bending and torsion, rods tension alone with, where their distance is given, the
-    couple of a pair (the virtual joints of A. Pashkevich, D. Chablat and P. Wenger, Mechanism and
-    Machine Theory 44 (2009) 966-982, summed up along a link). Of an overconstrained machine the
-    self-stress is that of the least energy. Joints, guides and the platform are rigid; preloads
-    are left out, and so is what legs that leave the platform free to tilt cannot hold.
+    By Castigliano's theorem C = X^T W X, where W is the energy matrix of the internal forces w, and
+    X are the internal forces of unit loads. Actuators are springs at their joints (C. Gosselin,
+    IEEE Transactions on Robotics and Automation 6 (1990) 377-382: K = J^T K_q J if nothing else is
+    elastic); links are slender beams with tension, bending and torsion; rods have tension only and,
+    if their distance is given, the couple of a pair (the virtual joints of A. Pashkevich, D.
+    Chablat and P. Wenger, Mechanism and Machine Theory 44 (2009) 966-982, integrated along a link).
+    In an overconstrained machine the self-stress minimises the energy. Joints, guides and the
+    platform are rigid; preloads are neglected, and so are loads that the legs of a platform free to
+    tilt cannot bear.
 
     Parameters
     ----------
@@ -184,7 +185,7 @@ def stiffness(
 def _block_compliance(
     robot: Manipulator, elasticity: Elasticity, poses: Array
 ) -> tuple[Array, Array]:
-    """Return the compliance at the tool (B, m, m) and the frequencies (B, m)."""
+    """Return the compliance at the tool (B, m, m) and the natural frequencies (B, m), Hz."""
     batch, m = poses.shape
     zero_rates = np.zeros(m)
     outputs: tuple[Array, ...] = evaluate_kernel(
@@ -220,7 +221,7 @@ def _block_compliance(
 
 
 def _compliance(robot: Manipulator, balance: Equations, energy: Array, arm: Array) -> Array:
-    """Return C (B, m, m), or (B, 6, 6), at a point whose vector from P is `arm` (B, 3)."""
+    """Return the compliance C (B, m, m), or (B, 6, 6), at a point `arm` (B, 3), m, away from P."""
     load, applied = _unit_loads(robot, balance, arm)
     batch, _, count = load.shape
     right = np.zeros((batch, balance.rows.shape[-2], count))
@@ -245,7 +246,7 @@ def _compliance(robot: Manipulator, balance: Equations, energy: Array, arm: Arra
 
 
 def _unit_loads(robot: Manipulator, balance: Equations, arm: Array) -> tuple[Array, Array]:
-    """Return unit loads at a point: about P (B, 6, K), and against the freedoms (B, m, K)."""
+    """Return unit loads at a point as wrenches about P (B, 6, K) and pose forces (B, m, K)."""
     batch, m = len(arm), robot.freedom
     if robot.platform.wrench_in_base_axes:
         load = wrench_shift(arm)
@@ -264,7 +265,7 @@ def _unit_loads(robot: Manipulator, balance: Equations, arm: Array) -> tuple[Arr
 def _energy_matrix(
     springs: Springs, rod_distance: float | None, balance: Equations, links: list[Array]
 ) -> Array:
-    """Return W (B, 6 n, 6 n): twice the energy of internal forces w is w^T W w."""
+    """Return W (B, 6 n, 6 n): internal forces w of the legs have the elastic energy w^T W w / 2."""
     actuators, sections = springs
     starts, ways, axes, couples = links
     batch, n = couples.shape[:2]
@@ -286,7 +287,7 @@ def _energy_matrix(
 
 
 def _rod_energy(section: Section, way: Array, couple: Array, distance: float | None) -> Array:
-    """Return the energy (B, 6, 6) of a rod, or of a pair whose couple pulls one and pushes one."""
+    """Return the energy matrix (B, 6, 6) of a rod, or of a pair of rods with a couple."""
     length = np.linalg.norm(way, axis=-1)
     n = way / length[:, None]
     energy = np.zeros((len(way), 6, 6))
@@ -303,9 +304,9 @@ def _rod_energy(section: Section, way: Array, couple: Array, distance: float | N
 
 
 def _beam_energy(section: Section, arm: Array, way: Array, axis: Array) -> Array:
-    """Return the energy (B, 6, 6) of a beam, for the wrench at c, where `arm` leads from its start.
+    """Return the energy matrix (B, 6, 6) of a beam, for the wrench at c, `arm` from its start.
 
-    It bends in its leg's plane about `axis`.
+    The beam bends in its leg's plane about `axis`, and across it.
     """
     length = np.linalg.norm(way, axis=-1)
     x = way / length[:, None]
@@ -336,11 +337,11 @@ def _square(rows: Array) -> Array:
 
 
 def _constrained_compliance(compliance: Array, twists: Array, length: float) -> Array:
-    """Return the compliance (m, m) of a pose's coordinates with parasitic motions constrained.
+    """Return the compliance (m, m) along a pose's coordinates, other motions constrained.
 
-    The platform moves by twists x' alone, `twists` (6, m), so that its stiffness is T^T C^-1 T. A
-    direction in which nothing gives way (C is singular where links are rigid) allows no x' that
-    moves along it; `length` balances moments and forces in the decision which those are.
+    The platform moves only by twists T x', T being `twists` (6, m), so that its stiffness is T^T
+    C^-1 T. A direction in which the machine is rigid (C is singular) allows no x' that moves along
+    it; `length` makes moments and forces comparable in deciding which directions are rigid.
     """
     scale = np.array([1.0, 1.0, 1.0, length, length, length])
     compliances, axes = np.linalg.eigh(scale[:, None] * compliance * scale)
@@ -355,7 +356,7 @@ def _constrained_compliance(compliance: Array, twists: Array, length: float) -> 
 
 
 def _frequencies(compliance: Array, mass: Array) -> Array:
-    """Return natural frequencies (B, m), Hz: of M x'' + C^-1 x = 0."""
+    """Return natural frequencies (B, m), Hz, from compliance and mass matrix."""
     lower = np.linalg.cholesky(mass)
     squares = np.linalg.eigvalsh(lower.mT @ compliance @ lower)[:, ::-1]
     with np.errstate(divide="ignore"):

@@ -54,7 +54,7 @@ def global_conditioning(
     count: int = 1 << 16,
     seed: Seed = 0,
 ) -> GlobalConditioning:
-    """Return the global conditioning index: the integral of 1 / c over that of 1.
+    """Return the global conditioning index: mean of 1 / condition number over poses in reach.
 
     C. Gosselin, J. Angeles, Journal of Mechanical Design 113 (1991) 220-226. The integrals are
     over the poses in reach within the joints' limits, by scrambled Sobol points.

@@ -14,7 +14,7 @@ from pteron.renamed import former_attribute
 
 
 def _positive_number(name: str, size: Any) -> float:
-    """Return a number above zero; infinite stands for rigid."""
+    """Return a positive number; infinity, which stands for rigid, is allowed."""
     checked = math.inf if size == math.inf else number(size, name)
     if not checked > 0.0:
         raise ModelError(f"{name}: {checked:g} given, a number above 0 expected")
@@ -77,7 +77,7 @@ class Section:
 
     @classmethod
     def tube(cls, diameter: float, wall: float, material: Material) -> Section:
-        """Return the section of a round tube, of an outer diameter and a wall, m.
+        """Return the cross-section of a round tube of outer diameter and wall thickness, m.
 
         A rod is a tube whose wall is half its diameter.
         """
@@ -88,9 +88,10 @@ class Section:
 
     @classmethod
     def square_tube(cls, side: float, wall: float, material: Material) -> Section:
-        """Return the section of a thin-walled square tube, of an outer side and a wall, m.
+        """Return the cross-section of a square tube of outer side and wall thickness, m.
 
-        Its torsion is Bredt's, J = t (a - t)^3: for walls that are thin beside the side.
+        The torsional stiffness is Bredt's, J = t (a - t)^3, for walls that are thin compared to the
+        side.
         """
         outer, inner = _hollow("side", side, wall)
         e_i = material.young * (outer**4 - inner**4) / 12
@@ -99,7 +100,7 @@ class Section:
 
 
 def _hollow(name: str, outer: float, wall: float) -> tuple[float, float]:
-    """Return the outer and the inner size of a tube."""
+    """Return the outer and inner size of a tube, m; raise if the wall is too thick."""
     outer, wall = _positive_number(name, outer), _positive_number("wall", wall)
     if 2 * wall > outer:
         raise ModelError(f"wall: {wall:g} m given, at most half of the {name}, {outer / 2:g} m")
@@ -147,7 +148,7 @@ class Elasticity:
             )
 
     def leg_springs(self, robot: Manipulator) -> Springs:
-        """Return the actuators' stiffness and the sections of both links, for each leg."""
+        """Return each leg's actuator stiffness and (upper, lower) link cross-sections."""
         actuators, upper, lower = (
             self._repeat_for_legs(robot, name) for name in ("actuators", "upper", "lower")
         )
@@ -156,7 +157,10 @@ class Elasticity:
     of_legs = former_attribute("of_legs", "leg_springs")
 
     def _repeat_for_legs(self, robot: Manipulator, name: str) -> tuple[Any, ...]:
-        """Return a setting for each leg; ModelError if a tuple has not a value for each leg."""
+        """Return the setting `name` for each leg.
+
+        A tuple must have one value for each leg.
+        """
         setting = getattr(self, name)
         if not isinstance(setting, tuple):
             return (setting,) * robot.joint_count

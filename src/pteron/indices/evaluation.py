@@ -15,7 +15,7 @@ from pteron.shapes import Numbers, OnFailure, PoseLike
 def evaluate(
     robot: RobotLike, name: str | Index, poses: PoseLike, *, on_failure: OnFailure = "raise"
 ) -> Numbers:
-    """Return an index of performance at poses; `INDICES` says what each one means.
+    """Return the values (...) of a performance index at poses (..., m).
 
     All poses go through one compiled kernel: a map of eight million poses takes about a second.
 
@@ -67,7 +67,7 @@ def evaluate(
 def values_in_reach(
     robot: Manipulator, index: Index, poses: Array, in_reach: NDArray[np.bool_]
 ) -> Array:
-    """Return an index's values at poses (..., m); NaN at those out of reach."""
+    """Return an index's values (...) at poses (..., m); NaN at those out of reach."""
     values = np.full(poses.shape[:-1], np.nan)
     if in_reach.any():
         values[in_reach] = function_values(robot, index, poses[in_reach])

@@ -65,7 +65,7 @@ class Index:
 
     @property
     def label(self) -> str:
-        """The title and, in brackets, the unit."""
+        """The index's title with its unit in brackets."""
         return f"{self.title} ({self.unit})" if self.unit else self.title
 
 
@@ -78,7 +78,7 @@ INDICES = {
 
 
 def index_named(name: str) -> Index | None:
-    """Return the index of a name, of an installed package too; None if there is none.
+    """Return the performance index of this name, also from a package; None if unknown.
 
     Raises
     ------
@@ -97,7 +97,7 @@ def index_named(name: str) -> Index | None:
 
 
 def indices_of(robot: RobotLike) -> tuple[str, ...]:
-    """Return the names of the indices that a machine has: those of what its platform does.
+    """Return the names of the performance indices that a machine has.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ def indices_of(robot: RobotLike) -> tuple[str, ...]:
 
 
 def _missing_motion(robot: Manipulator, index: Index) -> str:
-    """Return the motion that an index asks for and a platform lacks, in words; or nothing."""
+    """Return a phrase on the motion that an index needs and the platform lacks, or ''."""
     if index.turning and not robot.platform.angles:
         return "turning, but this {} platform does not turn"
     if index.moving and not robot.platform.lengths:
@@ -130,7 +130,7 @@ def _missing_motion(robot: Manipulator, index: Index) -> str:
 
 
 def expect_index(robot: RobotLike, name: str | Index) -> Index:
-    """Return the index of that name, or refuse one that does not exist or suit the machine."""
+    """Return the index of this name; raise if it does not exist or suit the machine."""
     robot = as_manipulator(robot)
     index = name if isinstance(name, Index) else index_named(name)
     if index is None:
@@ -152,7 +152,7 @@ def expect_index(robot: RobotLike, name: str | Index) -> Index:
 
 
 def function_values(robot: Manipulator, index: Index, poses: Array) -> Array:
-    """Return the values (N,) of an index's function at poses (N, m) in reach.
+    """Return the values (N,) of an index's own function at poses (N, m) in reach.
 
     Raises
     ------

@@ -49,28 +49,28 @@ _BLOCK = 1024
 
 
 def blocks(parts: Sequence[Array]) -> Iterator[list[Array]]:
-    """Yield arrays (B, ...) in blocks of states, one at least."""
+    """Yield all arrays cut into blocks of at most `_BLOCK` rows; one block even if empty."""
     for start in range(0, max(len(parts[0]), 1), _BLOCK):
         yield [part[start : start + _BLOCK] for part in parts]
 
 
 def size_of(robot: Manipulator) -> float:
-    """Return the length that makes moments comparable with forces where a rank is decided, m."""
+    """Return the mean leg size, m, by which moments are made comparable with forces."""
     return float(np.mean([leg.size for leg in robot.legs]))
 
 
 def force_units(robot: Manipulator) -> Array:
-    """Return the units that make the legs' forces and moments (6 n,) comparable: 1, and m."""
+    """Return scale factors (6 n,) of leg forces (1) and moments (mean leg size, m)."""
     return np.tile(np.repeat([1.0, size_of(robot)], 3), robot.joint_count)
 
 
 def balance_loads(
     robot: Manipulator, equations: Equations, right: Array, presumed: Array
 ) -> BalancedLoads:
-    """Return the leg forces that balance loads, given as right sides (B, R, K) and (B, S, K).
+    """Return the leg forces, self-stresses and residuals that balance loads (B, R, K).
 
-    The necessary equations hold exactly; among their solutions the one nearest to the presumed
-    equations is taken. Moments count as forces at the machine's size, so that no rank depends on a
+    The necessary equations hold exactly; of their solutions the one nearest to the presumed
+    equations is taken. Moments are divided by the machine's size, so that no rank depends on a
     unit.
     """
     count, length = equations.rows.shape[-1], size_of(robot)
@@ -101,7 +101,7 @@ def balance_loads(
 
 
 def _range(projectors: Array) -> Array:
-    """Return orthonormal columns (B, n, r) that span the range of products of projections."""
+    """Return orthonormal columns (B, n, r) that span the range of projectors (B, n, n)."""
     columns, sizes, _ = np.linalg.svd(projectors)
     counts = sizes > 0.5  # each is 0 or 1, but for rounding
     return np.asarray(
@@ -110,7 +110,7 @@ def _range(projectors: Array) -> Array:
 
 
 def platform_wrench(robot: Manipulator, wrench: Array, moment: Array) -> Array:
-    """Return the force and the moment at P (..., 6) of a wrench and of a moment beside it."""
+    """Return force and moment at P (..., 6) of a wrench (..., m) plus a moment (..., 3)."""
     force, moment_of_wrench = robot.platform.force_and_moment(wrench)
     return np.concatenate(np.broadcast_arrays(force, moment_of_wrench + moment), axis=-1)
 
@@ -127,10 +127,10 @@ def wrench_shift(arms: Array) -> Array:
 
 
 def inverse(matrices: Array) -> Array:
-    """Return the pseudo-inverse of matrices, small singular values truncated."""
+    """Return the pseudo-inverses of matrices, small singular values truncated."""
     return np.asarray(np.linalg.pinv(matrices, rcond=_RANK))
 
 
 def apply_matrices(matrices: Array, vectors: Array) -> Array:
-    """Return products of matrices and vectors."""
+    """Return the products (..., n) of matrices (..., n, m) and vectors (..., m)."""
     return np.asarray((matrices @ vectors[..., None])[..., 0])

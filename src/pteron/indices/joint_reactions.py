@@ -67,7 +67,7 @@ class Reactions(Result):
 
     @property
     def is_unique(self) -> bool:
-        """Whether statics alone determine the reactions."""
+        """Whether statics alone determine the joint reactions (no self-stress)."""
         return self.redundancy == 0
 
     unique = former_attribute("unique", "is_unique")
@@ -86,11 +86,11 @@ def reactions(
 ) -> Reactions:
     """Return the forces and moments in all joints and guides, by Newton and Euler.
 
-    Bodies are flat: their centres of mass are in the plane of their joints, as the inertial
-    parameters say no more. Parallel rods are one rod that passes on a force along it and a couple
-    across the plane of the rods. Where a machine is overconstrained the reactions of least norm are
-    returned, the root of the sum over all joints of |force|^2 + |moment / length|^2; which part of
-    them is certain the links' stiffness decides, not statics: `redundancy` says so.
+    Bodies are assumed flat, with centres of mass in the plane of their joints, as the inertial
+    parameters define nothing else. Parallel rods are treated as one rod that transmits an axial
+    force and a couple normal to the rods' plane. For an overconstrained machine the reactions of
+    least norm are returned, the norm being the root of the sum over all joints of |force|^2 +
+    |moment / length|^2; statics does not determine them completely, see `redundancy`.
 
     Parameters
     ----------
@@ -185,9 +185,9 @@ def _solve_reactions(
     wrench: Array,
     moment: Array,
 ) -> tuple[Array, Array, Array, Array, int]:
-    """Return points, joint wrenches (B, n, j, 6), actuator forces, residual, self-stress count.
+    """Return joint points, wrenches (B, n, j, 6), actuator forces, residual, self-stress count.
 
-    Where a self-stress leaves the wrenches undetermined, the minimum-norm solution is taken.
+    If a self-stress leaves the wrenches undetermined, the minimum-norm solution is taken.
     """
     state = pose, velocity, acceleration
     balance = Equations(*evaluate_kernel(robot, "reactions", "nan", *state))
@@ -229,7 +229,7 @@ def _solve_reactions(
 
 
 def _names(robot: Manipulator) -> tuple[tuple[str, ...], ...]:
-    """Return the joints' names, of the paper: P0 and R1 to R4."""
+    """Return the names of each leg's joints: "P0", "R1" and so on, as in the paper."""
     machine = Machine.numeric(robot)
     legs = machine.state(ca.SX.zeros(robot.freedom)).legs
     return tuple(tuple(f"{joint.kind}{k}" for k, joint in enumerate(leg.chain)) for leg in legs)

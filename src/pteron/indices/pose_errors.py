@@ -73,7 +73,7 @@ class PoseError(Result):
 def pose_error(
     robot: RobotLike, pose: PoseLike, tolerances: Tolerances, *, on_failure: OnFailure = "raise"
 ) -> PoseError:
-    """Return the errors of the tool's pose, to first order: dx = J^-1 (dq - (dq/dg) dg).
+    """Return the errors of the tool's pose caused by tolerances, to first order.
 
     J.-P. Merlet, Journal of Mechanical Design 128 (2006) 199-206.
 
@@ -147,7 +147,7 @@ def pose_error(
 
 
 def _expand_tolerances(setting: float | Sequence[float], name: str, count: int) -> Array:
-    """Return numbers of zero or more, one for all or `count`."""
+    """Return tolerances as an array (count,), >= 0, from one number or `count` numbers."""
     sizes = np.asarray(setting, dtype=float)
     if sizes.shape not in ((), (count,)):
         raise DataError(f"{name}: {sizes.shape} given, one number or {count} expected")

@@ -51,7 +51,7 @@ class Sensitivities(Result):
 
     @property
     def slopes(self) -> Array:
-        """The derivatives of `matrix`, shape (p, ... m): a row for each dimension."""
+        """The derivatives of the pose by the dimensions, (p, ... m): a row for each dimension."""
         columns: Array = np.moveaxis(self.matrix, -1, 0)
         return columns.reshape(len(self.names), -1)
 
@@ -59,15 +59,15 @@ class Sensitivities(Result):
 def geometric_sensitivities(
     robot: RobotLike, pose: PoseLike, *, on_failure: OnFailure = "raise"
 ) -> Sensitivities:
-    """Return the derivatives of the pose by every dimension, while the joints are held.
+    """Return the derivatives of the pose by every geometric dimension, joints held fixed.
 
-    The joint coordinates are q(x, g), g the dimensions; held, J dx + (dq/dg) dg = 0. A direction
-    has two angles by which it may be tilted, about axes of the base frame made perpendicular to it;
-    directions of the leg perpendicular to it are tilted with it, and may be turned about it. Angles
-    out of a planar machine's plane and between a leg's parallel axes are left out: they would
-    strain the machine or tilt its platform, which a pose cannot express. The point and the axes
-    about which a platform turns count too, as for `calibrate`: turns of its axes are about those of
-    its frame.
+    With joint coordinates q(x, g) and dimensions g, held joints give J dx + (dq/dg) dg = 0. A
+    direction has two tilt angles, about base axes made perpendicular to it; other directions of the
+    leg that are perpendicular to it are tilted with it, and may be turned about it. Angles out of a
+    planar machine's plane and between a leg's parallel axes are left out: they would strain the
+    machine or tilt its platform, which a pose cannot express. The point and the axes about which a
+    platform turns are included, as in `calibrate`: turns of these axes are about those of the
+    platform's frame.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ def geometric_sensitivities(
 
 @lru_cache(maxsize=64)
 def _slopes(robot: Manipulator) -> ca.Function:
-    """Return dq/dg (n, g) as a function of the geometry and a pose."""
+    """Return the CasADi function of geometry and pose: dq/dg (n, G), joint coordinates' slopes."""
     function = general_program(robot, "joint_coordinates").function
     geometry, pose = function.sx_in()
     joints = function(geometry, pose)
@@ -129,13 +129,13 @@ def _slopes(robot: Manipulator) -> ca.Function:
 
 
 def tool_arm(robot: Manipulator, poses: Array) -> Array:
-    """Return the vector (..., 3) from P to the tool's centre point, base frame."""
+    """Return the vector (..., 3), m, from P to the tool's centre point in the base frame."""
     _, axes = robot.platform.placement(poses)
     return np.asarray(np.array(robot.platform.tool) @ axes)
 
 
 def tool_pose_changes(robot: Manipulator, poses: Array, errors: Array) -> Array:
-    """Return changes of the pose (..., m, K) with the position of the tool's centre point."""
+    """Return pose changes (..., m, K) at P converted to those of the tool's centre point."""
     if not robot.platform.angles or not any(robot.platform.tool):
         return errors
     platform, turning = robot.platform, robot.platform.angular
@@ -155,7 +155,7 @@ _Dimension = tuple[str, str, str, Array]
 
 
 def _dimensions(robot: Manipulator) -> Iterator[_Dimension]:
-    """Yield name, role, unit and d geometry of every dimension; `numbers` has the order."""
+    """Yield name, role, unit and geometry change (G,) of every dimension of the machine."""
     size, start = len(numbers(robot)), 0
     point_unit = robot.platform.kind.point_unit
     for i, leg in enumerate(robot.legs, start=1):
@@ -178,7 +178,7 @@ def _dimensions(robot: Manipulator) -> Iterator[_Dimension]:
 
 
 def _platform_dimensions(robot: Manipulator) -> Iterator[_Dimension]:
-    """Yield the dimensions of the point and directions about which the platform turns."""
+    """Yield name, role, unit and geometry change of the platform's own dimensions."""
     changes = [change for change in variations(robot) if change.leg < 0]
     directions = slope_matrix(robot, changes, slope_terms(robot, changes), np.array(numbers(robot)))
     for change, direction in zip(changes, directions.T, strict=True):
@@ -193,7 +193,7 @@ def _platform_dimensions(robot: Manipulator) -> Iterator[_Dimension]:
 
 
 def _leg_dimensions(leg: LegKind) -> Iterator[tuple[str, str, dict[str, tuple[float, ...]]]]:
-    """Yield name, role and unit change of the quantities, for every dimension of a leg."""
+    """Yield name, role and changed quantities of every dimension of a leg."""
     units = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
     for quantity in leg.quantities:
         if quantity.role == "length":
@@ -226,7 +226,7 @@ def _leg_dimensions(leg: LegKind) -> Iterator[tuple[str, str, dict[str, tuple[fl
 def _tilts(
     name: str, moved: list[str], vectors: dict[str, Vector]
 ) -> Iterator[tuple[str, str, dict[str, tuple[float, ...]]]]:
-    """Yield the two tilts of a direction, about the base axes that are least along it."""
+    """Yield the two tilts of a direction: name, role and changed quantities of each."""
     v = np.array(vectors[name])
     for k in sorted(np.argsort(np.abs(v), kind="stable")[:2]):
         axis = np.eye(3)[k] - v[k] * v

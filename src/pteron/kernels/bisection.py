@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 def bisect_condition(
     holds: Callable[[Any], Any], low: ArrayLike, high: ArrayLike, halvings: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return an interval, halved, at whose low end a condition holds and at whose high end not.
+    """Return an interval with a condition true at its low and false at its high end, bisected.
 
     Parameters
     ----------

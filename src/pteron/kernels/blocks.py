@@ -34,27 +34,27 @@ class Block:
 
     @cached_property
     def state_inputs(self) -> tuple[Port, ...]:
-        """The inputs of a state."""
+        """The program's inputs that differ from state to state."""
         return tuple(port for port in self.program.inputs if not port.shared)
 
     @cached_property
     def machine_inputs(self) -> tuple[Port, ...]:
-        """The inputs that are the machine's own numbers."""
+        """The program's inputs that are parameters of the machine, the same for all its states."""
         return tuple(port for port in self.program.inputs if port.shared)
 
     @cached_property
     def first_rows(self) -> dict[str, int]:
-        """The first row of each input among its kind, and of each output."""
+        """The first row of each input in its array, by name (`in` or `numbers` in C)."""
         return {**_starts(self.state_inputs), **_starts(self.machine_inputs)}
 
     @cached_property
     def output_rows(self) -> dict[str, int]:
-        """The first row of each output."""
+        """The first row of each output in the C array `out`, by name."""
         return _starts([port for port in self.program.outputs if not self._is_late(port)])
 
     @cached_property
     def sizes(self) -> dict[str, int]:
-        """Numbers of rows: of inputs, of the machine's numbers, of `own`, and of outputs."""
+        """Numbers of rows of the C arrays: `in`, `numbers`, `own`, `kept` and `out`."""
         return {
             "in": max(1, sum(port.size for port in self.state_inputs)),
             "numbers": max(1, sum(port.size for port in self.machine_inputs)),
@@ -65,7 +65,7 @@ class Block:
 
     @cached_property
     def machine_statements(self) -> list[str]:
-        """The statements that fill `own`."""
+        """The C statements that fill `own`: values that only the machine's parameters determine."""
         names = self._names()
         lines = self._lines(
             [k for k in self._graph.operations() if k in self._shared_nodes], names, ""
@@ -73,7 +73,10 @@ class Block:
         return [*lines, *(f"own[{row}][k] = {names[k]};" for k, row in self._machine_rows.items())]
 
     def body(self, sincos: str) -> list[str]:
-        """Return the statements for a state; `sincos` is C's function for sine and cosine."""
+        """Return the C statements for one state.
+
+        `sincos` names C's function for sine and cosine.
+        """
         graph, names = self._graph, self._names()
         for k, row in self._machine_rows.items():
             names[k] = f"own[{row}][k]"
@@ -93,7 +96,7 @@ class Block:
 
     @cached_property
     def second_part(self) -> list[str]:
-        """The statements of the second part."""
+        """The C statements of the second part: outputs computed later than the first part's."""
         names = self._names()
         for where, rows in (("own", self._machine_rows), ("kept", self._passed_rows)):
             for k, row in rows.items():
@@ -102,7 +105,7 @@ class Block:
         return [*lines, *(f"out[{row}][k] = {names[k]};" for row, k in self._results(later=True))]
 
     def _results(self, *, later: bool) -> list[tuple[int, int]]:
-        """Return rows of `out` and their nodes, of one of the parts."""
+        """Return (row of `out`, graph node) pairs of the second part if `later`, else of part 1."""
         return [
             (self.output_rows[(self.later or {}).get(port.name, port.name)] + i, k)
             for port, part in zip(self.program.outputs, self._graph.outputs, strict=True)
@@ -111,12 +114,12 @@ class Block:
         ]
 
     def _is_late(self, port: Port) -> bool:
-        """Return whether an output belongs to the second part, which `later` names."""
+        """Return whether an output belongs to the second part, computed later."""
         return port.name in (self.later or ())
 
     @property
     def has_angles(self) -> bool:
-        """Whether the state determines the argument of a sine or a cosine."""
+        """Whether the program takes sines or cosines of quantities that depend on the state."""
         nodes = self._graph.nodes
         return any(
             n.operation in _ANGLES for k, n in enumerate(nodes) if k not in self._shared_nodes
@@ -124,18 +127,18 @@ class Block:
 
     @cached_property
     def _graph(self) -> Graph:
-        """The program's graph of operations, with exponentials in plain arithmetic."""
+        """The graph of the program's arithmetic, exponentials expanded into plain operations."""
         return graph_of(with_lowered_exponentials(self.program.function), self.program.inputs)
 
     @cached_property
     def _shared_nodes(self) -> frozenset[int]:
-        """The operations that inputs of the machine alone determine: its states share them."""
+        """The graph nodes that depend on the machine's parameters alone."""
         graph = self._graph
         return frozenset(k for k in graph.operations() if graph.nodes[k].shared)
 
     @cached_property
     def _late_nodes(self) -> frozenset[int]:
-        """The nodes on which the later outputs alone depend."""
+        """The graph nodes on which only outputs of the second part depend."""
         graph, needed = self._graph, {k for _, k in self._results(later=False)}
         late = set[int]()
         for k in reversed(graph.operations()):
@@ -147,7 +150,7 @@ class Block:
 
     @cached_property
     def _passed_rows(self) -> dict[int, int]:
-        """The rows of `kept`, by node: values of the first part that the second reads."""
+        """Rows of the C array `kept`, by graph node: first-part values that the second needs."""
         if not self.split:
             return {}
         graph = self._graph
@@ -158,7 +161,7 @@ class Block:
 
     @cached_property
     def _machine_rows(self) -> dict[int, int]:
-        """The rows of `own`, by node: those that nodes that are not shared read."""
+        """Rows of the C array `own`, by graph node: machine-only values that states read."""
         graph = self._graph
         read = {k for part in graph.outputs for k in part}
         for k in graph.operations():
@@ -167,7 +170,7 @@ class Block:
         return {k: row for row, k in enumerate(sorted(read & self._shared_nodes))}
 
     def _names(self) -> list[str]:
-        """Return each node's name in C: an element of the inputs, a constant or a variable."""
+        """Return the C expression of each graph node: an input's element, literal or variable."""
         ports = self.program.inputs
 
         def name(i: int, j: int) -> str:
@@ -178,7 +181,7 @@ class Block:
         return names_of(self._graph, name, c_language("float64").constant)
 
     def _lines(self, chosen: Sequence[int], names: list[str], sincos: str) -> list[str]:
-        """Return statements for nodes; those of sines and cosines share a call for an angle."""
+        """Return the C statements that compute the `chosen` graph nodes; updates `names`."""
         graph, language = self._graph, c_language("float64")
         lines: list[str] = []
         pairs: dict[int, str] = {}
@@ -198,7 +201,7 @@ class Block:
 
 
 def _starts(ports: Sequence[Port]) -> dict[str, int]:
-    """Return each port's first row in an array in which the ports are stacked."""
+    """Return each port's first row in an array in which all ports are stacked, by name."""
     starts, row = {}, 0
     for port in ports:
         starts[port.name] = row

@@ -50,7 +50,7 @@ class Bounded:
 
     @cached_property
     def _graph(self) -> Graph:
-        """The graph of the outputs, dense, and of all their elements' gradients, (m, R)."""
+        """The graph of the outputs and of the gradients of all their elements, (m, R)."""
         (pose,) = self.function.sx_in()
         outputs = [ca.densify(expression_) for expression_ in self.function.call([pose])]
         elements = ca.vertcat(*map(ca.vec, outputs))
@@ -58,7 +58,7 @@ class Bounded:
         return graph_of(ca.Function("bounded", [pose], ca.cse([*outputs, slopes])))
 
     def rows(self, name: str) -> range:
-        """Return the indices of an output's elements among those of all outputs."""
+        """Return the indices of the output `name`'s elements among the elements of all outputs."""
         start = 0
         for port in self.outputs:
             if port.name == name:
@@ -69,9 +69,9 @@ class Bounded:
     def __call__(
         self, low: Array, high: Array, rows: Sequence[int]
     ) -> tuple[Array, Array, NDArray[np.bool_]]:
-        """Return low, high and defined (B, R) of elements, in boxes with corners (B, m).
+        """Return bounds low, high and whether defined (B, R) of output elements, in B boxes.
 
-        low and high are NaN where the element is defined nowhere in the box.
+        low and high are NaN for an element that is undefined in all of the box.
         """
         graph, size = self._graph, low.shape[1]
         elements = [k for nodes in graph.outputs[:-1] for k in nodes]
@@ -101,7 +101,10 @@ class Bounded:
 def _mean_values(
     graph: Graph, nodes: Sequence[int], slopes: Mapping[int, Sequence[int]], low: Array, high: Array
 ) -> Interval:
-    """Return f(m) + f'(X) (X - m) of nodes, (B, N); NaN where f' may be undefined in the box."""
+    """Return mean-value bounds f(m) + f'(X) (X - m) of graph nodes (B, N).
+
+    The bounds are NaN if f' may be undefined in the box.
+    """
     count = len(low)
     with np.errstate(all="ignore"):  # of boxes without an end
         middle = 0.5 * low + 0.5 * high
@@ -122,7 +125,7 @@ def _mean_values(
 
 
 def bounded_function(robot: RobotLike, what: str) -> Bounded:
-    """Return a function of a machine's poses, in its plain form, for `bounds`.
+    """Return the kernel `what` of a machine as a function of the pose, for interval bounds.
 
     Raises
     ------
@@ -135,7 +138,7 @@ def bounded_function(robot: RobotLike, what: str) -> Bounded:
 
 @lru_cache(maxsize=256)
 def _cached_bounded_function(robot: Manipulator, what: str) -> Bounded:
-    """Return the function of the pose alone, for bounds, cached by machine and name."""
+    """Return the kernel `what` as a function of the pose, for interval bounds, cached."""
     built = numeric_program(robot, what, plain=True)
     names = [port.name for port in built.inputs]
     if "pose" not in names or set(names) - {"pose", *FIXED}:
@@ -153,11 +156,12 @@ def _cached_bounded_function(robot: Manipulator, what: str) -> Bounded:
 
 
 def bounds(robot: RobotLike, what: str, boxes: ArrayLike) -> dict[str, Enclosure]:
-    """Return proved bounds on a function of the pose, in boxes of poses.
+    """Return proved lower and upper bounds of a function of the pose in boxes of poses.
 
-    Every function of the pose alone has them. Of those that are made of singular values
-    (`UNBOUNDED`) they may be infinite and undefined in every box that is more than a pose: the
-    rotations that make them turn by any angle where two singular values may be equal.
+    All functions of the pose alone have bounds. For functions that use singular values
+    (`UNBOUNDED`) they may be infinite and undefined in every box larger than a single pose: the
+    Jacobi rotations that compute the singular values are undetermined where two of them may be
+    equal.
 
     Parameters
     ----------

@@ -67,22 +67,23 @@ _LIBRARY = "pteron_kernel" + SUFFIX
 
 
 def c_compiler() -> tuple[str, ...] | None:
-    """Return the C compiler's command, if there is one.
+    """Return the C compiler's command as a tuple of words; None without a compiler.
 
-    The environment variable CC names another than `cc` and `gcc`, with options: `CC="gcc -m64"`.
+    The environment variable CC names a compiler other than `cc` and `gcc`, with options: `CC="gcc
+    -m64"`.
     """
     return _command(os.environ.get("CC", ""), os.environ.get("PATH", ""))
 
 
 def compiler() -> tuple[str, ...] | None:
-    """Return the C compiler's command, if there is one and Python's headers are there too."""
+    """Return the C compiler's command; None without a compiler or Python's headers."""
     headers = Path(sysconfig.get_path("include"), "Python.h").exists()
     return c_compiler() if headers else None
 
 
 @lru_cache(maxsize=4)
 def _command(setting: str, path: str) -> tuple[str, ...] | None:
-    """Return the compiler's executable and options; None if CC is invalid or not installed."""
+    """Return the compiler's executable and options from CC's value; None if not installed."""
     try:
         words = shlex.split(setting) or ["cc" if shutil.which("cc", path=path) else "gcc"]
     except ValueError:
@@ -93,7 +94,7 @@ def _command(setting: str, path: str) -> tuple[str, ...] | None:
 
 @lru_cache(maxsize=4)
 def compiler_version(command: tuple[str, ...]) -> str:
-    """Return a compiler's version text."""
+    """Return the version text that a compiler prints."""
     return run([*command, "--version"]).stdout
 
 
@@ -105,22 +106,22 @@ def module_source(
     dtype: str,
     block: int = 32,
 ) -> str:
-    """Return the C of a module whose `bind` and `run` evaluate a graph, in blocks of states.
+    """Return the C source of a module that evaluates a graph, in blocks of states.
 
-    The arrays of the caller are read as they lie in memory.
+    The module reads the caller's arrays in place, without copies.
     """
     variables = module_values(name, graph, inputs, outputs, c_language(dtype))
     return module_of("module.c.j2", variables, dtype, block)
 
 
 def module_of(template: str, values: Mapping[str, Any], dtype: str, block: int = 32) -> str:
-    """Return the C code of a module's template with the values of `module_values`."""
+    """Return the C source of a module template filled with the values of `module_values`."""
     real = "float" if dtype == "float32" else "double"
     return render_template("pteron.kernels", template, real=real, block=block, **values)
 
 
 def c_language(dtype: str) -> Language:
-    """Return the notation of modules in C."""
+    """Return how operations, constants and statements are written in the C of modules."""
     printed = single_precision(C) if dtype == "float32" else C
     return Language(
         printed
@@ -171,14 +172,14 @@ class Code:
         return "c source", *parts, version("jinja2")
 
     def _write_source(self) -> str:
-        """Return the C source of the module."""
+        """Return the C source of the module that evaluates the function."""
         function, outputs = self._program
         graph = graph_of(with_lowered_exponentials(function), self.ports)
         return module_source(self.name, graph, self.ports, outputs, self.dtype)
 
     @property
     def _entry(self) -> str:
-        """The name of the library in the cache; ModelError without a compiler."""
+        """The name of the compiled library in the cache; raises ModelError without a compiler."""
         command = compiler()
         if command is None:
             setting = os.environ.get("CC")
@@ -195,10 +196,10 @@ class Code:
 
     @property
     def module(self) -> ModuleType:
-        """The module, compiled and loaded.
+        """The Python module of the compiled C code, loaded on first use.
 
-        Not a `cached_property`, whose lock a forked process would wait for if another thread had
-        been at it.
+        It is not a `cached_property`, on whose lock a forked process could wait for ever if another
+        thread held it.
         """
         if self._module is None:
             self._module = self._load_module()
@@ -232,10 +233,10 @@ class Code:
     def bound(
         self, fixed: Mapping[str, Array], otherwise: Callable[..., Any], most: int = sys.maxsize
     ) -> Callable[..., Any]:
-        """Return the callable with some inputs fixed, as cheap as a call from Python can be.
+        """Return a fast callable of the compiled code with the inputs in `fixed` bound.
 
-        Inputs that need conversion or checks, and batches of `most` states or more, go to
-        `otherwise`.
+        Calls with inputs that need conversion or checks, and batches of `most` states or more, are
+        passed to `otherwise`.
         """
         fixed_arrays = (
             np.array(fixed[port.name], self.dtype).reshape(port.shape)
@@ -254,16 +255,16 @@ class Compiled(ArrayKernel):
 
     @cached_property
     def code(self) -> Code:
-        """The C code and its compiled module."""
+        """The C code of the kernel, with its compiled module."""
         return Code(self.name, self.function, self.ports, self.outputs, self.dtype)
 
     @property
     def source(self) -> str:
-        """The C code."""
+        """The C source of the kernel."""
         return self.code.source
 
     def _evaluate(self, *values: ArrayLike, **fixed: ArrayLike) -> Any:
-        """Evaluate a first call; bind the compiled function as `call` for all later ones."""
+        """Evaluate the first call; later calls go straight to the compiled function."""
         # Threads are for batches: `evaluate_checked` splits them.
         most = 2 * SHARE if self.threads > 1 else sys.maxsize
         self.call = self.code.bound(self.fixed, self.evaluate_checked, most)

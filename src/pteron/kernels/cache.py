@@ -65,14 +65,14 @@ MOST_BYTES = 1 << 29
 
 
 def directory() -> Path:
-    """Return the directory of compiled code; it need not exist."""
+    """Return the directory for compiled code on disk; it need not exist."""
     setting = os.environ.get(VARIABLE)
     return Path(setting) if setting else user_cache_path("pteron") / "kernels"
 
 
 @lru_cache(maxsize=1)
 def host() -> str:
-    """Describe the host, which compiled code depends on: processor, Python, NumPy."""
+    """Return a text on processor, Python and NumPy, which compiled code depends on."""
     processor = platform.processor()
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
@@ -84,7 +84,7 @@ def host() -> str:
 
 
 def digest(*parts: str) -> str:
-    """Return a digest of texts and of this host, as a name."""
+    """Return a name for a cache entry: a digest of texts and of this computer."""
     total = hashlib.sha256()
     for part in (*parts, host()):
         total.update(len(part).to_bytes(8, "little") + part.encode())
@@ -92,7 +92,7 @@ def digest(*parts: str) -> str:
 
 
 def find(name: str, file: str) -> Path | None:
-    """Return the file of an existing, intact entry, or None."""
+    """Return the path of `file` in an intact cache entry, or None."""
     folder = _root() / name
     try:
         manifest = json.loads((folder / _MANIFEST).read_text(encoding="utf-8"))
@@ -105,7 +105,7 @@ def find(name: str, file: str) -> Path | None:
 
 
 def entry(name: str, file: str, build: Callable[[Path], None]) -> Path:
-    """Return a file of an entry; `build` fills a new folder where none exists or it is damaged.
+    """Return the path of `file` in a cache entry; `build` makes the entry if it is missing.
 
     Raises
     ------
@@ -134,7 +134,7 @@ def entry(name: str, file: str, build: Callable[[Path], None]) -> Path:
 
 
 def find_text(name: str) -> str | None:
-    """Return a cached, intact text, or None."""
+    """Return an intact cached text by its name, or None."""
     try:
         content = (_root() / TEXTS / name).read_bytes()
         if content[:32] == hashlib.sha256(content[32:]).digest():
@@ -145,7 +145,10 @@ def find_text(name: str) -> str | None:
 
 
 def store_text(name: str, text: str, most: int = MOST) -> None:
-    """Cache a text if the disk accepts it; of more than `most` texts the oldest are removed."""
+    """Store a text in the cache under a name, if possible.
+
+    If there are more than `most` texts, the oldest are removed.
+    """
     content = zlib.compress(text.encode(), 1)
     folder = _root() / TEXTS
     with suppress(OSError):
@@ -169,7 +172,7 @@ def store_text(name: str, text: str, most: int = MOST) -> None:
 
 
 def _age(listed: os.DirEntry[str]) -> float:
-    """Return a file's modification time; 0 if another process removed it meanwhile."""
+    """Return a file's modification time, s; 0 if another process has removed it."""
     try:
         return listed.stat().st_mtime
     except OSError:
@@ -177,7 +180,7 @@ def _age(listed: os.DirEntry[str]) -> float:
 
 
 def _root() -> Path:
-    """Return the directory of entries: the user's, or a temporary one where that is not safe."""
+    """Return the cache directory: the user's, or a temporary one where that is not safe."""
     folder = directory()
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -198,7 +201,7 @@ def _private() -> Path:
 
 
 def _prepare_work_folder() -> tuple[Path, Path]:
-    """Return the directory of entries, after removing excess ones, and a new work folder in it."""
+    """Return the cache directory, tidied up, and a new work folder in it."""
     root = _root()
     _sweep(root)
     _limit_size(root, MOST_BYTES)
@@ -217,7 +220,7 @@ def _work_folder(root: Path) -> Path:
 
 
 def _sweep(root: Path) -> None:
-    """Remove the work folders of processes that were killed, and nothing else."""
+    """Remove the cache's work folders of processes that were killed."""
     for mark in root.glob(f"{_WORK}*/{_MARK}"):
         with suppress(OSError):
             if time.time() - mark.stat().st_mtime > _STALE or not _may_be_running(mark.read_text()):
@@ -225,7 +228,7 @@ def _sweep(root: Path) -> None:
 
 
 def _may_be_running(mark: str) -> bool:
-    """Return whether the process of a mark may still be running; always of another computer."""
+    """Return whether the process that a work folder's mark names may still be running."""
     node, _, number = mark.rpartition(" ")
     if os.name != "posix" or node != platform.node() or not number.isdigit():
         return True
@@ -239,7 +242,7 @@ def _may_be_running(mark: str) -> bool:
 
 
 def _limit_size(root: Path, most: int) -> None:
-    """Remove the least recently used entries until all of them together have `most` bytes.
+    """Remove the least recently used cache entries until they take at most `most` bytes.
 
     An entry that a process is about to load may be removed: it is then rebuilt.
     """
@@ -266,7 +269,7 @@ def _remove_folder(folder: Path) -> None:
 
 
 def _move_into_place(work: Path, target: Path, file: str) -> Path:
-    """Move a finished folder into place, unless another process was first."""
+    """Rename a finished cache folder to `target`, unless another process did; return its path."""
     for _ in range(3):
         try:
             work.rename(target)

@@ -40,7 +40,7 @@ _WAITING: weakref.WeakSet[SharedCode] = weakref.WeakSet()
 
 
 def _begin_in_a_fork() -> None:
-    """Reset the semaphore in a forked process: the thread that would release it is not in it."""
+    """Reset the compilation semaphore in a forked process, in which its owner does not run."""
     global _AT_WORK
     _AT_WORK = threading.Semaphore(1)
     for tier in list(_WAITING):
@@ -55,17 +55,17 @@ if hasattr(os, "register_at_fork"):
 def numeric(
     robot: RobotLike, what: str, *, base: Selects | None = None, wrench: bool = False
 ) -> TieredKernel:
-    """Return the kernel with which the public functions evaluate `what` of a machine.
+    """Return the kernel that evaluates the function `what` of a machine, compiled when worthwhile.
 
     A first call runs at once, on CasADi's virtual machine: about 1 us a state, nothing to compile.
-    Once it has spent 0.1 s on a function of a machine's layout, C code for it is read from the
-    cache or, where there is a compiler, compiled in the background, which takes half a second or
-    so and lets no call wait. From then on calls, and the rest of a large batch, run that code, at
-    some tens of nanoseconds a state. It returns the same bits, so that a result does not depend on
-    when it is computed. Nothing is compiled at import. A process that ends during a compilation
-    waits for it, three seconds at most, so that the next process has the code. With
-    `PTERON_KERNELS=vm` in the environment only the virtual machine is used; `compile` returns a
-    kernel of any target, compiled at once.
+    After 0.1 s of work on a function of a machine's layout, C code for it is read from the cache
+    or, if there is a compiler, compiled in the background, which takes half a second or so and
+    delays no call. Later calls, and the rest of a large batch, run that code, at some tens of
+    nanoseconds a state. It returns the same bits, so that a result does not depend on when it is
+    computed. Nothing is compiled at import. A process that ends during a compilation waits for it,
+    three seconds at most, so that the next process has the code. With `PTERON_KERNELS=vm` in the
+    environment only the virtual machine is used; `compile` returns a kernel of any target, compiled
+    at once.
     """
     columns = None if base is None else columns_of(base)
     # Kernels are kept by machine, not by a name, whose file may change.
@@ -77,7 +77,7 @@ def numeric(
 def _cached_kernel(
     robot: Manipulator, what: str, columns: Columns | None, wrench: bool, like: object
 ) -> TieredKernel:
-    """Return the kernel of a function, cached; if `like` is set, its C code is loaded if cached."""
+    """Return the kernel of the function `what` of a machine, cached in this process."""
     kernel = kernel_with_status(robot, what, VirtualMachine, columns, wrench=wrench)
     tier = _tier(numeric_program(robot, what, columns, wrench=wrench, guarded=True))
     if like is not None:
@@ -93,14 +93,14 @@ def kernel_with_status(
     *,
     wrench: bool = False,
 ) -> Kernel:
-    """Return a kernel whose last output is `status`: 1 where the others are valid, else 0."""
+    """Return a kernel with a further output `status`: 1 where the others are valid, else 0."""
     built = numeric_program(robot, what, columns, wrench=wrench, guarded=True)
     fixed = {p.name: FIXED[p.name](robot) for p in built.inputs if p.name in FIXED}
     return kind(built.name, built.function, built.inputs, built.outputs, fixed)
 
 
 def tiered_kernel(key: tuple[Any, ...], build: Callable[[], Program]) -> TieredKernel:
-    """Return the kernel of a program of no machine, cached under a key."""
+    """Return the kernel of a program without a machine, cached under a key."""
     built = cached_program(key, build)
     parts = built.name, built.function, built.inputs, built.outputs
     return TieredKernel(VirtualMachine(*parts), _tier_of(Code(*parts)))
@@ -108,12 +108,12 @@ def tiered_kernel(key: tuple[Any, ...], build: Callable[[], Program]) -> TieredK
 
 @lru_cache(maxsize=512)
 def _tier(built: Program) -> SharedCode:
-    """Return the code that all machines of a program share."""
+    """Return the compiled code that all machines with this program share."""
     return _tier_of(Code(built.name, built.function, built.inputs, built.outputs))
 
 
 def _tier_of(code: Code) -> SharedCode:
-    """Return the shared code with its patience: endless if `PTERON_KERNELS=vm`."""
+    """Return C code with the interpreter time after which it is compiled; never if set to "vm"."""
     return SharedCode(code, math.inf if os.environ.get(VARIABLE) == "vm" else _PATIENCE)
 
 
@@ -134,9 +134,9 @@ class SharedCode:
         self._patience = patience
 
     def fetch(self, *, at_any_cost: bool) -> None:
-        """Load the code if it is cached; with `at_any_cost` compile it otherwise, and wait.
+        """Load the C code if it is cached; otherwise compile it if `at_any_cost`.
 
-        A batch of millions of states is worth the wait.
+        A batch of millions of states justifies waiting for the compiler.
         """
         if self.ready or os.environ.get(VARIABLE) == "vm" or compiler() is None:
             return
@@ -148,7 +148,7 @@ class SharedCode:
                 self._load()
 
     def add_interpreter_time(self, seconds: float) -> None:
-        """Add time of the virtual machine, s; beyond `patience`, compile in a thread."""
+        """Count interpreter time, s; when enough has been spent, compile the C code in a thread."""
         self._patience -= seconds
         taken = _AT_WORK
         if self._patience > 0.0 or not taken.acquire(blocking=False):
@@ -171,11 +171,11 @@ class SharedCode:
                 taken.release()
 
     def ask_again(self) -> None:
-        """Request the code again after further work: the thread that compiled it is gone."""
+        """Restart the count of interpreter time: the thread that compiled the code is gone."""
         self._patience = _PATIENCE
 
     def _load(self) -> None:
-        """Load or compile the module and set `ready`; a failure is ignored, `ready` stays False."""
+        """Load or compile the C module and set `ready`; on failure `ready` stays False."""
         try:
             _ = self.code.module
             self.ready = True
@@ -185,7 +185,7 @@ class SharedCode:
             pass
 
     def _load_and_release(self, taken: threading.Semaphore) -> None:
-        """Load the module in a worker thread, and release its semaphore in any case."""
+        """Load the C module in a worker thread, then release its semaphore in any case."""
         try:
             self._load()
         finally:
@@ -194,7 +194,7 @@ class SharedCode:
 
 
 def _end(worker: threading.Thread) -> None:
-    """Wait for a compilation at the end of the process, some seconds; then end the compiler."""
+    """Wait some seconds at exit for a compiling thread, then end its compiler."""
     worker.join(_AT_EXIT)
     if worker.is_alive():
         end_all()
@@ -221,18 +221,18 @@ class TieredKernel(VirtualMachine):
 
     @property
     def is_compiled(self) -> bool:
-        """Whether the C code is loaded, so that calls run it."""
+        """Whether the kernel's C code is loaded, so that calls run it."""
         return self.tier.ready
 
     def _evaluate(self, *values: ArrayLike, **fixed: ArrayLike) -> Any:
-        """Evaluate on the virtual machine until the C code is ready, then bind `call` to it."""
+        """Evaluate by the interpreter until the C code is ready, then by the C code."""
         if not self.tier.ready:
             return self.evaluate_checked(*values, **fixed)
         self.call = self.tier.code.bound(self.fixed, self.evaluate_checked)
         return self.call(*values, **fixed)
 
     def _evaluate_one_state(self, values: Sequence[Any]) -> Any:
-        """Evaluate a single state on the virtual machine, and count its time."""
+        """Evaluate a single state by the interpreter, and count the time it takes."""
         begin = time.perf_counter()
         outputs = super()._evaluate_one_state(values)
         if outputs is not None:
@@ -240,7 +240,7 @@ class TieredKernel(VirtualMachine):
         return outputs
 
     def _run(self, batch: int, inputs: Sequence[Array], outputs: Sequence[Array]) -> None:
-        """Fill `outputs` in chunks of states, in C as soon as its code is ready."""
+        """Fill `outputs` for a batch of states in chunks, in C once its code is ready."""
         for start in range(0, batch, self._chunk):
             stop = min(start + self._chunk, batch)
             part = slice_states(inputs, outputs, start, stop)

@@ -53,12 +53,12 @@ PYTHON = C | {"select": "({1} if {0} else 0.0)"}
 
 
 def single_precision(printed: Mapping[str, str]) -> dict[str, str]:
-    """Return the operations with math.h's functions for float: sqrtf for sqrt, and so on."""
+    """Return operations' C text with math.h's float functions (sqrtf for sqrt ...)."""
     return {op: re.sub(r"^(\w+)\(", r"\1f(", text) for op, text in printed.items()}
 
 
 def c_constant(number: float, dtype: str = "float64") -> str:
-    """Return a floating-point literal of C, in brackets where it has a sign."""
+    """Return a number as a floating-point literal of C, in brackets if it has a sign."""
     if np.isnan(number):
         return "NAN"
     text = f"{np.float32(number)!s}" if dtype == "float32" else repr(float(number))
@@ -73,7 +73,7 @@ def names_of(
     inputs: Callable[[int, int], str],
     constant: Callable[[float], str],
 ) -> list[str]:
-    """Return each node in code: an input's name, a literal, or `t` and a number."""
+    """Return the text of each graph node in code: an input, a literal, or a variable t1, t2 ..."""
     names: list[str] = []
     numbers = count(1)
     for node in graph.nodes:
@@ -93,7 +93,7 @@ def statements(
     printed: Mapping[str, str],
     form: str,
 ) -> list[str]:
-    """Return a statement for each of the nodes; `form` has {0} for the name, {1} for the value."""
+    """Return a code statement for each graph node; `form` has {0} for its name, {1} its value."""
     lines = []
     for k in nodes:
         node = graph.nodes[k]
@@ -105,7 +105,7 @@ def statements(
 
 
 def used_inputs(graph: Graph) -> list[tuple[int, int]]:
-    """Return the (port, element) pairs that the graph reads, in order."""
+    """Return the (input, element) index pairs that the graph reads, sorted."""
     places = (node.arguments for node in graph.nodes if node.operation == INPUT)
     return sorted((port, element) for port, element in places)
 
@@ -135,10 +135,10 @@ class Language:
 def module_values(
     name: str, graph: Graph, inputs: Sequence[Port], outputs: Sequence[Port], language: Language
 ) -> dict[str, Any]:
-    """Return the values of a module's template: statements for one state, and for a block.
+    """Return the template values of a module's code: statements for a state and a block.
 
-    In a block the inputs' elements have a row each, followed by each angle's sine and cosine, which
-    are computed ahead of the long loop; statements of shared inputs alone run once.
+    In a block each input element has a row, followed by rows for each angle's sine and cosine,
+    computed before the main loop; statements that depend on shared inputs alone run once.
     """
     nodes, operations = graph.nodes, graph.operations()
     printed, form = language.printed, language.form
@@ -197,7 +197,7 @@ def module_values(
 
 
 def arithmetic(form: str = "const double {0} = {1};") -> dict[str, Any]:
-    """Return statements of sine, cosine and exponential; `form` is that of one."""
+    """Return code statements for sine, cosine and exponential, as template values."""
     template_values: dict[str, Any] = {"limit": LIMIT}
     for function in (reduced_sincos(), exponential_function()):
         name, graph = function.name(), graph_of(function)
@@ -208,7 +208,7 @@ def arithmetic(form: str = "const double {0} = {1};") -> dict[str, Any]:
 
 
 def _runs(used: Sequence[tuple[int, int]]) -> Iterator[tuple[int, int, int, int]]:
-    """Yield row, port, element and number of neighbours that stand in rows one after another."""
+    """Yield (row, input, element, width) of groups of 4, 2 or 1 consecutive input elements."""
     row = 0
     while row < len(used):
         i, j = used[row]

@@ -21,7 +21,7 @@ _CHANGES = threading.RLock()
 
 
 def _begin_in_a_fork() -> None:
-    """Reset lock and list of running commands in a forked process: they are its parent's."""
+    """Reset lock and list of running compilers in a forked process."""
     global _CHANGES
     _CHANGES = threading.RLock()
     _RUNNING.clear()
@@ -32,7 +32,7 @@ if hasattr(os, "register_at_fork"):
 
 
 def run(command: Sequence[str]) -> subprocess.CompletedProcess[str]:
-    """Run a command to its end; return its exit code and output."""
+    """Run a command to its end; return its exit code, output and errors."""
     # Messages may be in any language and encoding; what cannot be read of them does not matter.
     process = subprocess.Popen(
         command,
@@ -65,7 +65,7 @@ def compile_library(
     what: str,
     advice: str,
 ) -> None:
-    """Write sources beside a library, and compile the C files among them to it.
+    """Write source files beside `library` and compile the C files into it.
 
     Raises
     ------
@@ -83,14 +83,14 @@ def compile_library(
 
 
 def end_all() -> None:
-    """End every command that runs, with all that it started."""
+    """Kill all running compilers and the processes they started."""
     with _CHANGES:
         for process in _RUNNING:
             _end(process)
 
 
 def _end(process: subprocess.Popen[str]) -> None:
-    """Kill a compiler with all processes of its group; on Windows the compiler alone."""
+    """Kill a compiler and its process group; on Windows the compiler alone."""
     with suppress(OSError):
         if sys.platform == "win32":
             process.kill()

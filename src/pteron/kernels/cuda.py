@@ -51,7 +51,7 @@ class DeviceKernel(Kernel):
 
     @cached_property
     def source(self) -> str:
-        """The CUDA code."""
+        """The CUDA source of the kernel."""
         graph = graph_of(with_lowered_exponentials(self.function), self.ports)
         language = c_language(self.dtype)
         texts = module_values(self.name, graph, self.ports, self.outputs, language)
@@ -59,11 +59,11 @@ class DeviceKernel(Kernel):
 
     @cached_property
     def _launch(self) -> Any:
-        """The compiled kernel, as CuPy launches it."""
+        """The compiled CUDA kernel, to be launched by CuPy."""
         return compiled_module(self.source, self.fast).get_function("run")
 
     def _evaluate(self, *values: Any, **fixed: Any) -> Any:
-        """Evaluate the kernel on arrays of the GPU, after checks of shapes and types."""
+        """Evaluate the kernel on GPU arrays, after checks of shapes and types."""
         cupy = device_library()
         by_port = self._values_by_port(values, fixed)
         arrays = {port.name: self._on_device(by_port[port.name], port) for port in self.ports}
@@ -97,7 +97,7 @@ class DeviceKernel(Kernel):
         return present[0] if len(present) == 1 else present
 
     def _on_device(self, array: Any, port: Port) -> Any:
-        """Return an input as an array of CuPy; DataError if its shape or type is another one."""
+        """Return an input as a CuPy array; raise DataError if its shape or type is wrong."""
         array = on_device(array, port.name, self.dtype)
         shape = array.shape
         if port.shared and shape != port.shape:
@@ -111,7 +111,7 @@ class DeviceKernel(Kernel):
 
 
 def launch(kernel: Any, batch: int, arguments: Sequence[Any]) -> None:
-    """Launch a kernel with a thread for each of some states, or with turns of them."""
+    """Launch a CUDA kernel for a batch of states, at most `_BLOCKS` blocks of threads."""
     blocks = min(-(-batch // _THREADS), _BLOCKS)
     integers = (np.int64(a) if isinstance(a, int) else a for a in arguments)
     kernel((blocks,), (_THREADS,), (np.int64(batch), *integers))
@@ -124,9 +124,9 @@ def run_loop(
     times: Sequence[float],
     counts: Sequence[int],
 ) -> None:
-    """Run some samples of a loop on the GPU; the parameters are those of `LoopCode.run`.
+    """Run a number of samples of a simulation loop on the GPU; results are copied back.
 
-    Arrays of NumPy are copied there, and what the loop changes is copied back.
+    NumPy arrays are copied to the GPU, and arrays that the loop changes are copied back.
     """
     cupy = device_library()
     present = {
@@ -149,7 +149,7 @@ def run_loop(
 
 
 def device_library() -> Any:
-    """Return CuPy; ModelError if it is not installed, or no GPU is here."""
+    """Return the module CuPy; raise ModelError if it or a GPU is missing."""
     cupy = import_extra("cuda", "cupy", 'target: "cuda" needs CuPy')
     if not _has_device(cupy):
         raise ModelError(
@@ -160,19 +160,19 @@ def device_library() -> Any:
 
 @lru_cache(maxsize=2)
 def _has_device(cupy: Any) -> bool:
-    """Return whether CuPy has a GPU."""
+    """Return whether CuPy finds a GPU."""
     return bool(cupy.is_available())
 
 
 @lru_cache(maxsize=64)
 def compiled_module(source: str, fast: bool = False) -> Any:
-    """Return the module of CUDA code, compiled by NVRTC or from CuPy's cache on disk."""
+    """Return the CuPy module compiled from CUDA source."""
     options = ("-std=c++17", f"--fmad={str(fast).lower()}")
     return device_library().RawModule(code=source, options=options)
 
 
 def on_device(array: Any, name: str, dtype: str) -> Any:
-    """Return an array of CuPy: of what is on the GPU the same memory, of others a copy there."""
+    """Return an array as a CuPy array: the same memory if on the GPU, else a copy there."""
     cupy = device_library()
     if isinstance(array, cupy.ndarray):
         known = array
@@ -192,7 +192,7 @@ def on_device(array: Any, name: str, dtype: str) -> Any:
 
 
 def like(array: Any, other: Any) -> Any:
-    """Return an array of CuPy as one of the library that another array is of, without a copy."""
+    """Return a CuPy array as an array of the library of `other`, sharing its memory."""
     library = sys.modules.get(type(other).__module__.partition(".")[0])
     if type(other).__module__.startswith("jax"):
         library = sys.modules["jax.numpy"]

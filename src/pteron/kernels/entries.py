@@ -112,7 +112,7 @@ def equation_entry(
     outputs: str,
     needs: tuple[Need, ...] = (),
 ) -> Entry:
-    """Return the entry of an equation that takes the machine and the inputs, in order.
+    """Return the table entry of a function `equation(machine, *inputs)` with named outputs.
 
     `outputs` are the names of its results, separated by blanks.
     """
@@ -127,16 +127,16 @@ def state_entry(
     outputs: str,
     needs: tuple[Need, ...] = (),
 ) -> Entry:
-    """Return the entry of an equation that takes the state of the machine."""
+    """Return the table entry of a function `equation(state)` with named outputs."""
     return _entry_of(lambda m, v: equation(state(m, v)), inputs, outputs, needs)
 
 
 def _entry_of(build: Any, inputs: tuple[str, ...], outputs: str, needs: tuple[Need, ...]) -> Entry:
-    """Return the entry of a function whose results have names, separated by blanks in `outputs`."""
+    """Return the table entry of a function whose outputs are named in a text."""
     names = outputs.split()
 
     def build_outputs(m: Machine, v: Inputs) -> Outputs:
-        """Return the results of a build by their names."""
+        """Return the results of `build` by output name."""
         results = build(m, v)
         return dict(zip(names, results if len(names) > 1 else [results], strict=True))
 
@@ -144,10 +144,10 @@ def _entry_of(build: Any, inputs: tuple[str, ...], outputs: str, needs: tuple[Ne
 
 
 def state(m: Machine, v: Inputs) -> Any:
-    """Return the state of a machine, to the order of the given symbols."""
+    """Return the machine's motion state for the given pose, velocity and acceleration symbols."""
     return m.state(v.pose, v.velocity, v.acceleration)
 
 
 def as_vector(column: Expression) -> tuple[Expression, tuple[int, ...]]:
-    """Return a column as a vector, also where it has one element or none."""
+    """Return a column with its shape (k,), also for a single element or none."""
     return column, column.shape[:1]

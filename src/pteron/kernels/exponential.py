@@ -30,10 +30,10 @@ _MOST = 709.0
 
 
 def exponential(x: Expression) -> Expression:
-    """Return exp(x): to 3e-16 absolutely where x is negative, as friction's laws have it.
+    """Return exp(x) in plain arithmetic, accurate to 3e-16 absolutely for x <= 0.
 
-    Where x is positive the relative error grows, to 1e-12 at 700. NaN counts as x = -709: a law of
-    friction has its speed in other terms too, and these make it NaN.
+    For positive x the relative error grows, to 1e-12 at 700. NaN counts as x = -709: in friction
+    laws other terms contain the speed too, and make the result NaN.
     """
     r = ca.fmin(ca.fmax(x, -_MOST), _MOST) * 0.5**_DOUBLINGS
     total: Expression = 1.0 / factorial(_DEGREE)
@@ -49,13 +49,13 @@ def exponential(x: Expression) -> Expression:
 
 @lru_cache(maxsize=1)
 def exponential_function() -> ca.Function:
-    """Return `exponential` as a function."""
+    """Return `exponential` as a CasADi function."""
     x = ca.SX.sym("exponent")
     return ca.Function("exponential", [x], [exponential(x)])
 
 
 def _tanh(x: Expression) -> Expression:
-    """Return the hyperbolic tangent of x, by the exponential of -2 |x|, which does not overflow."""
+    """Return tanh(x) in plain arithmetic, without overflow."""
     small = exponential(-2 * ca.fabs(x))
     return _sign(x) * (1 - small) / (1 + small)
 
@@ -76,5 +76,5 @@ _RULES: dict[str, Callable[..., Expression]] = {
 
 @lru_cache(maxsize=256)
 def with_lowered_exponentials(function: ca.Function) -> ca.Function:
-    """Return a function whose exponentials are computed by `exponential`, and tanh with it."""
+    """Return a CasADi function with exp and tanh replaced by plain arithmetic."""
     return rewrite_operations(function, _RULES)

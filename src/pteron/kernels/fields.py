@@ -36,22 +36,22 @@ class Field(Protocol, Generic[Element]):
     """The arithmetic that `evaluate` and the exact linear algebra need."""
 
     def number(self, value: Fraction | int) -> Element:
-        """Return a rational number as an element."""
+        """Return a rational number as an element of the field."""
 
     def add(self, a: Element, b: Element) -> Element:
-        """Return a + b."""
+        """Return a + b in the field."""
 
     def subtract(self, a: Element, b: Element) -> Element:
-        """Return a - b."""
+        """Return a - b in the field."""
 
     def multiply(self, a: Element, b: Element) -> Element:
-        """Return a b."""
+        """Return the product a b in the field."""
 
     def divide(self, a: Element, b: Element) -> Element:
-        """Return a / b; ZeroDivisionError where b is zero."""
+        """Return a / b in the field; raise ZeroDivisionError if b is zero."""
 
     def square_root(self, a: Element) -> Element:
-        """Return a square root of a, or raise `NoSquareRoot`."""
+        """Return a square root of a in the field, or raise `NoSquareRoot`."""
 
 
 class RationalField:
@@ -64,7 +64,7 @@ class RationalField:
     divide = staticmethod(operator.truediv)
 
     def square_root(self, a: Fraction) -> Fraction:
-        """Return the positive square root of a perfect square."""
+        """Return the rational square root of a; raise `NoSquareRoot` if it is irrational."""
         if a >= 0:
             root = Fraction(isqrt(a.numerator), isqrt(a.denominator))
             if root * root == a:
@@ -81,30 +81,30 @@ class PrimeField:
         self.prime = prime
 
     def number(self, value: Fraction | int) -> int:
-        """Return the residue of a rational number."""
+        """Return the residue of a rational number modulo the prime."""
         f = Fraction(value)
         return self.divide(f.numerator % self.prime, f.denominator % self.prime)
 
     def add(self, a: int, b: int) -> int:
-        """Return a + b."""
+        """Return (a + b) modulo the prime."""
         return (a + b) % self.prime
 
     def subtract(self, a: int, b: int) -> int:
-        """Return a - b."""
+        """Return (a - b) modulo the prime."""
         return (a - b) % self.prime
 
     def multiply(self, a: int, b: int) -> int:
-        """Return a b."""
+        """Return a b modulo the prime."""
         return a * b % self.prime
 
     def divide(self, a: int, b: int) -> int:
-        """Return a / b."""
+        """Return a / b modulo the prime."""
         if b == 0:
             raise ZeroDivisionError
         return a * pow(b, -1, self.prime) % self.prime
 
     def square_root(self, a: int) -> int:
-        """Return the square root a^((p + 1) / 4), or raise `NoSquareRoot`."""
+        """Return a square root of a modulo the prime; raise `NoSquareRoot` if none exists."""
         root = pow(a, (self.prime + 1) // 4, self.prime)
         if root * root % self.prime != a:
             raise NoSquareRoot
@@ -117,7 +117,7 @@ _SIGNS = {"add": "+", "sub": "-", "mul": "*"}
 
 @lru_cache(maxsize=64)
 def _compile_function(lines: str) -> CodeType:
-    """Return the code of a function `compute` of a list e, of lines of its body."""
+    """Return the code of a function `compute(e)` with these lines as its body."""
     return compile(f"def compute(e):\n pass\n{lines}", "<evaluation>", "exec")
 
 
@@ -175,7 +175,7 @@ class Evaluation(Generic[Element]):
         self._codes: list[Callable[[list[Element]], None]] | None = None
 
     def __call__(self, *inputs: Sequence[Element]) -> list[list[Element]]:
-        """Return the outputs at a state, the other inputs given; nonzeros by columns.
+        """Return the function's outputs, as field elements by column, at these inputs.
 
         Raises
         ------
@@ -189,7 +189,7 @@ class Evaluation(Generic[Element]):
         return [[elements[k] for k in nodes] for nodes in self._outputs]
 
     def elements(self, *inputs: Sequence[Element]) -> Iterator[Element]:
-        """Yield the outputs element by element, lazily."""
+        """Yield the function's outputs element by element, each computed lazily."""
         if self._codes is None:
             self._codes = [self._code_of(steps) for steps in self._separate_steps()]
         known = self._initial_elements(inputs)
@@ -199,7 +199,7 @@ class Evaluation(Generic[Element]):
             yield known[k]
 
     def _code_of(self, steps: list[int]) -> Callable[[list[Element]], None]:
-        """Return a function that computes steps; modulo a prime compiled, four times as fast."""
+        """Return a function that computes graph nodes in place; compiled for a prime field."""
         if not isinstance(self._field, PrimeField):
             return lambda elements: self._compute_steps(elements, steps)
         lines = []
@@ -216,14 +216,14 @@ class Evaluation(Generic[Element]):
         return compute
 
     def _initial_elements(self, inputs: Sequence[Sequence[Element]]) -> list[Element]:
-        """Return the elements by node: of precomputed nodes, and the inputs of a state."""
+        """Return field elements by graph node: precomputed ones and the inputs of a state."""
         elements = self._known.copy()
         for k, port, element in self._inputs:
             elements[k] = inputs[port][element]
         return elements
 
     def _compute_steps(self, elements: list[Element], steps: Iterable[int]) -> None:
-        """Compute the elements of steps, in place and in their order."""
+        """Compute the graph nodes `steps` in `elements`, in place and in this order."""
         for k in steps:
             operation, arguments = self._steps[k]
             if len(arguments) == 2:
@@ -233,7 +233,7 @@ class Evaluation(Generic[Element]):
                 elements[k] = operation(elements[arguments[0]])
 
     def _separate_steps(self) -> list[list[int]]:
-        """Return, for each output element, the steps that no previous element needs."""
+        """Return, for each output element, the graph nodes that no previous element needs."""
         done: set[int] = set()
         steps_by_element = []
         for root in (k for nodes in self._outputs for k in nodes):
@@ -249,15 +249,15 @@ class Evaluation(Generic[Element]):
 
 
 def _operations(field: Field[Element]) -> dict[str, Callable[..., Element]]:
-    """Return the operations of a graph that are exact in a field."""
+    """Return the exact field operation for each operation name of a graph."""
     zero, unit = field.number(0), field.number(1)
 
     def sine(t: Element) -> Element:
-        """Return the sine of an angle from t, the tangent of its half."""
+        """Return sin(a) in the field for t = tan(a / 2)."""
         return field.divide(field.add(t, t), field.add(unit, field.multiply(t, t)))
 
     def cosine(t: Element) -> Element:
-        """Return the cosine of an angle from t, the tangent of its half."""
+        """Return cos(a) in the field for t = tan(a / 2)."""
         square = field.multiply(t, t)
         return field.divide(field.subtract(unit, square), field.add(unit, square))
 
@@ -287,7 +287,7 @@ def _operations(field: Field[Element]) -> dict[str, Callable[..., Element]]:
 def evaluate(
     function: ca.Function, field: Field[Element], inputs: Sequence[Sequence[Element]]
 ) -> list[list[Element]]:
-    """Return the outputs of an SX function, evaluated in a field; nonzeros by columns.
+    """Return the outputs of a CasADi function evaluated in a field, as elements by column.
 
     Raises
     ------

@@ -58,12 +58,12 @@ _SAMPLE = (*MOTION, "joints", "joint_rates", "memory", "gains")
 
 
 def _as_matrix(matrix: Expression) -> tuple[Expression, tuple[int, ...]]:
-    """Return an expression as a matrix, also where it has one column."""
+    """Return an expression with its two-dimensional shape, also for a single column."""
     return matrix, matrix.shape
 
 
 def _set_payload(m: Machine, v: Inputs) -> Outputs:
-    """Return the machine's inertial parameters with a load's mass and inertia on its platform."""
+    """Return the inertial parameters with a payload's mass and inertia added to the platform."""
     platform, inertial = m.robot.platform, v.parameters
     on_axis, inertia = platform.carries_on_axis, ca.vertsplit(v.inertia)
     center = ca.SX(3, 1) if on_axis else v.center
@@ -73,7 +73,7 @@ def _set_payload(m: Machine, v: Inputs) -> Outputs:
 
 
 def _rigid(m: Machine, v: Inputs, at: Any) -> Expression:
-    """Return the actuator forces of the rigid bodies at a state."""
+    """Return the actuator forces (n, 1) of the rigid bodies in a motion state."""
     return inverse_dynamics(m, at, v.parameters, v.wrench, carried=v.carried)
 
 
@@ -83,25 +83,25 @@ def _inverse_dynamics(m: Machine, v: Inputs) -> Outputs:
 
 
 def _dynamics_arguments(m: Machine, v: Inputs) -> Any:
-    """Return pose, velocity, forces, parameters and wrench."""
+    """Return pose, velocity, forces, parameters and wrench; the wrench is zero if absent."""
     wrench = ca.SX.zeros(m.wrench_size) if v.wrench is None else v.wrench
     return v.pose, v.velocity, v.forces, v.parameters, wrench
 
 
 def _forward_dynamics(m: Machine, v: Inputs) -> Outputs:
-    """Return the pose's acceleration (n,) under actuator forces, without the drives' losses."""
+    """Return the platform's acceleration (m,) under actuator forces, without drive friction."""
     return {"acceleration": lagrangian.forward_dynamics(m, *_dynamics_arguments(m, v))}
 
 
 def _drive_forces(m: Machine, v: Inputs, *, smooth: bool) -> Outputs:
-    """Return the drives' forces (n,): of the rigid bodies, and of friction and rotors."""
+    """Return the drives' forces (n,): of rigid bodies, friction and rotors, N or N m."""
     at, drive_numbers = state(m, v), drives.Drives.from_vector(v.drives)
     moving = drives.joint_motion(at)
     return {"forces": _rigid(m, v, at) + drives.drive_forces(drive_numbers, *moving, smooth=smooth)}
 
 
 def _joint_feed_forward(m: Machine, v: Inputs) -> Outputs:
-    """Return the drives' forces (n,) of a motion of the joints, and the pose of these joints."""
+    """Return the drive forces (n,) of a motion of the joints, and the platform's pose."""
     moving = v.joint_rates, v.joint_accelerations
     pose, *_ = closing.direct_step(m, v.joints, v.pose, TYPE_II)
     at = m.state(pose, *kinematics.platform_rates(m, pose, *moving))
@@ -110,7 +110,7 @@ def _joint_feed_forward(m: Machine, v: Inputs) -> Outputs:
 
 
 def _drive_accelerations(m: Machine, v: Inputs) -> Outputs:
-    """Return the pose's acceleration (n,) under the drives' forces, with friction and rotors."""
+    """Return the platform's acceleration (m,) under drive forces, with friction and rotors."""
     drive_numbers = drives.Drives.from_vector(v.drives)
     return {
         "acceleration": drives.drive_accelerations(m, *(*_dynamics_arguments(m, v), drive_numbers))
@@ -118,7 +118,7 @@ def _drive_accelerations(m: Machine, v: Inputs) -> Outputs:
 
 
 def _control_outputs(m: Machine, v: Inputs, *, what: str) -> Outputs:
-    """Return a control law's forces and next memory; an adaptive law takes no parameters."""
+    """Return the drive forces and next memory of the control law `what`."""
     count = len(m.parameters)
     selection = ca.SX(count, 0) if v.selection is None else v.selection
     estimates = control.estimate_count(what, m.freedom, selection.shape[1])
@@ -143,24 +143,24 @@ def _control_outputs(m: Machine, v: Inputs, *, what: str) -> Outputs:
 
 
 def _law(name: str) -> Entry:
-    """Return the entry of a control law; adaptive laws take no inertial parameters as input."""
+    """Return the table entry of a control law."""
     known = () if "learnt" in control.MEMORY[name] else ("parameters",)
     return Entry((*_SAMPLE, *known, "drives"), partial(_control_outputs, what=name), NEEDS_TYPE_II)
 
 
 def _forces(m: Machine, v: Inputs, *, name: str) -> Outputs:
-    """Return the forces of a state that lacks an acceleration, and perhaps a velocity."""
+    """Return the generalized forces of a state, under `name`; missing rates are zero."""
     return {name: generalized_forces(m, state(m, v), v.parameters)}
 
 
 def _regressor(m: Machine, v: Inputs) -> Outputs:
-    """Return the matrix (n, K) whose product with the parameters is the actuator forces."""
+    """Return the regressor (n, K): its product with the parameters is the actuator forces."""
     selection = ca.SX.eye(len(m.parameters)) if v.selection is None else v.selection
     return {"regressor": _as_matrix(inverse_dynamics(m, state(m, v), selection))}
 
 
 def _paper_terms(m: Machine, v: Inputs) -> Outputs:
-    """Return the terms of the inverse dynamics in the paper's form, by their names there."""
+    """Return the factors of the inverse dynamics in the paper's form, by the paper's names."""
     parts = regressor.terms(m, state(m, v))
     return {
         "jacobian": parts.jacobian,
@@ -214,7 +214,7 @@ INTERNAL = ("driven_motion",)
 
 
 def _driven_motion(m: Machine, v: Inputs) -> Outputs:
-    """Return the rates of the states of a machine and its actuators under stick-slip friction."""
+    """Return the rates of machine and drive states under stick-slip friction, by name."""
     kind: transmissions.DriveKind = v.kind
     sides = sticking.Sides(v.side, v.hold, v.brake) if kind.dry else None
     drive_numbers = drives.Drives.from_vector(v.drives)
@@ -232,35 +232,35 @@ def _driven_motion(m: Machine, v: Inputs) -> Outputs:
 
 
 def _sensed_joints(at: Any) -> Any:
-    """Return the joint coordinates and rates of a state, (n,) each."""
+    """Return the joint coordinates and rates of a motion state, (n,) each."""
     return control.coordinates(at), drives.joint_motion(at)[0]
 
 
 def _geometric_index(m: Machine, v: Inputs, *, what: str) -> Outputs:
-    """Return a geometric performance index at a pose, by its name."""
+    """Return the geometric performance index `what` at a pose."""
     return {"value": indices.GEOMETRIC_INDICES[what](m, state(m, v))}
 
 
 def _kappa(m: Machine, v: Inputs) -> Outputs:
-    """Return the index kappa at a pose, with the mass matrix there."""
+    """Return the condition number of the mass matrix at a pose."""
     mass = lagrangian.mass_matrix(m, v.pose, v.parameters)
     return {"value": indices.kappa(m, state(m, v), mass)}
 
 
 def _homogeneous_jacobian(m: Machine, v: Inputs) -> Outputs:
-    """Return the Jacobian with joints and rotations in metres, and its length L, m."""
+    """Return the Jacobian in homogeneous units and its characteristic length L, m."""
     homogeneous = indices.homogeneous(m, state(m, v))
     return {"jacobian": homogeneous.matrix, "length": homogeneous.length}
 
 
 def _pad_rows(columns: Sequence[Expression], count: int) -> Expression:
-    """Return columns as rows (count, k), NaN where there are too few."""
+    """Return columns as rows (count, k), padded with NaN rows."""
     rows = ca.horzcat(*columns).T
     return ca.vertcat(rows, ca.SX.nan(count - rows.shape[0], rows.shape[1]))
 
 
 def _reactions(m: Machine, v: Inputs) -> Outputs:
-    """Return the equations of the joints' reaction forces, by name, with the points of each leg."""
+    """Return the linear equations of the joint reaction forces, by name."""
     equilibrium = reactions.equilibrium(m, state(m, v), v.parameters)
     wrenches = [
         [ca.vertcat(at.force, at.moment) for at in leg.wrenches] for leg in equilibrium.legs
@@ -284,7 +284,7 @@ def _reactions(m: Machine, v: Inputs) -> Outputs:
 
 
 def _beams(m: Machine, v: Inputs) -> Outputs:
-    """Return the legs' links as beams, by name; their rods' couples are rows (n, 3)."""
+    """Return the leg links as beams and the rods' couples (n, 3), by name."""
     beams = reactions.beams(m, state(m, v))
     *links, couples = beams._asdict().items()
     return {**dict(links), "couples": _as_matrix(ca.horzcat(*couples[1]).T)}
@@ -316,5 +316,5 @@ TABLE |= {
 
 
 def needs_of(what: str) -> tuple[Need, ...]:
-    """Return the conditions on the pose under which a function's result is valid."""
+    """Return the conditions on the pose that the function `what` needs for valid results."""
     return TABLE[what].needs

@@ -20,30 +20,31 @@ from pteron.manipulator import Manipulator, RobotLike
 
 
 def slopes_program(robot: RobotLike) -> Program:
-    """Return the function of `geometry` and `pose` for the machines of a robot's topology.
+    """Return the program of joint coordinates' derivatives by geometry, for a topology.
 
-    Its outputs: `joints` (n,); `jacobian` (n, m), their slopes against the pose; `slopes` (n, k),
-    each leg's against those numbers of the geometry that `slope_columns` names; `twists` (6, m),
-    the platform's twist against the pose's rates; `place` (3,), where its point P is; `axes`
-    (3, 3), the columns of its rotation. Where planes hold the platform, or it turns about a point
-    or axes that are part of the geometry, also `shifts` (6, k): its twist, at a given pose, against
-    the geometry.
+    The inputs are `geometry` and `pose`. The outputs are `joints` (n,); `jacobian` (n, m), their
+    derivatives by the pose; `slopes` (n, k), each leg's derivatives by the numbers of the geometry
+    that `slope_columns` returns; `twists` (6, m), the platform's twist per pose rate; `place` (3,),
+    the position of P; `axes` (3, 3), the columns of the platform's rotation. If planes hold the
+    platform, or it turns about a point or axes that are part of the geometry, a further output is
+    `shifts` (6, k): its twist at a fixed pose per change of the geometry.
     """
     layout = geometry_only(robot)
     return cached_program(_key(layout), lambda: _build_program(layout))
 
 
 def slopes_kernel(robot: RobotLike) -> TieredKernel:
-    """Return the kernel of `slopes_program`."""
+    """Return the kernel of joint coordinates' derivatives by geometry, see `slopes_program`."""
     return _kernel(geometry_only(robot))
 
 
 def slope_columns(robot: Manipulator) -> list[range]:
-    """Return the indices of the geometry by which each leg's coordinate is differentiated.
+    """Return, for each leg, the geometry indices by which its coordinate is differentiated.
 
-    All legs have as many: those of a shorter leg include some of its neighbour's, whose slopes are
-    zero. Where planes hold the platform every leg's coordinate hangs on all legs; and on what the
-    platform turns about, where that is part of the geometry.
+    All legs have equally many indices: those of a shorter leg include some of its neighbour's,
+    whose derivatives are zero. If planes hold the platform, every leg's coordinate depends on all
+    legs; it also depends on the point or axes about which the platform turns, if these are part of
+    the geometry.
     """
     sizes = [sum(len(q.value) for q in leg.quantities) + 6 for leg in robot.legs]
     total, most = sum(sizes), max(sizes)
@@ -57,17 +58,17 @@ def slope_columns(robot: Manipulator) -> list[range]:
 
 @lru_cache(maxsize=16)
 def _kernel(layout: Manipulator) -> TieredKernel:
-    """Return the kernel of slopes of a layout, cached."""
+    """Return the kernel of derivatives by geometry of a topology, cached."""
     return tiered_kernel(_key(layout), lambda: _build_program(layout))
 
 
 def _key(layout: Manipulator) -> tuple[str, Manipulator]:
-    """Return the cache key of a layout's slopes."""
+    """Return the cache key of the derivatives by geometry of a topology."""
     return "geometry_slopes", layout
 
 
 def _build_program(layout: Manipulator) -> Program:
-    """Return the program of joints and their derivatives by pose (n, n) and geometry."""
+    """Build the program of joint coordinates and their derivatives by pose and geometry."""
     machine, geometry = Machine.symbolic(layout)
     pose = ca.SX.sym("pose", layout.freedom)
     state = machine.state(pose)

@@ -77,15 +77,15 @@ class Graph:
     outputs: tuple[tuple[int, ...], ...]
 
     def operations(self) -> list[int]:
-        """Return the nodes that compute something, in order."""
+        """Return the indices of the nodes that compute something, in order."""
         return [k for k, node in enumerate(self.nodes) if node.operation not in (INPUT, CONSTANT)]
 
     def values(
         self, inputs: Callable[[int, int], Value], rule: Callable[[Node, list[Value]], Value]
     ) -> list[Value]:
-        """Return a value for each node, by a rule from its arguments' values.
+        """Return a value for each node: from `inputs`, or by `rule` from its arguments' values.
 
-        `inputs` gives those of the inputs, by port and element.
+        `inputs` returns the value of an input element, by port and element number.
         """
         computed: list[Value] = []
         for node in self.nodes:
@@ -96,13 +96,13 @@ class Graph:
         return computed
 
     def results(self, values: Sequence[Value]) -> list[list[Value]]:
-        """Return the elements of each output, of the nodes' values."""
+        """Return the values of each output's elements, from the values of all nodes."""
         return [[values[k] for k in nodes] for nodes in self.outputs]
 
 
 @lru_cache(maxsize=256)
 def graph_of(function: ca.Function, inputs: tuple[Port, ...] = ()) -> Graph:
-    """Return the graph of an SX function; `inputs` say which of its arguments are shared."""
+    """Return the graph of operations of a CasADi function; `inputs` say which are shared."""
     nodes: list[Node] = []
     slots: dict[int, int] = {}
     seen: dict[tuple[str, tuple[int, ...], str], int] = {}
@@ -117,7 +117,7 @@ def graph_of(function: ca.Function, inputs: tuple[Port, ...] = ()) -> Graph:
         return seen[key]
 
     def constant(number: float) -> int:
-        """Return the index of the node of a constant."""
+        """Return the index of the graph node of a constant."""
         return add(Node(CONSTANT, value=number, shared=True))
 
     for k in range(function.n_instructions()):
@@ -147,7 +147,7 @@ def graph_of(function: ca.Function, inputs: tuple[Port, ...] = ()) -> Graph:
 
 
 def expression(node: Node, arguments: Sequence[Expression]) -> Expression:
-    """Return the CasADi expression of a node that is no input."""
+    """Return the CasADi expression of a graph node from its arguments' expressions."""
     if node.operation == CONSTANT:
         return ca.SX(node.value)
     make = ca.SX.unary if len(arguments) == 1 else ca.SX.binary
@@ -157,14 +157,14 @@ def expression(node: Node, arguments: Sequence[Expression]) -> Expression:
 def rewrite_operations(
     function: ca.Function, rules: Mapping[str, Callable[..., Expression]]
 ) -> ca.Function:
-    """Return a function with some operations replaced by the expressions of rules."""
+    """Return a CasADi function with some operations replaced by the expressions of `rules`."""
     graph = graph_of(function)
     if not any(node.operation in rules for node in graph.nodes):
         return function
     entries = [symbol.nonzeros() for symbol in function.sx_in()]
 
     def rule(node: Node, arguments: list[Expression]) -> Expression:
-        """Return a node's expression, by the rule of its operation where a rule exists."""
+        """Return a graph node's expression, by the rule of its operation if there is one."""
         replacement = rules.get(node.operation)
         return replacement(*arguments) if replacement else expression(node, arguments)
 
@@ -179,7 +179,7 @@ def function_like(
     *,
     once: bool = False,
 ) -> ca.Function:
-    """Return a function with the names and the sparsities of another, its outputs' elements new.
+    """Return a CasADi function with names and sparsity of `model`, its output elements new.
 
     Common subexpressions are merged; `once` asserts that they are already, which saves the search.
     """

@@ -12,10 +12,11 @@ from pteron.kernels.program_cache import Program
 
 
 def hoist_invariants(program: Program, name: str) -> tuple[Program, ca.Function]:
-    """Return a program without the operations on its input x alone, and the function of these.
+    """Return a program without the operations on the input `name` alone, and their function.
 
-    They are functions `first` and `second` with function(..., x, ...) = first(..., second(x), ...):
-    second(x) has the largest subexpressions of x. Inputs and outputs keep their names and order.
+    The two functions `first` and `second` satisfy function(..., x, ...) = first(..., second(x),
+    ...), where x is the input: second(x) has the largest subexpressions of x alone. Inputs and
+    outputs keep their names and order.
     """
     function = program.function
     place = function.name_in().index(name)
@@ -25,13 +26,13 @@ def hoist_invariants(program: Program, name: str) -> tuple[Program, ca.Function]
     numbers: dict[int, tuple[Expression, Expression]] = {}
 
     def symbol_of(k: int, computed: Expression) -> Expression:
-        """Return a node's value as the first function sees it."""
+        """Return a graph node's value, as a symbol where the hoisted function computes it."""
         if not graph.nodes[k].shared or computed.is_constant():
             return computed
         return numbers.setdefault(k, (computed, ca.SX.sym(f"n{len(numbers)}")))[1]
 
     def rule(node: Node, computed: list[Expression]) -> Expression:
-        """Return a node's expression with the values of shared nodes replaced by symbols."""
+        """Return a graph node's expression, hoisted arguments replaced by symbols."""
         if not node.shared:
             computed = [symbol_of(k, v) for k, v in zip(node.arguments, computed, strict=True)]
         return expression(node, computed)

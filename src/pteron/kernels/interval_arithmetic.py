@@ -58,19 +58,19 @@ class Interval(NamedTuple):
 
 
 def constant(number: float) -> Interval:
-    """Return a number as an interval; NaN is defined nowhere."""
+    """Return a number as an interval [number, number]; NaN as one that is never defined."""
     if np.isnan(number):
         return Interval(-np.inf, np.inf, *(np.ones(1, bool) for _ in range(3)))
     return Interval(number, number)
 
 
 def either(a: Mask, b: Mask) -> Mask:
-    """Return the boxes of one mask or the other."""
+    """Return the union of two masks of boxes; None is an empty mask."""
     return b if a is None else a if b is None else a | b
 
 
 def _marks(*intervals: Interval) -> tuple[Mask, Mask, Mask]:
-    """Return the union of the masks of operands: maybe or never defined, with a jump."""
+    """Return the unions of intervals' masks: maybe undefined, never defined, with a jump."""
     maybe, never, jump = intervals[0][2:]
     for other in intervals[1:]:
         maybe, never = either(maybe, other.maybe), either(never, other.never)
@@ -79,42 +79,42 @@ def _marks(*intervals: Interval) -> tuple[Mask, Mask, Mask]:
 
 
 def _round_down(x: Bound) -> Bound:
-    """Return a lower bound of a correctly rounded result, by a relative ulp."""
+    """Return x lowered by a relative ulp: a lower bound of the exact value."""
     return x - np.abs(x) * _ULP
 
 
 def _round_up(x: Bound) -> Bound:
-    """Return an upper bound of a correctly rounded result, by a relative ulp."""
+    """Return x raised by a relative ulp: an upper bound of the exact value."""
     return x + np.abs(x) * _ULP
 
 
 def _lower_bound(x: Bound, share: float = _ULP) -> Bound:
-    """Return a lower bound of a result with a relative error of `share`, or an underflow."""
+    """Return a lower bound of a value known with a relative error `share`, or underflow."""
     return x - (np.abs(x) * share + _UNDERFLOW)
 
 
 def _upper_bound(x: Bound, share: float = _ULP) -> Bound:
-    """Return an upper bound of a result with a relative error of `share`, or an underflow."""
+    """Return an upper bound of a value known with a relative error `share`, or underflow."""
     return x + (np.abs(x) * share + _UNDERFLOW)
 
 
 def add(a: Interval, b: Interval) -> Interval:
-    """Return a + b."""
+    """Return the interval of a + b, rounded outwards."""
     return Interval(_round_down(a.low + b.low), _round_up(a.high + b.high), *_marks(a, b))
 
 
 def subtract(a: Interval, b: Interval) -> Interval:
-    """Return a - b."""
+    """Return the interval of a - b, rounded outwards."""
     return Interval(_round_down(a.low - b.high), _round_up(a.high - b.low), *_marks(a, b))
 
 
 def negate(a: Interval) -> Interval:
-    """Return -a."""
+    """Return the interval of -a."""
     return Interval(-a.high, -a.low, *a[2:])
 
 
 def multiply(a: Interval, b: Interval) -> Interval:
-    """Return a b."""
+    """Return the interval of the product a b, rounded outwards."""
     if isinstance(a.low, float) and a.low == a.high:
         a, b = b, a
     if isinstance(b.low, float) and b.low == b.high:
@@ -130,7 +130,7 @@ def multiply(a: Interval, b: Interval) -> Interval:
 
 
 def _finite_product(x: Bound, y: Bound) -> Bound:
-    """Return x y, where zero times an infinite bound, which stands for finite values, is zero."""
+    """Return the product x y of bounds, where zero times infinity is zero."""
     product = x * y
     return np.where((x == 0.0) | (y == 0.0), 0.0, product) if np.isnan(np.sum(product)) else product
 
@@ -146,14 +146,14 @@ def _greatest_of(bounds: list[Bound]) -> Bound:
 
 
 def square(a: Interval) -> Interval:
-    """Return a a, which is not negative."""
+    """Return the interval of the square of a, rounded outwards and not negative."""
     size = absolute(a)
     low = np.maximum(_lower_bound(size.low * size.low), 0.0)
     return Interval(low, _upper_bound(size.high * size.high), *a[2:])
 
 
 def divide(a: Interval, b: Interval) -> Interval:
-    """Return a / b where b is not zero."""
+    """Return the interval of a / b where b is not zero, rounded outwards."""
     zero = np.logical_not((b.low > 0.0) | (b.high < 0.0))
     if not np.any(zero):
         quotients = [x / y for x in a[:2] for y in b[:2]]
@@ -171,7 +171,7 @@ def divide(a: Interval, b: Interval) -> Interval:
 
 
 def root(a: Interval) -> Interval:
-    """Return the square root of a where a is not negative."""
+    """Return the interval of the square root of a where a >= 0, rounded outwards."""
     low = np.sqrt(np.maximum(a.low, 0.0))
     high = np.sqrt(np.maximum(a.high, 0.0))
     # Of a bound that is NaN nothing is known.
@@ -182,13 +182,13 @@ def root(a: Interval) -> Interval:
 
 
 def absolute(a: Interval) -> Interval:
-    """Return |a|."""
+    """Return the interval of |a|."""
     low = np.maximum(np.maximum(a.low, -a.high), 0.0)
     return Interval(low, np.maximum(-a.low, a.high), *a[2:])
 
 
 def _wave(a: Interval, function: Callable[[Bound], Bound], peak: float) -> Interval:
-    """Return the sine or the cosine, whose greatest value is at `peak` and 2 pi apart."""
+    """Return the interval of a sine or cosine, whose maximum is at `peak`."""
     ends = [function(x) for x in a[:2]]
     least = np.minimum(*ends)
     most = np.maximum(*ends)
@@ -206,13 +206,13 @@ def _wave(a: Interval, function: Callable[[Bound], Bound], peak: float) -> Inter
 
 
 def exponential(a: Interval) -> Interval:
-    """Return exp(a)."""
+    """Return the interval of exp(a), rounded outwards."""
     low, high = _lower_bound(np.exp(a.low), _LIBM), _upper_bound(np.exp(a.high), _LIBM)
     return Interval(np.maximum(low, 0.0), high, *a[2:])
 
 
 def angle(y: Interval, x: Interval) -> Interval:
-    """Return atan2(y, x): in (-pi, pi], with a jump where x is negative and y crosses zero."""
+    """Return the interval of atan2(y, x) in (-pi, pi], with its jump at y = 0, x < 0."""
     # A corner at y = -0.0 would count from below.
     angles = [np.arctan2(s + 0.0, c) for s in y[:2] for c in x[:2]]
     crossed = np.atleast_1d((x.low <= 0.0) & (y.low < 0.0) & (y.high >= 0.0))
@@ -225,62 +225,62 @@ def angle(y: Interval, x: Interval) -> Interval:
 
 
 def _stepwise(function: Callable[[Bound], Bound], a: Interval) -> Interval:
-    """Return the interval of a step function (floor, sign), with its jumps."""
+    """Return the interval of a step function (floor, sign) of a, with its jumps."""
     low, high = function(a.low), function(a.high)
     return Interval(low, high, a.maybe, a.never, either(a.jump, _mask_or_none(low != high)))
 
 
 def minimum(a: Interval, b: Interval) -> Interval:
-    """Return the lesser of a and b."""
+    """Return the interval of the lesser of a and b."""
     return Interval(np.minimum(a.low, b.low), np.minimum(a.high, b.high), *_marks(a, b))
 
 
 def maximum(a: Interval, b: Interval) -> Interval:
-    """Return the greater of a and b."""
+    """Return the interval of the greater of a and b."""
     return Interval(np.maximum(a.low, b.low), np.maximum(a.high, b.high), *_marks(a, b))
 
 
 def _mask_or_none(mask: Any) -> Mask:
-    """Return the mask as an array (K,); None if it marks no box."""
+    """Return a mask of boxes as an array (K,); None if it marks none."""
     mask = np.atleast_1d(mask)
     return mask if mask.any() else None
 
 
 def _truth(certain: Any, impossible: Any, *intervals: Interval) -> Interval:
-    """Return 1 where a test surely holds, 0 where it surely does not, else [0, 1]."""
+    """Return 1 where a test is certain, 0 where it is impossible, else [0, 1]."""
     low, high = np.where(certain, 1.0, 0.0), np.where(impossible, 0.0, 1.0)
     maybe, never, jump = _marks(*intervals)
     return Interval(low, high, maybe, never, either(jump, _mask_or_none(low != high)))
 
 
 def is_less(a: Interval, b: Interval) -> Interval:
-    """Return whether a < b."""
+    """Return a < b as an interval: 1 surely true, 0 surely false, else [0, 1]."""
     return _truth(a.high < b.low, a.low >= b.high, a, b)
 
 
 def is_less_equal(a: Interval, b: Interval) -> Interval:
-    """Return whether a <= b."""
+    """Return a <= b as an interval: 1 surely true, 0 surely false, else [0, 1]."""
     return _truth(a.high <= b.low, a.low > b.high, a, b)
 
 
 def is_equal(a: Interval, b: Interval) -> Interval:
-    """Return whether a = b."""
+    """Return a = b as an interval: 1 surely true, 0 surely false, else [0, 1]."""
     same = np.logical_and(np.equal(a.low, b.high), np.equal(a.high, b.low))
     return _truth(same, (a.high < b.low) | (a.low > b.high), a, b)
 
 
 def is_zero(a: Interval) -> Interval:
-    """Return whether a is zero: 1, 0, or [0, 1] where it may be."""
+    """Return a = 0 as an interval: 1 surely true, 0 surely false, else [0, 1]."""
     return _truth((a.low == 0.0) & (a.high == 0.0), (a.low > 0.0) | (a.high < 0.0), a)
 
 
 def is_nonzero(a: Interval) -> Interval:
-    """Return whether a is not zero: 1, 0, or [0, 1] where it may be."""
+    """Return a != 0 as an interval: 1 surely true, 0 surely false, else [0, 1]."""
     return is_zero(is_zero(a))
 
 
 def select(test: Interval, chosen: Interval) -> Interval:
-    """Return the value where the test holds, else 0."""
+    """Return the interval of `chosen` where `test` is nonzero, else 0."""
     truth = is_nonzero(test)
     on, off = np.atleast_1d(truth.low > 0.0), np.atleast_1d(truth.high < 1.0)
     # Where the value is defined nowhere, 0 is all that may be.

@@ -53,7 +53,7 @@ class Boxed(Kernel):
     """
 
     def _evaluate(self, *values: ArrayLike, **fixed: ArrayLike) -> Any:
-        """Return an `Enclosure` of each output in boxes (..., 2, n), the ends of each input."""
+        """Return an `Enclosure` of each output over boxes of the inputs (..., 2, n)."""
         by_port = self._values_by_port(values, fixed)
         arrays = []
         for port in self.ports:
@@ -100,7 +100,7 @@ def enclose_nodes(
     highs: Sequence[Array],
     count: int,
 ) -> tuple[Array, Array, NDArray[np.bool_], NDArray[np.bool_]]:
-    """Return low, high, defined and continuous (B, N) of nodes, for inputs' bounds (B or 1, size).
+    """Return bounds low, high, defined, continuous (B, N) of N graph nodes in B boxes.
 
     Only what the nodes depend on is computed.
     """
@@ -126,7 +126,7 @@ def enclose_nodes(
 
 
 def _columns(low: Array, high: Array) -> tuple[list[Array], list[Array]]:
-    """Return the elements of an input in all boxes, or one value where all boxes agree."""
+    """Return an input's low and high elements as columns (B,), or (1,) where all boxes agree."""
     lows, highs = [], []
     for a, b in zip(low.T, high.T, strict=True):
         alike = len(a) > 0 and bool((a == a[0]).all() and (b == b[0]).all())
@@ -141,7 +141,7 @@ def _walk(
     columns: Sequence[Sequence[Sequence[Array]]],
     part: slice,
 ) -> list[Interval | None]:
-    """Return the intervals of the nodes in a slice of the boxes; None at nodes not needed."""
+    """Return the interval of each graph node in a slice of the boxes; None if not needed."""
     intervals: list[Interval | None] = [None] * len(graph.nodes)
     for k in needed:
         node = graph.nodes[k]
@@ -161,7 +161,7 @@ def _walk(
 
 
 def _mark(low: Array, high: Array, interval: Interval) -> None:
-    """Set unknown bounds (B,) to infinity, and bounds of undefined outputs to NaN, in place."""
+    """Set NaN bounds (B,) to infinity, and bounds where nothing is defined to NaN, in place."""
     low[np.isnan(low)], high[np.isnan(high)] = -np.inf, np.inf
     if interval.never is not None:
         never = np.broadcast_to(interval.never, low.shape)
@@ -169,7 +169,7 @@ def _mark(low: Array, high: Array, interval: Interval) -> None:
 
 
 def dependencies_of(graph: Graph, nodes: Sequence[int]) -> list[int]:
-    """Return the nodes on which some nodes depend, including these, in order."""
+    """Return the indices of the graph nodes that the given nodes depend on, sorted."""
     needed = set(nodes)
     for k in range(max(nodes, default=-1), -1, -1):
         if k in needed and graph.nodes[k].operation != INPUT:
@@ -178,9 +178,10 @@ def dependencies_of(graph: Graph, nodes: Sequence[int]) -> list[int]:
 
 
 def occurs_once(graph: Graph, node: int, moving: Collection[int]) -> bool:
-    """Return whether a node's natural interval is exact up to rounding: no input occurs twice.
+    """Return whether a graph node depends on each `moving` input element only once.
 
-    Of the first input only the elements in `moving` are intervals; the others are numbers.
+    Then its natural interval is exact up to rounding. Elements of the first input that are not in
+    `moving` are numbers, not intervals.
     """
     uses: dict[int, int] = {}
     fixed: set[int] = set()

@@ -52,7 +52,7 @@ class Traced(Kernel):
 
     @cached_property
     def source(self) -> str:
-        """The Python code."""
+        """The Python source of the JAX function."""
         graph = graph_of(self.function, self.ports)
         names = names_of(graph, lambda i, j: f"{self.ports[i].name}[..., {j}]", repr)
         arguments = ", ".join(port.name for port in self.ports)
@@ -67,12 +67,12 @@ class Traced(Kernel):
 
     @cached_property
     def _jitted_function(self) -> Callable[..., Any]:
-        """The compiled function of JAX arrays, with leading axes broadcast."""
+        """The JAX function, compiled just in time; leading axes broadcast."""
         jax = import_extra("jax", "jax", 'target: "jax" needs JAX')
         jnp = jax.numpy
 
         def stack(*values: Any) -> Any:
-            """Return values, broadcast together, stacked on a new last axis."""
+            """Return values broadcast together and stacked along a new last axis."""
             return jnp.stack(jnp.broadcast_arrays(*values), axis=-1)
 
         names = ("sqrt", "sin", "cos", "exp", "floor", "fmin", "fmax", "where", "nan")
@@ -82,7 +82,7 @@ class Traced(Kernel):
         function = space[self.name]
 
         def evaluate(*values: Any) -> Any:
-            """Return the outputs as JAX arrays; leading axes of the inputs are broadcast."""
+            """Return the outputs as JAX arrays; leading axes of the inputs broadcast."""
             arrays = [jnp.asarray(part, np.dtype(self.dtype)) for part in values]
             lead = jnp.broadcast_shapes(
                 *(
@@ -114,7 +114,7 @@ class Traced(Kernel):
         return traced(*(by_port[port.name] for port in self.ports))
 
     def _check_digits(self, name: str, array: Any) -> None:
-        """Refuse an array that JAX has rounded to 32 bits, values and derivatives alike."""
+        """Raise for a float32 JAX array where float64 is expected."""
         import jax
 
         if isinstance(array, jax.Array) and (str(array.dtype), self.dtype) == _ROUNDED:

@@ -53,7 +53,7 @@ class Port:
 
     @property
     def size(self) -> int:
-        """Number of values for one state."""
+        """Number of elements of this input or output for one state."""
         return prod(self.shape)
 
 
@@ -119,12 +119,12 @@ class Kernel(ABC):
 
     @property
     def operations(self) -> int:
-        """Arithmetic operations for one state; see `count_operations`."""
+        """Number of arithmetic operations for one state; see `count_operations`."""
         return count_operations(self.function)
 
     @property
     def source(self) -> str:
-        """The code that runs, as text: the instructions, one a line, as CasADi prints them."""
+        """The code of the kernel as text: CasADi's instructions, one a line."""
         return str(self.function.str(True))
 
     def __call__(self, *values: Any, **fixed: Any) -> Any:
@@ -153,10 +153,10 @@ class Kernel(ABC):
 
     @abstractmethod
     def _evaluate(self, *values: Any, **fixed: Any) -> Any:
-        """Do what `call` is asked for; a target may put something faster in its place."""
+        """Evaluate the kernel as `call` does; a target may replace `call` by something faster."""
 
     def _values_by_port(self, values: Sequence[Any], fixed: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the value of each port."""
+        """Return the value of each input by name, fixed ones included; raise for wrong names."""
         if len(values) != len(self.inputs):
             names = ", ".join(port.name for port in self.inputs)
             raise DataError(
@@ -184,7 +184,7 @@ class ArrayKernel(Kernel):
 
     @abstractmethod
     def _run(self, batch: int, inputs: Sequence[Array], outputs: Sequence[Array]) -> None:
-        """Fill `outputs` (batch, size) from `inputs` (batch, size), or (size,) where shared."""
+        """Fill `outputs` (batch, size) from `inputs`, (batch, size) or (size,) where shared."""
 
     def _evaluate(self, *values: ArrayLike, **fixed: ArrayLike) -> Any:
         """Evaluate the kernel; a target may override it with a faster first call."""
@@ -231,12 +231,12 @@ class ArrayKernel(Kernel):
     def _run_in_threads(
         self, batch: int, inputs: Sequence[Array], outputs: Sequence[Array]
     ) -> None:
-        """Run slices of the batch in threads; a state's numbers do not depend on its slice."""
+        """Fill `outputs` for a batch by slices in several threads."""
         count = min(self.threads, batch // SHARE)
         bounds = [batch * k // count for k in range(count + 1)]
 
         def run(start: int, stop: int) -> None:
-            """Compute the outputs of the states `start` to `stop`."""
+            """Fill the outputs of the states `start` to `stop`."""
             self._run(stop - start, *slice_states(inputs, outputs, start, stop))
 
         with ThreadPoolExecutor(count) as pool:
@@ -246,13 +246,13 @@ class ArrayKernel(Kernel):
 def slice_states(
     inputs: Sequence[Array], outputs: Sequence[Array], start: int, stop: int
 ) -> tuple[list[Array], list[Array]]:
-    """Return the inputs and outputs of `_run` for the states from `start` to `stop`."""
+    """Return views of the inputs and outputs for the states `start` to `stop`."""
     parts = [array if array.ndim == 1 else array[start:stop] for array in inputs]
     return parts, [array[start:stop] for array in outputs]
 
 
 def count_operations(function: ca.Function) -> int:
-    """Return the arithmetic operations of one evaluation of an SX function.
+    """Return the number of arithmetic operations of one evaluation of a CasADi function.
 
     + - * / negation, square root, sine, cosine and the like count one each; inputs, outputs, moves
     and constants are free. Shared subexpressions count once, if `casadi.cse` was applied.
@@ -267,9 +267,9 @@ def as_array(
     dtype: str = "float64",
     columns: Sequence[str] = (),
 ) -> Array:
-    """Return an array of floats whose last axes are `shape`; raise where it is none.
+    """Return `value` as an array of floats with last axes `shape`; raise if it has others.
 
-    Of a table they are its columns of the names `columns`.
+    For a table they are its columns of the names `columns`.
     """
     array: Array
     if type(value) is np.ndarray and value.dtype == np.dtype(dtype) and value.flags.aligned:
@@ -299,7 +299,7 @@ def _convert_to_floats(raw: ArrayLike, name: str, dtype: str) -> Array:
 
 
 def require_unmasked(array: Any, name: str) -> Any:
-    """Return a masked array's data, or raise `DataError` if elements are masked; else `value`."""
+    """Return the data of a masked array, raising if any element is masked; others unchanged."""
     if not isinstance(array, np.ma.MaskedArray):
         return array
     if np.ma.is_masked(array):

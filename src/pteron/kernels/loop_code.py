@@ -96,7 +96,7 @@ class LinkedLaw:
     scales: tuple[float, ...]
 
     def arguments(self, block: Block) -> list[str]:
-        """Return the arguments of its call: those that go in, and those that come out."""
+        """Return the C arguments of the law's call: its inputs, then forces and next memory."""
         tables = dict(self.tables)
         taken = [
             tables[port.name] if port.shared else f"given + {block.first_rows[port.name]}"
@@ -105,7 +105,7 @@ class LinkedLaw:
         return taken + [name for name in ("forces", "next_memory") if name in block.output_rows]
 
     def readings(self, block: Block) -> list[tuple[int, float, float]]:
-        """Return the input rows of joints and rates that have readings, with zeros and scales."""
+        """Return (input row, zero, scale) of joints and rates whose readings differ."""
         zero_rates = (0.0,) * len(self.zeros)
         zeros = dict.fromkeys(("joints", "motors"), self.zeros)
         zeros |= dict.fromkeys(("joint_rates", "motor_rates"), zero_rates)
@@ -148,7 +148,7 @@ class LoopCode:
 
     @cached_property
     def _blocks(self) -> list[Block]:
-        """The blocks of the plant, and of sensors and law where the loop has them."""
+        """The blocks of C code: the plant, and sensors and law where the loop has them."""
         parts = {"sensed": self.sensed, "law": self.law}
         blocks = [Block(name, part) for name, part in parts.items() if part is not None]
         # Machines side by side rarely slide all at once, and one part fills the pipeline better.
@@ -158,7 +158,7 @@ class LoopCode:
 
     @cached_property
     def source(self) -> str:
-        """The C code."""
+        """The C source of the simulation loop."""
         plant, _, *laws = self._blocks
         law = laws[0] if laws else None
         sizes = {port.name: port.size for port in plant.state_inputs}
@@ -205,7 +205,7 @@ class LoopCode:
 
     @cached_property
     def names(self) -> list[str]:
-        """The names of the arrays that the loop's function takes, in the order of its arguments."""
+        """The names of the arrays that the loop's C function takes, in order."""
         numbers = (
             f"{block.name}_{port.name}" for block in self._blocks for port in block.machine_inputs
         )
@@ -224,7 +224,7 @@ class LoopCode:
         return ctypes.CDLL(str(entry(name, _LIBRARY, self._build)))
 
     def load(self) -> None:
-        """Load the library; compile it first if it is not in the cache.
+        """Load the loop's library; compile it first if it is not in the cache.
 
         Raises
         ------
@@ -234,7 +234,7 @@ class LoopCode:
         _ = self._library
 
     def _build(self, folder: Path) -> None:
-        """Compile the source to the library in a folder; ModelError if the compiler fails."""
+        """Compile the loop's C source into a library in `folder`; ModelError on failure."""
         advice = "set CC to another compiler, or PTERON_KERNELS=vm"
         flags, sources = [*FLAGS, *LINKED], {"loop.c": self.source}
         what = "the simulation's loop"
@@ -248,7 +248,10 @@ class LoopCode:
         counts: Sequence[int],
         ask: Callable[[int, int, Array], Array] | None = None,
     ) -> None:
-        """Run some samples; arrays (B or 1, T or 1, size) are read and filled in place."""
+        """Run the loop for a number of samples.
+
+        Arrays (B or 1, T or 1, size) are changed in place.
+        """
         table = (_Port * len(self.names))()
         for port, name in zip(table, self.names, strict=True):
             optional = name in (*RESULTS, "reference", "given")
@@ -262,7 +265,7 @@ class LoopCode:
         joints = arrays["most"].shape[2]
 
         def answer_request(machine: int, sample: int, measured: Any, forces: Any) -> None:
-            """Fill in the forces (n,) for readings (2 n,) at a sample; NaN after a failure."""
+            """Fill in the controller's forces (n,) for measurements (2 n,); NaN after a failure."""
             commanded = np.ctypeslib.as_array(forces, (joints,))
             commanded[:] = np.nan
             if not failures:

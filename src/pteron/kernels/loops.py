@@ -41,7 +41,7 @@ Arrays = dict[str, Array]
 def _pieces(
     arrays: Mapping[str, Array], samples: int, counts: Sequence[int], machines: int
 ) -> Iterator[tuple[Mapping[str, Array], int, Sequence[int]]]:
-    """Yield the pieces of a run: arrays, number of samples and `counts` of each."""
+    """Yield pieces of a run that are short enough to interrupt: arrays, samples, counts."""
     *fixed, first, end = counts
     size = max(1, _PIECE // (max(1, machines) * max(1, sum(counts[:PARTS]))))
     if size >= samples:
@@ -86,7 +86,7 @@ class Loop:
 
     @property
     def is_compiled(self) -> bool:
-        """Whether the steps run in C."""
+        """Whether the integration steps run as compiled C."""
         return os.environ.get(VARIABLE) != "vm" and c_compiler() is not None
 
     def run(
@@ -100,7 +100,7 @@ class Loop:
         go: Callable[..., None] | None = None,
         device: Literal["cpu", "cuda"] = "cpu",
     ) -> None:
-        """Run some samples, and change and fill `arrays`, each (B or 1, T or 1, size), in place.
+        """Simulate a number of samples; arrays (B or 1, T or 1, size) are changed in place.
 
         Parameters
         ----------
@@ -150,7 +150,7 @@ class Loop:
         ended = Event()
 
         def part(start: int, stop: int) -> None:
-            """Run the machines `start` to `stop`, piece by piece, until the run is ended."""
+            """Simulate the machines `start` to `stop`, piece by piece, until `ended` is set."""
             cut = {n: a[start:stop] if len(a) == batch else a for n, a in arrays.items()}
             for piece, size, numbers in _pieces(cut, samples, counts, stop - start):
                 if ended.is_set():
@@ -180,9 +180,9 @@ class Loop:
         run_loop(_code(*parts, 1, None, True), arrays, samples, times, counts)
 
     def idle(self, robot: Manipulator, state: Array, late: int = 0, behind: int = 0) -> Arrays:
-        """Return `run`'s arrays for states (B, 1, Y) without loads, limits or encoders.
+        """Return the arrays of `run` for states (B, 1, Y) without loads, limits or encoders.
 
-        Commands are so many samples late, and readings so many behind.
+        Commands are delayed by `late` samples, and readings by `behind` samples.
         """
         batch, n = len(state), robot.joint_count
         encoders = n * (2 if self.kind.bends else 1)
@@ -203,7 +203,7 @@ class Loop:
         }
 
     def _can_run(self, lanes: int) -> bool:
-        """Return whether the steps run in C; False if the compiler fails."""
+        """Return whether the steps can run in C; False if the compiler fails."""
         if not self.is_compiled:
             return False
         try:
@@ -213,7 +213,7 @@ class Loop:
         return True
 
     def code(self, lanes: int) -> LoopCode:
-        """Return its C for some machines side by side."""
+        """Return the loop's C code for `lanes` machines side by side."""
         return _code(self.plant, self.sensed, self.law, self.kind, lanes, self.linked)
 
 
@@ -224,12 +224,12 @@ def loop(
     linked: LinkedLaw | None = None,
     general: bool = False,
 ) -> Loop:
-    """Return the loop of a machine under a controller, or under given forces; see `Loop`."""
+    """Return the simulation loop of a machine under a control law or given forces."""
     return Loop(robot, law, linked, general)
 
 
 def machine_numbers(robot: Manipulator, part: Program, name: str) -> dict[str, Array]:
-    """Return a machine's own numbers for a program of the loop, as `Loop.run` takes them."""
+    """Return a machine's parameters as arrays by name, for a program of the loop."""
     return {
         f"{name}_{port.name}": _numbers(robot, port.name)
         for port in part.inputs
@@ -239,7 +239,7 @@ def machine_numbers(robot: Manipulator, part: Program, name: str) -> dict[str, A
 
 @lru_cache(maxsize=256)
 def _numbers(robot: Manipulator, what: str) -> Array:
-    """Return the numbers of a machine for an input, (1, 1, k), read-only and cached."""
+    """Return a machine's parameters for the input `what`, (1, 1, k), read-only and cached."""
     array = FIXED[what](robot).reshape(1, 1, -1)
     array.setflags(write=False)  # all runs of the machine read it
     return array

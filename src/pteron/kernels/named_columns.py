@@ -14,7 +14,7 @@ _MANY = 12
 
 
 def pick_columns(table: Any, columns: Sequence[str], name: str) -> Any:
-    """Return the requested columns of a table, in order; an argument that is no table, unchanged.
+    """Return a table's named columns (..., k), in order; an argument without names unchanged.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ def column_names(table: Any) -> list[str]:
 
 
 def _has_labels(array: Any) -> bool:
-    """Return whether a value is a DataArray of xarray whose last axis has names."""
+    """Return whether an array is an xarray DataArray whose last axis has text labels."""
     if isinstance(array, np.ndarray) or not getattr(array, "dims", ()):
         return False
     labels = getattr(array, "coords", {}).get(array.dims[-1])
@@ -98,13 +98,13 @@ def _has_labels(array: Any) -> bool:
 
 
 def _columns_from_labels(array: Any) -> dict[str, Any]:
-    """Return the columns of an xarray array by the labels of its last axis."""
+    """Return the columns of an xarray DataArray by the labels of its last axis."""
     axis = array.dims[-1]
     return {str(label): array.sel({axis: label}).values for label in array.coords[axis].values}
 
 
 def _column(raw: Any, name: str) -> np.ndarray[Any, np.dtype[np.float64]]:
-    """Return a column as floats; DataError if it is not real numbers."""
+    """Return a column as an array of floats; raise DataError if it is not real numbers."""
     try:
         if (array := np.asarray(raw)).dtype.kind not in "biufO":
             raise TypeError

@@ -38,13 +38,13 @@ class Jitted(ArrayKernel):
 
     @cached_property
     def source(self) -> str:
-        """The Python code."""
+        """The Python source of the Numba function."""
         graph = graph_of(with_lowered_exponentials(self.function), self.ports)
         return _source(self.name, graph, self.ports, self.outputs)
 
     @property
     def _entry(self) -> str:
-        """The name of the module in the cache; ModelError if Numba is not installed."""
+        """The cache name of the compiled module; raises ModelError if Numba is not installed."""
         if importlib.util.find_spec("numba") is None:
             raise ModelError(
                 f'target: "numba" needs Numba, which is not installed; {install_command("numba")}'
@@ -52,28 +52,28 @@ class Jitted(ArrayKernel):
         return f"numba-{self.name}-{digest(self.source, version('numba'), version('llvmlite'))}"
 
     def is_cached(self) -> bool:
-        """Return whether the code is on disk, ready to be loaded."""
+        """Return whether the compiled function is in the disk cache."""
         return find(self._entry, _FILE) is not None
 
     @cached_property
     def _module(self) -> ModuleType:
-        """The compiled module, from the cache or written on demand."""
+        """The Python module with the compiled function, from the cache or written on demand."""
         name = self._entry
 
         def build(folder: Path) -> None:
-            """Write the module's source to a folder and load it there, which compiles it."""
+            """Write the module's source to a folder and import it there, which compiles it."""
             (folder / _FILE).write_text(self.source, encoding="utf-8")
             _load(folder / _FILE, name)
 
         return _load(entry(name, _FILE, build), name)
 
     def _evaluate(self, *values: ArrayLike, **fixed: ArrayLike) -> Any:
-        """Evaluate a first call; bind the compiled function as `call` for all later ones."""
+        """Evaluate the first call; later calls go straight to the compiled function."""
         self.call = self._direct()
         return self.call(*values, **fixed)
 
     def _direct(self) -> Callable[..., Any]:
-        """Return the callable: `evaluate_state` for plain arrays, else `evaluate_checked`."""
+        """Return the fastest callable of the kernel: direct for plain arrays, checked otherwise."""
         evaluate_state = self._module.one  # which says in a line if Numba is missing
         from numba.core.errors import NumbaError
 
@@ -87,7 +87,7 @@ class Jitted(ArrayKernel):
         ]
 
         def call(*values: Any, **fixed: Any) -> Any:
-            """Return the outputs: directly for plain vectors, otherwise by the general callable."""
+            """Return the outputs: directly for plain vectors, otherwise after checks."""
             if not fixed and len(values) == count and getattr(values[0], "ndim", 0) == 1:
                 outputs = [empty(size) for size in sizes]
                 try:
@@ -110,7 +110,7 @@ class Jitted(ArrayKernel):
 
 
 def _load(path: Path, name: str) -> ModuleType:
-    """Execute the file as a module; Numba finds it by name when it reads its cache."""
+    """Import a Python file as the module `name`, under which Numba finds its cache."""
     name = name.replace("-", "_")
     spec = importlib.util.spec_from_file_location(name, path)
     assert spec is not None

@@ -8,10 +8,11 @@ from contextlib import contextmanager
 
 @contextmanager
 def one_thread() -> Iterator[None]:
-    """Let linear algebra use one thread: several add up in another order, so that bits differ.
+    """Restrict linear algebra to one thread in this context, so that results agree to the bit.
 
-    Dask's workers do so by themselves. Without threadpoolctl, of the extra `design`, the number of
-    threads stays that of the environment (OPENBLAS_NUM_THREADS).
+    Several threads add numbers in another order. Dask's workers use one thread anyway. Without
+    threadpoolctl, part of the extra `design`, the number of threads is that of the environment
+    (OPENBLAS_NUM_THREADS).
     """
     try:
         from threadpoolctl import threadpool_limits

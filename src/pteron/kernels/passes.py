@@ -40,8 +40,8 @@ from pteron.kernels.translation import to_function, to_term_graph
 def optimise_function(function: ca.Function) -> ca.Function:
     """Return a function of the same inputs, outputs and values that takes less time.
 
-    It has fewer operations, but for one more for each division that is saved: a division takes as
-    long as several products. Where nothing is saved it is the function given.
+    It has fewer operations, except that saving a division, which takes as long as several products,
+    may cost one more. If nothing is saved, the given function is returned.
 
     Examples
     --------
@@ -69,13 +69,13 @@ def optimise_function(function: ca.Function) -> ca.Function:
 
 
 def _share_divisions(old: TermGraph, roots: list[int]) -> tuple[TermGraph, list[int]] | None:
-    """Return the graph with one division for each divisor of several quotients; None if none."""
+    """Return the graph with one reciprocal for each repeated divisor; None if none repeats."""
     uses = old.uses(roots)
     if not any(old.is_kind("inverse", k) and uses[k] > 1 for k in uses):
         return None
 
     def rule(new: TermGraph, k: int, values: list[int]) -> int:
-        """Return the node of k in the new graph: a reciprocal if it divides several times."""
+        """Return the new graph's node for node k: a reciprocal if k divides several times."""
         several = old.is_kind("inverse", k) and uses[k] > 1
         return new.reciprocal(values[0]) if several else old.copy_node(new, k, values)
 
@@ -83,7 +83,7 @@ def _share_divisions(old: TermGraph, roots: list[int]) -> tuple[TermGraph, list[
 
 
 def _cost(graph: TermGraph, roots: list[int]) -> int:
-    """Return the number of operations without negations."""
+    """Return the number of operations that the roots need, negations not counted."""
     cost, alone = 0, {abs(root) for root in roots}
     order = graph.order(roots)
     for k in order:
@@ -98,11 +98,11 @@ def _cost(graph: TermGraph, roots: list[int]) -> int:
 
 
 def _flatten_terms(old: TermGraph, roots: list[int]) -> tuple[TermGraph, list[int]]:
-    """Return the graph with nested sums, and products, merged where they have a single use."""
+    """Return the graph and roots with nested sums and products of a single use merged."""
     uses = old.uses(roots)
 
     def rule(new: TermGraph, k: int, values: list[int]) -> int:
-        """Return the node of k in the new graph, with nested sums or products merged."""
+        """Return the new graph's node for node k, with nested sums or products merged."""
         kind = old.kinds[k]
         if kind == "reciprocal" and uses[k] == 1:
             return new.inverse(values[0])
@@ -124,11 +124,11 @@ def _flatten_terms(old: TermGraph, roots: list[int]) -> tuple[TermGraph, list[in
 
 
 def _factor_sums(old: TermGraph, roots: list[int]) -> tuple[TermGraph, list[int]]:
-    """Return the graph with the common factors of a sum's terms taken out of them."""
+    """Return the graph and roots with common factors of each sum's terms taken out."""
     uses = old.uses(roots)
 
     def rule(new: TermGraph, k: int, values: list[int]) -> int:
-        """Return the node of k in the new graph, a sum with its common factors taken out."""
+        """Return the new graph's node for node k; a sum has its common factors taken out."""
         if not old.is_kind("sum", k):
             return old.copy_node(new, k, values)
         terms = []
@@ -144,7 +144,7 @@ def _factor_sums(old: TermGraph, roots: list[int]) -> tuple[TermGraph, list[int]
 
 
 def _sum_of_products(graph: TermGraph, terms: list[tuple[int, tuple[int, ...]]]) -> int:
-    """Return the sum of terms, each a sign and factors, in factored form."""
+    """Return the node of a sum of (sign, factors) terms, common factors taken out."""
     while True:
         counts = Counter(f for _, factors in terms if len(factors) > 1 for f in set(factors))
         if max(counts.values(), default=0) < 2:
@@ -162,7 +162,7 @@ def _sum_of_products(graph: TermGraph, terms: list[tuple[int, tuple[int, ...]]])
 
 
 def _share_pairs(graph: TermGraph, roots: list[int]) -> tuple[TermGraph, list[int]]:
-    """Return the graph with a node for each pair of operands that sums or products share."""
+    """Return the graph and roots with one node for each operand pair that several nodes share."""
     order = graph.order(roots)
     for kind in ("sum", "product"):
         _name_pairs(graph, kind, [k for k in order if graph.is_kind(kind, k)])
@@ -170,7 +170,7 @@ def _share_pairs(graph: TermGraph, roots: list[int]) -> tuple[TermGraph, list[in
 
 
 def _name_pairs(graph: TermGraph, kind: str, owners: Sequence[int]) -> None:
-    """Replace each pair of operands that several owners share by a node, in place."""
+    """Replace each operand pair that several nodes share by one node, in place."""
     lists = {k: list(graph.operands[k]) for k in owners}
     holders: dict[tuple[int, int], dict[int, None]] = defaultdict(dict)
     for k, operands in lists.items():
@@ -211,13 +211,13 @@ def _name_pairs(graph: TermGraph, kind: str, owners: Sequence[int]) -> None:
 
 
 def _pair(a: int, b: int) -> tuple[int, int]:
-    """Return two values in a canonical form, equal for their negatives."""
+    """Return a pair of operands in a canonical form, equal for both negated."""
     a, b = (a, b) if abs(a) < abs(b) else (b, a)
     return (a, b) if a > 0 else (-a, -b)
 
 
 def _sign_of(pair: tuple[int, int], values: list[int]) -> int:
-    """Return the sign with which the values contain a pair; 0 if they do not."""
+    """Return 1 if the operands contain the pair, -1 if they contain its negatives, else 0."""
     a, b = pair
     if a == b:
         return int(values.count(a) > 1)

@@ -26,16 +26,16 @@ Parts = tuple[tuple[float, ...], tuple[float, ...]]
 
 @lru_cache(maxsize=8)
 def path_kernel(closed: Closed, start: Parts | None) -> TieredKernel:
-    """Return the kernel of a step along a path from one machine to another.
+    """Return the kernel of one step of the path tracker between machines of a closure kind.
 
-    It maps a path's `PathState` to the next one. A start machine is fixed in the kernel, as complex
-    constants; the target machine is then an input and real. With start None both are inputs and
-    complex: real parts first.
+    It maps a `PathState` to the next one. With a start machine, its numbers are constants in the
+    kernel, and the target machine is a real input. With start None both machines are complex
+    inputs: real parts first.
     """
     count = closed.numbers
 
     def build() -> Program:
-        """Return the program of a step along the path: next state, remaining correction."""
+        """Build the program of a path step: from a path state to the next, with its correction."""
         at = ca.SX.sym("at", closed.path_state_size)
         ends, inputs = [], {"at": at}
         for name, fixed in (("start", start), ("target", None)):
@@ -57,10 +57,10 @@ def path_kernel(closed: Closed, start: Parts | None) -> TieredKernel:
 
 @lru_cache(maxsize=8)
 def rows_kernel(closed: Closed) -> TieredKernel:
-    """Return the kernel of the residuals of a machine's closures at a real z, and their slopes."""
+    """Return the kernel of the closure equations' residuals and Jacobian at a real z."""
 
     def build() -> Program:
-        """Return the program of the slopes and residuals of the closures at z of a machine."""
+        """Build the program of the closure equations' Jacobian and residuals at z."""
         z, machine = ca.SX.sym("z", closed.size), ca.SX.sym("machine", closed.numbers)
         slopes, missed = rows(closed, numbers(machine), numbers(z))
         return Program.from_named_expressions(
@@ -71,16 +71,16 @@ def rows_kernel(closed: Closed) -> TieredKernel:
 
 
 def spheres_kernel(robot: Manipulator) -> TieredKernel:
-    """Return the kernel of the spheres on which joints hold platform points; see `closing`."""
+    """Return the kernel of centres and squared radii of the spheres that joints hold points on."""
     return _spheres(geometry_only(robot))
 
 
 @lru_cache(maxsize=64)
 def _spheres(robot: Manipulator) -> TieredKernel:
-    """Return the kernel of the spheres that the joints' coordinates constrain, cached."""
+    """Return the kernel of spheres (centre, squared radius) at joint coordinates, cached."""
 
     def build() -> Program:
-        """Return the program of the spheres' centers and squared radii at joint coordinates."""
+        """Build the program of the spheres' centres and squared radii at joint coordinates."""
         joints = ca.SX.sym("joints", robot.joint_count)
         centers, squares = held_spheres(Machine.numeric(robot), joints)
         return Program.from_named_expressions(

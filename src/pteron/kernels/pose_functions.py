@@ -51,14 +51,14 @@ def _poses(m: Machine, v: Inputs, *, reached: bool) -> Outputs:
 
 
 def _closure_rows(m: Machine, v: Inputs) -> Outputs:
-    """Return the rows of the closures with the joints fixed, with their origin and size, m."""
+    """Return the closure equations of fixed joints, with their origin and unit length, m."""
     closures = closing.closure_rows(m, v.joints)
     rows = {name: (part, part.shape) for name, part in closures._asdict().items()}
     return {**rows, "origin": closures.origin, "size": closures.size}
 
 
 def _direct_step(m: Machine, joints: Expression, pose: Expression) -> Any:
-    """Return the pose of joint coordinates near a pose, by Newton's method; see `closing`."""
+    """Return the pose of joint coordinates near a start pose, by Newton's method."""
     return closing.direct_step(m, joints, pose, TYPE_II)
 
 
@@ -71,29 +71,29 @@ def _followed_step(m: Machine, joints: Expression, pose: Expression) -> Any:
 def _leg_equation(
     quantity: Callable[[Any], Expression],
 ) -> Callable[[Machine, Expression], Expression]:
-    """Return the equation of a quantity of each leg's reach at a pose."""
+    """Return the function of (machine, pose) that stacks quantity(reach) of each leg, (n, 1)."""
     return lambda m, pose: ca.vertcat(*map(quantity, kinematics.reach(m, pose)))
 
 
 def _reach(m: Machine, pose: Expression) -> Any:
-    """Return the legs' margins, m, type-I measures and spreads, (n,) each."""
+    """Return the legs' reach margins, m, type-I measures and spreads at a pose, (n,) each."""
     reaches = kinematics.reach(m, pose)
     names = ("margin", "type_i", "spread")
     return [ca.vertcat(*(getattr(leg, name) for leg in reaches)) for name in names]
 
 
 def _room(m: Machine, pose: Expression) -> Expression:
-    """Return the legs' edge conditions at a pose, not negative within reach."""
+    """Return the conditions (K, 1) at a pose that are not negative within reach and limits."""
     return ca.vertcat(*(edge.value for edge in edges(m, pose)))
 
 
 def _platform(m: Machine, pose: Expression) -> Any:
-    """Return the platform's motion at a pose with zero rates."""
+    """Return the platform's motion state at a pose with zero rates."""
     return m.platform.motion(pose, *[ca.SX.zeros(m.freedom)] * 2)
 
 
 def platform_points(m: Machine, pose: Expression) -> Expression:
-    """Return the platform points in the base frame."""
+    """Return the platform points (n, 3) at a pose in the base frame, m."""
     return ca.vertcat(*(point.position.T for point in _platform(m, pose).points))
 
 
@@ -109,12 +109,12 @@ def _twist(m: Machine, pose: Expression, velocity: Expression) -> Expression:
 
 
 def _velocity_of_twist(m: Machine, pose: Expression, twist: Expression) -> Any:
-    """Return the pose's rates (n,) of a twist (6,), and the remainder that it cannot follow."""
+    """Return the pose rates (m,) for a twist (6,), and the part of it that they cannot give."""
     return _platform(m, pose).velocity_of(twist)
 
 
 def _joint_motion(m: Machine, v: Inputs) -> Outputs:
-    """Return the motion of actuated joints, links and passive joints up to an order."""
+    """Return rates, or accelerations if given, of actuated joints, links and passive joints."""
     at, order = state(m, v), int(v.acceleration is not None)
     links, passive = kinematics.link_turning(at, order), kinematics.passive_motion(at, order)
     return {

@@ -53,7 +53,7 @@ class Program:
         results: Sequence[Expression],
         outputs: Sequence[Port],
     ) -> Self:
-        """Return the program of expressions of its inputs' symbols; ports name and shape both."""
+        """Return the program of CasADi expressions, with named and shaped inputs and outputs."""
         names = [port.name for port in inputs], [port.name for port in outputs]
         return cls(name, ca.Function(name, symbols, results, *names), (*inputs,), (*outputs,))
 
@@ -65,7 +65,7 @@ class Program:
         found: Mapping[str, Expression],
         shared: Collection[str] = (),
     ) -> Self:
-        """Return the program of expressions by name; columns become vectors, matrices row-major."""
+        """Return the program of named expressions; columns become vectors, matrices row-major."""
         inputs = [Port(key, element.shape[:1], key in shared) for key, element in given.items()]
         outputs = [Port(key, shape_of(element)) for key, element in found.items()]
         dense = ca.cse([ca.densify(element).T for element in found.values()])
@@ -73,22 +73,22 @@ class Program:
 
     @property
     def text(self) -> str:
-        """The program as it is written on disk; equal programs have equal texts."""
+        """The program serialised as text; equal programs have equal texts."""
         return _serialise_program(self)
 
     def optimise(self) -> Self:
-        """Return the program after the passes that save operations."""
+        """Return the program with an equal function of fewer operations."""
         return replace(self, function=optimise_function(self.function))
 
 
 def shape_of(element: Expression) -> tuple[int, ...]:
-    """Return the shape of an expression: a column is a vector, and of one element a number."""
+    """Return an expression's array shape: () for a scalar, (k,) for a column, else two numbers."""
     rows, columns = element.shape
     return (rows, columns) if columns > 1 else () if rows == 1 else (rows,)
 
 
 def cached_program(key: tuple[Any, ...], build: Callable[[], Program]) -> Program:
-    """Return the program of a key, read from disk or built and stored."""
+    """Return the program stored on disk under a key; build and store it if absent."""
     name = name_of("program", *key)
     text = None if name is None else cache.find_text(name)
     program = None if text is None else _parse_program(text)
@@ -106,11 +106,11 @@ def cached_result(
     *,
     keeps: Callable[[_Result], bool] = lambda _: True,
 ) -> _Result:
-    """Return the result of a key, read from disk or computed by `find` and stored.
+    """Return the result stored on disk under a key; compute it by `find` and store it if absent.
 
-    It depends on the source of `packages`, or of top-level modules, and of all equations. It is
-    pickled: the cache is private to the user and holds executable code. Results for which `keeps`
-    is false are not stored.
+    The key is complemented by the sources of `packages` (or top-level modules) and of all
+    equations. Results are pickled: the cache is private to the user and holds executable code.
+    Results for which `keeps` is false are not stored.
     """
     name = name_of(*key, sources=(*EQUATIONS, *packages))
     text = None if name is None else cache.find_text(name)
@@ -125,15 +125,15 @@ def cached_result(
 
 
 def is_stored(key: tuple[Any, ...], packages: tuple[str, ...]) -> bool:
-    """Return whether `cached_result` has the result of a key on disk."""
+    """Return whether `cached_result` has a result on disk under this key."""
     name = name_of(*key, sources=(*EQUATIONS, *packages))
     return name is not None and cache.find_text(name) is not None
 
 
 def name_of(*key: Any, sources: tuple[str, ...] = EQUATIONS) -> str | None:
-    """Return the name of a key's cached text, see `cache`; None for a foreign leg.
+    """Return the file name of a cache key, with a digest of sources; None if it has none.
 
-    It changes with the source of each of the packages, or top-level modules, `sources`.
+    The name changes with the sources of the packages, or top-level modules, in `sources`.
     """
     canonical_key = _canonical_key(key)
     return (
@@ -144,7 +144,7 @@ def name_of(*key: Any, sources: tuple[str, ...] = EQUATIONS) -> str | None:
 
 
 def _parse_program(text: str) -> Program | None:
-    """Return the program of a cached text; None if the text is not valid."""
+    """Return the program from its cached text; None if the text is not valid."""
     try:
         record = json.loads(text)
         ports = (
@@ -159,7 +159,7 @@ def _parse_program(text: str) -> Program | None:
 
 
 def _serialise_program(program: Program) -> str:
-    """Return the text of a program for the cache, JSON."""
+    """Return a program as JSON text for the cache."""
     ports = {
         name: [asdict(port) for port in part]
         for name, part in (("inputs", program.inputs), ("outputs", program.outputs))
@@ -168,7 +168,7 @@ def _serialise_program(program: Program) -> str:
 
 
 def _canonical_key(part_: Any) -> str | None:
-    """Return a canonical cache key of a value; None if it has none (a foreign leg)."""
+    """Return a value as canonical text for a cache key; None if it has none (a foreign leg)."""
     if part_ is None or isinstance(part_, bool | int | float | str):
         return repr(part_)
     if isinstance(part_, tuple):
@@ -183,13 +183,13 @@ def _canonical_key(part_: Any) -> str | None:
 
 
 def _source(packages: tuple[str, ...]) -> str:
-    """Return the digests of packages' sources, joined in a text."""
+    """Return the digests of the packages' source files, joined in a text."""
     return " ".join(_digest(name) for name in sorted(packages))
 
 
 @lru_cache
 def _digest(name: str) -> str:
-    """Return a digest of the source of a package, or of a module, with its templates and data."""
+    """Return the SHA-256 digest of the source files of a package or module."""
     total, module = hashlib.sha256(), (_PACKAGE / name).with_suffix(".py")
     files = [module] if module.is_file() else sorted((_PACKAGE / name).rglob("*.*"))
     for path in files:

@@ -97,13 +97,13 @@ def program(
     plain: bool = False,
     named: bool = False,
 ) -> Program:
-    """Return the function `what` of a machine's geometry; inertial parameters stay inputs.
+    """Return the program of the function `what` of a machine, its geometry folded in.
 
-    With `columns` the dynamics are those of base parameters, which are then the input; with
-    `wrench` a wrench on the platform is an input too; with `guarded` a last output, `status`, is 1
-    where the result is valid and 0 where the pose is out of reach or singular, or a number is not
-    finite; with `plain` the equations are as they are written, without the pass that saves
-    operations; with `named` vectors are along the base's axes, as the names of exported code say.
+    Inertial parameters are inputs. With `columns` the dynamics are those of base parameters, which
+    are then the input; with `wrench` a wrench on the platform is a further input; with `guarded` a
+    last output, `status`, is 1 where the result is valid and 0 where the pose is out of reach or
+    singular, or a number is not finite; with `plain` the equations are not optimised; with `named`
+    vectors are along the base axes, as the names in exported code say.
 
     Raises
     ------
@@ -133,7 +133,7 @@ def numeric_program(
     guarded: bool = False,
     plain: bool = False,
 ) -> Program:
-    """Return the program that computes numbers: general within `sharing_programs`."""
+    """Return the program that evaluates `what`: with geometry as an input in `sharing_programs`."""
     like = ALIKE.get()
     specialised_names = _OF_ONE_MACHINE if like is True else BY_CASES
     if like is None or columns is not None or what in specialised_names:
@@ -144,11 +144,12 @@ def numeric_program(
 
 @contextmanager
 def sharing_programs(robot: RobotLike | None = None) -> Iterator[None]:
-    """Make the public functions fast for many machines of one topology, each used a few times.
+    """In this context, evaluate many machines of a topology by shared programs.
 
-    In this context they evaluate programs whose geometry is an input, so that nothing is built for
-    a machine that differs from `robot` in its numbers alone, nor, without a `robot`, for any whose
-    topology has been used before, in another process too. Results are the same but for rounding.
+    Within it the public functions evaluate programs whose geometry is an input, so that nothing is
+    built for a machine that differs from `robot` only in its numbers nor, without a `robot`, for a
+    machine whose topology has been used before, even in another process. Results are the same up to
+    rounding.
 
     Examples
     --------
@@ -170,13 +171,13 @@ def sharing_programs(robot: RobotLike | None = None) -> Iterator[None]:
 
 
 def layout_of(robot: RobotLike) -> Manipulator:
-    """Return the machine whose geometry programs have: itself, or that of `sharing_programs`."""
+    """Return the machine whose geometry programs contain: robot's, or `sharing_programs`'."""
     like = ALIKE.get()
     return like if isinstance(like, Manipulator) else geometry_only(robot)
 
 
 def specialise_program(given: Program, values: dict[str, NDArray[np.float64]]) -> Program:
-    """Return a plain program with numbers in place of some of its inputs, after the pass."""
+    """Return a program with some inputs replaced by numbers, optimised."""
     symbols = given.function.sx_in()
     folded = [
         ca.SX(ca.DM(values[port.name])) if port.name in values else symbol
@@ -190,17 +191,17 @@ def specialise_program(given: Program, values: dict[str, NDArray[np.float64]]) -
 
 
 def geometry_only(robot: RobotLike) -> Manipulator:
-    """Return the machine with unit inertia and no drives: those of one geometry share programs."""
+    """Return the machine with unit inertia and no drives: equal for machines of one geometry."""
     return _cached_geometry_only(as_manipulator(robot))
 
 
 @lru_cache(maxsize=256)
 def _cached_geometry_only(robot: Manipulator) -> Manipulator:
-    """Return the machine with trivial masses, and without drives, readings, tools or name."""
+    """Return the machine with unit inertia and no drives, readings, tools or name."""
     ones = ("m", "I", "Ixx", "Iyy", "Izz")
 
     def plain(body: Any) -> Any:
-        """Return a body with mass and moments of inertia 1, and all other values 0."""
+        """Return a body with unit mass and moments of inertia, other values zero."""
         return body.of_values([float(kind in ones) for kind in body.kinds])
 
     legs = tuple(
@@ -227,12 +228,12 @@ class _Form(NamedTuple):
 
 @lru_cache(maxsize=512)
 def _cached_program(robot: Manipulator, form: _Form, columns: Columns | None) -> Program:
-    """Return the program of a machine's function, cached in memory and on disk."""
+    """Return the program of a function of a machine, cached in memory and on disk."""
     return cached_program((robot, form, columns), partial(_build_program, robot, form, columns))
 
 
 def _build_program(robot: Manipulator, form: _Form, columns: Columns | None) -> Program:
-    """Return the program; of base parameters, the form that needs fewer operations."""
+    """Build the program of a function of a machine, in the form with fewest operations."""
     machine = Machine.numeric(robot)
     if columns is None:
         return _program(machine, form=form)
@@ -255,7 +256,7 @@ def _build_program(robot: Manipulator, form: _Form, columns: Columns | None) -> 
 
 
 def motion_program(robot: Manipulator, kind: DriveKind, general: bool = False) -> Program:
-    """Return the program of `equations.sticking.stick_slip_rates`.
+    """Return the program of stick-slip accelerations and rates, for this kind of drives.
 
     `kind` has the features of the drives. If `general`, geometry and gravity are an input too.
     """
@@ -265,7 +266,7 @@ def motion_program(robot: Manipulator, kind: DriveKind, general: bool = False) -
 
 
 def _motion(robot: Manipulator, kind: DriveKind, general: bool) -> Program:
-    """Return the program of the plant's motion under its actuators, of a machine or general."""
+    """Build the program of stick-slip accelerations and rates."""
     n = robot.joint_count
     names = [*(("side", "hold") if kind.dry else ()), *(name for name, _ in kind.extra_states)]
     extra = {name: ca.SX.sym(name, n) for name in names}
@@ -281,7 +282,7 @@ def _motion(robot: Manipulator, kind: DriveKind, general: bool) -> Program:
 
 
 def general_program(robot: RobotLike, what: str) -> Program:
-    """Return the function `what` of a machine's topology: its first input is `geometry`.
+    """Return the program of the function `what` of a topology, with `geometry` its first input.
 
     The vector's order is that of `equations.machine.numbers`.
     """
@@ -289,19 +290,19 @@ def general_program(robot: RobotLike, what: str) -> Program:
 
 
 def _general(robot: Manipulator, form: _Form) -> Program:
-    """Return the program of a topology; of the machine itself for `_OF_ONE_MACHINE`."""
+    """Return the program of a topology's function, or the machine's own for some functions."""
     layout = robot if form.what in _OF_ONE_MACHINE else topology_of(robot)
     return _cached_general(layout, form)
 
 
 @lru_cache(maxsize=256)
 def _cached_general(layout: Manipulator, form: _Form) -> Program:
-    """Return the program of a topology, cached in memory and on disk."""
+    """Return the program of a topology's function, cached in memory and on disk."""
     return cached_program(("general", layout, form), partial(_build_general, layout, form))
 
 
 def _build_general(layout: Manipulator, form: _Form) -> Program:
-    """Return the program of a topology, or of a machine if its numbers decide between cases.
+    """Build the program of a topology's function.
 
     The form is plain: exact arithmetic evaluates the equations as they are written.
     """
@@ -322,10 +323,11 @@ def _program(
     *,
     form: _Form,
 ) -> Program:
-    """Return a function of the table; `constants` stand for inputs, `extra` are more inputs.
+    """Build the program of a function of the table, from a machine's equations.
 
-    `vectors` are the machine's numbers, as symbols: those that the results depend on, and the
-    geometry, become inputs.
+    `vectors` are the machine's numbers as symbols: those that the results depend on, and the
+    geometry, become inputs. `constants` replace inputs of the table, and `extra` are further
+    inputs.
     """
     what, definition = form.what, TABLE[form.what]
     symbols = _input_symbols(machine, form, constants or {}, extra or {})
@@ -369,7 +371,7 @@ def _program(
 def _input_symbols(
     machine: Machine, form: _Form, constants: dict[str, Any], extra: dict[str, Expression]
 ) -> dict[str, Expression]:
-    """Return the inputs of a function as symbols by name, shared ones last."""
+    """Return the inputs of a function as symbols by name, shared inputs last."""
     names = [name for name in TABLE[form.what].inputs if name not in constants]
     names += ["wrench"] if form.wrench else []
     selected = constants.get("selection", ca.SX.eye(0)).shape[1]
@@ -389,12 +391,12 @@ def _input_symbols(
 
 
 def _shared_last(name: str) -> int:
-    """Return the sort key of an input: -1 for a state's, else its position in `_SHARED`."""
+    """Return a sort key of an input name: -1 if it varies by state, else its shared position."""
     return _SHARED.index(name) if name in _SHARED else -1
 
 
 def _with_shape(unshaped: Output) -> tuple[Expression, tuple[int, ...]]:
-    """Return an output's expression and its shape; parts are stacked one below another."""
+    """Return an output as one expression, parts stacked, and its array shape."""
     if isinstance(unshaped, tuple):
         return unshaped
     if isinstance(unshaped, list):
@@ -407,7 +409,7 @@ def _statuses(
 ) -> list[Expression]:
     """Return candidate expressions of the validity flag (1 valid, 0 invalid or NaN).
 
-    The one that shares most subexpressions with the results is the cheapest.
+    The candidate that shares most subexpressions with the results is the cheapest.
     """
     states = [symbol for name, symbol in symbols.items() if name not in _SHARED]
     sums = [

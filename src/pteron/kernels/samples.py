@@ -42,7 +42,7 @@ class Evaluated:
     def __call__(
         self, inputs_by_name: Mapping[str, Array], arrays: Mapping[str, Array]
     ) -> dict[str, Array]:
-        """Return the outputs (B, size) of inputs (B, size); the machine's numbers are `arrays`."""
+        """Return the program's outputs (B, size) by name, at inputs (B, size) by name."""
         batch = len(next(iter(inputs_by_name.values())))
         ports = self.program.inputs
         columns = [
@@ -74,7 +74,7 @@ class Plant:
         self.split = kind.parts
 
     def _evaluate(self, state: dict[str, Array], arrays: Mapping[str, Array]) -> dict[str, Array]:
-        """Return the motion of a state, including the friction that holds sticking joints."""
+        """Return accelerations and rates of a state; sticking joints are held by friction."""
         motion = self._program(state, arrays)
         stuck = {name: motion.pop(name) for name in STUCK if name in motion}
         if stuck:
@@ -86,7 +86,7 @@ class Plant:
     def begin(
         self, state: dict[str, Array], arrays: Mapping[str, Array], side: Array, step: float
     ) -> dict[str, Array]:
-        """Return the motion of a state; find the sliding sides and write them into `state`."""
+        """Return accelerations and rates of a state, and write the sliding sides into `state`."""
         state["pace"] = np.full((len(side), 1), 1.0 / step)
         if not self._dry:
             return self._evaluate(state, arrays)
@@ -125,7 +125,10 @@ class Plant:
         arrays: Mapping[str, Array],
         alive: Array,
     ) -> None:
-        """Advance states by Runge-Kutta steps; a machine whose motion is invalid stays."""
+        """Advance the states by Runge-Kutta steps of `step` s.
+
+        Machines whose motion is invalid are not advanced.
+        """
         y, side, clock = (arrays[name][:, 0] for name in ("state", "side", "clock"))
         m = self.split(y)["pose"].shape[1]
         for _ in range(steps):
@@ -170,7 +173,7 @@ def run_samples(
     counts: Sequence[int],
     ask: Ask | None,
 ) -> None:
-    """Run some samples of machines; see `LoopCode.run`."""
+    """Simulate a number of samples of machines, in place in `arrays`; see `LoopCode.run`."""
     numbers: dict[str, Any] = {name: array[:, 0] for name, array in arrays.items()}
     y, side, memory, fault, done, seen = (
         numbers[name] for name in ("state", "side", "memory", "fault", "done", "seen")
@@ -220,14 +223,14 @@ def run_samples(
 
 
 def _row(arrays: Mapping[str, Array], name: str, s: int) -> Array:
-    """Return the rows (B, size) of an array (B or 1, T or 1, size) at sample s."""
+    """Return the rows (B, size) of the array `name`, (B or 1, T or 1, size), at sample s."""
     array = arrays[name]
     row: Array = array[:, s if array.shape[1] > 1 else 0]
     return np.broadcast_to(row, (len(arrays["state"]), array.shape[2]))
 
 
 def _delay(line: Array, reported: Array, number: int, behind: int) -> Array:
-    """Put readings (B, E) into a delay line and return those of `behind` samples before."""
+    """Put readings (B, E) into a delay line; return those of `behind` samples before."""
     line[:, number % (behind + 1) if number else slice(None)] = (
         reported if number else reported[:, None]
     )
@@ -242,7 +245,7 @@ def _commands(
     number: int,
     measured: Sequence[Array],
 ) -> Array:
-    """Return the controller's forces (B, n), NaN where its law is not valid; update its memory."""
+    """Return the controller's forces (B, n), NaN where invalid, and update its memory."""
     if law is not None:
         desired = np.split(_row(arrays, "reference", s), 3, axis=1)
         inputs = dict(zip(("pose", "velocity", "acceleration"), desired, strict=True))
@@ -262,7 +265,7 @@ def _commands(
 def _acceleration(
     plant: Plant, state: dict[str, Array], arrays: Mapping[str, Array], side: Array, step: float
 ) -> Array:
-    """Return the acceleration (B, m) of a state, NaN where it is not valid, 0 at rest."""
+    """Return platform accelerations (B, m) of a state, NaN where invalid, 0 at rest."""
     motion = plant.begin(state, arrays, side, step)
     acceleration = np.where(motion["status"] != 0.0, motion["acceleration"], np.nan)
     if "side" in state and "motor" not in state:
@@ -278,9 +281,9 @@ def _encoder_readings(
     s: int,
     period: float,
 ) -> Array:
-    """Return the encoders' coordinates and rates (B, 2 E), and update their state `encoders`.
+    """Return encoder positions and rates (B, 2 E), and update the encoders' memory.
 
-    Where a transmission bends, motors have encoders too, after those of all joints.
+    With elastic transmissions, motors have encoders too, after those of all joints.
     """
     exact = [motion["joints"], motion["rates"]]
     if "motor" in state:
@@ -305,7 +308,7 @@ def _encoder_readings(
 
 
 def _controller_readings(reported: Array, at_motor: Array) -> tuple[Array, ...]:
-    """Return `READINGS`, (B, n) each, from the encoders' coordinates and rates."""
+    """Return positions and rates of joints and motors, (B, n) each, from encoder readings."""
     n = at_motor.shape[1] // 2
     parts = np.split(reported, reported.shape[1] // n, axis=1)
     if len(parts) == len(READINGS[:2]):

@@ -34,7 +34,7 @@ _COSINE = (
 
 @lru_cache(maxsize=1)
 def reduced_sincos() -> ca.Function:
-    """Return the function from an angle up to `LIMIT` to its sine and cosine."""
+    """Return the CasADi function of an angle, rad, up to `LIMIT`: its sine and cosine."""
     x = ca.SX.sym("angle")
     # r + low = x - q pi/2, where low is what r has no bits for. (Differences throughout: CasADi
     # takes a + b - a for b.)

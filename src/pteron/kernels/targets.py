@@ -71,14 +71,14 @@ class Selects(Protocol):
 
     @property
     def robot(self) -> Manipulator:
-        """The machine they belong to."""
+        """The machine that the base parameters belong to."""
 
     @property
     def selection(self) -> Array:
-        """(N, rank): base regressor = regressor @ selection."""
+        """The 0/1 matrix (N, rank) with base regressor = regressor @ selection."""
 
     def values(self, robot: Manipulator | None = None) -> Array:
-        """Return the base parameters' values."""
+        """Return the values of the base parameters (rank,), SI units."""
 
 
 def compile(
@@ -93,7 +93,7 @@ def compile(
     threads: int = 1,
     fast: bool = False,
 ) -> Kernel:
-    """Compile one of the numeric functions for a machine.
+    """Return a kernel: a numeric function of a machine compiled for a target.
 
     Parameters
     ----------
@@ -185,7 +185,7 @@ OTHER_LAYOUT = (
 
 
 def columns_of(base: Selects) -> Columns:
-    """Return, for each base parameter, the inertial parameters whose columns it adds up."""
+    """Return, for each base parameter, the indices of the inertial parameters it adds up."""
     return tuple(tuple(np.flatnonzero(column).tolist()) for column in base.selection.T)
 
 
@@ -202,7 +202,7 @@ def _cached_kernel(
     threads: int,
     fast: bool,
 ) -> Kernel:
-    """Return the kernel of a target, cached, with the machine's numbers as fixed inputs."""
+    """Return the kernel of a function for a target, cached, its parameters fixed inputs."""
     folded = grade == "specialised"
     built = program(robot, what, columns, wrench=wrench, plain=folded)
     fixed: dict[str, Array] = {}
@@ -241,7 +241,7 @@ def _cached_kernel(
 def _instantiate_kernel(
     kind: type[Kernel], built: Program, fixed: dict[str, Array], dtype: str, threads: int
 ) -> Kernel:
-    """Return a kernel of a program, whose inputs are reordered: fixed ones come last."""
+    """Return a kernel of class `kind` for a program, with fixed inputs moved to the end."""
     # Fixed inputs come last, so that a call may append them to what it is given.
     order = sorted(range(len(built.inputs)), key=lambda k: built.inputs[k].name in fixed)
     if order != sorted(order):
@@ -252,7 +252,7 @@ def _instantiate_kernel(
 
 
 def same_layout(one: RobotLike, other: RobotLike) -> bool:
-    """Return whether two machines have the same base parameters: layout and gravity are equal."""
+    """Return whether two machines have equal layout and gravity, hence equal base parameters."""
     return _layout(as_manipulator(one)) == _layout(as_manipulator(other))
 
 

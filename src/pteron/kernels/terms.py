@@ -37,7 +37,7 @@ class TermGraph:
         self._orders: dict[tuple[int, ...], list[int]] = {}
 
     def add(self, *node: Any) -> int:
-        """Return the number of a node, added if it is new."""
+        """Return the number of a node (kind, operands), added unless an equal node exists."""
         number = self.numbers.get(node)
         if number is None:
             number = self.numbers[node] = len(self.nodes)
@@ -50,21 +50,24 @@ class TermGraph:
         return number
 
     def replace(self, k: int, *node: Any) -> None:
-        """Replace node k, in place, by a node of the same value and kind."""
+        """Replace node k, in place, by a node of equal value."""
         self.nodes[k], self.operands[k] = node, node[1:]
         self._orders.clear()
 
     def constant(self, c: float) -> int:
-        """Return the value of a number."""
+        """Return the signed node number of a constant."""
         return -self.add("constant", -c) if c < 0 else self.add("constant", c)
 
     def constant_of(self, operand: int) -> float | None:
-        """Return the number that a value is, None where it depends on inputs or is not finite."""
+        """Return the constant that a signed node is.
+
+        The result is None if the node depends on inputs or is not finite.
+        """
         c = self._constants.get(abs(operand))
         return c if c is None or operand > 0 else -c
 
     def sum(self, operands: Iterable[int]) -> int:
-        """Return the value of a sum."""
+        """Return the signed node number of a sum of signed nodes."""
         terms = list(operands)
         sizes = set(map(abs, terms))
         if len(sizes) < len(terms) or not self._constants.keys().isdisjoint(sizes):
@@ -77,7 +80,7 @@ class TermGraph:
         return -self.add("sum", *[-term for term in terms])
 
     def _collect_terms(self, operands: list[int]) -> list[int]:
-        """Return a sum's terms with like terms and constants collected."""
+        """Return a sum's signed terms with like terms and constants collected."""
         constant = 0.0
         counts: dict[int, int] = {}
         for operand in operands:
@@ -98,7 +101,7 @@ class TermGraph:
         return terms
 
     def product(self, operands: Iterable[int]) -> int:
-        """Return the value of a product."""
+        """Return the signed node number of a product of signed nodes."""
         operand_list = list(operands)
         factors = sorted(map(abs, operand_list))
         turned = sum([operand < 0 for operand in operand_list]) % 2
@@ -118,21 +121,21 @@ class TermGraph:
         return -number if turned else number
 
     def quotient(self, a: int, b: int) -> int:
-        """Return the value of a/b; 1/b becomes an operation that others may use."""
+        """Return the signed node number of the quotient a / b."""
         c = self.constant_of(a)
         if c is not None and abs(c) == 1.0:
             return self.reciprocal(b) * int(c)
         return self.product([a, self.inverse(b)])
 
     def reciprocal(self, operand: int) -> int:
-        """Return the value of 1/x as a separate operation."""
+        """Return the signed node number of 1/x as an operation that others may share."""
         c = self.constant_of(operand)
         return (
             self.constant(1.0 / c) if c else sign_of(operand) * self.add("reciprocal", abs(operand))
         )
 
     def inverse(self, operand: int) -> int:
-        """Return 1/x as a factor: the reciprocal if the graph has it, else a division."""
+        """Return the signed node number of 1/x as a factor: shared if the graph has it."""
         c = self.constant_of(operand)
         if c:
             return self.constant(1.0 / c)
@@ -140,11 +143,11 @@ class TermGraph:
         return sign_of(operand) * (there or self.add("inverse", abs(operand)))
 
     def is_kind(self, kind: str, operand: int) -> bool:
-        """Return whether a value is a sum, a product, ..., or the negative of one."""
+        """Return whether a signed node is of this kind: "sum", "product" and so on."""
         return self.kinds[abs(operand)] == kind
 
     def order(self, roots: Iterable[int]) -> list[int]:
-        """Return the nodes that the roots depend on, operands first."""
+        """Return the numbers of the nodes that the roots depend on, operands first."""
         start = tuple(map(abs, roots))
         if start in self._orders:
             return self._orders[start]
@@ -165,13 +168,13 @@ class TermGraph:
         return ordered
 
     def uses(self, roots: Iterable[int]) -> Counter[int]:
-        """Return the number of times that each node is an operand or a root."""
+        """Return how often each node is used, as an operand or a root."""
         roots = list(roots)
         operands = chain.from_iterable([self.operands[k] for k in self.order(roots)])
         return Counter(map(abs, chain(roots, operands)))
 
     def rebuild(self, roots: Iterable[int], rule: Rule) -> tuple[TermGraph, list[int]]:
-        """Return the graph that a rule builds from this, node by node, and its roots' values."""
+        """Return the graph that `rule` builds node by node from this one, and the new roots."""
         new = TermGraph()
         new_values: dict[int, int] = {}
         for k in self.order(roots):
@@ -180,7 +183,7 @@ class TermGraph:
         return new, [new_values[v] for v in roots]
 
     def copy_node(self, new: TermGraph, k: int, operands: list[int]) -> int:
-        """Return the copy of a node in a new graph, with new operands (the identity rule)."""
+        """Return the signed number of node k copied into the graph `new` with these operands."""
         kind = self.kinds[k]
         if kind in ("sum", "product"):
             return new.sum(operands) if kind == "sum" else new.product(operands)
@@ -190,5 +193,5 @@ class TermGraph:
 
 
 def sign_of(value: float) -> int:
-    """Return 1 or -1."""
+    """Return 1 for a positive number, else -1."""
     return 1 if value > 0 else -1

@@ -25,11 +25,11 @@ _BINARY = ca.SX.binary
 
 
 def to_term_graph(function: ca.Function) -> tuple[TermGraph, list[int]]:
-    """Return a function's graph, and the nodes of its outputs' elements in one list."""
+    """Return a CasADi function as a term graph, with the signed nodes of its output elements."""
     graph, operations = TermGraph(), graph_of(function)
 
     def rule(node: Node, operands: list[int]) -> int:
-        """Return the term graph's node for a CasADi node from its operands' nodes."""
+        """Return the term graph's signed node for a node of the operation graph."""
         if node.operation == CONSTANT:
             return graph.constant(node.value)
         if node.operation in _ARITHMETIC:
@@ -94,7 +94,7 @@ def to_function(graph: TermGraph, roots: list[int], function: ca.Function) -> ca
 
 
 def _sign_balances(graph: TermGraph, order: list[int], roots: list[int]) -> list[int]:
-    """Return for each node the uses of its value minus those of its negative."""
+    """Return for each node the number of uses of its value minus those of its negative."""
     balance = [0] * len(graph.nodes)
     for v in roots:
         balance[abs(v)] += sign_of(v)
@@ -115,7 +115,7 @@ def _sign_balances(graph: TermGraph, order: list[int], roots: list[int]) -> list
 
 
 def _sum(terms: list[tuple[Any, int]], balance: int) -> tuple[Any, int]:
-    """Return a sum of signed terms or its negative, by the number of negations, and the sign."""
+    """Return a sum of (expression, sign) terms, or its negative if cheaper, with the sign."""
     positive = sum(sign > 0 for _, sign in terms)
     turn = -1 if positive == 0 or (balance < 0 and positive < len(terms)) else 1
     first, *others = sorted(terms, key=lambda term_and_sign: -turn * term_and_sign[1])
@@ -128,7 +128,7 @@ def _sum(terms: list[tuple[Any, int]], balance: int) -> tuple[Any, int]:
 def _product(
     above: list[tuple[Any, int]], below: list[tuple[Any, int]], balance: int
 ) -> tuple[Any, int]:
-    """Return a quotient of signed factors, and its sign."""
+    """Return the product of `above` over that of `below`, (expression, sign) each, and sign."""
     # CasADi turns a product with 1/x into a quotient, which is slower, but leaves -1/x alone.
     unit = 1 if balance > 0 else -1
     (total, sign), *others = above or [(unit, unit)]

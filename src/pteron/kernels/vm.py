@@ -83,7 +83,7 @@ class BatchInterpreter:
         ]
 
     def run(self, batch: int, inputs: Sequence[Array], outputs: Sequence[Array]) -> None:
-        """Fill the first rows of `outputs` by those of `inputs`, see `ArrayKernel`."""
+        """Fill the first `batch` rows of `outputs` from those of `inputs`."""
         with np.errstate(all="ignore"):
             for i, j, place in self._inputs:
                 if not place.ndim:
@@ -102,10 +102,10 @@ class BatchInterpreter:
 
 
 def _places(graph: Graph) -> dict[int, Array]:
-    """Return the storage of each node on which the outputs depend.
+    """Return the storage array of each graph node that the outputs depend on, rows reused.
 
-    A shared value has its own scalar, others a row, which is reused after its last use; rows of
-    inputs are not reused before.
+    A shared value has a scalar of its own, others a row, which is reused after its last use; rows
+    of inputs are not reused before the end.
     """
     count = len(graph.nodes)
     last = {k: count for nodes in graph.outputs for k in nodes}
@@ -134,7 +134,7 @@ def _places(graph: Graph) -> dict[int, Array]:
 
 
 def _casadi_operation(node: Node, shape: tuple[int, ...]) -> Callable[..., None]:
-    """Return an operation that CasADi evaluates element by element."""
+    """Return a function that evaluates a graph node element by element by CasADi."""
     symbols = [ca.SX.sym("value") for _ in node.arguments]
     scalar_function = ca.Function("one", symbols, [expression(node, symbols)])
     buffer, evaluate = scalar_function.map(int(np.prod(shape))).buffer()
@@ -145,7 +145,7 @@ def _casadi_operation(node: Node, shape: tuple[int, ...]) -> Callable[..., None]
     lowered = node.operation in ("sin", "cos")
 
     def operation(*arrays: Array) -> None:
-        """Fill the last array with the operation of the others; within LIMIT skip sines."""
+        """Fill the last array with the node's operation on the others."""
         *arguments, out = arrays
         if lowered and np.abs(arguments[0]).max() <= LIMIT:
             return
@@ -172,7 +172,7 @@ class VirtualMachine(ArrayKernel):
 
     @cached_property
     def _lowered_function(self) -> ca.Function:
-        """The function in plain arithmetic."""
+        """The kernel's function with sines, cosines and exponentials in plain arithmetic."""
         return _lower(self.function)
 
     @cached_property
@@ -203,7 +203,7 @@ class VirtualMachine(ArrayKernel):
         return copies[0] if len(copies) == 1 else copies
 
     def _run(self, batch: int, inputs: Sequence[Array], outputs: Sequence[Array]) -> None:
-        """Fill `outputs`: batches by the interpreter, what remains by functions of few states."""
+        """Fill `outputs` for a batch of states: most by the interpreter, the rest by CasADi."""
         shared = tuple(i for i, port in enumerate(self.ports) if port.shared)
         function = self._lowered_function
         remainder = batch % LENGTH
@@ -242,7 +242,7 @@ class OneState:
 
 @lru_cache(maxsize=256)
 def _lower(function: ca.Function) -> ca.Function:
-    """Return a function in plain arithmetic, from disk if it is there: rewriting takes 10 ms."""
+    """Return a CasADi function rewritten in plain arithmetic, cached on disk."""
 
     def rewrite() -> str:
         """Return the function as serialised text, rewritten in plain arithmetic."""
@@ -253,7 +253,7 @@ def _lower(function: ca.Function) -> ca.Function:
 
 
 def _with_lowered_sines(function: ca.Function) -> ca.Function:
-    """Return the function with the sines and cosines of `sincos`."""
+    """Return a CasADi function with its sines and cosines replaced by plain arithmetic."""
     rules = {"sin": partial(_sine_or_cosine, 0, ca.sin), "cos": partial(_sine_or_cosine, 1, ca.cos)}
     return rewrite_operations(function, rules)
 
@@ -261,13 +261,13 @@ def _with_lowered_sines(function: ca.Function) -> ca.Function:
 def _sine_or_cosine(
     place: int, exact: Callable[[Expression], Expression], angle: Expression
 ) -> Expression:
-    """Return the sine (place 0) or cosine (1) of `sincos`, within its limit of the angle."""
+    """Return sin (place 0) or cos (1) of an angle, rad: plain arithmetic within `LIMIT`."""
     return ca.if_else(ca.fabs(angle) <= LIMIT, reduced_sincos()(angle)[place], exact(angle))
 
 
 @lru_cache(maxsize=512)
 def _map_states(function: ca.Function, shared: tuple[int, ...], size: int) -> ca.Function:
-    """Return a function of `size` states side by side, cached."""
+    """Return the CasADi function that evaluates `size` states side by side, cached."""
     return function.map(f"{function.name()}_block", "serial", size, list(shared), [])
 
 
@@ -278,7 +278,7 @@ def _evaluate_calls(
     starts: range,
     step: int,
 ) -> None:
-    """Call a mapped function at each start, with its inputs and outputs as views of the arrays."""
+    """Call a mapped CasADi function from each start row on, reading and writing array views."""
     buffer, evaluate = function.buffer()
     for i, array in enumerate(inputs):
         if array.ndim == 1:

@@ -90,7 +90,7 @@ class Architecture(Result):
 
 
 def architecture(robot: RobotLike) -> Architecture:
-    """Return whether a layout is singular everywhere, with the reason and how that is known.
+    """Return whether a machine is singular at every pose, with the reason and the proof.
 
     Parameters
     ----------
@@ -142,7 +142,7 @@ def _architecture(robot: Manipulator) -> Architecture:
 
 
 def is_singular_everywhere(robot: RobotLike) -> bool:
-    """Return whether det J vanishes at every pose; `architecture` has the reason.
+    """Return whether det J of a machine vanishes at every pose; `architecture` has the reason.
 
     Examples are layouts where the rows of all legs lie in a plane, and P-R-R-R layouts with
     fourfold symmetry about k.
@@ -189,7 +189,7 @@ def _is_singular_everywhere(robot: Manipulator) -> bool:
 
 @lru_cache(maxsize=64)
 def _poses(robot: Manipulator) -> Array:
-    """Return some poses in reach, singular (type II) or not; an empty array if none is found."""
+    """Return random poses (K, m) in reach, singular (type II) or not; (0, m) if none is found."""
     try:
         # Limits, most of all those of short rams, leave few poses of a platform that tilts.
         limits, rng = not joints_limit_reach(robot), np.random.default_rng(0)
@@ -199,7 +199,7 @@ def _poses(robot: Manipulator) -> Array:
 
 
 def _vanishes_exactly(robot: Manipulator) -> bool:
-    """Return whether the type-II measure is zero at random states modulo primes."""
+    """Return whether the type-II measure is exactly zero at random states, modulo primes."""
     measure = general_program(robot, "type_ii").function
     rng = random.Random(0)
     for prime in _PRIMES:
@@ -226,7 +226,7 @@ def _vanishes_exactly(robot: Manipulator) -> bool:
 
 
 def _reason(robot: Manipulator) -> str:
-    """Return why a layout is singular everywhere: the simplest cause that holds in all poses."""
+    """Return as text why a machine is singular at every pose: the simplest cause that holds."""
     poses = _poses(robot)
     if not len(poses):
         poses = np.zeros((1, robot.freedom))
@@ -265,13 +265,13 @@ def _reason(robot: Manipulator) -> str:
 
 
 def _points_are_in_line(robot: Manipulator) -> bool:
-    """Return whether the platform turns about an axis through all its points, up to rounding."""
+    """Return whether the platform can turn about a line that has all its points."""
     points = np.array([leg.platform_point for leg in robot.legs])
     return bool(robot.wraps.any()) and robot.platform.has_points_in_line(points)
 
 
 def _always_free(rows: Array) -> Array | None:
-    """Return the direction (m,) that rows (K, n, m) are perpendicular to at all poses, if any."""
+    """Return the unit direction (m,) perpendicular to all rows (K, n, m), or None."""
     sizes = np.linalg.norm(rows, axis=-1, keepdims=True)
     stacked = (rows / np.where(sizes > 0.0, sizes, 1.0)).reshape(-1, rows.shape[-1])
     _, sigmas, axes = np.linalg.svd(stacked)
@@ -282,19 +282,19 @@ def _always_free(rows: Array) -> Array | None:
 
 
 def _round_components(axis: Array) -> list[float]:
-    """Return an axis rounded to three decimals, without negative zeros."""
+    """Return an axis (3,) rounded to three decimals, without negative zeros."""
     return [round(float(v), 3) + 0.0 for v in axis]
 
 
 def _dependent_legs(rows: Array) -> list[int]:
-    """Return the legs, from 1, whose rows (K, n, m) depend on each other at all poses."""
+    """Return the legs, from 1, whose Jacobian rows (K, n, m) are dependent at all poses."""
     _, _, axes = np.linalg.svd(np.swapaxes(rows, -1, -2))
     weights = np.abs(axes[:, -1, :]).max(axis=0)
     return [i for i, weight in enumerate(weights, start=1) if weight > 1e-8]
 
 
 def _has_fourfold_symmetry(robot: Manipulator, bars: Array) -> bool:
-    """Return whether a quarter turn about k maps each leg's row (n, 3) and point to another's."""
+    """Return whether a quarter turn about k permutes the legs' row directions and points."""
     x0, y0, k = (np.array(axis) for axis in robot.platform.frame)
     quarter = np.outer(y0, x0) - np.outer(x0, y0) + np.outer(k, k)
     points = np.array([leg.platform_point[:2] for leg in robot.legs])
@@ -309,7 +309,7 @@ def _has_fourfold_symmetry(robot: Manipulator, bars: Array) -> bool:
 
 
 def singular_everywhere(robot: Manipulator, index: tuple[int, ...] = ()) -> SingularPose:
-    """Return the error for a machine that is singular at every pose."""
+    """Return the error that says why a machine is singular at every pose."""
     return SingularPose(
         f"singular at every pose (type II): {architecture(robot).reason}; with the actuators held "
         "still the platform can move; change what the Jacobian depends on, a leg's "

@@ -70,9 +70,9 @@ poses, and above rounding. It separates modes to some 1e-7 of the size."""
 
 
 def every_pose(robot: Manipulator, joints: Array, most: int) -> Array:
-    """Return all poses (..., most, m) of joint coordinates (..., n), NaN last.
+    """Return all platform poses (..., most, m) with joint coordinates (..., n), padded with NaN.
 
-    They are ordered by phi, z, y and x: the coordinates from the last to the first.
+    Poses are sorted by phi, z, y and x: the coordinates from the last to the first.
     """
     shape = joints.shape[:-1]
     flat = joints.reshape(-1, joints.shape[-1])
@@ -98,7 +98,7 @@ def every_pose(robot: Manipulator, joints: Array, most: int) -> Array:
 
 
 def _poses(robot: Manipulator, joints: Array, most: int) -> Array:
-    """Return the poses (B, most, m) of joints (B, n), sorted; NaN where there are fewer."""
+    """Return the poses (B, most, m) with joint coordinates (B, n), sorted, padded with NaN."""
     slides = robot.platform.slides
     zeroth, first, second, origin, size, _ = numeric(robot, "closure_rows")(joints)
     rows = np.stack([zeroth, first, second], axis=-1)
@@ -118,9 +118,9 @@ def _poses(robot: Manipulator, joints: Array, most: int) -> Array:
 def _orthonormal_rows(rows: Array) -> Array:
     """Return orthonormal rows (B, n, d + 2, 3) with the same span at each phi.
 
-    0 where they are linearly dependent, so that the platform can move with the joints held. Two
-    spheres with equal motion may nearly coincide, as where two rods of a Par4's side are parallel:
-    their well-scaled difference determines where they meet.
+    Rows are 0 where they are linearly dependent, so that the platform can move with the joints
+    held. Two spheres with equal motion may nearly coincide, as where two rods of a Par4's side are
+    parallel: their well-scaled difference then determines where they meet.
     """
     q, r = np.linalg.qr(rows.reshape(*rows.shape[:2], -1).swapaxes(-1, -2))
     is_independent = np.abs(np.diagonal(r, axis1=-2, axis2=-1)).min(axis=-1) > _COINCIDING
@@ -129,9 +129,9 @@ def _orthonormal_rows(rows: Array) -> Array:
 
 
 def _angles(rows: Array, slides: bool) -> tuple[NDArray[np.int64], Array]:
-    """Return the zeros of det G: the state (K,) and phi (K,), the real part of nearly real ones.
+    """Return the angles phi (K,) at which det G vanishes, and the state's index of each (K,).
 
-    `rows` (B, n, d + 2, 3) are those of 1, f_1 and f_2.
+    `rows` (B, n, d + 2, 3) are the coefficients of 1, f_1 and f_2 in the closure rows.
     """
     form = _form(rows, slides)
     n = rows.shape[1]
@@ -154,10 +154,10 @@ def _angles(rows: Array, slides: bool) -> tuple[NDArray[np.int64], Array]:
 
 
 def _form(rows: Array, slides: bool) -> Array:
-    """Return the parts (B, n, n, 3) of c^2, c s and s^2 in G, with c = cos(alpha), s = sin(alpha).
+    """Return the coefficients (B, n, n, 3) of c^2, c s, s^2 in the matrix G of angle alpha.
 
-    phi = 2 alpha where the platform turns; where it slides phi = `_SPAN` s / c, and G is taken c^2
-    times.
+    phi = 2 alpha for a platform that turns; for one that slides phi = `_SPAN` s / c, and the form
+    is that of c^2 G.
     """
     low = _gram(_rows_at(rows, 0.0, slides))
     if slides:
@@ -170,21 +170,21 @@ def _form(rows: Array, slides: bool) -> Array:
 
 
 def _form_at(form: Array, alpha: Array) -> Array:
-    """Return G (..., n, n) at alpha, rad, from its parts of `_form`."""
+    """Return the matrix G (..., n, n) at angles alpha (...), rad, from its coefficients."""
     c, s = np.cos(alpha)[..., None, None], np.sin(alpha)[..., None, None]
     total: Array = form[..., 0] * (c * c) + form[..., 1] * (c * s) + form[..., 2] * (s * s)
     return total
 
 
 def _rows_at(rows: Array, phi: Array | float, slides: bool) -> Array:
-    """Return the rows (..., n, d + 2) at phi from their parts in phi, or in cos and sin."""
+    """Return closure rows (..., n, d + 2) at phi from their coefficients (..., 3)."""
     first, second = (phi, phi**2) if slides else (np.cos(phi), np.sin(phi))
     first, second = (np.asarray(f)[..., None, None] for f in (first, second))
     return rows[..., 0] + first * rows[..., 1] + second * rows[..., 2]
 
 
 def _gram(s: Array) -> Array:
-    """Return the products <s, s'> of rows (..., n, d + 2)."""
+    """Return the matrix (..., n, n) of inner products <s, s'> of rows s (..., n, d + 2)."""
     w, m, h = s[..., 0], s[..., 1:-1], s[..., -1]
     crossed = w[..., :, None] * h[..., None, :]
     return m @ np.swapaxes(m, -1, -2) - 2.0 * (crossed + np.swapaxes(crossed, -1, -2))
@@ -193,9 +193,9 @@ def _gram(s: Array) -> Array:
 def _points(
     rows: Array, which: NDArray[np.int64], phi: Array
 ) -> tuple[NDArray[np.int64], Array, Array]:
-    """Return the points v (L, d) that the line of the two smallest singular values holds.
+    """Return points (L, d) on the line of the two smallest singular vectors, with state, phi.
 
-    `rows` (K, n, d + 2) are those at phi (K,).
+    `rows` (K, n, d + 2) are the closure rows at phi (K,).
     """
     _, _, vectors = np.linalg.svd(rows)
     first, second = vectors[:, -1], vectors[:, -2]
@@ -215,7 +215,7 @@ def _points(
 
 
 def _quadric(x: Array, y: Array) -> Array:
-    """Return 0.5 (x_0 y_last + x_last y_0) - v . w (K,) of rows (x_0, v, x_last), (K, d + 2)."""
+    """Return the quadratic form 0.5 (x_0 y_last + x_last y_0) - v . w (K,) of x, y (K, d + 2)."""
     inner = (x[:, 1:-1] * y[:, 1:-1]).sum(axis=-1)
     return np.asarray(0.5 * (x[:, 0] * y[:, -1] + x[:, -1] * y[:, 0]) - inner)
 
@@ -223,7 +223,7 @@ def _quadric(x: Array, y: Array) -> Array:
 def _refine_poses(
     robot: Manipulator, joints: Array, which: NDArray[np.int64], poses: Array
 ) -> tuple[NDArray[np.int64], Array, Array]:
-    """Return the converged poses of Newton's method, their states and their residuals."""
+    """Refine poses by Newton's method; return those converged: state index, pose, residual."""
     step = numeric(robot, "newton_step")
     converged, residuals = np.empty_like(poses), np.full(len(poses), _LARGEST_RESIDUAL)
     active = np.arange(len(poses))
@@ -247,7 +247,7 @@ def _are_duplicates(
     residuals: Array,
     size: Array,
 ) -> NDArray[np.bool_]:
-    """Return which poses (K, m) duplicate an earlier one of the same joints."""
+    """Return which poses (K, m) duplicate an earlier pose of the same joint coordinates."""
     count = np.arange(len(which)) - np.searchsorted(which, which)  # they come in order
     is_duplicate = np.zeros(len(which), dtype=bool)
     for back in range(1, int(count.max(initial=0)) + 1):
@@ -268,7 +268,7 @@ def _are_duplicates(
 
 
 def _table(poses: Array, which: NDArray[np.int64], most: int, states: int) -> Array:
-    """Return the poses of each state (B, k, m), k at least `most`, NaN after them."""
+    """Return poses (K, m) arranged by state (B, k, m), k >= `most`, padded with NaN."""
     counts = np.bincount(which, minlength=states)
     columns = np.arange(len(which)) - np.repeat(np.cumsum(counts) - counts, counts)
     table = np.full((states, counts.max(initial=most), poses.shape[-1]), np.nan)
@@ -277,13 +277,13 @@ def _table(poses: Array, which: NDArray[np.int64], most: int, states: int) -> Ar
 
 
 def sort_poses(poses: Array) -> Array:
-    """Return poses (..., k, m) ordered by their last coordinate, then by those before; NaN last."""
+    """Return poses (..., k, m) sorted by their last coordinate, then by those before; NaN last."""
     order = np.lexsort([_dense_ranks(poses[..., k]) for k in range(poses.shape[-1])])
     return np.take_along_axis(poses, order[..., None], axis=-2)
 
 
 def _dense_ranks(coordinates: Array) -> NDArray[np.int64]:
-    """Return dense ranks of coordinates (..., k); values equal up to rounding share one."""
+    """Return integer ranks of coordinates (..., k); values equal up to rounding share a rank."""
     order = np.argsort(coordinates, axis=-1)
     steps = ~(np.diff(np.take_along_axis(coordinates, order, axis=-1), axis=-1) <= ROUNDING)
     ranks = np.zeros(coordinates.shape, dtype=np.int64)

@@ -13,10 +13,10 @@ def constraint_measure(
 ) -> Numbers:
     """Return the constraint measure: 0 where the platform is free to turn about a forbidden axis.
 
-    Each leg exerts couples, whatever its joint does: a P-R-R-R leg across its revolute axes, a pair
-    of parallel rods about bar x rod. The measure is the volume that they span, each of length 1 or
-    less, over the largest. It depends on the pose where rods are parallel pairs; of legs with
-    revolute joints alone it is the same at every pose.
+    Each leg exerts constraint couples: a P-R-R-R leg perpendicular to its revolute axes, a pair of
+    parallel rods about bar x rod. The measure is the volume that the couples span, each of length 1
+    or less, divided by the largest possible volume. It depends on the pose for machines with pairs
+    of parallel rods; for legs with revolute joints alone it is constant.
 
     Parameters
     ----------

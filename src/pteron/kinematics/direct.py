@@ -31,12 +31,12 @@ def direct_kinematics(
     """Return every pose with the given joint coordinates: all assembly modes.
 
     With the joints held, legs keep points of the platform on planes (P-R-R-R), spheres (the ends of
-    rods) or circles (planar legs); the poses are where these meet. They are found in closed form,
-    but for platforms with an angle on legs with rods or planar legs: there as the zeros of a
-    polynomial whose degree is k, polished by Newton's method to 1e-14 or so. Those of platforms
-    that tilt lie at the ends of k paths from a machine whose poses are known: all of them, each
-    proved, or next to a singularity missed by rounding alone. Where they form a curve it is found,
-    and refused.
+    rods) or circles (planar legs); the poses are where these intersect. They are computed in closed
+    form, except for platforms with an angle on legs with rods or planar legs: there phi is a root
+    of a polynomial of degree k, refined by Newton's method to about 1e-14. The poses of platforms
+    that tilt are the ends of k paths from a machine whose poses are known: each is proved, and none
+    is missed except, by rounding, next to a singularity. If the poses form a curve (self-motion),
+    an error is raised.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def direct_kinematics(
 def assembly_mode(
     robot: RobotLike, pose: PoseLike, *, all_branches: bool = False
 ) -> NDArray[np.int64]:
-    """Return a pose's assembly mode: its index among the poses of its joint coordinates.
+    """Return a pose's assembly mode: its index among all poses with its joint coordinates.
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ def assembly_mode(
 
 
 def working_mode(robot: RobotLike, pose: PoseLike, joints: JointsLike) -> NDArray[np.int64]:
-    """Return the side of each leg's elbow, 1 or -1, at which a pose has joint coordinates.
+    """Return the sign of each leg's elbow, 1 or -1, with which a pose has joint coordinates.
 
     Parameters
     ----------
@@ -188,11 +188,11 @@ def working_mode(robot: RobotLike, pose: PoseLike, joints: JointsLike) -> NDArra
 
 
 def assembly_modes(robot: RobotLike, joints: Array, *, all_branches: bool = False) -> Poses:
-    """Return the pose (..., k, m) of joint coordinates (..., n) in each assembly mode.
+    """Return the pose (..., k, m) of joint coordinates (..., n) in each assembly mode; else NaN.
 
-    Where the poses have a closed form they are not sorted, unlike those of `direct_kinematics`:
-    along a motion each column is one mode, a side of the singularities. NaN where a mode has no
-    pose, or one of other elbows.
+    Poses in closed form are not sorted, unlike those of `direct_kinematics`: along a motion each
+    column is one mode, on one side of the singularities. NaN stands for a mode without a pose, or
+    with other elbows.
     """
     robot = as_manipulator(robot)
     closure = closure_of(robot)
@@ -211,19 +211,19 @@ def assembly_modes(robot: RobotLike, joints: Array, *, all_branches: bool = Fals
 
 
 def mode_of(robot: RobotLike, pose: tuple[float, ...]) -> int:
-    """Return a pose's column of `assembly_modes`."""
+    """Return the assembly mode of a pose: its column in `assembly_modes`."""
     return _mode_of(as_manipulator(robot), pose)
 
 
 @lru_cache(maxsize=64)
 def _mode_of(robot: Manipulator, pose: tuple[float, ...]) -> int:
-    """Return the column of `assembly_modes` that is nearest to a pose, cached."""
+    """Return the assembly mode of a pose, the column nearest to it in `assembly_modes`, cached."""
     joints: PerJoint = evaluate_kernel(robot, "inverse_kinematics", "raise", np.array(pose))
     return int(nearest(robot, assembly_modes(robot, joints, all_branches=True), np.array(pose)))
 
 
 def nearest(robot: RobotLike, poses: Array, pose: Array) -> NDArray[np.int64]:
-    """Return the index of the pose of (..., k, m) nearest to a pose (..., m), modulo full turns."""
+    """Return the index (...) among poses (..., k, m) of that nearest to a pose (..., m)."""
     robot = as_manipulator(robot)
     differences = poses - pose[..., None, :]
     angular = robot.platform.angular
@@ -234,13 +234,13 @@ def nearest(robot: RobotLike, poses: Array, pose: Array) -> NDArray[np.int64]:
 
 
 def _rows(robot: Manipulator, joints: Array, *, all_branches: bool) -> Poses:
-    """Return the poses of joints, sorted where the closure does not keep the order of modes."""
+    """Return poses (..., k, m) of joint coordinates, sorted where modes have no fixed order."""
     poses = assembly_modes(robot, joints, all_branches=all_branches)
     return poses if closure_of(robot).keeps_modes else sort_poses(poses)
 
 
 def _same_joints(robot: Manipulator, joints: Array, other: Array) -> NDArray[np.bool_]:
-    """Return where joint coordinates (..., n) are equal, modulo full turns of cranks."""
+    """Return where joint coordinates (..., n) are equal, up to full turns of cranks: (..., n)."""
     differences = np.abs(joints - other)
     cranks = np.array([leg.joint.unit == "rad" for leg in robot.legs])
     turn = 2.0 * np.pi

@@ -37,7 +37,7 @@ def evaluate_kernel(
     base: Selects | None = None,
     wrench: bool = False,
 ) -> _Outputs:  # type: ignore[type-var]
-    """Return the outputs, or the only one, of a function of `kernels.functions.TABLE`."""
+    """Return the checked outputs of the kernel `what` at poses; a single output without tuple."""
     *results, status = numeric(robot, what, base=base, wrench=wrench).call(*arguments)
     good = status.item() if status.ndim == 0 else status.all()
     if not good or on_failure != "raise":
@@ -57,13 +57,13 @@ def evaluate_kernel(
 def evaluate_unchecked(
     robot: RobotLike, what: str, *arguments: PoseLike, base: Selects | None = None
 ) -> Any:
-    """Return the outputs of a function without checks: NaN or arbitrary in an invalid state."""
+    """Return the outputs of the kernel `what` without checks: NaN or arbitrary if invalid."""
     *results, _ = numeric(robot, what, base=base)(*arguments)
     return results[0] if len(results) == 1 else tuple(results)
 
 
 def expect_choice(on_failure: str) -> None:
-    """Raise for a value other than "raise" or "nan"."""
+    """Raise unless `on_failure` is "raise" or "nan"."""
     if on_failure not in ("raise", "nan"):
         raise DataError(f'on_failure: {on_failure!r} is neither "raise" nor "nan"')
 
@@ -71,7 +71,7 @@ def expect_choice(on_failure: str) -> None:
 def finite_rows(
     robot: Manipulator, raw: PoseLike, name: str, on_failure: OnFailure = "raise"
 ) -> Array:
-    """Return an array (..., m) of finite numbers; raise with the element that is not finite.
+    """Return `raw` as an array (..., m) of finite numbers; raise, or set NaN, where not finite.
 
     With ``on_failure="nan"`` rows that are not finite become NaN.
     """
@@ -90,7 +90,7 @@ def finite_rows(
 
 
 def finite_pose(robot: Manipulator, raw: PoseLike, name: str) -> Array:
-    """Return one pose (m,) of finite numbers, see `finite_rows`; a table of one row is a pose."""
+    """Return a pose or a table of one row as an array (m,); raise unless it is finite."""
     array = finite_rows(robot, raw, name)
     if array.size != robot.freedom:
         raise DataError(f"{name}: {array.size // robot.freedom} poses given, 1 expected")
@@ -98,7 +98,7 @@ def finite_pose(robot: Manipulator, raw: PoseLike, name: str) -> Array:
 
 
 def _not_finite(name: str, array: Array, index: tuple[int, ...]) -> DataError:
-    """Return the error for an element that is not finite, or not of a sensible size."""
+    """Return the error for the array element at `index` that is not finite or is far too large."""
     expected = "a finite number" if not np.isfinite(array[index]) else "a number of sensible size"
     return DataError(f"{name}{list(index)}: {array[index]} given, {expected} expected")
 
@@ -106,7 +106,7 @@ def _not_finite(name: str, array: Array, index: tuple[int, ...]) -> DataError:
 def _failure(
     robot: Manipulator, what: str, arguments: tuple[PoseLike, ...], status: Array, wrench: bool
 ) -> PteronError:
-    """Return the error for the first state that fails."""
+    """Return the error for the first state at which the kernel `what` failed."""
     index = tuple(int(i) for i in np.argwhere(status == 0.0)[0])
     ports = [p for p in numeric(robot, what, wrench=wrench).inputs if not p.shared]
     for port, argument in zip(ports, arguments, strict=True):
@@ -129,7 +129,7 @@ def _failure(
 def singular_angles(
     robot: Manipulator, pose: Array, index: tuple[int, ...], many: str = ""
 ) -> SingularPose:
-    """Return the error for a pose whose angles are singular."""
+    """Return the error for a pose at which the platform's angles are singular coordinates."""
     first, second, third = robot.platform.angles
     return SingularPose(
         f"{place('pose', index)}: the angles are singular where {second} is +-90 degrees, not the "
@@ -160,7 +160,7 @@ def place(name: str, index: tuple[int, ...]) -> str:
 def _is_any_far(robot: Manipulator, poses: Array) -> bool:
     """Return whether any of the poses (K, m) is so far out of reach that it is probably in mm.
 
-    The first failing pose may be near: a motion in millimetres may begin at zero.
+    The first failed pose may be near: a motion in millimetres may begin at zero.
     """
     misses = -numeric(robot, "reach")(poses)[0]
     return bool((misses > _MILLIMETRES * np.array([leg.size for leg in robot.legs])).any())
@@ -175,7 +175,7 @@ def _bad_pose(
     *,
     far: bool,
 ) -> PteronError:
-    """Return the error that explains a bad pose: out of reach or singular, with leg and measure."""
+    """Return the error that explains a failed pose: out of reach or singular, with the leg."""
     where = place("pose", index)
     margin, type_i, spread, _ = numeric(robot, "reach")(pose)
     if "rows" in needs:

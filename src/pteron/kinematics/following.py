@@ -17,11 +17,11 @@ _HALVINGS = 12
 def follow(
     robot: RobotLike, joints: JointsLike, start: PoseLike, *, on_failure: OnFailure = "raise"
 ) -> PerCoordinate:
-    """Return the poses along a motion of the joints, in the assembly mode of a pose to start from.
+    """Return the poses along a motion of the joints, in the assembly mode of the start pose.
 
-    Each pose is extrapolated from the last two and found by Newton's steps; where they do not
-    converge the joints' step is halved. A mode ends where the machine is singular (type II), and
-    the motion with it.
+    Each pose is extrapolated from the last two and refined by Newton's method; if that does not
+    converge, the joints' step is halved. An assembly mode, and the motion with it, ends at a
+    type-II singularity.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def follow(
 
 
 def _joints_of(robot: Manipulator, pose: Array, near: Array) -> Array:
-    """Return the joint coordinates of a pose, with cranks' full turns nearest to `near`."""
+    """Return a pose's joint coordinates (n,), cranks' full turns chosen nearest to `near` (n,)."""
     joints: Array = evaluate_unchecked(robot, "inverse_kinematics", pose)
     cranks = [leg.goes_round for leg in robot.legs]
     turns = np.where(cranks, np.round((near - joints) / (2.0 * np.pi)), 0.0)
@@ -97,7 +97,7 @@ def _joints_of(robot: Manipulator, pose: Array, near: Array) -> Array:
 def _follow_halved_steps(
     step: Kernel, here: Array, there: Array, pose: Array, side: float
 ) -> tuple[Array, float]:
-    """Return the pose of joints `there` from that of joints `here`, by adaptive step halving.
+    """Return the pose (m,) at joints `there`, followed from that at `here` in halved steps.
 
     `side` is the sign of the type-II measure, which must not change; the measure is returned too.
     """
@@ -115,7 +115,7 @@ def _follow_halved_steps(
 
 
 def _end_of_mode(joints: Array, k: int) -> UnreachablePose:
-    """Return the error for the sample k to which the platform does not follow."""
+    """Return the error that the platform cannot follow to the joint coordinates of sample k."""
     text = ", ".join(f"{coordinate:.6g}" for coordinate in joints[k])
     return UnreachablePose(
         f"joints[{k}]: the platform does not follow to the joint coordinates [{text}]: "

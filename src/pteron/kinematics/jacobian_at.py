@@ -29,7 +29,7 @@ class JacobianAtPose:
 
 
 def jacobian_at(robot: Manipulator, pose: Array) -> JacobianAtPose:
-    """Return the Jacobian at a pose (m,), and its condition number."""
+    """Return the Jacobian at a pose (m,) with its characteristic length and condition number."""
     matrix = jacobian(robot, pose)
     homogeneous: tuple[Array, Array] = evaluate_kernel(robot, "homogeneous_jacobian", "raise", pose)
     plain, length = homogeneous

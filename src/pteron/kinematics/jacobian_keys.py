@@ -14,10 +14,10 @@ _ROLES = ("point", "direction", "length")
 
 
 def jacobian_keys(robot: Manipulator) -> tuple[str, ...]:
-    """Return the keys of the legs' dimensions that J depends on, as files name them.
+    """Return the keys of the leg dimensions that the Jacobian depends on, as files name them.
 
-    They are read off the structure of J's expression in symbols of the geometry, so that no kind of
-    leg says them. A key that no leg gives, being at its default, is left out.
+    They are derived from the sparsity of the symbolic Jacobian by the geometry. A key that no leg
+    gives, because its default is used, is left out.
     """
     jacobian = general_program(robot, "jacobian").function
     touched = set(jacobian.jac_sparsity(0, 0).get_triplet()[1])
@@ -35,6 +35,6 @@ def jacobian_keys(robot: Manipulator) -> tuple[str, ...]:
 
 
 def alternatives(keys: Iterable[str]) -> str:
-    """Return keys in words: "direction", "direction or platform_point", "a, b or c"."""
+    """Return names joined by "or": "direction", "direction or platform_point", "a, b or c"."""
     *others, last = keys
     return f"{', '.join(others)} or {last}" if others else last

@@ -50,13 +50,13 @@ class LimitedJoint(Result):
     told_limits = former_attribute("told_limits", "limits_text")
 
     def limits_text(self, text: Callable[..., str]) -> str:
-        """Return its limits in words; `text` makes text of a value and the unit."""
+        """Return the joint's limits as text; `text` formats a value with its unit."""
         most = text(self.most, self.unit)
         return f"at most {most}" if self.only_most else f"{text(self.least, self.unit)} to {most}"
 
 
 def limited_joints(robot: RobotLike, pose: PoseLike) -> tuple[LimitedJoint, ...]:
-    """Return all joints that have limits, actuated and passive, at a pose (m,) in reach."""
+    """Return each joint that has limits, actuated or passive, with its value at a pose (m,)."""
     robot = as_manipulator(robot)
     pose_array = finite_pose(robot, pose, "pose")
     joints = numeric(robot, "joint_coordinates")(pose_array)[0]
@@ -73,6 +73,6 @@ def limited_joints(robot: RobotLike, pose: PoseLike) -> tuple[LimitedJoint, ...]
 
 
 def _passive_limited_joint(leg: int, at: Passive) -> LimitedJoint:
-    """Return the limited joint of a leg's passive joint, with its coordinate in the pose."""
+    """Return a leg's passive joint as a `LimitedJoint` with its value at the pose."""
     limits = at.least, at.most, at.only_most
     return LimitedJoint(leg, at.noun, False, at.unit, float(at.value), *limits)

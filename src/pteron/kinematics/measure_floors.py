@@ -38,9 +38,9 @@ class Floors(NamedTuple):
 def usual_floors(
     robot: Manipulator, type_i: float | None, type_ii: float | None, limits: bool
 ) -> Floors:
-    """Return the floors of poses away from singularities, with defaults for those not given.
+    """Return type-I and type-II thresholds for poses far from singular; None means default.
 
-    A default is 0.1 where at least a tenth of the machine's poses exceed it, else their median.
+    The default is 0.1 if at least a tenth of the machine's poses exceed it, else their median.
     """
     if type_i is not None and type_ii is not None:
         return Floors(type_i, type_ii)
@@ -52,9 +52,9 @@ def usual_floors(
 
 
 def median_floors(robot: Manipulator, limits: bool = True) -> Floors:
-    """Return the median type-I measure, and the median type-II measure of poses that exceed it.
+    """Return the median type-I measure of poses, and the median type-II measure above it.
 
-    So a quarter of the poses in reach pass both, whatever machine it is.
+    So a quarter of the poses in reach exceed both, for any machine.
     """
     type_i_measures, type_ii_measures = _measures(robot, 0.0, limits)
     least = _median(type_i_measures)
@@ -63,18 +63,18 @@ def median_floors(robot: Manipulator, limits: bool = True) -> Floors:
 
 @lru_cache(maxsize=64)
 def _measures(robot: Manipulator, type_i: float, limits: bool) -> tuple[Array, Array]:
-    """Return the type-I measure (K,), the least of all legs, and the type-II measure of poses."""
+    """Return the least type-I measure over legs (K,) and the type-II measure (K,) of poses."""
     poses = sample_poses(robot, _SAMPLE, np.random.default_rng(0), type_i, limits=limits)
     return numeric(robot, "reach")(poses)[1].min(axis=-1), type_ii_sizes(robot, poses)
 
 
 def _usual(measures: Array) -> float:
-    """Return the usual floor where enough measures exceed it, else the median."""
+    """Return the default threshold, 0.1, if enough measures (K,) exceed it, else their median."""
     enough = int((measures >= _USUAL).sum()) >= _SHARE * len(measures)
     return _USUAL if enough else _median(measures)
 
 
 def _median(measures: Array) -> float:
-    """Return the median of measures above 0; 0 where there is none."""
+    """Return the median of the measures above 0 (K,); 0 if there are none."""
     measures = measures[measures > 0.0]
     return float(np.median(measures)) * (1.0 - ROUNDING) if len(measures) else 0.0

@@ -29,7 +29,10 @@ _DIGITS = 12
 
 
 def modular_geometry(robot: Manipulator, field: PrimeField) -> list[int] | None:
-    """Return the numbers of `equations.machine.numbers` in a prime field, or None if not known."""
+    """Return the machine's geometric numbers in a prime field.
+
+    None if not exactly representable.
+    """
     geometry: list[int] = []
     for leg in robot.legs:
         units: list[list[int]] = []
@@ -70,7 +73,7 @@ def _decimal(number: float) -> Fraction:
 
 
 def _unit(vector: Sequence[float], field: PrimeField) -> list[int] | None:
-    """Return a unit vector in the field; None where its components are not simple."""
+    """Return a unit vector (3,) in the field; None unless its squares are simple fractions."""
     squares = [Fraction(v * v).limit_denominator(_SIMPLE) for v in vector]
     near = all(abs(float(q) - v * v) < _ROUNDING for q, v in zip(squares, vector, strict=True))
     if not near or sum(squares) != 1:
@@ -82,7 +85,7 @@ def _unit(vector: Sequence[float], field: PrimeField) -> list[int] | None:
 
 
 def _signed_root(square: Fraction, negative: bool, field: PrimeField) -> int:
-    """Return a residue whose square is a fraction's, with a sign."""
+    """Return a residue whose square is the fraction `square`, negated if `negative`."""
     product = square.numerator * square.denominator
     root = reduce(mul, (_prime_root(p, field) for p in _prime_factors(product)), 1)
     share = field.divide(root % field.prime, field.number(square.denominator))
@@ -112,7 +115,7 @@ def _prime_factors(number: int) -> list[int]:
 def _same_right_angles(
     vectors: Sequence[Sequence[float]], units: Sequence[Sequence[int]], field: PrimeField
 ) -> bool:
-    """Return whether vectors that are perpendicular up to rounding are so in the field."""
+    """Return whether vectors perpendicular up to rounding are perpendicular in the field."""
     pairs = [(i, j) for i in range(len(units)) for j in range(i)]
     return all(
         sum(a * b for a, b in zip(units[i], units[j], strict=True)) % field.prime == 0

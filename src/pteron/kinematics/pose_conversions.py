@@ -34,7 +34,7 @@ _SHAPES: dict[str, tuple[int, ...]] = {"matrix": (3, 3), "quaternion": (4,), "ti
 
 
 def position_of(robot: RobotLike, pose: PoseLike) -> Vectors:
-    """Return the position of P in the base frame; of a tripod the legs' planes give x and y.
+    """Return the positions (..., 3), m, of the platform's reference point P in the base frame.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def position_of(robot: RobotLike, pose: PoseLike) -> Vectors:
 
 
 def rotation_of(robot: RobotLike, pose: PoseLike, *, form: RotationForm = "matrix") -> Array:
-    """Return the platform's rotation.
+    """Return the platform's rotation at a pose: a matrix, a quaternion or tilt and torsion.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ def pose_of(
     form: RotationForm = "matrix",
     on_failure: OnFailure = "raise",
 ) -> PerCoordinate:
-    """Return the poses of a position of P and a rotation, which broadcast.
+    """Return the poses (..., m) with a position of P and a rotation, which broadcast.
 
     Parameters
     ----------
@@ -220,7 +220,7 @@ def twist(
 def velocity_of(
     robot: RobotLike, pose: PoseLike, twist: ArrayLike, *, on_failure: OnFailure = "raise"
 ) -> PerCoordinate:
-    """Return the pose's derivative for a twist of the platform.
+    """Return the pose's time derivative (..., m) for a twist of the platform (..., 6).
 
     Parameters
     ----------
@@ -290,11 +290,11 @@ def velocity_of(
 def twist_jacobian(
     robot: RobotLike, pose: PoseLike, *, on_failure: OnFailure = "raise"
 ) -> Matrices:
-    """Return the rows A of the legs against the twist: joint rates = A @ twist.
+    """Return the Jacobian (..., n, 6) against the platform's twist: joint rates = A @ twist.
 
-    Where `jacobian` stands against the pose's derivative, they have no part in the singularities of
-    its angles: row i is (g, s x g), with g the row against the velocity of the leg's platform point
-    and s the way there from P.
+    Unlike the rows of `jacobian`, which refer to the pose's derivative, these rows do not depend on
+    the choice of angles and their singularities: row i is (g, s x g), with g the derivative by the
+    velocity of the leg's platform point and s the vector from P to that point.
 
     Parameters
     ----------
@@ -329,24 +329,24 @@ def twist_jacobian(
 
 
 def _expect_form(form: str) -> None:
-    """Raise DataError if a form is not among the known forms."""
+    """Raise unless `form` is a known form of rotations."""
     if form not in _SHAPES:
         raise DataError(f"form: {form!r} is none of {', '.join(_SHAPES)}")
 
 
 def _frame_at_zero(robot: Manipulator) -> Array:
-    """Return the axes (3, 3) of the platform at angles zero, one a row."""
+    """Return the platform's axes (3, 3), one a row, at angles zero, in the base frame."""
     return np.array(robot.platform.frame)
 
 
 def _difference_text(length: float, angle: float, per: str = "") -> str:
-    """Return a phrase for a difference in length and angle, without parts that are rounding."""
+    """Return a length and an angle as text, without a part that is mere rounding."""
     parts = [(length, f"{length:.3g} m{per}"), (angle, f"{angle:.3g} rad{per}")]
     return " and ".join(text for size, text in parts if size > ROOT_OF_ROUNDING)
 
 
 def _matrix(robot: Manipulator, rotations: Array, form: RotationForm) -> Array:
-    """Return rotations (..., 3, 3) as matrices."""
+    """Return rotations given in a form as matrices (..., 3, 3)."""
     if form == "matrix":
         return rotations
     if form == "quaternion":
@@ -375,7 +375,7 @@ def _stack_rows(rows: list[list[Array]]) -> Array:
 
 
 def _tilt_torsion(matrix: Array) -> Array:
-    """Return (azimuth, tilt, torsion), (..., 3), of rotations; level ones have azimuth 0."""
+    """Return (azimuth, tilt, torsion) (..., 3), rad, of rotation matrices (..., 3, 3)."""
     x, y, z = matrix[..., 0, 2], matrix[..., 1, 2], matrix[..., 2, 2]
     sine, cosine = matrix[..., 1, 0] - matrix[..., 0, 1], matrix[..., 0, 0] + matrix[..., 1, 1]
     parts = np.arctan2(y, x), np.arctan2(np.hypot(x, y), z), np.arctan2(sine, cosine)
@@ -383,9 +383,9 @@ def _tilt_torsion(matrix: Array) -> Array:
 
 
 def _quaternion(matrix: Array) -> Array:
-    """Return quaternions (..., 4), scalar last and not negative, of rotations.
+    """Return quaternions (x, y, z, w), w >= 0, of rotation matrices (..., 3, 3): (..., 4).
 
-    The largest of the four components is the root of a sum, the others are quotients by it.
+    The largest of the four components is computed by a square root, the others as quotients by it.
     """
     trace = np.trace(matrix, axis1=-2, axis2=-1)
     diagonal = np.diagonal(matrix, axis1=-2, axis2=-1)

@@ -30,12 +30,12 @@ residuals there are about its m-th power, far above rounding."""
 
 
 def lie_on_curves(closed: Closed, machines: Array, z: Array) -> NDArray[np.bool_]:
-    """Return which z (K, d) converge to a pose on a curve of poses, each of its own machine.
+    """Return which states z (K, d) lie on a continuous curve of poses of their machine.
 
     `machines` (K, k, 7) holds seven numbers for each of the k closure equations, as in `Closed`.
 
-    Where the closures' derivatives lose a rank, other poses are sought at a distance in the free
-    direction, to both sides.
+    Where the Jacobian of the closure equations loses rank, other poses are sought at a distance in
+    the null direction, to both sides.
     """
     if not len(z):
         return np.zeros(0, dtype=bool)
@@ -57,11 +57,12 @@ def lie_on_curves(closed: Closed, machines: Array, z: Array) -> NDArray[np.bool_
 def _levenberg_marquardt(
     closed: Closed, machines: Array, z: Array, projectors: Array
 ) -> tuple[Array, Array]:
-    """Return the best z (K, d) of Levenberg-Marquardt steps, and the norms of its residuals (K,).
+    """Return z (K, d) after Levenberg-Marquardt steps, and the norms of their residuals (K,).
 
-    Damped by the square of the residual they reach a curve of poses as fast as Newton's a regular
-    pose (Yamashita and Fukushima, On the rate of convergence of the Levenberg-Marquardt method,
-    2001). `projectors` (d, d) or (K, d, d) project onto the allowed steps.
+    Damped by the squared residual, the steps converge to a curve of poses as fast as Newton's
+    method to a regular pose (Yamashita and Fukushima, On the rate of convergence of the
+    Levenberg-Marquardt method, 2001). `projectors` (d, d) or (K, d, d) project onto the allowed
+    steps.
     """
     numbers = machines.reshape(len(z), 7 * closed.equations)
     best, least = z, np.full(len(z), np.inf)
@@ -78,7 +79,7 @@ def _levenberg_marquardt(
 
 
 def second_slopes(closed: Closed, machines: Array) -> Array:
-    """Return a bound (K,) of the closures' second derivatives, which are constant: quadrics."""
+    """Return an upper bound (K,) of the second derivatives of the closure equations."""
     a, b, r = machines[..., :3], machines[..., 3:6], np.abs(machines[..., 6])
     length_a, length_b = (np.linalg.norm(v, axis=-1) for v in (a, b))
     bends = (length_a + length_b) ** 2 + 4.0 * closed.moves + r
@@ -87,5 +88,5 @@ def second_slopes(closed: Closed, machines: Array) -> Array:
 
 
 def normalise_rows(z: Array) -> Array:
-    """Return z (..., d) divided by their lengths."""
+    """Return rows z (..., d) scaled to unit length."""
     return np.asarray(z / np.linalg.norm(z, axis=-1, keepdims=True))

@@ -70,14 +70,14 @@ class Generic(NamedTuple):
 
     @property
     def size(self) -> float:
-        """The root of the mean squares of its points, on the base and on the platform."""
+        """The machine's size: root mean square of its point coordinates on base and platform."""
         points = self.machine.reshape(-1, 7)[: self.closed.spheres, :6]
         return float(np.sqrt((np.abs(points) ** 2).sum(axis=-1).mean()))
 
 
 @lru_cache
 def generic(closed: Closed) -> Generic:
-    """Return the start machine of a kind of closures, from the file."""
+    """Return the start machine, with all its known poses, for a kind of closure equations."""
     key = key_of(closed)
     with np.load(FILE) as file:
         if f"machine {key}" not in file:
@@ -89,7 +89,7 @@ def generic(closed: Closed) -> Generic:
 
 
 def key_of(closed: Closed) -> str:
-    """Return the name of a kind of closures in the file."""
+    """Return the name under which the data file holds a kind of closure equations."""
     return "-".join(str(int(part)) for part in closed)
 
 
@@ -105,9 +105,9 @@ class RealPoses(NamedTuple):
 
 
 def real_poses(closed: Closed, machines: Array) -> RealPoses:
-    """Return all real poses of machines (B, k, 7).
+    """Return all real poses of machines with numbers (B, k, 7), by path following.
 
-    See `advance_path` for the numbers of a machine; they should be about 1.
+    See `advance_path` for the numbers of a machine, which should be of size 1 or so.
     """
     known = generic(closed)
     share = max(_PATHS // len(known.poses), 1)
@@ -121,7 +121,7 @@ def real_poses(closed: Closed, machines: Array) -> RealPoses:
 
 
 def _real_poses(known: Generic, machines: Array, first: int) -> RealPoses:
-    """Return the real poses of machines, by up to `_TRIALS` random turns of each machine."""
+    """Return all real poses of machines (B, k, 7), up to `_TRIALS` random rotations of each."""
     rng = np.random.default_rng(1)
     remaining, move = np.arange(len(machines)), np.zeros(len(machines), dtype=bool)
     which, poses = np.empty(0, dtype=np.int64), np.empty((0, known.closed.size))
@@ -164,13 +164,13 @@ _Step = Callable[[Array, Array], tuple[Array, Array]]
 
 
 def _step(known: Generic) -> _Step:
-    """Return the compiled step along the paths from a known machine."""
+    """Return the compiled step of the path tracker from a known machine to real machines."""
     machine = known.machine
     return path_kernel(known.closed, (tuple(machine.real.tolist()), tuple(machine.imag.tolist())))
 
 
 def _any_step(known: Generic) -> _Step:
-    """Return the step towards machines in complex numbers."""
+    """Return the compiled step of the path tracker from a known machine to complex ones."""
     kernel, start = path_kernel(known.closed, None), _parts(known.machine)
     return lambda at, target: kernel(at, start, target)
 
@@ -178,9 +178,10 @@ def _any_step(known: Generic) -> _Step:
 def follow_paths(
     known: Generic, targets: Array | Complex
 ) -> tuple[Complex, NDArray[np.bool_], NDArray[np.bool_]]:
-    """Return the ends z (B, N, d) of the paths to machines (B, k, 7).
+    """Return path ends z (B, N, d) at machines (B, k, 7), whether reached, and whether converged.
 
-    Two arrays (B, N) follow: whether a path has arrived, and whether Newton's steps then converge.
+    Two arrays (B, N) follow: whether a path has arrived, and whether Newton's method then
+    converges.
     """
     count, d = known.poses.shape
     machines = targets.reshape(len(targets), 7 * known.closed.equations)
@@ -200,7 +201,7 @@ def follow_paths(
 
 
 def _track_paths(step: _Step, target: Array, z: Array, d: int) -> tuple[Array, NDArray[np.bool_]]:
-    """Return the ends (K, 2 d) of paths from z to machines, real parts first."""
+    """Return the ends (K, 2 d) of paths from z to target machines; whether each arrived (K,)."""
     at = _initial_states(z)
     at, _ = step(at, target)  # for dz/dt
     at[:, 4 * d : 8 * d] = at[:, : 4 * d]
@@ -222,7 +223,7 @@ def _track_paths(step: _Step, target: Array, z: Array, d: int) -> tuple[Array, N
 
 
 def _initial_states(z: Array) -> Array:
-    """Return initial path states (K, 4 d + 3) at z (K, 2 d)."""
+    """Return initial states (K, 4 d + 3) of the path tracker at z (K, 2 d)."""
     width = z.shape[1]
     at = np.zeros((len(z), 4 * width + 3))
     at[:, :width] = at[:, 2 * width : 3 * width] = z
@@ -241,28 +242,28 @@ def _complex(parts: Array, d: int) -> Complex:
 
 
 def _all_differ(ends: Complex) -> NDArray[np.bool_]:
-    """Return whether all ends z (B, N, d) of a machine differ: then the poses are complete."""
+    """Return for each machine (B,) whether all its path ends z (B, N, d) differ: none is lost."""
     alike = np.abs(ends.conj() @ np.swapaxes(ends, -1, -2)) ** 2
     pairs = np.triu(np.ones(alike.shape[1:], dtype=bool), 1)
     return np.asarray(~((alike > 1.0 - _DUPLICATE**2) & pairs).any(axis=(-2, -1)))
 
 
 def _candidates(ends: Complex, arrived: NDArray[np.bool_]) -> tuple[NDArray[np.int64], Array]:
-    """Return the machines' numbers (K,) and ends z (K, d), of (B, N, d), that may be real."""
+    """Return machine indices (K,) and ends z (K, d), of path ends (B, N, d), that may be real."""
     turned = _largest_real(ends)
     real = arrived & (np.abs(turned.imag).max(axis=-1) <= _REAL)
     return np.nonzero(real)[0], normalise_rows(turned.real[real])
 
 
 def _largest_real(z: Complex) -> Complex:
-    """Return z (..., d) times the phase that makes its largest coordinate real."""
+    """Return complex z (..., d), each rotated so that its largest coordinate is real."""
     phase = np.take_along_axis(z, np.abs(z).argmax(axis=-1)[..., None], axis=-1)
     with np.errstate(all="ignore"):
         return np.asarray(z * (phase.conj() / np.abs(phase)))
 
 
 def _refine_ends(step: _Step, target: Array, z: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Return ends z (K, 2 d) of paths after Newton's steps, and whether they converged."""
+    """Return path ends z (K, 2 d) after Newton's steps, and whether each converged (K,)."""
     for _ in range(_REFINING):
         at = _initial_states(z)
         at[:, -2] = 1.0
@@ -272,7 +273,7 @@ def _refine_ends(step: _Step, target: Array, z: Array) -> tuple[Array, NDArray[n
 
 
 def _polish_poses(closed: Closed, machines: Array, z: Array) -> Array:
-    """Return real poses z (K, d) after those of Newton's steps that reduce their residuals."""
+    """Return real poses z (K, d) refined by Newton's steps that reduce their residuals."""
     numbers = machines.reshape(len(z), 7 * closed.equations)
     best, least = z, np.full(len(z), np.inf)
     for _ in range(_POLISHING):
@@ -289,10 +290,10 @@ def _polish_poses(closed: Closed, machines: Array, z: Array) -> Array:
 
 
 def _prove_poses(closed: Closed, machines: Array, z: Array) -> tuple[NDArray[np.bool_], Array]:
-    """Return which z (K, d) are proved to be poses, and the radius of uniqueness of each.
+    """Return which z (K, d) are proved to be poses, and the radius in which each is unique (K,).
 
-    The proof is Kantorovich's theorem. A pose next to a singularity, where it proves nothing,
-    counts if its residuals are rounding alone; the radius is then 0.
+    The proof is Kantorovich's theorem. A pose next to a singularity, where the theorem does not
+    apply, is accepted if its residuals are mere rounding; its radius is then 0.
     """
     if not len(z):
         return np.zeros(0, dtype=bool), np.zeros(0)
@@ -311,7 +312,7 @@ def _prove_poses(closed: Closed, machines: Array, z: Array) -> tuple[NDArray[np.
 
 
 def _invert(matrices: Array) -> Array:
-    """Return inverses, infinite where there are none."""
+    """Return inverses of matrices (..., d, d); infinite entries for singular ones."""
     try:
         return np.asarray(np.linalg.inv(matrices), dtype=float)
     except np.linalg.LinAlgError:
@@ -321,7 +322,10 @@ def _invert(matrices: Array) -> Array:
 
 
 def _are_duplicates(which: NDArray[np.int64], z: Array, radius: Array) -> NDArray[np.bool_]:
-    """Return which poses (K, d), in order, equal an earlier one of the same machine."""
+    """Return which of the poses z (K, d) repeat an earlier pose of the same machine, (K,).
+
+    `which` (K,) is each pose's machine, ascending; `radius` (K,) proves it unique within, if > 0.
+    """
     count = np.arange(len(which)) - np.searchsorted(which, which)
     is_duplicate = np.zeros(len(which), dtype=bool)
     for back in range(1, int(count.max(initial=0)) + 1):
@@ -344,7 +348,7 @@ def _unit_quaternion(rng: np.random.Generator) -> Array:
 
 
 def _rotate_machines(machines: Array, base: Array, platform: Array) -> Array:
-    """Return machines (B, k, 7) in rotated frames."""
+    """Return machines (B, k, 7) with base and platform points rotated by unit quaternions."""
     turned = machines.copy()
     for columns, q in ((slice(0, 3), base), (slice(3, 6), platform)):
         turned[..., columns] = machines[..., columns] @ rotation(q).T
@@ -352,35 +356,35 @@ def _rotate_machines(machines: Array, base: Array, platform: Array) -> Array:
 
 
 def _rotate_back(z: Array, base: Array, platform: Array) -> Array:
-    """Return poses z = (x, y) of rotated frames in the original ones, u* x v and u* y v."""
+    """Return poses z = (x, y) (K, d) of rotated frames expressed in the original frames."""
     u, v = base * [1.0, -1.0, -1.0, -1.0], platform
     matrix = _left_matrix(u) @ _right_matrix(v)
     return np.concatenate([z[:, k : k + 4] @ matrix.T for k in range(0, z.shape[1], 4)], axis=-1)
 
 
 def _left_matrix(q: Array) -> Array:
-    """Return the matrix (..., 4, 4) of x -> q x."""
+    """Return the matrix (..., 4, 4) of left multiplication x -> q x by quaternions q (..., 4)."""
     w, i, j, k = np.moveaxis(q, -1, 0)
     rows = [[w, -i, -j, -k], [i, w, -k, j], [j, k, w, -i], [k, -j, i, w]]
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
 def _right_matrix(q: Array) -> Array:
-    """Return the matrix (..., 4, 4) of x -> x q."""
+    """Return the matrix (..., 4, 4) of right multiplication x -> x q by quaternions q (..., 4)."""
     w, i, j, k = np.moveaxis(q, -1, 0)
     rows = [[w, -i, -j, -k], [i, w, k, -j], [j, -k, w, i], [k, j, -i, w]]
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
 def rotation(x: Array) -> Array:
-    """Return the rotation (..., 3, 3) of a quaternion, of any length."""
+    """Return the rotation matrix (..., 3, 3) of quaternions x (..., 4), of any length."""
     conjugate = x * [1.0, -1.0, -1.0, -1.0]
     product = _left_matrix(x) @ _right_matrix(conjugate) / (x * x).sum(axis=-1)[..., None, None]
     return np.asarray(product[..., 1:, 1:])
 
 
 def positions_and_rotations(z: Array) -> tuple[Array, Array]:
-    """Return P (K, 3), 0 if it is fixed, and the rotation (K, 3, 3) of poses z (K, d)."""
+    """Return positions of P (K, 3), 0 if fixed, and rotations (K, 3, 3) of states z (K, d)."""
     x, square = z[:, :4], (z[:, :4] ** 2).sum(axis=-1)[:, None]
     place = np.zeros((len(z), 3))
     if z.shape[1] > 4:

@@ -20,9 +20,9 @@ ROUNDING = 1e-10
 
 
 def balance_of_rams(robot: Manipulator) -> str:
-    """Return why a hexapod of rams is singular at every pose; "" where its figures do not show it.
+    """Return as text why a hexapod of rams is singular at every pose; '' if its points show none.
 
-    It is proved up to rounding of the points.
+    The conditions are checked up to rounding of the points.
     """
     figures = ram_figures(robot)
     if figures is None:
@@ -46,9 +46,9 @@ def balance_of_rams(robot: Manipulator) -> str:
 
 
 def ram_figures(robot: Manipulator) -> tuple[Array, Array] | None:
-    """Return centred guide points and platform points (6, 3) of a hexapod of rams, m.
+    """Return centred guide points and platform points (6, 3) of a hexapod of rams, m, or None.
 
-    None for any other machine, and where all points of a figure coincide.
+    The result is None for any other machine, or if all points of a figure coincide.
     """
     if not robot.platform.moves_freely:
         return None
@@ -62,10 +62,10 @@ def ram_figures(robot: Manipulator) -> tuple[Array, Array] | None:
 
 
 def similarity(robot: Manipulator) -> tuple[float, float] | None:
-    """Return a hexapod's platform figure over its base figure, and how far it is from similar, m.
+    """Return a hexapod's scale factor platform/base figure, and its deviation from similar, m.
 
-    None where the machine is no hexapod of rams. The distance is the greatest of a platform point
-    from its image.
+    The result is None if the machine is no hexapod of rams. The deviation is the greatest distance
+    of a platform point from the image of its guide point.
     """
     figures = ram_figures(robot)
     if figures is None:
@@ -75,25 +75,25 @@ def similarity(robot: Manipulator) -> tuple[float, float] | None:
 
 
 def _similar(base: Array, top: Array) -> tuple[Array, float]:
-    """Return the base's figure rotated to the platform's, and the least-squares scale factor."""
+    """Return the base points (6, 3) rotated to fit the platform's, and the scale factor."""
     u, _, v = np.linalg.svd(base.T @ top)
     rotated = base @ u @ v
     return rotated, float((rotated * top).sum() / (rotated * rotated).sum())
 
 
 def _vanishes(rows: Array, rank: int) -> bool:
-    """Return whether a matrix has a rank of at most `rank`, up to rounding."""
+    """Return whether a matrix has rank `rank` at most, up to rounding."""
     sigmas = np.linalg.svd(rows, compute_uv=False)
     return bool(sigmas[rank] <= ROUNDING * sigmas[0])
 
 
 def _homogeneous_coordinates(figure: Array) -> Array:
-    """Return the points (n, d) with a leading 1, (n, d + 1)."""
+    """Return points (n, d) in homogeneous coordinates (n, d + 1): a leading 1 each."""
     return np.hstack([np.ones((len(figure), 1)), figure])
 
 
 def _similarity_phrase(base: Array, top: Array) -> str:
-    """Return a phrase with the scale factor of similar base and platform figures; else ""."""
+    """Return a phrase with the scale factor if base and platform points are similar, else ''."""
     turned, factor = _similar(base, top)
     if np.linalg.norm(top - factor * turned) > ROUNDING * np.linalg.norm(top):
         return ""
@@ -105,7 +105,7 @@ def _similarity_phrase(base: Array, top: Array) -> str:
 
 
 def _conics_phrase(*figures: Array) -> str:
-    """Return a phrase if each figure lies on a plane conic; else ""."""
+    """Return a phrase if each set of points lies on a plane conic, else ''."""
     for figure in figures:
         if not _vanishes(figure, 2):
             return ""

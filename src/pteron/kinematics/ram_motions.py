@@ -16,9 +16,9 @@ from pteron.manipulator import Manipulator
 
 
 def self_motions_of_rams(robot: Manipulator) -> tuple[str, ...]:
-    """Return phrases of the poses at which a hexapod's platform moves with its rams fixed.
+    """Return phrases on the poses at which a hexapod's platform can move with its rams fixed.
 
-    It is proved up to rounding of the points.
+    The conditions are checked up to rounding of the points.
     """
     figures = ram_figures(robot)
     if figures is None:
@@ -29,10 +29,10 @@ def self_motions_of_rams(robot: Manipulator) -> tuple[str, ...]:
 
 
 def _half_turn_phrase(base: Array, top: Array) -> str:
-    """Return a phrase if a displacement maps platform points to guide points of paired legs.
+    """Return a phrase if the hexapod has line-symmetric self-motions (paired legs), else ''.
 
-    After it and any half turn the two legs are equally long, so that three lengths leave one of the
-    four numbers of a half turn free.
+    After this displacement and any half turn the two legs of a pair are equally long, so that three
+    lengths leave one of the four parameters of a half turn free.
     """
     for order in permutations(range(6)):
         if any(k == i or order[k] != i for i, k in enumerate(order)):
@@ -50,10 +50,10 @@ def _half_turn_phrase(base: Array, top: Array) -> str:
 
 
 def _translation_phrase(base: Array, top: Array) -> str:
-    """Return a phrase if in some orientation R all rams' vectors differ along at most one line.
+    """Return a phrase if the hexapod can translate with its rams fixed in some orientation.
 
-    P is then on spheres about that line. For v across it and w = R^T v, base v = top w: the null
-    space of (base, -top) holds a plane of such pairs, |v| = |w|.
+    P then moves on spheres about that line. For v perpendicular to it and w = R^T v, base v = top
+    w: the null space of (base, -top) contains a plane of such pairs with |v| = |w|.
     """
     sizes, axes = np.linalg.svd(np.hstack([base, -top]))[1:]
     null = axes[sizes <= ROUNDING * sizes[0]]

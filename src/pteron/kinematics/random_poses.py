@@ -22,14 +22,13 @@ def random_poses(
     type_ii: float | None = None,
     limits: bool = True,
 ) -> Poses:
-    """Return poses drawn at random from those in reach and away from singularities.
+    """Return poses drawn at random, in reach and away from singularities, (count, m).
 
-    Uniformly in position and orientation, within a box that holds all but the rarest corners.
-    Passive joints and the platform's angle keep their limits; the actuated joints need not. A
-    platform that tilts is drawn within the limits of its angles, or where it has none with each of
-    them within 0.5 rad of 0, and its actuated joints keep their limits too: poses that it takes.
-    Where fewer than one in a thousand of the poses drawn are in reach, a random walk finds where
-    they lie.
+    Poses are uniform in position and orientation, within a box that holds nearly all poses in
+    reach. Passive joints and the platform's angle keep their limits; the actuated joints need not.
+    For a platform that tilts, angles are drawn within their limits, or within 0.5 rad of 0 without
+    limits, and actuated joints keep their limits too. If fewer than one in a thousand of the poses
+    drawn are in reach, a random walk finds the region in reach.
 
     Parameters
     ----------

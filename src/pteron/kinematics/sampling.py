@@ -82,7 +82,7 @@ def draw_poses(
     *,
     limits: bool = True,
 ) -> Array:
-    """Return poses (count, m) in reach, as `random_poses` does, also if all are singular."""
+    """Return random poses (count, m) in reach, as `random_poses` does, also if all are singular."""
     conditions = _Conditions(type_i, type_ii, limits)
     sample = _search(robot, count, rng, conditions)
     if len(sample.poses) < count:
@@ -98,14 +98,14 @@ def sample_poses(
     *,
     limits: bool = True,
 ) -> Array:
-    """Return poses (count, m) in reach like `draw_poses`, or as many (k, m) as are found."""
+    """Return random poses (k, m) in reach; k = count, or less if no more are found."""
     return _search(robot, count, rng, _Conditions(type_i, 0.0, limits)).poses[:count]
 
 
 def _search(
     robot: Manipulator, count: int, rng: np.random.Generator, conditions: _Conditions
 ) -> _Sample:
-    """Return a sample of at least `count` usable poses, or of as many as are found."""
+    """Return a sample of at least `count` poses that keep the conditions, or of all found."""
     widest = widest_box(robot)
     every = np.ones(robot.freedom, dtype=bool)
     if conditions.limits and all(leg.limits for leg in robot.legs):
@@ -134,7 +134,7 @@ def _search(
 def _box_about(
     poses: Array, share: float, free: NDArray[np.bool_], widest: tuple[Array, Array]
 ) -> tuple[Array, Array]:
-    """Return the ends of the bounding box of poses, widened by a share, in the free coordinates."""
+    """Return low and high end (m,) of the box around poses, widened by a share of its sides."""
     least, most = poses.min(axis=0), poses.max(axis=0)
     margin = share * (most - least)
     low = np.where(free, np.maximum(least - margin, widest[0]), widest[0])
@@ -153,7 +153,7 @@ class _Conditions(NamedTuple):
     def select_reachable(
         self, robot: Manipulator, poses: Array, sample: _Sample | None = None
     ) -> Array:
-        """Return those of the poses that are in reach and away from singularities.
+        """Return those of the poses (K, m) in reach with sufficient singularity measures.
 
         The number in reach and the greatest measures are recorded in `sample`.
         """
@@ -172,7 +172,7 @@ class _Conditions(NamedTuple):
         return poses
 
     def keep_within_limits(self, robot: Manipulator, poses: Array) -> Array:
-        """Return those of the poses that keep the limits."""
+        """Return those of the poses (K, m) at which joints keep their limits."""
         if self.limits:
             poses = poses[(numeric(robot, "passive_room")(poses)[0] >= 0.0).all(axis=-1)]
         if self.limits and joints_limit_reach(robot):
@@ -203,7 +203,7 @@ class _Sample:
 
 
 def widest_box(robot: Manipulator) -> tuple[Array, Array]:
-    """Return the ends of a box (m,) of poses from which to draw."""
+    """Return low and high end (m,) of the box from which random poses are drawn."""
     center, radius = search_ball(robot)
     platform = robot.platform
     angles = np.array(list(platform.angle_box.values())).reshape(-1, 2)
@@ -220,10 +220,10 @@ def joint_limits(robot: Manipulator) -> Array:
 def _solved_poses(
     robot: Manipulator, low: Array, high: Array, rng: np.random.Generator, conditions: _Conditions
 ) -> Array:
-    """Return usable poses, solved by Newton's method for random joint coordinates from a box.
+    """Return poses found by Newton's method for random joint coordinates, if usable.
 
-    With short rams or cranks hardly any pose of the box is in reach. Empty where the platform does
-    not tilt, or a joint has no range (`_joint_ranges`).
+    With short rams or cranks hardly any pose of the box is in reach. The result is empty if the
+    platform does not tilt, or a joint has no range (`_joint_ranges`).
     """
     ranges = _joint_ranges(robot, limits=conditions.limits)
     if ranges is None:
@@ -237,14 +237,14 @@ def _solved_poses(
 
 
 def joints_limit_reach(robot: Manipulator) -> bool:
-    """Return whether actuated joints' limits count: strokes of rams are the reach of a hexapod."""
+    """Return whether limits of actuated joints bound the reach: only if the platform tilts."""
     return robot.platform.tilts
 
 
 def _joint_ranges(robot: Manipulator, *, limits: bool) -> Array | None:
-    """Return the ranges (2, n) of joints, m or rad, of a platform that tilts, if all have one.
+    """Return (2, n) low and high joint coordinates of a platform that tilts; None if endless.
 
-    A crank has a turn where it has no limits, or where these do not count.
+    A crank has the range of a full turn if it has no limits, or if limits are ignored.
     """
     if not joints_limit_reach(robot):
         return None
@@ -263,7 +263,7 @@ def _draw_in_box(
     rng: np.random.Generator,
     conditions: _Conditions,
 ) -> _Sample:
-    """Return at least `count` usable poses drawn from a box, or as many as are found."""
+    """Draw poses from a box until `count` keep the conditions; return the sample."""
     usable = [np.empty((0, robot.freedom))]
     sample = _Sample(usable[0], seen=usable[0])
     total = barren = 0
@@ -299,11 +299,12 @@ def _random_walk(
     rng: np.random.Generator,
     conditions: _Conditions,
 ) -> Array:
-    """Return at least `count` usable poses (k, m) that a random walk finds, or as many as it does.
+    """Return usable poses (k, m) that a random walk finds, about `count` of them.
 
-    It serves where poses in reach are so rare that drawing meets next to none: links of very
-    unequal length have a reach as thin as a shell. The poses that miss the legs' reach by least
-    lead to it; from poses in reach it spreads, in steps of which some, not all, stay there.
+    It serves machines whose poses in reach are so rare that random drawing finds next to none:
+    links of very unequal length have a reach as thin as a shell. The walk starts from the poses
+    that are least out of reach; from poses in reach it spreads by steps of which some, not all,
+    stay in reach.
     """
     poses = rng.uniform(low, high, (_BATCH, robot.freedom))
     kin = poses[:0]
@@ -333,7 +334,7 @@ def _random_walk(
 
 
 def _least_margins(robot: Manipulator, poses: Array) -> Array:
-    """Return the least margin (K,) of all legs' reach, m; -infinity where it is none."""
+    """Return the least reach margin over legs (K,), m, at poses (K, m); -inf if undefined."""
     margins = numeric(robot, "reach")(poses)[0].min(axis=-1)
     return np.asarray(np.nan_to_num(margins, nan=-np.inf))
 
@@ -341,7 +342,7 @@ def _least_margins(robot: Manipulator, poses: Array) -> Array:
 def _too_few(
     robot: Manipulator, count: int, sample: _Sample, conditions: _Conditions
 ) -> ModelError:
-    """Return the error of a search with fewer than `count` poses: it names the condition."""
+    """Return the error that fewer than `count` poses keep the conditions, naming which."""
     total = len(sample.poses)
     if sample.regular >= count:
         text = (
@@ -365,7 +366,7 @@ def _too_few(
 
 
 def _too_small_measures_phrase(robot: Manipulator, sample: _Sample, conditions: _Conditions) -> str:
-    """Return the message for poses in reach of which too few have the required measures."""
+    """Return the message that too few poses in reach have the required singularity measures."""
     head = f"only {sample.regular} of {sample.reachable} random poses in reach of all legs have "
     if sample.type_i < conditions.type_i or conditions.type_ii <= 0.0:
         return (
@@ -384,7 +385,7 @@ def _too_small_measures_phrase(robot: Manipulator, sample: _Sample, conditions: 
 
 
 def _rarely_kept_limits_phrase(robot: Manipulator, poses: Array) -> str:
-    """Return a phrase that lists the joints which rarely are within their limits at poses."""
+    """Return a phrase that lists the joints rarely within their limits at poses (K, m)."""
     pose, machine = ca.SX.sym("pose", robot.freedom), Machine.numeric(robot)
     angles, *legs = passive_joints(machine, pose)
     if joints_limit_reach(robot):
@@ -410,7 +411,7 @@ def _rarely_kept_limits_phrase(robot: Manipulator, poses: Array) -> str:
 
 
 def search_ball(robot: Manipulator) -> tuple[Array, float]:
-    """Return a centre, nearest to all legs' bounds, and a radius that hold every pose in reach.
+    """Return centre (k,) and radius, m, of a ball that holds every position of P in reach.
 
     The centre's coordinates are the pose's lengths.
     """
@@ -434,9 +435,9 @@ def search_ball(robot: Manipulator) -> tuple[Array, float]:
 
 
 def type_ii_sizes(robot: Manipulator, poses: PoseLike) -> Array:
-    """Return the size (...) of the type-II measure of poses (..., m), 0 where it is not finite.
+    """Return the absolute type-II measure (...) at poses (..., m); 0 where it is not finite.
 
-    A pose out of reach, or where a leg loses its force, thus fails every floor.
+    A pose out of reach, or where a leg transmits no force, thus fails any threshold.
     """
     sizes = np.abs(numeric(robot, "type_ii")(poses)[0])
     return np.where(np.isfinite(sizes), sizes, 0.0)

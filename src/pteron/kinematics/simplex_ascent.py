@@ -21,13 +21,13 @@ def climb(
     gain: float,
     evaluations: float = math.inf,
 ) -> tuple[Array, Array]:
-    """Return local maxima (S, k) of a function of points (..., k), and its values (S,) there.
+    """Return local maxima (S, k) of `worth` near S simplices, and its values there (S,).
 
-    From each simplex (S, k + 1, k) the search goes on until it is no larger than `size` and its
-    values differ by `gain` at most, or until as many `evaluations` would have been needed, one by
-    one. The function need not be smooth; where it is -inf no simplex goes. The method is that of
-    J. A. Nelder and R. Mead, A simplex method for function minimization, 1965, with the usual
-    factors 1, 2, 1/2 and 1/2.
+    The search from each simplex (S, k + 1, k) ends when it is no larger than `size` and its values
+    differ by at most `gain`, or when a serial search would have used `evaluations` evaluations. The
+    function need not be smooth; points at which it is -inf are avoided. The method is that of J. A.
+    Nelder and R. Mead, A simplex method for function minimization, 1965, with the usual factors 1,
+    2, 1/2 and 1/2.
     """
     if not len(simplices):
         return simplices[:, 0], np.empty(0)
@@ -58,9 +58,9 @@ def climb(
 def _step_simplices(
     worth: Callable[[Array], Array], simplex: Array, height: Array
 ) -> tuple[Array, Array, Array]:
-    """Return simplices (S, k + 1, k) after one step, their values, and the evaluations it needs.
+    """Return simplices (S, k + 1, k) after one Nelder-Mead step, values, evaluation counts.
 
-    In each simplex the best point stands first.
+    In each simplex the best point is first.
     """
     rows, (_, count, _) = np.arange(len(simplex)), simplex.shape
     middle, last = simplex[:, :-1].mean(axis=1), simplex[:, -1]

@@ -21,9 +21,9 @@ _STEP = 1e-6
 
 
 def coordinate_distances(robot: Manipulator, poses: Array) -> Array:
-    """Return the least change of points and lengths, m, that makes each pose (K, m) singular (K,).
+    """Return the least change of points and lengths, m, that makes each pose singular (K,).
 
-    It is to first order, at a held pose; NaN out of reach.
+    The distance is to first order, at a fixed pose; NaN out of reach.
     """
     unit = unit_rows(robot, poses)
     distances = np.full(len(poses), np.nan)
@@ -40,7 +40,7 @@ def coordinate_distances(robot: Manipulator, poses: Array) -> Array:
 
 
 def _slopes(robot: Manipulator, poses: Array) -> Array:
-    """Return the derivatives (B, K, n, m) of unit rows by points and lengths, 1/m."""
+    """Return derivatives (B, K, n, m) of normalised Jacobian rows by points and lengths, 1/m."""
     changes = [v for v in variations(robot) if v.group in ("points", "lengths")]
     frame = row_frame(robot, poses)
     step = _STEP * frame.length
@@ -54,10 +54,10 @@ def _slopes(robot: Manipulator, poses: Array) -> Array:
 def _rows_of(
     robot: Manipulator, kernel: str, changes: list[Variation], amounts: Array, poses: Array
 ) -> Array:
-    """Return the rows (B, K, n, 6 or m) of B changed machines at poses (K, m).
+    """Return the Jacobian rows (B, K, n, 6 or m) of B changed machines at poses (K, m).
 
-    `kernel` is that of a `RowFrame`, and `amounts` (B, len(changes)), m, are the sizes of the
-    changes of each machine.
+    `kernel` is the one that a `RowFrame` names, and `amounts` (B, len(changes)), m, are the changes
+    of each machine.
     """
     geometry = varied_numbers(robot, changes, amounts)
     function = general_program(robot, kernel).function

@@ -49,17 +49,17 @@ _HALVINGS = 50
 
 @lru_cache(maxsize=64)
 def best_type_ii(robot: Manipulator) -> float:
-    """Return the largest type-II measure, in size, of poses in reach; 1 if all are singular.
+    """Return the largest absolute type-II measure over poses in reach; 1 if all are singular.
 
-    It is the best of many random poses, the foremost of them improved by Nelder and Mead's method.
-    Limits do not count: it is a measure of the geometry, which another limit leaves as it is.
+    The best of many random poses are improved by the Nelder-Mead method. Joint limits are ignored,
+    so that the value depends on the geometry alone.
     """
     key = "best_type_ii", geometry_only(robot)
     return cached_result(key, ("kinematics",), lambda: _best_type_ii(robot))
 
 
 def _best_type_ii(robot: Manipulator) -> float:
-    """Return the largest type-II measure of poses in reach, by local searches from random poses."""
+    """Return the largest absolute type-II measure, by local searches from random poses."""
 
     def measure(poses: Array) -> Array:
         """Return the type-II measures (K,) of poses (K, m); 0 out of reach."""
@@ -83,7 +83,7 @@ def _best_type_ii(robot: Manipulator) -> float:
 
 
 def singular_orientations(robot: RobotLike, position: ArrayLike | None = None) -> Array:
-    """Return the orientations of the platform that are singular (type II), at a position.
+    """Return the platform angles (A,), rad, at which the machine is singular (type II).
 
     For P-R-R-R legs under a 3T1R platform det J is a multiple of A cos(phi) + B sin(phi), whatever
     the position: there are two singular orientations, 180 degrees apart. For other legs they depend
@@ -137,7 +137,7 @@ def singular_orientations(robot: RobotLike, position: ArrayLike | None = None) -
 
 
 def _sign_changes(robot: Manipulator, position: Array) -> Array:
-    """Return the angles at which the type-II measure at a position changes its sign, in reach."""
+    """Return the angles, rad, at which the type-II measure at a position changes its sign."""
 
     def measure(angles: Array) -> Array:
         """Return the type-II measures (K,) at the position with angles (K,), rad."""
@@ -167,5 +167,5 @@ def _sign_changes(robot: Manipulator, position: Array) -> Array:
 
 
 def _wrap_angles(angles: Array) -> Array:
-    """Return angles in (-pi, pi]."""
+    """Return angles wrapped to (-pi, pi], rad."""
     return np.asarray(np.pi - (np.pi - angles) % (2.0 * np.pi))

@@ -24,11 +24,11 @@ _HUGE = 1e30
 def tilting_poses(
     robot: Manipulator, joints: Array
 ) -> tuple[NDArray[np.int64], Array, NDArray[np.bool_]]:
-    """Return the row of joint coordinates (B, n) of each pose, ascending, and the poses (K, m).
+    """Return all poses of joint coordinates (B, n) of a tilting platform, with the row of each.
 
-    The third result is whether the platform can move while a row's joints are held (B,), a
-    self-motion, of which no poses are listed. Poses of a tripod on the other side of its yaw are
-    excluded.
+    The third result (B,) is whether the platform can move while a row's joints are held (a
+    self-motion), for which no poses are listed. Poses of a tripod with the other solution of its
+    yaw are excluded.
     """
     centers, squares = spheres_kernel(robot)(joints)
     good = np.flatnonzero(
@@ -80,7 +80,7 @@ def tilting_poses(
 
 
 def _equations(robot: Manipulator, centers: Array, squares: Array) -> tuple[Array, Array, Array]:
-    """Return a, b and r of spheres |P + R b - a|^2 = r and planes a.(P + R b) = r."""
+    """Return a, b, r of the closures: spheres |P + R b - a|^2 = r, planes a.(P + R b) = r."""
     platform, count = robot.platform, len(centers)
     points = np.array([leg.platform_point for leg in robot.legs]) @ np.array(platform.frame)
     if platform.second_axis is not None:  # whose angle with the first does not change

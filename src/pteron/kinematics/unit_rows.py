@@ -61,7 +61,7 @@ class RowFrame:
     angular: NDArray[np.bool_]
 
     def normalise(self, rows: Array) -> tuple[Array, Array]:
-        """Return unit rows (..., K, n, m) of a kernel's rows, and their divisors (..., K, n)."""
+        """Return Jacobian rows (..., K, n, m) scaled to unit length, and their divisors."""
         if self.motion is None:
             scaled = np.where(self.angular, rows / self.length, rows)
             sizes = np.linalg.norm(scaled[..., ~self.angular], axis=-1)
@@ -72,14 +72,14 @@ class RowFrame:
 
 
 def unit_rows(robot: Manipulator, poses: Array) -> UnitRows:
-    """Return the unit rows of the legs at poses (K, m)."""
+    """Return the legs' Jacobian rows at poses (K, m), scaled to unit length, with the scales."""
     frame = row_frame(robot, poses)
     rows, sizes = frame.normalise(numeric(robot, frame.kernel)(poses)[0])
     return UnitRows(rows, sizes, frame.length)
 
 
 def row_frame(robot: Manipulator, poses: Array) -> RowFrame:
-    """Return the scaling of a kernel's rows at poses (K, m) to unit rows."""
+    """Return the scaling that makes Jacobian rows at poses (K, m) unit rows."""
     points = np.array([leg.platform_point for leg in robot.legs])
     middle = np.zeros(3) if robot.platform.center else points.mean(axis=0)
     length = float(np.linalg.norm(points - middle, axis=1).max())
@@ -105,9 +105,9 @@ def row_frame(robot: Manipulator, poses: Array) -> RowFrame:
 
 
 def normalise_rows(twists: Array, arm: Array, length: float) -> tuple[Array, Array]:
-    """Return rows (K, n, 6) of unit forces in (v, L omega), and their divisors (K, n).
+    """Return force rows (K, n, 6) scaled to unit size, moments over `length`, and divisors (K, n).
 
-    A leg that turns the platform alone has a unit couple, force times L.
+    The row of a leg that only turns the platform has a unit couple, force times `length`.
     """
     forces, moments = twists[..., :3], twists[..., 3:]
     moments = (moments - np.cross(arm[:, None, :], forces)) / length
@@ -117,7 +117,7 @@ def normalise_rows(twists: Array, arm: Array, length: float) -> tuple[Array, Arr
 
 
 def least_singular_values(robot: Manipulator, poses: Array) -> Array:
-    """Return the least singular value (K,) of the unit rows at poses; NaN out of reach."""
+    """Return the least singular value (K,) of the unit Jacobian rows at poses; NaN out of reach."""
     rows = unit_rows(robot, poses).rows
     least = np.full(len(rows), np.nan)
     good = np.isfinite(rows).all(axis=(1, 2))

@@ -17,7 +17,7 @@ _WOUND = 6.0 * np.pi
 
 
 def unlikely_length(robot: Manipulator) -> float:
-    """Return the length, m, above which a number is likely in millimetres."""
+    """Return the length, m, above which a coordinate of the machine is likely in millimetres."""
     return 10.0 * max(
         hypot(*leg.guide_point) + leg.size + hypot(*leg.platform_point) for leg in robot.legs
     )
@@ -28,8 +28,8 @@ def unlikely_values(
 ) -> tuple[str, ...]:
     """Return a warning for each column of poses or joints that is probably in another unit.
 
-    `coordinates` (..., C), m and rad, are those of the columns, such as ``x``, ``phi`` or ``rho1``;
-    columns of other names are ignored.
+    `coordinates` (..., C), m and rad, are the values of the columns, such as ``x``, ``phi`` or
+    ``rho1``; columns of other names are ignored.
     """
     length, limits = unlikely_length(robot), robot.platform.angle_limits
     # Angles of a platform that tilts repeat beyond half a turn.
@@ -67,6 +67,6 @@ def _turn(limits: tuple[float, float] | None, least: float) -> float:
 def warn_of_unlikely(
     robot: Manipulator, columns: Sequence[str], coordinates: Array, source: str = ""
 ) -> None:
-    """Warn, with `UnlikelyValue`, about coordinates that are probably in another unit."""
+    """Issue an `UnlikelyValue` warning for each column of coordinates probably in another unit."""
     for text in unlikely_values(robot, columns, coordinates):
         warn_unlikely(f"{source}{text}")

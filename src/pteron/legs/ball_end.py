@@ -23,7 +23,7 @@ def every_axis() -> tuple[Vector, ...]:
 
 @property  # type: ignore[misc]
 def held_plane(leg: Any) -> HeldPlane:
-    """The plane that a leg's platform point never leaves.
+    """Return the plane that a leg's platform point never leaves, through its guide point.
 
     It is normal to the leg's direction `d` and contains its guide point `r`.
     """
@@ -33,11 +33,11 @@ def held_plane(leg: Any) -> HeldPlane:
 def ball_cone(
     cone: Cone | None, motion: LegMotion, socket: Expression, length: float
 ) -> list[Passive]:
-    """Return the limit of the ball joint at the platform; an empty list if `cone` is None.
+    """Return the limit of the ball joint at the platform as a list; [] if `cone` is None.
 
-    It is the angle, rad, between the link that ends at the platform (`length`, m) and the axis of
-    `cone`, in the platform's frame. The columns of `socket` (3, 3) are the platform's axes in the
-    base frame.
+    The limit is on the angle, rad, between the link that ends at the platform (`length`, m) and the
+    axis of `cone`, in the platform's frame. The columns of `socket` (3, 3) are the platform's axes
+    in the base frame.
     """
     link = motion.links[1]
     assert link is not None
@@ -51,11 +51,11 @@ def ball_joint(
     rate: Expression,
     acceleration: Expression,
 ) -> list[Joint]:
-    """Return hinges that together equal the ball joint at c (3, 1), m, of the platform.
+    """Return hinges that together equal a ball joint at c (3, 1), m, one for each platform turn.
 
-    One for each turn of the platform's rotation, about that turn's axis; its rate is the platform's
-    turn relative to the leg's last link. `rate` (3, 1), rad/s, and `acceleration` (3, 1), rad/s^2,
-    are the link's angular velocity and acceleration; `row` (3, 6) are the velocity's derivatives by
+    Each hinge is about the axis of one of the platform's turns; its rate is that turn's relative to
+    the leg's last link. `rate` (3, 1), rad/s, and `acceleration` (3, 1), rad/s^2, are the link's
+    angular velocity and acceleration; `row` (3, 6) are the derivatives of the angular velocity by
     (c', omega).
     """
     return [

@@ -22,26 +22,26 @@ _ROUNDING = 1e-15
 
 
 def edges_of_reach(lu: Expression, ll: Expression, n2: Expression) -> tuple[Expression, Expression]:
-    """Return (lu + ll)^2 - n2 and n2 - (lu - ll)^2, negative beyond reach; n2 is u . u."""
+    """Return (lu + ll)^2 - n2 and n2 - (lu - ll)^2, m^2, negative out of reach; n2 = u . u."""
     longest, shortest = lu + ll, lu - ll  # Remark 1: radii, not diameters
     return longest * longest - n2, n2 - shortest * shortest
 
 
 def squared_reach(lu: Expression, ll: Expression, n2: Expression) -> Expression:
-    """Return Delta, the radicand of Eqs. (1) and (2), its four factors paired; n2 is u . u."""
+    """Return Delta = ((lu + ll)^2 - n2) (n2 - (lu - ll)^2), m^4, negative out of reach."""
     stretched, folded = edges_of_reach(lu, ll, n2)
     return stretched * folded
 
 
 def quarter_turn(v: Expression) -> Expression:
-    """Return d x v for a vector v of the plane, or for the columns of a matrix (2, K)."""
+    """Return v (2, K), or each column, rotated by +90 degrees in the plane."""
     return ca.vertcat(-v[1, :], v[0, :])
 
 
 def links_from_triangle(
     lu: Expression, ll: Expression, sigma: Expression, u: Expression
 ) -> tuple[Expression, Expression, Expression]:
-    """Return links l_u + l_l = u (Eqs. 1 and 2) and 1/D with D = (l_u x l_l) . d.
+    """Return the two links l_u + l_l = u (2, 1), and 1 / D with D = (l_u x l_l) . d.
 
     D = -sigma sqrt(Delta) / 2: twice the area of the links' triangle.
     """
@@ -56,7 +56,7 @@ def links_from_triangle(
 def first_moment(
     vector: Expression, hx: Expression, hy: Expression
 ) -> tuple[Expression, Expression]:
-    """Return h = vector hx + (d x vector) hy and d x h, each (2, K)."""
+    """Return the first moment h (2, K) of (hx, hy) along `vector`, and d x h."""
     turned = quarter_turn(vector)
     return (
         ca.mtimes(vector, hx) + ca.mtimes(turned, hy),
@@ -65,16 +65,16 @@ def first_moment(
 
 
 def pole(direction: Sequence[float]) -> tuple[int, int]:
-    """Return the index of a unit vector's largest component and its sign, for `plane_axis`."""
+    """Return index and sign of a unit vector's largest component, as `plane_axis` takes them."""
     i = max(range(3), key=lambda j: abs(direction[j]))
     return i, 1 if direction[i] > 0 else -1
 
 
 def plane_axis(d: Expression, i: int, sign: int) -> Expression:
-    """Return a unit vector a perpendicular to d, without a root; d along axis i gives axis i + 1.
+    """Return a unit vector (3, 1) perpendicular to d, by a formula without a square root.
 
-    It is the image of axis i + 1 under the reflection that takes axis i to -sign d. `sign` is that
-    of d's component i, so that the denominator is at least 1.
+    It is axis i + 1 reflected by the reflection that maps axis i to -sign d. `sign` is the sign of
+    d's component i, so that the denominator is at least 1.
     """
     unit = ca.DM.eye(3)
     v = d + sign * unit[:, i]
@@ -95,13 +95,13 @@ def plane_of(d: Expression, a: Expression) -> Expression:
 
 @lru_cache(maxsize=256)
 def perpendicular_to(d: Vector) -> Vector:
-    """Return a unit vector of numbers perpendicular to another."""
+    """Return a unit vector perpendicular to the unit vector d."""
     x, y, z = (float(part) for part in ca.vertsplit(plane_axis(ca.DM(list(d)), *pole(d))))
     return (x, y, z)
 
 
 def random_vector(length: Fraction, dimension: int, rng: Random) -> list[Fraction]:
-    """Return a random vector with this length, rational by its stereographic projection."""
+    """Return a random vector (dimension,) of this length with rational components."""
     flat = [random_fraction(rng) for _ in range(dimension - 1)]
     square = sum(t * t for t in flat)
     return [length * part / (1 + square) for part in (*(2 * t for t in flat), 1 - square)]
@@ -110,7 +110,7 @@ def random_vector(length: Fraction, dimension: int, rng: Random) -> list[Fractio
 def random_triangle(
     values: Mapping[str, Sequence[Fraction]], rng: Random
 ) -> tuple[list[Fraction], int]:
-    """Return the sum of two links drawn in their plane, in fractions, and the side of the elbow."""
+    """Return the sum u (3,) of two random links in their plane, and the elbow's sign."""
     a = values["plane_axis"]
     b = cross(values["direction"], a)
     (ua, ub), (la, lb) = (

@@ -39,14 +39,14 @@ class Cone:
 
 
 def angle_between(a: Expression, b: Expression) -> Expression:
-    """Return the angle between two vectors, 0 to pi."""
+    """Return the angle between two vectors (3, 1), rad, 0 to pi."""
     return ca.atan2(ca.norm_2(ca.cross(a, b)), ca.dot(a, b))
 
 
 def cone_limit(
     noun: str, cone: Cone | None, socket: Expression, rod: Expression, length: float
 ) -> list[Passive]:
-    """Return the limit on the angle of a rod, seen from its joint, to a cone's axis; if any.
+    """Return the limit, in a list or [], on a rod's angle to the cone's axis at a ball joint.
 
     The columns of `socket` (3, 3) are the axes of the body that carries the socket.
     """
@@ -64,5 +64,5 @@ def joint_limit(
     limits: tuple[float, float] | None,
     lever: float,
 ) -> list[Passive]:
-    """Return a passive joint with its limits; an empty list without limits."""
+    """Return a passive joint with limits in a list; [] if `limits` is None."""
     return [] if limits is None else [Passive(noun, unit, value, *limits, lever)]

@@ -63,7 +63,7 @@ class _LegInMotion:
 def faults(
     leg: LegKind, axis: Vector | None = None, seed: int = 0, *, tilts: bool = False
 ) -> tuple[str, ...]:
-    """Return the breaches of the protocol by a leg, one line each; () where it conforms.
+    """Return the faults of a leg against the protocol of legs, one line each; () if none.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ def faults(
 
 
 def _joint_faults(at: _LegInMotion) -> Iterator[str]:
-    """Yield the faults of rates, accelerations and rows of coordinate and chain's joints."""
+    """Yield the faults of joint rates, accelerations and Jacobian rows against derivatives."""
     motion = at.motion
     row = motion.row / motion.divisor
     pairs = {
@@ -120,14 +120,14 @@ def _joint_faults(at: _LegInMotion) -> Iterator[str]:
 
 
 def _screw(kind: str, axis: Expression, point: Expression, c: Expression) -> Expression:
-    """Return the velocity at c and the angular velocity (6, 1), per unit of a joint's rate."""
+    """Return velocity at c and angular velocity (6, 1) for a joint rate of 1."""
     if kind == "P":
         return ca.vertcat(axis, ca.SX(3, 1))
     return ca.vertcat(ca.cross(axis, c - point), axis)
 
 
 def _body_faults(at: _LegInMotion) -> Iterator[str]:
-    """Yield the faults of the bodies' rows, accelerations and axes against exact derivatives."""
+    """Yield the faults of bodies' rows, accelerations and axes against exact derivatives."""
     for letter, body in at.motion.bodies.items():
         velocity = ca.mtimes(body.velocity_row, at.twist)
         turning = ca.mtimes(body.turning_row, at.twist)
@@ -150,7 +150,7 @@ def _body_faults(at: _LegInMotion) -> Iterator[str]:
 
 
 def _force_faults(at: _LegInMotion) -> Iterator[str]:
-    """Yield the faults of `needs` against `needs_of_bodies`, and of its power against energy."""
+    """Yield the faults of the leg's forces against its bodies' and of power against energy."""
     state = at.point, at.rotation, at.gravity, at.inertia
     needs, body_needs = at.equations.needs(*state), at.equations.needs_of_bodies(*state)
     point_needs = (
@@ -181,7 +181,7 @@ def _force_faults(at: _LegInMotion) -> Iterator[str]:
 
 
 def _locus_faults(at: _LegInMotion) -> Iterator[str]:
-    """Yield a fault if c is not on the leg's locus at the joint's coordinate."""
+    """Yield a fault if the platform point c is not on the leg's locus at the joint coordinate."""
     locus, c = at.equations.locus(at.motion.coordinate), at.point.position
     if isinstance(locus, PlaneLocus):
         pair = ca.dot(locus.normal, c), locus.offset

@@ -65,7 +65,7 @@ class CrankLeg(LegKind):
 
     @property
     def quantities(self) -> tuple[LegQuantity, ...]:
-        """The geometry of crank and last link; the angle is the nearest to `middle`, rad."""
+        """The leg's geometric quantities: points, directions, lengths, `middle` angle and elbow."""
         # The crank's angle is the one nearest to the middle of its limits, else in (-pi, pi].
         low, high = self.limits or (0.0, 0.0)
         inside = -math.pi < low and high <= math.pi
@@ -96,11 +96,11 @@ class CrankLeg(LegKind):
         return self.zero_direction
 
     def zero_at(self, zero: float) -> dict[str, Any]:
-        """Return the `zero_direction` for which the crank's angle counts from `zero`, rad."""
+        """Return the field `zero_direction` that makes the crank's angle count from `zero`, rad."""
         return {"zero_direction": self._direction_at(zero)}
 
     def _direction_at(self, angle: float) -> Vector:
-        """Return the crank's direction at an angle, a unit vector in the base frame."""
+        """Return the unit vector of the crank in the base frame at an angle, rad."""
         normal_direction = cross(self.direction, self.zero_direction)
         return shift_point(
             scale_vector(self.zero_direction, math.cos(angle)), normal_direction, math.sin(angle)
@@ -118,7 +118,7 @@ class CrankLeg(LegKind):
 
     @property
     def extents(self) -> dict[str, tuple[str, float, float, str]]:
-        """The usual range of x of the centres of mass of crank and last link, m."""
+        """The range of x, m, where crank and last link usually have their centres of mass."""
         last = self.names["l"]
         return {
             "u": ("upper", 0.0, self.upper_length, f"its axis and the {last}"),
@@ -126,7 +126,7 @@ class CrankLeg(LegKind):
         }
 
     def transfers(self, gravity: Vector) -> tuple[LegTransfer, ...]:
-        """Return the transfers of a crank on a fixed axis and of the joint between both links."""
+        """Return which inertial parameters of crank and last link transfer to others, and why."""
         last = self.names["l"]
         transfer_list = [
             LegTransfer("the crank{} turns about a fixed axis", {("m", "u"): (1, ())}),
@@ -178,15 +178,15 @@ class CrankEquations(LegEquations):
 
     @abstractmethod
     def to_link_space(self, v: Expression) -> Expression:
-        """Return a vector (3, K) in the link's space: itself, or (2, K) in the crank's plane."""
+        """Return a vector (3, K) as the link's space has it: as it is, or (2, K) in a plane."""
 
     @abstractmethod
     def plane_to_link_space(self, v: Expression) -> Expression:
-        """Return a vector of the crank's plane (2, K) in the last link's space."""
+        """Return a vector (2, K) of the crank's plane as (2, K) or (3, K) of the link's space."""
 
     @abstractmethod
     def height(self, w: Expression) -> Expression:
-        """Return the distance of c from the crank's plane, 0 for a planar link; w = c - r."""
+        """Return the distance of c from the crank's plane, m, 0 for a planar link; w = c - r."""
 
     @abstractmethod
     def last_link(
@@ -196,10 +196,10 @@ class CrankEquations(LegEquations):
         at: CrankState,
         crank: Joint,
     ) -> tuple[BodyMotion, list[Joint], tuple[Expression, Expression] | None]:
-        """Return the last link's motion, the joints after the crank, the link's rate and growth."""
+        """Return the last link's motion, the joints after the crank, the link's angular motion."""
 
     def _triangle(self, w: Expression) -> tuple[Expression, Expression, Expression]:
-        """Return u, h and lu^2 u.u - h^2, a quarter of the Delta of two circles, for w = c - r.
+        """Return u, h and lu^2 u.u - h^2 of the triangle of crank and last link, for w = c - r.
 
         The length of the last link is |w - l_u| = ll, so that u . l_u = h, u being in the plane.
         """
@@ -208,7 +208,7 @@ class CrankEquations(LegEquations):
         return u, h, self.lu * self.lu * ca.dot(u, u) - h * h
 
     def state(self, point: PointMotion) -> CrankState:
-        """Return crank, last link, and the crank's rate and acceleration.
+        """Return the vectors of crank and last link, and the crank's angular rate and acceleration.
 
         b . c' = (b . g) q'. Differentiated, (b . g) q'' = b . c'' + b' . b' - q'^2 b . g', whose
         last two terms are c' . c' + q' (q' h - 2 g . c').
@@ -227,11 +227,11 @@ class CrankEquations(LegEquations):
         return CrankState(l_u, g, b, divisor, rate, acceleration)
 
     def to_base_frame(self, v: Expression) -> Expression:
-        """Return a vector of the last link's space in the base frame (3, K)."""
+        """Return a vector of the last link's space in the base frame, (3, K)."""
         return v if v.shape[0] == 3 else ca.mtimes(self.plane, v)
 
     def motion(self, point: PointMotion, rotation: RotationMotion) -> LegMotion:
-        """Return the motion of the leg; q' = row (c', omega) / (b . g), the crank's rate, rad/s."""
+        """Return the leg's motion, from the motion of its platform point and the rotation."""
         at = self.state(point)
         l_u, g, b = (self.to_base_frame(v) for v in (at.l_u, at.g, at.b))
         full, square = point_rows(b.T), at.rate * at.rate
@@ -259,7 +259,7 @@ class CrankEquations(LegEquations):
         )
 
     def exported_terms(self, point: PointMotion, rotation: RotationMotion) -> dict[str, Expression]:
-        """Return the closure's named terms w, u, n2, h, quarter, root, and the crank's vectors."""
+        """Return intermediate quantities of the leg's equations by name, for exported code."""
         w, at = point.position - self.r, self.state(point)
         u, h, quarter = self._triangle(w)
         n2, root = ca.dot(u, u), ca.sqrt(quarter)
@@ -268,7 +268,7 @@ class CrankEquations(LegEquations):
         return {**closing, **crank, "theta_rate2": at.rate * at.rate}
 
     def reach(self, c: Expression) -> Reach:
-        """Return the reach by the least and greatest distance of c from the crank's circle."""
+        """Return the leg's reach margins from the distance of c to the crank's circle."""
         w = c - self.r
         u, _, quarter = self._triangle(w)
         near, far = (ca.sqrt(square) for square in self._distances(w))
@@ -276,13 +276,13 @@ class CrankEquations(LegEquations):
         return Reach(margin, quarter, (self.lu * self.ll) ** 2, ca.sqrt(ca.dot(u, u)))
 
     def _distances(self, w: Expression) -> tuple[Expression, Expression]:
-        """Return the squares of the least and greatest distance of c from the crank's circle."""
+        """Return the squared least and greatest distance, m^2, of c from the crank's circle."""
         u, height = ca.mtimes(self.plane.T, w), self.height(w)
         n = ca.sqrt(ca.dot(u, u))
         return (n - self.lu) ** 2 + height**2, (n + self.lu) ** 2 + height**2
 
     def edges(self, c: Expression) -> dict[str, Expression]:
-        """Return the margins of ll^2, m^2, to the squared distances of c from the circle."""
+        """Return margins, m^2, by name: ll^2 to squared distances of c from the crank's circle."""
         near, far = self._distances(c - self.r)
         longest = self.ll * self.ll
         return {"stretched": longest - near, "folded": far - longest}
@@ -290,10 +290,10 @@ class CrankEquations(LegEquations):
     def limit_margins(
         self, c: Expression, q: Expression, low: float, high: float
     ) -> dict[str, Expression]:
-        """Return the sines of the crank's angles to its limits, times lu n^2: not negative within.
+        """Return margins of the crank's limits, by name, not negative within; low, high in rad.
 
-        They avoid the angle, which jumps at half a turn. Limits more than that apart are one
-        condition: that the crank is no farther from their middle than they are.
+        They avoid the angle, which jumps at half a turn. Limits more than half a turn apart are one
+        condition: the crank's distance from their middle.
         """
         w = c - self.r
         u, h, quarter = self._triangle(w)
@@ -311,16 +311,16 @@ class CrankEquations(LegEquations):
         }
 
     def _plane_direction_at(self, q: Expression) -> Expression:
-        """Return the crank's direction at an angle q, a unit vector (2, 1) of its plane."""
+        """Return the crank's direction (2, 1) in its plane at an angle q, rad."""
         turn = q - self.middle
         return ca.cos(turn) * self.zero + ca.sin(turn) * quarter_turn(self.zero)
 
     def lever(self, length: Expression) -> Expression:
-        """Return the crank's length, m per rad."""
+        """Return the crank's length, m per rad; `length` is ignored."""
         return self.lu
 
     def tip(self, q: Expression) -> Expression:
-        """Return the crank's end at an angle q."""
+        """Return the position of the crank's end (3, 1), m, at an angle q, rad."""
         return self.r + self.lu * ca.mtimes(self.plane, self._plane_direction_at(q))
 
     def needs(
@@ -330,12 +330,12 @@ class CrankEquations(LegEquations):
         gravity: Expression,
         inertia: Mapping[str, Moments],
     ) -> Needs:
-        """Return the required forces of crank and last link, the latter's at its ends.
+        """Return the forces that crank and last link require at joint and platform point.
 
         With eta = m gamma_x / ll, nu = m gamma_y / ll and mu = I / ll^2 of the last link, alpha =
-        eta + mu, t the tip and z = d, the tip needs mu t'' - alpha c'' + eta g + nu z x (c'' - g)
-        and the platform point alpha (g - t'') - nu z x (t'' - g) beside a mass m + eta + alpha
-        that rides. A rod has no m gamma_y.
+        eta + mu, t the tip and z = d, the tip needs mu t'' - alpha c'' + eta g + nu z x (c'' - g);
+        the platform point needs alpha (g - t'') - nu z x (t'' - g), besides a point mass m + eta +
+        alpha. A rod has no m gamma_y.
         """
         at, upper, lower = self.state(point), inertia["u"], inertia["l"]
         lu2, weight = self.lu * self.lu, ca.mtimes(self.plane.T, gravity)

@@ -15,10 +15,10 @@ from pteron.toml import keep_checked, raise_faults
 def _number_check(
     condition: Callable[[float], bool], expectation: str, optional: bool = True
 ) -> Callable[[object, str], float | None]:
-    """Return the validator of a number, which is None where an optional one is omitted."""
+    """Return a validator that accepts a number if `condition` holds, and None if `optional`."""
 
     def check(value: object, key: str) -> float | None:
-        """Return a number that meets the condition; None if it is optional and omitted."""
+        """Return `value` as a number if it meets the condition; None if optional and omitted."""
         if value is None and optional:
             return None
         converted = number(value, key)
@@ -229,7 +229,7 @@ class Drive:
         raise_faults(faults)
 
     def _wrong_parts(self) -> list[str]:
-        """Return the faults of parts of a wrong type; convert lists to tuples."""
+        """Return the faults of drive parts of a wrong type; convert lists to tuples in place."""
         faults = []
         parts = {"stribeck": Stribeck, "lugre": LuGre, "elastic": Elastic, "winding": Winding}
         for name, kind in parts.items():
@@ -258,7 +258,7 @@ class Drive:
         return faults
 
     def _contradictions(self, wrong: set[str]) -> list[str]:
-        """Return the contradictions between parts, except those that are `wrong` by themselves."""
+        """Return the contradictions between the drive's parts, the names in `wrong` left out."""
         faults = []
         if "elastic" not in wrong and self.elastic and not self.rotor_inertia:
             faults.append(
@@ -285,15 +285,15 @@ class Drive:
 
     @property
     def gear(self) -> float:
-        """Motor turns per turn of a crank, or rad of the motor per m of a slider; 1 by default."""
+        """The gear ratio: motor rad per rad of a crank or per m of a slider; 1 by default."""
         return 1.0 if self.ratio is None else self.ratio
 
     @property
     def inertia(self) -> float:
-        """The motor's inertia at the joint, ratio^2 rotor_inertia, kg or kg m^2."""
+        """The rotor's inertia reflected to the joint, ratio^2 rotor_inertia, kg or kg m^2."""
         return self.gear**2 * self.rotor_inertia
 
     @property
     def rated_force(self) -> float | None:
-        """The motor's rated torque at the joint, N or N m."""
+        """The motor's rated torque as a force at the joint, N or N m; None if not given."""
         return None if self.rated_torque is None else abs(self.gear) * self.rated_torque

@@ -29,9 +29,9 @@ _QUANTITIES = (
 
 
 def drive_rows(legs: Sequence[LegKind]) -> list[tuple[str, list[str]]]:
-    """Return a row for each quantity that some drive has: its name, a text a leg, "-" for none.
+    """Return table rows of the drives' quantities: (name, a text for each leg).
 
-    A unit that all legs share stands with the name.
+    A unit that all legs share is part of the quantity's name.
 
     Examples
     --------
@@ -58,7 +58,7 @@ def drive_rows(legs: Sequence[LegKind]) -> list[tuple[str, list[str]]]:
 
 
 def _drive_number(drive: Drive | None, place: str) -> float | None:
-    """Return a number of a drive, by its attribute path; None if it has none."""
+    """Return a number of a drive by attribute path ("elastic.stiffness"); None if absent."""
     if drive is None or (place == "rest_speed" and not (drive.coulomb or drive.stribeck)):
         return None
     quantity: Drive | Stribeck | Elastic | float | None = drive
@@ -68,7 +68,7 @@ def _drive_number(drive: Drive | None, place: str) -> float | None:
 
 
 def _units(leg: LegKind) -> dict[str, str]:
-    """Return the units of a leg's drive numbers by quantity, linear or rotary."""
+    """Return the units of a leg's drive quantities ("force", "rate" ...), linear or rotary."""
     slides = leg.joint.unit == "m"
     return {
         "joint": leg.joint.unit,

@@ -33,7 +33,7 @@ _WAVE = 0.5
 
 
 def drive_warnings(leg: LegKind) -> Iterator[str]:
-    """Yield warnings about a leg's drive by itself, one line each."""
+    """Yield warnings about unlikely values of a leg's drive, one line each."""
     drive = leg.drive
     if drive is None:
         return
@@ -89,7 +89,7 @@ def drive_warnings(leg: LegKind) -> Iterator[str]:
 
 
 def _elastic_warnings(drive: Drive, bends: Elastic, unit: str) -> Iterator[str]:
-    """Yield warnings about an elastic transmission."""
+    """Yield warnings about unlikely values of an elastic transmission."""
     stiffness = "N/m" if unit == "m" else "N m/rad"
     frequency = sqrt(bends.stiffness / drive.inertia) / (2.0 * pi)
     if not _SLOWEST <= frequency <= _FASTEST:
@@ -102,7 +102,7 @@ def _elastic_warnings(drive: Drive, bends: Elastic, unit: str) -> Iterator[str]:
 
 
 def _winding_warnings(drive: Drive, winding: Winding, unit: str, rate: str) -> Iterator[str]:
-    """Yield warnings about a winding that is inconsistent with the drive's other numbers."""
+    """Yield warnings about a motor winding inconsistent with the drive's other values."""
     constant = abs(drive.gear) * winding.torque_constant
     stall, fastest = constant * winding.voltage / winding.resistance, winding.voltage / constant
     if drive.max_force is not None and drive.max_force > stall:

@@ -34,12 +34,12 @@ Leg = PRRR
 
 
 def kind_names() -> tuple[str, ...]:
-    """Return the names of all kinds that files may name."""
+    """Return the names of all kinds of legs, built-in and of installed packages."""
     return (*KINDS, *(name for name in extension_names(GROUP) if name not in KINDS))
 
 
 def kind_named(name: str) -> type[LegKind] | None:
-    """Return a kind of leg by its name, of an installed package too; None if there is none.
+    """Return the class of a kind of leg by its name, also from a package; None if unknown.
 
     Raises
     ------

@@ -81,12 +81,12 @@ ACCOUNTS: dict[str, str] = _GROUPS.pop("accounts")
 
 
 def keys_of(*groups: str) -> dict[str, Key]:
-    """Return the keys of groups of `keys.toml`; a later group overrides an earlier one."""
+    """Return the file keys of legs in groups of `keys.toml`; later groups override earlier ones."""
     return {name: _key(**about) for group in groups for name, about in _GROUPS[group].items()}
 
 
 def _key(*, default: Any = ..., optional: bool = False, **about: Any) -> Key:
-    """Return a key from its TOML entry; the default of an optional key is None."""
+    """Return the `Key` of an entry in `keys.toml`; the default of an optional key is None."""
     default_value = tuple(default) if isinstance(default, list) else default
     return Key(**about, default=None if optional else default_value)
 
@@ -96,7 +96,7 @@ COMMON = keys_of("common")
 
 
 def parameters_section(keys: Mapping[str, Key]) -> str:
-    """Return the Parameters section of a leg's docstring."""
+    """Return the text of the Parameters section of a leg class's docstring."""
     lines = ["", "", "    Parameters", "    ----------"]
     for name, key in keys.items():
         optional = "" if key.default is ... else ", optional"
@@ -119,7 +119,7 @@ def sound_fields(
     conditions: Sequence[FieldCondition],
     branches: Sequence[int],
 ) -> tuple[dict[str, Any], list[str]]:
-    """Return the valid fields, converted, and the faults of the others.
+    """Return the valid fields, converted, and the faults of the others, one line each.
 
     Fields and conditions that depend on an invalid or missing field are not checked. `branches` are
     the values that a sign may have.
@@ -150,7 +150,7 @@ def sound_fields(
 
 
 def _check_value(value: Any, name: str, role: KeyRole) -> Any:
-    """Return a field's value, converted; raise where it is invalid."""
+    """Return a leg field's value, converted by its role; raise where it is invalid."""
     if role == "point":
         return vector(value, name)
     if role == "direction":
@@ -177,7 +177,7 @@ def _check_value(value: Any, name: str, role: KeyRole) -> Any:
 def check_elbow(
     limits: tuple[float, float] | None, least: float = 0.0, most: float = math.pi
 ) -> None:
-    """Raise where an elbow's limits exceed the range of its angle."""
+    """Raise if an elbow's limits, rad, exceed the range of its angle, `least` to `most`."""
     if limits is not None and not least <= limits[0] < limits[1] <= most:
         raise ModelError(
             f"elbow_limits: {list(limits)} rad reaches beyond {least:.4g} to {most:.4g}, where the "

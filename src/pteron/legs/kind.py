@@ -151,19 +151,19 @@ class LegKind(ABC):
 
     @classmethod
     def check_fields(cls, fields: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:
-        """Return the valid fields, converted, and the faults of the others; see `sound_fields`."""
+        """Return the valid fields of a leg, converted, and the faults of the others."""
         return sound_fields(fields, cls.every_key(), cls.conditions, cls.branches)
 
     @classmethod
     @cache
     def every_key(cls) -> dict[str, Key]:
-        """Return all its keys, in the order of files and pages."""
+        """Return all keys of this kind of leg by name, in the order of files and pages."""
         roles, keys = get_args(KeyRole), {**COMMON, **cls.keys}
         return dict(sorted(keys.items(), key=lambda named_key: roles.index(named_key[1].role)))
 
     @property
     def bodies(self) -> dict[str, Inertia]:
-        """The inertia of its bodies, by letter in the order "p", "u", "l"."""
+        """The inertia of the leg's bodies by letter: "p" slider, "u" upper, "l" lower link."""
         inertias: dict[str, Inertia] = {}
         for name, key in self.every_key().items():
             if key.body:
@@ -172,7 +172,7 @@ class LegKind(ABC):
         return {letter: inertias[letter] for letter in LEG_BODIES if letter in inertias}
 
     def with_bodies(self, bodies: Mapping[str, Any]) -> Self:
-        """Return the leg with other inertia, by letter."""
+        """Return the leg with other inertia of its bodies, given by letter."""
         new = {}
         for name, key in self.keys.items():
             if key.body:
@@ -181,15 +181,18 @@ class LegKind(ABC):
         return replace(self, **new)
 
     def with_length(self, body: str, length: float) -> Self | None:
-        """Return the leg with another length, m, of a link ("upper", "lower"), if it has one."""
+        """Return the leg with its "upper" or "lower" link of another length, m.
+
+        The result is None if the leg has no such link.
+        """
         key = f"{body}_length"
         return replace(self, **{key: length}) if key in self.every_key() else None
 
     def with_zero(self, zero: float) -> Self | None:
-        """Return the leg with its coordinate counted from `zero`, m or rad: q becomes q - zero.
+        """Return the leg with its coordinate counted from `zero`, m or rad, or None.
 
-        Limits and a `reading` are shifted with it, so that the drive's readings stay the same. None
-        where the geometry cannot represent a zero, such as a ram's length.
+        Limits and `reading` are shifted too, so that the drive's readings are unchanged. The result
+        is None for coordinates whose zero is fixed, such as a ram's length.
         """
         changed = self.zero_at(zero)
         if changed is None:
@@ -201,36 +204,40 @@ class LegKind(ABC):
         return replace(self, **changed)
 
     def zero_at(self, zero: float) -> dict[str, Any] | None:
-        """Return the changed fields of the geometry that move the coordinate's zero; or None."""
+        """Return the fields that count the joint coordinate from `zero`; None if it cannot."""
         return None
 
     @property
     def crank_at_zero(self) -> Vector | None:
-        """The unit vector along which the crank points at coordinate 0; None without a crank."""
+        """The unit vector along which the crank points at joint coordinate 0.
+
+        None without a crank.
+        """
         return None
 
     @property
     def goes_round(self) -> bool:
-        """Whether a full turn of its joint leads to the same pose, as a crank's does."""
+        """Whether a full turn of the actuated joint gives the same pose, as a crank's does."""
         return self.joint.unit == "rad" and not self.follows_angle
 
     @property
     @abstractmethod
     def quantities(self) -> tuple[LegQuantity, ...]:
-        """The geometry that its equations need, except the platform point."""
+        """The geometric quantities that the leg's equations need, except the platform point."""
 
     @abstractmethod
     def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
-        """Return axes that span the rotations of the platform that the leg does not constrain.
+        """Return axes that span the platform rotations that the leg does not constrain.
 
-        `axis` is k of a platform that turns about it, or None.
+        `axis` is the axis k about which the platform turns, or None.
         """
 
     def couples(self, motion: LegMotion, axis: Vector | None) -> Sequence[Expression] | None:
-        """Return the constraint couples (3, 1), of length 1 or less, of the leg.
+        """Return the leg's constraint couples (3, 1) on the platform, each of length 1 or less.
 
-        They constrain rotations of the part of the platform that it carries; each vanishes where it
-        loses its effect. `axis` is as in `free_axes`. None where the file does not define them.
+        They constrain rotations of the part of the platform that the leg carries; each vanishes
+        where it loses its effect. `axis` is that of `free_axes`. The result is None if the file
+        does not define the couples.
         """
         return [ca.SX(row) for row in complement(self.free_axes(axis))]
 
@@ -256,7 +263,7 @@ class LegKind(ABC):
 
     @property
     def base_axis(self) -> Vector | None:
-        """The axis of its joint with the base, as pictures show it; `joint_axis` where it has one.
+        """The axis of the leg's joint at the base, for pictures; None where it is not defined.
 
         None where it is not defined.
         """
@@ -269,12 +276,12 @@ class LegKind(ABC):
 
     @property
     def cylinder(self) -> float | None:
-        """The length of a ram's cylinder, from the base joint, as pictures show it, m."""
+        """The length of a ram's cylinder from the base joint, m, for pictures; None without one."""
         return None
 
     @property
     def bar(self) -> Vector | None:
-        """The direction from one of its parallel rods to the other; None if the file has none.
+        """The direction from one parallel rod of the leg to the other; None without any.
 
         Pictures show such rods as two.
         """
@@ -285,7 +292,7 @@ class LegKind(ABC):
 
     @property
     def lever(self) -> float:
-        """Metres that the actuated body's end moves per unit of the joint: 1 for a slider.
+        """Metres that the driven body's end moves per unit of its joint: 1 for a slider.
 
         It is meaningless for a joint that follows the platform's angle.
         """
@@ -293,12 +300,12 @@ class LegKind(ABC):
 
     @property
     def reach_bound(self) -> ReachBound | None:
-        """A bound on the platform points in reach; None where there is none."""
+        """A ball or cylinder that holds all platform points in reach; None without a bound."""
         return None
 
     @property
     def held_bound(self) -> ReachBound | None:
-        """A bound on the platform points in reach within the limits of its joint."""
+        """A bound on the platform points in reach while the actuated joint keeps its limits."""
         bound = self.reach_bound
         if bound is None or bound.line is None or self.limits is None:
             return bound
@@ -312,15 +319,15 @@ class LegKind(ABC):
     @property
     @abstractmethod
     def reach_text(self) -> str:
-        """Its reach, as a clause for messages: "its links span 0.1 to 0.4 m"."""
+        """The leg's reach as a clause for messages: "its links span 0.1 to 0.4 m"."""
 
     @property
     def extents(self) -> dict[str, tuple[str, float, float, str]]:
-        """The usual range of x of each body's mass: TOML key, least, greatest, what ends there."""
+        """Usual x of each body's centre of mass, by letter: TOML key, low, high (m), end names."""
         return {}
 
     def center_of_mass_warning(self, letter: str, x: float) -> str | None:
-        """Return a warning about a centre of mass at x, m, beyond its body's ends; None within."""
+        """Return a warning if a body's centre of mass at x, m, lies beyond the body's ends."""
         if letter not in self.extents:
             return None
         _, low, high, ends = self.extents[letter]
@@ -332,7 +339,7 @@ class LegKind(ABC):
 
     @property
     def metres(self) -> dict[str, Sequence[float]]:
-        """Its lengths, m, by key, from which a file in millimetres is recognised."""
+        """All lengths of the leg, m, by key: a file in millimetres is recognised by them."""
         lengths: dict[str, Sequence[float]] = {
             q.name: q.value for q in self.quantities if q.role == "length"
         }
@@ -344,22 +351,22 @@ class LegKind(ABC):
 
     @property
     def size(self) -> float:
-        """The length that its reach is relative to, m."""
+        """The length, m, that the leg's reach is relative to: the sum of its link lengths."""
         return sum(float(q.value[0]) for q in self.quantities if q.role == "length")
 
     def passive_joints(
         self, motion: LegMotion, zero_axes: Expression, axes: Expression
     ) -> list[Passive]:
-        """Return its passive joints that have limits.
+        """Return the passive joints of the leg that have limits, with their values in this motion.
 
         The columns (3, 3) of `axes` are the platform's axes, of `zero_axes` at phi = 0.
         """
         return []
 
     def rod_couple(self, motion: LegMotion) -> Expression | None:
-        """Return the couple (3, 1) that its rods transmit beside a force along them.
+        """Return the couple (3, 1) that parallel rods transmit beside the axial force, or None.
 
-        It is zero for a single rod; None for a leg whose chain of joints determines its wrench.
+        It is zero for a single rod; None for a leg whose joints determine its wrench.
         """
         return None
 
@@ -371,27 +378,27 @@ class LegKind(ABC):
         yield from ()
 
     def equations(self, values: Mapping[str, Expression] | None = None) -> LegEquations:
-        """Return its equations, for its geometry or for other values of its quantities."""
+        """Return the leg's equations, for its own geometry or other `values` of its quantities."""
         if values is None:
             values = {q.name: ca.SX(ca.DM(list(q.value))) for q in self.quantities}
         return self.equations_class(**values)
 
     def transfers(self, gravity: Vector) -> tuple[LegTransfer, ...]:
-        """Return the mass transfers within the leg, for gravity in the base frame."""
+        """Return how inertial parameters transfer to others within the leg, and the reasons."""
         return ()
 
     @classmethod
     def draw_closure(
         cls, values: Mapping[str, Sequence[Fraction]], rng: Random
     ) -> tuple[list[Fraction], int] | None:
-        """Return a random rational c - r whose closure has a rational root, and the elbow.
+        """Return a random rational platform point that the leg reaches, and the elbow; or None.
 
-        With it base parameters are proved over the rationals as well as modulo a prime.
+        Base parameters are proved by it over the rationals, as well as modulo a prime.
         """
         return None
 
     def map_vectors(self, turn: Any, *, platform: bool = False) -> Self:
-        """Return the leg with every base-frame vector v replaced by `turn(v)`.
+        """Return the leg with every vector v of the base frame replaced by `turn(v)`.
 
         If `platform`, vectors of the platform's frame are replaced too.
         """

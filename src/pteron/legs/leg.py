@@ -98,7 +98,7 @@ class LegMotion(NamedTuple):
 
     @property
     def actuated_joint(self) -> Joint:
-        """The actuated joint."""
+        """The actuated joint of the leg's chain."""
         return next(joint for joint in self.chain if joint.driven)
 
     @property
@@ -108,7 +108,7 @@ class LegMotion(NamedTuple):
 
     @property
     def wrench_size(self) -> Expression:
-        """The norm in space of the force that `row` is; of its moment where it has no force."""
+        """The norm of the force in `row`, or of its moment where it has no force."""
         if self.row_size is not None:
             return self.row_size
         return ca.norm_2(self.row[:3] if self.pushes else self.row[3:])
@@ -141,12 +141,12 @@ class Needs(NamedTuple):
 
     @classmethod
     def zeros(cls, columns: int) -> Needs:
-        """Return the forces of a leg without bodies, such as a cable: none."""
+        """Return the required forces of a leg without bodies: zeros with this number of columns."""
         return cls(ca.SX(1, columns), ca.SX(6, columns), ca.SX(1, columns))
 
 
 def force_wrench(force: Expression) -> Expression:
-    """Return the wrench (6, K) of a force (3, K) on the platform point alone."""
+    """Return the wrench (6, K) of forces (3, K) that act at the platform point."""
     return ca.vertcat(force, ca.SX(3, force.shape[1]))
 
 
@@ -164,9 +164,9 @@ class Reach(NamedTuple):
 
     @property
     def type_i(self) -> Expression:
-        """The type-I measure, dimensionless: 0 where the leg is singular, 1 at best, NaN beyond.
+        """The type-I measure, no unit: 0 where the leg is singular, 1 at best, NaN out of reach.
 
-        A quotient by it loses as many digits as it has leading zeros.
+        A division by it loses as many digits as it has leading zeros.
         """
         return ca.sqrt(self.discriminant / self.scale)
 
@@ -229,28 +229,28 @@ class LegEquations(ABC):
 
     @abstractmethod
     def motion(self, point: PointMotion, rotation: RotationMotion) -> LegMotion:
-        """Return the motion of the leg's joints and bodies."""
+        """Return the motion of the leg's joints and bodies, from platform point and rotation."""
 
     @abstractmethod
     def reach(self, c: Expression) -> Reach:
-        """Return whether the leg reaches c."""
+        """Return the leg's reach margins at the platform point c (3, 1), m."""
 
     def change_frame(self, axes: Expression, origin: Expression) -> LegEquations | None:
-        """Return the leg with vectors in other axes, the columns of (3, 3), about an origin.
+        """Return the leg's equations in other axes, the columns of (3, 3), or None if dearer there.
 
-        None where the leg has directions, which are cheaper in the base frame.
+        The result is None for legs with directions, whose equations are cheaper in the base frame.
         """
         return None
 
     def lever(self, length: Expression) -> Expression:
-        """Return the metres per unit of its joint; 1 for a slider.
+        """Return metres per unit of the leg's joint; 1 for a slider.
 
         `length` is the platform's characteristic length, m per rad.
         """
         return ca.SX(1)
 
     def edges(self, c: Expression) -> dict[str, Expression]:
-        """Return smooth expressions, by name, that are not negative within each edge of its reach.
+        """Return expressions, by name, that are not negative where the leg reaches c (3, 1), m.
 
         The leg reaches c where none is negative; the names distinguish the causes.
         """
@@ -259,18 +259,19 @@ class LegEquations(ABC):
     def limit_margins(
         self, c: Expression, q: Expression, low: float, high: float
     ) -> dict[str, Expression]:
-        """Return smooth expressions, by name, that are not negative within its joint's limits.
+        """Return expressions, by name, that are not negative while the joint's q is in its limits.
 
-        The joint is at q, the pose in reach. They need not be distances.
+        `low` and `high` are the limits, q the joint coordinate (m or rad) at the platform point c,
+        which the leg reaches. The expressions need not be distances.
         """
         return {"least": q - low, "most": high - q}
 
     @abstractmethod
     def locus(self, q: Expression) -> Locus:
-        """Return the locus of c while the actuated joint is at q."""
+        """Return the locus of the platform point c while the actuated joint is held at q."""
 
     def exported_terms(self, point: PointMotion, rotation: RotationMotion) -> dict[str, Expression]:
-        """Return the named terms of exported code: scalars, or vectors (2, 1) or (3, 1)."""
+        """Return intermediate quantities of the leg's equations by name, for exported code."""
         return {}
 
     def needs(
@@ -280,11 +281,11 @@ class LegEquations(ABC):
         gravity: Expression,
         inertia: Mapping[str, Moments],
     ) -> Needs:
-        """Return the forces required to move the leg's bodies.
+        """Return the forces at joint and platform point required to move the leg's bodies.
 
-        A kind of leg may override it with a cheaper form of `needs_of_bodies`, with the forces at
-        its joint in `Needs.joint` and masses at its platform point in `Needs.mass`; the conformance
-        test compares the two.
+        A kind of leg may override it with a cheaper form of `needs_of_bodies`, with forces at its
+        joint in `Needs.joint` and masses at its platform point in `Needs.mass`; the conformance
+        test compares both.
         """
         return self.needs_of_bodies(point, rotation, gravity, inertia)
 
@@ -295,10 +296,10 @@ class LegEquations(ABC):
         gravity: Expression,
         inertia: Mapping[str, Moments],
     ) -> Needs:
-        """Return the forces required to move the leg's bodies, body by body, as in the paper.
+        """Return the forces required to move the leg's bodies, summed body by body, Eq. (13).
 
-        F_b is the wrench on a body of its weight and inertia; the required wrench is -F_b. Eq. (13)
-        sums J_b^T F_b, J_b being the body's rows in (c', omega).
+        F_b is the wrench of weight and inertia on a body; the required wrench is -F_b. Eq. (13)
+        sums J_b^T F_b, J_b being the body's Jacobian by (c', omega).
         """
         if not inertia:
             return Needs.zeros(1)
@@ -313,7 +314,7 @@ class LegEquations(ABC):
         return Needs(ca.SX(1, columns), total, ca.SX(1, columns))
 
     def point_mass_needs(self, point: PointMotion, gravity: Expression, mass: Expression) -> Needs:
-        """Return the force for a mass at the platform point, outside the platform's inertia."""
+        """Return the force required to move masses (1, K) fixed at the platform point."""
         none = ca.SX(1, mass.shape[1])
         force = ca.mtimes(point.acceleration - gravity, mass)
         return Needs(none, force_wrench(force), none)

@@ -21,7 +21,7 @@ class SpeedLine(NamedTuple):
 
 
 def supply(drive: Drive) -> tuple[float, float]:
-    """Return a winding's stall force, N or N m, and its slope, less per m/s or rad/s."""
+    """Return a winding's stall force, N or N m, and its decrease per joint rate (m/s or rad/s)."""
     winding, gear = drive.winding, abs(drive.gear)
     if winding is None:
         raise ValueError("drive: has no winding")
@@ -32,7 +32,7 @@ def supply(drive: Drive) -> tuple[float, float]:
 def limit_to_motor(
     drive: Drive, forces: NDArray[np.float64], rates: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return forces (...) of a drive, saturated at its motor's limits at its rates (...).
+    """Return drive forces (...) limited to what the motor can give at its rates (...).
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ class MotorPeak(NamedTuple):
 
 
 def motor_peak(drive: Drive, forces: NDArray[np.float64], rates: NDArray[np.float64]) -> MotorPeak:
-    """Return the moment at which forces and rates (...) are nearest to the limit, NaN ignored."""
+    """Return force, limit and index of the sample (...) with the greatest force over limit."""
     forces, rates = np.broadcast_arrays(forces, rates)
     side = np.where(forces < 0.0, -1.0, 1.0)
     most = np.maximum(side * limit_to_motor(drive, side * np.inf, rates), 0.0)
@@ -76,10 +76,11 @@ def motor_peak(drive: Drive, forces: NDArray[np.float64], rates: NDArray[np.floa
 
 
 def speed_lines(drive: Drive) -> tuple[SpeedLine, ...]:
-    """Return linear limits within those of curve and winding, for motion planning.
+    """Return linear force limits that fall with speed, within the motor's curve and winding.
 
-    They are the winding's and, while each piece of the curve is steeper than the one before, the
-    curve's. Where the curve becomes flatter again, the steeper line continues (conservative).
+    They include the winding's limits and those of the motor's curve as long as each piece is
+    steeper than the one before. Where the curve becomes flatter again, the steeper line continues
+    (conservative).
     """
     lines: list[SpeedLine] = []
     if drive.curve:

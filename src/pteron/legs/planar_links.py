@@ -27,7 +27,7 @@ class LinkRotation(NamedTuple):
     acceleration: Expression
 
     def relative_to(self, other: LinkRotation) -> LinkRotation:
-        """Return the rotation relative to another link's."""
+        """Return this link's angle rate and acceleration relative to another link's."""
         return LinkRotation(*(a - b for a, b in zip(self, other, strict=True)))
 
 
@@ -38,7 +38,7 @@ def link_body(
     x: Expression,
     turning: LinkRotation,
 ) -> BodyMotion:
-    """Return a link's motion from its reference point (position, row, acceleration) and its x."""
+    """Return a planar link's motion from its reference point, x axis (2, 1) and rotation."""
     y = quarter_turn(x)  # Fig. 3
     acceleration, square = turning.acceleration, turning.rate * turning.rate
     vectors = (x, y, acceleration * y - square * x, -acceleration * x - square * y)
@@ -49,7 +49,7 @@ def link_body(
 def lower_link_body(
     point: PointMotion, d: Expression, plane: Expression, x: Expression, turning: LinkRotation
 ) -> BodyMotion:
-    """Return the link that ends at the platform point, its reference point."""
+    """Return the motion of a planar link whose reference point is the platform point."""
     rides = point.position, point_rows(ca.SX.eye(3)), point.acceleration  # Fig. 3, origin on R3
     return link_body(rides, d, plane, x, turning)
 
@@ -57,10 +57,10 @@ def lower_link_body(
 def last_joints(
     d: Expression, point: PointMotion, lower: LinkRotation, rotation: RotationMotion
 ) -> list[Joint]:
-    """Return the revolute joint at the platform point, and one about each turn of the platform.
+    """Return the revolute joint at the platform point, then one for each platform rotation axis.
 
-    Two joints about one axis are one: the first has its motion, the second none. Where the platform
-    tilts all of them are a ball joint.
+    Two joints about one axis count as one: the first has its motion, the second none. If the
+    platform tilts, all of them are a ball joint.
     """
     if rotation.tilts:
         link = ca.mtimes(d, lower.row), d * lower.rate, d * lower.acceleration

@@ -21,9 +21,10 @@ _TRIAL_POINTS = 200
 
 
 def breaches(leg: LegKind, axes: Sequence[Vector]) -> tuple[str, ...]:
-    """Return the breaches of the protocol by a leg, one line each; () where it conforms.
+    """Return how a leg breaches the protocol of legs, one line each; () where it conforms.
 
-    `axes` are those about which the platform turns against the leg, perpendicular to each other.
+    `axes` are the axes, perpendicular to each other, about which the platform turns relative to the
+    leg.
     """
     if not leg.size > 0.0 and not leg.follows_angle:
         return (
@@ -40,7 +41,7 @@ search makes thousands of machines and a chain does not depend on a leg's number
 
 @lru_cache(maxsize=64)
 def _chain_breaches(leg: LegKind, axes: tuple[Vector, ...]) -> tuple[str, ...]:
-    """Return the breaches in a leg's bodies and driven joint; () also if no point is in reach."""
+    """Return faults of a leg's bodies and driven joint, one line each; () if none in reach."""
     motion = _motion(leg, axes)
     if motion is None:
         return ()  # nowhere in reach, which is reported where a pose is used
@@ -51,7 +52,7 @@ def _chain_breaches(leg: LegKind, axes: tuple[Vector, ...]) -> tuple[str, ...]:
 
 
 def point_in_reach(leg: LegKind, seed: int = 0) -> NDArray[np.float64] | None:
-    """Return a random point (3,) in the reach of a leg, m; None if no trial succeeds."""
+    """Return a random point (3,), m, in the reach of a leg; None if no trial succeeds."""
     equations, bound = leg.equations(), leg.reach_bound
     center, radius = (leg.guide_point, 1.0) if bound is None else (bound.point, bound.radius)
     rng = np.random.default_rng(seed)
@@ -62,7 +63,7 @@ def point_in_reach(leg: LegKind, seed: int = 0) -> NDArray[np.float64] | None:
 
 
 def _motion(leg: LegKind, axes: Sequence[Vector]) -> LegMotion | None:
-    """Return the leg's motion at rest at a random point in its reach."""
+    """Return the leg's motion at rest at a random point in its reach; None without such a point."""
     point, zero = point_in_reach(leg), ca.SX(3, 1)
     if point is None:
         return None
@@ -72,7 +73,7 @@ def _motion(leg: LegKind, axes: Sequence[Vector]) -> LegMotion | None:
 
 
 def _body_breaches(leg: LegKind, motion: LegMotion) -> Iterator[str]:
-    """Yield the faults of bodies that are not carried by exactly one joint."""
+    """Yield the faults of leg bodies that are not carried by exactly one joint of the chain."""
     named = Counter(joint.body for joint in motion.chain if joint.body)
     for letter in sorted({*leg.bodies, *motion.bodies, *named}):
         name = f'body "{letter}"' + (f" ({leg.names[letter]})" if letter in leg.names else "")
@@ -87,7 +88,7 @@ def _body_breaches(leg: LegKind, motion: LegMotion) -> Iterator[str]:
 
 
 def _driven_joint_breaches(leg: LegKind, motion: LegMotion) -> Iterator[str]:
-    """Yield the faults of the chain's driven joint."""
+    """Yield the faults of the driven joint of a leg's chain."""
     row = _numbers(motion.row / motion.divisor)
     size = np.abs(row).max()
     if not size > 0.0:

@@ -58,7 +58,7 @@ class PRR(SlideLeg):
     def passive_joints(
         self, motion: LegMotion, zero_axes: Expression, axes: Expression
     ) -> list[Passive]:
-        """Return the joint of slider and link if it has limits; its angle is 0 along the slider."""
+        """Return the joint of slider and link in a list if it has limits, with its angle in rad."""
         # The branch keeps the link ahead of the slider along sigma e.
         ahead, link = self.elbow * ca.SX(ca.vertcat(*self.slider_direction)), motion.links[1]
         sideways = ca.cross(ca.SX(ca.vertcat(*self.plane_normal)), ahead)
@@ -75,7 +75,7 @@ class PRR(SlideLeg):
 
     @property
     def quantities(self) -> tuple[LegQuantity, ...]:
-        """The geometry of slider and link in their plane."""
+        """The leg's geometric quantities: point, directions, link length and elbow."""
         d = self.plane_normal
         return (
             LegQuantity("guide_point", "point", self.guide_point),
@@ -93,12 +93,12 @@ class PRR(SlideLeg):
         return self.direction
 
     def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
-        """Return the plane's normal, about which the leg leaves the platform free to turn."""
+        """Return (normal,): the leg leaves the platform free to turn about its plane's normal."""
         return (self.plane_normal,)
 
     @classmethod
     def random_link(cls, values: Mapping[str, Sequence[Fraction]], rng: Random) -> list[Fraction]:
-        """Return the link in a random direction of the leg's plane (3,), in fractions."""
+        """Return the link as a random rational vector (3,) in the leg's plane."""
         a, (x, y) = values["plane_axis"], random_vector(values["lower_length"][0], 2, rng)
         return [x * p + y * q for p, q in zip(a, cross(values["direction"], a), strict=True)]
 
@@ -124,7 +124,7 @@ class PRREquations(SlideEquations):
     def link(
         self, point: PointMotion, rotation: RotationMotion, at: SlideState, slider: Joint
     ) -> tuple[BodyMotion, list[Joint], tuple[Expression, Expression]]:
-        """Return the link: b' = theta' d x b, whose component normal to e is that of c'."""
+        """Return the link's motion, the joints after the slider, the link's angular motion."""
         rate_row = quarter_turn(self.to_link_space(self.e)) / at.divisor
         row = point_rows(self.to_base_frame(rate_row).T)
         rate = ca.dot(rate_row, self.to_link_space(point.velocity))
@@ -139,7 +139,7 @@ class PRREquations(SlideEquations):
         return body, joints, (turning.rate, turning.acceleration)
 
     def locus(self, q: Expression) -> CircleLocus:
-        """Return the circle of c about the slider at q, m; its radius is the link's length."""
+        """Return the circle of the platform point c while the slider is held at q, m."""
         return CircleLocus(self.r + q * self.e, self.ll)
 
     def needs(
@@ -149,7 +149,7 @@ class PRREquations(SlideEquations):
         gravity: Expression,
         inertia: Mapping[str, Moments],
     ) -> Needs:
-        """Return the required forces of slider and link, with the term of the link's m gamma_y.
+        """Return the forces that slider and link require at joint and platform point.
 
         With nu = m gamma_y / ll: nu d x (c'' - g) at the tip t, -nu d x (t'' - g) at the platform.
         """

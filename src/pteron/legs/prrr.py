@@ -105,12 +105,12 @@ class PRRR(LegKind):
 
     @property
     def e(self) -> Vector:
-        """The slider's direction; `direction` by default."""
+        """The unit vector of the slider; `direction` by default."""
         return self.slider_direction or self.direction
 
     @property
     def quantities(self) -> tuple[LegQuantity, ...]:
-        """The geometry of slider and links."""
+        """The leg's geometric quantities: point, directions, link lengths and elbow."""
         return (
             LegQuantity("guide_point", "point", self.guide_point),
             LegQuantity("direction", "direction", self.direction, "d"),
@@ -122,13 +122,13 @@ class PRRR(LegKind):
         )
 
     def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
-        """Return the axes of R3 and, if the platform turns, of the joint along its axis."""
+        """Return the axes of platform rotations that the leg leaves free: R3's and `axis`."""
         return (self.direction,) if axis is None else (self.direction, axis)
 
     def passive_joints(
         self, motion: LegMotion, zero_axes: Expression, axes: Expression
     ) -> list[Passive]:
-        """Return the elbow R2 if it has limits; its angle between the links is in rad."""
+        """Return the elbow R2 in a list if it has limits; its value is the links' angle, rad."""
         angle = angle_between(*motion.links)
         return joint_limit("elbow", "rad", angle, self.elbow_limits, self.lower_length)
 
@@ -143,26 +143,26 @@ class PRRR(LegKind):
 
     @property
     def reach_bound(self) -> ReachBound:
-        """A cylinder about the slider's line through the guide point, m."""
+        """A cylinder about the slider's line that holds all platform points in reach, m."""
         slant = abs(dot(self.direction, self.e))
         return ReachBound(self.guide_point, self.e, self.size / slant)
 
     @property
     def reach_text(self) -> str:
-        """The range of both links' span, as a clause for messages."""
+        """The range that both links span, m, as a clause for messages."""
         shortest = abs(self.upper_length - self.lower_length)
         return f"its links span {shortest:.4g} to {self.size:.4g} m across direction"
 
     @property
     def extents(self) -> dict[str, tuple[str, float, float, str]]:
-        """The usual range of x of both links' centres of mass, m."""
+        """The range of x, m, where both links usually have their centres of mass."""
         return {
             "u": ("upper", 0.0, self.upper_length, "R1, where it begins, and R2"),
             "l": ("lower", -self.lower_length, 0.0, "R2 and R3, where its x is zero"),
         }
 
     def transfers(self, gravity: Vector) -> tuple[LegTransfer, ...]:
-        """Return the transfers between slider and upper link, and at the elbow of both links."""
+        """Return how inertial parameters of slider and links transfer to others, with reasons."""
         transfer_list = [
             LegTransfer(
                 "slider and upper link{} move as one along the guide",
@@ -181,7 +181,7 @@ class PRRR(LegKind):
     def draw_closure(
         cls, values: Mapping[str, Sequence[Fraction]], rng: Random
     ) -> tuple[list[Fraction], int]:
-        """Draw the directions of the links in the leg's plane; the triangle then closes."""
+        """Return a random rational platform point, the sum of two links, and the elbow's sign."""
         return random_triangle(values, rng)
 
 
@@ -233,7 +233,7 @@ class PRRREquations(LegEquations):
         self.projection = self.plane.T - ca.mtimes(self.e_plane, self.d_bar.T)  # Eq. (3)
 
     def _state(self, point: PointMotion) -> _PlanarLinks:
-        """Return the links and their motion, in the leg's plane.
+        """Return both links, their angle rates and accelerations, in the leg's plane.
 
         theta_u' = l_l . u' / D and theta_l' = -l_u . u' / D. Differentiated, and with l_l . l_l =
         ll^2, theta_u'' = l_l . v / D and theta_l'' = -l_u . v / D, v = u'' + theta_u'^2 l_u +
@@ -253,7 +253,7 @@ class PRRREquations(LegEquations):
         return _PlanarLinks(l_u, l_l, rows, upper, lower, ddu)
 
     def motion(self, point: PointMotion, rotation: RotationMotion) -> LegMotion:
-        """Return the motion of the leg; rho' = d_bar . c', so that its row is constant."""
+        """Return the motion of slider, links and joints; the Jacobian row is constant."""
         at = self._state(point)
         rho = ca.dot(self.d_bar, point.position - self.r)  # Eq. (4)
         rate, sliding = (ca.dot(self.d_bar, v) for v in (point.velocity, point.acceleration))
@@ -276,7 +276,7 @@ class PRRREquations(LegEquations):
         return LegMotion(rho, rate, sliding, row, ca.SX(1), bodies, chain, links, angles)
 
     def exported_terms(self, point: PointMotion, rotation: RotationMotion) -> dict[str, Expression]:
-        """Return the closure's named terms, and those of each link's rate and acceleration."""
+        """Return intermediate quantities of the leg's equations by name, for exported code."""
         at = self._state(point)
         u = at.l_u + at.l_l
         delta = squared_reach(self.lu, self.ll, ca.dot(u, u))
@@ -295,20 +295,20 @@ class PRRREquations(LegEquations):
         return {**terms, "v": v}
 
     def reach(self, c: Expression) -> Reach:
-        """Return the reach: both links span from |lu - ll| to lu + ll across d, m."""
+        """Return the reach margins of platform point c: the links span |lu - ll| to lu + ll, m."""
         u = ca.mtimes(self.projection, c - self.r)
         n, delta = ca.sqrt(ca.dot(u, u)), squared_reach(self.lu, self.ll, ca.dot(u, u))
         margin = ca.fmin(self.lu + self.ll - n, n - ca.fabs(self.lu - self.ll))
         return Reach(margin, delta, (2 * self.lu * self.ll) ** 2, n)
 
     def edges(self, c: Expression) -> dict[str, Expression]:
-        """Return the conditions of a closed triangle; zero where links are stretched or folded."""
+        """Return squared-length margins of the links, by name; zero where stretched or folded."""
         u = ca.mtimes(self.projection, c - self.r)
         stretched, folded = edges_of_reach(self.lu, self.ll, ca.dot(u, u))
         return {"stretched": stretched, "folded": folded}
 
     def locus(self, q: Expression) -> PlaneLocus:
-        """Return the plane of c, d_bar . c = q + d_bar . r, which the links do not change."""
+        """Return the plane of platform point c while the slider is held at q, m."""
         size = ca.fabs(q) + ca.dot(ca.fabs(self.d_bar), ca.fabs(self.r))
         return PlaneLocus(self.d_bar, q + ca.dot(self.d_bar, self.r), size)
 
@@ -319,7 +319,7 @@ class PRRREquations(LegEquations):
         gravity: Expression,
         inertia: Mapping[str, Moments],
     ) -> Needs:
-        """Return the required forces of the bodies, in the leg's plane.
+        """Return the forces that slider and links require at joint and platform point.
 
         The moments of the links act through theta_u and theta_l, whose rows with respect to u turn
         them into a force tau; as u' is the part of c' - e rho' in the plane, tau acts on the point
@@ -340,7 +340,10 @@ class PRRREquations(LegEquations):
         )
 
     def point_mass_needs(self, point: PointMotion, gravity: Expression, mass: Expression) -> Needs:
-        """Return the force for a mass at the platform point; along d the slider exerts it."""
+        """Return the force required to move masses (1, K) at the platform point.
+
+        The slider exerts the component along d.
+        """
         a_g = point.acceleration - gravity
         slope = 1 if self.aligned else ca.dot(self.d, self.e)
         plane_force = ca.mtimes(self.plane, ca.mtimes(ca.mtimes(self.plane.T, a_g), mass))
@@ -350,9 +353,9 @@ class PRRREquations(LegEquations):
     def _link_needs(
         self, at: _PlanarLinks, on_r1: Expression, upper: Moments, lower: Moments
     ) -> tuple[Expression, Expression]:
-        """Return the required forces of the links along the slider, (1, K), and at R3, (2, K).
+        """Return the links' required forces along the slider, (1, K), and at joint R3, (2, K).
 
-        `on_r1` is a - g in the leg's plane on R1; on R3 it is u'' more.
+        `on_r1` is the acceleration a - g of R1 in the leg's plane; that of R3 is larger by u''.
         """
         h, dh = first_moment(at.l_u, upper.hx / self.lu, upper.hy / self.lu)
         upper_force = at.upper.acceleration * dh - at.upper.rate**2 * h  # h'' of a turning vector

@@ -38,7 +38,7 @@ class PRS(PRR):
     def passive_joints(
         self, motion: LegMotion, zero_axes: Expression, axes: Expression
     ) -> list[Passive]:
-        """Return the joints that have limits: of slider and link, and the ball joint."""
+        """Return the joints with limits: that of slider and link, and the ball joint."""
         inherited = super().passive_joints(motion, zero_axes, axes)
         return [*inherited, *ball_cone(self.platform_cone, motion, axes, self.lower_length)]
 

@@ -43,7 +43,7 @@ class PSS(RodLeg, SlideLeg):
 
     @property
     def quantities(self) -> tuple[LegQuantity, ...]:
-        """The geometry of slider and rod."""
+        """The leg's geometric quantities: point, directions, rod length and elbow."""
         return (
             LegQuantity("guide_point", "point", self.guide_point),
             LegQuantity("slider_direction", "direction", self.slider_direction, "e"),
@@ -54,10 +54,10 @@ class PSS(RodLeg, SlideLeg):
 
     @property
     def _counting_axis(self) -> Vector:
-        """The first axis of the rod's universal joints: the bar of parallel rods.
+        """The unit vector of the first axis of the rod's universal joints: that of the rods' bar.
 
-        A single rod's is across the guide: universal joints about it are singular where the rod
-        lies along it, and there the leg is singular anyway (type I).
+        For a single rod the axis is perpendicular to the guide: universal joints about it are
+        singular where the rod lies along it, and there the leg is singular anyway (type I).
         """
         if self.bar_direction is not None:
             return self.bar_direction
@@ -65,16 +65,16 @@ class PSS(RodLeg, SlideLeg):
 
     @property
     def bar(self) -> Vector | None:
-        """The direction from a parallel rod to the other; None for a single rod."""
+        """The direction from one parallel rod to the other; None for a single rod."""
         return self.bar_direction if self.rods > 1 else None
 
     def tip_axes(self, motion: LegMotion) -> Expression:
-        """Return the base frame's axes (3, 3): a slider does not turn."""
+        """Return the axes (3, 3) of the slider, which are the base frame's."""
         return ca.SX.eye(3)
 
     @classmethod
     def random_link(cls, values: Mapping[str, Sequence[Fraction]], rng: Random) -> list[Fraction]:
-        """Return the rod in a random direction (3,), in fractions."""
+        """Return the rod as a random rational vector (3,)."""
         return random_vector(values["lower_length"][0], 3, rng)
 
 
@@ -88,17 +88,17 @@ class PSSEquations(SlideEquations):
         self.bar = bar_direction
 
     def to_link_space(self, v: Expression) -> Expression:
-        """Return the vector (3, K) itself: the rod moves in space."""
+        """Return the vector (3, K) unchanged: the rod's space is the base frame."""
         return v
 
     def to_base_frame(self, v: Expression) -> Expression:
-        """Return the vector (3, K) itself: the rod's space is the base frame."""
+        """Return the vector (3, K) unchanged: the rod's space is the base frame."""
         return v
 
     def link(
         self, point: PointMotion, rotation: RotationMotion, at: SlideState, slider: Joint
     ) -> tuple[BodyMotion, list[Joint], None]:
-        """Return the rod's motion and the axes of its universal joints; no turning in a plane."""
+        """Return the rod's motion, the joints at its ends, and None for a planar angle."""
         rides = point_rows(ca.SX.eye(3))
         swing = (rides - ca.mtimes(self.e, slider.row)) / self.ll
         n = at.b / self.ll
@@ -109,7 +109,7 @@ class PSSEquations(SlideEquations):
         return rod_body(point, n, ddn, swing), joints, None
 
     def locus(self, q: Expression) -> SphereLocus:
-        """Return the sphere of c about the slider at q, m; its radius is the rod's length."""
+        """Return the sphere of platform point c while the slider is held at q, m."""
         return SphereLocus(self.r + q * self.e, self.ll)
 
 

@@ -65,7 +65,7 @@ class RamLeg(LegKind):
 
     @property
     def extents(self) -> dict[str, tuple[str, float, float, str]]:
-        """The usual range of x of the centres of mass of cylinder and piston, m."""
+        """The range of x, m, where cylinder and piston usually have their centres of mass."""
         shortest = self.limits[0]
         return {
             "u": ("upper", 0.0, shortest, "the joint on the base and the shortest ram's end"),

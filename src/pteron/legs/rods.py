@@ -31,10 +31,10 @@ class RodLeg(LegKind):
 
     @abstractmethod
     def tip_axes(self, motion: LegMotion) -> Expression:
-        """Return the axes of the body that carries the rod, by columns (3, 3)."""
+        """Return the axes, as columns (3, 3), of the body that carries the rod's first end."""
 
     def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
-        """Return the axes that the rods do not constrain; `axis` is the platform's, if it turns.
+        """Return the axes of platform rotations that the rods leave free; `axis` is the platform's.
 
         Parallel rods keep the direction of the bar at their ends, on a hinge where the platform
         turns; a single rod keeps none. Without a bar direction in the file only `axis` is
@@ -45,7 +45,7 @@ class RodLeg(LegKind):
         return tuple(v for v in (self.bar, axis) if v is not None)
 
     def couples(self, motion: LegMotion, axis: Vector | None) -> list[Expression] | None:
-        """Return the couple about bar x rod that parallel rods transmit by opposite forces.
+        """Return, in a list, the couple that parallel rods transmit (3, 1), 1 or less.
 
         Its length is the sine of the angle between bar and rod, 0 where the parallelogram is flat.
         The rods transmit no couple about themselves. None where the bar's direction is not known.
@@ -57,10 +57,10 @@ class RodLeg(LegKind):
     def passive_joints(
         self, motion: LegMotion, zero_axes: Expression, axes: Expression
     ) -> list[Passive]:
-        """Return the ball joints at the ends of the rod that have cones.
+        """Return the ball joints at the rod's ends that have limit cones.
 
-        The columns of `axes` are the platform's axes, of `zero_axes` at phi = 0. The bars of
-        parallel rods do not turn, nor do parts with a fixed offset.
+        The columns of `axes` are the platform's axes, those of `zero_axes` the axes at phi = 0. The
+        bars of parallel rods do not turn, nor do platform parts with a fixed offset.
         """
         rod, length = motion.links[1], self.lower_length
         assert rod is not None
@@ -72,7 +72,7 @@ class RodLeg(LegKind):
         ]
 
     def rod_couple(self, motion: LegMotion) -> Expression:
-        """Return the couple of parallel rods, normal to their plane; zero for a single rod.
+        """Return the couple (3, 1) of parallel rods, normal to their plane; zero for a single rod.
 
         A bar whose direction is not known is taken along the leg's first passive joint.
         """
@@ -98,7 +98,7 @@ class RodLeg(LegKind):
 
 
 def rod_body(point: PointMotion, n: Expression, ddn: Expression, swing: Expression) -> BodyMotion:
-    """Return a rod's motion from its direction n towards the platform point, n'' and the row of n'.
+    """Return a rod's motion from its unit vector n, n'' and the matrix `swing` (3, 6) of n'.
 
     `swing` is (3, 6). The rod's angular velocity is n x n', its reference point the platform point.
     """
@@ -117,10 +117,10 @@ def universal_joints(
     preceding: Joint | None = None,
     body: str = "l",
 ) -> list[Joint]:
-    """Return the universal joints at a rod's ends, tip and c: about d, and about d x n.
+    """Return the universal joints at a rod's two ends, then hinges of the platform's rotation.
 
-    A hinge about each axis of the platform's rotation follows; where the platform tilts the joint
-    at c is a ball joint.
+    The joints are about d, and about d x n, at both ends. Hinges about each axis of the platform's
+    rotation follow; if the platform tilts, the joint at c is a ball joint.
 
     With n' = omega x n and omega = alpha' d + beta' e, e = d x n / |d x n|: alpha' = n'.(d x n) /
     |d x n|^2 and beta' = - n'.d / |d x n|. `direction` is n, n' and n''; `swing` (3, 6) is

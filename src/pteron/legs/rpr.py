@@ -53,7 +53,7 @@ class RPR(RamLeg):
 
     @property
     def quantities(self) -> tuple[LegQuantity, ...]:
-        """The geometry of the ram's plane; its length is its coordinate."""
+        """The leg's geometric quantities: point, plane directions and elbow."""
         d = self.plane_normal
         return (
             LegQuantity("guide_point", "point", self.guide_point),
@@ -69,11 +69,11 @@ class RPR(RamLeg):
         return self.direction
 
     def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
-        """Return the plane's normal, about which the leg leaves the platform free to turn."""
+        """Return (normal,): the leg leaves the platform free to turn about its plane's normal."""
         return (self.plane_normal,)
 
     def transfers(self, gravity: Vector) -> tuple[LegTransfer, ...]:
-        """Return the transfers of a cylinder on a fixed axis and of two bodies that turn alike."""
+        """Return how inertial parameters of cylinder and piston transfer to others, and why."""
         transfer_list = [
             LegTransfer("the cylinder{} turns about a fixed axis", {("m", "u"): (1, ())}),
             LegTransfer(
@@ -91,7 +91,7 @@ class RPR(RamLeg):
     def draw_closure(
         cls, values: Mapping[str, Sequence[Fraction]], rng: Random
     ) -> tuple[list[Fraction], int]:
-        """Draw the ram in the leg's plane."""
+        """Return a random rational ram vector (3,) in the leg's plane; 1 for the elbow's sign."""
         a, (x, y) = values["plane_axis"], random_vector(abs(random_fraction(rng)), 2, rng)
         b = cross(values["direction"], a)
         return [x * p + y * q for p, q in zip(a, b, strict=True)], 1
@@ -129,7 +129,7 @@ class RPREquations(LegEquations):
         self.plane = plane_of(direction, plane_axis)
 
     def _ram(self, point: PointMotion) -> _Ram:
-        """Return the ram in motion.
+        """Return the ram's vector, length, rate, rotation and length acceleration at a motion.
 
         L' = n.c' and L theta' = y.c'. Differentiated, L'' = n.c'' + L theta'^2 and L theta'' =
         y.c'' - 2 L' theta'.
@@ -145,7 +145,10 @@ class RPREquations(LegEquations):
         return _Ram(w, length, n, rate, turning, ca.dot(n, ddw) + length * swing * swing)
 
     def motion(self, point: PointMotion, rotation: RotationMotion) -> LegMotion:
-        """Return the motion of cylinder, piston and their joints; L' = n . c'."""
+        """Return the motion of cylinder, piston and their joints.
+
+        The coordinate is the length L.
+        """
         at = self._ram(point)
         n = ca.mtimes(self.plane, at.n)
         row, fixed = point_rows(n.T), (self.r, ca.SX(3, 6), ca.SX(3, 1))
@@ -166,19 +169,19 @@ class RPREquations(LegEquations):
         )
 
     def exported_terms(self, point: PointMotion, rotation: RotationMotion) -> dict[str, Expression]:
-        """Return the named terms w, length, n and theta_rate, the ram's rate about d, rad/s."""
+        """Return intermediate quantities of the ram by name, for exported code."""
         at = self._ram(point)
         return {"w": at.w, "length": at.length, "n": at.n, "theta_rate": at.turning.rate}
 
     def reach(self, c: Expression) -> Reach:
-        """Return the reach: the ram's length, zero only where c is at the guide point."""
+        """Return the reach margin: the ram's length, zero only with c at the guide point."""
         w = ca.mtimes(self.plane.T, c - self.r)
         square = ca.dot(w, w)
         length = ca.sqrt(square)
         return Reach(length, square, square, length)
 
     def locus(self, q: Expression) -> CircleLocus:
-        """Return the circle of c about the guide point; its radius is the ram's length q, m."""
+        """Return the circle of platform point c while the ram's length is q, m."""
         return CircleLocus(self.r, q)
 
     def needs(
@@ -188,10 +191,10 @@ class RPREquations(LegEquations):
         gravity: Expression,
         inertia: Mapping[str, Moments],
     ) -> Needs:
-        """Return the required forces of cylinder and piston, all at the platform point.
+        """Return the forces that cylinder and piston require, all at the platform point.
 
-        With h and dh = d x h their first moments, it is the force h_l'' of the piston and y / L
-        times (I_u + I_l) theta'' - g.dh_u + (c'' - g).dh_l, beside that of the mass at the point.
+        With h and dh = d x h their first moments, the force is h_l'' of the piston plus y / L times
+        (I_u + I_l) theta'' - g.dh_u + (c'' - g).dh_l, besides a point mass at the platform point.
         """
         at, upper, lower = self._ram(point), inertia["u"], inertia["l"]
         ddc, weight = (ca.mtimes(self.plane.T, v) for v in (point.acceleration, gravity))

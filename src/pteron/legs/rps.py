@@ -37,7 +37,7 @@ class RPS(RPR):
     def passive_joints(
         self, motion: LegMotion, zero_axes: Expression, axes: Expression
     ) -> list[Passive]:
-        """Return the ball joint at the platform, if it has a cone."""
+        """Return the ball joint at the platform in a list if it has a limit cone."""
         return ball_cone(self.platform_cone, motion, axes, self.limits[1])
 
 

@@ -43,13 +43,13 @@ class RRR(CrankLeg):
     conditions = (FieldCondition(("elbow_limits",), check_elbow),)
 
     def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
-        """Return the revolute axis, about which the leg leaves the platform free to turn."""
+        """Return (axis,): the leg leaves the platform free to turn about its revolute axis."""
         return (self.direction,)
 
     def passive_joints(
         self, motion: LegMotion, zero_axes: Expression, axes: Expression
     ) -> list[Passive]:
-        """Return the elbow if it has limits; its angle between the links is in rad."""
+        """Return the elbow in a list if it has limits; its value is the links' angle, rad."""
         angle = angle_between(*motion.links)
         return joint_limit("elbow", "rad", angle, self.elbow_limits, self.lower_length)
 
@@ -60,7 +60,7 @@ class RRR(CrankLeg):
 
     @property
     def reach_text(self) -> str:
-        """The range of both links' span, as a clause for messages."""
+        """The range that both links span, m, as a clause for messages."""
         shortest = abs(self.upper_length - self.lower_length)
         return f"its links span {shortest:.4g} to {self.size:.4g} m"
 
@@ -68,7 +68,7 @@ class RRR(CrankLeg):
     def draw_closure(
         cls, values: Mapping[str, Sequence[Fraction]], rng: Random
     ) -> tuple[list[Fraction], int]:
-        """Draw the directions of the links; the triangle then closes."""
+        """Return a random rational platform point, the sum of two links, and the elbow's sign."""
         return random_triangle(values, rng)
 
 
@@ -82,17 +82,17 @@ class RRREquations(CrankEquations):
         return ca.mtimes(self.plane.T, v)
 
     def plane_to_link_space(self, v: Expression) -> Expression:
-        """Return the vector (2, K) itself: the last link moves in the crank's plane."""
+        """Return the vector (2, K) unchanged: the last link moves in the crank's plane."""
         return v
 
     def height(self, w: Expression) -> Expression:
-        """Return 0: c stays in the crank's plane."""
+        """Return 0: the platform point stays in the crank's plane."""
         return ca.SX(0)
 
     def last_link(
         self, point: PointMotion, rotation: RotationMotion, at: CrankState, crank: Joint
     ) -> tuple[BodyMotion, list[Joint], tuple[Expression, Expression]]:
-        """Return the lower link: theta_l' = -l_u . u' / D and theta_l'' = -l_u . v / D.
+        """Return the lower link's motion, the joints after the crank, the link's angular motion.
 
         With v = u'' + theta_u'^2 l_u + theta_l'^2 b; D = b . g.
         """
@@ -110,7 +110,7 @@ class RRREquations(CrankEquations):
         return body, joints, (lower.rate, lower.acceleration)
 
     def locus(self, q: Expression) -> CircleLocus:
-        """Return the circle of c about the crank's end at q, rad; its radius is the last link."""
+        """Return the circle of platform point c while the crank is held at q, rad."""
         return CircleLocus(self.tip(q), self.ll)
 
 

@@ -61,7 +61,7 @@ class RSS(RodLeg, CrankLeg):
         return self.direction if self.rods > 1 else None
 
     def tip_axes(self, motion: LegMotion) -> Expression:
-        """Return the crank's axes x, y and d as columns (3, 3)."""
+        """Return the crank's axes x, y and d as columns (3, 3), in the base frame."""
         crank = motion.bodies["u"]
         return ca.horzcat(crank.x, crank.y, crank.axes)
 
@@ -77,7 +77,7 @@ class RSS(RodLeg, CrankLeg):
     def draw_closure(
         cls, values: Mapping[str, Sequence[Fraction]], rng: Random
     ) -> tuple[list[Fraction], int]:
-        """Draw the directions of crank and rod: their sum is a platform point."""
+        """Return a random rational platform point, as crank plus rod, and the elbow's sign."""
         d, a = values["direction"], values["zero_direction"]
         b = cross(d, a)
         x, y = random_vector(values["upper_length"][0], 2, rng)
@@ -93,7 +93,7 @@ class RSSEquations(CrankEquations):
     kinds: ClassVar = {"u": PlanarInertia.kinds, "l": RodInertia.kinds}
 
     def to_link_space(self, v: Expression) -> Expression:
-        """Return the vector (3, K) itself: the rod moves in space."""
+        """Return the vector (3, K) unchanged: the rod's space is the base frame."""
         return v
 
     def plane_to_link_space(self, v: Expression) -> Expression:
@@ -101,13 +101,13 @@ class RSSEquations(CrankEquations):
         return ca.mtimes(self.plane, v)
 
     def height(self, w: Expression) -> Expression:
-        """Return the signed distance of c from the crank's plane, m; w = c - r."""
+        """Return the signed distance of platform point c from the crank's plane, m; w = c - r."""
         return ca.dot(w, self.d)
 
     def last_link(
         self, point: PointMotion, rotation: RotationMotion, at: CrankState, crank: Joint
     ) -> tuple[BodyMotion, list[Joint], None]:
-        """Return the rod's motion and the axes of its universal joints; no turning in a plane."""
+        """Return the rod's motion, the joints at its ends, and None for a planar angle."""
         l_u, g = (ca.mtimes(self.plane, v) for v in (at.l_u, at.g))
         rides, square = point_rows(ca.SX.eye(3)), at.rate * at.rate
         swing = (rides - ca.mtimes(g, crank.row)) / self.ll
@@ -119,7 +119,7 @@ class RSSEquations(CrankEquations):
         return rod_body(point, n, ddn, swing), joints, None
 
     def locus(self, q: Expression) -> SphereLocus:
-        """Return the sphere of c about the crank's end at q, rad; its radius is the rod."""
+        """Return the sphere of platform point c while the crank is held at q, rad."""
         return SphereLocus(self.tip(q), self.ll)
 
 

@@ -42,7 +42,7 @@ _FAST = 10.0
 
 
 def _check_ratio(ratio: float) -> None:
-    """Raise ModelError if the ratio is 0."""
+    """Raise if the shaft's transmission ratio is 0."""
     if ratio == 0.0:
         raise ModelError("ratio: 0 given; the joint would not turn the platform")
 
@@ -105,7 +105,7 @@ class RUPU(LegKind):
 
     @property
     def quantities(self) -> tuple[LegQuantity, ...]:
-        """The geometry of the shaft: base point, axis and ratio."""
+        """The leg's geometric quantities: base point, axis, ratio and elbow."""
         d = self.joint_axis
         return (
             LegQuantity("guide_point", "point", self.guide_point),
@@ -116,13 +116,13 @@ class RUPU(LegKind):
         )
 
     def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
-        """Return three axes: the shaft constrains no rotation but through its drive."""
+        """Return three axes: the shaft leaves every platform rotation free except by its drive."""
         return (1, 0, 0), (0, 1, 0), (0, 0, 1)
 
     def passive_joints(
         self, motion: LegMotion, zero_axes: Expression, axes: Expression
     ) -> list[Passive]:
-        """Return the telescope, m, if the file limits its travel."""
+        """Return the telescope's length in a list, m, if its travel is limited."""
         return joint_limit("shaft", "m", ca.norm_2(motion.links[1]), self.travel, 1.0)
 
     def unlikely_values(self, axis: Vector | None) -> Iterator[str]:
@@ -139,7 +139,7 @@ class RUPU(LegKind):
 
     @property
     def metres(self) -> dict[str, Sequence[float]]:
-        """Its lengths, m, by key: those of every leg, and the telescope's travel."""
+        """All lengths of the leg, m, by key, the telescope's travel included."""
         return {**super().metres, **({} if self.travel is None else {"travel": self.travel})}
 
     @property
@@ -154,7 +154,7 @@ class RUPU(LegKind):
         return "its shaft has no length"
 
     def transfers(self, gravity: Vector) -> tuple[LegTransfer, ...]:
-        """Return the transfers of a shaft that swings about a fixed point."""
+        """Return how inertial parameters of the shaft's parts transfer to others, with reasons."""
         swing = {("I", "u"): (1, ()), ("I", "l"): (-1, ())}
         transfer_list = [
             LegTransfer("the shaft{} swings about a fixed point", {("m", "u"): (1, ())}),
@@ -170,7 +170,7 @@ class RUPU(LegKind):
     def draw_closure(
         cls, values: Mapping[str, Sequence[Fraction]], rng: Random
     ) -> tuple[list[Fraction], int]:
-        """Draw the shaft."""
+        """Return a random rational shaft vector (3,), and 1 for the elbow's sign."""
         return random_vector(abs(random_fraction(rng)), 3, rng), 1
 
 
@@ -191,7 +191,7 @@ class RUPUEquations(LegEquations):
         self.r, self.d, self.hinge, self.ratio = guide_point, direction, plane_axis, ratio
 
     def motion(self, point: PointMotion, rotation: RotationMotion) -> LegMotion:
-        """Return the motion of shaft and joints; its coordinate is ratio times phi."""
+        """Return the motion of shaft and joints; the joint coordinate is ratio times phi."""
         (turn,) = rotation.turns  # the manipulator has asked for one
         w = point.position - self.r
         length = ca.sqrt(ca.dot(w, w))
@@ -244,11 +244,11 @@ class RUPUEquations(LegEquations):
         gravity: Expression,
         inertia: Mapping[str, Moments],
     ) -> Needs:
-        """Return the required forces of both parts, all at the platform point.
+        """Return the forces that both parts of the shaft require, all at the platform point.
 
         With mu = (I_u + I_l) / L^2, eta = m gamma_x / L of the lower part and nu that of the upper,
-        kappa = L' / L and P = 1 - n n^T, they are P v - 2 kappa (mu + eta) P c' - eta (n'.n') w
-        beside the mass that rides, v = (mu + 2 eta) c'' - (eta + nu) g.
+        kappa = L' / L and P = 1 - n n^T, the force is P v - 2 kappa (mu + eta) P c' - eta (n'.n')
+        w, with v = (mu + 2 eta) c'' - (eta + nu) g, besides a point mass at the platform point.
         """
         dc, ddc, w = point.velocity, point.acceleration, point.position - self.r
         square, forward = ca.dot(w, w), ca.dot(w, dc)
@@ -263,7 +263,7 @@ class RUPUEquations(LegEquations):
         return Needs(ca.SX(1, swing.shape[1]), force_wrench(force), inertia["l"].m)
 
     def reach(self, c: Expression) -> Reach:
-        """Return the reach: the shaft's length, zero only where c is at the guide point."""
+        """Return the reach margin: the shaft's length, zero only with c at the guide point."""
         w = c - self.r
         square = ca.dot(w, w)
         length = ca.sqrt(square)
@@ -274,7 +274,7 @@ class RUPUEquations(LegEquations):
         return length / ca.fabs(self.ratio)
 
     def locus(self, q: Expression) -> AngleLocus:
-        """Return the platform's angle q / ratio, rad; c may be anywhere."""
+        """Return the platform's angle q / ratio, rad, while the joint is held at q."""
         return AngleLocus(q / self.ratio)
 
 

@@ -61,7 +61,7 @@ class SlideLeg(LegKind):
 
     @property
     def reach_bound(self) -> ReachBound:
-        """A cylinder about the slider's line, with the link's length as its radius, m."""
+        """A cylinder about the slider's line that holds all platform points in reach, m."""
         return ReachBound(self.guide_point, self.slider_direction, self.size)
 
     @property
@@ -71,12 +71,12 @@ class SlideLeg(LegKind):
 
     @property
     def extents(self) -> dict[str, tuple[str, float, float, str]]:
-        """The usual range of x of the link's centre of mass, m."""
+        """The range of x, m, where the link usually has its centre of mass."""
         ends = "slider and platform, where its x is zero"
         return {"l": ("lower", -self.lower_length, 0.0, ends)}
 
     def transfers(self, gravity: Vector) -> tuple[LegTransfer, ...]:
-        """Return the transfer of mass between slider and link at their joint."""
+        """Return how inertial parameters transfer between slider and link, with reasons."""
         entries = {
             ("m", "p"): (1, ()),
             ("m", "l"): (-1, ()),
@@ -92,13 +92,13 @@ class SlideLeg(LegKind):
     def random_link(
         cls, values: Mapping[str, Sequence[Fraction]], rng: Random
     ) -> Sequence[Fraction]:
-        """Return the link in a random direction, in fractions."""
+        """Return the link as a random rational vector (3,)."""
 
     @classmethod
     def draw_closure(
         cls, values: Mapping[str, Sequence[Fraction]], rng: Random
     ) -> tuple[list[Fraction], int]:
-        """Draw the link and the slider's place: their sum is a platform point."""
+        """Return a random rational platform point, slider position plus link; the elbow's sign."""
         b, e, q = cls.random_link(values, rng), values["slider_direction"], random_fraction(rng)
         ahead = sum(x * y for x, y in zip(b, e, strict=True))
         return [x + q * y for x, y in zip(b, e, strict=True)], 1 if ahead > 0 else -1
@@ -135,11 +135,11 @@ class SlideEquations(LegEquations):
 
     @abstractmethod
     def to_link_space(self, v: Expression) -> Expression:
-        """Return a vector (3, K) in the link's space: itself, or (2, K) in the link's plane."""
+        """Return a vector (3, K) as the link's space has it: as it is, or (2, K) in a plane."""
 
     @abstractmethod
     def to_base_frame(self, v: Expression) -> Expression:
-        """Return a vector of the link's space in the base frame (3, K)."""
+        """Return a vector of the link's space, (2, K) or (3, K), in the base frame (3, K)."""
 
     @abstractmethod
     def link(
@@ -149,17 +149,17 @@ class SlideEquations(LegEquations):
         at: SlideState,
         slider: Joint,
     ) -> tuple[BodyMotion, list[Joint], tuple[Expression, Expression] | None]:
-        """Return the link's motion, the joints after the slider, the link's rate and growth."""
+        """Return the link's motion, the joints after the slider, the link's angular motion."""
 
     def _closure_terms(self, c: Expression) -> tuple[Expression, Expression, Expression]:
-        """Return w, h = w . e and ll^2 - |w - h e|^2, with |w - h e| the distance c to guide."""
+        """Return w = c - r, h = w . e, and ll^2 minus the squared distance of c to the guide."""
         w, e = self.to_link_space(c - self.r), self.to_link_space(self.e)
         h = ca.dot(w, e)
         perpendicular = w - h * e
         return w, h, self.ll * self.ll - ca.dot(perpendicular, perpendicular)
 
     def state(self, point: PointMotion) -> SlideState:
-        """Return slider, link, and the slider's rate and acceleration.
+        """Return the vectors of slider and link, and the slider's rate and acceleration.
 
         (b . e) q' = b . c'. Differentiated, (b . e) q'' = b . c'' + b' . b'.
         """
@@ -173,7 +173,7 @@ class SlideEquations(LegEquations):
         return SlideState(w, q, b, divisor, rate, (ca.dot(b, ddw) + ca.dot(db, db)) / divisor)
 
     def motion(self, point: PointMotion, rotation: RotationMotion) -> LegMotion:
-        """Return the motion of slider, link and their joints; (b . e) q' = b . c'."""
+        """Return the motion of slider, link and joints, from platform point and rotation."""
         at = self.state(point)
         b = self.to_base_frame(at.b)
         full = point_rows(b.T)
@@ -196,12 +196,12 @@ class SlideEquations(LegEquations):
         )
 
     def exported_terms(self, point: PointMotion, rotation: RotationMotion) -> dict[str, Expression]:
-        """Return the closure's named terms w, h, square and root, and the link b."""
+        """Return intermediate quantities of the leg's equations by name, for exported code."""
         w, h, square = self._closure_terms(point.position)
         return {"w": w, "h": h, "square": square, "root": ca.sqrt(square), "b": self.state(point).b}
 
     def reach(self, c: Expression) -> Reach:
-        """Return the reach by the distance of c from the guide, at most the link's length."""
+        """Return the reach margin: link length less the distance of c from the guide, m."""
         _, _, square = self._closure_terms(c)
         far = ca.sqrt(self.ll * self.ll - square)
         return Reach(self.ll - far, square, self.ll * self.ll, self.ll)
@@ -213,11 +213,11 @@ class SlideEquations(LegEquations):
         gravity: Expression,
         inertia: Mapping[str, Moments],
     ) -> Needs:
-        """Return the required forces of slider and link, the latter's at its ends.
+        """Return the forces that slider and link require at joint and platform point.
 
         With eta = m gamma_x / ll and mu = I / ll^2 of the link, alpha = eta + mu and t the tip, the
-        tip needs mu t'' - alpha c'' + eta g and the platform point alpha (g - t'') beside a mass
-        m + eta + alpha that rides.
+        tip needs mu t'' - alpha c'' + eta g; the platform point needs alpha (g - t''), besides a
+        point mass m + eta + alpha.
         """
         at, slider, lower = self.state(point), inertia["p"], inertia["l"]
         e, ddc, weight = (self.to_link_space(v) for v in (self.e, point.acceleration, gravity))

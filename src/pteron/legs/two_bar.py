@@ -44,10 +44,10 @@ def two_bar_needs(
     gravity: Expression,
     inertia: tuple[Moments, Moments],
 ) -> tuple[Expression, Expression]:
-    """Return the required forces of a leg's links along the slider, (1, K), and at R3, (2, K).
+    """Return the links' required forces along the slider, (1, K), and at joint R3, (2, K).
 
-    `u` is u, u' and u'', `sliding` is rho'', `gravity` its part in the plane. The lower link's
-    m gamma_x must be zero; the masses of both links are left out, for others to add.
+    `u` is u, u' and u'', `sliding` is rho'', `gravity` is gravity in the leg's plane. The lower
+    link's m gamma_x must be zero; both links' masses are not included.
     """
     u, du, ddu = u
     upper, lower = inertia

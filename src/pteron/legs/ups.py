@@ -62,7 +62,7 @@ class UPS(RamLeg):
     keys: ClassVar = keys_of("ram", "UPS")
 
     def with_platform_frame(self, frame: Sequence[Vector]) -> Self:
-        """Return the leg with a missing `direction`: the platform's x or y across the ram."""
+        """Return the leg with a missing `direction` set to the platform's x or y across the ram."""
         if self.direction is not None:
             return self
         way = [a - b for a, b in zip(self.platform_point, self.guide_point, strict=True)]
@@ -72,7 +72,7 @@ class UPS(RamLeg):
 
     @property
     def quantities(self) -> tuple[LegQuantity, ...]:
-        """The geometry of the ram's joint with the base; its length is its coordinate."""
+        """The leg's geometric quantities: guide point, first joint axis and elbow."""
         assert self.direction is not None  # the manipulator has given it
         return (
             LegQuantity("guide_point", "point", self.guide_point),
@@ -92,7 +92,7 @@ class UPS(RamLeg):
     def passive_joints(
         self, motion: LegMotion, zero_axes: Expression, axes: Expression
     ) -> list[Passive]:
-        """Return the joints at the ram's ends that have cones."""
+        """Return the joints at the ram's two ends that have limit cones."""
         (_, way), length = motion.links, self.limits[1]
         assert way is not None
         return [
@@ -105,7 +105,7 @@ class UPS(RamLeg):
         return ca.SX(3, 1)
 
     def transfers(self, gravity: Vector) -> tuple[LegTransfer, ...]:
-        """Return the transfers of a cylinder on a fixed point and of two bodies that turn alike."""
+        """Return how inertial parameters of cylinder and piston transfer to others, and why."""
         return (
             LegTransfer("the cylinder{} turns about a fixed point", {("m", "u"): (1, ())}),
             LegTransfer(
@@ -117,7 +117,7 @@ class UPS(RamLeg):
     def draw_closure(
         cls, values: Mapping[str, Sequence[Fraction]], rng: Random
     ) -> tuple[list[Fraction], int]:
-        """Draw the ram."""
+        """Return a random rational ram vector (3,), and 1 for the elbow's sign."""
         return random_vector(abs(random_fraction(rng)), 3, rng), 1
 
 
@@ -144,12 +144,12 @@ class UPSEquations(LegEquations):
         self.r, self.d = guide_point, direction
 
     def change_frame(self, axes: Expression, origin: Expression) -> UPSEquations:
-        """Return the leg in axes that are the columns of (3, 3), about an origin (3, 1)."""
+        """Return the leg's equations in axes, the columns of (3, 3), about an origin (3, 1)."""
         guide = ca.mtimes(axes.T, self.r) - ca.mtimes(axes.T, origin)
         return UPSEquations(guide, ca.mtimes(axes.T, self.d), ca.SX(1))
 
     def _ram(self, point: PointMotion) -> _Ram:
-        """Return the ram in motion.
+        """Return the ram's length and unit vector, and their first two time derivatives.
 
         L' = n.c' and L n' = c' - L' n; differentiated, L'' = n.c'' + L n'.n' and L n'' = c'' - L''
         n - 2 L' n'.
@@ -165,7 +165,10 @@ class UPSEquations(LegEquations):
         return _Ram(length, rate, growth, n, dn, ddn, swing)
 
     def motion(self, point: PointMotion, rotation: RotationMotion) -> LegMotion:
-        """Return the motion of cylinder, piston and their joints; L' = n . c'."""
+        """Return the motion of cylinder, piston and their joints.
+
+        The coordinate is the length L.
+        """
         at = self._ram(point)
         row, unit = point_rows(at.n.T), ca.SX(1)
         turning = ca.mtimes(ca.skew(at.n), at.swing)
@@ -184,19 +187,19 @@ class UPSEquations(LegEquations):
         )
 
     def exported_terms(self, point: PointMotion, rotation: RotationMotion) -> dict[str, Expression]:
-        """Return the named terms w, length, n and dn, the ram's direction and its rate."""
+        """Return intermediate quantities of the ram by name, for exported code."""
         at = self._ram(point)
         return {"w": point.position - self.r, "length": at.length, "n": at.n, "dn": at.dn}
 
     def reach(self, c: Expression) -> Reach:
-        """Return the reach: the ram's length, zero only where c is at the guide point."""
+        """Return the reach margin: the ram's length, zero only with c at the guide point."""
         w = c - self.r
         square = ca.dot(w, w)
         length = ca.sqrt(square)
         return Reach(length, square, square, length)
 
     def locus(self, q: Expression) -> SphereLocus:
-        """Return the sphere of c about the guide point; its radius is the ram's length q, m."""
+        """Return the sphere of platform point c while the ram's length is q, m."""
         return SphereLocus(self.r, q)
 
     def needs(
@@ -206,11 +209,12 @@ class UPSEquations(LegEquations):
         gravity: Expression,
         inertia: Mapping[str, Moments],
     ) -> Needs:
-        """Return the required forces of cylinder and piston; those along the ram at the joint.
+        """Return the forces that cylinder and piston require, axial ones at the joint.
 
-        With P_n = 1 - n n^T, beside the mass that rides: m gamma_l n'' + P_n ((I_u + I_l) n'' - m
-        gamma_u g + m gamma_l (c'' - g)) / L. As P_n n'' = P_n (c'' - 2 L'/L c') / L that is P_n x -
-        m gamma_l (n'.n') n, with x of c'', c' and g alone; what of x is along n the ram bears.
+        With P_n = 1 - n n^T, besides a point mass at the platform point, the force is m gamma_l n''
+        + P_n ((I_u + I_l) n'' - m gamma_u g + m gamma_l (c'' - g)) / L. As P_n n'' = P_n (c'' - 2
+        L'/L c') / L, it is P_n x - m gamma_l (n'.n') n, where x depends on c'', c' and g alone; the
+        ram itself bears the component of x along n.
         """
         w, inverse = point.position - self.r, 1 / ca.norm_2(point.position - self.r)
         upper, lower, n = inertia["u"], inertia["l"], w * inverse

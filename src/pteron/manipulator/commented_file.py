@@ -32,7 +32,7 @@ LEVEL = "horizontal"
 
 
 def commented_text(name_or_path: str | Path, dimensions: Mapping[str, Any] | None = None) -> str:
-    """Return the text of a robot file based on another, with a comment on each key.
+    """Return the TOML text of a machine file based on another, with a comment on each key.
 
     Parameters
     ----------
@@ -62,10 +62,10 @@ def commented_text(name_or_path: str | Path, dimensions: Mapping[str, Any] | Non
 
 
 def _with_centers(table: Any) -> Any:
-    """Return a file's tables with each body's centre of mass in place of its first moment.
+    """Return a file's tables with each body's centre of mass instead of its first moment.
 
-    An edit of the mass alone then keeps the centre of mass. A body without mass keeps its first
-    moment.
+    If a user then edits the mass alone, the centre of mass stays. A body without mass keeps its
+    first moment.
     """
     if isinstance(table, list | tuple):
         return [_with_centers(content) for content in table]
@@ -82,9 +82,9 @@ def _with_centers(table: Any) -> Any:
 
 
 def kept_numbers_sentence(robot: Manipulator, dimensions: Mapping[str, Any]) -> list[str]:
-    """Return a sentence on a machine's numbers that do not depend on the changed dimensions.
+    """Return a sentence, or [], on masses and angles that changed dimensions leave as they were.
 
-    The list is empty where nothing is changed, or nothing independent.
+    The list is empty if no dimension is changed, or all numbers depend on those changed.
     """
     if not dimensions:
         return []
@@ -105,16 +105,16 @@ def kept_numbers_sentence(robot: Manipulator, dimensions: Mapping[str, Any]) -> 
 
 
 def _masses(robot: Manipulator, stock: Mapping[str, Any]) -> str:
-    """Return the text of the masses of the first leg's links without a stock."""
+    """Return as text the masses of the first leg's links that are not cut from stock."""
     leg: Any = robot.legs[0]
     links = {key: leg.bodies[letter].mass for letter, (key, *_) in leg.extents.items()}
     return " and ".join(f"{key} {mass:.3g} kg" for key, mass in links.items() if key not in stock)
 
 
 def crank_direction_text(robot: Manipulator) -> str:
-    """Return the direction of cranks at 0 in words: "5.33 deg below horizontal"; "" without cranks.
+    """Return as text the direction of cranks at angle 0: "5.33 deg below horizontal"; '' without.
 
-    It is "" without gravity, too.
+    The text is empty without gravity, too.
     """
     down = np.array(robot.gravity)
     zeros = [leg.crank_at_zero for leg in robot.legs if leg.crank_at_zero is not None]
@@ -129,7 +129,7 @@ def crank_direction_text(robot: Manipulator) -> str:
 
 
 def _dimension_text(dimension: Any) -> str:
-    """Return a variant's dimension as text: a number, a range, or the stock of each link."""
+    """Return a dimension as text: a number, a range, or the stock of each link."""
     if isinstance(dimension, Mapping):
         return ", ".join(f"{stock} ({key})" for key, stock in dimension.items())
     return (

@@ -41,7 +41,7 @@ class Stock:
 
     @classmethod
     def parse(cls, text: str) -> Self:
-        """Return the stock of a text such as aluminium-tube:30x2 or steel-rod:8, mm.
+        """Return the bar stock that a text such as aluminium-tube:30x2 or steel-rod:8 (mm) names.
 
         Examples
         --------
@@ -62,7 +62,7 @@ class Stock:
         return cls(_DENSITIES[match[1]], outer / 1e3, round(outer - 2.0 * wall, 9) / 1e3)
 
     def link(self, kind: Any, low: float, high: float, count: int = 1) -> Any:
-        """Return the inertia of a link, or of several identical ones, from x = low to high."""
+        """Return the inertia of `count` parallel links of this stock, from x = low to high, m."""
         length, squares = high - low, self.outer**2 + self.inner**2
         area = math.pi / 4.0 * (self.outer**2 - self.inner**2)
         mass, middle = count * self.density * area * length, (low + high) / 2.0
@@ -83,9 +83,9 @@ def with_dimensions(
 ) -> Manipulator:
     """Return a machine of the same kind with other dimensions, equal for all legs.
 
-    Links of another length keep their section unless `stock` is given; so do a ram's cylinder and
-    piston, which are as long as its shortest length. Limits of joints, and the platform's mass and
-    inertia, are unchanged unless given. The file's home is omitted where lengths or limits change.
+    Links of changed length keep their cross-section unless `stock` is given; so do a ram's cylinder
+    and piston, which are as long as its shortest length. Joint limits, and the platform's mass and
+    inertia, are unchanged unless given. The file's home is omitted if lengths or limits change.
 
     Parameters
     ----------
@@ -148,13 +148,13 @@ def with_dimensions(
 
 
 def _with_limits(leg: LegKind, limits: tuple[float, float]) -> LegKind:
-    """Return a leg with limits; a ram's cylinder and piston are as long as its shortest length."""
+    """Return a leg with joint limits (low, high), m or rad; a ram with bodies of that length."""
     changed = replace(leg, limits=limits)
     return changed if changed.extents == leg.extents else with_stretched_bodies(leg, changed)
 
 
 def _with_mass(robot: Manipulator, mass: float) -> Manipulator:
-    """Return a machine whose platform has a mass, kg; its inertia and bars are scaled alike."""
+    """Return the machine with a platform of this mass, kg; inertia and bars scale with it."""
     platform_inertia, bars = robot.platform.inertia, robot.platform.bars
     factor = mass / (platform_inertia.mass + sum(bar.mass for bar in bars))
     inertia = type(platform_inertia).of_values(
@@ -165,12 +165,12 @@ def _with_mass(robot: Manipulator, mass: float) -> Manipulator:
 
 
 def _with_legs(robot: Manipulator, legs: Iterable[LegKind]) -> Manipulator:
-    """Return a machine with other legs."""
+    """Return a copy of the machine with these legs."""
     return replace(robot, legs=tuple(legs))
 
 
 def _with_base(robot: Manipulator, radius: float) -> Manipulator:
-    """Return a machine whose guide points have a radius, m, about the platform's axis."""
+    """Return the machine with guide points moved to a greatest radius, m, about the axis."""
     points = np.array([leg.guide_point for leg in robot.legs])
     axis = np.array(robot.platform.axis)
     radial = (points - points.mean(axis=0)) @ (np.eye(3) - np.outer(axis, axis))
@@ -181,7 +181,7 @@ def _with_base(robot: Manipulator, radius: float) -> Manipulator:
 
 
 def _with_platform(robot: Manipulator, radius: float) -> Manipulator:
-    """Return a machine whose platform points have a radius, m, about the platform's axis."""
+    """Return the machine with platform points moved to a greatest radius, m, about the axis."""
     platform = robot.platform
     axis, frame = np.array(platform.axis), np.array(platform.frame)
     fixed = np.array([leg.fixed_offset for leg in robot.legs])
@@ -204,7 +204,7 @@ def _with_platform(robot: Manipulator, radius: float) -> Manipulator:
 
 
 def _factor(name: str, radial: Any, radius: float) -> float:
-    """Return the factor that scales radial vectors (n, 3) to a greatest length, m."""
+    """Return the factor that scales vectors (n, 3) to a greatest length of `radius`, m."""
     greatest = float(np.linalg.norm(radial, axis=1).max())
     if greatest < 1e-9:
         raise ModelError(f"{name}: the points are on one line along the axis, and have no radius")
@@ -217,7 +217,7 @@ def _vector(components: Any) -> Vector:
 
 
 def _with_length(robot: Manipulator, name: str, body: str, length: float) -> Manipulator:
-    """Return a machine with a length, m, of a leg's body in all legs that have this body."""
+    """Return the machine with the length, m, of the named leg body changed in all legs."""
     changed = [leg.with_length(body, length) for leg in robot.legs]
     if not any(changed):
         raise ModelError(f"{name}: the legs of {robot.name} have no such length")
@@ -228,7 +228,7 @@ def _with_length(robot: Manipulator, name: str, body: str, length: float) -> Man
 
 
 def _with_stock(robot: Manipulator, key: str, stock: Stock) -> Manipulator:
-    """Return a machine whose links of a key, upper or lower, are cut from a stock."""
+    """Return the machine with all links of a key, upper or lower, cut from a stock."""
     bodies_by_leg = [cut_links(leg, {key: stock}) for leg in robot.legs]
     if not any(bodies_by_leg):
         raise ModelError(f"{key}: no link of {robot.name}; upper or lower, which its legs have")
@@ -237,7 +237,7 @@ def _with_stock(robot: Manipulator, key: str, stock: Stock) -> Manipulator:
 
 
 def cut_links(leg: Any, stocks: Mapping[str, Stock]) -> dict[str, Any]:
-    """Return the inertia, by letter, of a leg's links that are cut from stock (by their key)."""
+    """Return by letter the inertia of a leg's links cut from the stocks of their keys."""
     rods = {"lower": getattr(leg, "rods", 1)}
     return {
         letter: stocks[key].link(type(leg.bodies[letter]), low, high, rods.get(key, 1))

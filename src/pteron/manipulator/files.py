@@ -31,7 +31,7 @@ DEFAULT_KIND = "PRRR"
 
 
 def catalog() -> tuple[str, ...]:
-    """Return the names of the machines in the catalog that is part of Pteron."""
+    """Return the names of the machines in Pteron's catalog."""
     return _names()
 
 
@@ -91,7 +91,7 @@ def load(name_or_path: str | Path) -> Manipulator:
 def read_machine(
     content: bytes, source: str, source_name: str
 ) -> tuple[Manipulator, tuple[str, ...]]:
-    """Return the machine of a file's contents, and warnings (cached)."""
+    """Return the machine described by a TOML file's bytes, and its warnings (cached)."""
     return _machine_and_warnings(parsed_toml(content, source, ModelError), source_name)
 
 
@@ -164,7 +164,7 @@ def from_dict(tables: Mapping[str, Any]) -> Manipulator:
 
 
 def _warned(robot: Manipulator, unlikely: Sequence[str], source: str) -> Manipulator:
-    """Return a machine after issuing warnings of its unlikely values."""
+    """Issue the warnings about unlikely values, then return the machine unchanged."""
     for text in unlikely:
         warn_unlikely(f"{source}: {text}")
     return robot
@@ -173,7 +173,7 @@ def _warned(robot: Manipulator, unlikely: Sequence[str], source: str) -> Manipul
 def _machine_and_warnings(
     document: dict[str, Any], source: str
 ) -> tuple[Manipulator, tuple[str, ...]]:
-    """Return the machine of a file's tables, and warnings."""
+    """Return the machine described by a file's tables, and its warnings."""
     robot = _machine(document, source)
     # Pteron writes first moments, people centres of mass: an identified value of a single body is
     # one of many equivalent ones, and need not be likely.
@@ -181,7 +181,7 @@ def _machine_and_warnings(
 
 
 def _has_first_moments(table: Any) -> bool:
-    """Return whether a body of a file has a first moment."""
+    """Return whether any body in a file's tables has a first moment."""
     if isinstance(table, list):
         return any(map(_has_first_moments, table))
     if not isinstance(table, dict):
@@ -190,12 +190,12 @@ def _has_first_moments(table: Any) -> bool:
 
 
 def document(name_or_path: str | Path) -> dict[str, Any]:
-    """Return the tables of a machine's file, unchecked."""
+    """Return a machine file's tables as read from TOML, unchecked."""
     return parsed_toml(*contents(name_or_path), ModelError)
 
 
 def contents(name_or_path: str | Path) -> tuple[bytes, str]:
-    """Return the bytes of a machine's file, and its name in messages."""
+    """Return the bytes of a machine's file, and the name that messages give it."""
     name = str(name_or_path)
     if name in catalog():
         resource = files("pteron.manipulator") / "catalog" / f"{name}.toml"
@@ -209,7 +209,7 @@ def contents(name_or_path: str | Path) -> tuple[bytes, str]:
 
 
 def _similar_files(path: Path) -> list[str]:
-    """Return the file in the same folder whose name is most similar to a missing file's, if any."""
+    """Return, in a list or [], the file in the folder whose name is most like a missing one's."""
     with suppress(OSError, ValueError):  # no such folder, one that may not be read, or no path
         if not path.exists():
             names = [file.name for file in path.parent.iterdir() if file.suffix == ".toml"]
@@ -219,7 +219,7 @@ def _similar_files(path: Path) -> list[str]:
 
 
 def _similar_machines(name: str) -> list[str]:
-    """Return the machines of the catalog that a name may mean, by names or descriptions."""
+    """Return the catalog machines that a mistyped name may mean, by name or description."""
     word = Path(name).stem.lower()
     by_description = [
         machine for machine, text in descriptions().items() if word in text.lower().split()
@@ -283,7 +283,7 @@ class _FileReader:
     """The lists of valid keys that messages have named."""
 
     def table(self, model: Any, raw_table: object, prefix: str) -> Any:
-        """Return a table as its model; if it has faults, collect them and return `valid_part`."""
+        """Return a table validated as `model`; on faults record them and return the valid part."""
         from pydantic import ValidationError
 
         try:
@@ -293,7 +293,7 @@ class _FileReader:
             return self.valid_part(model, raw_table)
 
     def valid_part(self, model: Any, raw_table: object) -> Any:
-        """Return a table's valid entries as a model, None for invalid and missing ones."""
+        """Return the valid entries of a table as a model; invalid and missing ones are None."""
         from pydantic import ValidationError
 
         from pteron.manipulator.leg_tables import part_of
@@ -307,7 +307,7 @@ class _FileReader:
             return valid.model_copy(update=dict.fromkeys(wrong.intersection(part.model_fields)))
 
     def build_or_note(self, prefix: str, build: Callable[[], _Built]) -> _Built | None:
-        """Return the result of `build`, or None and collect its faults, with `prefix`."""
+        """Return the result of `build`; if it raises, record its faults and return None."""
         try:
             return build()
         except ModelError as error:
@@ -315,7 +315,7 @@ class _FileReader:
             return None
 
     def parts(self, key: str, tables: Sequence[Any], kind: Callable[..., _Built]) -> list[_Built]:
-        """Return the valid parts of a list of tables, and collect the faults of the others."""
+        """Return objects built from a list of tables; record the faults of those that fail."""
         parts_or_none = [
             self.build_or_note(f"{key}, item {i}: ", partial(kind, **dict(part)))
             for i, part in enumerate(tables, start=1)
@@ -323,7 +323,7 @@ class _FileReader:
         return [part for part in parts_or_none if part is not None]
 
     def platform(self, table: Any) -> Platform | None:
-        """Return the platform; if it has faults, a substitute for checks of the legs, or None."""
+        """Return the platform of a table; on faults a substitute for further checks, or None."""
         from pteron.manipulator.tables import PlatformTable, TiltingTable
 
         inertia = table.unit
@@ -360,7 +360,7 @@ class _FileReader:
         return None
 
     def leg(self, i: int, raw_table: object) -> LegKind | None:
-        """Return leg i, from 1; if it has faults, a substitute for further checks, or None."""
+        """Return leg i, from 1, of a table; on faults a substitute for further checks, or None."""
         from pteron.manipulator.leg_tables import FORMER, leg_of, leg_table
 
         prefix = f"leg {i}: "

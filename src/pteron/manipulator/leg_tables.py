@@ -22,7 +22,7 @@ from pteron.toml import raise_faults
 
 
 def _no_truth(sign: Any) -> Any:
-    """Return a sign; a bool, which Python counts as an integer, is refused."""
+    """Return a sign; raise for a bool, which Python counts as an integer."""
     if isinstance(sign, bool):  # Python counts it as 1 or 0
         raise ValueError(f"{sign} given, 1 or -1 expected")
     return sign
@@ -50,7 +50,7 @@ FORMER = {"limits": "slider_limits"}
 
 @lru_cache(maxsize=16)
 def leg_table(kind: type[LegKind]) -> type[TomlTable]:
-    """Return the pydantic model of a table of `[[legs]]` for a kind of leg."""
+    """Return the pydantic model of a `[[legs]]` table for a kind of leg."""
     fields: dict[str, Any] = {"type": (str, Field(kind.type, description="the kind of leg"))}
     for key, about in kind.every_key().items():
         field_type, former = _TYPES[about.role], FORMER.get(key)
@@ -69,7 +69,7 @@ def leg_table(kind: type[LegKind]) -> type[TomlTable]:
 
 @lru_cache(maxsize=16)
 def part_of(model: type[TomlTable]) -> type[TomlTable]:
-    """Return the model with all keys optional, None if missing."""
+    """Return a pydantic model with all keys of `model` optional, None if missing."""
     required: dict[str, Any] = {
         key: (field.rebuild_annotation() | None, None)
         for key, field in model.model_fields.items()
@@ -79,7 +79,7 @@ def part_of(model: type[TomlTable]) -> type[TomlTable]:
 
 
 def toml_key(name: str, key: Key) -> str:
-    """Return the TOML key of a leg's field; a slider's mass is in the table `slider`."""
+    """Return the TOML key of a leg's field: "slider" for a slider's mass, else the field's name."""
     return "slider" if key.role == "slider" else name
 
 
@@ -98,7 +98,7 @@ def leg_of(
 ) -> tuple[LegKind | None, list[str]]:
     """Build a leg from its table, in which required keys may be None; collect its faults.
 
-    `tilts` is whether its platform tilts.
+    `tilts` is whether the leg's platform tilts.
 
     Returns
     -------
@@ -137,7 +137,7 @@ def leg_of(
 
 
 def _field_value(raw: Any, name: str, key: Key) -> Any:
-    """Return the value of a leg's field from that of its table."""
+    """Return a leg field's value from that of its TOML key."""
     if key.role == "slider":
         return raw.mass
     if key.body:
@@ -146,7 +146,7 @@ def _field_value(raw: Any, name: str, key: Key) -> Any:
 
 
 def _build_part(kind: Any, table: TomlTable, key: str) -> Any:
-    """Return a part of a leg from its table; errors name its keys with the prefix `key`."""
+    """Return a dataclass part of a leg from its table; errors name keys with the prefix `key`."""
     faults, raw_fields = (
         list[str](),
         {name: getattr(table, name) for name in type(table).model_fields},
@@ -174,7 +174,7 @@ def _build_part(kind: Any, table: TomlTable, key: str) -> Any:
 
 
 def _end_fault(leg: LegKind, letter: str, body: Any) -> str | None:
-    """Return the fault of a body whose centre of mass is beyond its ends, or None."""
+    """Return a message if a body's centre of mass lies beyond the link's ends, else None."""
     if not letter or body.center_of_mass is None or min(body.mass, body.inertia) <= 0.0:
         return None
     text = leg.center_of_mass_warning(letter, body.center_of_mass[0])
@@ -182,7 +182,7 @@ def _end_fault(leg: LegKind, letter: str, body: Any) -> str | None:
 
 
 def leg_items(leg: LegKind) -> Mapping[str, Any]:
-    """Return a leg's fields by their TOML keys; bodies remain objects."""
+    """Return a leg's field values by their TOML keys; bodies remain objects."""
     items: dict[str, Any] = {"type": leg.type}
     for name, key in leg.every_key().items():
         items[toml_key(name, key)] = leg.bodies[key.body] if key.body else getattr(leg, name)

@@ -43,7 +43,7 @@ class _Dimension(NamedTuple):
 
 
 def machine_record(robot: Manipulator) -> dict[str, Any]:
-    """Return the record of a machine, for the table `machine` of a TOML or JSON file."""
+    """Return a machine's name, layout and dimensions as a table, to be stored in a file."""
     dimensions = {d.name: [float(v) for v in d.values] for d in _dimensions(robot)}
     return {
         "name": robot.name,
@@ -55,7 +55,7 @@ def machine_record(robot: Manipulator) -> dict[str, Any]:
 
 
 def expect_machine(record: object, robot: Manipulator, source: object) -> None:
-    """Compare the record of a file with the machine that the file is to be used with.
+    """Raise if the machine recorded in a file differs from the machine used with it.
 
     Without a record (files of earlier versions) nothing is compared. A difference of at most
     `MOST_DIFFERENCE`, as of a calibrated machine, is issued as a warning, `UnlikelyValue`.
@@ -93,7 +93,7 @@ def expect_machine(record: object, robot: Manipulator, source: object) -> None:
 def _largest_difference(
     record: Mapping[str, Any], robot: Manipulator, source: object
 ) -> tuple[float, str]:
-    """Return the largest relative difference of a dimension, and a text that names it."""
+    """Return the largest relative difference of dimensions, and a text that names it."""
     numbers = record.get("dimensions")
     if not isinstance(numbers, Mapping):
         raise DataError(f"{source}: machine.dimensions: missing; make the file anew")
@@ -122,7 +122,7 @@ def _largest_difference(
 
 
 def _relative_difference(role: str, here: Any, there: Any, size: float) -> float:
-    """Return |difference| over the length, or over the machine's size; of directions in rad."""
+    """Return |difference| / length, for points over the machine's size; for directions in rad."""
     change = float(np.linalg.norm(there - here))
     if role in _ANGULAR:
         return change
@@ -144,7 +144,7 @@ def _layout(robot: Manipulator) -> str:
 
 
 def _dimensions(robot: Manipulator) -> Iterator[_Dimension]:
-    """Yield the geometry of a machine: of each leg, then of the platform."""
+    """Yield each geometric dimension of a machine by name: of every leg, then the platform."""
     for i, leg in enumerate(robot.legs, start=1):
         stored = {field.name for field in fields(leg)}
         for quantity in leg.quantities:
@@ -164,10 +164,10 @@ def _dimensions(robot: Manipulator) -> Iterator[_Dimension]:
 
 
 def _digest(content: object) -> str:
-    """Return a digest of a value that JSON can hold, as hexadecimal digits."""
+    """Return a SHA-256 digest of JSON content, shortened, as hexadecimal digits."""
     return sha256(json.dumps(content).encode()).hexdigest()[:_DIGITS]
 
 
 def _numbers(components: Any) -> str:
-    """Return components as text, to six digits, with commas."""
+    """Return numbers as text with six digits, separated by commas."""
     return ", ".join(f"{component:.6g}" for component in components)

@@ -41,7 +41,7 @@ _PULL = 30.0
 
 
 def machine_warnings(robot: Manipulator, *, bodies: bool = True) -> tuple[str, ...]:
-    """Return warnings about a machine's file, one line each.
+    """Return warnings about unlikely values in a machine, one line each.
 
     Each begins with the place: ``leg 2: lower: center_of_mass: ...``. Masses and inertias are
     checked if `bodies` is set.
@@ -87,7 +87,7 @@ def machine_warnings(robot: Manipulator, *, bodies: bool = True) -> tuple[str, .
 
 
 def _beside_the_pin(robot: Manipulator) -> Iterator[str]:
-    """Yield warnings of points beside the pin where both legs of a five-bar meet."""
+    """Yield warnings about tool or mass beside the pin at which both legs of a five-bar meet."""
     platform = robot.platform
     if platform.plane_normal is None:
         return
@@ -111,7 +111,7 @@ def _beside_the_pin(robot: Manipulator) -> Iterator[str]:
 
 
 def _odd_directions(robot: Manipulator) -> Iterator[str]:
-    """Yield warnings about a leg with a direction opposite to all others', in radial frames."""
+    """Yield warnings about legs with a direction opposite to all others', seen from the axis."""
     points = np.array([leg.guide_point for leg in robot.legs])
     axis = np.array(robot.platform.axis)
     out = (points - points.mean(axis=0)) @ (np.eye(3) - np.outer(axis, axis))
@@ -148,7 +148,7 @@ def _mass_warnings(platform: Platform, legs: Sequence[LegKind]) -> Iterator[str]
 
 
 def _long_lengths(robot: Manipulator) -> dict[int, dict[str, Sequence[float]]]:
-    """Return lengths beyond `_LARGE`, m, by leg (from 1; 0 for the platform) and key."""
+    """Return lengths beyond `_LARGE` m by leg number (0 for the platform) and key."""
     platform = robot.platform
     lengths: dict[int, dict[str, Sequence[float]]] = {
         0: {
@@ -174,7 +174,7 @@ def _long_lengths(robot: Manipulator) -> dict[int, dict[str, Sequence[float]]]:
 
 
 def _millimetre_warnings(far: Mapping[int, Mapping[str, Sequence[float]]]) -> list[str]:
-    """Return a warning about lengths that are probably in mm, with their legs and keys."""
+    """Return, in a list or [], a warning that lengths of these legs and keys are likely in mm."""
     if not far:
         return []
     legs_by_keys: dict[tuple[str, ...], list[int]] = {}
@@ -190,7 +190,7 @@ def _millimetre_warnings(far: Mapping[int, Mapping[str, Sequence[float]]]) -> li
 
 
 def _leg_warnings(leg: LegKind, platform: Platform, bodies: bool) -> Iterator[str]:
-    """Yield warnings about a leg, one line each."""
+    """Yield warnings about unlikely values of a leg, one line each."""
     far = hypot(*leg.platform_point)
     # A platform that tilts may have a pivot far away for its P.
     if 0.0 < leg.size < far and not platform.tilts:
@@ -251,7 +251,7 @@ def _inertia_warnings(body: Any, length: float) -> Iterator[str]:
 
 
 def _size_warnings(platform: Platform, radius: float) -> Iterator[str]:
-    """Yield warnings about a centre of mass or inertia too large for a platform's radius, m."""
+    """Yield warnings about platform masses or inertias too large for its radius, m."""
     body, size = platform.inertia, 3.0 * radius
     off = hypot(*body.center_of_mass)
     if off > size:

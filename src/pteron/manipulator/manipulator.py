@@ -76,12 +76,12 @@ class Manipulator:
     owner: Mapping[str, Any] = field(default_factory=OwnerData, compare=False, repr=False)
 
     def __hash__(self) -> int:
-        """Hash once: the public functions look machines up at every call."""
+        """Return the machine's hash, computed only once."""
         return self._hash
 
     @cached_property
     def _hash(self) -> int:
-        """The hash of the fields that equality compares."""
+        """The hash of all fields that equality compares, cached."""
         compared = (part.name for part in fields(self) if part.compare)
         return hash(tuple(getattr(self, name) for name in compared))
 
@@ -102,26 +102,26 @@ class Manipulator:
         object.__setattr__(self, "gravity", vector(self.gravity, "gravity"))
 
     def __repr__(self) -> str:
-        """Return the machine in a line; `save` writes all of it."""
+        """Return the machine's name, kinds of legs and platform motion in one line."""
         kinds = " + ".join(
             f"{count} {kind}" for kind, count in Counter(leg.type for leg in self.legs).items()
         )
         return f"<Manipulator {self.name!r}: {kinds} under a {self.platform.motion} platform>"
 
     def _repr_html_(self) -> str:
-        """Return the table of the legs as HTML, for notebooks."""
+        """Return the machine's legs as an HTML table, for notebooks."""
         from pteron.manipulator.notebook import machine_table
 
         return machine_table(self)
 
     @property
     def freedom(self) -> int:
-        """Number of pose coordinates m."""
+        """Number of pose coordinates, m."""
         return len(self.coordinates)
 
     @property
     def joint_count(self) -> int:
-        """Number of actuated joints n, equal to that of legs."""
+        """Number of actuated joints, n, one for each leg."""
         return len(self.legs)
 
     @property
@@ -131,9 +131,10 @@ class Manipulator:
 
     @property
     def wraps(self) -> NDArray[np.bool_]:
-        """Coordinates (m,) of which a full turn gives the same joint coordinates.
+        """Mask (m,) of pose coordinates that are angles whose full turn changes no joint.
 
-        A platform's angle does, unless it slides the platform's halves or a joint follows it.
+        The platform's angles are such, unless they slide the platform's halves or a joint follows
+        them.
         """
         around = bool(self.platform.rotation_axes)
         return self.platform.angular & (around and not any(leg.follows_angle for leg in self.legs))
@@ -155,10 +156,10 @@ class Manipulator:
 
     @cached_property
     def column_names(self) -> dict[str, tuple[str, ...]]:
-        """Names of the columns of tables that hold a pose, a velocity and so on.
+        """Names of table columns, by quantity: "pose", "velocity", "joints", "forces" and so on.
 
         A pose is x y z phi, a velocity dx dy dz dphi, an acceleration ddx ddy ddz ddphi, a wrench
-        fx fy fz mk: those that the machine has; where its platform tilts a pose has other angles,
+        fx fy fz mk, as far as the machine has them; if its platform tilts, a pose has other angles,
         and a wrench is fx fy fz mx my mz. Joints are rho1 or theta1, their rates drho1 or dtheta1,
         forces force1 or torque1.
         """
@@ -176,7 +177,7 @@ class Manipulator:
 
     @property
     def column_units(self) -> dict[str, str]:
-        """Units of those columns by name; m, rad, N, N m, and per s or s^2."""
+        """Units of the table columns by column name: m, rad, N, N m, and per s or s^2."""
         joints = [leg.joint for leg in self.legs]
         units: dict[str, Sequence[str]] = {
             "pose": self.units,
@@ -200,7 +201,7 @@ def faults_of(
     tools: Sequence[Tool] = (),
     home: Sequence[float] | None = None,
 ) -> list[str]:
-    """Return the faults of a machine, one line each; a leg is None if it has faults itself."""
+    """Return the faults of a machine's parts, one line each; None stands for a faulty leg."""
     faults = [*name_faults(name), *tool_faults(platform, tools), *_home_faults(platform, home)]
     freedom = len(platform.coordinates)
     if len(legs) != freedom:
@@ -219,7 +220,7 @@ def faults_of(
 
 
 def _home_faults(platform: Platform, home: Sequence[float] | None) -> Iterator[str]:
-    """Yield the faults of a home that is not a pose of the platform."""
+    """Yield the faults of a home pose that does not fit the platform's coordinates."""
     if home is None:
         return
     names = platform.coordinates
@@ -233,7 +234,7 @@ def _home_faults(platform: Platform, home: Sequence[float] | None) -> Iterator[s
 
 
 def _leg_faults(platform: Platform, leg: object) -> Iterator[str]:
-    """Yield the faults of a leg under a platform."""
+    """Yield the faults of a leg under a platform, as lines of text."""
     if not isinstance(leg, LegKind):
         yield f"{type(leg).__name__} given, a leg expected"
         return
@@ -284,7 +285,7 @@ def _leg_faults(platform: Platform, leg: object) -> Iterator[str]:
 
 
 def _tilting_leg_faults(platform: Platform, leg: LegKind) -> Iterator[str]:
-    """Yield the faults of a leg under a platform that tilts."""
+    """Yield the faults of a leg under a platform that tilts, as lines of text."""
     takes, on_planes = (
         "legs that end in ball joints and hold nothing else",
         platform.keeps_points_in_planes,
@@ -317,7 +318,7 @@ def _tilting_leg_faults(platform: Platform, leg: LegKind) -> Iterator[str]:
 
 
 def _unheld_tilting(platform: Platform, legs: Sequence[LegKind]) -> list[str]:
-    """Return the fault of legs that leave a tilting platform a free motion at every pose."""
+    """Return, in a list or [], the fault that legs leave a tilting platform a free motion."""
     normals = [leg.plane_normal for leg in legs if leg.plane_normal is not None]
     if normals and all(parallel(normals[0], normal) for normal in normals[1:]):
         return [
@@ -328,7 +329,7 @@ def _unheld_tilting(platform: Platform, legs: Sequence[LegKind]) -> list[str]:
 
 
 def _with_held_points(platform: Platform, legs: Sequence[LegKind]) -> Platform:
-    """Return a tripod's platform with the planes that its legs confine its points to."""
+    """Return a tripod's platform with the planes in which its legs keep its points."""
     if not platform.keeps_points_in_planes:
         return platform
     planes = [
@@ -342,7 +343,8 @@ def _with_held_points(platform: Platform, legs: Sequence[LegKind]) -> Platform:
 def unheld_axes(platform: Platform, legs: Sequence[LegKind]) -> NDArray[np.float64]:
     """Return axes (k, 3) about which no leg prevents a non-tilting platform from rotating.
 
-    Only the points where both legs meet may carry anything there, as of a five-bar.
+    Such axes are allowed only for a five-bar, whose legs meet in one point: only that point may
+    carry anything.
     """
     axis = platform.turning_axis
     # What one leg withholds is perpendicular to the axes about which it lets the platform turn.
@@ -351,7 +353,7 @@ def unheld_axes(platform: Platform, legs: Sequence[LegKind]) -> NDArray[np.float
 
 
 def _unheld_freedoms(platform: Platform, legs: list[LegKind]) -> list[str]:
-    """Return the fault of legs that leave the platform a free motion other than its own."""
+    """Return, in a list or [], the fault that legs leave the platform a free motion."""
     turning = [i for i, leg in enumerate(legs, start=1) if leg.follows_angle]
     if len(turning) > 1:
         return [f"{legs_text(turning)}: all turn the platform, which takes one such leg"]

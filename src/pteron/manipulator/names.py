@@ -13,7 +13,7 @@ _JOINERS = "\u200c\u200d"
 
 
 def name_faults(name: object) -> Iterator[str]:
-    """Yield the faults of a machine's name."""
+    """Yield the faults of a machine's name, as lines of text."""
     if type(name) is not str or not name.strip():
         yield f"name: {name!r} is not a text with at least one letter"
         return

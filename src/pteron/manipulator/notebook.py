@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def machine_table(robot: Any) -> str:
-    """Return the platform and the table of the legs of a machine, as HTML."""
+    """Return a machine's legs as an HTML table under a line on its platform."""
     driven = any(leg.drive for leg in robot.legs)
     columns = [
         *(Column("leg", "number"), Column("kind"), Column("joint"), Column("limits")),
@@ -39,12 +39,12 @@ def machine_table(robot: Any) -> str:
 
 
 def _numbers(components: Sequence[float]) -> str:
-    """Return components as text, to four digits, with commas and true minus signs."""
+    """Return numbers as text with four digits, commas and true minus signs."""
     return ", ".join(f"{component:.4g}" for component in components).replace("-", "\u2212")
 
 
 def _limits(leg: LegKind) -> str:
-    """Return the text of a leg's joint limits."""
+    """Return a leg's joint limits as text with the unit, or "none"."""
     if leg.limits is None:
         return "none"
     low, high = (f"{limit:.4g}".replace("-", "\u2212") for limit in leg.limits)
@@ -52,7 +52,7 @@ def _limits(leg: LegKind) -> str:
 
 
 def _drive(leg: LegKind) -> str:
-    """Return the text of the limits of a leg's drive."""
+    """Return as text the force and speed limit of a leg's drive."""
     drive, joint = leg.drive, leg.joint
     if drive is None:
         return "none"

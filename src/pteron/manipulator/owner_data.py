@@ -56,7 +56,7 @@ class OwnerData(Mapping[str, Any]):
 
 
 def _type_faults(content: object, place: str) -> Iterator[str]:
-    """Yield each key whose content TOML cannot represent."""
+    """Yield a fault for each key in `content` whose value TOML cannot represent."""
     if isinstance(content, Mapping):
         for key, part in content.items():
             if isinstance(key, str):

@@ -20,7 +20,7 @@ from pteron.manipulator.robot_like import RobotLike, as_manipulator
 def parameter_data(
     robot: RobotLike, groups: Sequence[tuple[int, ...]] | None = None
 ) -> tuple[Parameter, ...]:
-    """Return the inertial parameters as data: kind, body, legs and unit of each.
+    """Return kind, body, legs and unit of each inertial parameter of a machine.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def _cached_parameter_list(
     platform: tuple[str, ...],
     groups: tuple[tuple[int, ...], ...] | None,
 ) -> tuple[Parameter, ...]:
-    """Return the inertial parameters of legs' bodies and the platform, cached by their kinds."""
+    """Return the list of inertial parameters for these kinds of bodies, cached."""
     return parameter_list([dict(bodies) for bodies in kinds], platform, groups)
 
 

@@ -41,5 +41,5 @@ class Radii:
 
     @property
     def leg(self) -> float:
-        """The radius of a leg with upper and lower part on a common line, m: the greater one."""
+        """The greater of the upper and lower link's radius, m, for both on one line."""
         return max(self.upper, self.lower)

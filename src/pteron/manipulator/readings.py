@@ -23,7 +23,7 @@ def has_readings(robot: Manipulator) -> bool:
 
 
 def reading_scales(robot: Manipulator) -> Array:
-    """Return each joint's scale, (n,): coordinate per unit of its reading."""
+    """Return the joint coordinate per unit of each drive's reading (n,)."""
     return np.array([(leg.reading or Reading()).scale for leg in robot.legs])
 
 
@@ -33,13 +33,13 @@ def reading_zeros(robot: Manipulator) -> Array:
 
 
 def from_readings(robot: Manipulator, readings: ArrayLike) -> Array:
-    """Return joint coordinates (..., n) of readings (..., n)."""
+    """Return joint coordinates (..., n), m or rad, from drive readings (..., n)."""
     array = np.asarray(readings, dtype=float)
     return reading_zeros(robot) + reading_scales(robot) * array if has_readings(robot) else array
 
 
 def to_readings(robot: Manipulator, joints: ArrayLike) -> Array:
-    """Return the readings (..., n) of joint coordinates (..., n)."""
+    """Return drive readings (..., n) from joint coordinates (..., n), m or rad."""
     array = np.asarray(joints, dtype=float)
     return (array - reading_zeros(robot)) / reading_scales(robot) if has_readings(robot) else array
 
@@ -51,7 +51,7 @@ def remove_readings(robot: Manipulator) -> Manipulator:
 
 
 def refuse_readings(robot: Manipulator, writer: str) -> None:
-    """Refuse a machine with readings where `writer` supports joint coordinates only."""
+    """Raise if the machine's drives have readings, which `writer` does not support."""
     if has_readings(robot):
         legs = [str(i) for i, leg in enumerate(robot.legs, start=1) if leg.reading is not None]
         raise ModelError(

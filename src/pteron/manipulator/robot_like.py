@@ -13,7 +13,7 @@ RobotLike = Manipulator | str | Path
 
 
 def as_manipulator(robot: RobotLike) -> Manipulator:
-    """Return a machine itself, or the machine that `load` reads by name or path.
+    """Return a machine as it is; load it if its name or path is given.
 
     Parameters
     ----------

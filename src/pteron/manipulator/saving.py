@@ -79,14 +79,14 @@ def to_dict(robot: RobotLike) -> dict[str, Any]:
 
 
 def text_of(robot: Manipulator) -> str:
-    """Return the text of a manipulator's file, unique to the machine."""
+    """Return the TOML text of a machine's file; equal machines have equal texts."""
     from pteron.manipulator.writing import robot_text
 
     return robot_text(document_of(robot))
 
 
 def document_of(robot: Manipulator) -> dict[str, Any]:
-    """Return the contents of a manipulator's file."""
+    """Return the tables of a machine's file as a dictionary."""
     from pteron.manipulator.leg_tables import leg_items
 
     moving_platform = robot.platform

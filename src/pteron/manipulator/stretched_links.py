@@ -15,7 +15,7 @@ from pteron.legs import LegKind
 
 
 def with_stretched_bodies(unchanged: LegKind, changed: LegKind) -> LegKind:
-    """Return a leg with the inertia of its links stretched to their new lengths.
+    """Return `changed` with links' inertia stretched from the lengths in `unchanged`.
 
     `changed` has the new lengths with the inertia of `unchanged`.
     """
@@ -27,7 +27,7 @@ def with_stretched_bodies(unchanged: LegKind, changed: LegKind) -> LegKind:
 
 
 def stretch_link(body: Any, factor: float) -> Any:
-    """Return the inertia of a link stretched along x by a factor, with the same section.
+    """Return a link's inertia after stretching it along x by a factor, same cross-section.
 
     Examples
     --------

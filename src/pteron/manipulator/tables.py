@@ -43,7 +43,7 @@ PARTS: dict[type[TomlTable], Any] = {}
 
 
 def _table_of(part: Any) -> type[TomlTable]:
-    """Return the table model of a dataclass: its fields in the order of files."""
+    """Return the pydantic table model of a dataclass, with its fields in file order."""
     hints, defaults = get_type_hints(part), {field.name: field.default for field in fields(part)}
     table_fields: dict[str, Any] = {}
     for name, description in _DESCRIPTIONS[part.__name__].items():
@@ -57,7 +57,7 @@ def _table_of(part: Any) -> type[TomlTable]:
 
 
 def _field_type(hint: Any) -> Any:
-    """Return the type of a table's key from a field's type hint: parts become tables."""
+    """Return the pydantic type of a table's key for a dataclass field's type hint."""
     tables = {part: table for table, part in PARTS.items()}
     if hint in (float, *tables):
         return tables.get(hint, Number)
@@ -138,7 +138,7 @@ class TiltingTable(SpatialBody, _Motion):
 
 
 def platform_table(motion: Any) -> type[PlatformTable] | type[TiltingTable]:
-    """Return the table model of a platform's motion; `PlatformTable` for an unknown motion."""
+    """Return the table model for platforms of this motion; `PlatformTable` if it is unknown."""
     kind = kind_of_motion(motion)
     return TiltingTable if kind is not None and kind.tilts else PlatformTable
 

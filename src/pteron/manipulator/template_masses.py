@@ -12,10 +12,11 @@ from pteron.tolerances import SAME
 
 
 def template_masses(robot: Manipulator) -> str:
-    """Return a sentence on masses equal to those of a catalog machine; "" without any.
+    """Return a warning that masses equal those of a catalog machine; '' if none do.
 
-    All links of the first leg have its masses or its sections (kg/m), and perhaps the platform.
-    Machines with a name of the catalog count as the catalog's; `pteron new` gives other names.
+    All links of the first leg, and perhaps the platform, must have the masses or the mass per
+    length of a machine of the catalog. Machines with a name of the catalog are exempt; `pteron new`
+    gives other names.
     """
     if robot.name in catalog():
         return ""
@@ -38,7 +39,7 @@ def template_masses(robot: Manipulator) -> str:
 
 
 def _links(robot: Manipulator, template: Manipulator) -> Iterator[str]:
-    """Yield the first leg's links whose mass or section is that of the template."""
+    """Yield text for each link of the first leg whose mass or section equals the template's."""
     leg: Any = robot.legs[0]
     template_leg: Any = template.legs[0]
     for letter, (key, low, high, _) in leg.extents.items():

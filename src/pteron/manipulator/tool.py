@@ -65,7 +65,7 @@ class Tool:
 
     @property
     def center(self) -> Vector:
-        """Its centre of mass in the platform's frame, m."""
+        """The tool's centre of mass in the platform's frame, m."""
         return self.point if self.center_of_mass is None else self.center_of_mass
 
     def turned(self, turn: Callable[[Vector], Vector]) -> Tool:
@@ -88,7 +88,7 @@ class Tool:
 
 
 def tool_faults(platform: Platform, tools: Sequence[Tool]) -> Iterator[str]:
-    """Yield the faults of a machine's tools."""
+    """Yield the faults of a machine's tools, as lines of text."""
     names = [tool.name for tool in tools]
     for i, tool in enumerate(tools, start=1):
         if tool.name in names[: i - 1]:
@@ -104,5 +104,5 @@ def tool_faults(platform: Platform, tools: Sequence[Tool]) -> Iterator[str]:
 
 
 def _inertia(raw: Any, key: str) -> float | tuple[float, ...]:
-    """Return a tool's inertia from a file: a number, or the numbers of a spatial inertia."""
+    """Return a tool's inertia from a file: one number, or six for a spatial inertia."""
     return numbers(raw, key, _SPATIAL) if isinstance(raw, Sequence) else number(raw, key)

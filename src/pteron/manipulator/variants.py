@@ -17,7 +17,7 @@ from pteron.tolerances import ROUNDING
 
 
 def working_modes(robot: RobotLike) -> tuple[Manipulator, ...]:
-    """Return the working modes of a manipulator: every choice of its elbows' sides, 2^n for n legs.
+    """Return the machine in each of its 2^n working modes (signs of n elbows).
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ def working_modes(robot: RobotLike) -> tuple[Manipulator, ...]:
 def with_elbows(robot: Manipulator, signs: Sequence[int]) -> Manipulator:
     """Return the machine in the working mode with these elbows, +1 or -1 for each leg.
 
-    The home that its file names is that of the file's working mode alone.
+    The home in the machine's file applies to the file's working mode only.
     """
     legs = tuple(replace(leg, elbow=sign) for leg, sign in zip(robot.legs, signs, strict=True))
     return replace(robot, legs=legs, home=robot.home if legs == robot.legs else None)
@@ -56,7 +56,7 @@ def elbow_signs(elbows: Iterable[float]) -> str:
 
 
 def turned(robot: RobotLike, rotation: ArrayLike, *, gravity: bool = True) -> Manipulator:
-    """Return the machine rotated rigidly about the base frame's origin.
+    """Return the machine rotated rigidly about the origin of the base frame.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def turned(robot: RobotLike, rotation: ArrayLike, *, gravity: bool = True) -> Ma
         raise ModelError("rotation: the matrix is a reflection (determinant -1); negate one column")
 
     def turn(v: Vector) -> Vector:
-        """Return a vector rotated by the matrix."""
+        """Return the vector rotated by the matrix."""
         return vector((matrix @ v).tolist(), "rotation")
 
     # A 2R platform's frame is the base frame at angles zero.

@@ -33,10 +33,10 @@ _CONVENTIONS = (
 def robot_text(
     document: Mapping[str, Any], *, explained: bool = False, about: Sequence[str] = ()
 ) -> str:
-    """Return the text of a machine's file.
+    """Return the TOML text of a machine's file from its tables, with comments if `explained`.
 
-    With `explained`, comments describe every key, also absent ones; for legs of one kind at the
-    first. `about` are comments at its head.
+    With `explained`, comments describe every key, also absent ones; for legs of one kind only at
+    the first. `about` are comments at the top of the file.
     """
     head = [*about, *([*_CONVENTIONS, _bodies()] if explained else [f"For Pteron. {_UNITS}"])]
     lines = [f"# {line}" for text in head for line in wrap(text, _WIDTH - 2)]
@@ -65,7 +65,7 @@ def robot_text(
 
 
 def _kind_of(name: str) -> type[LegKind]:
-    """Return a kind of leg by its name, also from an installed package."""
+    """Return the class of a kind of leg by its name; raise if it is not installed."""
     kind = kind_named(name)
     if kind is None:
         raise ModelError(
@@ -84,7 +84,7 @@ def _bodies() -> str:
 def _block(
     name: str, model: type[TomlTable], table: Mapping[str, Any], explained: bool
 ) -> list[str]:
-    """Return the lines of one table, and of the lists of tables in it."""
+    """Return the TOML lines of the table `name`, and of the lists of tables in it."""
     fields, lines, inner = model.model_fields, [f"[{name}]"] if name else [], []
     entries = []
     for key, content in table.items():
@@ -109,7 +109,7 @@ def _block(
 
 
 def _example(field: FieldInfo, table: Mapping[str, Any]) -> Any:
-    """Return an example value of an absent key of a table."""
+    """Return an example value for a key that is absent from a table."""
     like = field.json_schema_extra
     if isinstance(like, Mapping) and like["like"] in table:
         return table[str(like["like"])]
@@ -117,7 +117,7 @@ def _example(field: FieldInfo, table: Mapping[str, Any]) -> Any:
 
 
 def _comment_lines(entries: list[tuple[str, FieldInfo | None]]) -> list[str]:
-    """Return lines with comments on their keys: behind short lines, above long ones."""
+    """Return TOML lines with comments on their keys: behind short lines, above long ones."""
     lines = []
     column = max((len(text) for text, _ in entries if len(text) <= _COLUMN), default=0)
     for text, field in entries:
@@ -134,7 +134,7 @@ def _comment_lines(entries: list[tuple[str, FieldInfo | None]]) -> list[str]:
 
 
 def _toml(content: Any) -> str:
-    """Return a value in TOML on a single line: mappings as inline tables, sequences as arrays."""
+    """Return a value as TOML text on one line."""
     if isinstance(content, Mapping):
         return "{ " + ", ".join(f"{key} = {_toml(part)}" for key, part in content.items()) + " }"
     if isinstance(content, Sequence) and not isinstance(content, str):

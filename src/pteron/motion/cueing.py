@@ -208,9 +208,9 @@ def _even_times(time: Array, source: str) -> Array:
 
 
 def _control_points(time: Array, parts: Array) -> Array:
-    """Return the absolute Bernstein coefficients (6, T - 1, 6) of `Motion.at` between samples.
+    """Return the absolute Bernstein coefficients (6, T - 1, 6) of a motion between samples.
 
-    The curve between two samples lies in the hull of its six coefficients.
+    The curve between two samples lies in the convex hull of its six coefficients.
     """
     step = np.diff(time)[:, None]
     (a, va, aa), (b, vb, ab) = parts[:, :-1], parts[:, 1:]
@@ -221,7 +221,7 @@ def _control_points(time: Array, parts: Array) -> Array:
 
 
 def _filter_motion(time: Array, vehicle_motion: Array, washout: Washout) -> Array:
-    """Return the uncompressed motion, x y z roll pitch yaw from the middle, and two derivatives.
+    """Return the simulator's motion, its limits ignored, and two derivatives (3, T, 6).
 
     The array is (3, T, 6), in m, rad and s.
     """
@@ -259,7 +259,7 @@ def _filter_motion(time: Array, vehicle_motion: Array, washout: Washout) -> Arra
 def _filter_signal(
     time: Array, signal: Array, numerator: Sequence[float], denominator: Any
 ) -> Array:
-    """Return a filter's output and two derivatives (3, T), for an input that was 0 before."""
+    """Return a linear filter's output and two derivatives (3, T), for a signal (T,)."""
     return np.array(
         [
             scipy.signal.lsim(
@@ -281,9 +281,9 @@ def _compress(demand: Array, half: Array) -> Array:
 
 
 def _box(robot: Manipulator, middle: Array, demand: Array, type_ii: float) -> tuple[Box, Proof]:
-    """Return a box about the middle, proved to lie in the workspace, and its proof.
+    """Return a box of poses about the middle, and the proof that it lies in the workspace.
 
-    Its sides are in proportion to the ranges of the uncompressed motion.
+    Its sides are proportional to the ranges of the motion `demand` before compression.
     """
     required: tuple[Condition, ...] = conditions(robot, type_ii=type_ii)
     least = 1e-3 * max(float(demand.max()), 1e-3)

@@ -12,9 +12,9 @@ from pteron.motion.joint_points import Guide, JointPoints, Part
 
 
 def enlarged_points(points: JointPoints, other: JointPoints, times: float) -> JointPoints:
-    """Return a machine's points at a pose, moved `times` the way to another machine's points.
+    """Return joint points moved by `times` their difference from another machine's points.
 
-    With 1 they are the other machine's.
+    With `times` = 1 they are the other machine's points.
     """
     other_corners = np.vstack([part.corners for part in other.parts])
     return replace(
@@ -39,7 +39,7 @@ def enlarged_points(points: JointPoints, other: JointPoints, times: float) -> Jo
 def enlarged_guides(
     guides: Sequence[Guide], others: Sequence[Guide], times: float
 ) -> tuple[Guide, ...]:
-    """Return a machine's guides, moved by `times` the way to another machine's guides."""
+    """Return guides moved by `times` their difference from another machine's guides."""
     return tuple(
         replace(guide, path=guide.path + times * (other.path - guide.path))
         for guide, other in zip(guides, others, strict=True)
@@ -47,7 +47,7 @@ def enlarged_guides(
 
 
 def greatest_difference(points: JointPoints, other: JointPoints) -> float:
-    """Return the greatest distance, m, between corresponding joints of two machines."""
+    """Return the greatest distance, m, between corresponding joints of two machines at a pose."""
     moved = enlarged_points(points, other, 1.0)
     return max(
         float(np.linalg.norm(there - line, axis=-1).max())
@@ -56,7 +56,7 @@ def greatest_difference(points: JointPoints, other: JointPoints) -> float:
 
 
 def _shift_points(points: Array, others: Array, times: float) -> Array:
-    """Return points (K, 3) shifted by `times` their difference from another machine's."""
+    """Return points (K, 3) moved by `times` the way to the nearest or same of `others`."""
     # Joints that coincide in one machine may be two in the other: the nearest is the same one.
     if len(points) == len(others):
         nearest = others

@@ -38,9 +38,9 @@ class Part(NamedTuple):
 
     @property
     def triangles(self) -> NDArray[np.intp] | None:
-        """The faces (F, 3) about all corners, as numbers of these; None where they lie in a plane.
+        """Triangles (F, 3) of the part's convex hull, as corner indices; None if it is flat.
 
-        Seen from outside their corners follow each other anticlockwise.
+        Seen from outside, the corners of a triangle are in anticlockwise order.
         """
         corners = self.corners[(0,) * (self.corners.ndim - 2)]
         away = corners - corners[:1]
@@ -96,7 +96,7 @@ class JointPoints:
     rams: tuple[bool, ...]
 
     def at(self, index: int) -> JointPoints:
-        """Return the points of a pose, by its index."""
+        """Return the joint points at pose number `index` of several."""
         return replace(
             self,
             chain=self.chain[index],
@@ -133,7 +133,7 @@ class Guide:
 
 
 def joint_points(robot: RobotLike, pose: PoseLike) -> JointPoints:
-    """Return the points of the joints and of the platform.
+    """Return the positions of all joints and platform points at poses, m.
 
     Parameters
     ----------
@@ -187,7 +187,7 @@ def joint_points(robot: RobotLike, pose: PoseLike) -> JointPoints:
 
 
 def _links(leg: LegKind, chain: Array, coordinate: Array, end: Array) -> Array:
-    """Return a leg's line, which ends at its platform point: a hinge of the platform is beyond."""
+    """Return the points (..., k, 3) of a leg's line from its base to its platform point, m."""
     start = chain[..., 0, :]
     if "p" in leg.bodies and leg.joint_axis is not None:
         start = start + np.multiply.outer(coordinate, leg.joint_axis)
@@ -228,7 +228,7 @@ def _parts(robot: Manipulator, poses: Array, p: Array) -> tuple[Part, ...]:
 
 
 def _corners(arms: Array) -> Array:
-    """Return the distinct arms (k, 3) that lead away from a hub, in order round its z axis."""
+    """Return the distinct non-zero vectors (k, 3) from a hub, ordered by angle about z."""
     arms_out = _distinct(arms[np.abs(arms).max(axis=-1) > ROUNDING])
     offsets = arms_out - arms_out.mean(axis=0) if len(arms_out) else arms_out
     return arms_out[np.argsort(np.arctan2(offsets[:, 1], offsets[:, 0]), kind="stable")]
@@ -241,7 +241,7 @@ def _distinct(points: Array) -> Array:
 
 
 def joint_guides(robot: RobotLike, poses: PoseLike) -> tuple[Guide, ...]:
-    """Return the path along which each actuated joint guides its body, for pictures.
+    """Return the path of each leg's actuated joint over its travel, for pictures.
 
     Within the joints' limits; a guide without limits is a little longer than the poses need, a
     crank without limits goes all the way round.

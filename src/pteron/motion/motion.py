@@ -55,12 +55,12 @@ class Motion(Result):
                 )
 
     def __repr__(self) -> str:
-        """Return a summary of the motion in one line."""
+        """Return the motion's duration and its counts of samples and coordinates in one line."""
         rows = f"{len(self.time)} samples of {self.pose.shape[1]} coordinates"
         return f"<{type(self).__name__}: {self.duration:.6g} s, {rows}>"
 
     def summary(self) -> str:
-        """Return the range and rates of the motion as lines of text."""
+        """Return the range, speed and acceleration of each pose coordinate as lines of text."""
         return self._overview().text
 
     def _overview(self) -> Overview:
@@ -76,7 +76,7 @@ class Motion(Result):
         return Overview(type(self).__name__, about, columns, rows)
 
     def expect_ascending(self) -> None:
-        """Refuse a motion whose times are fewer than two, or do not ascend.
+        """Raise unless the motion has two or more times that ascend.
 
         Raises
         ------
@@ -92,7 +92,7 @@ class Motion(Result):
         return float(self.time[-1] - self.time[0])
 
     def at(self, time: ArrayLike) -> tuple[Array, Array, Array]:
-        """Return pose, velocity and acceleration at any times.
+        """Return pose, velocity and acceleration at any times, (..., m) each.
 
         Between two samples the pose is the polynomial of the fifth degree that has their poses,
         velocities and accelerations; before the first and after the last the platform rests there.
@@ -174,5 +174,5 @@ def interpolate_columns(time: Array, columns: Array, at: Array) -> Array:
 
 
 def pose_text(pose: Array) -> str:
-    """Return a pose in brackets for messages, five digits a number."""
+    """Return a pose as text in brackets for messages, five digits for each number."""
     return f"[{', '.join(f'{coordinate:.5g}' for coordinate in pose + 0.0)}]"

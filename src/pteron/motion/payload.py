@@ -20,7 +20,7 @@ carry up to their own moving mass, presses and simulators up to ten times it."""
 
 
 def payload_warning(robot: Manipulator, mass: float) -> str:
-    """Return a warning about an unlikely payload, kg, as a clause; else an empty text."""
+    """Return a warning if a payload of `mass` kg is unlikely for the machine; else ''."""
     bodies = [body for leg in robot.legs for body in leg.bodies.values()]
     moving = sum(body.values[0] for body in (*bodies, robot.platform.total_inertia))
     if mass <= _HEAVY * moving:
@@ -87,9 +87,10 @@ def with_payload(
 ) -> Manipulator:
     """Return the machine with a body on its platform: a point mass at the tool by default.
 
-    It is the same machine whose platform is heavier: m + m_L, m gamma + m_L s and I + I_L + m_L
-    |s|^2, s being `center` across the platform's axis; as a whole, where the platform tilts, and
-    with its part of the inertia tensor. Exported code does the same while it runs: `set_payload`.
+    The platform's mass becomes m + m_L, its first moment m gamma + m_L s and its inertia I + I_L +
+    m_L |s|^2, s being the part of `center` perpendicular to the platform's axis; for a platform
+    that tilts, s is all of `center` and the inertia is a tensor. Exported code does the same at run
+    time by `set_payload`.
 
     Parameters
     ----------
@@ -141,7 +142,7 @@ def add_payload(
     center: Sequence[float] | None = None,
     inertia: float | Sequence[float] = 0.0,
 ) -> Manipulator:
-    """Return the machine with a body, like `with_payload`, without a warning about its mass."""
+    """Return the machine with a payload on its platform; unlike `with_payload` it never warns."""
     payload = number_or_nan(mass)
     if not (math.isfinite(payload) and payload >= 0.0):
         raise DataError(f"payload: {mass!r} given, a mass of 0 kg or more expected")

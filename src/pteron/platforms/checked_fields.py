@@ -61,7 +61,7 @@ def _axes(platform: Any) -> dict[str, Any]:
 
 
 def _limits(platform: Any) -> dict[str, Any]:
-    """Return the angles' `limits`, checked, rad: a pair, or a pair per angle where it tilts."""
+    """Return the platform's angle limits after a check, rad: a pair, or one for each angle."""
     if platform.limits is None:
         return {}
     if not platform.angles:
@@ -81,12 +81,12 @@ def _limits(platform: Any) -> dict[str, Any]:
 
 
 def _tool(platform: Any) -> dict[str, Any]:
-    """Return the `tool`, checked as a vector."""
+    """Return the platform's field `tool`, checked as a vector."""
     return {"tool": vector(platform.tool, "tool")}
 
 
 def _joint(platform: Any) -> dict[str, Any]:
-    """Return the fields of a platform on a joint with the base; raise where others have them."""
+    """Return the checked fields of a platform on a joint with the base; raise if misplaced."""
     faults, checked = [], {}
     if platform.angle_order not in get_args(AngleOrder):
         faults.append(f'angles: {platform.angle_order!r} is not "rpy" or "xyz"')

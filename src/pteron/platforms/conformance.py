@@ -24,7 +24,7 @@ _SMALL = 0.3
 
 
 def faults(platform: Platform, seed: int = 0) -> tuple[str, ...]:
-    """Return the breaches of the protocol by a platform, one line each; () where it conforms.
+    """Return how a platform breaches the protocol of platforms, one line each; () if not.
 
     Examples
     --------
@@ -44,7 +44,7 @@ def faults(platform: Platform, seed: int = 0) -> tuple[str, ...]:
         return ca.SX(ca.DM(rng.normal(size=shape)))
 
     def points(flat: bool) -> list[Expression]:
-        """Return random points (3, 1), flat ones at height 0."""
+        """Return random points (3, 1), with z = 0 if `flat`."""
         high = 0.0 if flat else 1.0  # what slides moves across the axis
         return [ca.SX(ca.DM(rng.normal(size=3) * (1.0, 1.0, high))) for _ in range(_POINTS)]
 
@@ -64,7 +64,7 @@ def faults(platform: Platform, seed: int = 0) -> tuple[str, ...]:
 
 
 def _motion_faults(motion: PlatformMotion, rates: Expression) -> Iterator[str]:
-    """Yield the faults of axes, turns, points and matrices against exact derivatives."""
+    """Yield the faults of a platform's axes, points and matrices against exact derivatives."""
     omega = sum((turn.rate * turn.axis for turn in motion.rotation.turns), ca.SX(3, 1))
     turned = ca.mtimes(ca.skew(omega), motion.axes)
     pairs = {"axes: do not turn with the angular velocity": (rate_of(motion.axes), turned)}
@@ -102,7 +102,7 @@ def _force_faults(
     gravity: Expression,
     rows: list[Expression],
 ) -> Iterator[str]:
-    """Yield the faults of `needs`, the mass matrix and point masses, by energy and its rate."""
+    """Yield the faults of a platform's forces and mass matrix against its energy."""
     inertia = equations.moments(rows)
     mass = equations.mass_matrix(motion, inertia)
     energy = 0.5 * ca.bilin(mass, rates, rates)

@@ -37,12 +37,12 @@ class Coordinate(NamedTuple):
 
     @property
     def shown_unit(self) -> str:
-        """The unit that people read it in: mm or degrees."""
+        """The unit in which the coordinate is shown: "mm" or "deg"."""
         return SHOWN[self.unit][0]
 
     @property
     def shown_factor(self) -> float:
-        """Its value in `shown_unit` over its value in SI units."""
+        """The factor from the coordinate's SI unit to `shown_unit`."""
         return SHOWN[self.unit][1]
 
 
@@ -64,7 +64,7 @@ COORDINATES: dict[str, Coordinate] = {
 
 
 def coordinate(name: str) -> Coordinate:
-    """Return a coordinate by its name; one that no platform has counts as a length."""
+    """Return the pose coordinate of this name; an unknown one counts as a length."""
     return COORDINATES.get(name, Coordinate("m", name, f"f{name}"))
 
 

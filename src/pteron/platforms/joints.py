@@ -25,9 +25,9 @@ class PlatformJoint(NamedTuple):
 
 
 def platform_joints(platform: Platform, poses: Array) -> list[PlatformJoint]:
-    """Return the chain of joints whose motion is the platform's, at poses (..., m).
+    """Return the joints, with axis and values, that together move as the platform does.
 
-    A tripod's chain has x, y and yaw too, which depend on its pose.
+    A tripod's joints include x, y and yaw, which depend on its pose.
     """
     kind = platform.kind
     x0, y0, k = (np.array(axis) for axis in platform.frame)

@@ -50,12 +50,12 @@ XYZ: dict[str, type[PlatformEquations]] = {
 
 
 def motion_names() -> tuple[str, ...]:
-    """Return the motions that files may name, of installed packages too."""
+    """Return the names of all platform motions, built-in and of installed packages."""
     return (*KINDS, *(name for name in extension_names(GROUP) if name not in KINDS))
 
 
 def kind_of_motion(motion: object) -> type[PlatformEquations] | None:
-    """Return the kind of platform with a motion; None if there is none.
+    """Return the platform class of a motion such as "3T1R"; None if it is unknown.
 
     Raises
     ------
@@ -77,7 +77,7 @@ def kind_of_motion(motion: object) -> type[PlatformEquations] | None:
 
 
 def equations_class(motion: str, angle_order: str, slides: bool) -> type[PlatformEquations]:
-    """Return the class of equations for a motion, an order of angles, and sliding halves or not."""
+    """Return the class of platform equations for a motion, an angle order and sliding halves."""
     if slides:
         return Sliding
     return XYZ[motion] if angle_order == "xyz" and motion in XYZ else KINDS[motion]

@@ -64,18 +64,18 @@ class PlatformMotion(NamedTuple):
     k angles, and x' above stands for them. None where they are the pose's rates."""
 
     def pose_rows(self, rows: Expression) -> Expression:
-        """Return rows (j, m) in x' from rows in the quasi-velocities."""
+        """Return the matrix (j, m) that applies to pose rates, from that for quasi-velocities."""
         if self.angular is None:
             return rows
         lengths = rows.shape[1] - self.angular.shape[0]
         return ca.horzcat(rows[:, :lengths], ca.mtimes(rows[:, lengths:], self.angular))
 
     def pose_forces(self, forces: Expression) -> Expression:
-        """Return forces (m, K) along the pose from those along the quasi-velocities."""
+        """Return generalized forces (m, K) along the pose from those along quasi-velocities."""
         return self.pose_rows(forces.T).T
 
     def pose_rates(self, quasi: Expression) -> Expression:
-        """Return x' (m, K) of quasi-velocities; not finite where the angles are singular."""
+        """Return pose rates (m, K) from quasi-velocities; not finite where angles are singular."""
         if self.angular is None:
             return quasi
         lengths = quasi.shape[0] - self.angular.shape[0]
@@ -88,9 +88,9 @@ class PlatformMotion(NamedTuple):
         return self.pose_rows(self.matrix)
 
     def velocity_of(self, twist: Expression) -> tuple[Expression, Expression]:
-        """Return x' (m, 1) nearest to a twist of P (6, 1), and the remaining twist (6, 1).
+        """Return the pose rates (m, 1) nearest to a twist (6, 1), and the twist left over.
 
-        The solution is that of least squares; the remaining part is infeasible for the platform.
+        The solution is that of least squares; the twist left over is infeasible for the platform.
         """
         square, projection = ca.mtimes(self.matrix.T, self.matrix), ca.mtimes(self.matrix.T, twist)
         quasi = projection if square.is_constant() else ca.mtimes(ca.inv_minor(square), projection)
@@ -98,14 +98,14 @@ class PlatformMotion(NamedTuple):
 
     @property
     def angle_measure(self) -> Expression:
-        """Det E: 0 where the angles are singular (gimbal lock), 1 at best."""
+        """The determinant of the angles' matrix E: 0 in gimbal lock, 1 at best, no unit."""
         if self.angular is None:
             return ca.SX(1)
         a, b, c = ca.horzsplit(self.angular)
         return ca.dot(a, ca.cross(b, c))
 
     def quasi_forces(self, forces: Expression) -> Expression:
-        """Return forces (m, K) along the quasi-velocities from those along the pose."""
+        """Return forces (m, K) along quasi-velocities from those along the pose."""
         if self.angular is None:
             return forces
         lengths = forces.shape[0] - self.angular.shape[0]
@@ -120,7 +120,7 @@ class PlatformMotion(NamedTuple):
         return adj.T / ca.dot(a, adj[:, 0])
 
     def rotation_at(self, point: PointMotion, fixed: Expression) -> RotationMotion:
-        """Return the rotation at a leg's platform point with the fixed offset `fixed` (3, 1), m."""
+        """Return the platform's rotation as seen from a leg's platform point."""
         return self.rotation._replace(hinge=point.position - fixed)
 
 
@@ -192,76 +192,77 @@ class PlatformEquations(ABC):
         return Offset(x0 * s[0] + y0 * s[1], y0 * s[0] - x0 * s[1], k * s[2] + t)
 
     def axes_by_angle(self) -> dict[str, Expression]:
-        """Return the axis (3, 1) that each angle turns it about, or along, at angles zero."""
+        """Return the rotation axis (3, 1) of each angle, at angles zero, by the angle's name."""
         return {} if self.axis_angle is None else {self.axis_angle: self.frame[2]}
 
     @classmethod
     def angles(cls) -> list[int]:
-        """Return the indices of the angles in a pose."""
+        """Return the indices of the pose coordinates that are angles."""
         return np.flatnonzero(are_angles(cls.coordinates)).tolist()
 
     def change_to_platform_axes(
         self, pose: Expression
     ) -> tuple[PlatformEquations, Expression] | None:
-        """Return the platform with vectors in its own axes, from P, and the axes (3, 3).
+        """Return the platform in its own axes, and these axes (3, 3); None if not cheaper.
 
-        None where that saves no operations.
+        The result is None if that saves no operations.
         """
         return None
 
     def moments(self, rows: Sequence[Expression]) -> PlatformMoments:
-        """Return the platform's inertia from the rows (1, K) of its parameters."""
+        """Return the platform's mass moments from rows (1, K) of its parameters."""
         return moments_of(self.kinds, list(rows))
 
     @abstractmethod
     def motion(
         self, pose: Expression, velocity: Expression, acceleration: Expression
     ) -> PlatformMotion:
-        """Return the motion of the platform and of its points."""
+        """Return the motion of platform and points at a pose, with its rates and second rates."""
 
     @abstractmethod
     def needs(
         self, motion: PlatformMotion, gravity: Expression, inertia: PlatformMoments
     ) -> Expression:
-        """Return the wrench (m, K) required at P to move the platform itself, -F_e."""
+        """Return the generalized force (m, K) required at P to move the platform itself."""
 
     def needed_wrench(
         self, motion: PlatformMotion, gravity: Expression, inertia: PlatformMoments
     ) -> tuple[Expression, Expression]:
-        """Return the force and the moment about P, each (3, K), required to move the platform."""
+        """Return force and moment about P, (3, K) each, required to move the platform itself."""
         return needed_wrench(motion.body, inertia, gravity)
 
     def wrench_matrix(self, motion: PlatformMotion, gravity: Expression) -> Expression:
-        """Return Om_e (m, k): the wrench on it per unit of each of its k parameters."""
+        """Return Om_e (m, k): the generalized force on the platform per unit of each parameter."""
         return -self.needs(motion, gravity, self.moments(ca.vertsplit(ca.SX.eye(len(self.kinds)))))
 
     @abstractmethod
     def mass_matrix(self, motion: PlatformMotion, inertia: PlatformMoments) -> Expression:
-        """Return its mass matrix (m, m) with respect to the pose."""
+        """Return the platform's mass matrix (m, m) in its quasi-velocities."""
 
     def mass_moment(self, motion: PlatformMotion, inertia: PlatformMoments) -> Expression:
-        """Return mass times centre of mass, (3, K), in the base frame."""
+        """Return the platform's mass times centre of mass, (3, K), kg m, in the base frame."""
         return mass_moment(motion.body, inertia)
 
     def generalized_forces(self, motion: PlatformMotion, wrench: Expression) -> Expression:
-        """Return the generalized forces (m, K) of a wrench, whose rows are `wrench_columns`."""
+        """Return the generalized forces (m, K) of wrenches with the rows `wrench_columns`."""
         return wrench
 
     def constraint(self, motion: PlatformMotion) -> Expression | None:
-        """Return the constraint measure of the freedoms outside the pose.
+        """Return a measure, 1 at best, of constraints by the platform itself; None without.
 
-        It is 1 at best, 0 where a freedom is unconstrained; None where the legs' couples do it.
+        It is 1 at best, 0 where a freedom is unconstrained; None if the legs' couples constrain
+        them.
         """
         return None
 
     def plane_wrenches(self, motion: PlatformMotion) -> Expression | None:
-        """Return the unit constraint wrenches (k, 6) of planes about P; None without planes."""
+        """Return the unit wrenches (k, 6) about P by which planes hold points; None without."""
         return None
 
     def add_point_masses(
         self, inertia: PlatformMoments, masses: Sequence[Expression]
     ) -> PlatformMoments:
-        """Return the platform's inertia with point masses (1, K), one a leg, at its points."""
+        """Return the platform's mass moments with point masses (1, K) added at its points."""
         m, hx, hy, i = inertia
         for s, mass in zip(self.points, masses, strict=True):
             m, hx, hy = m + mass, hx + s[0] * mass, hy + s[1] * mass

@@ -29,10 +29,10 @@ _SINGULAR = 1e-12
 
 
 def nearest_pose(platform: Platform, position: Array, rotation: Array) -> Array:
-    """Return the pose (..., m) with a position (..., 3) of P and a rotation, if one exists.
+    """Return the pose (..., m) nearest to a position of P (..., 3) and a rotation (..., 3, 3).
 
-    Where the motion cannot have them it is a pose near to them. Roll, or rz, is 0 where the angles
-    are singular.
+    If the platform can have both, the pose is exact. Roll, or rz, is 0 where the angles are
+    singular.
     """
     named = dict(zip(platform.angles, _angles(platform, rotation), strict=True))
     lengths = np.moveaxis(position @ platform.directions.T, -1, 0)
@@ -42,10 +42,10 @@ def nearest_pose(platform: Platform, position: Array, rotation: Array) -> Array:
 
 
 def pose_nearest_frame(platform: Platform, pose: Array, axes: Array) -> Array:
-    """Return the pose (m,) near `pose` whose axes are nearest to a frame's.
+    """Return the pose (m,) near `pose` whose platform axes are nearest to `axes` (3, 3).
 
-    `axes` (3, 3) are the frame's, one a row, not necessarily feasible for the platform; the sum of
-    squared differences is minimised by Gauss-Newton; a single angle turns x to the frame's.
+    `axes` (3, 3) are one a row, and need not be feasible for the platform; the sum of squared
+    differences is minimised by the Gauss-Newton method; a single angle aligns the x axes.
     """
     nearest, turns = np.array(pose, dtype=float), np.flatnonzero(platform.angular)
     if platform.axis_angle is not None:
@@ -68,7 +68,7 @@ def pose_nearest_frame(platform: Platform, pose: Array, axes: Array) -> Array:
 
 
 def _angles(platform: Platform, rotation: Array) -> tuple[Array, ...]:
-    """Return the pose's angles (...), in order."""
+    """Return the platform's angles (...) for a rotation, rad, in the pose's order."""
     if not platform.angles:
         return ()
     if platform.second_axis is not None:
@@ -85,7 +85,7 @@ def _angles(platform: Platform, rotation: Array) -> tuple[Array, ...]:
 
 
 def _roll_pitch_yaw(matrix: Array) -> tuple[Array, Array, Array]:
-    """Return the angles of Rz(yaw) Ry(pitch) Rx(roll)."""
+    """Return roll, pitch and yaw, rad, of matrices Rz(yaw) Ry(pitch) Rx(roll)."""
     cosine = np.hypot(matrix[..., 0, 0], matrix[..., 1, 0])
     pitch = np.arctan2(-matrix[..., 2, 0], cosine)
     is_singular = cosine < _SINGULAR
@@ -99,7 +99,7 @@ def _roll_pitch_yaw(matrix: Array) -> tuple[Array, Array, Array]:
 
 
 def _universal_angles(first: Array, second: Array, rotation: Array) -> tuple[Array, Array]:
-    """Return the angles of Rot(first, alpha) Rot(second, beta)."""
+    """Return the angles (alpha, beta), rad, of rotations Rot(first, alpha) Rot(second, beta)."""
     alpha = _angle_about(first, second, rotation @ second)
     # In the base frame the second axis is R b, and its normal turns about it by beta.
     second_now = rotation @ second
@@ -109,13 +109,13 @@ def _universal_angles(first: Array, second: Array, rotation: Array) -> tuple[Arr
 
 
 def _angle_about(axis: Array, start: Array, end: Array) -> Array:
-    """Return the angle (...) about an axis that takes one vector to another, both normal to it."""
+    """Return the angle (...), rad, about `axis` that takes `start` to `end`, both normal to it."""
     sine = (axis * np.cross(start, end)).sum(axis=-1)
     cosine = (start * end).sum(axis=-1) - (axis * start).sum(axis=-1) * (axis * end).sum(axis=-1)
     return np.asarray(np.arctan2(sine, cosine))
 
 
 def _rotate(axis: Array, angle: Array, vector: Array) -> Array:
-    """Return a vector normal to an axis (3,), rotated about it."""
+    """Return a vector (3,) normal to an axis (3,), rotated about it by angles (...), rad."""
     cosine, sine = np.cos(angle)[..., None], np.sin(angle)[..., None]
     return np.asarray(cosine * vector + sine * np.cross(axis, vector))

@@ -113,7 +113,7 @@ class Platform:
 
     @property
     def frame(self) -> tuple[Vector, Vector, Vector]:
-        """The platform frame's x, y and z at angles zero, in the base frame."""
+        """The platform's x, y and z axes at angles zero, in the base frame."""
         x = self.x_axis
         if x is None:  # of a 2R platform
             return (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), BASE_Z
@@ -121,52 +121,52 @@ class Platform:
 
     @property
     def planar(self) -> bool:
-        """Whether the platform stays in the plane across its axis."""
+        """Whether the platform stays in the plane perpendicular to its axis."""
         return self.plane_normal is not None
 
     @property
     def turns(self) -> bool:
-        """Whether phi turns it about its axis, or slides its halves."""
+        """Whether the pose has the angle phi, which turns the platform or slides its halves."""
         return self.axis_angle is not None
 
     @property
     def keeps_points_in_planes(self) -> bool:
-        """Whether planes, in which its legs keep its points, fix its dependent coordinates."""
+        """Whether legs keep platform points in planes, which fix the other coordinates."""
         return self.kind.keeps_points_in_planes
 
     @property
     def tilts(self) -> bool:
-        """Whether it turns about more axes than one."""
+        """Whether the platform turns about more than one axis."""
         return self.kind.tilts
 
     @property
     def kind(self) -> type[PlatformEquations]:
-        """The kind of its equations."""
+        """The class of the platform's equations."""
         return equations_class(self.motion, self.angle_order, self.slides)
 
     @property
     def coordinates(self) -> tuple[str, ...]:
-        """Names of the pose's coordinates, in order; see `platforms.coordinates`."""
+        """Names of the pose's coordinates, in order: "x", "y", "phi" and so on."""
         return self.kind.coordinates
 
     @property
     def units(self) -> tuple[Unit, ...]:
-        """Their units: "m" or "rad"."""
+        """Units of the pose's coordinates, "m" or "rad"."""
         return tuple(COORDINATES[name].unit for name in self.coordinates)
 
     @property
     def angular(self) -> NDArray[np.bool_]:
-        """Whether each of them is an angle, (m,)."""
+        """Mask (m,) of the pose coordinates that are angles."""
         return are_angles(self.coordinates)
 
     @property
     def lengths(self) -> tuple[str, ...]:
-        """Names of those that are lengths."""
+        """Names of the pose coordinates that are lengths."""
         return tuple(name for name in self.coordinates if COORDINATES[name].unit == "m")
 
     @property
     def angles(self) -> tuple[str, ...]:
-        """Names of those that are angles; none where the platform does not turn."""
+        """Names of the pose coordinates that are angles; none where the platform does not turn."""
         return tuple(name for name in self.coordinates if COORDINATES[name].unit == "rad")
 
     @property
@@ -179,7 +179,7 @@ class Platform:
 
     @property
     def wrench_columns(self) -> tuple[str, ...]:
-        """Names of a wrench at P: a force and moments along its coordinates, all where it tilts."""
+        """Names of the components of a wrench at P: forces and moments, all six if it tilts."""
         columns = self.kind.wrench_columns
         return columns or tuple(COORDINATES[name].wrench for name in self.coordinates)
 
@@ -200,7 +200,7 @@ class Platform:
     def force_and_moment(
         self, wrench: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return the force and the moment at P (..., 3) in base axes of wrenches (..., w)."""
+        """Return force and moment at P, (..., 3) each, in base axes, of wrenches (..., w)."""
         if self.wrench_in_base_axes:
             return wrench[..., :3], wrench[..., 3:]
         force = wrench[..., : len(self.lengths)] @ self.directions
@@ -210,30 +210,31 @@ class Platform:
 
     @property
     def inertia_names(self) -> tuple[str, ...]:
-        """Names of the moments of inertia that a body on it has: "I" about k, or six, "Ixx" ..."""
+        """Names of a platform body's moments of inertia: "I" about k, or six, "Ixx" and so on."""
         return tuple(name for name in self.kind.kinds if name.startswith("I"))
 
     @property
     def payload_axes(self) -> str:
-        """Axes of its frame along which a payload's centre of mass matters to its forces.
+        """Platform axes, such as "xy", along which a payload's centre of mass changes forces.
 
-        "" where it does not turn, or where a payload is on its axis, as on one that slides.
+        The text is empty if the platform does not turn, or if payloads count as on its axis, as on
+        a platform that slides.
         """
         return self.arm_axes if self.rotation_axes else ""
 
     @property
     def carries_on_axis(self) -> bool:
-        """Whether a payload counts as on its axis: phi moves it, and no arm of it turns."""
+        """Whether a payload counts as on the axis: the pose has an angle, no arm turns with it."""
         return bool(self.angles) and not self.payload_axes
 
     @property
     def arm_axes(self) -> str:
-        """Axes of its frame whose parts of a vector from P change as it turns."""
+        """Platform axes, such as "xy", whose parts of a vector from P change with the angles."""
         return self.kind.arm_axes
 
     @property
     def angle_range(self) -> float:
-        """Largest size of an angle, rad, within which every orientation occurs."""
+        """Largest absolute angle, rad, within which every orientation occurs."""
         return self.kind.angle_range
 
     @property
@@ -247,42 +248,48 @@ class Platform:
 
     @property
     def plane_normal(self) -> Vector | None:
-        """The normal of the plane in which it moves and is drawn; None where it moves in space."""
+        """The normal of the plane in which the platform moves; None where it moves in space."""
         return self.axis if self.lengths == ("x", "y") else None
 
     @property
     def turning_axis(self) -> Vector | None:
-        """The one axis about which it turns against its legs; None without, or with several."""
+        """The single axis about which the platform turns; None without one, or with several."""
         axes = self.rotation_axes
         return axes[0] if len(axes) == 1 else None
 
     @property
     def axis_angle(self) -> str | None:
-        """The name of phi, about or along its axis; None where it has no angle, or others."""
+        """The name of the single angle, "phi", about or along the axis.
+
+        It is None for other platforms.
+        """
         return self.kind.axis_angle
 
     @property
     def spin_angle(self) -> str | None:
-        """The angle that turns it about its axis where all others are 0; None without."""
+        """The angle that turns the platform about its axis if all others are 0; None without."""
         return self.kind.spin_angle
 
     @property
     def spin_axis(self) -> Vector | None:
-        """The axis fixed to the base about which `spin_angle` turns it at every pose, or None."""
+        """The axis about which `spin_angle` turns the platform at every pose, or None.
+
+        It is None if the axis is not fixed to the base.
+        """
         return self.axis if self.spin_angle in ("phi", "yaw") else None
 
     @property
     def has_angle_order(self) -> bool:
-        """Whether its angles have several orders, of which `angle_order` is one."""
+        """Whether the platform's angles can have several orders, named by `angle_order`."""
         return self.motion in XYZ
 
     @property
     def moves_freely(self) -> bool:
-        """Whether every twist is feasible: six coordinates."""
+        """Whether the platform has all six degrees of freedom."""
         return len(self.coordinates) == 6
 
     def has_points_in_line(self, points: NDArray[np.float64]) -> bool:
-        """Return whether it turns about an axis through platform points (k, 3), up to rounding."""
+        """Return whether the platform turns about a line that has all points (k, 3)."""
         size = ROUNDING * max(float(np.abs(points).max()), ROUNDING)
         if not self.tilts:
             return bool(np.ptp(points[:, :2], axis=0).max() <= size)
@@ -293,7 +300,7 @@ class Platform:
 
     @property
     def rotation_axes(self) -> tuple[Vector, ...]:
-        """Unit vectors that span the axes about which it turns against its legs."""
+        """Unit vectors that span the axes about which the platform turns."""
         if self.second_axis is not None:
             return self.axis, self.second_axis
         if self.tilts:
@@ -302,7 +309,7 @@ class Platform:
 
     @property
     def directions(self) -> NDArray[np.float64]:
-        """Unit vectors (l, 3) along which the pose's lengths count; l = 2 or 3 of most."""
+        """Unit vectors (l, 3) of the pose's length coordinates, in the base frame."""
         x, y, k = self.frame
         frame_axes = {"x": x, "y": y, "z": k}
         unit_vectors = np.array([frame_axes[name] for name in self.lengths]).reshape(-1, 3)
@@ -310,16 +317,16 @@ class Platform:
 
     @property
     def axes_by_angle(self) -> dict[str, NDArray[np.float64]]:
-        """The unit vector (3,) that each angle turns it about, or along, at angles zero."""
+        """The unit vector (3,) that each angle turns the platform about, by angle name."""
         axes = _numeric_equations(self).axes_by_angle()
         return {name: np.array(ca.DM(axis)).ravel() for name, axis in axes.items()}
 
     def placement(
         self, poses: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return P (..., 3) and the platform frame's axes (..., 3, 3), one a row, in base frame.
+        """Return P (..., 3), m, and the platform's axes (..., 3, 3), one a row, in the base frame.
 
-        For a platform that slides the axes are the tool's.
+        For a platform with sliding halves the axes are the tool's.
         """
         if self.tilts:
             return self._place_tilting(poses)
@@ -331,7 +338,7 @@ class Platform:
         return poses[..., :count] @ self.directions, np.stack(axes, axis=-2)
 
     def angle_measures(self, poses: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return a measure (...) of poses' angles: 1 at best, 0 where they are singular.
+        """Return a measure (...) of poses' angles, no unit: 1 at best, 0 in gimbal lock.
 
         They are singular where the second of three rotations aligns the third axis with the first.
         """
@@ -343,7 +350,7 @@ class Platform:
     def _place_tilting(
         self, poses: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return places (..., 3), m, and axes (..., 3, 3) of poses of a platform that tilts."""
+        """Return P (..., 3), m, and axes (..., 3, 3), one a row, of a platform that tilts."""
         shape = poses.shape[:-1]
         if not poses.size:
             return np.empty((*shape, 3)), np.empty((*shape, 3, 3))
@@ -358,7 +365,7 @@ class Platform:
         velocities: NDArray[np.float64],
         accelerations: NDArray[np.float64],
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Return position, velocity and acceleration (..., 3) of the tool's centre point."""
+        """Return position, velocity, acceleration (..., 3) of the tool point in a motion."""
         parts = poses, velocities, accelerations
         rows = [np.asarray(part, dtype=float).reshape(-1, part.shape[-1]).T for part in parts]
         place, first, second = (
@@ -369,7 +376,7 @@ class Platform:
 
     @property
     def quantities(self) -> dict[str, tuple[float, ...]]:
-        """The numbers that its equations need beside its frame and its points, by name.
+        """The vectors and numbers that the equations need besides frame and points, by name.
 
         Names that end in "axis" denote unit vectors.
         """
@@ -387,9 +394,9 @@ class Platform:
 
     @property
     def turning_keys(self) -> tuple[str, ...]:
-        """Keys of the points and directions about which it turns, where its legs do not fix them.
+        """Names of the points and directions about which the platform turns, if legs fix none.
 
-        The legs determine those of a planar platform.
+        For a planar platform the legs determine the axis.
         """
         if self.second_axis is not None:
             return ("center", "axis", "second_axis")
@@ -398,14 +405,14 @@ class Platform:
         return ("axis",) if self.turns and not self.slides and not self.planar else ()
 
     def expressions(self) -> dict[str, Any]:
-        """Return its `quantities`, and the planes that hold its points, as expressions."""
+        """Return the `quantities` by name, and planes that hold points, as CasADi expressions."""
         quantities: dict[str, Any] = {name: _column(v) for name, v in self.quantities.items()}
         planes = [HeldPlane(_column(n), _column(r)) for n, r, _ in self.planes]
         return {**quantities, "planes": planes} if planes else quantities
 
     @property
     def _side(self) -> float:
-        """The side, 1 or -1, on which a level tripod's yaw is nearest to 0."""
+        """The sign, 1 or -1, of the yaw solution that is nearest to 0 for a level tripod."""
         normals = np.array([plane.normal for plane in self.planes])
         arms = np.array([plane.platform_point for plane in self.planes]) @ np.array(self.frame)
         k = np.array(self.axis)
@@ -413,7 +420,7 @@ class Platform:
         return float(np.copysign(1.0, -(weights * (np.cross(normals, arms) @ k)).sum()))
 
     def arms(self, points: NDArray[np.float64], poses: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return vectors (..., k, 3) from P to platform points (k, 3), without fixed offsets."""
+        """Return vectors (..., k, 3), m, from P to points (k, 3) at poses, in the base frame."""
         if self.slides:
             return np.asarray(poses[..., -1:, None] * (points @ np.array(self.frame)))
         return np.asarray(points @ self.placement(poses)[1])
@@ -421,8 +428,8 @@ class Platform:
     def map_vectors(self, turn: Callable[[Vector], Vector]) -> Platform:
         """Return the platform with every base-frame vector v replaced by `turn(v)`.
 
-        The frame of a 2R platform is the base frame at angles zero: its tool, inertia and platform
-        points are converted to the new frame.
+        The frame of a 2R platform is the base frame at angles zero: the platform's tool, inertia
+        and points are converted to the new frame.
         """
         x, _, axis = self.frame
         center = self.center and turn(self.center)
@@ -440,7 +447,7 @@ class Platform:
 
     @property
     def total_inertia(self) -> PlanarInertia | SpatialInertia:
-        """The platform's inertia including its bars and geared parts, for the equations.
+        """The platform's inertia with its bars and geared parts, for the equations.
 
         A bar counts as a point mass at its hinge; a gear of ratio n adds n^2 times the inertia.
         """
@@ -455,7 +462,7 @@ class Platform:
         return PlanarInertia(mass, (hx, hy), inertia)
 
     def with_total_inertia(self, inertia: PlanarInertia | SpatialInertia) -> Platform:
-        """Return the platform with this inertia for all of it, without separate parts."""
+        """Return the platform with `inertia` for all of it, without bars and geared parts."""
         return replace(self, inertia=inertia, bars=(), geared=())
 
     at = former_attribute("at", "placement")
@@ -467,7 +474,7 @@ class Platform:
 
 @lru_cache(maxsize=64)
 def _placement_function(platform: Platform) -> ca.Function:
-    """Return the function from a tilting platform's pose to P (3,) and axes, columns (3, 3)."""
+    """Return the CasADi function from a tilting platform's pose to P (3,) and axes (3, 3)."""
     pose = ca.SX.sym("pose", len(platform.coordinates))
     motion = _rest_motion(platform, pose)
     return ca.Function("placing", [pose], [motion.body.position, ca.vec(ca.densify(motion.axes))])
@@ -475,7 +482,7 @@ def _placement_function(platform: Platform) -> ca.Function:
 
 @lru_cache(maxsize=64)
 def _tool_function(platform: Platform) -> ca.Function:
-    """Return the function from a pose, its rate and growth to those of the tool's point (3,)."""
+    """Return the CasADi function from a pose and two derivatives to the tool point's."""
     pose, rate, growth = (ca.SX.sym(name, len(platform.coordinates)) for name in "xva")
     motion = _rest_motion(platform, pose)
     place = motion.body.position + ca.mtimes(motion.axes, _column(platform.tool))
@@ -486,13 +493,13 @@ def _tool_function(platform: Platform) -> ca.Function:
 
 
 def _rest_motion(platform: Platform, pose: ca.SX) -> PlatformMotion:
-    """Return the motion of a platform at rest; its points are those kept in planes."""
+    """Return the motion of a platform at rest at a pose."""
     zero_rates = ca.SX.zeros(len(platform.coordinates))
     return _numeric_equations(platform).motion(pose, zero_rates, zero_rates)
 
 
 def _numeric_equations(platform: Platform) -> PlatformEquations:
-    """Return the equations of a platform with its numbers, and as points those kept in planes."""
+    """Return the platform's equations with its geometry as constants."""
     points = [_column(plane.platform_point) for plane in platform.planes]
     frame = [_column(axis) for axis in platform.frame]
     return platform.kind(frame, points, [ca.SX(3, 1)] * len(points), platform.expressions())

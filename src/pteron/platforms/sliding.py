@@ -37,7 +37,7 @@ class Sliding(PlatformEquations):
     )
 
     def offset(self, s: Expression, t: Expression) -> Offset:
-        """Return the offset of a platform point, whose s slides in m/rad and t is fixed."""
+        """Return the offset of a platform point: s slides with phi, t stays."""
         x0, y0, _ = self.frame
         return Offset(x0 * s[0] + y0 * s[1], ca.SX(3, 1), t)
 
@@ -61,22 +61,25 @@ class Sliding(PlatformEquations):
         )
 
     def _matrix(self, way: Expression) -> Expression:
-        """Return the matrix (6, m) of a point that slides by `way` (3, 1), m, per radian."""
+        """Return the matrix (6, 4) from pose rates to a point's velocity.
+
+        The point slides by `way` (3, 1), m, per rad of phi.
+        """
         return ca.blockcat([[ca.SX.eye(3), way], [ca.SX(3, 3), ca.SX(3, 1)]])
 
     def _moment(self, inertia: Moments) -> Expression:
-        """Return the first moment of the halves per radian (3, K), kg m/rad."""
+        """Return the first moment of the sliding halves (3, K), kg m per rad of phi."""
         x0, y0, _ = self.frame
         return ca.mtimes(x0, inertia.hx) + ca.mtimes(y0, inertia.hy)
 
     def needs(self, motion: PlatformMotion, gravity: Expression, inertia: Moments) -> Expression:
-        """Return the wrench (4, K) required at P and along phi."""
+        """Return the force and the moment along phi (4, K) required to move the platform."""
         a_g, growth = motion.body.acceleration - gravity, ca.dot(self.frame[0], motion.body.ddx)
         h = self._moment(inertia)
         force = ca.mtimes(a_g, inertia.m) + h * growth
         return ca.vertcat(force, ca.mtimes(a_g.T, h) + growth * inertia.i)
 
     def mass_matrix(self, motion: PlatformMotion, inertia: Moments) -> Expression:
-        """Return the mass matrix (4, 4) of both halves."""
+        """Return the mass matrix (4, 4) of a platform with sliding halves."""
         h = self._moment(inertia)
         return ca.blockcat([[inertia.m * ca.SX.eye(3), h], [h.T, inertia.i]])

@@ -50,7 +50,7 @@ def rotation(
     rates: Sequence[Expression],
     accelerations: Sequence[Expression],
 ) -> Rotation:
-    """Return R = Rot(a_1, angle_1) Rot(a_2, angle_2) ..., angles given by cosine and sine.
+    """Return R = Rot(a_1, angle_1) Rot(a_2, angle_2) ..., with angular velocity and acceleration.
 
     With u_i the axis a_i rotated by the preceding angles: omega = sum u_i angle_i', and alpha = sum
     u_i angle_i'' + omega_(i-1) x u_i angle_i', omega_(i-1) being the preceding partial sum.
@@ -93,16 +93,16 @@ class Tilting(PlatformEquations):
         """R s0 at angles zero."""
 
     def axes_by_angle(self) -> dict[str, Expression]:
-        """Return the axis (3, 1) that each angle turns it about at angles zero."""
+        """Return the rotation axis (3, 1) of each angle, at angles zero, by the angle's name."""
         x, y, k = self.frame
         return {"roll": x, "rx": x, "pitch": y, "ry": y, "yaw": k, "rz": k}
 
     def pose_rotation(
         self, pose: Expression, velocity: Expression, acceleration: Expression, sign: int = 1
     ) -> Rotation:
-        """Return the rotation of a pose; the columns of E are in the order of the coordinates.
+        """Return the platform's rotation at a pose, with angular velocity and acceleration.
 
-        With sign -1 it is the inverse rotation, by -angles in reverse order.
+        With `sign` -1 it is the inverse rotation, by the negative angles in reverse order.
         """
         places = [self.coordinates.index(name) for name in self.order][::sign]
         axes = self.axes_by_angle()
@@ -131,7 +131,10 @@ class Tilting(PlatformEquations):
     def change_to_platform_axes(
         self, pose: Expression
     ) -> tuple[PlatformEquations, Expression] | None:
-        """Return the equations in the platform's axes, and these; None if P does not translate."""
+        """Return the platform in its own axes, and these axes (3, 3).
+
+        The result is None if P does not translate.
+        """
         if "x" not in self.coordinates:
             return None
         in_own_frame = type(self)(
@@ -193,19 +196,19 @@ class Tilting(PlatformEquations):
         )
 
     def moments(self, rows: Sequence[Expression]) -> SpatialMoments:
-        """Return the spatial inertia from the rows (1, K) of its parameters."""
+        """Return the platform's spatial mass moments from rows (1, K) of its parameters."""
         return spatial_moments(rows)
 
     def needs(
         self, motion: PlatformMotion, gravity: Expression, inertia: SpatialMoments
     ) -> Expression:
-        """Return the wrench (m, K) required at P along the quasi-velocities."""
+        """Return the generalized force (m, K) required to move the platform itself."""
         return ca.mtimes(motion.matrix.T, ca.vertcat(*self.needed_wrench(motion, gravity, inertia)))
 
     def needed_wrench(
         self, motion: PlatformMotion, gravity: Expression, inertia: SpatialMoments
     ) -> tuple[Expression, Expression]:
-        """Return the force and the moment about P, each (3, K), from the rotation's rates."""
+        """Return force and moment about P, (3, K) each, required to move the platform itself."""
         assert motion.spatial is not None
         return needed_twist_wrench(motion.spatial, inertia, gravity)
 
@@ -215,22 +218,22 @@ class Tilting(PlatformEquations):
         return ca.mtimes(motion.matrix.T, ca.mtimes(twist_mass, motion.matrix))
 
     def mass_moment(self, motion: PlatformMotion, inertia: SpatialMoments) -> Expression:
-        """Return mass times centre of mass, (3, K), in the base frame."""
+        """Return the platform's mass times centre of mass, (3, K), kg m, in the base frame."""
         moment = ca.mtimes(motion.axes, inertia.h)
         return ca.mtimes(motion.body.position, inertia.m) + moment
 
     def add_point_masses(
         self, inertia: SpatialMoments, masses: Sequence[Expression]
     ) -> SpatialMoments:
-        """Return the spatial inertia with point masses (1, K) at the legs' points."""
+        """Return the platform's mass moments with point masses (1, K) added at its points."""
         return inertia.with_points(self.points, masses)
 
     def generalized_forces(self, motion: PlatformMotion, wrench: Expression) -> Expression:
-        """Return the wrench along the quasi-velocities (m, K)."""
+        """Return the generalized forces (m, K) along quasi-velocities of a wrench (6, K)."""
         return ca.mtimes(motion.matrix.T, wrench)
 
     def constraint(self, motion: PlatformMotion) -> Expression:
-        """Return 1: there are no freedoms outside the pose to constrain."""
+        """Return 1, the best constraint measure: the pose has all freedoms of the platform."""
         return ca.SX(1)  # there are none
 
 
@@ -270,7 +273,10 @@ class _Centred(Tilting):
         return self.assemble_motion(place, turned, *self.basis(turned))
 
     def basis(self, turned: Rotation) -> tuple[Expression, Expression | None]:
-        """Return the matrix (6, k) of the quasi-velocities, and that from the angles' rates."""
+        """Return the twists (6, k) of unit quasi-velocities.
+
+        The second result is the matrix from angle rates to quasi-velocities.
+        """
         return ca.vertcat(ca.SX(3, 3), ca.SX.eye(3)), turned.axes
 
 
@@ -298,9 +304,9 @@ class Universal(_Centred):
     order = ("alpha", "beta")
 
     def axes_by_angle(self) -> dict[str, Expression]:
-        """Return the axes (3, 1) of alpha and beta."""
+        """Return the rotation axes (3, 1) of alpha and beta, at angles zero, by these names."""
         return {"alpha": self.quantities["first_axis"], "beta": self.quantities["second_axis"]}
 
     def basis(self, turned: Rotation) -> tuple[Expression, Expression | None]:
-        """Return the twists (6, 2) of unit rates of the angles; they are quasi-velocities."""
+        """Return the twists (6, 2) of unit angle rates (the quasi-velocities), and None."""
         return ca.vertcat(ca.SX(3, 2), turned.axes), None

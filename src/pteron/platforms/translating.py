@@ -40,12 +40,12 @@ class Translating(PlatformEquations):
         return PlatformMotion(points, (matrix,) * len(points), RotationMotion(), axes, body, matrix)
 
     def needs(self, motion: PlatformMotion, gravity: Expression, inertia: Moments) -> Expression:
-        """Return the force (m, K) required along the pose's lengths."""
+        """Return the force (m, K) along the pose's lengths required to move the platform."""
         a_g = ca.mtimes(self.directions.T, motion.body.acceleration - gravity)
         return ca.mtimes(a_g, inertia.m)
 
     def mass_matrix(self, motion: PlatformMotion, inertia: Moments) -> Expression:
-        """Return the mass times the identity (m, m)."""
+        """Return the platform's mass matrix (m, m): mass times the identity."""
         return inertia.m * ca.SX.eye(len(self.coordinates))
 
 

@@ -48,7 +48,7 @@ class Tripod(Tilting):
         """(3, 1) a leg: P moves by the sum of them times n_i . v_i if plane i moves by v_i."""
 
     def _yaw(self, level: Expression) -> tuple[Expression, Expression]:
-        """Return the yaw's cosine and sine; `level` (3, 3) turns by roll and pitch."""
+        """Return cosine and sine of the yaw that follows from roll and pitch (`level`, (3, 3))."""
         k = self.frame[2]
         a, b, c = ca.SX(0), ca.SX(0), ca.SX(0)
         for weight, (n, r), arm in zip(self.weights, self.planes, self.arms, strict=True):
@@ -109,15 +109,15 @@ class Tripod(Tilting):
         return self.assemble_motion(PointMotion(place, dp, ddp), turned, twist, None)
 
     def plane_wrenches(self, motion: PlatformMotion) -> Expression:
-        """Return the wrenches (3, 6) with which the planes constrain their points, about P."""
+        """Return the unit wrenches (3, 6) about P by which the planes hold their points."""
         normals = [plane.normal.T for plane in self.planes]
         pairs = zip(normals, motion.point_twists, strict=True)
         return ca.vertcat(*(ca.mtimes(n, shift[:3, :]) for n, shift in pairs))
 
     def constraint(self, motion: PlatformMotion) -> Expression:
-        """Return the constraint measure of x, y and yaw: 0 at a constraint singularity.
+        """Return the constraint measure of x, y and yaw, 1 at best: 0 at a constraint singularity.
 
-        It is the determinant of the planes' forces and moments about k over its upper bound.
+        It is the determinant of the planes' forces and moments about k, divided by its upper bound.
         """
         x, y, k = self.frame
         rows = self.plane_wrenches(motion)

@@ -50,12 +50,12 @@ class Turning(PlatformEquations):
         return PlatformMotion(tuple(points), tuple(matrices), rotation, axes, body, at_p)
 
     def _matrix(self, lever: Expression) -> Expression:
-        """Return the matrix (6, m) of a point with this k x s."""
+        """Return the matrix (6, m) from pose rates to (v, omega) of a point, `lever` = k x s."""
         zero = ca.SX(3, self.directions.shape[1])
         return ca.blockcat([[self.directions, lever], [zero, self.frame[2]]])
 
     def needs(self, motion: PlatformMotion, gravity: Expression, inertia: Moments) -> Expression:
-        """Return the wrench (m, K) required at P: force along the lengths and moment about k."""
+        """Return the force along the lengths and the moment about k (m, K) to move the platform."""
         a_g = motion.body.acceleration - gravity
         _, dh, ddh = self._first_moment(motion, inertia)
         force = ca.mtimes(a_g, inertia.m) + ddh
@@ -63,7 +63,7 @@ class Turning(PlatformEquations):
         return ca.vertcat(ca.mtimes(self.directions.T, force), moment)
 
     def mass_matrix(self, motion: PlatformMotion, inertia: Moments) -> Expression:
-        """Return the mass matrix (m, m), coupled by the first moment."""
+        """Return the platform's mass matrix (m, m) in its pose coordinates."""
         coupling = ca.mtimes(self.directions.T, self._first_moment(motion, inertia)[1])
         masses = inertia.m * ca.SX.eye(self.directions.shape[1])
         return ca.blockcat([[masses, coupling], [coupling.T, inertia.i]])
@@ -71,7 +71,7 @@ class Turning(PlatformEquations):
     def _first_moment(
         self, motion: PlatformMotion, inertia: Moments
     ) -> tuple[Expression, Expression, Expression]:
-        """Return h, k x h and h'' (3, K) of the first moment, which turns with the platform."""
+        """Return the first moment h (3, K), kg m, with k x h and h''."""
         x0, y0, _ = self.frame
         h0 = ca.mtimes(x0, inertia.hx) + ca.mtimes(y0, inertia.hy)
         dh0 = ca.mtimes(y0, inertia.hx) - ca.mtimes(x0, inertia.hy)

@@ -51,7 +51,7 @@ class Cut(NamedTuple):
     """Cells that are a number or a time."""
 
     def is_row(self, record: Record) -> bool:
-        """Return whether a record has a number or time in every numeric column."""
+        """Return whether a record has a number or a time in every numeric column."""
         return (
             bool(self.columns)
             and len(record.cells) == self.width
@@ -68,12 +68,12 @@ class Cut(NamedTuple):
 
 
 def single_blanks(text: bytes) -> bytes:
-    """Return lines with single blanks and none at their ends."""
+    """Return the lines of a text with runs of blanks made single, and none at their ends."""
     return re.sub(rb"(?m)^ | $", b"", re.sub(rb" +", b" ", text))
 
 
 def best_cut(text: Sequence[str], declared: Dialect) -> Cut | None:
-    """Return the file split by the separator that makes most of its cells numbers."""
+    """Return the text split by the separator that makes most of its cells numbers."""
     separators = [declared.separator] if declared.separator else list(SEPARATORS)
     decimals = [declared.decimal] if declared.decimal else list(get_args(Decimal))
     cuts = [
@@ -84,7 +84,7 @@ def best_cut(text: Sequence[str], declared: Dialect) -> Cut | None:
     ]
 
     def sense(rows: Cut) -> tuple[float, int, int]:
-        """Return a cut's share and number of numeric columns, and its cells that match."""
+        """Return a sort key: share and number of numeric columns, count of matching cells."""
         return len(rows.columns) / rows.width, len(rows.columns), rows.matched
 
     several = [rows for rows in cuts if len(rows.columns) > 1]
@@ -95,7 +95,7 @@ def best_cut(text: Sequence[str], declared: Dialect) -> Cut | None:
 
 
 def _split_cells(text: Sequence[str], separator: Separator, decimal: Decimal) -> Cut:
-    """Return a text's records, cut by a separator, with the columns that mostly hold numbers."""
+    """Return a text split into records of cells, with its mostly numeric columns."""
     records = list(_records(text, separator))
     width = Counter(len(record.cells) for record in records).most_common(1)[0][0] if records else 0
     full_rows = [record.cells for record in records if len(record.cells) == width]
@@ -106,7 +106,7 @@ def _split_cells(text: Sequence[str], separator: Separator, decimal: Decimal) ->
 
 
 def _records(text: Sequence[str], separator: Separator) -> Iterator[Record]:
-    """Yield the records that are not empty, with their lines, up to a fault of CSV."""
+    """Yield the non-blank records with their line numbers, up to a fault of CSV."""
     if separator == " ":
         text = [single_blanks(line.encode()).decode() for line in text]
     reader, last_line = csv.reader(text, delimiter=separator), 0

@@ -103,7 +103,7 @@ class CsvFile:
             self._mend += ", or export with another separator: blanks cannot mark an empty cell"
 
     def tables(self, columns: Sequence[str] | None = None) -> Iterator[Table]:
-        """Yield the cells as text, in blocks of rows; blank lines are skipped.
+        """Yield the file's rows as tables of text cells, a block each; blank lines are skipped.
 
         Parameters
         ----------
@@ -144,9 +144,10 @@ class CsvFile:
             return file.read(_HEAD)
 
     def _text(self, size: int, start: int = 0) -> Iterator[bytes]:
-        """Yield the text from `start` on, in UTF-8 and with the line ends of Unix, in pieces.
+        """Yield the file's text from `start` on, as UTF-8 in pieces with Unix line ends.
 
-        Where blanks separate the cells, each line has single ones, and none at its ends.
+        If blanks separate the cells, runs of blanks are made single, and removed at the ends of
+        lines.
         """
         decoder = codecs.getincrementaldecoder(self._encoding)()
         decode = io.IncrementalNewlineDecoder(decoder, translate=True).decode
@@ -166,7 +167,7 @@ class CsvFile:
                 start = max(start - len(piece), 0)
 
     def _header(self, head: bytes) -> tuple[tuple[str, ...], int, int]:
-        """Return the columns' names, where the rows begin, and on which line."""
+        """Return the columns' names, the offset at which rows begin, and their line number."""
         lines = io.BytesIO(head).readlines()
         records = csv.reader(map(bytes.decode, lines), strict=True)
         try:
@@ -189,7 +190,7 @@ class CsvFile:
         return names, sum(map(len, lines[:read])), read + 1
 
     def _other_dialect(self, header: str, row: bytes) -> str | None:
-        """Return the dialect that a file seems to have instead of the plain one; None if plain."""
+        """Return a message on the CSV dialect that a file seems to have; None if it is plain."""
         other = next((s for s in SEPARATORS if s not in ", " and s in header), None)
         if self._found or len(self.columns) > 1 or other is None:
             return None
@@ -201,10 +202,10 @@ class CsvFile:
         )
 
     def _read_by_polars(self, block: bytes, names: Sequence[str]) -> pl.DataFrame | None:
-        """Return the cells as Polars reads them; None where Polars might misread them.
+        """Return a block's cells as read by Polars; None where Polars might misread them.
 
-        Polars fills short rows and takes blank lines for rows, which separators that are not there
-        tell; and it is lenient with quotes.
+        Polars pads short rows and reads blank lines as rows, which a count of separators reveals;
+        it also tolerates wrong quotes.
         """
         separator, last = self._separator, len(self.columns) - 1
         if not last or b'"' in block:
@@ -222,7 +223,7 @@ class CsvFile:
         return frame.rename({str(j): self.columns[j] for j in indices})
 
     def _read_by_record(self, block: bytes, row: int, line: int) -> pl.DataFrame:
-        """Return a block's rows as text, read by `csv`; errors name the line of the row."""
+        """Return a block's cells as text, read by `csv`; errors name the row's line."""
         names, rows = self.columns, list[list[str | None]]()
         try:
             for begins, cells in self._records(block, line):
@@ -241,7 +242,7 @@ class CsvFile:
         return pl.DataFrame(rows, schema=dict.fromkeys(names, pl.String), orient="row")
 
     def _records(self, block: bytes, line: int) -> Iterator[tuple[int, list[str]]]:
-        """Yield the records that are not blank, each with the line it begins on."""
+        """Yield the non-blank records of a block, each with the line it begins on."""
         lines = map(bytes.decode, io.BytesIO(block))
         reader = csv.reader(lines, delimiter=self._separator, strict=True)
         begins = line
@@ -251,7 +252,7 @@ class CsvFile:
             begins = line + reader.line_num
 
     def _line_of(self, block: bytes, line: int, index: int) -> int:
-        """Return the line of the file at which the row of an index in a block begins."""
+        """Return the line of the file on which row `index` of a block begins."""
         try:
             return next(islice(self._records(block, line), index, None))[0]
         except csv.Error:  # a cell longer than `csv` reads, which Polars did: each row is a line

@@ -63,7 +63,7 @@ PLAIN = Dialect(",", ".", "utf-8")
 
 
 def declaration(table: str, **entries: object) -> str:
-    """Return lines for the TOML file beside a log, to be put at the end of a message.
+    """Return TOML lines for a file beside a log, to be put at the end of a message.
 
     Examples
     --------

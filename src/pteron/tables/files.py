@@ -126,12 +126,12 @@ def whole_table(file: CsvFile | ParquetFile) -> Table:
 
 
 def _join_tables(tables: list[Table]) -> Table:
-    """Return the tables of a file as a single table that gives each row's line in the file."""
+    """Return the tables of a file joined into one, which knows each row's line."""
     if len(tables) == 1:
         return tables[0]
 
     def line_of(index: int) -> int:
-        """Return the line in the file of a row, by its index in the joined table."""
+        """Return the line in the file of the row `index` of the joined table."""
         table = next(table for table in reversed(tables) if table.first_row <= index)
         assert table.line_of is not None
         return table.line_of(index - table.first_row)
@@ -142,7 +142,7 @@ def _join_tables(tables: list[Table]) -> Table:
 
 @contextmanager
 def _name_in_errors(source: str) -> Iterator[None]:
-    """Raise errors of the file system in a block as a `DataError` that names the source."""
+    """In this context, raise file system errors as a `DataError` that names the source."""
     try:
         yield
     except FileNotFoundError:
@@ -154,7 +154,7 @@ def _name_in_errors(source: str) -> Iterator[None]:
 
 
 def check_output(path: str | Path, dialect: Dialect | None = None) -> Path:
-    """Return `path`, checked beforehand for whether a table can be written there.
+    """Return `path` after a check that a table can be written there.
 
     Raises
     ------
@@ -191,7 +191,7 @@ def write_table(frame: pl.DataFrame, path: str | Path, dialect: Dialect | None =
 
 
 def table_bytes(frame: pl.DataFrame, path: str | Path, dialect: Dialect | None = None) -> bytes:
-    """Return the bytes that `write_table` writes."""
+    """Return the bytes of the CSV or Parquet file that `write_table` writes for a table."""
     file = check_output(path, dialect)
     buffer = io.BytesIO()
     try:
@@ -212,6 +212,6 @@ ENDINGS: dict[str, Callable[[pl.DataFrame, io.BytesIO, Dialect], None]] = {
 
 
 def _ending_fault(file: Path, noun: str) -> str:
-    """Return the text of the fault of a file's ending, with the valid endings."""
+    """Return a message that a file's ending is wrong, with the valid endings."""
     fault = f"unknown ending {shorten(file.suffix)}" if file.suffix else "no ending"
     return f"{fault}; a {noun}'s file ends in {' or '.join(ENDINGS)}"

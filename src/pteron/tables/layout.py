@@ -72,7 +72,7 @@ class Layout:
 
 
 def find_encoding(head: bytes, declared: str | None, source: str) -> str:
-    """Return the encoding: declared, by byte order mark, UTF-8, or else cp1252."""
+    """Return a text's encoding: as declared, by its byte order mark, UTF-8, or else cp1252."""
     if declared is not None:
         return declared
     if head.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
@@ -91,9 +91,10 @@ def find_encoding(head: bytes, declared: str | None, source: str) -> str:
 
 
 def find_layout(head: bytes, declared: Dialect, encoding: str, source: str) -> Layout:
-    """Return the layout of a CSV file.
+    """Return the layout of a CSV file: dialect, names, units and where its rows begin.
 
-    `head` is the beginning of its text, in UTF-8; `declared` has the parts that are declared.
+    `head` is the beginning of the file's text, in UTF-8; `declared` has the parts of the dialect
+    that are declared.
     """
     lines = io.BytesIO(head).readlines()
     text = [line.decode() for line in lines[:_LINES]]
@@ -131,7 +132,7 @@ def find_layout(head: bytes, declared: Dialect, encoding: str, source: str) -> L
 
 
 def _check_commas(rows: Cut, source: str) -> None:
-    """Refuse numbers whose commas may be decimal commas or thousands separators."""
+    """Raise if commas in numbers may be either decimal commas or thousands separators."""
     if rows.decimal != ",":
         return
     cells = [cell for record in rows.records if rows.is_row(record) for cell in record.cells]
@@ -145,7 +146,7 @@ def _check_commas(rows: Cut, source: str) -> None:
 
 
 def _first_row(rows: Cut, header_lines: int | None) -> int:
-    """Return the line of the first row of data, from 0."""
+    """Return the line number, from 0, of the first row of data."""
     if header_lines is not None:
         below = [record for record in rows.records if record.line >= header_lines]
         return below[0].after if below and _are_units(below[0]) else header_lines
@@ -162,7 +163,7 @@ def _first_row(rows: Cut, header_lines: int | None) -> int:
 def _names(
     rows: Cut, above: Sequence[Record], header_lines: int | None, source: str
 ) -> tuple[tuple[str, ...], tuple[str, ...], bool]:
-    """Return names and units of the columns, and whether units are on a separate line."""
+    """Return the columns' names and units, and whether units are on a line of their own."""
     width = rows.width
     # Rows may end in a separator where the line of names does not.
     fitting = [record for record in above if len(record.cells) in (width, width - 1)]
@@ -187,7 +188,7 @@ def _names(
 
 
 def _are_units(record: Record) -> bool:
-    """Return whether all cells of a record are units, and at least two are not empty."""
+    """Return whether a record has units only: two or more cells that are not empty."""
     cells = [cell for cell in record.cells if cell]
     return len(cells) > 1 and all(map(_UNIT.fullmatch, cells))
 
@@ -195,7 +196,7 @@ def _are_units(record: Record) -> bool:
 def _scope_names(
     rows: Cut, title: Record, keyed: Sequence[Record]
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return names and units in an export of TwinCAT Scope: its lines begin with a key.
+    """Return the columns' names and units in a TwinCAT Scope export.
 
     Times are in milliseconds from the start, or full stamps in ticks of 100 ns; a unit is written
     like "mm (Length)" or "(None)".
@@ -213,7 +214,7 @@ def _scope_names(
 
 
 def _nameless(rows: Cut, above: Sequence[Record], source: str) -> DataError:
-    """Return the error that no line above the rows names their columns."""
+    """Return the error that no line above the rows names the columns."""
     if not above:
         return DataError(f"{source}: no line names the columns; the first line must name them")
     last = above[-1]
@@ -229,7 +230,7 @@ def _nameless(rows: Cut, above: Sequence[Record], source: str) -> DataError:
 
 
 def _number_repeated(names: Sequence[str]) -> tuple[tuple[str, ...], dict[str, str]]:
-    """Return distinct names, repeated ones numbered, and a map from numbered to original names."""
+    """Return names made distinct by numbers, and a map from numbered to original names."""
     numbered: list[str] = []
     repeated: dict[str, str] = {}
     seen: Counter[str] = Counter()

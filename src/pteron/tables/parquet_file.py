@@ -45,7 +45,7 @@ class ParquetFile:
         self.columns = tuple(self._kinds)
 
     def tables(self, columns: Sequence[str] | None = None) -> Iterator[Table]:
-        """Yield the rows in order, in blocks.
+        """Yield the file's rows in order, as tables of a block each.
 
         Parameters
         ----------

@@ -35,9 +35,9 @@ _Columns = dict[str, list[tuple[str, str]]]
 
 
 def side_by_side(file: Path, encoding: str | None, source: str) -> bytes | None:
-    """Return a log with variables one below another as plain CSV with columns, time in t.
+    """Return as plain CSV a log that lists one variable below another; None for other files.
 
-    `encoding` is what was declared. None for any other file.
+    `encoding` is the declared encoding, if any. The time column is called t.
     """
     with file.open("rb") as opened:
         head = opened.read(_HEAD)
@@ -72,7 +72,7 @@ def side_by_side(file: Path, encoding: str | None, source: str) -> bytes | None:
 
 
 def _columns_of_values(rows: list[list[str]], source: str) -> _Columns:
-    """Return each variable's samples (seconds, value) of a WinCC log with a row for each value."""
+    """Return each variable's (seconds, value) samples in a WinCC log, one value a row."""
     names = rows[0]
     needed = ["VarName", "VarValue", "Time_ms"]
     if missing := [name for name in needed if name not in names]:
@@ -101,7 +101,7 @@ def _columns_of_values(rows: list[list[str]], source: str) -> _Columns:
 
 
 def _columns_of_blocks(rows: list[list[str]]) -> _Columns:
-    """Return each variable's samples (time, value) of a CODESYS log with a block for each."""
+    """Return each variable's (time, value) samples in a CODESYS log, one block a variable."""
     columns: _Columns = {}
     for row in rows:
         if _BLOCK_HEADER.match(f"{row[0]};"):

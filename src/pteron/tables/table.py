@@ -50,20 +50,20 @@ class Table:
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """Names of the columns, in order."""
+        """Names of the table's columns, in order."""
         return tuple(self.frame.columns)
 
     def place(self, index: int) -> str:
-        """Return the place of a row: its number from 1 and, in a CSV file, its line."""
+        """Return as text where a row is: file, row number from 1 and, in a CSV file, line."""
         return f"{self.source}: {self.place_in_file(index)}"
 
     def place_in_file(self, index: int) -> str:
-        """Return the place of a row, without the file's name."""
+        """Return as text where a row is in its file: row number and, in a CSV file, line."""
         row = f"row {self.first_row + index + 1}"
         return row if self.line_of is None else f"{row} (line {self.line_of(index)})"
 
     def numbers(self, columns: Sequence[str], on_failure: OnFailure | None = None) -> NDArray[Any]:
-        """Return columns as an array of floats.
+        """Return the named columns as an array of floats (rows, columns).
 
         Parameters
         ----------
@@ -104,7 +104,7 @@ class Table:
         return array
 
     def with_columns(self, results: Mapping[str, ArrayLike]) -> Table:
-        """Return the table with columns appended; a column of the same name is replaced.
+        """Return the table with columns appended, or replaced where the name exists.
 
         NaN becomes an empty cell.
         """
@@ -119,7 +119,7 @@ class Table:
         return self.frame[column].null_count()
 
     def rows(self, columns: Sequence[str], most: int) -> Iterator[tuple[Any, ...]]:
-        """Return the first rows of columns."""
+        """Return an iterator over the first `most` rows of the named columns."""
         return self.frame.select(columns).head(most).iter_rows()
 
     def json(self) -> str:
@@ -131,7 +131,7 @@ class Table:
         return parse_numeric_columns(self.frame).write_json()
 
     def text(self) -> Iterator[str]:
-        """Yield the rows as CSV, in pieces, the header first."""
+        """Yield the table as CSV text in pieces, the header first."""
         for start in range(0, len(self), _ROWS_AT_A_TIME):
             part = self.frame.slice(start, _ROWS_AT_A_TIME)
             try:
@@ -140,11 +140,11 @@ class Table:
                 raise self._unfit("CSV", str(error).splitlines()[0]) from None
 
     def _unfit(self, kind: str, reason: str) -> DataError:
-        """Return the error that the table cannot be written as a kind of file, and why."""
+        """Return the error that the table cannot be written as this kind of file, and why."""
         return DataError(f"{self.source}: cannot be written as {kind} ({reason}); drop the column")
 
     def _require(self, columns: Sequence[str]) -> None:
-        """Raise a `DataError` that names the missing columns, if there are any."""
+        """Raise a `DataError` that names the missing columns, if any of `columns` is missing."""
         missing = [name for name in columns if name not in self.columns]
         if not missing:
             return
@@ -155,7 +155,7 @@ class Table:
         )
 
     def _cells(self, name: str) -> tuple[pl.Series, pl.Series]:
-        """Return a column's cells, null if empty, and their numbers, null if not numeric."""
+        """Return a column's cells (null if empty), and the cells as numbers (null if text)."""
         cells = self.frame[name]
         if cells.dtype == pl.String:
             cells = cells.str.strip_chars()
@@ -173,7 +173,7 @@ class Table:
         return cells, signs.cast(pl.Float64, strict=False)
 
     def _fault(self, row: int, column: str, *, is_text: bool, choice: bool) -> str:
-        """Return the text of a cell's fault, an empty cell or no finite number, with its place."""
+        """Return a message on a cell that is empty or no finite number, with its place."""
         cell = self.frame[column][row]
         name = shorten(column, bare=True)
         fault = f"the cell is empty; {name} needs a number"
@@ -188,13 +188,13 @@ class Table:
 
 
 def join_names(names: Sequence[str]) -> str:
-    """Return names in a list for messages, shortened if there are many or long ones."""
+    """Return names as a list in a text, shortened if there are many or long ones."""
     some = ", ".join(shorten(name, bare=True) for name in names[:20])
     return some + (", ..." if len(names) > 20 else "")
 
 
 def parse_numeric_columns(frame: pl.DataFrame) -> pl.DataFrame:
-    """Return the frame with text columns of numbers converted to numeric types."""
+    """Return the frame with text columns converted to numbers where all cells are numbers."""
     columns = [_number_column(column) for column in frame.get_columns()]
     return pl.DataFrame(columns)
 

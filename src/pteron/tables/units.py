@@ -23,7 +23,7 @@ _NAMED = re.compile(r"(?P<name>[^\s(\[]+)\s*[\[(]\s*(?P<unit>[^\])]+?)\s*[\])]")
 
 
 def convert_to_si(table: Table, units: Mapping[str, str]) -> Table:
-    """Return the table with columns such as ``x (mm)`` in SI units, named without their unit.
+    """Return the table with columns such as ``x (mm)`` converted to SI units and renamed ``x``.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ def convert_to_si(table: Table, units: Mapping[str, str]) -> Table:
 
 
 def _si_factor(unit: str, si: str) -> float | None:
-    """Return the factor from a unit to an SI unit; None for another quantity."""
+    """Return the factor from a unit to an SI unit; None if it measures another quantity."""
     (numerator, _, per), (base, _, si_per) = unit.partition("/"), si.partition("/")
     if re.sub("[ ^]", "", per) != re.sub("[ ^]", "", si_per):
         return None

@@ -75,11 +75,11 @@ class Exported:
 
     @property
     def period(self) -> float:
-        """Time between two samples, s."""
+        """Sampling period of the controller, s."""
         return self.controller.period
 
     def law(self, model: RobotLike) -> ExportedLaw | ExportedCustomLaw:
-        """Return its law, which runs in the simulation's loop only."""
+        """Return the control law that runs the exported C code inside a simulation's loop."""
         plain_law, law_name = self.controller.law(model), self.controller.law_name
         header, source, function = self._text  # type: ignore[attr-defined]
         tables = []
@@ -113,7 +113,7 @@ class Exported:
         return ExportedLaw(plain_law.what, plain_law.model, plain_law.gains, plain_law.base, linked)
 
     def _expect_period(self, source: str, table: str) -> None:
-        """Refuse gains that were exported for another period."""
+        """Raise if the exported C code's gains are for another sampling period."""
         period_match = re.search(
             rf"\b{table}\[\d+\] = {{[^}}]*?([-+.\w]+),?\s*/\* period \*/", source
         )
@@ -125,7 +125,7 @@ class Exported:
             )
 
     def _read_code(self) -> tuple[str, str, str]:
-        """Return header and source, without the line that includes it, and the function."""
+        """Return the exported header, the source without that include, the function's name."""
         law_name = self.controller.law_name
         for path in sorted(Path(self.folder).glob("*.h")):
             header = path.read_text(encoding="utf-8")

@@ -49,7 +49,7 @@ class ControlLaw(Protocol):
     """A controller's law for one machine; `pteron.controllers` has some."""
 
     def memory(self, pose: Array, velocity: Array) -> Array:
-        """Return the initial memory, (K,)."""
+        """Return the controller's initial memory (K,) at a pose and velocity of the platform."""
 
     def __call__(
         self,
@@ -60,7 +60,7 @@ class ControlLaw(Protocol):
         joint_rates: Array,
         memory: Array,
     ) -> tuple[Array, Array]:
-        """Return forces (n,) and the next memory, from the reference and the measured joints."""
+        """Return drive forces (n,) and the next memory (K,), from reference and measured joints."""
 
 
 @runtime_checkable
@@ -69,14 +69,14 @@ class ProgramLaw(Protocol):
 
     @property
     def program(self) -> Program:
-        """The program from readings, reference, memory and parameters to forces and next memory."""
+        """The program from measurements, reference, memory and parameters to forces."""
 
     @property
     def numbers(self) -> dict[str, Array]:
-        """The law's parameters, as `pteron.kernels.loops.Loop.run` takes them."""
+        """The law's parameters as arrays by name, for `pteron.kernels.loops.Loop.run`."""
 
     def memory(self, pose: Array, velocity: Array) -> Array:
-        """Return the initial memory, (K,)."""
+        """Return the controller's initial memory (K,) at a pose and velocity of the platform."""
 
 
 @dataclass(frozen=True)
@@ -100,7 +100,7 @@ class Timing:
     sensing: float = 0.0
 
     def parts(self, period: float, samples: int) -> tuple[list[float], list[int]]:
-        """Return times and counts for `pteron.kernels.loops.Loop.run`, all but the last counts."""
+        """Return times, s, and sample counts of delays and steps, for a kernel loop's `run`."""
         (late, late_samples), (reading_age, old_samples) = (
             split_delay(min(delay, period * samples), period)  # later than the end is never
             for delay in (self.delay, self.sensing)
@@ -122,7 +122,7 @@ class Timing:
 
 
 def split_delay(delay: float, period: float) -> tuple[float, int]:
-    """Return a delay as a fraction of a sample, s, and a number of complete samples."""
+    """Return a delay as a part below one sample, s, and a number of complete samples."""
     samples = int(delay / period + ROUNDING)
     part = max(delay - samples * period, 0.0)
     return (part if part > ROUNDING * period else 0.0), samples
@@ -140,9 +140,10 @@ def run_simulation(
     limits: bool,
     progress: Progress | None = None,
 ) -> Simulation:
-    """Return a simulation; `limits` ends it at joints' limits and type-II singularities.
+    """Simulate the machine under a control law or given forces (T, n); return the `Simulation`.
 
-    The source of forces is a controller's law, or forces at each sample.
+    `source` is a control law, or the forces at each sample. With `limits` the simulation ends at
+    joint limits and type-II singularities.
     """
     time, m, n = reference.time, robot.freedom, robot.joint_count
     count, period = len(time), float(time[1] - time[0])
@@ -204,9 +205,9 @@ def _run_segments(
     ask: Callable[[int, int, Array], Array] | None,
     progress: Progress | None,
 ) -> None:
-    """Run the loop with the machine of each payload in turn; it fills `outputs`.
+    """Run the loop for each payload in turn, in blocks of samples; it fills `outputs`.
 
-    It returns from compiled code after `_BLOCK` samples, for interrupts and progress.
+    Compiled code returns after every `_BLOCK` samples, for interrupts and progress.
     """
     count = len(loads.masses)
     changes = np.flatnonzero(np.diff(loads.masses)) + 1
@@ -231,7 +232,7 @@ def _run_segments(
 
 
 def _simulation_columns(robot: Manipulator, columns: dict[str, Array]) -> dict[str, Array]:
-    """Return the columns of a `Simulation` from the outputs of a loop, a row for each sample."""
+    """Return the arrays of a `Simulation` by field name from a loop's raw outputs (T, ...)."""
     kind = DriveKind.from_robot(robot)
     parts = kind.parts(columns.pop("states"))
     columns |= {"pose": parts["pose"], "velocity": parts["velocity"]}
@@ -250,7 +251,7 @@ def _simulation_columns(robot: Manipulator, columns: dict[str, Array]) -> dict[s
 def _fault_text(
     robot: Manipulator, arrays: dict[str, Array], joints: Array, *, has_callback: bool
 ) -> str | None:
-    """Return why a loop ended before its time; None if it did not."""
+    """Return the reason why a simulation ended early, as text; None if it did not."""
     fault, m = arrays["fault"].item(), robot.freedom
     if fault == _NO_FORCES and has_callback:
         return "no forces are asked for: the controller returns some that are not finite numbers"
@@ -265,7 +266,7 @@ def _fault_text(
 
 
 def _limit_stop(robot: Manipulator, pose: Array, joints: Array) -> tuple[int, str] | None:
-    """Return the number of samples up to the first limit or singularity, and its text."""
+    """Return the sample count up to the first joint limit or singularity, and its text."""
     ends = {
         first_beyond_limits(robot, pose, joints): limit_text,
         first_singular(robot, pose): singularity_text,
@@ -285,9 +286,9 @@ def loop_arrays(
     sensors: Sensors,
     counts: Sequence[int],
 ) -> dict[str, Array]:
-    """Return the arrays for a loop's `run` of a machine, with or without a control law.
+    """Return the input arrays, by name, of a simulation loop with or without a control law.
 
-    `counts` are those of `Timing.parts`.
+    `counts` are the sample counts that `Timing.parts` returns.
     """
     period = float(reference.time[1] - reference.time[0])
     parts = reference.pose, reference.velocity, reference.acceleration
@@ -308,10 +309,10 @@ def loop_arrays(
 def _callback(
     law: ControlLaw, reference: Motion, joints: int, memories: list[Array]
 ) -> Callable[[int, int, Array], Array]:
-    """Return the callback that evaluates a Python controller and appends to `memories`."""
+    """Return the callback that evaluates a Python controller at a sample, to (n,) forces."""
 
     def ask(_: int, sample: int, measured: Array) -> Array:
-        """Return the controller's forces (n,) at a sample, from positions and rates (2 n,)."""
+        """Return the controller's forces (n,) at a sample, from measured joints and rates."""
         parts = reference.pose, reference.velocity, reference.acceleration
         pose, velocity, acceleration = (part[sample] for part in parts)
         readings = measured[:joints], measured[joints:]
@@ -332,7 +333,7 @@ def _callback(
 
 
 def _accelerations(loads: Loads, pose: Array, velocity: Array, forces: Array) -> Array:
-    """Return accelerations (T, m) at states with smooth friction; NaN where there are none."""
+    """Return platform accelerations (T, m) at states, friction smooth; NaN where undefined."""
     accelerations, masses = np.empty_like(pose), loads.masses[: len(pose)]
     for mass, machine in loads.machines.items():
         chosen: Any = masses == mass

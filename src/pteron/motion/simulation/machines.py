@@ -73,7 +73,7 @@ class Machines:
             self._expect_numbers(name)
 
     def _expect_numbers(self, name: str) -> None:
-        """Refuse numbers that no machine can have, and name the first of them."""
+        """Raise if an array of the machines, by name, has an impossible number; name the first."""
         array, columns = getattr(self, name), tuple[str, ...]()
         least = np.full(array.shape[-1], 0.0 if name == "payload" else -np.inf)
         if name == "parameters":
@@ -98,13 +98,13 @@ class Machines:
 
     @property
     def parameters_with_payload(self) -> Array:
-        """Inertial parameters with the payload, (B, N)."""
+        """Inertial parameters of each machine with its payload, (B, N)."""
         robot = self.robot
         unit_payload = parameters(with_payload(robot, 1.0)) - parameters(robot)
         return self.parameters + self.payload[:, None] * unit_payload
 
     def rows(self, chosen: slice) -> Machines:
-        """Return a slice of the machines."""
+        """Return the machines of a slice of indices."""
         parts = self.parameters[chosen], self.drives[chosen], self.payload[chosen]
         return Machines(
             self.robot, *parts, None if self.geometry is None else self.geometry[chosen]
@@ -112,7 +112,7 @@ class Machines:
 
     @property
     def numbers(self) -> dict[str, Array]:
-        """Their numbers as `pteron.kernels.loops.Loop.run` takes them."""
+        """The machines' parameters as arrays by name, for `pteron.kernels.loops.Loop.run`."""
         plant_numbers = {
             "plant_parameters": self.parameters_with_payload,
             "plant_drives": self.drives,
@@ -134,11 +134,11 @@ def machines_about(
     directions: float = 0.0,
     seed: Seed = 0,
 ) -> Machines:
-    """Return random machines about a nominal machine, by tolerances of masses, drives and so on.
+    """Return `count` random machines about a nominal one, varied within given tolerances.
 
-    Each body is made of lighter or heavier material (one factor a body, so that it stays a real
-    one), and each drive has factors of its dry friction, Stribeck's included, of its viscous
-    friction and of its rotor's inertia. Factors are uniform between 1 - share and 1 + share.
+    Each body's mass, first moment and inertia have one common factor, so that it remains physically
+    possible; each drive has factors of its dry friction (Stribeck's included), its viscous friction
+    and its rotor's inertia. Factors are uniform between 1 - share and 1 + share.
 
     Parameters
     ----------

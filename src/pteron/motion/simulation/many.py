@@ -78,7 +78,7 @@ class Batch(Result):
     files: tuple[Path, ...]
 
     def __repr__(self) -> str:
-        """Return the batch in a line."""
+        """Return the counts of machines, and of those that ended early, in one line."""
         ended = int((self.stopped != "").sum())
         return f"<Batch of {len(self.samples)} {self.machines.robot.name!r}: {ended} ended early>"
 
@@ -99,9 +99,10 @@ def simulate_many(
 ) -> Batch:
     """Return statistics of many simulated machines that follow a motion under a controller.
 
-    Each is what `simulate` makes of it, to the same bits but for the noise, whose seed is that of
-    the sensors with the machine's number; where machines have a geometry of their own, to rounding.
-    Joints' limits and singularities of type II do not end it. In C eight machines share a vector.
+    Each machine's result equals that of `simulate` to the bit, except for noise, whose seed is the
+    sensors' seed with the machine's number; for machines with geometry of their own it is equal up
+    to rounding. Joint limits and type-II singularities do not end a simulation. In C, eight
+    machines share a vector instruction.
 
     Parameters
     ----------
@@ -202,7 +203,7 @@ def simulate_many(
 
 
 def _expect_own_controller(controller: object) -> None:
-    """Refuse a custom controller, whose law is no program."""
+    """Raise for a custom controller whose law is not a program."""
     if not isinstance(controller, Controller | Custom):
         raise DataError(
             f"controller: {controller!r} given, one of pteron.controllers expected: `simulate` "
@@ -213,7 +214,7 @@ def _expect_own_controller(controller: object) -> None:
 def _group_arrays(
     simulator: Loop, group: Machines, shared_arrays: dict[str, Array], period: float
 ) -> dict[str, Array]:
-    """Return a loop's arrays for a group of machines, from those of the nominal machine."""
+    """Return the loop's arrays for a group of machines, from those of the nominal machine."""
     arrays = shared_arrays | group.numbers
     arrays |= {name: np.repeat(shared_arrays[name], len(group), axis=0) for name in STATE}
     if group.geometry is not None:
@@ -222,7 +223,7 @@ def _group_arrays(
 
 
 def _limit_forces(simulator: Loop, robot: Manipulator, samples: dict[str, Array]) -> None:
-    """Replace the commanded forces in samples by the motors' forces."""
+    """Replace commanded drive forces in `samples` by the forces that the motors give, in place."""
     rates, parts = samples["rates"], simulator.kind.parts(samples["states"])
     if simulator.kind.bends:
         rates = np.where(simulator.kind.elastic, parts["motor_rate"], rates)
@@ -232,7 +233,7 @@ def _limit_forces(simulator: Loop, robot: Manipulator, samples: dict[str, Array]
 def _group_statistics(
     samples: dict[str, Array], arrays: dict[str, Array], reference: Array, ended: NDArray[np.bool_]
 ) -> dict[str, Array]:
-    """Return the statistics of a group of machines; `ended` marks samples after its end."""
+    """Return rms and largest errors, peak forces and counts of samples for a group of machines."""
     error = samples["states"][..., : reference.shape[-1]] - reference
     error[ended] = np.nan
     force = np.abs(samples["forces"])
@@ -252,7 +253,7 @@ def _group_statistics(
 def _start_arrays(
     simulator: Loop, group: Machines, arrays: dict[str, Array], period: float
 ) -> dict[str, Array]:
-    """Return the initial encoders and motors of machines at a common pose."""
+    """Return initial encoder and motor states for machines that start at a common pose."""
     robot, state = group.robot, arrays["state"].copy()
     m, n = robot.freedom, robot.joint_count
     motion = {"pose": state[:, 0, :m], "velocity": state[:, 0, m : 2 * m]}
@@ -270,7 +271,7 @@ def _start_arrays(
 
 
 def _make_empty_folder(out: str | Path) -> Path:
-    """Return the output folder, created on demand; refuse a folder with results of another run."""
+    """Return the output folder, created if absent; raise if it has results of another run."""
     folder = make_folder(out)
     there = sorted(folder.glob("machines-*.parquet"))
     if there:
@@ -279,7 +280,7 @@ def _make_empty_folder(out: str | Path) -> Path:
 
 
 def _write_samples(folder: Path, start: int, table: pl.DataFrame) -> Path:
-    """Write the samples of a group of machines, the first of which has the number `start`."""
+    """Write a group's samples to a Parquet file, numbered by its first machine; return the path."""
     path = folder / f"machines-{start:08d}.parquet"
     # Noisy floats hardly shrink: lz4 takes half the time of the usual zstd.
     table.write_parquet(path, compression="lz4")
@@ -293,7 +294,7 @@ def _table(
     samples: dict[str, Array],
     is_valid: NDArray[np.bool_],
 ) -> pl.DataFrame:
-    """Return the valid samples of machines as a table."""
+    """Return the valid samples of machines as a table, a row for each machine and time."""
     import polars as pl
 
     robot = machines.robot

@@ -13,7 +13,7 @@ from pteron.manipulator import Manipulator
 def motor_forces(
     robot: Manipulator, forces: Array, motor_rates: Array, currents: Array | None
 ) -> Array:
-    """Return the motors' forces (..., n) for commanded forces.
+    """Return the forces (..., n) that the motors give for commanded forces.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ def motor_forces(
 
 
 def limit_to_motors(robot: Manipulator, forces: Array, motor_rates: Array) -> Array:
-    """Return forces (..., n) of the drives, limited to their motors' torque at their rates.
+    """Return drive forces (..., n) limited to their motors' torque at their rates.
 
     Parameters
     ----------

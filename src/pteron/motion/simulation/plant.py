@@ -42,10 +42,9 @@ def advance(
 ) -> tuple[Array, Array, Array, Any]:
     """Return machines' states after several fourth-order Runge-Kutta steps.
 
-    Friction and the motors' inertia count; a joint at rest sticks while its drive and its loads are
-    less than its dry friction. Where there is a C compiler the steps are one loop of machine code,
-    which is compiled when it is first asked for, and several states of a batch are computed by one
-    instruction.
+    Friction and the motors' inertia are included; a joint at rest sticks while the force on it is
+    less than its dry friction. With a C compiler the steps run as one loop of machine code,
+    compiled at the first call, and several states of a batch share an instruction.
 
     Parameters
     ----------
@@ -144,7 +143,7 @@ def advance(
 
 
 def drive_states(robot: Manipulator, pose: Array, velocity: Array) -> Array:
-    """Return the states (..., K) of drives with extra states at zero acceleration."""
+    """Return the states (..., K) of drives that bend or lag, as at zero acceleration."""
     states = motor_states(robot, pose, velocity, np.zeros_like(pose))
     return np.concatenate([np.empty((*pose.shape[:-1], 0)), *states.values()], axis=-1)
 
@@ -152,7 +151,7 @@ def drive_states(robot: Manipulator, pose: Array, velocity: Array) -> Array:
 def motor_states(
     robot: Manipulator, pose: Array, velocity: Array, acceleration: Array
 ) -> dict[str, Array]:
-    """Return the extra drive states, (..., n) each, that a motion requires, by name."""
+    """Return by name the drive states (..., n) that a motion requires beyond joint coordinates."""
     kind = DriveKind.from_robot(robot)
     if not kind.extra_states:
         return {}
@@ -192,12 +191,12 @@ class AdaptivePlant:
     def go(
         self, steps: int, step: float, loads_held: Loads, arrays: Mapping[str, Array], alive: Array
     ) -> None:
-        """Advance the state by several steps, like `pteron.kernels.samples.Plant.go`."""
+        """Advance the state in `arrays` by `steps` steps of `step` s, by an adaptive method."""
         state, clock, span = arrays["state"][0, 0], arrays["clock"][0, 0], steps * step
         m, loads = len(state) // 2, (loads_held["forces"][0], loads_held["wrench"][0])
 
         def rates(_: float, state: Array) -> Array:
-            """Return the rates (2 m,) of a state of pose and velocity; NaN without a solution."""
+            """Return the time derivative (2 m,) of pose and velocity; NaN without a solution."""
             velocity = state[m:]
             acceleration, status = self._accelerations(state[:m], velocity, *loads)
             return np.concatenate([velocity, acceleration if status else np.full(m, np.nan)])

@@ -71,10 +71,10 @@ class Sensors:
 def encoder_arrays(
     sensors: Sensors, robot: Manipulator, period: float, state: Mapping[str, Array]
 ) -> dict[str, Array]:
-    """Return a control loop's arrays for encoders that begin in a state: numbers and memory.
+    """Return the loop's arrays of encoder resolution, noise and initial memory, by name.
 
-    The angle of a crank that may go all the way round jumps by a turn: its readings go on by the
-    shorter way.
+    The angle of a crank that can turn all the way round jumps by a full turn: its readings continue
+    by the shorter way.
     """
     pose, velocity = state["pose"], state["velocity"]
     joints = inverse_kinematics(robot, pose)
@@ -111,7 +111,7 @@ def encoder_arrays(
 def encoder_memory(joints: Array, rates: Array, steps: Array, period: float) -> Array:
     """Return the initial memory (..., 4 E) of encoders at joints and rates (..., E).
 
-    `steps` (E,) are theirs, `period` is from one sample to the next.
+    `steps` (E,) are the encoders' resolutions, m or rad, and `period`, s, is the sampling period.
     """
     last_readings = joints - period * rates
     widths = np.where(steps > 0.0, steps, 1.0)
@@ -122,7 +122,7 @@ def encoder_memory(joints: Array, rates: Array, steps: Array, period: float) -> 
 def encoder_noise(
     sensors: Sensors, robot: Manipulator, samples: int, machines: range | None = None
 ) -> dict[str, Array]:
-    """Return standardised noise of the samples, of a machine or of numbered machines."""
+    """Return {"noise": standard normal noise (B, samples, encoders)}, B machines."""
     count = robot.joint_count * (2 if DriveKind.from_robot(robot).bends else 1)
     if not np.any(sensors.noise):
         return {"noise": np.zeros((1, 1, count))}
@@ -139,8 +139,8 @@ def encoder_of(drive: Drive | None) -> str:
 def rate_shares(sensors: Sensors, robot: Manipulator, period: float) -> Array:
     """Return the filter gain of each estimated rate (n,); NaN where the rate is measured.
 
-    A rate is that of the differences of its encoder where this rounds or is noisy, and it is the
-    motor's where the drive tells the motor's.
+    A rate is estimated from differences of an encoder that rounds or is noisy; it is the motor's
+    rate if the drive's encoder is at the motor.
     """
     count = robot.joint_count
     at_motors = sensors.encoder if sensors.motor_encoder is None else sensors.motor_encoder
@@ -152,14 +152,14 @@ def rate_shares(sensors: Sensors, robot: Manipulator, period: float) -> Array:
 
 
 def _share(sensors: Sensors, period: float) -> float:
-    """Return the filter gain of a rate estimated from differences, by the filter's cut-off."""
+    """Return the gain (0 to 1) of the low-pass filter that estimates rates from differences."""
     if sensors.cutoff is None:
         return 1.0
     return -float(np.expm1(-2.0 * np.pi * sensors.cutoff * period))
 
 
 def expect_encoders(robot: Manipulator, law: Program) -> None:
-    """Refuse a controller that needs readings of motors where there is no encoder."""
+    """Raise if the law needs motor readings where a drive has its encoder at the joint only."""
     motor_readings = [port.name for port in law.inputs if port.name in ("motors", "motor_rates")]
     legs_without = [
         str(i) for i, leg in enumerate(robot.legs, 1) if encoder_of(leg.drive) == "joint"

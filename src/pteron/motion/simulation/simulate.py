@@ -54,10 +54,10 @@ class Controls(Protocol):
 
     @property
     def period(self) -> float:
-        """Time between two samples, s."""
+        """Sampling period of the controller, s."""
 
     def law(self, model: Manipulator) -> ControlLaw:
-        """Return the control law for a machine."""
+        """Return the control law for a machine model."""
 
 
 def simulate(
@@ -81,15 +81,15 @@ def simulate(
     error: float | None = None,
     progress: Progress | None = None,
 ) -> Simulation:
-    """Return the simulation of a machine with drives under a controller, under forces, or free.
+    """Simulate a machine with drives under a controller, under given forces, or free.
 
     The rigid bodies and the motors' inertia move under the drives' forces and friction. Dry
-    friction sticks: a joint at rest does not move until it is pulled by more than its friction
-    (with "dop853" it is smooth at rest, by `rest_speed`, and such a joint creeps). No drive gives
-    more than its `max_force`. At each sample the controller sees the reference and the measured
-    joints; what it asks for is held until the next, as a digital drive does. The simulation ends,
-    and says why, where a leg comes to the edge of its reach; and under a controller, unless told
-    otherwise, where a joint comes to its limits or the platform to a singularity of type II.
+    friction sticks: a joint at rest does not move until the force on it exceeds its friction (with
+    "dop853" friction is smooth at rest, by `rest_speed`, and such a joint creeps). No drive gives
+    more than its `max_force`. At each sample the controller receives the reference and the measured
+    joints; the forces that it returns are held until the next sample, as in a digital drive. The
+    simulation ends, with the reason in `stopped`, where a leg reaches the limit of its reach; and
+    under a controller, unless `limits` is false, at a joint limit or a type-II singularity.
 
     Parameters
     ----------
@@ -188,7 +188,7 @@ def simulate(
     loads = Loads(masses, machines, _sample_source(wrench, robot, "wrench", reference.time))
 
     def run_with(timing: Timing) -> Simulation:
-        """Return the simulation with this timing of the samples."""
+        """Return the simulation with these sampling times, delays and steps."""
         arguments = (pose, velocity), reference, source, loads, sensors, timing
         ends = limits and controller is not None
         return run_simulation(robot, *arguments, limits=ends, progress=progress)
@@ -199,11 +199,12 @@ def simulate(
 def _refine_steps(
     run_with: Callable[[Timing], Simulation], timing: Timing, error: float, period: float
 ) -> Simulation:
-    """Return a simulation with steps refined until no pose changes by more than the error.
+    """Repeat a simulation with shorter steps until no pose changes by more than `error`.
 
-    A step that holds a joint's reversal is of first order in its length and depends on where in the
-    step that is. So each run has an odd number of steps more than twice the last one's, by which no
-    two runs divide a sample alike, and two changes in a row must be small enough.
+    The error of a step in which a joint reverses is of first order in its length, and depends on
+    when in the step it reverses. So each run has an odd number of steps, more than twice the
+    previous number, so that no two runs divide a sample alike, and two successive changes must be
+    small enough.
     """
     check_positive(error=error)
     if timing.method != "rk4":
@@ -227,7 +228,7 @@ def _refine_steps(
 
 
 def _expect_method(robot: Manipulator, method: Method) -> None:
-    """Refuse an unknown method of integration, or a method that the drives do not allow."""
+    """Raise if the integration method is unknown, or unsuited to the machine's drives."""
     expect(method in get_args(Method), "method", repr(method), '"rk4" or "dop853"')
     if method == "dop853" and not DriveKind.from_robot(robot).plain:
         raise DataError(
@@ -237,7 +238,7 @@ def _expect_method(robot: Manipulator, method: Method) -> None:
 
 
 def _expect_controller(controller: object, forces: object) -> None:
-    """Refuse an argument that is no controller, and forces in addition to a controller."""
+    """Raise if `controller` is no controller, or forces are given in addition to it."""
     period = getattr(controller, "period", None)
     if isinstance(controller, type) or not isinstance(period, float | int):
         raise DataError(
@@ -248,7 +249,7 @@ def _expect_controller(controller: object, forces: object) -> None:
 
 
 def check_delay(delay: float) -> None:
-    """Refuse a delay that is negative or not finite."""
+    """Raise if a delay, s, is negative or not finite."""
     expect(_is_number(delay) and delay >= 0.0, "delay", shorten(delay), "0 s or more")
 
 
@@ -258,13 +259,13 @@ def _is_number(number: object) -> bool:
 
 
 def check_positive(**positive: float) -> None:
-    """Refuse a number that is not positive and finite."""
+    """Raise if a named number is not positive and finite."""
     for name, number in positive.items():
         expect(_is_number(number) and number > 0.0, name, shorten(number), "a number above 0")
 
 
 def _state(robot: Manipulator, start: tuple[PoseLike, PoseLike]) -> tuple[Array, Array]:
-    """Return a pose and a velocity, (m,) each."""
+    """Return the initial pose and velocity as arrays (m,); raise if they are not finite."""
     expect(len(start) == len(_STATE), "start", f"{len(start)} parts", "a pose and a velocity")
     pose, velocity = (finite_pose(robot, v, name) for v, name in zip(start, _STATE, strict=True))
     return pose, velocity
@@ -304,7 +305,7 @@ def reference_of(
 
 
 def _masses(payload: float | Sequence[tuple[float, float]], time: Array) -> Array:
-    """Return the payload at each sample (T,), kg."""
+    """Return the payload mass at each sample (T,), kg."""
     array = as_array(payload, "payload", ())
     if array.ndim == 0:
         return np.full(len(time), array)
@@ -325,7 +326,7 @@ def _sample_source(
     name: str,
     time: Array,
 ) -> Array:
-    """Return a machine's forces or a wrench at each time (T, k); constant rows are repeated."""
+    """Return forces or a wrench at each time (T, k), from a constant or a function of time."""
     columns = robot.column_names[name]
     size = len(columns)
 

@@ -73,13 +73,13 @@ class Simulation(Result):
     stopped: str | None
 
     def __repr__(self) -> str:
-        """Return the simulation in a line; `table` has its samples."""
+        """Return the machine, the duration and the count of samples in one line."""
         end = f"; stopped: {self.stopped}" if self.stopped else ""
         rows = f"{self.time[-1]:.6g} s, {len(self.time)} samples"
         return f"<Simulation of {self.robot.name!r}: {rows}{end}>"
 
     def summary(self) -> str:
-        """Return errors and drives' loads as lines of text."""
+        """Return tracking errors and each drive's loads as lines of text."""
         return self._overview().text
 
     def _overview(self) -> Overview:
@@ -114,17 +114,17 @@ class Simulation(Result):
 
     @property
     def error(self) -> Array:
-        """Pose less reference, (T, m), m and rad."""
+        """Pose error: actual pose less reference, (T, m), m and rad."""
         return self.pose - self.reference.pose
 
     @property
     def motion(self) -> Motion:
-        """Motion of the platform."""
+        """The simulated motion of the platform."""
         return Motion(self.time, self.pose, self.velocity, self.acceleration)
 
     @property
     def saturated_share(self) -> Array:
-        """Share of the samples, (n,), in which a drive's commanded force exceeded its limits."""
+        """Share of the samples, (n,), 0 to 1, in which a drive's command exceeded its limits."""
         beyond = np.abs(self.asked) > limits_of(self.robot).force
         beyond |= (
             np.abs(limit_to_motors(self.robot, self.asked, self.motor_rates) - self.asked) > 0.0
@@ -132,13 +132,14 @@ class Simulation(Result):
         return np.asarray(beyond.mean(axis=0))
 
     def table(self) -> pl.DataFrame:
-        """Return the samples as a table.
+        """Return the samples as a table, a row for each time.
 
-        Its columns are t; x y z phi, dx dy dz dphi, ddx ddy ddz ddphi and xref yref zref phiref,
-        those that the machine has; its joints (rho1, theta2) and their rates (drho1, dtheta2);
-        forces (force1, torque2); and payload. Joints and forces are as the drives count them: where
-        a transmission bends and its encoder is at the motor, the joint's columns are the motor's.
-        With such transmissions motor_rho1, ..., dmotor_rho1, ... are the motors' everywhere.
+        The columns are t; x y z phi, dx dy dz dphi, ddx ddy ddz ddphi and xref yref zref phiref, as
+        far as the machine has them; its joints (rho1, theta2) and their rates (drho1, dtheta2);
+        forces (force1, torque2); and payload. Joints and forces are in the drives' units of
+        reading: if a transmission is elastic and its encoder is at the motor, the joint's columns
+        are the motor's. With elastic transmissions motor_rho1, ..., dmotor_rho1, ... are the
+        motors' coordinates.
         """
         import polars as pl
 

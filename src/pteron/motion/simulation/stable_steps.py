@@ -31,11 +31,11 @@ _SHORTEST = 1e-8
 def longest_step(robot: RobotLike, poses: PoseLike, machines: Machines | None = None) -> float:
     """Return the longest stable step of the simulation, s; infinite if nothing limits it.
 
-    The fastest of these limits it: the decay of rates by viscous friction or by a winding at its
-    supply's limit, the vibration of motors and joints on transmissions that bend, and the lag of
-    currents. Dry friction needs no short steps. The poses, (..., m), are those where the machine
-    may be. For several machines the step is stable for all of them, at the pose where the mass at
-    the joints is least.
+    It is limited by the fastest of these: the decay of rates by viscous friction or by a winding at
+    its supply's limit, the vibration of motors and joints on elastic transmissions, and the lag of
+    currents. Dry friction needs no short steps. `poses` (..., m) are those where the machine may
+    be. For several machines the step is stable for all of them, at the pose with the least mass at
+    the joints.
     """
     return _longest_stable_step(as_manipulator(robot), poses, machines)[0]
 
@@ -43,7 +43,7 @@ def longest_step(robot: RobotLike, poses: PoseLike, machines: Machines | None = 
 def _longest_stable_step(
     robot: Manipulator, poses: PoseLike, machines: Machines | None = None
 ) -> tuple[float, str]:
-    """Return the longest stable step, s, and a clause that begins a sentence on its cause."""
+    """Return the longest stable integration step, s, and a phrase that names its cause."""
     kind, drives = DriveKind.from_robot(robot), drives_of(robot)
     if machines is not None:
         parts = machines.drives.reshape(len(machines), len(drives), -1)
@@ -70,7 +70,7 @@ def _longest_stable_step(
 
 
 def _supply_damping(robot: Manipulator) -> Array:
-    """Return the fall (n,) of drive forces per joint rate where the supply is at its limit."""
+    """Return (n,) the decrease of drive force per joint rate where the supply voltage limits it."""
     falls = np.zeros(robot.joint_count)
     for i, leg in enumerate(robot.legs):
         if leg.drive and leg.drive.winding:
@@ -82,7 +82,7 @@ def _supply_damping(robot: Manipulator) -> Array:
 def _step_of_drives(
     robot: Manipulator, rows: Array, mass: Array, drives: Drives
 ) -> tuple[float, str]:
-    """Return the longest step and its cause, from J, M and drives of poses or of machines."""
+    """Return the longest stable step, s, and its cause, from Jacobian, mass matrix and drives."""
     kind, longest = DriveKind.from_robot(robot), (float("inf"), "")
     if drives.viscous.any() or kind.bends:
         system, bent = _linear_machine(robot, rows, mass, drives)
@@ -113,11 +113,11 @@ def _step_of_drives(
 
 
 def modes(robot: RobotLike, poses: PoseLike) -> tuple[Array, Array]:
-    """Return the eigenvalues of a machine with its drives, linear about rest at poses.
+    """Return the eigenvalues of the machine with its drives, linearised about rest at poses.
 
     The linear machine is M x'' = J^T (k d + c d') and I w' = -k d - c d' - b w, with d the
-    deflection of each transmission; play, dry friction and the change of gravity forces with the
-    pose are left out.
+    deflection of each transmission; backlash, dry friction and the change of gravity forces with
+    the pose are neglected.
 
     Parameters
     ----------
@@ -162,7 +162,7 @@ def _linear_machine(
 ) -> tuple[Array, Array]:
     """Return the linear machine's matrix (..., 2 K, 2 K) and the deflections (..., n, K).
 
-    The K coordinates are those of the pose, then the motors behind transmissions that bend.
+    The K coordinates are those of the pose, then those of the motors behind elastic transmissions.
     """
     bends = [leg.drive and leg.drive.elastic for leg in robot.legs]
     stiffness, damping = (
@@ -178,7 +178,7 @@ def _linear_machine(
     rigid = np.where(soft, 0.0, 1.0)
 
     def assemble(joints: Array, motors: Array, springs: Array) -> Array:
-        """Return the matrix (..., K, K) of coefficients at joints, motors and springs, (..., n)."""
+        """Return the matrix (..., K, K) of coefficients (..., n) at joints, motors, springs."""
         joint_part = rows.mT @ (joints[..., None] * rows)
         spring_part = bent.mT @ (springs[:, None] * bent)
         matrix = np.zeros(
@@ -211,7 +211,7 @@ def allowed_step(
     usual: bool = True,
     machines: Machines | None = None,
 ) -> float:
-    """Return min(step, longest stable step), s.
+    """Return min(step, longest stable step), s; raise if that is too short to be sensible.
 
     Raises
     ------

@@ -19,7 +19,7 @@ _FAST = 1e3
 
 
 def why_not_further(robot: Manipulator, pose: Array, velocity: Array) -> str:
-    """Return why the equations of motion cannot go on from a state, (m,) each."""
+    """Return as text why the equations of motion have no solution beyond a state, (m,) each."""
     if not np.abs(velocity).max() < _FAST:
         return (
             "the motion diverges: the controller is unstable, or the forces are far too large; "
@@ -41,7 +41,7 @@ def first_beyond_limits(robot: Manipulator, poses: Array, joints: PerJoint) -> i
 
 
 def limit_text(robot: Manipulator, pose: Array) -> str:
-    """Return a text on the joint that is beyond its limits at a pose (m,)."""
+    """Return as text which joint is beyond its limits at a pose (m,), and by how much."""
     worst = max(
         limited_joints(robot, pose),
         key=lambda joint: max(joint.least - joint.value, joint.value - joint.most),
@@ -59,7 +59,7 @@ def first_singular(robot: Manipulator, poses: Array) -> int | None:
 
 
 def singularity_text(_: Manipulator, pose: Array) -> str:
-    """Return the sentence for a singularity of type II."""
+    """Return the sentence that a pose (m,) is a type-II singularity."""
     return (
         f"singular (type II) at pose {pose_text(pose)}: the actuators no longer hold the platform"
     )

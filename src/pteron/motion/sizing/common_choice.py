@@ -17,9 +17,10 @@ have when they are built and measured."""
 
 
 def alike_legs(robot: RobotLike) -> tuple[tuple[int, ...], ...]:
-    """Return groups, of two or more, of identical legs, from 1.
+    """Return groups of identical legs, as leg numbers from 1; groups have two or more.
 
-    They are of one kind and have links of the same lengths: what makes one drive fit all of them.
+    Identical legs are of one kind with links of the same lengths, so that one drive fits all of
+    them.
 
     Parameters
     ----------
@@ -52,7 +53,7 @@ def alike_legs(robot: RobotLike) -> tuple[tuple[int, ...], ...]:
 
 
 def _dimensions(leg: LegKind) -> dict[str, float]:
-    """Return a leg's lengths and other numbers, by their keys."""
+    """Return a leg's lengths and other numeric parameters, by their keys."""
     roles = ("length", "number", "count")
     keys = [name for name, key in leg.every_key().items() if key.role in roles]
     settings = {name: getattr(leg, name) for name in keys}
@@ -62,10 +63,10 @@ def _dimensions(leg: LegKind) -> dict[str, float]:
 def choose_common(
     sizing: Sizing, motors: Sequence[Motor], *, margin: float = 1.0
 ) -> tuple[CommonFit, ...]:
-    """Return how each motor suits identical legs, with a common ratio for them.
+    """Return how each motor suits each group of identical legs, with a common gear ratio.
 
-    A machine is built with the same drive at legs that are alike, though its cycle does not ask
-    the same of each. The best is first, as `choose` has it.
+    A machine is built with the same drive at identical legs, though its cycle loads them
+    differently. The best motor is first, in the order of `choose`.
 
     Parameters
     ----------

@@ -75,11 +75,11 @@ class Sizing(Result):
     assumed_friction: PerJoint
 
     def __repr__(self) -> str:
-        """Return the sizing in a line; `table` has it all."""
+        """Return the machine's name and the cycle's duration in one line."""
         return f"<Sizing of {self.robot.name!r}: a cycle of {self.duration:.6g} s>"
 
     def summary(self) -> str:
-        """Return the loads of each drive as lines of text."""
+        """Return force, speed and power of each drive as lines of text."""
         return self._overview().text
 
     def _overview(self) -> Overview:
@@ -103,16 +103,16 @@ class Sizing(Result):
 
     @property
     def duration(self) -> float:
-        """The cycle's time, the rests included, s."""
+        """Duration of the cycle, rests included, s."""
         return float(self.time[-1] - self.time[0])
 
     @cached_property
     def loads(self) -> Array:
-        """Load forces: `forces` without the motors' inertia, so independent of the ratio."""
+        """Load forces at the joints, N or N m: `forces` less those of the motors' inertia."""
         return self.forces - self.rotor_inertia * self.accelerations
 
     def select_place(self, place: int) -> Sizing:
-        """Return the sizing at one of several places, by its index."""
+        """Return the drive loads at one of several places of the cycle, by its index."""
         parts = (self.forces, self.speeds, self.accelerations)
         forces, speeds, accelerations = (part[:, place] for part in parts)
         return replace(self, forces=forces, speeds=speeds, accelerations=accelerations, places=())
@@ -121,7 +121,7 @@ class Sizing(Result):
     where = former_attribute("where", "place_text")
 
     def worst(self, quantity: str) -> PerJoint:
-        """Return, for each drive, the index in `places` where a quantity is greatest.
+        """Return for each drive the index in `places` where the load `quantity` is greatest.
 
         The quantity is "peak_force", "rms_force", "peak_speed", "rms_speed", "peak_power",
         "peak_braking", "given_energy" or "braked_energy".
@@ -130,7 +130,7 @@ class Sizing(Result):
 
     @cached_property
     def _quantities_at_places(self) -> dict[str, Array]:
-        """Each quantity at each place, (W, n); W = 1 without places."""
+        """Each load quantity at each place, (W, n), by name; W = 1 without places."""
         shape = len(self.time), -1, self.robot.joint_count
         forces, speeds = self.forces.reshape(shape), self.speeds.reshape(shape)
         power = forces * speeds
@@ -147,7 +147,7 @@ class Sizing(Result):
         }
 
     def _greatest(self, quantity: str) -> PerJoint:
-        """Return the greatest value of a quantity over all places, for each joint (n,)."""
+        """Return the greatest value of a load quantity over all places, for each joint (n,)."""
         return np.asarray(self._quantities_at_places[quantity].max(axis=0))
 
     def integral(self, samples: Array) -> Array:
@@ -162,22 +162,22 @@ class Sizing(Result):
 
     @property
     def peak_forces(self) -> PerJoint:
-        """Largest size of each force, N or N m."""
+        """Largest absolute force of each drive (n,), N or N m."""
         return self._greatest("peak_force")
 
     @property
     def rms_forces(self) -> PerJoint:
-        """Root mean square of each force over the cycle, N or N m, which heats the motor."""
+        """Root mean square force of each drive over the cycle (n,), N or N m."""
         return self._greatest("rms_force")
 
     @property
     def peak_speeds(self) -> PerJoint:
-        """Largest speed of each joint, m/s or rad/s."""
+        """Largest absolute speed of each joint (n,), m/s or rad/s."""
         return self._greatest("peak_speed")
 
     @property
     def rms_speeds(self) -> PerJoint:
-        """Root mean square of each speed over the cycle, m/s or rad/s."""
+        """Root mean square speed of each joint over the cycle (n,), m/s or rad/s."""
         return self._greatest("rms_speed")
 
     @property
@@ -187,7 +187,7 @@ class Sizing(Result):
 
     @property
     def peak_power(self) -> PerJoint:
-        """Largest power that each drive delivers, W."""
+        """Largest power that each drive delivers (n,), W."""
         return self._greatest("peak_power")
 
     @property
@@ -215,7 +215,8 @@ class Sizing(Result):
     def net_energy(self) -> float:
         """Energy that all drives deliver over the cycle, less the energy they absorb, J.
 
-        It is what friction takes, and the motion leaves; 0 where it is none but for rounding.
+        It is the energy that friction dissipates plus what the motion keeps; 0 if it is zero up to
+        rounding.
         """
         driving, braking = (
             self._quantities_at_places[f"{key}_energy"].sum(axis=1) for key in ("given", "braked")
@@ -235,17 +236,20 @@ class Sizing(Result):
 
     @property
     def drives(self) -> tuple[Drive, ...]:
-        """The drives; an empty drive where the file has none."""
+        """The drive of each leg; an empty `Drive` where the machine's file has none."""
         return tuple(leg.drive or Drive() for leg in self.robot.legs)
 
     @property
     def rotor_inertia(self) -> PerJoint:
-        """Each motor's inertia at the joint, ratio^2 rotor_inertia, kg or kg m^2."""
+        """Each rotor's inertia reflected to the joint, ratio^2 rotor_inertia (n,), kg or kg m^2."""
         return np.array([drive.inertia for drive in self.drives])
 
     @property
     def inertia_ratios(self) -> PerJoint:
-        """The greatest load inertia over the motor's, at the joint; NaN without a rotor inertia."""
+        """The greatest load inertia over the motor's, at each joint (n,).
+
+        NaN without rotor inertia.
+        """
         rotors = self.rotor_inertia
         return np.where(
             rotors > 0.0, self.load_inertia[1] / np.where(rotors > 0.0, rotors, 1.0), np.nan
@@ -258,34 +262,37 @@ class Sizing(Result):
         return self.rms_forces / gears, self.peak_forces / gears
 
     def squares(self, leg: int) -> tuple[Array, Array, Array]:
-        """Return the means over the cycle of f^2, f q'' and q''^2, f being the load of a leg.
+        """Return the cycle means of f^2, f q'' and q''^2, f being the load force of a leg.
 
-        Each is (), or (W,) of several places.
+        Each has the shape (), or (W,) for W places.
         """
         force, mixed, acceleration = (part[..., leg - 1] for part in self._squares)
         return force, mixed, acceleration
 
     @cached_property
     def _squares(self) -> tuple[Array, Array, Array]:
-        """Means over the cycle of force^2, force times acceleration, and acceleration^2."""
+        """Cycle means of force^2, force times acceleration, acceleration^2, (n,) or (W, n) each."""
         f, a = self.loads, self.accelerations
         return self.mean(f * f), self.mean(f * a), self.mean(a * a)
 
     @cached_property
     def margins(self) -> tuple[DriveMargin, ...]:
-        """The margins of the limits of the file's drives over the cycle's loads, leg by leg."""
+        """The margins (limit over load) of each drive's limits in the cycle, leg by leg."""
         needed = {name: self._greatest(name) for name in ("rms_force", "peak_force", "peak_speed")}
         return drive_margins(self.robot, needed, self.forces, self.speeds)
 
     @cached_property
     def overloads(self) -> tuple[str, ...]:
-        """Loads beyond the drives' limits, a line each: the leg, the limit, the excess."""
+        """Lines of text, one for each drive limit exceeded: leg, limit and load."""
         exceeded = [margin for margin in self.margins if margin.margin < 1.0]
         exceeded.sort(key=lambda margin: margin.quantity == "rms_force")
         return tuple(margin.overload_text(self.place_text(margin)) for margin in exceeded)
 
     def place_text(self, margin: DriveMargin) -> str:
-        """Return the text of the place with the least margin; empty without places."""
+        """Return in words the place of the cycle where a drive margin is least.
+
+        The text is empty without places.
+        """
         if not self.places:
             return ""
         leg = margin.leg - 1
@@ -295,9 +302,9 @@ class Sizing(Result):
         return f" {self.places[self.worst(margin.quantity)[leg]]}"
 
     def table(self) -> pl.DataFrame:
-        """Return a table with a row per leg, in SI units at the joint, but for motor_torque.
+        """Return a table of drive loads with a row for each leg, SI units at the joint.
 
-        What a drive has not is empty.
+        Cells of quantities that a drive does not have are empty.
         """
         import polars as pl
 
@@ -339,7 +346,7 @@ class Sizing(Result):
 
 
 def best_ratio(sizing: Sizing, leg: int, rotor_inertia: float) -> float:
-    """Return the ratio that minimises a motor's root mean square torque over the cycle.
+    """Return the gear ratio that minimises a motor's root mean square torque over the cycle.
 
     T^2 = <f^2> / i^2 + 2 J <f q''> + J^2 i^2 <q''^2> is least at i^2 = rms(f) / (J rms(q'')): the
     load and the rotor then take equal parts of the torque.
@@ -397,7 +404,7 @@ def mean_squares(sizing: Sizing, leg: int, ratio: float, rotor_inertia: float) -
 
 
 def best_ratios(sizing: Sizing) -> PerJoint:
-    """Return the best ratio of each drive's motor, rad/m or rad/rad; NaN without rotor inertia.
+    """Return the gear ratio of least rms torque for each drive; NaN without rotor inertia.
 
     Parameters
     ----------

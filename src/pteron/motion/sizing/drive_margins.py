@@ -34,11 +34,11 @@ class DriveMargin(Result):
 
     @property
     def margin(self) -> float:
-        """The limit over the load: 1 or more suffices."""
+        """The drive's limit divided by its load: 1 or more suffices."""
         return self.most / self.needed if self.needed > 0.0 else math.inf
 
     def overload_text(self, where: str) -> str:
-        """Return a line that says by which load, and where, the limit is exceeded."""
+        """Return a line of text: the leg, the load that exceeds a limit, `where`, and the limit."""
         needed = f"{self.needed:.4g} {self.unit}"
         if self.quantity == "rms_force":
             return (
@@ -59,10 +59,10 @@ class DriveMargin(Result):
 def drive_margins(
     robot: Manipulator, needed: Mapping[str, PerJoint], forces: Array, speeds: Array
 ) -> tuple[DriveMargin, ...]:
-    """Return the margins of the limits in the file, leg by leg.
+    """Return the margins (limit over load) of all drive limits in the machine's file.
 
-    `needed` has what a cycle takes of each joint (n,), by quantity: of some or of all. `forces` and
-    `speeds` (..., n) are those of its moments.
+    `needed` has the loads of a cycle at each joint (n,), by quantity; quantities may be missing.
+    `forces` and `speeds` (..., n) are those at the samples of the cycle.
     """
     margins = []
     for i, leg in enumerate(robot.legs):

@@ -58,11 +58,11 @@ class DutyCycle:
 
     @cached_property
     def course(self) -> Course:
-        """The tool's paths of the motions, relative to their middle."""
+        """The tool's paths of the cycle's motions, relative to their common middle."""
         return Course.from_motions(self.robot, self.motions)
 
     def thin_out(self) -> DutyCycle:
-        """Return the cycle resampled to the number of samples that each place evaluates."""
+        """Return the cycle with its motions resampled to at most `_SAMPLES` samples each."""
         motions = []
         for motion in self.motions:
             time = np.linspace(motion.time[0], motion.time[-1], _SAMPLES)
@@ -72,7 +72,7 @@ class DutyCycle:
         return replace(self, motions=tuple(motions))
 
     def loads_at(self, places: Sequence[CyclePlace] = ()) -> Sizing:
-        """Return the loads at places, or of the original motions without places."""
+        """Return the drive loads of the cycle at places; without places, where its motions are."""
         curves: list[Curve] = [(m.pose, m.velocity, m.acceleration) for m in self.motions]
         if places:
             count = sum(2.0 * curve[0].size for curve in curves)
@@ -85,7 +85,7 @@ class DutyCycle:
         return self._loads_of_curves(curves, places)
 
     def _loads_of_curves(self, curves: Sequence[Curve], places: Sequence[CyclePlace]) -> Sizing:
-        """Return the loads over motions (T, m), or (T, W, m) of places."""
+        """Return the drive loads over motions (T, m), or over (T, W, m) at W places."""
         clock, inertias = float(self.motions[0].time[0]), []
         blocks: list[tuple[Array, ...]] = []
         for motion, curve, pause in zip(self.motions, curves, self.rests, strict=True):
@@ -129,7 +129,7 @@ class DutyCycle:
         return tuple(leg.drive or Drive() for leg in self.robot.legs)
 
     def _loads(self, pose: Array, velocity: Array, acceleration: Array) -> Curve:
-        """Return forces of the drives, rates and accelerations of the joints (..., n)."""
+        """Return drive forces, joint rates and joint accelerations (..., n) at platform states."""
         state = pose, velocity, acceleration
         return (
             drive_forces(self.robot, *state, self.wrench, smooth=True),
@@ -138,20 +138,20 @@ class DutyCycle:
         )
 
     def _inertia(self, poses: Array) -> tuple[Array, Array]:
-        """Return least and greatest inertia at each joint (n,), the other joints fixed."""
+        """Return least and greatest reflected inertia (n,) at the joints, kg or kg m^2."""
         rows, mass = jacobian(self.robot, poses), mass_matrix(self.robot, poses)
         joint_inertias = moved_inertias(rows, mass).reshape(-1, self.robot.joint_count)
         return joint_inertias.min(axis=0), joint_inertias.max(axis=0)
 
     def _assumed_friction(self, forces: Array) -> Array:
-        """Return dry friction (n,) of the drives that have none in the file."""
+        """Return the assumed dry friction (n,), N or N m, of drives without any in the file."""
         most = np.abs(forces).reshape(-1, self.robot.joint_count).max(axis=0)
         frictionless = [not (d.coulomb or d.viscous or d.stribeck) for d in self.drives]
         return np.asarray(self.friction * most * frictionless)
 
 
 def _sample_curve(time: Array, curve: Curve, middles: Array) -> Curve:
-    """Return a curve (T, ..., m) interpolated at other times."""
+    """Return a curve (T, ..., m) with two derivatives interpolated at other times."""
     flat = Motion(time, *(part.reshape(len(time), -1) for part in curve))
     shape = len(middles), *curve[0].shape[1:]
     pose, velocity, acceleration = (part.reshape(shape) for part in flat.at(middles))
@@ -166,6 +166,6 @@ def _interleave(samples: Array, middles: Array) -> Array:
 
 
 def _join_parts(parts: Sequence[Array]) -> Array:
-    """Return parts concatenated, with an interval of zero length between two."""
+    """Return arrays (T, ...) concatenated in time; the last row of each but one is repeated."""
     rows = [row for part in parts for row in (part, part[-1:])]
     return np.concatenate(rows[:-1])

@@ -23,15 +23,15 @@ class Span(NamedTuple):
     greatest: float
 
     def __bool__(self) -> bool:
-        """Say whether there is any."""
+        """Return whether the span of gear ratios is not empty."""
         return self.least <= self.greatest
 
     def __contains__(self, ratio: object) -> bool:
-        """Say whether a ratio is one of them."""
+        """Return whether a gear ratio lies in the span."""
         return isinstance(ratio, float) and self.least <= ratio <= self.greatest
 
     def intersect(self, other: Span) -> Span:
-        """Return the intersection of both spans."""
+        """Return the intersection of two spans of gear ratios."""
         return Span(max(self.least, other.least), min(self.greatest, other.greatest))
 
 
@@ -43,9 +43,9 @@ NONE = Span(math.inf, 0.0)
 
 
 def torques(sizing: Sizing, leg: int, ratio: float, rotor_inertia: float) -> tuple[float, float]:
-    """Return root mean square and peak of a motor's torque over the cycle, N m.
+    """Return root mean square and peak torque, N m, of a motor over the cycle at a gear ratio.
 
-    N m, at a ratio in rad/m or rad/rad, of a motor with this inertia of its rotor, kg m^2.
+    The ratio is in rad/m or rad/rad, `rotor_inertia` in kg m^2.
     """
     rms = math.sqrt(float(mean_squares(sizing, leg, ratio, rotor_inertia).max()))
     loads, accelerations = sizing.loads[..., leg - 1], sizing.accelerations[..., leg - 1]
@@ -54,13 +54,13 @@ def torques(sizing: Sizing, leg: int, ratio: float, rotor_inertia: float) -> tup
 
 
 def speed_span(sizing: Sizing, leg: int, max_speed: float) -> Span:
-    """Return the ratios at which a motor is no faster than `max_speed`, rad/s."""
+    """Return the span of gear ratios at which a motor is no faster than `max_speed`, rad/s."""
     fastest = float(sizing.peak_speeds[leg - 1])
     return Span(0.0, max_speed / fastest if fastest else math.inf)
 
 
 def rated_span(sizing: Sizing, leg: int, rotor_inertia: float, rated_torque: float) -> Span:
-    """Return the ratios at which the root mean square torque is no more than the rated, N m."""
+    """Return the span of gear ratios at which the rms torque is at most `rated_torque`, N m."""
     force, mixed, acceleration = sizing.squares(leg)
     # C u^2 - B u + A <= 0 with u = i^2.
     a, b, c = force, rated_torque**2 - 2.0 * rotor_inertia * mixed, rotor_inertia**2 * acceleration
@@ -74,9 +74,10 @@ def rated_span(sizing: Sizing, leg: int, rotor_inertia: float, rated_torque: flo
 
 
 def peak_span(sizing: Sizing, leg: int, rotor_inertia: float, peak_torque: float) -> Span:
-    """Return the ratios at which the torque is never more than a motor's greatest, N m.
+    """Return the span of gear ratios at which the torque never exceeds `peak_torque`, N m.
 
-    At each sample |f / i + J i q''| <= T holds between the roots of two parabolas, an interval.
+    At each sample |f / i + J i q''| <= T holds for ratios i between the roots of two parabolas,
+    which is an interval.
     """
     loads, accelerations = sizing.loads[..., leg - 1], sizing.accelerations[..., leg - 1]
     rotor_loads = rotor_inertia * accelerations

@@ -50,12 +50,12 @@ class MotorFit(Result):
 
     @property
     def fits(self) -> bool:
-        """Whether the motor is feasible at some ratio."""
+        """Whether some gear ratio keeps all limits of the motor."""
         return bool(self.span)
 
     @property
     def margin(self) -> float:
-        """The least of the three margins."""
+        """The least margin (limit over load) of rated torque, peak torque and speed."""
         return min(self._margins.values())
 
     @property
@@ -66,7 +66,7 @@ class MotorFit(Result):
 
     @property
     def _margins(self) -> dict[str, float]:
-        """The margins of the motor, limit over load, by the limit's name."""
+        """The motor's margins, limit over load, by the name of the limit."""
         return {
             "rated torque": self.rated_margin,
             "peak torque": self.peak_margin,
@@ -103,19 +103,18 @@ class CommonFit(Result):
 
     @property
     def worst(self) -> MotorFit:
-        """The leg where its least margin is smallest."""
+        """The fit at the leg where the motor's least margin is smallest."""
         return min(self.fits, key=lambda fit: fit.margin)
 
 
 def choose(sizing: Sizing, motors: Sequence[Motor], *, margin: float = 1.0) -> tuple[MotorFit, ...]:
     """Return how each motor suits each joint: feasible motors first, by size, then others.
 
-    A motor serves at a ratio if, times the margin, its root mean square torque over the cycle, the
-    rest included, is no more than its rated torque, its greatest torque no more than its peak
-    torque, and its greatest speed no more than its own. All ratios that serve are found, in closed
-    form; what the transmission loses is the joint's friction in the machine's file. Of two motors
-    the smaller has less rated torque times speed; those that do not serve follow, by how near they
-    come.
+    A motor is feasible at a ratio if, times the margin, its root mean square torque over the cycle
+    (rests included) is at most its rated torque, its greatest torque at most its peak torque, and
+    its greatest speed at most its maximum speed. All feasible ratios are computed in closed form;
+    losses of the transmission count as the joint's friction in the machine's file. Motors are
+    ordered by rated torque times speed; infeasible motors follow, by their margin.
 
     Parameters
     ----------
@@ -153,9 +152,10 @@ def choose(sizing: Sizing, motors: Sequence[Motor], *, margin: float = 1.0) -> t
 def rank_motors(
     sizing: Sizing, groups: Sequence[tuple[int, ...]], motors: Sequence[Motor], margin: float
 ) -> list[CommonFit]:
-    """Return how each motor suits each group of legs, with a common ratio per group.
+    """Return how each motor suits each group of legs (one gear ratio per group), best first.
 
-    What serves comes first in a group, the smallest motor before others; then what comes nearest.
+    In each group feasible motors come first, the smallest before others; then the infeasible ones,
+    by margin.
     """
     expect(1.0 <= margin < math.inf, "margin", margin, "a number of 1 or more")
     fits: list[CommonFit] = []
@@ -171,7 +171,7 @@ def _order(fit: CommonFit) -> tuple[bool, float]:
 
 
 def _fit(sizing: Sizing, legs: tuple[int, ...], motor: Motor, margin: float) -> CommonFit:
-    """Return a motor's fit to legs with a common ratio, within the ratios feasible at each leg."""
+    """Return a motor's fit to a group of legs with a common gear ratio, feasible if possible."""
     span = fast = Span(0.0, math.inf)
     for leg in legs:
         fast = fast.intersect(speed_span(sizing, leg, motor.max_speed / margin))
@@ -185,7 +185,7 @@ def _fit(sizing: Sizing, legs: tuple[int, ...], motor: Motor, margin: float) -> 
 
 
 def serving_span(sizing: Sizing, leg: int, motor: Motor, margin: float) -> Span:
-    """Return the ratios at which a motor keeps its speed and torque limits."""
+    """Return the span of gear ratios at which a motor keeps its speed and torque limits."""
     rotor = motor.rotor_inertia
     span = speed_span(sizing, leg, motor.max_speed / margin)
     span = span.intersect(rated_span(sizing, leg, rotor, motor.rated_torque / margin))
@@ -193,7 +193,7 @@ def serving_span(sizing: Sizing, leg: int, motor: Motor, margin: float) -> Span:
 
 
 def _best_ratio(sizing: Sizing, legs: tuple[int, ...], rotor_inertia: float) -> float:
-    """Return the ratio that minimises the largest root mean square torque of all legs."""
+    """Return the gear ratio that minimises the largest rms torque over several legs."""
     optimal_ratios = [best_ratio(sizing, leg, rotor_inertia) for leg in legs]
     moving = [ratio for ratio in optimal_ratios if math.isfinite(ratio)]
     if not moving:
@@ -205,7 +205,7 @@ def _best_ratio(sizing: Sizing, legs: tuple[int, ...], rotor_inertia: float) -> 
         return most
 
     def largest(log: float) -> float:
-        """Return the largest mean square torque of all legs, (N m)^2, at a ratio's logarithm."""
+        """Return the largest mean square torque over the legs, (N m)^2, at a ratio's logarithm."""
         ratio = math.exp(log)
         return max(float(mean_squares(sizing, leg, ratio, rotor_inertia).max()) for leg in legs)
 
@@ -218,7 +218,7 @@ def _best_ratio(sizing: Sizing, legs: tuple[int, ...], rotor_inertia: float) -> 
 
 
 def fit_at(sizing: Sizing, leg: int, motor: Motor, span: Span, ratio: float) -> MotorFit:
-    """Return a motor's margins at a ratio."""
+    """Return a motor's margins (limit over load) at a leg for a gear ratio."""
     rotor = motor.rotor_inertia
     rms, peak = torques(sizing, leg, ratio, rotor)
     load_inertia = float(sizing.load_inertia[1, leg - 1])
@@ -235,5 +235,5 @@ def fit_at(sizing: Sizing, leg: int, motor: Motor, span: Span, ratio: float) -> 
 
 
 def _margin(limit: float, needed: float) -> float:
-    """Return limit / needed; infinity where nothing is needed."""
+    """Return limit / needed; infinity if `needed` is zero."""
     return limit / needed if needed > 0.0 else np.inf

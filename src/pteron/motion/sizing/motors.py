@@ -78,7 +78,7 @@ class Motor:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Warnings of unlikely numbers, most often in a wrong unit, one line each."""
+        """Warnings about unlikely numbers of the motor, often of a wrong unit, one line each."""
         texts = []
         if self.max_speed >= _FASTEST:
             texts.append(
@@ -154,14 +154,14 @@ _Rows = list[tuple[str, dict[str, Any]]]
 
 
 def _read_toml_motors(path: str | Path) -> _Rows:
-    """Return the motors of a TOML file as rows: the file's name and the motor's values."""
+    """Return the motors of a TOML file as rows: (file name, values of the motor by key)."""
     document = read_toml(path, DataError, "no such file")
     motor_file = to_model(_MotorsFile, document, str(path), DataError)
     return [(str(path), motor.model_dump(exclude={"price"})) for motor in motor_file.motors]
 
 
 def _read_table_motors(path: str | Path) -> _Rows:
-    """Return the motors of a table as rows: the place in the file and the motor's values."""
+    """Return the motors of a CSV or Parquet file as rows: (place in the file, values by key)."""
     table = read_table(path)
     numbers = table.numbers(_NUMBERS)
     if "name" in table.columns:

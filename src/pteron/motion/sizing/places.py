@@ -59,7 +59,7 @@ class CyclePlace(Result):
     turn: float = 0.0
 
     def __str__(self) -> str:
-        """Return it in words."""
+        """Return the place as text: the pose of its middle and its turn in degrees."""
         turned = f" turned {np.degrees(self.turn) % 360:.4g} deg" if self.turn else ""
         return f"about {pose_text(np.round(self.pose, 4))}{turned}"
 
@@ -91,7 +91,7 @@ class Course:
 
     @classmethod
     def from_motions(cls, robot: Manipulator, motions: Sequence[Motion]) -> Course:
-        """Return the course of motions."""
+        """Return the tool's course in `motions`, relative to the middle of the box around it."""
         platform = robot.platform
         curves = [tool_motion(platform, m.pose, m.velocity, m.acceleration) for m in motions]
         ends = Box.around(np.vstack([curve[0] for curve in curves])).box
@@ -101,7 +101,7 @@ class Course:
         return cls(robot, middle, relative, axis, _yaw(robot, axis))
 
     def curves_at(self, places: Sequence[CyclePlace]) -> Iterator[Curve]:
-        """Yield each motion's poses and their derivatives (T, W, m) at places."""
+        """Yield each motion's poses and two derivatives (T, W, m), moved to W places."""
         platform = self.robot.platform
         lengths = ~platform.angular
         poses = np.array([place.pose for place in places])
@@ -115,7 +115,7 @@ class Course:
             yield pose_motion(platform, parts[0] + poses, parts[1], parts[2])
 
     def rotation(self, turn: float) -> Array:
-        """Return the rotation of the pose's lengths (l, l)."""
+        """Return the matrix (l, l) that rotates the pose's length coordinates by `turn`, rad."""
         directions = self.robot.platform.directions
         if self.axis is None:
             return np.eye(len(directions))
@@ -123,7 +123,7 @@ class Course:
         return np.asarray(directions @ matrix @ directions.T)
 
     def extent(self, turn: float) -> Array:
-        """Return the least and the greatest coordinates (2, m) of the path from its middle."""
+        """Return least and greatest coordinates (2, m) of the turned course about its middle."""
         poses = np.vstack([curve[0] for curve in self.curves])
         lengths = ~self.robot.platform.angular
         poses[:, lengths] = poses[:, lengths] @ self.rotation(turn).T
@@ -135,11 +135,11 @@ Fits = Callable[[Array], bool]
 
 
 def region_fits(course: Course, region: Region | None) -> tuple[Array, Fits]:
-    """Return the box (2, m) of a region, and the function that says whether it holds poses.
+    """Return a region's box (2, m), and a function that tests whether poses lie in the region.
 
-    Without a region it is the workspace: poses that keep `least_margin` to singularities and the
-    joints within their limits, about the home pose's angles: its box has room for those that the
-    course goes through. Of a platform that moves along fewer than two directions they vary, too.
+    Without a region the workspace is used: poses with singularity margins of at least
+    `least_margin` and joints within their limits, at the home pose's angles, in a box wide enough
+    for the angles of the course. For a platform with fewer than two lengths the angles vary, too.
     """
     robot = course.robot
     if region is not None:
@@ -157,11 +157,12 @@ def region_fits(course: Course, region: Region | None) -> tuple[Array, Fits]:
 
 
 def places_in(course: Course, box: Array, fits: Fits) -> tuple[CyclePlace, ...]:
-    """Return places at which all of a course lies in a region.
+    """Return places in a region's box at which the complete course lies in the region.
 
-    They are on a grid that goes to the ends of the region's box, for turns by 30 degrees; the
-    platform is turned as the path is, too, unless the box has a range of that. Where the region
-    leaves out some of them, others are spread over all of the box.
+    Places are on a grid that includes the ends of the region's box, with turns in steps of 30
+    degrees; the platform is turned with the path, and also not turned, unless the box has a range
+    of that angle. If the course leaves the region at some of them, further places are spread over
+    the box.
     """
     turns = np.linspace(0.0, 2.0 * np.pi, TURNS, endpoint=False) if course.axis is not None else [0]
     candidates = []
@@ -182,9 +183,9 @@ def places_in(course: Course, box: Array, fits: Fits) -> tuple[CyclePlace, ...]:
 
 
 def _quasirandom_places(course: Course, box: Array) -> Iterator[CyclePlace]:
-    """Yield quasi-random places in a box and all turns; every other one turns the platform.
+    """Yield quasi-random places of a course in a box (2, m), with turns in all directions.
 
-    They are the quasirandom sequence of M. Roberts, "The unreasonable effectiveness of quasirandom
+    They are a quasirandom sequence of M. Roberts, "The unreasonable effectiveness of quasirandom
     sequences" (2018): multiples of powers of a generalised golden ratio.
     """
     count = len(box[0]) + 1
@@ -202,12 +203,12 @@ def _quasirandom_places(course: Course, box: Array) -> Iterator[CyclePlace]:
 
 
 def stays(course: Course, place: CyclePlace, fits: Fits) -> bool:
-    """Return whether all of a course lies in a region at a place."""
+    """Return whether the complete course of a cycle lies in a region when moved to a place."""
     return all(fits(poses[:, 0]) for poses, *_ in course.curves_at([place]))
 
 
 def with_platform(place: CyclePlace, yaw: Array, turn: float) -> CyclePlace:
-    """Return a place with the platform turned by an angle, wrapped to half a turn, along `yaw`."""
+    """Return a cycle's place with the platform turned further by `turn`, rad, along `yaw` (m,)."""
     pose = np.array(place.pose) + yaw * np.angle(np.exp(1j * turn))
     return CyclePlace(tuple(map(float, pose)), place.turn)
 
@@ -215,10 +216,10 @@ def with_platform(place: CyclePlace, yaw: Array, turn: float) -> CyclePlace:
 def neighbours(
     place: CyclePlace, steps: Array, turn: float, yaw: Array, *, oblique: bool
 ) -> Iterator[CyclePlace]:
-    """Yield a place's neighbours: a step (m,) along each coordinate, and a turn, to both sides.
+    """Yield neighbours of a cycle's place at +- `steps` (m,) in coordinates and +- `turn`, rad.
 
-    A turn is that of the path alone, and that of the platform, too. In a region whose boundary is
-    oblique come steps along all coordinates and turns at once.
+    A turn is one of the path alone, and one of path and platform. For regions with an oblique
+    boundary there are steps in all coordinates and turns at once, too.
     """
     for side in (1.0, -1.0):
         if turn:
@@ -240,7 +241,7 @@ def neighbours(
 
 
 def _axis(robot: Manipulator) -> Array | None:
-    """Return the axis a cycle may be turned about: the vertical, or the normal of a level plane."""
+    """Return the unit axis (3,) a cycle may be turned about, vertical or plane normal, or None."""
     platform = robot.platform
     if len(platform.lengths) < 2:
         return None
@@ -251,7 +252,7 @@ def _axis(robot: Manipulator) -> Array | None:
 
 
 def _yaw(robot: Manipulator, axis: Array | None) -> Array:
-    """Return the change (m,) of the pose for a platform rotation of 1 rad about an axis."""
+    """Return the pose change (m,) for a platform rotation of 1 rad about an axis."""
     platform, rates = robot.platform, np.zeros(robot.freedom)
     last = len(rates) - 1
     about = platform.spin_axis
@@ -271,7 +272,7 @@ def _is_in_box(region: Region, poses: Array) -> NDArray[np.bool_]:
 
 
 def expect_places_of(robot: Manipulator, places: Sequence[CyclePlace]) -> tuple[CyclePlace, ...]:
-    """Return places after a check: at least one, each with the machine's coordinates."""
+    """Return the places; raise if there are none, or a pose has a wrong number of coordinates."""
     expect(places, "places", "none", "at least one")
     for i, place in enumerate(places):
         if len(place.pose) != robot.freedom:
@@ -283,7 +284,7 @@ def expect_places_of(robot: Manipulator, places: Sequence[CyclePlace]) -> tuple[
 
 
 def motion_at_place(robot: RobotLike, motion: Motion, place: CyclePlace) -> Motion:
-    """Return a motion at another place, with its shape and duration.
+    """Return a motion moved to another place, its shape and duration unchanged.
 
     Parameters
     ----------

@@ -55,7 +55,7 @@ def size(
     places: Region | Sequence[CyclePlace] | Literal["workspace"] | None = None,
     friction: float = 0.0,
 ) -> Sizing:
-    """Return the load of a cycle on each drive: its forces and speeds, and their integrals.
+    """Return the loads of a cycle on each drive of a machine: forces, speeds, their integrals.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ def size(
 def _size_at_places(
     cycle: DutyCycle, places: Region | Sequence[CyclePlace] | Literal["workspace"]
 ) -> Sizing:
-    """Return the loads at places, or at those of a region, refined about the worst."""
+    """Return the drive loads at given places, or in a region at a grid refined about the worst."""
     cycle = cycle.thin_out()
     if not (isinstance(places, Region) or places == "workspace"):
         return cycle.loads_at(expect_places_of(cycle.robot, places))
@@ -172,7 +172,7 @@ def _size_at_places(
 
 
 def _check(robot: Manipulator, motion: Motion, dwell: float) -> None:
-    """Refuse a motion of unfit shape, and a rest that is invalid or after a moving end."""
+    """Raise for a motion of wrong shape, an invalid rest, or a rest after an end in motion."""
     expected = (len(motion.time), robot.freedom)
     for name in ("pose", "velocity", "acceleration"):
         if getattr(motion, name).shape != expected:

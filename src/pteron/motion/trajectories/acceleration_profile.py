@@ -22,7 +22,7 @@ class Profile(NamedTuple):
 
     @classmethod
     def from_squares(cls, grid: Array, squares: Array) -> Profile:
-        """Return the profile with the squared speeds s'^2 (K,) on a grid of s, at rest outside."""
+        """Return the profile s(t) of squared speeds `squares` (K,) at the values `grid` of s."""
         rate = np.sqrt(np.maximum(squares, 0.0))
         spans = 2.0 * np.diff(grid) / (rate[1:] + rate[:-1])
         time = np.concatenate([[0.0], np.cumsum(spans)])
@@ -34,9 +34,9 @@ class Profile(NamedTuple):
         return float(self.time[-1])
 
     def smooth(self, h: float) -> Callable[[Array], tuple[Array, Array, Array]]:
-        """Return s averaged over h before and after, by a triangle's weights, from rest to rest.
+        """Return a function of tau (0 to 1): s averaged over +-h by a triangular weight.
 
-        Its acceleration is continuous, and its jerk too but for steps.
+        The acceleration is continuous; the jerk is continuous except for steps.
         """
         stretched_duration = self.duration + 2.0 * h
 
@@ -51,7 +51,7 @@ class Profile(NamedTuple):
         return progress
 
     def _state(self, t: Array) -> tuple[Array, Array]:
-        """Return s and s' (T,) at times (T,)."""
+        """Return the path parameter s and its rate s' (T,) at times (T,)."""
         clipped = np.clip(t, 0.0, self.duration)
         k = np.clip(np.searchsorted(self.time, clipped, side="right") - 1, 0, len(self.gain) - 1)
         d = clipped - self.time[k]
@@ -62,10 +62,10 @@ class Profile(NamedTuple):
         )
 
     def _moments(self, t: Array, h: float) -> tuple[Array, Array, Array]:
-        """Return the parts of s(t + h) and its integrals due to s'' from t to t + h, h of any sign.
+        """Return integrals (T,) of s'' from t to t + h, weighted by (h - r)^k / k!, k = 1, 2, 3.
 
-        The integrals of (h - r)^k / k! s''(t + r) over r, k = 1, 2 and 3: small where h is, so that
-        averages are exact to rounding however little they take in.
+        The integrals of (h - r)^k / k! s''(t + r) over r, k = 1, 2, 3, vanish with h, so that
+        averages over any h are exact to rounding.
         """
         edges = np.concatenate([[-np.inf], self.time, [np.inf]])
         gain = np.concatenate([[0.0], self.gain, [0.0]])

@@ -32,7 +32,7 @@ _MILLIMETRES = 20.0
 
 
 def check_path(robot: RobotLike, path: Path) -> None:
-    """Refuse a path that the machine cannot follow.
+    """Raise if the machine cannot follow a path, at the first failure along it.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def check_path(robot: RobotLike, path: Path) -> None:
 def check_motion(
     robot: RobotLike, motion: Motion, place: Callable[[float], str] | None = None
 ) -> None:
-    """Refuse a motion that the machine cannot do, like `check_path`; the error names the time.
+    """Raise if the machine cannot do a motion; the error names the time of the first failure.
 
     Parameters
     ----------
@@ -97,9 +97,9 @@ def check_motion(
 def check_curve(
     robot: Manipulator, poses: Callable[[Array], Array], marks: Array, place: Callable[[float], str]
 ) -> None:
-    """Refuse a curve of poses (K, m) over a parameter (K,), by its first failure.
+    """Raise the error of the first pose of a curve that is out of reach, limits, or singular.
 
-    `marks` are the parameters checked first, and `place` says in words where a parameter is.
+    `marks` are the parameters checked first, and `place` returns as text where a parameter is.
     """
     expect_regular(robot)
     curve = _Curve(robot, poses, place)
@@ -124,11 +124,11 @@ class _Curve(NamedTuple):
     place: Callable[[float], str]
 
     def value(self, what: str, at: Array, index: int = 0) -> Array:
-        """Return an output of a function of the pose at parameters (K,)."""
+        """Return output `index` of the kernel `what` at the curve's parameters (K,): (K, ...)."""
         return np.asarray(numeric(self.robot, what)(self.poses(at))[index])
 
     def place_text(self, at: float) -> str:
-        """Return the text of a parameter's place on the curve and of the pose there."""
+        """Return as text where a parameter lies on the curve, and the pose there."""
         return f"{self.place(at)}, pose {pose_text(self.poses(np.array([at]))[0])}"
 
 
@@ -140,10 +140,10 @@ class _Failure(NamedTuple):
 
 
 def _reach_failure(curve: _Curve, marks: Array) -> _Failure | None:
-    """Return the first place where a leg does not reach or is singular (type I), else None."""
+    """Return the first failure where a leg is out of reach or singular (type I), or None."""
 
     def squares(at: Array) -> Array:
-        """Return squared type-I measures at places of the curve; -1 where a leg does not reach."""
+        """Return squared type-I measures (K, n) at curve parameters (K,); -1 out of reach."""
         return np.nan_to_num(curve.value("squared_type_i", at), nan=-1.0)
 
     first = first_below(squares, marks, TYPE_I**2)
@@ -179,10 +179,10 @@ def _reach_failure(curve: _Curve, marks: Array) -> _Failure | None:
 
 
 def _joint_failure(curve: _Curve, marks: Array) -> _Failure | None:
-    """Return the first place where an actuated joint passes its limits, else None."""
+    """Return the first failure where an actuated joint passes its limits, or None."""
 
     def margin(at: Array) -> Array:
-        """Return the distances of actuated joints to their limits at places, m or rad."""
+        """Return actuated joints' distances (K, n) to their limits at parameters (K,)."""
         return joint_distances(curve.robot, curve.value("joint_coordinates", at))
 
     first = first_below(margin, marks, -ROUNDING)
@@ -200,10 +200,10 @@ def _joint_failure(curve: _Curve, marks: Array) -> _Failure | None:
 
 
 def _passive_failure(curve: _Curve, marks: Array) -> _Failure | None:
-    """Return the first place where a passive joint passes its limits, else None."""
+    """Return the first failure where a passive joint passes its limits, or None."""
 
     def margin(at: Array) -> Array:
-        """Return the distances of passive joints to their limits at places of the curve."""
+        """Return distances (K, n) of passive joints to their limits at curve parameters (K,)."""
         return curve.value("passive_room", at, 1)
 
     first = first_below(margin, marks, -ROUNDING)
@@ -224,13 +224,13 @@ def _passive_failure(curve: _Curve, marks: Array) -> _Failure | None:
 
 
 def _limit_failure(curve: _Curve, at: float, leg: int, fault: str, metres: float) -> _Failure:
-    """Return the failure of a leg's limit at a place on a curve, passed by a length, m."""
+    """Return the failure of a joint limit at parameter `at`, passed by `metres`."""
     text = f"{curve.place_text(at)}: {fault}; take another path"
     return _Failure(at, UnreachablePose(text, leg=leg, shortfall=metres, index=()))
 
 
 def _type_ii_failure(curve: _Curve, marks: Array) -> _Failure | None:
-    """Return the first place where the type-II measure changes its sign, else None."""
+    """Return the first failure where the type-II measure changes its sign, or None."""
     if closure_of(curve.robot).vanishes() is False and not curve.robot.platform.angles:
         return None
     # Its sign is that of the beginning, as far as the actuators hold the platform.

@@ -34,12 +34,12 @@ the corners and saves time."""
 
 
 def quintic(tau: Array, begin: float, end: float) -> tuple[Array, Array, Array]:
-    """Return a move from 0 to 1 within [begin, end], and its first two derivatives.
+    """Return a smooth step s(tau) from 0 to 1 within [begin, end], and its first two derivatives.
 
     s = 10 t^3 - 15 t^4 + 6 t^5 with t = (tau - begin) / (end - begin): velocity and acceleration
-    are zero at both ends, so that it joins rest without a jump of either.
+    are zero at both ends, so that the motion is continuous with rest.
 
-    Derivatives are by the unit of `tau`, `begin` and `end`.
+    Derivatives are per unit of `tau`.
 
     Examples
     --------
@@ -85,9 +85,9 @@ class Cycle:
     scale: float
 
     def path(self, tau: Array) -> tuple[Array, Array, Array]:
-        """Return the tool's displacement from the middle (T, k), and two derivatives by tau.
+        """Return the tool's displacement from the cycle's middle (T, k), m, and two derivatives.
 
-        k is the number of the pose's lengths, tau (T,) in [0, 1].
+        k is the number of the pose's lengths; tau (T,) is in [0, 1].
         """
         move, climb = (
             self.scale * size * (self.platform.directions @ way)
@@ -100,9 +100,10 @@ class Cycle:
         return place, velocity, acceleration
 
     def at(self, tau: Array) -> tuple[Array, Array, Array]:
-        """Return poses (T, m) at times `tau` (T,) in [0, 1], and two derivatives by tau.
+        """Return poses (T, m) of the cycle at `tau` (T,) in [0, 1], and two derivatives by tau.
 
-        Of a platform that tilts it is P that goes the path, and the angles turn with both moves.
+        If the platform tilts, P instead of the tool moves on the path, and the angles change with
+        both moves.
         """
         place, velocity, acceleration = self.path(tau)
         angular = self.platform.angular
@@ -139,19 +140,20 @@ class Cycle:
 
     @property
     def _turns_across(self) -> NDArray[np.bool_]:
-        """Whether each angle (a,) rotates on the way across: the last angle does."""
+        """Whether each platform angle (a,) rotates on the way across; only the last one does."""
         count = len(self.platform.angles)
         return np.asarray(np.arange(count) == count - 1)
 
     @property
     def _turns_up(self) -> NDArray[np.bool_]:
-        """Whether each angle (a,) rises and falls: all but the last, for fewer than two lengths."""
+        """Whether each platform angle (a,) rises and falls: all but the last, for < 2 lengths."""
         return np.asarray(~self._turns_across & (len(self.platform.lengths) < 2))
 
     def acceleration(self, tau: Array, radius: float) -> Array:
-        """Return the tool's acceleration (T, k) by tau; angular accelerations follow if it tilts.
+        """Return second derivatives by tau (T, k) of tool position, and of angles by `radius`.
 
-        Of a platform that tilts that of a point at a radius from P, m, as it turns, comes behind.
+        If the platform tilts, the angular accelerations of a point at `radius` from P, m, follow as
+        further columns.
         """
         if not self.platform.tilts:
             return self.path(tau)[2]
@@ -164,7 +166,7 @@ _Shares = tuple[Array, Array, Array]
 
 
 def _shares(tau: Array) -> tuple[_Shares, _Shares]:
-    """Return the progress of the moves across and up, from -1/2 to 1/2, with two derivatives.
+    """Return the progress of the moves across and up (-1/2 to 1/2), with two derivatives each.
 
     The first half of the time is the path out, the second the same path back.
     """
@@ -180,13 +182,13 @@ def _shares(tau: Array) -> tuple[_Shares, _Shares]:
 def moves(
     robot: Manipulator, direction: ArrayLike | None, count: int
 ) -> tuple[tuple[Array, Array], ...]:
-    """Return pairs of unit vectors across and up: for a direction, or `count` candidates.
+    """Return (across, up) unit vectors (3,) of a cycle: for one direction, or `count` candidates.
 
-    Up is against gravity, or the platform's axis where there is none, and of a tripod; of a planar
-    machine, against what gravity does in its plane or, where that is nothing, the axis times
-    across. Across is horizontal, and in the plane: the given direction as far as it is so, or
-    `count` directions that go round from the platform's x axis (or y, where x is nearer to the
-    vertical); two, to and fro, in an upright plane.
+    Up is opposite to gravity; without gravity, and for a tripod, it is the platform's axis. For a
+    planar machine it is opposite to gravity's component in the plane or, if that is zero, the axis
+    times across. Across is horizontal and in the plane: the horizontal part of the given direction,
+    or `count` directions all round from the platform's x axis (or y, if x is nearer to the
+    vertical); in an upright plane these are two, to and fro.
     """
     platform, gravity = robot.platform, np.array(robot.gravity)
     axis, planar = np.array(platform.axis), platform.plane_normal is not None

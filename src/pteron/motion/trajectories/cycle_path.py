@@ -39,20 +39,20 @@ class CyclePath:
         self.rests = (0.0, self.length)
 
     def _curve(self, tau: Array) -> Curve:
-        """Return the platform's poses and two derivatives at parameters of the cycle."""
+        """Return the platform's poses (T, m) and two derivatives at cycle parameters tau (T,)."""
         platform = self._cycle.platform
         return tool_motion(platform, *self._cycle.at(tau))
 
     def _weighted_pose(self, tau: Array) -> Array:
-        """Return poses (..., m) with angles weighted to lengths, m."""
+        """Return poses (T, m) at cycle parameters tau (T,), with angles weighted to metres."""
         return self._curve(tau)[0] * self._weights
 
     def _speed(self, tau: Array) -> Array:
-        """Return the arc length's derivative by the parameter of the cycle (...,)."""
+        """Return d s / d tau (T,), the arc length per cycle parameter, m, at tau (T,)."""
         return np.asarray(np.linalg.norm(self._curve(tau)[1] * self._weights, axis=-1))
 
     def at(self, s: Array) -> Curve:
-        """Return poses (T, m) at s (T,), and two derivatives by s."""
+        """Return poses (T, m) at arc lengths s (T,), m, and two derivatives by s."""
         s = np.clip(np.asarray(s, dtype=float), 0.0, self.length)
         clipped = np.clip(s, self._s[0], self._s[-1])
         tau = self._times(clipped)
@@ -66,7 +66,7 @@ class CyclePath:
         return pose_motion(self._cycle.platform, place + excess * first, first, second)
 
     def _times(self, s: Array) -> Array:
-        """Return tau (T,) at s (T,): Newton's steps on the length between nodes, by quadrature."""
+        """Return the cycle parameters tau (T,) at arc lengths s (T,), m, by Newton's method."""
         k = np.clip(np.searchsorted(self._s, s, side="right") - 1, 0, len(self._tau) - 2)
         low, high = self._tau[k], self._tau[k + 1]
         nodes, shares = np.polynomial.legendre.leggauss(5)
@@ -79,5 +79,5 @@ class CyclePath:
         return tau
 
     def place(self, s: float) -> str:
-        """Return the text of a place on the path, by its s."""
+        """Return as text where the arc length s, m, lies on the path."""
         return f"{s:.4g} m along its path of {self.length:.4g} m"

@@ -65,9 +65,9 @@ class Demand(NamedTuple):
     """Derivatives of the tool's place (K, k) by p."""
 
     def drive_forces(self, rate: Array, gain: Array) -> Array:
-        """Return forces (2, K, n) at p' (K,) and p'' (K,): with least and with most dry friction.
+        """Return drive forces (2, K, n) at p' and p'' (K,), with least and greatest dry friction.
 
-        What the drives give is between the two.
+        The actual drive forces lie between the two.
         """
         moving = np.sign(self.first * rate[:, None])
         rigid = self.static + self.growth * gain[:, None] + self.square * rate[:, None] ** 2
@@ -77,7 +77,7 @@ class Demand(NamedTuple):
 
 
 def demand(robot: Manipulator, pose: Array, first: Array, second: Array) -> Demand:
-    """Return the demand of poses (K, m) on a curve with first and second derivatives by p."""
+    """Return coefficients of drive forces, joint and tool rates in p' and p'' at poses (K, m)."""
     zero_rates = np.zeros_like(pose)
     weight = evaluate_unchecked(robot, "inverse_dynamics", pose, zero_rates, zero_rates)
     rates = evaluate_unchecked(robot, "joint_rates", pose, first)[0]
@@ -101,10 +101,11 @@ def demand(robot: Manipulator, pose: Array, first: Array, second: Array) -> Dema
 def demand_between(
     robot: Manipulator, states: Callable[[Array], Curve], at: Array
 ) -> tuple[Array, Demand, Array]:
-    """Return places on a curve, their demand and poses (K, m): also where joints reverse.
+    """Return curve parameters, the `Demand` and poses (K, m) there, joint reversals inserted.
 
-    `states` gives the curve at places, which ascend. Where a joint reverses between two of them dry
-    friction changes its sign, and a force jumps: that place is there twice, moving either way.
+    `states` returns the curve at ascending parameters. Where a joint reverses between two of them,
+    dry friction changes its sign and a force jumps: that parameter is inserted twice, with either
+    sign of the rate.
     """
     turns, joints = _reversals(robot, states, at)
     all_places = np.concatenate([at, turns, turns])
@@ -120,10 +121,10 @@ def demand_between(
 def _reversals(
     robot: Manipulator, states: Callable[[Array], Curve], at: Array
 ) -> tuple[Array, NDArray[np.intp]]:
-    """Return the places (R,) where joints reverse, and the joint of each (R,)."""
+    """Return curve parameters (R,) at which joints reverse, and the joint index of each (R,)."""
 
     def rates(places: Array) -> Array:
-        """Return the joint rates (R, n) at places (R,)."""
+        """Return the joint rates (R, n) at curve parameters (R,)."""
         return np.asarray(evaluate_unchecked(robot, "joint_rates", *states(places)[:2])[0])
 
     known = rates(at)
@@ -141,16 +142,16 @@ def _reversals(
 def curve_rate(
     robot: Manipulator, curve: Curve, limits: MotionLimits, most: float = np.inf
 ) -> float:
-    """Return `most_rate` for poses (K, m) on a curve, with two derivatives by p."""
+    """Return the largest constant p' <= `most` at which a curve of poses (K, m) keeps limits."""
     return most_rate(robot, demand(robot, *curve), limits, curve[0], most)
 
 
 def most_rate(
     robot: Manipulator, needs: Demand, limits: MotionLimits, poses: Array, most: float = np.inf
 ) -> float:
-    """Return the largest constant p', at most `most`, at which a curve keeps the limits.
+    """Return the largest constant p' <= `most` at which the demand keeps the limits at all poses.
 
-    Infinite where it meets none.
+    It is infinite if no limit is reached.
     """
     with np.errstate(divide="ignore", invalid="ignore"):
         rates = [
@@ -193,7 +194,7 @@ def most_rate(
 def _expect_strength(
     robot: Manipulator, static_forces: Array, limits: MotionLimits, poses: Array
 ) -> None:
-    """Refuse a curve on which static forces exceed a drive's limit at any speed."""
+    """Raise if static forces (K, n) exceed a drive's limit, so that no speed is slow enough."""
     joints, force, _, _ = limits.force_lines
     strength = np.full(static_forces.shape[-1], np.inf)
     np.minimum.at(strength, joints, force)
@@ -230,11 +231,11 @@ class Peak(Result):
 
     @property
     def share(self) -> float:
-        """The size over the limit; 0 without a limit, infinite if the limit is 0."""
+        """The peak value over its limit; 0 without a limit, infinite if the limit is 0."""
         return self.size / self.limit if self.limit else math.inf
 
     def phrase(self) -> str:
-        """Return the peak and its limit as words."""
+        """Return as text the peak value and its limit: "leg 1 takes ..., its limit is ..."."""
         who = f"leg {self.leg}" if self.leg else "the tool"
         verb, _ = _WORDS[self.name]
         where = " at that speed" if self.name == "force_at_speed" else ""
@@ -247,7 +248,7 @@ class Peak(Result):
 def peaks(
     robot: RobotLike, pose: Array, velocity: Array, acceleration: Array, limits: MotionLimits
 ) -> tuple[Peak, ...]:
-    """Return the largest sizes in a motion (T, m): for each leg and quantity, then the tool.
+    """Return the largest values in a motion (T, m): of each leg and quantity, then of the tool.
 
     Parameters
     ----------

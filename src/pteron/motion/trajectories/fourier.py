@@ -76,16 +76,16 @@ class FourierSeries:
 
     @property
     def coefficients(self) -> Array:
-        """Center, cosines and sines as one array (2 H + 1, m)."""
+        """Centre, cosine and sine coefficients of the series as one array (2 H + 1, m)."""
         return np.vstack([self.center, self.cosines, self.sines])
 
     def at(self, time: ArrayLike) -> Curve:
-        """Return pose, velocity and acceleration, (T, m) each, at times (T,), s."""
+        """Return pose, velocity and acceleration of the series, (T, m) each, at times (T,), s."""
         return fourier_curve(self.coefficients, self.period, np.asarray(time, dtype=float))
 
 
 def fourier_curve(coefficients: Array, period: float, times: Array) -> Curve:
-    """Return the sums of coefficients (2 H + 1, m) at times (T,), s, and two derivatives."""
+    """Return sums of Fourier coefficients (2 H + 1, m) at times (T,), s, and two derivatives."""
     harmonics = len(coefficients) // 2
     blocks = [
         [basis @ coefficients for basis in fourier_bases(times[rows], harmonics, period)]
@@ -98,13 +98,13 @@ def fourier_curve(coefficients: Array, period: float, times: Array) -> Curve:
 def fourier_basis(times: Array, harmonics: int, period: float) -> Array:
     """Return 1, the cosine and the sine of each harmonic at times (T,), s: (T, 2 H + 1).
 
-    The columns are those of 1, then of all cosines, then of all sines.
+    The columns are 1, then all cosines, then all sines.
     """
     return next(fourier_bases(times, harmonics, period))
 
 
 def fourier_bases(times: Array, harmonics: int, period: float) -> Iterator[Array]:
-    """Yield the basis of Fourier series, and its first and second derivative."""
+    """Yield the Fourier basis (T, 2 H + 1) at times (T,), s, its first and second derivative."""
     w = 2.0 * np.pi / period * np.arange(1, harmonics + 1)
     angles = np.outer(np.remainder(times, period), w)
     cosines, sines = np.cos(angles), np.sin(angles)
@@ -114,7 +114,7 @@ def fourier_bases(times: Array, harmonics: int, period: float) -> Iterator[Array
 
 
 def row_blocks(rows: int) -> Iterator[slice]:
-    """Yield the rows in blocks of bounded size; an empty block if there are no rows."""
+    """Yield slices of at most `_BLOCK` rows that cover all rows; one empty slice if rows is 0."""
     for start in range(0, max(rows, 1), _BLOCK):
         yield slice(start, min(start + _BLOCK, rows))
 

@@ -40,8 +40,8 @@ def jerk_limited(
 ) -> Motion:
     """Return the motion of the joints from rest in one pose to rest in another, with limited jerk.
 
-    The joints start and arrive together; where forces of the drives are limited too, or the tool,
-    the motion is slowed as a whole. The path of the tool follows from them and is no line.
+    The joints start and arrive together; if drive forces or the tool are limited too, the motion is
+    slowed as a whole. The tool's path follows from the joints' motion and is not a straight line.
 
     Parameters
     ----------
@@ -135,7 +135,7 @@ def _wrap_half_turn(angles: Array) -> Array:
 
 
 def _end_joints(robot: Manipulator, name: str, pose: Array) -> Array:
-    """Return the joint coordinates (n,) at a pose, which errors call by a name."""
+    """Return the joint coordinates (n,) at a pose; errors call the pose by `name`."""
     try:
         return inverse_kinematics(robot, pose)
     except UnreachablePose as error:
@@ -146,7 +146,7 @@ def _end_joints(robot: Manipulator, name: str, pose: Array) -> Array:
 
 
 def _expect_modes(robot: Manipulator, motion: Motion, planned: Any, end: Array) -> None:
-    """Refuse a motion that leaves the working mode, or ends in another assembly mode."""
+    """Raise if a motion leaves the working mode, or ends in another assembly mode."""
     end_error = motion.pose[-1] - end
     end_error = np.where(robot.wraps, _wrap_half_turn(end_error), end_error)
     joints = np.array([planned.at_time(t)[0] for t in motion.time])
@@ -162,12 +162,12 @@ def _expect_modes(robot: Manipulator, motion: Motion, planned: Any, end: Array) 
 
 
 def _lost_error(text: str) -> UnreachablePose:
-    """Return an error for a motion that leaves reach, without a leg or a distance."""
+    """Return an `UnreachablePose` error with this text, without a leg or a distance."""
     return UnreachablePose(text, leg=0, shortfall=float("nan"), index=())
 
 
 def _plan_trajectory(first: Array, last: Array, limits: MotionLimits, jerks: Array) -> Any:
-    """Return Ruckig's trajectory between joint coordinates (n,)."""
+    """Return Ruckig's trajectory between joint coordinates (n,), within the limits."""
     ruckig = import_extra("motion", "ruckig", "motion with limited jerk needs ruckig", PteronError)
     count = len(first)
     parameters = ruckig.InputParameter(count)

@@ -28,22 +28,22 @@ class LimitRows(NamedTuple):
     most: Array
 
     def usage(self, u: Array, x: Array) -> Array:
-        """Return the share (K, R) of each limit that is used at s'' and s'^2, (K,) each."""
+        """Return load / limit (K, R) of R limits at K path points, for s'' and s'^2 (K,) there."""
         u, x = u[:, None], x[:, None]
         return np.asarray(self.a * u + self.b * x + self.c + self.v * np.sqrt(x))
 
 
 def limit_rows(needs: Demand, limits: MotionLimits, unit: float) -> LimitRows:
-    """Return the limits as rows for the demand at K points of a path.
+    """Return the motion limits as linear constraints on s'' and s'^2 at K points of a path.
 
-    Times are in units of `unit`, s.
+    Times are in units of `unit` seconds.
     """
     count = len(needs.first)
     none = np.zeros((count, 0))
     a, b, c, v = [none], [none], [none], [none]
 
     def add(linear: Array, square: Array, constant: Array, root: Array, limit: Array) -> None:
-        """Append rows to a, b, c and v: the coefficients by the limit, where it is finite."""
+        """Append constraint rows to a, b, c and v: coefficients over `limit`, where finite."""
         has = np.isfinite(limit)
         for part, coefficients in zip(
             (a, b, c, v), (linear / unit**2, square / unit**2, constant, root / unit), strict=True

@@ -49,13 +49,13 @@ class MotionLimits:
 
     @property
     def bounds_acceleration(self) -> bool:
-        """Whether any limit bounds the acceleration."""
+        """Whether any limit bounds the acceleration: of joints, forces or tool."""
         finite = np.isfinite([*self.acceleration, *self.force, self.tool_acceleration])
         return bool(finite.any()) or any(self.lines)
 
     @property
     def force_lines(self) -> tuple[NDArray[np.int64], Array, Array, Array]:
-        """All limits of forces, as lines: joint, force, fall and back, (R,) each."""
+        """Force limits as lines falling with speed: joint index, force, fall, back, (R,) each."""
         flat = [(i, (force, 0.0, 0.0)) for i, force in enumerate(self.force) if force < math.inf]
         every = [*flat, *((i, line) for i, lines in enumerate(self.lines) for line in lines)]
         joints = np.array([i for i, _ in every], dtype=np.int64)
@@ -64,7 +64,7 @@ class MotionLimits:
 
     @property
     def is_limited(self) -> bool:
-        """Whether there is a limit at all."""
+        """Whether the motion has any limit at all."""
         return self.bounds_acceleration or bool(np.isfinite([*self.speed, self.tool_speed]).any())
 
     any = former_attribute("any", "is_limited")
@@ -79,7 +79,7 @@ def limits_of(
     tool_speed: float | None = None,
     tool_acceleration: float | None = None,
 ) -> MotionLimits:
-    """Return the limits of a motion; those of speed and force are by default the drives'.
+    """Return the limits of a motion; those of speed and force are the drives' by default.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ def limits_of(
 def limit_array(
     robot: Manipulator, name: str, setting: PerJointLimit, defaults: Sequence[float | None]
 ) -> Array:
-    """Return a limit of each joint (n,), by default the joint's, infinite without a limit."""
+    """Return a limit of each joint (n,): `setting`, else the defaults; infinite without a limit."""
     if setting is None:
         return np.array([math.inf if limit is None else limit for limit in defaults])
     several = list(setting) if isinstance(setting, Sequence | np.ndarray) else [setting]
@@ -138,7 +138,7 @@ def limit_array(
 
 
 def _positive_number(name: str, setting: object) -> float:
-    """Return a setting as a float; it must be a number above 0."""
+    """Return `setting` as a float; raise unless it is a number above 0."""
     number = number_or_nan(setting)
     if not number > 0.0:
         text = setting if isinstance(setting, float) else shorten(setting)

@@ -25,10 +25,11 @@ _HALVINGS = 50
 def least_along(
     measure: Callable[[Array], Array], marks: Array, enough: float
 ) -> tuple[Array, Array]:
-    """Return the place and value of the least of each column of a measure (K, c), (c,) each.
+    """Return place and value of the minimum of each column of measure(marks) (K, c), (c,) each.
 
-    Its lowest valleys among the marks are looked into, finer and finer, if it may go below
-    `enough` there: between two marks it changes by no more than twice what it does elsewhere.
+    The lowest valleys among the marks are sampled finer and finer if the measure may be below
+    `enough` there, assuming that between two marks it changes by at most twice as much as between
+    others.
     """
     samples = measure(marks)
     places, least = marks[samples.argmin(axis=0)], samples.min(axis=0)
@@ -53,7 +54,7 @@ def least_along(
 def first_below(
     measure: Callable[[Array], Array], marks: Array, least: float
 ) -> tuple[float, int, float] | None:
-    """Return place, column and value where a measure (K, c) first falls below a bound."""
+    """Return place, column and value where a measure (K, c) first falls below `least`, or None."""
     places, lowest = least_along(measure, marks, least)
     columns = np.flatnonzero(lowest < least)
     if not len(columns):

@@ -39,17 +39,17 @@ class Path(Protocol):
 
     @property
     def length(self) -> float:
-        """Its length, m."""
+        """The path's arc length, m."""
 
     @property
     def rests(self) -> tuple[float, ...]:
-        """The values of s where the platform stops, ascending, from 0 to the length."""
+        """The arc lengths s, m, at which the platform stops, ascending, from 0 to the length."""
 
     def at(self, s: Array) -> Curve:
-        """Return poses (T, m) at s (T,), and two derivatives by s."""
+        """Return poses (T, m) at arc lengths s (T,), m, and two derivatives by s."""
 
     def place(self, s: float) -> str:
-        """Return the text of a place on the path, by its s."""
+        """Return as text where the arc length s, m, lies on the path."""
 
 
 @dataclass(frozen=True)
@@ -79,11 +79,11 @@ class LinePath:
 
     @property
     def length(self) -> float:
-        """Its length, m."""
+        """The path's arc length, m."""
         return float(self.knots[-1])
 
     def at(self, s: Array) -> Curve:
-        """Return poses (T, m) at s (T,), and two derivatives by s."""
+        """Return poses (T, m) at arc lengths s (T,), m, and two derivatives by s."""
         s = np.clip(np.asarray(s, dtype=float), 0.0, self.length)
         k = np.clip(np.searchsorted(self.knots, s, side="right") - 1, 0, len(self.controls) - 1)
         span = (self.knots[k + 1] - self.knots[k])[:, None]
@@ -95,7 +95,7 @@ class LinePath:
         return pose_motion(self.platform, *curve)
 
     def place(self, s: float) -> str:
-        """Return the text of a place on the path, by its s."""
+        """Return as text where the arc length s, m, lies on the path, and between which poses."""
         k = int(np.clip(np.searchsorted(self.corners, s, side="right"), 1, len(self.corners) - 1))
         between = f", between poses {k} and {k + 1}" if len(self.corners) > 2 else ""
         return f"{s:.4g} m along its {self.length:.4g} m{between}"
@@ -111,10 +111,10 @@ def _bezier(points: Array, u: Array) -> Array:
 def line_path(robot: RobotLike, poses: ArrayLike, corner: float = 0.0) -> LinePath:
     """Return the path of the tool's centre point along straight lines through poses.
 
-    The pose's angles change evenly along a line; where there is one of them, the platform turns
-    evenly. A corner is rounded by a Bezier curve of the fifth
-    degree whose ends are `corner` metres before and after it, on both lines, without curvature: the
-    path is twice continuously differentiable. It passes a right angle at 0.27 times that distance.
+    The pose's angles change linearly along a line; a single angle makes the platform turn evenly. A
+    corner is rounded by a Bezier curve of the fifth degree whose ends lie `corner` metres before
+    and after it, on both lines, without curvature: the path is twice continuously differentiable.
+    At a right angle it passes the corner at 0.27 times that distance.
 
     Parameters
     ----------
@@ -164,14 +164,14 @@ def line_path(robot: RobotLike, poses: ArrayLike, corner: float = 0.0) -> LinePa
 
 
 def path_weights(platform: Platform) -> Array:
-    """Return the weight (m,) of each coordinate in the path's length: m/m or m/rad."""
+    """Return the weight (m,) of each pose coordinate in the path's length: 1, or m per rad."""
     return np.where(platform.angular, TURN, 1.0)
 
 
 def _round_corners(
     platform: Platform, places: Array, directions: Array, sizes: Array, corner: float
 ) -> LinePath:
-    """Return the path through places (K, m), with rounded corners between its lines."""
+    """Return the path of straight lines through places (K, m), with rounded corners."""
     controls: list[Array] = []
     knots, rests, corners = [0.0], [0.0], [0.0]
     here = places[0]
@@ -210,26 +210,26 @@ class BackPath:
         self.rests = (*out.rests, *(self.length - s for s in out.rests[-2::-1]))
 
     def at(self, s: Array) -> Curve:
-        """Return poses (T, m) at s (T,), and two derivatives by s."""
+        """Return poses (T, m) at arc lengths s (T,), m, and two derivatives by s."""
         s = np.asarray(s, dtype=float)
         back = s > self._out.length
         pose, first, second = self._out.at(np.where(back, self.length - s, s))
         return pose, np.where(back[:, None], -first, first), second
 
     def place(self, s: float) -> str:
-        """Return the text of a place on the path, by its s."""
+        """Return as text where the arc length s, m, lies on the path out or back."""
         if s <= self._out.length:
             return self._out.place(s)
         return f"{self._out.place(self.length - s)}, on the path back"
 
 
 def return_path(path: Path) -> BackPath:
-    """Return the path and, after a rest at its end, its reverse."""
+    """Return the path followed by a rest at its end and the same path in reverse."""
     return BackPath(path)
 
 
 def poses_of(path: Path, count: int) -> tuple[Array, Array]:
-    """Return about `count` values of s (K,) along a path, its rests included, and poses (K, m)."""
+    """Return about `count` arc lengths s (K,), m, along a path with its rests; poses (K, m)."""
     spans = np.diff(path.rests)
     parts: Sequence[Array] = [
         np.linspace(a, b, max(2, int(np.ceil(count * (b - a) / spans.sum()))), endpoint=False)

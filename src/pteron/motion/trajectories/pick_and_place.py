@@ -64,11 +64,11 @@ def pick_and_place(
 ) -> PickAndPlace:
     """Return the standard pick-and-place cycle: 25 mm up, 305 mm across, 25 mm down, and back.
 
-    It is the path of the tool's centre point, `platform.tool`; P follows where that needs it. Up
-    is against gravity, or along the platform's axis where there is none. A planar machine goes the
-    cycle in its plane: up is then against what gravity does there or, in a horizontal plane, at a
-    right angle to across. Each move is a quintic in time; they overlap, so that the corners are
-    round. The platform rests at both ends.
+    It is the path of the tool's centre point, `platform.tool`; P moves accordingly. Up is opposite
+    to gravity, or along the platform's axis without gravity. A planar machine performs the cycle in
+    its plane: up is then opposite to gravity's component there or, in a horizontal plane,
+    perpendicular to across. Each move is a quintic in time; the moves overlap, so that the corners
+    are round. The platform rests at both ends.
 
     Parameters
     ----------
@@ -172,12 +172,12 @@ def cycle_path(found: PickAndPlace) -> BackPath:
 
 
 def farthest_point(robot: Manipulator) -> float:
-    """Return how far the farthest platform point is from P, m."""
+    """Return the greatest distance of a platform point from P, m."""
     return max(float(np.linalg.norm(leg.platform_point)) for leg in robot.legs)
 
 
 def _peak_acceleration(cycle: Cycle, radius: float) -> float:
-    """Return the largest acceleration over a cycle that takes one second, m/s^2."""
+    """Return the largest acceleration, m/s^2, of a tool cycle that takes one second."""
     low, high = 0.0, 0.5
     for _ in range(_ZOOMS):
         tau = np.linspace(low, high, 1001)

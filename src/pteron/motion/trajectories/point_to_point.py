@@ -24,9 +24,9 @@ def point_to_point(
     law: PolynomialLaw = "quintic",
     step: float = STEP,
 ) -> Motion:
-    """Return the motion from rest in one pose straight to rest in another.
+    """Return the straight motion of the tool from rest in one pose to rest in another.
 
-    The tool's centre point goes along a line, and the pose's angles change in proportion with it.
+    The tool's centre point moves on a straight line, and the pose's angles change in proportion.
 
     Parameters
     ----------

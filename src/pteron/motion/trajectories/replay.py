@@ -32,7 +32,7 @@ _DEGREE = 5
 def replay(
     robot: RobotLike, table: str | File | Table | Columns, *, start: PoseLike | None = None
 ) -> Motion:
-    """Return the motion that a table holds.
+    """Return the motion recorded in a table of poses or joint coordinates over time.
 
     Parameters
     ----------
@@ -92,13 +92,13 @@ def replay(
 
 
 def _place(rows: Table, motion: Motion, at: float) -> str:
-    """Return the text of a table's row at or before a time, s."""
+    """Return as text which table row is at or before a time, s."""
     k = int(np.searchsorted(motion.time, at, side="right")) - 1
     return f"{rows.place(max(k, 0))}, at {at:.4g} s"
 
 
 def rows_of(source: str | File | Table | Columns, useful: Sequence[str]) -> Table:
-    """Return a table, an object's useful columns as a table, or the table in a file."""
+    """Return `source` as a table: a table as it is, a file read, columns of an object taken."""
     if isinstance(source, Table):
         return source
     if isinstance(source, str | File):
@@ -116,7 +116,7 @@ def rows_of(source: str | File | Table | Columns, useful: Sequence[str]) -> Tabl
 
 
 def _read_columns(rows: Table, columns: Sequence[str]) -> tuple[Array, Array]:
-    """Return times (T,), from 0, and columns (T, K)."""
+    """Return times (T,), s, starting from 0, and the named columns (T, K) of a table."""
     numbers = rows.numbers([TIME, *columns])
     time = numbers[:, 0]
     expect(len(time) >= 2, rows.source, "one row", "at least two")
@@ -136,7 +136,7 @@ def _unwrap_angles(robot: Manipulator, poses: Array) -> Array:
 
 
 def _spline(time: Array, samples: Array) -> tuple[Array, Array, Array]:
-    """Return values (T, K) and two derivatives, of the spline through them."""
+    """Return samples (T, K) and two time derivatives of the spline through them."""
     degree = min(_DEGREE, len(time) - 1)
     spline = scipy.interpolate.make_interp_spline(time, samples, k=degree)
     orders = (
@@ -148,7 +148,7 @@ def _spline(time: Array, samples: Array) -> tuple[Array, Array, Array]:
 def _follow_joints(
     robot: Manipulator, time: Array, joints: Array, start: PoseLike | None
 ) -> Motion:
-    """Return the platform's motion that follows joint coordinates (T, n) over time."""
+    """Return the platform's motion for joint coordinates (T, n) at times (T,), from a pose."""
     if start is None:
         raise DataError(
             "start: the table holds joint coordinates, which may have several poses; give one of "

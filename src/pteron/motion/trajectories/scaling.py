@@ -45,9 +45,9 @@ _WORTH = 1.01
 
 
 def least_margin(robot: RobotLike, around: PoseLike) -> float:
-    """Return the default margin to singularities that a cycle about a pose keeps.
+    """Return the default least singularity margin (no unit) for a cycle about a pose.
 
-    It is 0.2; a machine with little margin moves where it has half of what the pose has.
+    It is 0.2, or half of the margin at the pose if that is less.
 
     Parameters
     ----------
@@ -76,9 +76,9 @@ def scaled_to_reach(
 ) -> tuple[float, Array]:
     """Return the scale of the largest pick-and-place cycle about a pose, and its direction.
 
-    The whole cycle stays in reach, keeps the margins of type I and type II (see
+    The complete cycle stays in reach, keeps the margins of type I and type II (see
     `pteron.workspace.PoseMargins`) at `least` or above, and the joints within their limits. The
-    scale is found by bisection: a smaller cycle stays nearer to the pose in its middle.
+    scale is found by bisection, since a smaller cycle stays nearer to the pose in its middle.
 
     Parameters
     ----------
@@ -139,11 +139,11 @@ def scaled_to_reach(
 
 
 def _largest_scale(robot: Manipulator, cycle: Cycle, least: float, minimum: int) -> int:
-    """Return the largest feasible scale, in thousandths; 0 if it is below `minimum`."""
+    """Return the largest feasible scale of a cycle, in thousandths; 0 if below `minimum`."""
     way = np.linspace(0.0, 0.5, _SAMPLES)
 
     def fits(thousandths: int) -> bool:
-        """Return whether a scale, in thousandths, keeps margins at poses of half the cycle."""
+        """Return whether the cycle at this scale, in thousandths, keeps all margins."""
         return keeps_margin(robot, replace(cycle, scale=thousandths / _STEPS).at(way)[0], least)
 
     if minimum > _STEPS or not fits(minimum):
@@ -155,7 +155,7 @@ def _largest_scale(robot: Manipulator, cycle: Cycle, least: float, minimum: int)
 
 
 def keeps_margin(robot: Manipulator, poses: Array, least: float) -> bool:
-    """Return whether all poses keep the margins and the joints' limits."""
+    """Return whether all poses (K, m) keep singularity margins >= `least`, and joint limits."""
     type_i = numeric(robot, "reach")(poses)[1]
     if not (type_i >= least + _DIP).all():  # NaN, out of reach, compares false
         return False

@@ -81,7 +81,7 @@ def time_curve(
     limits: MotionLimits,
     step: float = STEP,
 ) -> Motion:
-    """Return the motion along a curve of poses in a duration, s, or the shortest."""
+    """Return the motion along a curve of poses in `duration` s, or in the shortest time."""
     if duration is None:
         return shortest(robot, curve, limits, step)
     course = Timed(curve, _expect_time("duration", duration))
@@ -106,7 +106,7 @@ def polynomial_motion(
     law: PolynomialLaw = "quintic",
     step: float = STEP,
 ) -> Motion:
-    """Return the motion along a path that is a polynomial in time between two rests.
+    """Return the motion along a path with a polynomial time law between each two rests.
 
     Parameters
     ----------
@@ -171,7 +171,7 @@ def polynomial_motion(
 def stretch_times(
     robot: Manipulator, path: Path, law: Progress, limits: MotionLimits
 ) -> list[float]:
-    """Return the shortest durations, s, of the stretches between rests that keep the limits."""
+    """Return the shortest duration, s, of each part of a path between rests within the limits."""
     durations = []
     tau = np.linspace(0.0, 1.0, _LOOK)
     share, rate, gain = law(tau)
@@ -190,7 +190,7 @@ def stretch_times(
 def _expect_kept(
     robot: Manipulator, course: Timed, limits: MotionLimits, shortest: float | None = None
 ) -> None:
-    """Refuse a motion that is too fast for the limits; the error names the worst limit."""
+    """Raise if a motion is too fast for the limits; the error names the worst limit."""
     curve = course.at(np.linspace(0.0, course.duration, _LOOK))
     if curve_rate(robot, curve, limits, 1.0) * KEPT >= 1.0:
         return
@@ -205,11 +205,12 @@ def _expect_kept(
 
 
 def limit_motion(robot: Manipulator, course: Timed, limits: MotionLimits, step: float) -> Motion:
-    """Return a course as a motion, slowed down to keep the limits at ten times its samples too.
+    """Return the motion along a timed curve, slowed down until it keeps the limits everywhere.
 
-    And where a joint reverses between them.
+    The limits are checked at ten times as many samples as the motion has, and where joints reverse.
 
-    Its duration is a multiple of the step; the course is slowed by what it exceeds a limit.
+    The duration is a multiple of the step; the course is slowed by the factor by which it exceeds a
+    limit.
     """
     for _ in range(_TRIES):
         count = max(1, int(np.ceil(course.duration / _expect_time("step", step) - 1e-9)))
@@ -227,7 +228,7 @@ def limit_motion(robot: Manipulator, course: Timed, limits: MotionLimits, step: 
 
 
 def sample_curve(states: Callable[[Array], Curve], duration: float, step: float = STEP) -> Motion:
-    """Return a motion's samples from beginning to end, equidistant, at most a step apart.
+    """Return a motion sampled from 0 to `duration` s at equal steps of at most `step` s.
 
     `states` takes times (T,), s, and returns pose, velocity and acceleration, (T, m) each.
     """
@@ -242,6 +243,6 @@ def sample_curve(states: Callable[[Array], Curve], duration: float, step: float 
 
 
 def _expect_time(name: str, seconds: float) -> float:
-    """Return a time, s; it must be finite and above 0."""
+    """Return a time in s; raise unless it is finite and above 0."""
     expect(np.isfinite(seconds) and seconds > 0.0, name, seconds, "a time above 0 s")
     return seconds

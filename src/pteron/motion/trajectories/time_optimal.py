@@ -98,8 +98,8 @@ def time_optimal(
 ) -> TimeOptimal:
     """Return the fastest motion along a path that keeps the limits.
 
-    It rests where the path does. The acceleration is continuous: its jumps are spread over a few
-    samples. The limits are kept at ten times as many samples too.
+    The motion rests where the path does. The acceleration is continuous: its jumps are spread over
+    a few samples. The limits are also checked at ten times as many samples.
 
     Parameters
     ----------
@@ -178,14 +178,14 @@ def _fastest_law(
     step: float,
     toppra: Any,
 ) -> _Stretch:
-    """Return the fastest time law of a stretch; times are in `unit`, s in its length."""
+    """Return the fastest time law of part j of a path, between two rests, and its motion."""
     begin, end = path.rests[j : j + 2]
     # Denser towards the rests, where the motion is slow; TOPP-RA loses digits on a denser grid.
     even = np.linspace(0.0, 1.0, _GRID + 1)
     grid = _EVEN * even + (1.0 - _EVEN) * (0.5 - 0.5 * np.cos(np.pi * even))
 
     def states(share: Array) -> Curve:
-        """Return pose and two derivatives by the share, (T, m) each, at shares (T,)."""
+        """Return poses (T, m) and two derivatives by the share (0 to 1) of this path part."""
         pose, first, second = path.at(begin + (end - begin) * share)
         return pose, (end - begin) * first, (end - begin) ** 2 * second
 
@@ -203,7 +203,7 @@ def _fastest_law(
         # Limits are tightened by what the spread motion exceeds them.
 
         def evaluate_law(tau: Array, progress: Progress = progress) -> Curve:
-            """Return states at shares of the duration."""
+            """Return poses (T, m) and two derivatives by path share at duration shares (T,)."""
             return states(progress(tau)[0])
 
         tau, needs, _ = demand_between(robot, evaluate_law, np.linspace(0.0, 1.0, _LOOK))
@@ -226,7 +226,7 @@ def _fastest_law(
 
 
 def _first_pass(toppra: Any, rows: LimitRows, grid: Array) -> Array:
-    """Return x = s'^2 on the grid by first passes that start from the quintic's speeds."""
+    """Return x = s'^2 (K,) on the grid of s, by TOPP-RA started from the quintic's speeds."""
     share, rate, _ = polynomial("quintic")(np.linspace(0.0, 1.0, _LOOK))
     quintic = np.interp(grid, share, rate) ** 2
     if not rows.v.any():
@@ -245,7 +245,10 @@ def _first_pass(toppra: Any, rows: LimitRows, grid: Array) -> Array:
 
 
 def _ranges_near(times: Array, nodes: Array, span: float) -> Array:
-    """Return the range of the times (T,) near each node: first and last + 1, (2, K)."""
+    """Return for each node (K,) the index range (2, K) of the times (T,) within `span` of it.
+
+    A range is the first index and the last one + 1; all times count between distant nodes.
+    """
     first = np.searchsorted(times, nodes - span)
     last = np.searchsorted(times, nodes + span)
     # Between distant nodes all times count.
@@ -255,16 +258,17 @@ def _ranges_near(times: Array, nodes: Array, span: float) -> Array:
 
 
 def _largest_in_ranges(ranges: Array, quantities: Array) -> Array:
-    """Return the largest of the values (T, R) near each node, (K, R)."""
+    """Return the largest of the values (T, R) in each index range (2, K): (K, R)."""
     return np.array([quantities[a:b].max(axis=0) for a, b in ranges.T])
 
 
 def _solve_pass(
     toppra: Any, rows: LimitRows, grid: Array, last_squares: Array, ahead: float
 ) -> Array:
-    """Return x = s'^2 on the grid, by TOPP-RA, from the solution of the previous pass.
+    """Return x = s'^2 (K,) on the grid of s, by TOPP-RA, from the previous pass's solution.
 
-    With viscous friction it is at most `ahead` times as large: there the chord ends.
+    With viscous friction x is at most `ahead` times its previous value: there the linearisation
+    ends.
     """
     most = np.minimum(rows.most, _FASTEST)
     a, b, c = rows.a.copy(), rows.b.copy(), rows.c.copy()

@@ -18,14 +18,14 @@ class Progress(Protocol):
     """A time law from rest to rest: the fraction of the path covered, over a unit of time."""
 
     def __call__(self, tau: Array, /) -> tuple[Array, Array, Array]:
-        """Return a share of the path in [0, 1] and two derivatives, (T,) each, at tau (T,)."""
+        """Return the covered share of the path (0 to 1) and two derivatives at tau, (T,) each."""
 
 
 def polynomial(law: PolynomialLaw) -> Progress:
-    """Return the polynomial from 0 to 1 whose derivatives vanish at both ends.
+    """Return the time law: the polynomial from 0 to 1 whose derivatives vanish at both ends.
 
-    The quintic, 10 t^3 - 15 t^4 + 6 t^5, has two such derivatives; the seventh degree's, 35 t^4 -
-    84 t^5 + 70 t^6 - 20 t^7, has three: the jerk begins and ends at zero too.
+    The quintic, 10 t^3 - 15 t^4 + 6 t^5, has two such derivatives; the polynomial of the seventh
+    degree, 35 t^4 - 84 t^5 + 70 t^6 - 20 t^7, has three, so that the jerk is zero at both ends too.
 
     Examples
     --------
@@ -43,7 +43,7 @@ def polynomial(law: PolynomialLaw) -> Progress:
     ds, dds = s.deriv(1), s.deriv(2)
 
     def progress(tau: Array) -> tuple[Array, Array, Array]:
-        """Return the share of the path and its first two derivatives by tau, (T,) each."""
+        """Return the covered share of the path and its first two derivatives by tau, (T,) each."""
         t = np.clip(tau, 0.0, 1.0)
         return s(t), ds(t), dds(t)
 

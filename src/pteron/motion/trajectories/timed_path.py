@@ -29,7 +29,7 @@ class Timed:
     duration: float
 
     def slow_down(self, factor: float) -> Timed:
-        """Return the curve with its duration multiplied by a factor."""
+        """Return the timed curve with its duration multiplied by a factor."""
         return Timed(self.curve, factor * self.duration)
 
     def at(self, time: Array) -> Curve:
@@ -39,7 +39,7 @@ class Timed:
 
 
 def timed_path(path: Path, durations: Sequence[float], laws: Sequence[Progress]) -> Timed:
-    """Return a path traversed from rest to rest, a duration (s) and a time law for each stretch."""
+    """Return a path with time: a duration, s, and a time law for each part between rests."""
     duration = float(sum(durations))
     starts = np.concatenate([[0.0], np.cumsum(durations)]) / duration
 

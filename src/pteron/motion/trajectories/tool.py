@@ -12,24 +12,25 @@ Curve = tuple[Array, Array, Array]
 
 
 def tool_motion(platform: Platform, pose: Array, first: Array, second: Array) -> Curve:
-    """Return poses with their lengths moved from P to the tool, and two derivatives.
+    """Return poses (..., m) whose lengths are the tool's place instead of P's, and two derivatives.
 
-    Where the platform turns about its axis alone, the constant part from P to the tool along that
-    axis is left out. A platform whose lengths cannot move the tool to any place, such as a
-    tripod's, keeps its pose.
+    If the platform turns about its axis alone, the constant part of the vector from P to the tool
+    along that axis is left out. The pose is unchanged for a platform whose lengths cannot move the
+    tool to any place, such as a tripod.
     """
     return _shift_curve(platform, (pose, first, second), 1.0)
 
 
 def pose_motion(platform: Platform, place: Array, first: Array, second: Array) -> Curve:
-    """Return the poses from the motion of the tool: the inverse of `tool_motion`."""
+    """Return poses of P from those of the tool, and two derivatives: inverse of `tool_motion`."""
     return _shift_curve(platform, (place, first, second), -1.0)
 
 
 def tool_path(platform: Platform, pose: Array, first: Array, second: Array) -> Curve:
     """Return the tool's position (..., k) and two derivatives; k = 3 where the platform tilts.
 
-    Else k is the number of the pose's lengths, and they are those of `tool_motion`.
+    If the platform does not tilt, k is the number of the pose's lengths, and the columns are those
+    of `tool_motion`.
     """
     if platform.tilts:
         return platform.tool_motion(pose, first, second)
@@ -54,15 +55,15 @@ def _shift_curve(platform: Platform, curve: Curve, side: float) -> Curve:
 
 
 def carries(platform: Platform) -> bool:
-    """Return whether the pose's lengths can compensate the tool's displacement by its angles."""
+    """Return whether the platform's lengths can move the tool to any place as its angles change."""
     return bool(platform.angles) and set(platform.arm_axes) <= set(platform.lengths)
 
 
 def arm_motion(platform: Platform, angles: Array, rates: Array, growths: Array) -> Curve:
-    """Return the rotating part of the arm from P to the tool, and two derivatives, (..., k).
+    """Return the part of the vector from P to the tool that turns (..., k), and two derivatives.
 
-    The k components are along the pose's lengths; angles, rates and growths, their second
-    derivatives, are (..., j). The platform is one that `carries` its tool.
+    The k components are along the pose's lengths; `angles`, `rates` and `growths` (second
+    derivatives) are (..., j). The platform must be one that `carries` its tool.
     """
     if platform.axis_angle is None:
         state = (_pose_of_angles(platform, part) for part in (angles, rates, growths))

@@ -36,9 +36,9 @@ class LinearLaw:
 
 
 def linearised_law(law: Law, pose: Array, velocity: Array, acceleration: Array) -> LinearLaw:
-    """Return a law linearised where the measured state is the reference, (m,) each.
+    """Return a control law linearised at a reference state, (m,) each, measured without error.
 
-    The derivatives are exact. Its model has no dry friction there, as the plant has none.
+    The derivatives are exact. Dry friction is neglected, as in the linear plant.
     """
     model, size = law.model, law.model.freedom
     memory = law.memory(pose, velocity)
@@ -69,7 +69,7 @@ def linearised_law(law: Law, pose: Array, velocity: Array, acceleration: Array) 
 
 @lru_cache(maxsize=16)
 def _derivatives(robot: Manipulator, what: str, columns: Columns | None) -> ca.Function:
-    """Return the Jacobians of (forces, next memory) by the memory, and by the measurements."""
+    """Return a CasADi function: Jacobians of (forces, next memory) by memory and measurements."""
     law_program = program(robot, what, columns, plain=True)
     names = [port.name for port in law_program.inputs]
     symbols = dict(zip(names, law_program.function.sx_in(), strict=True))

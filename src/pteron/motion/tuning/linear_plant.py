@@ -63,7 +63,7 @@ class LinearPlant(Result):
         return np.asarray(np.linalg.eigvals(self.matrix))
 
     def zero_order_hold(self, span: float) -> tuple[Array, Array]:
-        """Return exp(A t) and the integral of exp(A s) B over a span: exact for constant forces."""
+        """Return exp(A t) and the integral of exp(A s) B over a time span, s: the sampled plant."""
         size, count = self.inputs.shape
         block = np.zeros((size + count, size + count))
         block[:size] = np.hstack([self.matrix, self.inputs]) * span
@@ -81,12 +81,12 @@ def linearise(
 ) -> LinearPlant:
     """Return a machine with its drives, linearised at a pose at rest or a moment of a motion.
 
-    The drives' forces are those that hold the machine there, or that the motion needs. The closed
-    chain is kept whole: at rest A has (J M^-1 J^T) times the change of the forces of gravity, and B
-    is J M^-1 J^T, with the motors' inertia in M. A moment of a motion is frozen: A and B are those
-    of this moment. The derivatives are exact, of the equations of `simulate`: transmissions that
-    bend and currents that lag are states of their own. Viscous friction counts; dry friction does
-    not, as it only damps, and least where a joint moves, nor do backlash, ripple and limits.
+    The drive forces are those that hold the machine there, or that the motion needs. The closed
+    chain is fully included: at rest A contains J M^-1 J^T times the derivative of the gravity
+    forces, and B is J M^-1 J^T, with the motors' inertia in M. For a moment of a motion A and B are
+    those of that moment (frozen). The derivatives of the equations of `simulate` are exact: elastic
+    transmissions and lagging currents have states of their own. Viscous friction is included; dry
+    friction, which only adds damping, is not, nor are backlash, ripple and limits.
 
     Parameters
     ----------
@@ -182,7 +182,7 @@ def with_linear_drives(robot: Manipulator) -> Manipulator:
 
 @lru_cache(maxsize=16)
 def _derivatives(robot: Manipulator, kind: DriveKind) -> ca.Function:
-    """Return Jacobians of the state's rates by state and by forces, and of J x' by x."""
+    """Return a CasADi function: Jacobians of the state derivative by state and drive forces."""
     plant_program = motion_program(robot, kind)
     names, symbols = [port.name for port in plant_program.inputs], plant_program.function.sx_in()
     by_name = dict(zip(names, symbols, strict=True))

@@ -60,7 +60,7 @@ class LoopMargins(Result):
 
     @cached_property
     def gain(self) -> Array:
-        """The gain margin above 1 of each drive's loop, (n,)."""
+        """The gain margin of each drive's loop, a factor above 1, (n,)."""
         return np.asarray(self._single_margins[0])
 
     @cached_property
@@ -98,9 +98,9 @@ class LoopMargins(Result):
     def disk(self) -> float:
         """The disk margin d at all drives at once.
 
-        The loop stays stable though each force is multiplied by a complex number of its own, within
-        the disk on whose rim (1 + d / 2) / (1 - d / 2) and its inverse are. It is a lower bound, by
-        the greatest singular value and by Perron's bound, of which the better.
+        The loop stays stable if each force is multiplied by any complex number in the disk whose
+        diameter ends at (1 + d / 2) / (1 - d / 2) and its inverse. It is a lower bound, the better
+        of one by the greatest singular value and one by Perron's theorem.
         """
         identity = np.eye(len(self._response[0]))
         middle = np.linalg.inv(identity + self._response) - 0.5 * identity
@@ -110,7 +110,7 @@ class LoopMargins(Result):
 
     @property
     def least(self) -> dict[str, float]:
-        """The least margin of each kind, of single drives and of all together: factors, rad, s."""
+        """The least gain, phase (rad), delay (s) and disk margin of the loop, by name."""
         return {
             "gain": float(min(self.gain.min(), self.common_gain)),
             "phase": float(self.phase.min()),
@@ -125,7 +125,7 @@ class LoopMargins(Result):
 
     @cached_property
     def drive_loops(self) -> Array:
-        """Frequency response of each drive's loop, the others closed, (W, n), at `frequencies`."""
+        """Frequency response of each drive's loop with the others closed, (W, n), complex."""
         sensitivity = np.linalg.inv(np.eye(len(self._response[0])) + self._response)
         return np.asarray(1.0 / np.diagonal(sensitivity, axis1=1, axis2=2) - 1.0)
 
@@ -136,17 +136,17 @@ class LoopMargins(Result):
 
     @cached_property
     def _stable(self) -> float:
-        """Stability of the closed loop: 1.0 if it is stable, else 0.0."""
+        """1.0 if the closed loop is stable, else 0.0."""
         return float(self.slowest > 0.0)
 
     @cached_property
     def _response(self) -> Array:
-        """Frequency response of the loop at `frequencies`, (W, n, n)."""
+        """Complex frequency response of the loop opened at all drives, (W, n, n)."""
         return self.loop.response(self.frequencies)
 
     @cached_property
     def _single_margins(self) -> Array:
-        """Margins of gain, phase (rad), delay (s), and crossover (rad/s), of each drive (4, n)."""
+        """Gain, phase (rad) and delay (s) margin, crossover (rad/s), of each drive (4, n)."""
         n = self.loop.plant.inputs.shape[1]
         if not self._stable:
             return np.array([0.0, 0.0, 0.0, np.nan])[:, None] * np.ones(n)
@@ -161,7 +161,7 @@ def radius(matrix: Array) -> float:
 
 
 def _smallest_change(radius_of: Callable[[float], float], unit: float, which: int) -> float:
-    """Return the least change that puts the dominant pole on the unit circle, or inf."""
+    """Return the least x at which radius_of(x), a spectral radius, reaches 1; inf if none."""
     step, below = _STEPS[which] * unit, 0.0
     while below < _MOST[which] * unit:
         above = below + max(step, 0.1 * below)
@@ -174,7 +174,7 @@ def _smallest_change(radius_of: Callable[[float], float], unit: float, which: in
 
 
 def _classical(omega: Array, loop: Array) -> tuple[float, float, float, float]:
-    """Return gain, phase (rad) and delay (s) margin and crossover (rad/s) of one loop (W,)."""
+    """Return gain, phase (rad) and delay (s) margin, crossover (rad/s), of a loop (W,)."""
     lead = np.unwrap(np.angle(-loop))  # 0 where L is on the negative axis
     size = np.log(np.abs(loop))
     turns = (
@@ -196,7 +196,7 @@ def _classical(omega: Array, loop: Array) -> tuple[float, float, float, float]:
 
 
 def _values_at_zeros(signal: Array, others: Array) -> Array:
-    """Return another signal's values at sign changes of a signal (W,), by interpolation."""
+    """Return the values of `others` (W,) interpolated where `signal` (W,) changes its sign."""
     k = np.flatnonzero(np.signbit(signal[1:]) != np.signbit(signal[:-1]))
     share = signal[k] / (signal[k] - signal[k + 1])
     return others[k] + share * (others[k + 1] - others[k])

@@ -100,7 +100,7 @@ class SampledLoop:
         return matrix, inputs, force_rows
 
     def closed_loop(self, more: float = 0.0) -> Array:
-        """Return the closed loop's matrix; `more` is an additional delay of all forces, s."""
+        """Return the matrix (S, S) of the closed loop per sample, with `more` s of extra delay."""
         matrix, inputs, force_rows = self.open_loop(more)
         return matrix + inputs @ force_rows
 
@@ -112,8 +112,8 @@ class SampledLoop:
     def response(self, frequencies: Array) -> Array:
         """Return the loop's frequency response L (W, n, n), from drive forces to commanded forces.
 
-        Opened at all drives; I + L is singular where the closed loop has a pole. In rad/s, at most
-        pi / period.
+        The loop is opened at all drives; I + L is singular where the closed loop has a pole.
+        Frequencies are in rad/s, at most pi / period.
         """
         matrix, inputs, force_rows = self.open_loop()
         z = np.exp(1j * frequencies * self.period)[:, None, None]

@@ -79,9 +79,9 @@ def trial(
     sensors: Sensors | None = None,
     delay: float = 0.0,
 ) -> GainTrial:
-    """Return the figures of a simulated motion and of the rest at its end.
+    """Simulate a motion and the rest at its end; return errors, forces and energy as a trial.
 
-    Parameters are those of `simulate`, and so is what it raises.
+    The parameters, and the errors raised, are those of `simulate`.
     """
     robot = as_manipulator(robot)
     simulation = simulate(
@@ -125,7 +125,7 @@ def trials(
     sensors: Sensors | None = None,
     delay: float = 0.0,
 ) -> pl.DataFrame:
-    """Return the figures of a motion as bandwidth, delay or encoders change, one at a time.
+    """Return a table of simulated trials: bandwidth, delay, encoder or stiffness varied singly.
 
     Parameters
     ----------
@@ -198,7 +198,10 @@ def _stiffer(robot: Manipulator, factor: float) -> Manipulator:
     expect(0.0 < factor < np.inf, "stiffnesses", f"{factor:g}", "factors above 0")
 
     def stiffen(drive: Drive | None) -> Drive | None:
-        """Return a drive with its stiffness multiplied; unchanged if it is not elastic."""
+        """Return a drive with its stiffness multiplied by `factor`.
+
+        A drive without elastic transmission is unchanged.
+        """
         if drive is None or drive.elastic is None:
             return drive
         stiffness = factor * drive.elastic.stiffness
@@ -209,7 +212,7 @@ def _stiffer(robot: Manipulator, factor: float) -> Manipulator:
 
 
 def _tool_places(robot: Manipulator, poses: Array) -> Array:
-    """Return the tool's positions (..., k) at poses (..., m); the poses if it has none."""
+    """Return the tool's positions (..., k), m, at poses (..., m); the poses if k is zero."""
     zero_rates = np.zeros_like(poses)
     place = tool_path(robot.platform, poses, zero_rates, zero_rates)[0]
     return place if place.shape[-1] else poses
@@ -218,7 +221,7 @@ def _tool_places(robot: Manipulator, poses: Array) -> Array:
 def _settling_figures(
     simulation: Simulation, motion: Motion, errors: Array, moving: NDArray[np.bool_]
 ) -> tuple[float, float]:
-    """Return settling time and overshoot after the motion's end; NaN where it does not end."""
+    """Return settling time, s, and overshoot after a motion's end; NaN if it ends in motion."""
     after = errors[~moving]
     if not len(after) or np.abs(motion.velocity[-1]).max() > 1e-6:
         return float("nan"), float("nan")

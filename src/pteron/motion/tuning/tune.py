@@ -76,7 +76,7 @@ class Required:
         expect(0.0 <= self.delay < np.inf, "delay margin", shorten(self.delay), "0 s or more")
 
     def share(self, found: LoopMargins) -> float:
-        """Return the least ratio of margin to required margin; 1 or more suffices."""
+        """Return the least ratio of stability margin to required margin; 1 or more suffices."""
         each = self._share(found.gain.min(), found.delay.min()), found.phase.min() / self.phase
         if min(each) < 1.0:  # those of all drives at once take longer to compute
             return float(min(each))
@@ -84,7 +84,7 @@ class Required:
         return float(min(*each, self._share(found.common_gain, delay)))
 
     def _share(self, gain: float, delay: float) -> float:
-        """Return min(log gain / log required gain, delay / required delay)."""
+        """Return the lesser of log(gain) / log(required gain) and delay / required delay."""
         factor = np.log(max(gain, 1.0)) / np.log(self.gain)
         return float(min(factor, delay / self.delay if self.delay else np.inf))
 
@@ -121,27 +121,28 @@ class Tuning(Result):
 
     @property
     def worst(self) -> int:
-        """The index of the state with the least ratio of margin to required margin."""
+        """Index of the state where stability margin over required margin is least."""
         return int(np.argmin([self.required.share(margins) for margins in self.margins]))
 
     @property
     def least(self) -> dict[str, float]:
-        """The least margins of all states: factors, rad, s and the disk margin."""
+        """The least gain, phase (rad), delay (s) and disk margins of all states, by name."""
         each = [margins.least for margins in self.margins]
         return {name: min(least[name] for least in each) for name in each[0]}
 
     def gains(self) -> dict[str, list[float]]:
-        """Return proportional (or slope) and derivative gains of each joint, by name."""
+        """Return the proportional (or slope) and derivative gains of each joint, by name."""
         law = self.controller.law(self.robot)
         n = self.robot.joint_count
         first = "proportional" if isinstance(self.controller, Feedback) else "slope"
         return {first: law.gains[:n].tolist(), "derivative": law.gains[n : 2 * n].tolist()}
 
     def table(self) -> pl.DataFrame:
-        """Return the margins as a table, a row for each state.
+        """Return the stability margins as a table, a row for each state.
 
-        Columns: t (of the motion; empty in the workspace), the pose, gain, phase and delay margin
-        of each drive, those of all at once, the disk margin, and the slowest pole's rate.
+        The columns are t (of the motion; empty in the workspace), the pose, the gain, phase and
+        delay margin of each drive, those of all drives together, the disk margin, and the decay
+        rate of the slowest pole.
         """
         import polars as pl
 
@@ -168,11 +169,11 @@ def tune(
     delay: float = 0.0,
     progress: Progress | None = None,
 ) -> Tuning:
-    """Return the controller of the greatest bandwidth that has the required margins everywhere.
+    """Return the controller of the greatest bandwidth that keeps the required stability margins.
 
     The loop of machine, drives, encoders, controller and delay is linearised at moments of the
-    motion, frozen there, and at poses of the workspace, at rest. All coupling of the closed chain
-    counts. From one sample to the next it is exact: forces are held, and act after the delay.
+    motion, and at poses of the workspace at rest, with all coupling of the closed chain. Its
+    sampling is exact: forces are held from one sample to the next, and act after the delay.
 
     Parameters
     ----------
@@ -249,7 +250,7 @@ def tune(
 
 
 def _states(robot: Manipulator, motion: Motion | None, poses: Array | None) -> tuple[Array, Array]:
-    """Return the states (S, 3, m) at which the loop is linearised, and their times (S,)."""
+    """Return states (S, 3, m) (pose and two derivatives) to linearise at; times (S,), s."""
     if poses is None:
         poses = light_poses(robot)
         within = (joint_distances(robot, inverse_kinematics(robot, poses)) >= 0.0).all(axis=-1)
@@ -279,16 +280,16 @@ class _Search:
     steps: Steps
 
     def loop(self, controller: Controller, i: int) -> SampledLoop:
-        """Return the sampled loop of a controller at state `i`."""
+        """Return the linearised sampled loop of a controller at state number i."""
         law = linearised_law(controller.law(self.model), *self.states[i])
         return SampledLoop(self.plants[i], law, controller.period, **self.how)
 
     def share(self, controller: Controller, which: Sequence[int]) -> tuple[float, int]:
-        """Return the least share of the required margins at some states, and the state."""
+        """Return the least ratio margin / required margin of some states, and that state."""
         return min((self.required.share(LoopMargins(self.loop(controller, i))), i) for i in which)
 
     def choose_controller(self) -> Controller:
-        """Return the controller with the greatest bandwidth whose margins suffice at all states."""
+        """Return the controller of greatest bandwidth with sufficient margins; raise if none."""
         controller, every = self.controller, range(len(self.states))
         most = np.pi / controller.period
         has_gains = (
@@ -330,13 +331,14 @@ class _Search:
         few: list[int],
         tried: list[tuple[float, Controller]],
     ) -> Controller | None:
-        """Return the controller with the greatest bandwidth whose margins suffice, or None.
+        """Return the controller of greatest bandwidth with sufficient margins, or None if none has.
 
-        `few` are the states that decided so far, `tried` what was tried, with its share.
+        `few` are the states that limited the bandwidth so far, `tried` the controllers tried, with
+        their least ratio.
         """
 
         def share(bandwidth: float) -> float:
-            """Return the least share of the required margins at a bandwidth, rad/s."""
+            """Return the least ratio margin / required margin at a bandwidth, rad/s."""
             attempt = replace(controller, bandwidth=bandwidth)
             tried.append((self.share(attempt, few)[0], attempt))
             self.steps.report("Searching", len(tried) / (len(tried) + _USUAL_TRIALS))
@@ -359,7 +361,7 @@ class _Search:
             high = low
 
     def _margins_text(self, controller: Controller, i: int) -> str:
-        """Return the text of a controller's margins at state `i` beside the required margins."""
+        """Return the text of a controller's margins at state i beside the required margins."""
         least, required = LoopMargins(self.loop(controller, i)).least, self.required
         delay_text = f", {1e3 * required.delay:.3g} ms" if required.delay else ""
         rate = controller.bandwidth
