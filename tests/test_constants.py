@@ -49,7 +49,8 @@ def test_a_scaled_constant_is_seen_where_it_is_used():
 
 @NIGHTLY
 @pytest.mark.timeout(7200)
-@pytest.mark.parametrize("folder", constants.TASKS)
+@pytest.mark.parametrize("folder", [f for f in constants.TASKS if f != "identification"])
 def test_other_constants_change_no_result(folder):
+    """Those of identification take hours: `python benchmarks/constants.py identification`."""
     found = {f"{c.module}.{c.name}": line for c, _, line in constants.deciding(folder, jobs=2)}
     assert {name: line for name, line in found.items() if name not in DECIDING} == {}
