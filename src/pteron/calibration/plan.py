@@ -117,19 +117,19 @@ def plan(
     count : int
         How many poses.
     measure : {"poses", "positions", "heights", "distances"}
-        What is to be measured at each. Heights are over the setup's plane; by default z = 0, the
-        plane of a log that names none, where the tool's home is above it and poses on it are
-        proved to serve, as on a printer's bed, else an unknown plane at the bottom of the proved
-        box. Distances are to the setup's anchor, by default an unknown one below home.
+        What is to be measured at each. Heights are over the setup's plane. By default it is z = 0,
+        as a printer's bed, if the tool's home is above it and the machine reaches it; otherwise an
+        unknown plane at the lowest poses. Distances are to the setup's anchor, by default an
+        unknown point below home.
     setup : Setup, optional
         Noise, marks, planes, anchors and frame, as a log's TOML says them.
     free, prior
         As for `calibrate`.
     criterion : {"D", "worst"}
-        What is made least: the volume of the values' joint region, or the greatest error of the
-        tool's place.
+        What is minimised: the volume of the joint confidence region of all values, or the greatest
+        error of the tool's position.
     seed : int
-        Of the candidates.
+        Of the random candidates among which the poses are chosen.
 
     Returns
     -------

@@ -140,7 +140,10 @@ def _drawing_errors(measurements: Measurements, guess: Guess) -> dict[str, float
 
 
 def _drawing_residuals(guess: Guess, rows: Measurements) -> tuple[Array, NDArray[np.bool_]]:
-    """Return residuals (N, K) on the drawn machine, and which of them are measured at a pose."""
+    """Return the residuals (N, K) of rows if the machine is as drawn, and which of them are valid.
+
+    A row has K residuals at most; one is valid if it is measured and the row's joints have a pose.
+    """
     poses = _trial_poses(guess, rows)
     lost: NDArray[np.bool_] = np.asarray(np.isnan(poses).any(axis=1))
     filled = np.where(lost[:, None], np.median(poses[~lost], axis=0), poses)

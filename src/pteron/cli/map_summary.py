@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 _AXIS = "name unit least greatest count"
 """Keys of an axis in the data."""
 
+_MARGIN_TITLE = "least distance of a leg from the end of its reach, or of a joint from its limit"
+"""The meaning of the default index, longer than on pictures."""
+
 _SUMMARY = "best best_pose worst worst_pose mean median"
 """Keys of an index in the data."""
 
@@ -136,5 +139,9 @@ def show_map(index_map: Map, volume: ReachVolume | None, record: Mapping[str, An
             share = index["undetermined"] / index_map.grid.size
             index_table.add_row("", "singular", "-", f"{percent(share)} of the poses")
     better = {"less": "smaller is better", "more": "larger is better"}
-    legend = (f"{i['index']}: {i['title']}, {better[i['better']]}" for i in record["indices"])
+    titles = {"margin": _MARGIN_TITLE}
+    legend = (
+        f"{i['index']}: {titles.get(i['index'], i['title'])}, {better[i['better']]}"
+        for i in record["indices"]
+    )
     show(*lines, index_table, *map(plain, legend))

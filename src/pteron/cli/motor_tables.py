@@ -96,7 +96,7 @@ def _table(robot: Manipulator, heading: str, fits: Iterable[CommonFit]) -> list[
 
 
 def _margins(common: CommonFit) -> tuple[float, ...]:
-    """Return the margins of a motor, the least of several legs."""
+    """Return the margins of a motor to its limits, each the least among several legs."""
     return tuple(min(getattr(fit, name) for fit in common.fits) for name in _MARGINS)
 
 

@@ -297,7 +297,7 @@ def proof_sentence(evaluator: KindEvaluator, proofs: Sequence[Proof]) -> str:
 
 
 def is_clear(evaluator: KindEvaluator, robot: Manipulator, middle: Array) -> bool:
-    """Return whether the required clearance between all bodies is proved over the workspace."""
+    """Return whether all bodies' clearance is proved in the workspace with the given middle."""
     radii, least = robot.radii or Radii(), evaluator.job.floors.clearance / 2.0
     parts = (radii.guide, radii.upper, radii.lower, radii.platform)
     required = interference(robot, Radii(*(part + least for part in parts)))

@@ -98,7 +98,10 @@ def sample_poses(
     *,
     limits: bool = True,
 ) -> Array:
-    """Return random poses (k, m) in reach; k = count, or less if no more are found."""
+    """Return random poses (k, m) in reach; k = count, or less if no more are found.
+
+    Their type-I measure is at least `type_i`; with `limits` they are within the joints' limits.
+    """
     return _search(robot, count, rng, _Conditions(type_i, 0.0, limits)).poses[:count]
 
 

@@ -181,16 +181,17 @@ class ExactCertificate(Certificate):
             f"at least {self.rank}: a square submatrix of that size, at {self.states} states, has "
             f"a nonzero determinant, computed exactly modulo {len(self.primes)} primes of "
             f"{max(self.primes).bit_length()} bits;",
-            f"at most {self.rank}: {self.null_vectors} null vectors annihilate the regressor "
-            f"exactly at {checked}{self.modular_configurations} configurations modulo another "
-            f"prime; a false one would pass with probability below {self.false_acceptance:.0e}.",
-            f"{self.transfers} of the null vectors are transfers of mass between bodies that share "
-            f"a point. Coefficients of the sums: {self.coefficients} numbers, in powers of m.",
+            f"at most {self.rank}: the regressor times {self.null_vectors} independent vectors is "
+            f"zero, exactly, at {checked}{self.modular_configurations} configurations modulo "
+            "another prime; a wrong vector would pass with a probability below "
+            f"{self.false_acceptance:.0e}.",
+            f"{self.transfers} of the vectors are exchanges of mass between bodies that share a "
+            f"point. Coefficients in the sums: {self.coefficients} numbers; units: powers of m.",
         ]
         if self.unexplained:
             lines.append(
                 f"The grouping of {', '.join(self.unexplained)} is explained by this machine's "
-                "special geometry, not by a transfer."
+                "special geometry, not by an exchange of mass."
             )
         lines += _sentence_of_list("Taken as exact", self.recognised)
         lines += _sentence_of_list("Approximated", self.approximated)

@@ -280,7 +280,11 @@ def _bodies_nearest_target(problem: _Problem, aim: _Aim) -> Array:
 
 
 def _checked_parameters(problem: _Problem, aim: _Aim, z: Array) -> tuple[Array, float]:
-    """Return the parameters (N,) of bodies z and their error, checked without the solver."""
+    """Return the inertial parameters (N,) of a solution z, and the base parameters' greatest error.
+
+    The error is relative. That the bodies are physically consistent is checked independently of the
+    solver; ModelError if they are not.
+    """
     bodies, limits, target = problem.bodies, problem.limits, problem.target
     error = (problem.grouping @ z - aim.values) / (problem.sizes * np.linalg.norm(z))
     residual = float(np.abs(error).max())

@@ -130,9 +130,11 @@ def condition_numbers(root: Array, base_values: Array) -> Conditioning:
 
 
 def condition_with_penalty(root: Array, short: Array) -> float:
-    """Return `scaled_condition` times sqrt(1 + (short / length)^2) of every column, `short` (p,).
+    """Return the condition number of columns scaled to length 1, with a penalty for short ones.
 
-    The scaled condition number alone does not see that a motion hardly moves a body.
+    `root` is the triangular factor of the regressor. Each column of length l multiplies the number
+    by sqrt(1 + (s / l)^2), s being its element of `short` (p,): a motion that hardly moves a body
+    makes its column short, which the scaled condition number alone does not show.
     """
     lengths = np.linalg.norm(root, axis=0)
     if not np.isfinite(lengths).all() or not lengths.all():

@@ -112,8 +112,8 @@ class Excitation(Result):
         """How far the search came, and whether its motion identifies the machine, in sentences."""
         finished = sum(start.finished for start in self.starts)
         search = (
-            f"Search: {self.draws} random motions drawn, {finished} of {len(self.starts)} "
-            f"optimised to convergence, {self.seconds:.0f} s."
+            f"Search: {self.draws} random motions drawn, the best {len(self.starts)} optimised in "
+            f"{self.seconds:.0f} s, {finished} of them to convergence; more time may improve them."
         )
         condition = self.conditioning.scaled
         size = f"{condition:.0f}" if 1e3 <= condition < 1e6 else f"{condition:.3g}"

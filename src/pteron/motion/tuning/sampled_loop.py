@@ -44,10 +44,12 @@ class SampledLoop:
     share: float | Array | None = None
 
     def open_loop(self, more: float = 0.0) -> tuple[Array, Array, Array]:
-        """Return (F, G, H) of s' = F s + G u, commands = H s: the loop opened at all drives.
+        """Return the matrices (F, G, H) of the discrete-time loop, opened at all drives.
 
-        s are the changes of the plant's state, last readings of joints and rates, memory, and
-        commanded forces not yet applied; u are commanded forces, `more` is an extra delay, s.
+        With the state x_k at sample k, the forces u_k that the drives apply, and the forces y_k
+        that the controller commands: x_(k+1) = F x_k + G u_k, y_k = H x_k. The state has the
+        deviations of the plant's state, the last readings of joints and rates, the controller's
+        memory and the commanded forces still delayed. `more` is a further delay in seconds.
         """
         period, law, n = self.period, self.law, self.plant.inputs.shape[1]
         late, delay_samples = split_delay(self.delay + more, period)

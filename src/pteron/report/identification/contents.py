@@ -151,7 +151,11 @@ def contents(identification: Identification) -> Contents:
 
 
 def _page_recording(prediction: Prediction, names: dict[str, str]) -> PageRecording:
-    """Return a recording with the stretch of greatest error, which is drawn."""
+    """Return a prediction of forces for the page, with the samples that its figure shows.
+
+    They are those of some seconds in which measured and predicted forces differ most; `names` are
+    the names of recordings by their source.
+    """
     time = prediction.time
     step = float(time[-1] - time[0]) / max(len(time) - 1, 1)
     length = min(max(int(_STRETCH / max(step, 1e-9)), _FEWEST), len(time))
