@@ -279,7 +279,7 @@ class MachineSlopes:
         return slope_matrix(guess.robot, self._changes, self._terms, geometry)
 
     def _readings(self, readings: Array, joints: Array) -> Array:
-        """Return readings (N, n) by which scale errors are multiplied."""
+        """Return the readings (N, n) whose products with scale errors are errors of the joints."""
         return readings
 
     def _base_vectors(self, vectors: Array) -> Array:

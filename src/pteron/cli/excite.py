@@ -30,9 +30,9 @@ _CLEARANCE = "joint_clearance"
 """The limit of the joints' distance from their limits."""
 
 _MEASURES = {
-    "type_i": "stretched or folded leg (type-I measure, 0 to 1)",
-    "type_ii": "platform not held (type-II measure, 0 to 1)",
-    "joint_clearance": "joint limits, beyond the required distance",
+    "type_i": "stretched or folded leg (type-I measure)",
+    "type_ii": "platform not held (type-II measure)",
+    "joint_clearance": "joint limits",
     "passive_clearance": "passive joint limits (over half the range)",
 }
 """Names of limits in the output, where they are not those of the code."""
@@ -292,7 +292,7 @@ def _quality(excitation: Excitation) -> Table:
         caption = "-: undefined, because a base parameter's nominal value is 0"
     numbers = (
         ("scaled to length 1", best.scaled, random.scaled),
-        ("scaled by nominal parameters", best.nominal, random.nominal),
+        ("times nominal values", best.nominal, random.nominal),
         ("unscaled, in SI units", best.unscaled, random.unscaled),
     )
     rows = ((n, _number(a, 3), _number(b, 3), _number(b / a, 3)) for n, a, b in numbers)

@@ -85,13 +85,13 @@ class AdaptationScales:
     def adaptation_matrix(
         self, damping: Array, count: int, rate: float, most: float
     ) -> tuple[Array, float]:
-        """Return the learning matrix L (count, count), and the usual size of eta in L eta.
+        """Return the factor L (count, count) of the adaptation gain, and the usual error over it.
 
         An estimate's error x acts as the force Y x; the joints with damping K (n,) respond by K^-1
         Y x, and the estimate changes by Gamma Y^T times that. So Gamma = L L^T is `rate` times the
         inverse of the mean of Y^T K^-1 Y, reduced where a parameter would be learnt faster than
-        `most` somewhere in the motion. The second result is the norm of eta if the estimates are
-        wrong by their `scales`, theta - theta_0 = L eta, averaged over signs.
+        `most` somewhere in the motion. The second result is the mean norm of eta, where
+        L eta is an error of the estimates by their `scales` with any signs.
         """
         scales = self.scales[:count]
         effects = self.columns[..., :count] * (scales / np.sqrt(damping)[:, None])

@@ -80,8 +80,9 @@ def terms(machine: Machine, state: State) -> RegressorTerms:
 def paper_regressor(machine: Machine, state: State) -> Expression:
     """Return the regressor D (n, N) of Eq. (15): drive forces F_a = D P for parameters P.
 
-    Omega contains the forces that act on the bodies, so that the forces that balance them have a
-    minus sign.
+    Eq. (15) is the paper's: each body's link Jacobian, transposed, times its matrix Omega, whose
+    product with the body's parameters is the inertial force that acts on it; the drive forces
+    balance these, hence a minus sign.
     """
     bracket = state.platform.quasi_forces(terms(machine, state).bracket)
     return -machine.closure.forces(bracket, state.platform, state.legs)  # J^-T of Eq. (15)

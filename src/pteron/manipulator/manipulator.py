@@ -133,8 +133,8 @@ class Manipulator:
     def wraps(self) -> NDArray[np.bool_]:
         """Mask (m,) of pose coordinates that are angles whose full turn changes no joint.
 
-        The platform's angles are such, unless they slide the platform's halves or a joint follows
-        them.
+        These are all angles of the platform, except phi of an I4, which moves its two halves along
+        each other, and except angles that an actuated joint follows turn by turn.
         """
         around = bool(self.platform.rotation_axes)
         return self.platform.angular & (around and not any(leg.follows_angle for leg in self.legs))

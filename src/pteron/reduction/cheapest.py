@@ -133,7 +133,10 @@ class _Model:
         self.known: dict[tuple[int, ...], int] = {}
 
     def cost(self, base_columns: tuple[int, ...]) -> int:
-        """Return the operations for a state, before the optimisation pass, which is slow."""
+        """Return the operations of inverse dynamics at a state with these base parameters.
+
+        They are counted before the optimisation pass, which is slow.
+        """
         if base_columns not in self.known:
             base = ca.SX.sym("base", len(base_columns))
             base_values = ca.SX(len(self.machine.parameters), 1)

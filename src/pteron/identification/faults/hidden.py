@@ -32,12 +32,12 @@ up to 3 % is trusted, and a fault may be larger than usual."""
 def hidden_faults(
     columns: FaultColumns, observations: Observations, noise: Array, other: ReferenceCycle
 ) -> list[FaultName]:
-    """Return the faults that the equations cannot show beyond the noise (n,) of the forces.
+    """Return the faults that these logs cannot reveal, given the noise (n,) of the forces.
 
-    `other` is another motion than that of the logs. The clock and the scale of one force are left
-    open if their column depends on the model's columns, but for a part below the noise. Zeros,
-    ratios, lengths, elasticity and friction are left open if an error of a usual size that
-    residuals do not tell changes the other motion's forces by more than `_HARMFUL`.
+    A delay of the clock and the scale of one force are returned if their column is a linear
+    combination of the model's columns up to the noise. Zeros, ratios, lengths, elasticity and
+    friction are returned if an error of usual size hardly changes the residuals, but changes the
+    forces of another motion, `other`, by more than `_HARMFUL`.
     """
     motion = columns.motion(other.states, np.full(len(other.states), 0.5))
     weights = 1.0 / np.maximum(noise, _NOISELESS * noise.max() + 1e-300)
