@@ -143,7 +143,7 @@ class TermGraph:
         return sign_of(operand) * (there or self.add("inverse", abs(operand)))
 
     def is_kind(self, kind: str, operand: int) -> bool:
-        """Return whether an operand, a node's index with a sign, is a node of this kind, "sum" ..."""
+        """Return whether an operand, a node's index with a sign, is of this kind: "sum" ..."""
         return self.kinds[abs(operand)] == kind
 
     def order(self, roots: Iterable[int]) -> list[int]:
