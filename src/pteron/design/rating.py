@@ -205,10 +205,7 @@ class KindEvaluator:
         if self.job.workspace.tilt is not None:
             # Between the tilts of the samples rams are longer and shorter.
             def ends(places: Array) -> Array:
-                """Return joint coordinates and their negatives (N, 2 n), m or rad.
-
-                They are infinite out of reach.
-                """
+                """Return joint coordinates and their negatives (N, 2 n); infinite out of reach."""
                 at = inverse_kinematics(robot, rating.middle + places, on_failure="nan")
                 return np.asarray(np.nan_to_num(np.hstack([at, -at]), nan=np.inf))
 
