@@ -241,15 +241,16 @@ def test_structured_text_closes_the_loop(tmp_path):
 @pytest.mark.parametrize("what", ["simulate", "advance"])
 def test_an_interrupt_ends_a_loop_that_would_run_for_minutes_or_years(what, monkeypatch):
     monkeypatch.delenv("PTERON_KERNELS", raising=False)
-    robot = driven("tripteron")
+    robot, law = driven("tripteron"), ComputedTorque(period=1e-4)
     advance(robot, REST, REST, REST, 1e-6, 10)  # compiles
+    simulate(robot, None, law, start=(REST, REST), duration=1e-3)
     main = threading.main_thread().ident
     timer = threading.Timer(1.0, signal.pthread_kill, (main, signal.SIGINT))
     timer.start()
     still = {"start": (REST, REST), "duration": 0.5, "step": 1e-8}
     run = {
         "advance": lambda: advance(robot, REST, REST, REST, 1e-15, 10**12),
-        "simulate": lambda: simulate(robot, None, ComputedTorque(period=1e-4), **still),
+        "simulate": lambda: simulate(robot, None, law, **still),
     }
     with pytest.raises(KeyboardInterrupt):
         run[what]()

@@ -46,11 +46,13 @@ def run(command: Sequence[str]) -> subprocess.CompletedProcess[str]:
     with _CHANGES:
         _RUNNING.add(process)
     try:
-        out, error = process.communicate()
-    except BaseException:
-        _end(process)
-        process.wait()
-        raise
+        with process:  # which closes its pipes where Ctrl-C ends this
+            try:
+                out, error = process.communicate()
+            except BaseException:
+                _end(process)
+                process.wait()
+                raise
     finally:
         with _CHANGES:
             _RUNNING.discard(process)
