@@ -74,7 +74,7 @@ class _DriveOutputs(NamedTuple):
     motor_forces: list[Expression]
     """With ripple and cogging, less LuGre's friction."""
     transmission_forces: list[Expression]
-    """Of transmissions that bend, on their joints; 0 of a rigid one."""
+    """The forces of elastic transmissions on their joints; 0 of a rigid one."""
     current_rates: list[Expression]
     bristle_rates: list[Expression]
 

@@ -12,7 +12,7 @@ import textwrap
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 
@@ -118,8 +118,6 @@ def export_c(
     ['CMakeLists.txt', 'quadrupteron.c', 'quadrupteron.h', 'test_quadrupteron.c']
     """
     robot = as_manipulator(robot)
-    if real not in get_args(Real):
-        raise ModelError(f'real: {real!r} is neither "double" nor "float"')
     exported = exported_functions(
         robot, functions, specialised=specialised, wrench=wrench, output=output, base=base
     )
@@ -130,20 +128,9 @@ def c_texts(
     robot: Manipulator, exported: Sequence[ExportedFunction], real: Real = "double"
 ) -> dict[str, str]:
     """Return the files of `export_c` by their names: header, source, test, CMakeLists.txt."""
-    prefix, single = prefix_of(robot), real == "float"
-    variables = {
-        "banner": banner(robot, "C99"),
-        "prefix": prefix,
-        "upper": prefix.upper(),
-        "real": real,
-        "f": "f" if single else "",
-        "printer": CPrinter(prefix, real),
-        "tables": {t.name: t for function in exported for t in function.tables}.values(),
-        "functions": exported,
-        "largest": 3.4028234e38 if single else 1.7976931348623157e308,
-        "tolerance": _tolerance_of(float(np.finfo(np.float32 if single else np.float64).eps)),
-        **arithmetic(),
-    }
+    variables, prefix = source_variables(robot, exported, real, "C99"), prefix_of(robot)
+    rounding = float(np.finfo(np.float32 if real == "float" else np.float64).eps)
+    variables["tolerance"] = _tolerance_of(rounding)
     files = {
         f"{prefix}.h": "header.h.j2",
         f"{prefix}.c": "source.c.j2",
@@ -152,6 +139,30 @@ def c_texts(
     }
     folder = "pteron.export"
     return {file: render_template(folder, name, **variables) for file, name in files.items()}
+
+
+def source_variables(
+    robot: Manipulator,
+    exported: Sequence[ExportedFunction],
+    real: Real,
+    language: Literal["C99", "CUDA"],
+) -> dict[str, Any]:
+    """Return the variables of the templates of C and CUDA; ModelError if `real` is unknown."""
+    if real not in get_args(Real):
+        raise ModelError(f'real: {real!r} is neither "double" nor "float"')
+    prefix, single = prefix_of(robot), real == "float"
+    return {
+        "banner": banner(robot, language),
+        "prefix": prefix,
+        "upper": prefix.upper(),
+        "real": real,
+        "f": "f" if single else "",
+        "printer": CPrinter(prefix, real, device=language == "CUDA"),
+        "tables": {t.name: t for function in exported for t in function.tables}.values(),
+        "functions": exported,
+        "largest": 3.4028234e38 if single else 1.7976931348623157e308,
+        **arithmetic(),
+    }
 
 
 def _tolerance_of(rounding: float) -> Callable[[float], float]:
@@ -174,12 +185,12 @@ class CPrinter:
 
     @property
     def table(self) -> str:
-        """What precedes a constant table's type."""
+        """The qualifiers before the type of a constant table or an exported function."""
         return "static __device__ " if self.device else ""
 
     @property
     def helper(self) -> str:
-        """What precedes the type of a function that the exported ones call."""
+        """The qualifiers before the type of a helper function, which exported functions call."""
         return "static __device__ " if self.device else "static "
 
     def number(self, number: float) -> str:

@@ -9,16 +9,13 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import get_args
 
 from pteron.atomic import write_texts
-from pteron.errors import ModelError
-from pteron.export.c import CPrinter, Real
+from pteron.export.c import Real, source_variables
 from pteron.export.command_units import Output
-from pteron.export.descriptions import banner
 from pteron.export.functions import FunctionChoice, exported_functions
 from pteron.export.names import prefix_of
-from pteron.kernels.code import arithmetic, render_template
+from pteron.kernels.code import render_template
 from pteron.manipulator import RobotLike, as_manipulator
 
 _MACROS = re.compile(r"\bis(?=(?:less|lessequal|greaterequal)\()")
@@ -73,24 +70,10 @@ def export_cuda(
     ['quadrupteron.cu', 'quadrupteron.cuh', 'quadrupteron_cuda.py']
     """
     robot = as_manipulator(robot)
-    if real not in get_args(Real):
-        raise ModelError(f'real: {real!r} is neither "double" nor "float"')
     exported = exported_functions(
         robot, functions, specialised=specialised, wrench=wrench, output=output, base=base
     )
-    prefix, single = prefix_of(robot), real == "float"
-    variables = {
-        "banner": banner(robot, "CUDA"),
-        "prefix": prefix,
-        "upper": prefix.upper(),
-        "real": real,
-        "f": "f" if single else "",
-        "printer": CPrinter(prefix, real, device=True),
-        "tables": {t.name: t for function in exported for t in function.tables}.values(),
-        "functions": exported,
-        "largest": 3.4028234e38 if single else 1.7976931348623157e308,
-        **arithmetic(),
-    }
+    variables, prefix = source_variables(robot, exported, real, "CUDA"), prefix_of(robot)
     files = {f"{prefix}.cuh": "device.cuh.j2", f"{prefix}.cu": "kernels.cu.j2"}
     files[f"{prefix}_cuda.py"] = "cuda.py.j2"
     texts = {

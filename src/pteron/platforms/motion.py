@@ -138,7 +138,7 @@ class PlatformEquations(ABC):
     kinds: ClassVar[tuple[str, ...]] = PlanarInertia.kinds
     """The kinds of its inertial parameters."""
     freedom_text: ClassVar[str]
-    """What the platform does, for people: a verb, and its motion's name."""
+    """The platform's motion in words: a verb, and the name of the motion."""
     slides: ClassVar[bool] = False
     """Whether phi makes parts of the platform slide instead of turning it."""
     tilts: ClassVar[bool] = False

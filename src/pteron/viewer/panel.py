@@ -307,7 +307,7 @@ _ACTIONS: dict[str, Callable[[_Request], _Action]] = {
     "step": lambda r: ("step", partial(r.session.step, -1 if r.fields["back"] else 1)),
     "rest": lambda r: ("push", r.session.end_push),
 }
-"""What a page may ask for, by the field `do` of its request."""
+"""The requests that a page may send, by their field `do`."""
 
 
 def _joint_factors(robot: Manipulator) -> Array:

@@ -39,7 +39,7 @@ class PlayRecord(NamedTuple):
     """The force that its transmission passes on, by the fit."""
     residual: Array
     moving: NDArray[np.bool_]
-    """Where it moves: as it turns round, dry friction alone makes residuals."""
+    """Samples at which the joint moves: where it reverses, dry friction alone makes residuals."""
 
 
 class BacklashSignature(NamedTuple):
