@@ -38,7 +38,31 @@ GRID, BLOCK = 2, 3
 
 
 class DeviceArray(np.ndarray):
-    """An array of the emulated GPU."""
+    """An array of the emulated GPU; NumPy's functions refuse others beside it, as CuPy's do."""
+
+    def __array_ufunc__(self, ufunc, method, *inputs, out=None, **options):
+        """Return the result of a function of elements as an array of the GPU."""
+        _expect_on_device((inputs, out))
+        plain = [np.asarray(array) for array in inputs]
+        if out is not None:
+            options["out"] = tuple(map(np.asarray, out))
+        result = getattr(ufunc, method)(*plain, **options)
+        return np.asarray(result).view(DeviceArray) if out is None else out[0]
+
+    def __array_function__(self, function, types, arguments, options):
+        """Return the result of a function of arrays as an array of the GPU."""
+        _expect_on_device((arguments, options))
+        return _viewed(function(*_viewed(arguments, np.ndarray), **_viewed(options, np.ndarray)))
+
+    def __setitem__(self, place, values):
+        """Set elements to numbers, or an array on the GPU."""
+        _expect_on_device((place, values))
+        super().__setitem__(place, values)
+
+    def __getitem__(self, place):
+        """Return elements as an array on the GPU, also a single one."""
+        _expect_on_device(place)
+        return np.asarray(super().__getitem__(place)).view(DeviceArray)
 
     @property
     def data(self):
@@ -48,6 +72,27 @@ class DeviceArray(np.ndarray):
     def get(self):
         """Return a copy on the host."""
         return np.array(self)
+
+
+def _viewed(values, kind=DeviceArray):
+    """Return values with their arrays seen as arrays of a kind; numbers of NumPy as arrays too."""
+    if isinstance(values, (tuple, list)):
+        return type(values)(_viewed(value, kind) for value in values)
+    if isinstance(values, dict):
+        return {key: _viewed(value, kind) for key, value in values.items()}
+    is_array = isinstance(values, np.ndarray | np.generic)
+    return np.asarray(values).view(kind) if is_array else values
+
+
+def _expect_on_device(values):
+    """Raise TypeError for an array with axes that is not on the GPU."""
+    if isinstance(values, (tuple, list)):
+        for value in values:
+            _expect_on_device(value)
+    elif isinstance(values, dict):
+        _expect_on_device(list(values.values()))
+    elif isinstance(values, np.ndarray) and values.ndim and not isinstance(values, DeviceArray):
+        raise TypeError(f"an array of NumPy beside arrays on the GPU: {values.shape}")
 
 
 def asarray(values, dtype=None):
@@ -82,7 +127,7 @@ class RawModule:
     """A module of CUDA code."""
 
     def __init__(self, code, options=()):
-        assert all(option.startswith(("-std=", "--fmad=")) for option in options)
+        assert all(option.startswith(("-std=", "--fmad=", "--device-int128")) for option in options)
         self._library = _library(code)
 
     def get_function(self, name):
@@ -113,6 +158,7 @@ def module(available=True):
     cupy.empty = lambda shape, dtype=float: np.empty(shape, dtype).view(DeviceArray)
     cupy.broadcast_to = lambda array, shape: np.broadcast_to(array, shape, subok=True)
     cupy.ascontiguousarray = lambda array: np.ascontiguousarray(array).view(DeviceArray)
+    cupy.zeros = lambda shape, dtype=float: np.zeros(shape, dtype).view(DeviceArray)
     cupy.is_available = lambda: available
     # What benchmarks use beside.
     cupy.tile = lambda array, count: np.tile(array, count).view(DeviceArray)

@@ -105,12 +105,12 @@ def test_arrays_may_have_any_strides(cupy):
     columns = cupy.asarray(np.ascontiguousarray(poses.T)).T
     by_columns = kernel(columns)
     assert by_columns.strides == columns.strides
-    np.testing.assert_array_equal(by_columns, expected)
-    np.testing.assert_array_equal(kernel(cupy.asarray(poses)[::2]), expected[::2])
+    np.testing.assert_array_equal(by_columns.get(), expected)
+    np.testing.assert_array_equal(kernel(cupy.asarray(poses)[::2]).get(), expected[::2])
     np.testing.assert_array_equal(
-        kernel(cupy.asarray(poses.reshape(4, 6, 3))), expected.reshape(4, 6, 3)
+        kernel(cupy.asarray(poses.reshape(4, 6, 3))).get(), expected.reshape(4, 6, 3)
     )
-    np.testing.assert_array_equal(kernel(poses[5]), expected[5])
+    np.testing.assert_array_equal(kernel(poses[5]).get(), expected[5])
     assert kernel(cupy.empty((0, 3))).shape == (0, 3)
     assert kernel(cupy.empty((2, 0, 3))).shape == (2, 0, 3)
 
@@ -121,14 +121,14 @@ def test_leading_axes_broadcast(cupy):
     kernel = pteron.compile(robot, "inverse_dynamics", "cuda")
     expected = pteron.compile(robot, "inverse_dynamics", "c")(poses, rates, np.zeros(4))
     present = kernel(cupy.asarray(poses), cupy.asarray(rates), np.zeros(4))
-    np.testing.assert_array_equal(present, expected)
+    np.testing.assert_array_equal(present.get(), expected)
 
 
 def test_more_states_than_threads(cupy):
     poses = np.tile(pteron.random_poses("delta", 100), (1000, 1))
     assert len(poses) > GRID * BLOCK
     present = pteron.compile("delta", "inverse_kinematics", "cuda")(cupy.asarray(poses))
-    np.testing.assert_array_equal(present, pteron.inverse_kinematics("delta", poses))
+    np.testing.assert_array_equal(present.get(), pteron.inverse_kinematics("delta", poses))
 
 
 def test_arrays_of_other_libraries_come_back_as_they_were(cupy):
@@ -268,18 +268,18 @@ def test_exported_functions_have_results_and_status_of_c(cupy, name, tmp_path):
             code, *expected = call(item.name, *(array[k] for array in states), sizes=sizes)
             assert status[k] == code
             for result, row in zip(results, expected, strict=True):
-                np.testing.assert_array_equal(np.ravel(result[k]), row)
-    assert {0, 1} <= set(np.ravel(status).tolist())
+                np.testing.assert_array_equal(result[k].get().ravel(), row)
+    assert {0, 1} <= set(status.get().tolist())
 
 
 def test_exported_parameters_are_the_default(cupy, tmp_path):
     module = exported(tmp_path, "delta", ["inverse_dynamics"])
     pose, zero = [0.0, 0.1, -0.9], np.zeros(3)
     forces, status = module.inverse_dynamics(pose, zero, zero)
-    np.testing.assert_allclose(forces, pteron.inverse_dynamics("delta", pose, zero, zero))
+    np.testing.assert_allclose(forces.get(), pteron.inverse_dynamics("delta", pose, zero, zero))
     assert status == 0
     heavier = module.inverse_dynamics(pose, zero, zero, 2.0 * module.PARAMETERS)[0]
-    np.testing.assert_allclose(heavier, 2.0 * forces)
+    np.testing.assert_allclose(heavier.get(), 2.0 * forces.get())
     with pytest.raises(ValueError, match=r"pose: shape \(2,\) given, \(..., 3\) expected"):
         module.inverse_dynamics([0.0, 0.0], zero, zero)
 

@@ -24,32 +24,32 @@ class EnvironmentPicture:
     """The picture of one machine, drawn anew for each state: its guides are the same in all."""
 
     def __init__(self, world: World) -> None:
-        self._world = world
+        self.world = world
 
     @cached_property
     def _guides(self) -> tuple[Guide, ...]:
         """The paths of the machine's actuated joints, over random poses."""
         generators = [np.random.default_rng(seed) for seed in range(_POSES)]
-        return joint_guides(self._world.robot, self._world.start_episodes(generators, None).pose)
+        return joint_guides(self.world.robot, self.world.start_episodes(generators, None).pose)
 
     def render(self, state: EpisodeState) -> NDArray[np.uint8]:
         """Return pixels (height, width, 3) of the machine in a state, with a line to its target.
 
         All pictures have the size of the picture with the machine at home.
         """
-        figure = self._drawn(state.pose, self._world.target(state)[0])
+        figure = self._drawn(state.pose, self.world.target(state)[0])
         figure.set_size_inches(self._size)
         return pixels(figure)
 
     @cached_property
     def _size(self) -> tuple[float, float]:
         """Width and height of the figure with the machine at home, in inches."""
-        width, height = self._drawn(self._world.home, self._world.home).get_size_inches()
+        width, height = self._drawn(self.world.home, self.world.home).get_size_inches()
         return float(width), float(height)
 
     def _drawn(self, pose: Array, target: Array) -> Figure:
         """Return the figure of the machine at a pose (m,), with a line from tool to target."""
-        robot = self._world.robot
+        robot = self.world.robot
         points = joint_points(robot, pose)
         figure = robot_figure(
             points,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Literal, get_args
 
 import numpy as np
 from gymnasium.utils import seeding
@@ -11,14 +11,19 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from pteron.arguments import checked_arguments
+from pteron.arguments import checked_arguments, expect_one_of
 from pteron.environments.construction import world_of
+from pteron.environments.device_world import device_world
 from pteron.environments.environment import Numbers, checked_mode, spaces
 from pteron.environments.picture import EnvironmentPicture
 from pteron.environments.state import Bools, EpisodeState
 from pteron.errors import DataError
+from pteron.kernels.loops import Device
 from pteron.manipulator import RobotLike, as_manipulator
 from pteron.motion import Machines, Motion
+
+Tensors = Literal["torch", "cupy", "jax"]
+"""A library of arrays on a GPU."""
 
 
 @checked_arguments
@@ -40,11 +45,17 @@ class PteronVectorEnv(VectorEnv[Numbers, Numbers, Numbers]):
     machines : Machines, optional
         The machine of each environment (domain randomisation), `num_envs` of them, such as
         `pteron.motion.machines_about` draws: their masses, friction and payload differ.
+    device : {"cpu", "cuda"}
+        The processor, or an NVIDIA GPU: there states, observations, rewards and resets stay, and
+        episodes are those of the processor. Actions are float32; `infos` have no "stopped":
+        `end_reason` returns it.
+    tensors : {"torch", "cupy", "jax"}
+        The library of the GPU's results, which share memory with the environment.
 
     Raises
     ------
     DataError, ModelError
-        As `PteronEnv`, or if there is no environment.
+        As `PteronEnv`, or if there is no environment, or no GPU or library.
 
     Examples
     --------
@@ -73,7 +84,11 @@ class PteronVectorEnv(VectorEnv[Numbers, Numbers, Numbers]):
         max_episode_steps: int | None = None,
         render_mode: str | None = None,
         machines: Machines | None = None,
+        device: Device = "cpu",
+        tensors: Tensors = "torch",
     ) -> None:
+        expect_one_of(get_args(Device), device=device)
+        expect_one_of(get_args(Tensors), tensors=tensors)
         for name, number in {"num_envs": num_envs, "max_episode_steps": max_episode_steps}.items():
             if number is not None and number < 1:
                 raise DataError(f"{name}: {number} given, 1 or more expected")
@@ -91,18 +106,20 @@ class PteronVectorEnv(VectorEnv[Numbers, Numbers, Numbers]):
             tolerance=tolerance,
             machines=machines,
         )
-        self.num_envs = num_envs
+        self._picture = EnvironmentPicture(self.world)
+        if device == "cuda":
+            self.world = device_world(self.world, tensors)
+        self.num_envs, self._device, self._tensors = num_envs, device, tensors
         pair = spaces(self.world.bounds, len(self.world.forces))
         self.single_observation_space, self.single_action_space = pair
         self.observation_space, self.action_space = (batch_space(space, num_envs) for space in pair)
         self.render_mode = checked_mode(render_mode)
         self.metadata = {**self.metadata, "render_fps": max(1, round(1.0 / period))}
         self._most = max_episode_steps
-        self._generators: list[np.random.Generator | None] = [None] * num_envs
+        self._generators = self.world.generators(num_envs)
         self._state: EpisodeState | None = None
-        self._done = np.zeros(num_envs, dtype=bool)
-        self._steps = np.zeros(num_envs, dtype=np.int64)
-        self._picture = EnvironmentPicture(self.world)
+        self._done = self.world.array(np.zeros(num_envs, dtype=bool))
+        self._steps = self.world.array(np.zeros(num_envs, dtype=np.int64))
 
     def reset(
         self,
@@ -118,20 +135,24 @@ class PteronVectorEnv(VectorEnv[Numbers, Numbers, Numbers]):
         options = dict(options or {})
         chosen = self._mask(options.pop("reset_mask", None))
         seeds = self._seeds(seed)
-        for i in np.flatnonzero(chosen).tolist():
-            if seeds[i] is not None or self._generators[i] is None:
-                self._generators[i] = seeding.np_random(seeds[i])[0]
-        self._start(chosen, options)
+        is_first = self._state is None
+        rows = [i for i in np.flatnonzero(chosen).tolist() if is_first or seeds[i] is not None]
+        self._generators.put(rows, [seeding.np_random(seeds[i])[0] for i in rows])
+        known = self.world.array(chosen)
+        self._start(known, options)
         assert self._state is not None
-        return self.world.observations(self._state), self._infos(
-            self.world.distance(self._state), chosen
-        )
+        infos = self._infos(self.world.distance(self._state), known)
+        return self._tensor(self.world.observations(self._state)), infos
+
+    def _tensor(self, array: Any) -> Any:
+        """Return an array as the user is given it."""
+        return self.world.tensor(array, self._tensors)
 
     def _mask(self, mask: Any) -> Bools:
         """Return the checked mask (E,) of environments to reset; all if `mask` is None."""
         if mask is None:
             return np.ones(self.num_envs, dtype=bool)
-        chosen = np.asarray(mask)
+        chosen = np.asarray(mask.get() if hasattr(mask, "get") else mask)
         if chosen.shape != (self.num_envs,) or chosen.dtype != bool or not chosen.any():
             raise DataError(
                 f"options: reset_mask must be {self.num_envs} truth values, at least one True"
@@ -154,9 +175,10 @@ class PteronVectorEnv(VectorEnv[Numbers, Numbers, Numbers]):
 
     def _start(self, chosen: Bools, options: dict[str, Any] | None) -> None:
         """Start new episodes in the chosen environments; the others are unchanged."""
-        generators = [self._generators[i] for i in np.flatnonzero(chosen).tolist()]
-        new = self.world.start_episodes([rng for rng in generators if rng is not None], options)
-        self._state = new if self._state is None else self._state.put(chosen, new)
+        rows = np.flatnonzero(chosen)
+        numbers = self._generators.random(rows, self.world.number_count)
+        new = self.world.episodes_from(numbers, options)
+        self._state = new if self._state is None else self._state.put(rows, new)
         self._done = self._done & ~chosen
         self._steps = np.where(chosen, 0, self._steps)
 
@@ -181,21 +203,24 @@ class PteronVectorEnv(VectorEnv[Numbers, Numbers, Numbers]):
         late = late & ~starting
         self._done = ended | late
         infos = self._infos(distance, np.ones_like(ended))
-        if ended.any():
+        if self._device == "cpu" and ended.any():
             reasons = np.full(self.num_envs, None, dtype=object)
             for i in np.flatnonzero(ended).tolist():
-                reasons[i] = self.world.end_reason(self._state.pose[i], self._state.velocity[i])
+                reasons[i] = self.end_reason(i)
             infos |= {"stopped": reasons, "_stopped": ended.copy()}
-        return self.world.observations(self._state), reward, ended, late, infos
+        arrays = self.world.observations(self._state), reward, ended, late
+        observations, reward, ended, late = map(self._tensor, arrays)
+        return observations, reward, ended, late, infos
 
     def _infos(self, distance: NDArray[Any], known: Bools) -> dict[str, Any]:
         """Return the infos of gymnasium's vector API: distance, success, and masks where known."""
-        return {
+        infos = {
             "distance": np.where(known, distance, 0.0),
             "_distance": known.copy(),
             "is_success": (distance < self.world.tolerance) & known,
             "_is_success": known.copy(),
         }
+        return {name: self._tensor(array) for name, array in infos.items()}
 
     def render(self) -> tuple[NDArray[np.uint8], ...] | None:
         """Return a picture (height, width, 3) of every machine; None without a render mode."""
@@ -203,4 +228,12 @@ class PteronVectorEnv(VectorEnv[Numbers, Numbers, Numbers]):
             return None
         if self._state is None:
             raise DataError("render before reset; call reset first")
-        return tuple(self._picture.render(self._state.row(i)) for i in range(self.num_envs))
+        states = self.world.host_state(self._state)
+        return tuple(self._picture.render(states.row(i)) for i in range(self.num_envs))
+
+    def end_reason(self, i: int) -> str:
+        """Return as text why the episode of environment i ended with the last step."""
+        if self._state is None:
+            raise DataError("end_reason before reset; call reset first")
+        state = self.world.host_state(self._state.row(i))
+        return self._picture.world.end_reason(state.pose, state.velocity)

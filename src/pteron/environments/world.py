@@ -6,18 +6,19 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import hypot
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from pteron.environments.state import Bools, EpisodeState
+from pteron.environments.state import Bools, EpisodeState, HostGenerators
 from pteron.errors import DataError
 from pteron.kernels import Array, as_array, numeric
 from pteron.manipulator import Manipulator
 from pteron.motion import Machines, Motion, advance
 from pteron.motion.simulation.plant import drive_states
 from pteron.workspace import pose_margins
+from pteron.workspace.margins import MarginScales, margin_scales, margins_from
 
 LEVER = 0.1
 """Length that counts as much as a radian in the distance between poses, m."""
@@ -44,10 +45,24 @@ _GREATEST = float(np.finfo(np.float32).max)
 """Bound of an observed number that has none: as Gymnasium's own environments have it."""
 
 _DRAWS = 16
-"""Random poses drawn at a time for each start or target."""
+"""Random poses drawn for each start and target."""
 
 _SHARES = (1.0, 0.5, 0.25, 0.125)
 """Shares of the way from home to random poses that are tried in turn."""
+
+
+class Constants(NamedTuple):
+    """Arrays of a `World` that do not change, see there; `levers` (m,) are `LEVER` of angles.
+
+    `speeds` (m,), m/s and rad/s, are those above which an episode ends.
+    """
+
+    home: Array
+    forces: Array
+    bounds: Array
+    levers: Array
+    speeds: Array
+    margins: MarginScales
 
 
 @dataclass(frozen=True)
@@ -126,15 +141,14 @@ class World:
     def observations(self, state: EpisodeState) -> NDArray[np.float32]:
         """Return observations (..., 4 m): pose and velocity of platform and target."""
         parts = [state.pose, state.velocity, *self.target(state)]
-        bounds = self.bounds
+        bounds = self._constants.bounds
         return np.clip(np.concatenate(parts, axis=-1), -bounds, bounds).astype(np.float32)
 
     def target(self, state: EpisodeState) -> tuple[Array, Array]:
         """Return pose and velocity of the targets, (..., m) each."""
         if self.motion is None:
             return state.target, np.zeros_like(state.target)
-        time = self.motion.time[0] + np.mod(state.clock, self.motion.duration)
-        return self.motion.at(time)[:2]
+        return self._reference(np.mod(state.clock, self.motion.duration))
 
     def distance(self, state: EpisodeState) -> Array:
         """Return the distance (...), m, of machines from their targets.
@@ -145,8 +159,9 @@ class World:
 
     def metres(self, differences: Array) -> Array:
         """Return the norms (...), m, of pose differences (..., m); a radian counts `LEVER` m."""
-        scaled = differences * np.where(self.robot.platform.angular, LEVER, 1.0)
-        return np.asarray(np.sqrt((scaled**2).sum(axis=-1)))
+        scaled = differences * self._constants.levers
+        metres: Array = np.sqrt((scaled**2).sum(axis=-1))
+        return metres
 
     def travel(self, spread: float) -> Array:
         """Return how far each coordinate can go down and up from home, (2, m), with margin left.
@@ -171,55 +186,65 @@ class World:
         DataError
             If an option is unknown, or a pose is none that the machine may have.
         """
-        chosen = {key: self._pose(key, option) for key, option in (options or {}).items()}
-        poses = self._draw_poses(generators, None)
-        targets = self._draw_poses(generators, chosen.get("pose", poses))
-        velocity, clock = np.zeros_like(poses), np.zeros(len(poses))
+        numbers = np.stack([rng.random(self.number_count) for rng in generators])
+        return self.episodes_from(numbers, options)
+
+    @property
+    def number_count(self) -> int:
+        """How many random numbers an episode's start takes."""
+        return 2 * _DRAWS * self.robot.freedom + (self.motion is not None)
+
+    def episodes_from(self, numbers: Array, options: Mapping[str, Any] | None) -> EpisodeState:
+        """Return initial states (B, m) of episodes from random numbers in [0, 1), (B, K)."""
+        poses_given = {key: self._pose(key, option) for key, option in (options or {}).items()}
+        chosen = {key: self.array(pose) for key, pose in poses_given.items()}
+        shape = (len(numbers), 2, _DRAWS, self.robot.freedom)
+        draws = 2.0 * numbers[:, : 2 * _DRAWS * self.robot.freedom].reshape(shape) - 1.0
+        poses = self._feasible_poses(draws[:, 0], None)
+        targets = self._feasible_poses(draws[:, 1], chosen.get("pose", poses))
+        velocity, clock = np.zeros_like(poses), np.zeros_like(poses[:, 0])
         if self.motion is not None:
-            clock = np.array([rng.uniform(0.0, self.motion.duration) for rng in generators])
+            clock = self.motion.duration * numbers[:, -1]
             if "pose" not in chosen:
-                poses, velocity, _ = self.motion.at(self.motion.time[0] + clock)
+                poses, velocity = self._reference(clock)
         start_poses = np.broadcast_to(chosen.get("pose", poses), poses.shape)
         return EpisodeState(
             start_poses,
             velocity,
-            drive_states(self.robot, start_poses, velocity),
+            self._drive_states(start_poses, velocity),
             np.broadcast_to(chosen.get("target", targets), poses.shape),
             clock,
         )
 
-    def _draw_poses(
-        self, generators: Sequence[np.random.Generator], others: ArrayLike | None
-    ) -> Array:
-        """Return a random pose (m,) with sufficient margin for each generator; home if none.
+    def _feasible_poses(self, draws: Array, others: Array | None) -> Array:
+        """Return a pose (m,) with sufficient margin from each row of draws (B, D, m) in [-1, 1).
 
         The pose is apart from the other poses (m,) or (B, m). If all draws lack margin, they are
-        moved nearer to home.
+        moved nearer to home; home if none has margin there.
         """
-        shape = (_DRAWS, self.robot.freedom)
-        draws = np.stack([rng.uniform(-1.0, 1.0, shape) for rng in generators])
-        box = self.travel(self.spread) if self.box is None else self.box
-        draws = np.where(draws < 0.0, -draws * box[0], draws * box[1])
-        poses_found = np.tile(self.home, (len(draws), 1))
-        missing = np.arange(len(draws))
-        other_poses = None if others is None else np.broadcast_to(others, poses_found.shape)
+        down, up = self._box
+        draws = np.where(draws < 0.0, -draws * down, draws * up)
+        home = self._constants.home
+        feasible = np.zeros_like(draws[:, 0]) + home
+        missing = np.ones_like(draws[:, 0, 0], dtype=bool)
         for share in _SHARES:
-            poses = self.home + share * draws[missing]
+            poses = home + share * draws
             is_valid: Any = self.margin_of(poses) >= self.least
-            if other_poses is not None:
-                distances = self.metres(poses - other_poses[missing, None, :])
-                is_valid &= distances > _APART * self.tolerance
-            has = is_valid.any(axis=-1)
-            poses_found[missing[has]] = poses[has, is_valid[has].argmax(axis=-1)]
-            missing = missing[~has]
-            if not len(missing):
+            if others is not None:
+                distances = self.metres(poses - others[..., None, :])
+                is_valid = is_valid & (distances > _APART * self.tolerance)
+            first = is_valid.argmax(axis=-1)[:, None, None]
+            has = (missing & is_valid.any(axis=-1))[:, None]
+            feasible = np.where(has, np.take_along_axis(poses, first, axis=1)[:, 0], feasible)
+            missing = missing & ~has[:, 0]
+            if not missing.any():
                 break
-        return poses_found
+        return feasible
 
     def margin_of(self, poses: Array) -> Array:
         """Return the singularity margins (...) of poses, negative beyond a type-II singularity."""
-        beyond = numeric(self.robot, "type_ii")(poses)[0] * self._side < 0.0
-        smallest = pose_margins(self.robot, poses).least
+        beyond = self._kernel("type_ii")(poses)[0] * self._side < 0.0
+        smallest = margins_from(self._kernel, self._constants.margins, poses).least
         return np.where(beyond, -np.abs(smallest), smallest)
 
     @cached_property
@@ -237,7 +262,7 @@ class World:
         if pose.shape != (self.robot.freedom,) or not np.isfinite(pose).all():
             names = " ".join(self.robot.coordinates)
             raise DataError(f"options: {key} is {option!r}, {names} expected, m and rad")
-        if self.margin_of(pose[None])[0] <= ENDS:
+        if self.margin_of(self.array(pose[None]))[0] <= ENDS:
             raise DataError(
                 f"options: {key} {pose.tolist()} is out of reach, singular, or beyond the joints' "
                 f"limits; choose one near home, {self.home.round(4).tolist()}"
@@ -258,27 +283,81 @@ class World:
             If the action has another shape, or is not of finite numbers.
         """
         action = np.clip(self._action(action, state.pose.shape), -1.0, 1.0)
-        pose, velocity, drives, going = advance(
-            *(self.robot, state.pose, state.velocity, action * self.forces, self.step, self.count),
-            machines=self.machines,
-            drives=state.drives,
-        )
+        pose, velocity, drives, going = self._advance(state, action * self._constants.forces)
         new = EpisodeState(pose, velocity, drives, state.target, state.clock + self.period)
         distance = self.distance(new)
         reward = 1.0 - np.tanh(2.0 * distance / self.spread)
         reward = reward - EFFORT * (action**2).mean(axis=-1)
-        ended = ~np.asarray(going, dtype=bool) | (self.margin_of(pose) < ENDS)
-        ended = ended | (np.abs(velocity) > self._speeds).any(axis=-1)
+        ended = ~going | (self.margin_of(pose) < ENDS)
+        ended = ended | (np.abs(velocity) > self._constants.speeds).any(axis=-1)
         return new, distance, np.where(ended, -1.0, reward), ended
 
-    @property
-    def _speeds(self) -> Array:
-        """The platform speeds (m,), m/s and rad/s, above which an episode ends."""
-        return np.where(self.robot.platform.angular, TURN, SPEED)
+    # What depends on where the arrays are: `DeviceWorld` has these on a GPU.
+
+    @cached_property
+    def _constants(self) -> Constants:
+        """The world's constant arrays."""
+        angular = self.robot.platform.angular
+        return Constants(
+            home=self.array(self.home),
+            forces=self.array(self.forces),
+            bounds=self.array(self.bounds),
+            levers=self.array(np.where(angular, LEVER, 1.0)),
+            speeds=self.array(np.where(angular, TURN, SPEED)),
+            margins=MarginScales(*map(self.array, margin_scales(self.robot))),
+        )
+
+    @cached_property
+    def _box(self) -> Array:
+        """The box of starts and targets about home, (2, m), m and rad."""
+        box: Array = self.array(self.travel(self.spread) if self.box is None else self.box)
+        return box
+
+    def _kernel(self, what: str) -> Any:
+        """Return the kernel of a function of the machine, by name."""
+        return numeric(self.robot, what)
+
+    def _reference(self, clock: Array) -> tuple[Array, Array]:
+        """Return pose and velocity (..., m) of the motion at times (...) since its begin, s."""
+        assert self.motion is not None
+        return self.motion.at(self.motion.time[0] + clock)[:2]
+
+    def _drive_states(self, pose: Array, velocity: Array) -> Array:
+        """Return the states (..., K) of drives that bend or lag, as at zero acceleration."""
+        return drive_states(self.robot, pose, velocity)
+
+    def _advance(self, state: EpisodeState, forces: Array) -> tuple[Array, Array, Array, Bools]:
+        """Return pose, velocity and drives of machines after a period, and which can go on."""
+        pose, velocity, drives, going = advance(
+            *(self.robot, state.pose, state.velocity, forces, self.step, self.count),
+            machines=self.machines,
+            drives=state.drives,
+        )
+        return pose, velocity, drives, np.asarray(going, dtype=bool)
+
+    def _action_array(self, action: Any) -> Array:
+        """Return an action as an array of double precision."""
+        return as_array(action, "action", ())
+
+    def array(self, numbers: Any) -> Any:
+        """Return numbers as an array where the world's arrays are."""
+        return np.asarray(numbers)
+
+    def tensor(self, array: Any, library: str) -> Any:
+        """Return an array as the user is given it."""
+        return array
+
+    def host_state(self, state: EpisodeState) -> EpisodeState:
+        """Return a state in NumPy's arrays."""
+        return state
+
+    def generators(self, count: int) -> Any:
+        """Return `count` random generators, to be put."""
+        return HostGenerators(count)
 
     def _action(self, action: Any, shape: tuple[int, ...]) -> Array:
         """Return an action as an array (..., n); raise for a wrong shape or non-finite numbers."""
-        action_array = as_array(action, "action", ())
+        action_array = self._action_array(action)
         if action_array.shape != shape:
             raise DataError(f"action: shape {action_array.shape} given, {shape} expected")
         if not np.isfinite(action_array).all():
@@ -287,7 +366,7 @@ class World:
 
     def end_reason(self, pose: Array, velocity: Array) -> str:
         """Return as text why a machine's episode ended in this last state (m,)."""
-        if (np.abs(velocity) > self._speeds).any():
+        if (np.abs(velocity) > self._constants.speeds).any():
             return f"faster than {SPEED:g} m/s or {TURN:g} rad/s"
         margins = pose_margins(self.robot, pose)
         leg = int(margins.type_i.argmin()) + 1

@@ -10,9 +10,9 @@ disk, allocates the results, and exchanges arrays with PyTorch and JAX by DLPack
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Mapping, Sequence
 from functools import cached_property, lru_cache
+from importlib import import_module
 from math import prod
 from typing import Any
 
@@ -167,7 +167,7 @@ def _has_device(cupy: Any) -> bool:
 @lru_cache(maxsize=64)
 def compiled_module(source: str, fast: bool = False) -> Any:
     """Return the CuPy module compiled from CUDA source."""
-    options = ("-std=c++17", f"--fmad={str(fast).lower()}")
+    options = "-std=c++17", "--device-int128", f"--fmad={str(fast).lower()}"
     return device_library().RawModule(code=source, options=options)
 
 
@@ -193,8 +193,10 @@ def on_device(array: Any, name: str, dtype: str) -> Any:
 
 def like(array: Any, other: Any) -> Any:
     """Return a CuPy array as an array of the library of `other`, sharing its memory."""
-    library = sys.modules.get(type(other).__module__.partition(".")[0])
-    if type(other).__module__.startswith("jax"):
-        library = sys.modules["jax.numpy"]
-    convert = getattr(library, "from_dlpack", None)
-    return array if convert is None or isinstance(other, np.ndarray) else convert(array)
+    return in_library(array, type(other).__module__.partition(".")[0])
+
+
+def in_library(array: Any, library: str) -> Any:
+    """Return a CuPy array as an array of PyTorch or JAX, sharing its memory; else as it is."""
+    names = {"torch": "torch", "jax": "jax.numpy", "jaxlib": "jax.numpy"}
+    return import_module(names[library]).from_dlpack(array) if library in names else array

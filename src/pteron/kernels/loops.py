@@ -37,6 +37,9 @@ _PIECE = 200_000
 Arrays = dict[str, Array]
 """Arrays of a run by name."""
 
+Device = Literal["cpu", "cuda"]
+"""Where machines run: the processor, or an NVIDIA GPU."""
+
 
 def _pieces(
     arrays: Mapping[str, Array], samples: int, counts: Sequence[int], machines: int
@@ -98,7 +101,7 @@ class Loop:
         ask: Ask | None = None,
         threads: int = 1,
         go: Callable[..., None] | None = None,
-        device: Literal["cpu", "cuda"] = "cpu",
+        device: Device = "cpu",
     ) -> None:
         """Simulate a number of samples; arrays (B or 1, T or 1, size) are changed in place.
 
@@ -182,7 +185,8 @@ class Loop:
     def idle(self, robot: Manipulator, state: Array, late: int = 0, behind: int = 0) -> Arrays:
         """Return the arrays of `run` for states (B, 1, Y) without loads, limits or encoders.
 
-        Commands are delayed by `late` samples, and readings by `behind` samples.
+        What a run changes is of the library of `state`, NumPy or one like it. Commands are delayed
+        by `late` samples, and readings by `behind` samples.
         """
         batch, n = len(state), robot.joint_count
         encoders = n * (2 if self.kind.bends else 1)
@@ -190,12 +194,12 @@ class Loop:
         machine_sizes |= dict.fromkeys(("clock", "done", "fault"), 1)
         shared = {"given": n, "wrench": len(robot.column_names["wrench"]), "at_motor": 2 * n}
         shared |= dict.fromkeys(("steps", "noises", "round", "noise"), encoders)
+        sizes = {name: (1, size) for name, size in machine_sizes.items()}
+        sizes |= {"queue": (late + 2, n), "told": (behind + 1, 2 * encoders)}
         return {
             "state": state,
             "seen": state.copy(),
-            "queue": np.zeros((batch, late + 2, n)),
-            "told": np.zeros((batch, behind + 1, 2 * encoders)),
-            **{name: np.zeros((batch, 1, size)) for name, size in machine_sizes.items()},
+            **{name: np.zeros_like(state, shape=(batch, *size)) for name, size in sizes.items()},
             **{name: np.zeros((1, 1, size)) for name, size in shared.items()},
             "most": np.full((1, 1, n), np.inf),
             "share": np.ones((1, 1, 1)),

@@ -442,5 +442,10 @@ def type_ii_sizes(robot: Manipulator, poses: PoseLike) -> Array:
 
     A pose out of reach, or where a leg transmits no force, thus fails any threshold.
     """
-    sizes = np.abs(numeric(robot, "type_ii")(poses)[0])
+    return finite_sizes(numeric(robot, "type_ii")(poses)[0])
+
+
+def finite_sizes(measures: Array) -> Array:
+    """Return the absolute values of measures; 0 where they are not finite."""
+    sizes = np.abs(measures)
     return np.where(np.isfinite(sizes), sizes, 0.0)

@@ -121,23 +121,7 @@ class Motion(Result):
         if len(self.time) == 1:
             zero_rates = np.zeros((*times.shape, self.pose.shape[-1]))
             return zero_rates + self.pose[0], zero_rates, zero_rates.copy()
-        clipped = np.clip(times, self.time[0], self.time[-1])
-        k = np.clip(np.searchsorted(self.time, clipped, side="right") - 1, 0, len(self.time) - 2)
-        span = (self.time[k + 1] - self.time[k])[..., None]
-        u = (clipped - self.time[k])[..., None] / span
-        p, v, a = self.pose[k], span * self.velocity[k], 0.5 * span**2 * self.acceleration[k]
-        # The remainder at the next sample, for the terms of third to fifth degree.
-        dp = self.pose[k + 1] - p - v - a
-        dv = span * self.velocity[k + 1] - v - 2.0 * a
-        da = 0.5 * span**2 * self.acceleration[k + 1] - a
-        c = 10.0 * dp - 4.0 * dv + da
-        d = -15.0 * dp + 7.0 * dv - 2.0 * da
-        e = 6.0 * dp - 3.0 * dv + da
-        pose = p + u * (v + u * (a + u * (c + u * (d + u * e))))
-        velocity = (v + u * (2.0 * a + u * (3.0 * c + u * (4.0 * d + u * 5.0 * e)))) / span
-        acceleration = (2.0 * a + u * (6.0 * c + u * (12.0 * d + u * 20.0 * e))) / span**2
-        moving = (times == clipped)[..., None]
-        return pose, np.where(moving, velocity, 0.0), np.where(moving, acceleration, 0.0)
+        return interpolate((self.time, self.pose, self.velocity, self.acceleration), times)
 
     def repeat(self, count: int) -> Motion:
         """Return the motion repeated `count` times without a pause; it must end where it begins.
@@ -176,3 +160,31 @@ def interpolate_columns(time: Array, columns: Array, at: Array) -> Array:
 def pose_text(pose: Array) -> str:
     """Return a pose as text in brackets for messages, five digits for each number."""
     return f"[{', '.join(f'{coordinate:.5g}' for coordinate in pose + 0.0)}]"
+
+
+def interpolate(
+    samples: tuple[Array, Array, Array, Array], times: Array
+) -> tuple[Array, Array, Array]:
+    """Return pose, velocity and acceleration (..., m) at times, as `Motion.at` describes.
+
+    `samples` are time (T,), T above 1, and pose, velocity and acceleration (T, m) there. Arrays may
+    be of any library whose arrays NumPy's functions take.
+    """
+    time, pose, velocity, acceleration = samples
+    clipped = np.clip(times, time[0], time[-1])
+    k = np.clip(np.searchsorted(time, clipped, side="right") - 1, 0, len(time) - 2)
+    span = (time[k + 1] - time[k])[..., None]
+    u = (clipped - time[k])[..., None] / span
+    p, v, a = pose[k], span * velocity[k], 0.5 * span**2 * acceleration[k]
+    # The remainder at the next sample, for the terms of third to fifth degree.
+    dp = pose[k + 1] - p - v - a
+    dv = span * velocity[k + 1] - v - 2.0 * a
+    da = 0.5 * span**2 * acceleration[k + 1] - a
+    c = 10.0 * dp - 4.0 * dv + da
+    d = -15.0 * dp + 7.0 * dv - 2.0 * da
+    e = 6.0 * dp - 3.0 * dv + da
+    poses = p + u * (v + u * (a + u * (c + u * (d + u * e))))
+    rates = (v + u * (2.0 * a + u * (3.0 * c + u * (4.0 * d + u * 5.0 * e)))) / span
+    rate_changes = (2.0 * a + u * (6.0 * c + u * (12.0 * d + u * 20.0 * e))) / span**2
+    moving = (times == clipped)[..., None]
+    return poses, np.where(moving, rates, 0.0), np.where(moving, rate_changes, 0.0)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +13,7 @@ from numpy.typing import NDArray
 from pteron.arguments import expect
 from pteron.kernels import Array, numeric
 from pteron.kinematics import inverse_kinematics
-from pteron.kinematics.sampling import joint_limits, type_ii_sizes
+from pteron.kinematics.sampling import finite_sizes, joint_limits
 from pteron.kinematics.singularities import best_type_ii
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.renamed import former_attribute
@@ -72,16 +74,41 @@ def pose_margins(robot: RobotLike, pose: PoseLike) -> PoseMargins:
     array([1.   , 1.   , 0.991, 1.   ])
     """
     robot = as_manipulator(robot)
-    reach, measure, _, _ = numeric(robot, "reach")(pose)
-    # A shaft without lengths reaches everywhere.
-    type_i = np.divide(reach, _leg_sizes(robot), out=np.nan_to_num(measure), where=reach < 0.0)
-    type_ii = np.minimum(type_ii_sizes(robot, pose) / best_type_ii(robot), 1.0)
+    return margins_from(partial(numeric, robot), margin_scales(robot), pose)
+
+
+class MarginScales(NamedTuple):
+    """What measures are divided by to give margins: leg sizes (n,), m, and joint limits (n,)."""
+
+    sizes: Array
+    low: Array
+    high: Array
+    half_range: Array
+    type_ii: float
+
+
+@lru_cache(maxsize=64)
+def margin_scales(robot: Manipulator) -> MarginScales:
+    """Return a machine's `MarginScales`."""
     low, high = joint_limits(robot)
-    half = np.where(np.isinf(low), 1.0, (high - low) / 2.0)
-    distances = joint_distances(robot, numeric(robot, "joint_coordinates")(pose)[0])
-    shares = np.where(np.isinf(distances), 1.0, distances / half)
+    half_range = np.where(np.isinf(low), 1.0, (high - low) / 2.0)
+    # A shaft without lengths reaches everywhere.
+    sizes = np.array([leg.size or 1.0 for leg in robot.legs])
+    return MarginScales(sizes, low, high, half_range, best_type_ii(robot))
+
+
+def margins_from(
+    kernel_of: Callable[[str], Any], scales: MarginScales, pose: PoseLike
+) -> PoseMargins:
+    """Return the margins of poses from kernels by name, on arrays of any library like NumPy."""
+    reach, measure, _, _ = kernel_of("reach")(pose)
+    type_i = np.where(reach < 0.0, reach / scales.sizes, np.nan_to_num(measure))
+    type_ii = np.minimum(finite_sizes(kernel_of("type_ii")(pose)[0]) / scales.type_ii, 1.0)
+    joints = kernel_of("joint_coordinates")(pose)[0]
+    distances = np.minimum(joints - scales.low, scales.high - joints)
+    shares = np.where(np.isinf(distances), 1.0, distances / scales.half_range)
     shares = np.where(np.isnan(shares), np.minimum(type_i, 0.0), shares)
-    shares = np.fmin(shares, numeric(robot, "passive_room")(pose)[0])
+    shares = np.fmin(shares, kernel_of("passive_room")(pose)[0])
     least = np.minimum(np.minimum(type_i, shares).min(axis=-1), type_ii)
     return PoseMargins(type_i, type_ii, shares, least)
 
@@ -102,12 +129,6 @@ def least_margin_text(robot: Manipulator, pose: Array) -> tuple[str, str]:
 def _first_least(margins: Array) -> int:
     """Return the first leg, from 1, whose value (n,) is least up to rounding."""
     return int((margins <= margins.min() + ROUNDING).argmax()) + 1
-
-
-@lru_cache(maxsize=64)
-def _leg_sizes(robot: Manipulator) -> Array:
-    """Return the size of each leg, m, (n,)."""
-    return np.array([leg.size for leg in robot.legs])
 
 
 def joint_distances(robot: Manipulator, joints: Array) -> Array:

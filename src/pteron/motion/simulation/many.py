@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import TYPE_CHECKING, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ from pteron.controllers import Controller, Custom
 from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.kernels.loop_code import STATE
-from pteron.kernels.loops import Loop, loop
+from pteron.kernels.loops import Device, Loop, loop
 from pteron.kernels.samples import Evaluated
 from pteron.kinematics import inverse_kinematics
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
@@ -39,9 +39,6 @@ if TYPE_CHECKING:
 
 _ROWS = 200_000
 """Samples that are held in memory at once, and stand in one file, about."""
-
-Device = Literal["cpu", "cuda"]
-"""Where machines run: the processor, or an NVIDIA GPU."""
 
 _WHY = ("", "no forces were asked for", "a leg came to the edge of its reach, or it diverged")
 """Why a machine ended, by its fault."""

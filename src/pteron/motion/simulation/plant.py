@@ -16,7 +16,7 @@ from pteron.equations.transmissions import DriveKind
 from pteron.errors import DataError, shorten
 from pteron.kernels import Array, as_array, numeric
 from pteron.kernels.kernel import broadcast_lead
-from pteron.kernels.loops import loop
+from pteron.kernels.loops import Device, Loop, loop
 from pteron.kinematics import inverse_kinematics, joint_rates
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.simulation.machines import Machines
@@ -121,7 +121,7 @@ def advance(
     drive_rows = as_array(drives, "drives", (count_drives,))
     drive_rows = np.broadcast_to(drive_rows, (*lead, count_drives)).reshape(batch, 1, count_drives)
     state = np.concatenate([rows["pose"], rows["velocity"], drive_rows], axis=-1)
-    arrays = simulator.idle(robot, state) | {"given": np.ascontiguousarray(rows["forces"])}
+    arrays = {"given": np.ascontiguousarray(rows["forces"])}
     if wrench is not None:
         arrays["wrench"] = np.ascontiguousarray(rows["wrench"])
     if machines is not None:
@@ -131,15 +131,33 @@ def advance(
                 f"{robot.name} expected, one for each state"
             )
         arrays |= machines.numbers
-    steps_done, piece = 0, max(1, _PIECE // max(1, batch))
-    while batch and steps_done < count:  # in pieces, between which Ctrl-C is seen
+    state, succeeded = advance_states(simulator, robot, state, arrays, step, count)
+    m, state = robot.freedom, state.reshape(*lead, -1)
+    parts_of_state = state[..., :m], state[..., m : 2 * m], state[..., 2 * m :]
+    return *parts_of_state, succeeded.reshape(lead)
+
+
+def advance_states(
+    simulator: Loop,
+    robot: Manipulator,
+    state: Array,
+    arrays: dict[str, Array],
+    step: float,
+    count: int,
+    device: Device = "cpu",
+) -> tuple[Array, Any]:
+    """Advance states (B, 1, Y) of a loop in place; return them, and if all steps were made (B,).
+
+    `arrays` has the drives' forces, "given", and what else differs from `Loop.idle`.
+    """
+    inputs = simulator.idle(robot, state) | arrays
+    steps_done, piece = 0, count if device == "cuda" else max(1, _PIECE // max(1, len(state)))
+    while len(state) and steps_done < count:  # in pieces, between which Ctrl-C is seen
         steps = min(piece, int(count) - steps_done)
-        simulator.run(arrays, 1, [step, 0.0, 0.0, step * steps], [steps, 0, 0, 0, 0, 0, 0, 0, 0])
+        times, counts = [step, 0.0, 0.0, step * steps], [steps, 0, 0, 0, 0, 0, 0, 0, 0]
+        simulator.run(inputs, 1, times, counts, device=device)
         steps_done += steps
-    m = robot.freedom
-    state = arrays["state"].reshape(*lead, 2 * m + count_drives)
-    succeeded = (arrays["fault"] == 0.0).reshape(lead)
-    return state[..., :m], state[..., m : 2 * m], state[..., 2 * m :], succeeded
+    return state, inputs["fault"].reshape(-1) == 0.0
 
 
 def drive_states(robot: Manipulator, pose: Array, velocity: Array) -> Array:
