@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 from pteron.closures.closure import Closure
 from pteron.closures.constant_rows import ConstantRows
+from pteron.closures.redundant_loci import RedundantLoci
 from pteron.closures.three_loci import ThreeLoci
 from pteron.closures.tilting_loci import TiltingLoci
 from pteron.closures.turning_loci import TurningLoci
@@ -12,7 +13,9 @@ from pteron.legs.leg import LegEquations
 from pteron.platforms import PlatformEquations
 from pteron.public import publish as _publish
 
-KINDS: tuple[type[Closure], ...] = (ConstantRows, ThreeLoci, TwoLoci, TurningLoci, TiltingLoci)
+KINDS: tuple[type[Closure], ...] = (
+    *(RedundantLoci, ConstantRows, ThreeLoci, TwoLoci, TurningLoci, TiltingLoci),
+)
 """The kinds of closures; the first that fits a machine's legs and platform serves it."""
 
 

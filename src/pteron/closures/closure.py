@@ -27,13 +27,24 @@ from pteron.tolerances import ROUNDING
 class Closure(ABC):
     """The closure of one machine, for one state, from its legs and platform."""
 
-    def __init__(self, legs: Sequence[LegEquations], platform: PlatformEquations) -> None:
-        if len(legs) != len(platform.coordinates):
+    def __init__(
+        self,
+        legs: Sequence[LegEquations],
+        platform: PlatformEquations,
+        strengths: Expression | None = None,
+    ) -> None:
+        if len(legs) < len(platform.coordinates):
             raise ModelError(
-                f"legs: {len(legs)} given, {len(platform.coordinates)} expected, one for each "
-                f"coordinate of the platform: {', '.join(platform.coordinates)}"
+                f"legs: {len(legs)} given, {len(platform.coordinates)} or more expected, one for "
+                f"each coordinate of the platform: {', '.join(platform.coordinates)}"
             )
         self.legs, self.platform = legs, platform
+        self.strengths = ca.SX.ones(len(legs)) if strengths is None else strengths
+
+    @property
+    def is_redundant(self) -> bool:
+        """Whether there are more legs than coordinates of the platform."""
+        return len(self.legs) > len(self.platform.coordinates)
 
     @classmethod
     @abstractmethod
@@ -50,8 +61,12 @@ class Closure(ABC):
     ) -> Expression:
         """Return drive forces F (n, K) with J^T F = wrench (m, K) along the quasi-velocities.
 
-        With J = B^-1 A, B being the divisors: F = B A^-T wrench.
+        With J = B^-1 A, B being the divisors: F = B A^-T wrench. Of a redundant machine's forces
+        these have the least sum of (F / strength)^2.
         """
+        if self.is_redundant:
+            shares, _ = solve_transposed(self._strong_rows(platform, legs), wrench)
+            return ca.mtimes(ca.diag(self.strengths), shares)
         shares, volume = solve_transposed(plain_rows(platform, legs), wrench)
         rows = zip(legs, ca.vertsplit(shares), strict=True)
         return ca.vertcat(*(leg.divisor / volume * share for leg, share in rows))
@@ -59,10 +74,21 @@ class Closure(ABC):
     def rates(
         self, joints: Expression, platform: PlatformMotion, legs: Sequence[LegMotion]
     ) -> Expression:
-        """Return pose rates x (m, K) with J x = joints (n, K)."""
+        """Return pose rates x (m, K) with J x = joints (n, K).
+
+        For a redundant machine this is the least of the sum of (strength (J x - joints))^2.
+        """
+        if self.is_redundant:
+            right = ca.mtimes(ca.diag(self.strengths), joints)
+            return platform.pose_rates(solve(self._strong_rows(platform, legs), right)[0])
         right = ca.vertcat(*(leg.divisor * joints[i, :] for i, leg in enumerate(legs)))
         quasi, volume = solve(plain_rows(platform, legs), right)
         return platform.pose_rates(quasi / volume)
+
+    def _strong_rows(self, platform: PlatformMotion, legs: Sequence[LegMotion]) -> Expression:
+        """Return J's rows (n, m) in quasi-velocities, times the drives' strengths."""
+        scales = self.strengths / ca.vertcat(*(leg.divisor for leg in legs))
+        return ca.mtimes(ca.diag(scales), plain_rows(platform, legs))
 
     @abstractmethod
     def poses(self, joints: Expression) -> Expression:
@@ -74,12 +100,13 @@ class Closure(ABC):
     def measure(self, platform: PlatformMotion, legs: Sequence[LegMotion]) -> Expression:
         """Return the type-II measure, no unit: at most 1 in size, 0 where J is singular.
 
-        It is det A of J = B^-1 A, with each leg's force on its platform point, or moment on the
-        platform, scaled to unit size, divided by Hadamard's bound of the determinant of as many
-        unit forces on these points. Its size is 1 only if the forces are isotropic and their
-        moments balanced, which the points may not allow: a Quadrupteron with the platform points of
-        Table 1 reaches 27/32. So it does not depend on units, frame or kind of leg; a force across
-        a planar machine counts only with its component in the plane.
+        It is det A of J = B^-1 A, or sqrt(det(A^T A)) of a redundant machine, with each leg's force
+        on its platform point, or moment on the platform, scaled to unit size, divided by Hadamard's
+        bound of the determinant of as many unit forces on these points. Its size is 1 only if the
+        forces are isotropic and their moments balanced, which the points may not allow: a
+        Quadrupteron with the platform points of Table 1 reaches 27/32. So it does not depend on
+        units, frame or kind of leg; a force across a planar machine counts only with its component
+        in the plane.
         """
         if any(leg.row.is_zero() for leg in legs):
             return ca.SX(0)  # a leg that moves nothing
@@ -108,6 +135,9 @@ class Closure(ABC):
             if self._points_are_collinear:  # no force has a moment
                 return ca.SX(0)
             bound = bound * self._moment_bound
+        elif self.is_redundant and self.platform.angles():
+            moments = len(self.legs) - forces
+            bound = bound * ca.sqrt(self._moment_bound**2 + moments)
         return determinant(rows_in_quasi_velocities(platform, rows)) / (bound * reduce(mul, sizes))
 
     def measure_squares(

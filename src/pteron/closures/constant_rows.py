@@ -41,8 +41,13 @@ class ConstantRows(Closure):
             constant and issubclass(platform, Translating | Turning) and "z" in platform.coordinates
         )
 
-    def __init__(self, legs: Sequence[LegEquations], platform: PlatformEquations) -> None:
-        super().__init__(legs, platform)
+    def __init__(
+        self,
+        legs: Sequence[LegEquations],
+        platform: PlatformEquations,
+        strengths: Expression | None = None,
+    ) -> None:
+        super().__init__(legs, platform, strengths)
         self._has_angle = bool(platform.angles())
         bars: list[Expression] = [leg.constant_row for leg in legs]
         self.rows = ca.horzcat(*bars).T  # D

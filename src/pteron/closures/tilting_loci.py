@@ -21,7 +21,7 @@ from pteron.platforms.motion import PlatformEquations, PlatformMotion
 
 
 class TiltingLoci(Closure):
-    """Two to six legs under a platform with several angles."""
+    """Legs under a platform with several angles, one for each coordinate, or more."""
 
     closed_form = False
 
@@ -33,7 +33,7 @@ class TiltingLoci(Closure):
     @property
     def modes(self) -> int:
         """The greatest number of poses of joint coordinates: 40 (six legs), 16 (tripod) or 8."""
-        if len(self.legs) == 6:
+        if len(self.platform.coordinates) == 6:
             return 40
         return 16 if "z" in self.platform.coordinates else 8
 
@@ -73,7 +73,7 @@ class TiltingLoci(Closure):
     ) -> list[Expression]:
         """Return equivalent expressions of the squared type-II measure, to choose the cheapest."""
         squares = super().measure_squares(platform, legs)
-        if len(legs) == 6:
+        if len(legs) == 6 == len(self.platform.coordinates):
             bound = reduce(mul, (leg.wrench_size for leg in legs), self._bound(1))
             squares.append(determinant_square(plain_rows(platform, legs)) / (bound * bound))
         return squares
@@ -86,5 +86,6 @@ class TiltingLoci(Closure):
         points, centred = self.platform.points, "z" not in self.platform.coordinates
         center = ca.SX(3, 1) if centred else sum(points) / len(points)
         square = sum(ca.dot(s - center, s - center) for s in points)
-        turns = len(self.legs) if centred else 3
-        return (1.0 if centred else 2.0**1.5) * ca.sqrt(forces * square / turns) ** turns
+        turns = len(self.platform.coordinates) if centred else 3
+        translations = 1.0 if centred else (forces * len(self.legs) / 3.0) ** 1.5
+        return translations * ca.sqrt(forces * square / turns) ** turns

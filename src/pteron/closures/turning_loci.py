@@ -25,8 +25,13 @@ from pteron.platforms.motion import PlatformEquations
 class TurningLoci(Closure):
     """Three legs, or four, under a platform with one angle, where `ConstantRows` does not fit."""
 
-    def __init__(self, legs: Sequence[LegEquations], platform: PlatformEquations) -> None:
-        super().__init__(legs, platform)
+    def __init__(
+        self,
+        legs: Sequence[LegEquations],
+        platform: PlatformEquations,
+        strengths: Expression | None = None,
+    ) -> None:
+        super().__init__(legs, platform, strengths)
         fixes_angle = any(isinstance(leg.locus(ca.SX(0)), AngleLocus) for leg in legs)
         curved = sum(not leg.row_is_constant for leg in legs) - fixes_angle
         self.closed_form = fixes_angle or not curved

@@ -178,9 +178,10 @@ class Law:
 
     def _sizes(self, layout: Layout) -> dict[str, int]:
         """Return the length of each named part of the law's gain or memory vector."""
-        freedom = self.model.freedom
+        freedom, joints = self.model.freedom, self.model.joint_count
         inertial = 0 if self.base is None else self.base.selection.shape[1]
-        return lengths(layout[self.what], freedom, estimate_count(self.what, freedom, inertial))
+        estimates = estimate_count(self.what, joints, inertial)
+        return lengths(layout[self.what], freedom, joints, estimates)
 
     def _parts(self, layout: Layout, vector: Array) -> dict[str, Array]:
         """Return the named parts (..., k) of a gain or memory vector (..., K)."""

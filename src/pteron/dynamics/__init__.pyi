@@ -1,3 +1,4 @@
+from pteron.dynamics.distribution import null_space as null_space
 from pteron.dynamics.forces import (
     drive_accelerations as drive_accelerations,
     drive_forces as drive_forces,

@@ -2,8 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from pteron.dynamics.distribution import forces_within_limits
 from pteron.kinematics.evaluate import evaluate_kernel
-from pteron.manipulator import RobotLike
+from pteron.manipulator import RobotLike, as_manipulator
+from pteron.manipulator.distribution import Distribution
 from pteron.shapes import JointsLike, OnFailure, PerCoordinate, PerJoint, PoseLike, Regressors
 
 
@@ -14,6 +21,7 @@ def inverse_dynamics(
     acceleration: PoseLike,
     wrench: PoseLike | None = None,
     *,
+    distribution: Distribution | None = None,
     on_failure: OnFailure = "raise",
 ) -> PerJoint:
     """Return the actuator forces (..., n) of a motion, without friction, by virtual work, Eq. (13).
@@ -29,6 +37,8 @@ def inverse_dynamics(
     wrench : array, shape (..., m), optional
         Wrench on the platform at P: a force in N and, where it turns, a moment about k in N m; of a
         platform that tilts a force and a moment in the base frame, (..., 6).
+    distribution : Distribution, optional
+        With more legs than coordinates: how forces are shared, in place of the machine's own.
     on_failure : {"raise", "nan"}
         Whether a pose that fails raises, or gives NaN.
 
@@ -44,6 +54,8 @@ def inverse_dynamics(
     SingularPose
         If a leg is stretched or folded (type I), or the actuators do not hold the platform
         (type II).
+    DataError
+        If a distribution's limits admit no forces.
 
     Examples
     --------
@@ -55,9 +67,43 @@ def inverse_dynamics(
     array([31.082, -1.881,  2.566,  0.685])
     """
     inputs = [pose, velocity, acceleration, *([] if wrench is None else [wrench])]
-    return evaluate_kernel(
-        robot, "inverse_dynamics", on_failure, *inputs, wrench=wrench is not None
+    robot = _distributed(robot, distribution)
+    forces: PerJoint = evaluate_kernel(
+        _without_limits(robot), "inverse_dynamics", on_failure, *inputs, wrench=wrench is not None
     )
+    return _within_limits(robot, pose, forces, lambda: np.zeros(forces.shape[-1]), on_failure)
+
+
+def _distributed(robot: RobotLike, distribution: Distribution | None) -> RobotLike:
+    """Return the machine with another distribution of forces; as it is for None."""
+    if distribution is None:
+        return robot
+    return replace(as_manipulator(robot), distribution=distribution)
+
+
+def _without_limits(robot: RobotLike) -> RobotLike:
+    """Return the machine whose forces are shared without limits."""
+    shares = as_manipulator(robot).distribution
+    if shares is None or not shares.limits:
+        return robot
+    return replace(as_manipulator(robot), distribution=replace(shares, limits=False))
+
+
+def _within_limits(
+    robot: RobotLike,
+    pose: PoseLike,
+    forces: PerJoint,
+    drive_loads: Callable[[], PerJoint],
+    on_failure: OnFailure,
+) -> PerJoint:
+    """Return forces within the limits of the machine's distribution, if it has them.
+
+    `drive_loads` returns the part of the forces that the drives need for themselves.
+    """
+    machine = as_manipulator(robot)
+    if machine.greatest_forces is None:
+        return forces
+    return forces_within_limits(machine, pose, forces, drive_loads(), on_failure)
 
 
 def forward_dynamics(
@@ -123,6 +169,7 @@ def drive_forces(
     wrench: PoseLike | None = None,
     *,
     smooth: bool = False,
+    distribution: Distribution | None = None,
     on_failure: OnFailure = "raise",
 ) -> PerJoint:
     """Return the drives' forces: `inverse_dynamics` plus friction and the motors' inertia.
@@ -142,6 +189,9 @@ def drive_forces(
     smooth : bool
         s is the sign of q', exact where a joint moves, which suits logs; or tanh(q'/rest_speed),
         which suits simulation and controllers (the kernel `feed_forward`).
+    distribution : Distribution, optional
+        With more legs than coordinates: how forces are shared, in place of the machine's own; its
+        limits count friction and the motors' inertia.
     on_failure : {"raise", "nan"}
         Whether a pose that fails raises, or gives NaN.
 
@@ -172,7 +222,18 @@ def drive_forces(
     """
     inputs = [pose, velocity, acceleration, *([] if wrench is None else [wrench])]
     what = "feed_forward" if smooth else "drive_forces"
-    return evaluate_kernel(robot, what, on_failure, *inputs, wrench=wrench is not None)
+    robot = _distributed(robot, distribution)
+    unlimited, loaded = _without_limits(robot), wrench is not None
+    forces: PerJoint = evaluate_kernel(unlimited, what, on_failure, *inputs, wrench=loaded)
+
+    def drive_loads() -> PerJoint:
+        """Return friction and the motors' inertia."""
+        rigid: PerJoint = evaluate_kernel(
+            unlimited, "inverse_dynamics", "nan", *inputs, wrench=loaded
+        )
+        return np.asarray(forces - rigid)
+
+    return _within_limits(robot, pose, forces, drive_loads, on_failure)
 
 
 def drive_accelerations(

@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 
 from pteron.dynamics import drive_forces, mass_matrix
-from pteron.dynamics.joint_space import mass_with_rotors
+from pteron.dynamics.joint_space import mass_with_rotors, share_loads
 from pteron.environments.world import ENDS, LEVER, World
 from pteron.equations.drives import drives_of
 from pteron.errors import DataError
@@ -95,7 +95,7 @@ def _forces(robot: Manipulator, home: Array) -> Array:
     rows = jacobian(robot, home)
     mass = mass_with_rotors(rows, mass_matrix(robot, home), drives_of(robot).inertia)
     most = np.where(robot.platform.angular, _LIVELY / LEVER, _LIVELY)
-    lively = np.linalg.solve(rows.T, mass * most)
+    lively = share_loads(rows, mass * most, robot.drive_strengths)
     enough = 2.0 * np.abs(drive_forces(robot, home, zero_rates, zero_rates)) + np.abs(lively).sum(
         axis=1
     )

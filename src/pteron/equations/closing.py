@@ -33,6 +33,10 @@ its tolerance, but each step halves the determinant or more.
 """
 
 
+_AGREEMENT = 1e-2
+"""Difference, relative to the legs' sizes, up to which more readings than coordinates belong to one
+pose."""
+
 _NO_CHANGE = 1e-300
 """Factor of a term that is added to propagate NaN: it changes no finite number."""
 
@@ -137,6 +141,8 @@ class ClosureResiduals(NamedTuple):
     platform: PlatformMotion
     leg_rows: list[Expression]
     """(1, 6) each: the legs' part of `rows`, against (c', omega)."""
+    contradiction: Expression = 0
+    """By how much a redundant machine's joints differ, relative to the legs' sizes."""
 
     @property
     def step(self) -> tuple[Expression, Expression]:
@@ -181,6 +187,31 @@ def closure_residuals(machine: Machine, joints: Expression, pose: Expression) ->
     return ClosureResiduals(ca.vertcat(*lengths), quasi_rows, largest, arms, platform, rows)
 
 
+def joint_residuals(machine: Machine, joints: Expression, pose: Expression) -> ClosureResiduals:
+    """Return a redundant machine's joint errors (n, 1) at a pose, in the robot's working mode.
+
+    More readings than coordinates contradict each other by their noise: `relative` is what a step
+    of least squares still changes, relative to the legs' sizes, and `contradiction` the rest.
+    """
+    state = machine.state(pose)
+    behind = ca.vertcat(*(leg.coordinate for leg in state.legs)) - joints
+    legs = list(zip(machine.robot.legs, ca.vertsplit(behind), strict=True))
+    errors = ca.vertcat(
+        *(
+            ca.atan2(ca.sin(error), ca.cos(error)) if leg.goes_round else error
+            for leg, error in legs
+        )
+    )
+    rows = [motion.row / motion.divisor for motion in state.legs]
+    matrix = rows_in_quasi_velocities(state.platform, rows)
+    scales = ca.SX([leg.lever / (leg.size or 1.0) for leg in machine.robot.legs])
+    change = ca.mtimes(matrix, solve(matrix, errors)[0])
+    relative, contradiction = (ca.mmax(scales * ca.fabs(part)) for part in (change, errors))
+    nothing: list[Expression | None] = [None] * len(rows)
+    parts = errors, matrix, relative, nothing, state.platform, rows
+    return ClosureResiduals(*parts, contradiction)
+
+
 def newton_step(
     machine: Machine, joints: Expression, pose: Expression
 ) -> tuple[Expression, Expression]:
@@ -209,14 +240,17 @@ def converged_step(
     machine: Machine, joints: Expression, pose: Expression, least: float
 ) -> NewtonEnd:
     """Return the pose of joints (n, 1) by Newton's method from a start pose (m, 1)."""
-    residuals = closure_residuals(machine, joints, pose)
+    residuals_at = joint_residuals if machine.closure.is_redundant else closure_residuals
+    residuals = residuals_at(machine, joints, pose)
     step, divisor = residuals.step
     for _ in range(_STEPS - 1):
         previous_divisor, pose = divisor, pose + step / divisor
-        residuals = closure_residuals(machine, joints, pose)
+        residuals = residuals_at(machine, joints, pose)
         step, divisor = residuals.step
-    measure = machine.closure.measure_of(residuals.platform, residuals.leg_rows)
+    measure = _measure(machine, residuals, pose)
     validity = nan_below_zero(_CLOSED - residuals.relative)
+    if machine.closure.is_redundant:
+        validity += nan_below_zero(_AGREEMENT - residuals.contradiction)
     validity += nan_below_zero(_STEADY - ca.fabs(divisor / previous_divisor - 1))
     # The last step's divisor vanishes where the measure is too small.
     enough = ca.fmax(measure * measure - least * least, 0) / (measure * measure)
@@ -227,6 +261,14 @@ def converged_step(
         if isinstance(leg.locus(q), PlaneLocus):  # it goes on where the leg does not reach
             validity += nan_below_zero(at.discriminant)
     return NewtonEnd(last_pose + validity, measure, divisor, residuals)
+
+
+def _measure(machine: Machine, residuals: ClosureResiduals, pose: Expression) -> Expression:
+    """Return the type-II measure where the residuals are taken, at a pose (m, 1)."""
+    if machine.closure.is_redundant:
+        state = machine.state(pose)
+        return machine.closure.measure(state.platform, state.legs)
+    return machine.closure.measure_of(residuals.platform, residuals.leg_rows)
 
 
 def direct_step(
@@ -240,6 +282,8 @@ def direct_step(
     Newton's method does not converge.
     """
     end = converged_step(machine, joints, pose, least)
+    if machine.closure.is_redundant:  # whose residuals are those of the working mode alone
+        return end.pose, end.measure, ca.SX(0)
     # At the start pose the loci are those of the joints there, not of the given joints.
     start, rows = machine.state(pose), ca.vertsplit(closure_residuals(machine, joints, pose).rows)
     closed_rows = ca.vertsplit(plain_rows(start.platform, start.legs))

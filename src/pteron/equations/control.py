@@ -71,10 +71,10 @@ ADAPTED = ("inertia", "coulomb", "viscous", "offset")
 all joints: the first of `Drives`, in which forces are linear."""
 
 
-def lengths(parts: Mapping[str, Per], freedom: int, estimates: int) -> dict[str, int]:
+def lengths(parts: Mapping[str, Per], freedom: int, joints: int, estimates: int) -> dict[str, int]:
     """Return the length of each named part of a controller's gains or memory vector."""
     sizes = {
-        "joint": freedom,
+        "joint": joints,
         "coordinate": freedom,
         "parameter": estimates,
         "pair": estimates**2,
@@ -83,16 +83,16 @@ def lengths(parts: Mapping[str, Per], freedom: int, estimates: int) -> dict[str,
     return {name: sizes[per] for name, per in parts.items()}
 
 
-def estimate_count(what: str, freedom: int, inertial: int) -> int:
+def estimate_count(what: str, joints: int, inertial: int) -> int:
     """Return the number of parameters that the law `what` estimates."""
-    return inertial + (len(ADAPTED) * freedom if what == "adaptive_drives" else 0)
+    return inertial + (len(ADAPTED) * joints if what == "adaptive_drives" else 0)
 
 
-def input_sizes(what: str, freedom: int, inertial: int) -> dict[str, int]:
+def input_sizes(what: str, freedom: int, joints: int, inertial: int) -> dict[str, int]:
     """Return the lengths of a law's "gains" and "memory"; {} if `what` is no law."""
-    estimates = estimate_count(what, freedom, inertial)
+    estimates = estimate_count(what, joints, inertial)
     return {
-        name: sum(lengths(parts[what], freedom, estimates).values())
+        name: sum(lengths(parts[what], freedom, joints, estimates).values())
         for name, parts in (("gains", GAINS), ("memory", MEMORY))
         if what in parts
     }

@@ -16,7 +16,7 @@ import casadi as ca
 
 from pteron.bodies.motion import Expression
 from pteron.closures.closure import plain_rows, rows_in_quasi_velocities
-from pteron.closures.determinants import adjugate
+from pteron.closures.determinants import adjugate, determinant, solve
 from pteron.equations.machine import Machine, State
 from pteron.equations.singular_values import largest, singular_values, smallest
 from pteron.errors import ModelError
@@ -134,8 +134,10 @@ def _ratio(matrix: Expression) -> Expression:
 
 
 def manipulability(machine: Machine, state: State) -> Expression:
-    """Return the manipulability 1 / |det J| of the homogeneous Jacobian."""
+    """Return the manipulability 1 / sqrt(det(J^T J)) of the homogeneous Jacobian."""
     rows = homogeneous(machine, state).matrix
+    if rows.shape[0] > rows.shape[1]:
+        return 1 / determinant(rows)
     return 1 / ca.fabs(ca.mtimes(rows[0, :], adjugate(rows)[:, 0]))
 
 
@@ -232,7 +234,12 @@ def _require_columns(machine: Machine, columns: Expression, lacking: str) -> Exp
 
 
 def _inverse(rows: Expression) -> tuple[Expression, Expression]:
-    """Return adjugate (m, m) and determinant of a square matrix; their quotient is the inverse."""
+    """Return adjugate (m, m) and determinant of a square matrix; their quotient is the inverse.
+
+    Of more rows than columns these are the pseudo-inverse (m, n) and 1.
+    """
+    if rows.shape[0] > rows.shape[1]:
+        return solve(rows, ca.SX.eye(rows.shape[0]))
     adj = adjugate(rows)
     return adj, ca.mtimes(rows[0, :], adj[:, 0])
 
@@ -261,6 +268,11 @@ def output_pressure_angle(machine: Machine, state: State) -> Expression:
 
     The motion is that with the other joints held: a column of J^-1.
     """
+    if machine.closure.is_redundant:
+        raise ModelError(
+            "output_pressure_angle: with more legs than freedoms no joint can move while the "
+            "others are held; pteron.indices.indices_of lists the indices of a machine"
+        )
     adj, angles = adjugate(plain_rows(state.platform, state.legs)), [ca.SX(0)]
     for i, (leg, matrix) in enumerate(zip(state.legs, state.platform.matrices, strict=True)):
         if leg.pushes:

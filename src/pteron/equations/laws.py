@@ -14,25 +14,31 @@ from pteron.bodies.motion import Expression
 from pteron.equations.control import ADAPTED, Sample, estimates
 from pteron.equations.drives import Drives, drive_forces, joint_motion
 from pteron.equations.kinematics import platform_rates
+from pteron.equations.machine import State
 from pteron.equations.mixed import mixed_forces
-from pteron.equations.virtual_work import inverse_dynamics
+from pteron.equations.virtual_work import SharedForces, rigid_forces, share_forces
 
-Answer = tuple[Expression, dict[str, Expression]]
+Answer = tuple[SharedForces, dict[str, Expression]]
 """Forces of the drives (n, 1), and the parts of the law's memory by name."""
 
 
 def pd_gravity(s: Sample) -> Answer:
     """Return drive forces K_p e + K_d e' plus gravity and offsets, and the measured pose."""
     pose = s.find_pose(s.joints)
-    gravity_forces = inverse_dynamics(s.machine, s.machine.state(pose), s.parameters)
-    return s.feedback + gravity_forces + s.drives.offset, {"measured": pose}
+    drive_loads = s.feedback + s.drives.offset
+    return _forces(s, s.machine.state(pose), drive_loads), {"measured": pose}
+
+
+def _forces(s: Sample, state: State, drive_loads: Expression) -> SharedForces:
+    """Return the drive forces that move the bodies of a state, plus those of the drives."""
+    shared = rigid_forces(s.machine, state, s.parameters, drive_loads=drive_loads)
+    return shared.plus(drive_loads)
 
 
 def feed_forward_pd(s: Sample) -> Answer:
     """Return drive forces K_p e + K_d e' plus those of the desired motion, and next memory."""
-    needed = inverse_dynamics(s.machine, s.middle, s.parameters)
-    needed += drive_forces(s.drives, *joint_motion(s.middle), smooth=True)
-    return s.feedback + needed, {"acceleration": s.desired.acceleration}
+    drive_loads = s.feedback + drive_forces(s.drives, *joint_motion(s.middle), smooth=True)
+    return _forces(s, s.middle, drive_loads), {"acceleration": s.desired.acceleration}
 
 
 def computed_torque(s: Sample) -> Answer:
@@ -44,8 +50,8 @@ def computed_torque(s: Sample) -> Answer:
     pose, (desired_rates, desired_accelerations) = s.middle_pose, joint_motion(s.middle)
     accelerations = desired_accelerations + s.feedback
     motion = platform_rates(s.machine, pose, s.middle_rates, accelerations)
-    needed = inverse_dynamics(s.machine, s.machine.state(pose, *motion), s.parameters)
-    needed += drive_forces(s.drives, desired_rates, accelerations, smooth=True)
+    drive_loads = drive_forces(s.drives, desired_rates, accelerations, smooth=True)
+    needed = _forces(s, s.machine.state(pose, *motion), drive_loads)
     return needed, {"measured": pose, "acceleration": s.desired.acceleration}
 
 
@@ -76,7 +82,7 @@ def adaptive_drives(s: Sample) -> Answer:
     """
     estimate = estimates(s.gains, s.memory["learnt"])
     drive = estimate[s.selection.shape[1] :]
-    estimated_drives = Drives(*ca.vertsplit(drive, s.machine.freedom), *s.drives[len(ADAPTED) :])
+    estimated_drives = Drives(*ca.vertsplit(drive, len(s.machine.legs)), *s.drives[len(ADAPTED) :])
     return _adaptive_law(s, estimate, estimated_drives)
 
 
@@ -93,10 +99,13 @@ def _adaptive_law(s: Sample, estimate: Expression, drives: Drives) -> Answer:
     needed = mixed_forces(
         s.machine, pose, s.middle_rates, reference_rates, reference_accelerations, parameters
     )
-    needed += drive_forces(drives, reference_rates, reference_accelerations, smooth=True)
-    updated = learnt + s.gains["period"] * ca.jtimes(needed, learnt, z, True)
+    at_rates = reference_rates, reference_accelerations
+    drive_loads = drive_forces(drives, *at_rates, smooth=True)
+    updated = learnt + s.gains["period"] * ca.jtimes(needed + drive_loads, learnt, z, True)
     room = s.gains["room"]
-    return needed + s.gains["derivative"] * z, {
+    drive_loads += s.gains["derivative"] * z
+    shared = share_forces(s.machine, s.machine.state(pose), needed, drive_loads)
+    return shared.plus(drive_loads), {
         "measured": pose,
         "acceleration": s.desired.acceleration,
         "learnt": updated * (room / ca.fmax(ca.norm_2(updated), room)),

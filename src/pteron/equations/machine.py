@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from itertools import accumulate, chain
 from typing import Any
@@ -36,6 +36,10 @@ class Machine:
     platform: PlatformEquations
     closure: Closure
     gravity: Expression
+    reference: Expression | None = None
+    """The drives' forces (n, 1) that those of a redundant machine are nearest to; None for 0."""
+    greatest: Expression | None = None
+    """The drives' greatest forces (n, 1), if a redundant machine's are to stay within them."""
 
     @property
     def freedom(self) -> int:
@@ -63,16 +67,17 @@ class Machine:
             for name in ("platform_point", "fixed_offset")
         )
         quantities = {name: ca.SX(list(v)) for name, v in robot.platform.quantities.items()}
-        return cls._assemble(
-            robot, legs, frame, points, fixed, quantities, ca.SX(list(robot.gravity))
-        )
+        shares = {name: ca.SX(list(v)) for name, v in distribution_numbers(robot).items()}
+        gravity = ca.SX(list(robot.gravity))
+        return cls._assemble(robot, legs, frame, points, fixed, quantities, gravity, shares)
 
     @classmethod
     def symbolic(cls, robot: Manipulator) -> tuple[Machine, Expression]:
         """Return equations with dimensions as symbols, and the vector (G, 1) of these symbols.
 
         The vector holds the quantities of each leg, its platform point and fixed offset; then x0,
-        y0, k, the platform's quantities and gravity: the order of `numbers`.
+        y0, k, the platform's quantities and gravity; of a redundant machine
+        its `distribution_numbers`: the order of `numbers`.
         """
         legs, points, fixed, vectors = [], [], [], []
         for i, leg in enumerate(robot.legs, start=1):
@@ -84,8 +89,12 @@ class Machine:
         frame = [ca.SX.sym(name, 3) for name in ("x0", "y0", "k")]
         quantities = {n: ca.SX.sym(n, len(v)) for n, v in robot.platform.quantities.items()}
         gravity = ca.SX.sym("gravity", 3)
-        machine = cls._assemble(robot, tuple(legs), frame, points, fixed, quantities, gravity)
-        return machine, ca.vertcat(*vectors, *frame, *quantities.values(), gravity)
+        shares = {n: ca.SX.sym(n, len(v)) for n, v in distribution_numbers(robot).items()}
+        platform = frame, points, fixed, quantities
+        machine = cls._assemble(robot, tuple(legs), *platform, gravity, shares)
+        return machine, ca.vertcat(
+            *vectors, *frame, *quantities.values(), gravity, *shares.values()
+        )
 
     @classmethod
     def _assemble(
@@ -97,13 +106,19 @@ class Machine:
         fixed: list[Expression],
         quantities: dict[str, Any],
         gravity: Expression,
+        shares: dict[str, Expression],
     ) -> Machine:
-        """Return a machine's equations from its legs' equations and its platform's geometry."""
+        """Return a machine's equations from its legs' equations and its platform's geometry.
+
+        `shares` are a redundant machine's `distribution_numbers`.
+        """
         quantities = {**quantities, "planes": [leg.holds for leg in legs]}
         platform = robot.platform.kind(frame, points, fixed, quantities)
         closure = kind_for([type(leg) for leg in legs], type(platform))
         assert closure is not None  # the manipulator has checked it
-        return cls(robot, legs, platform, closure(legs, platform), gravity)
+        others = {name: share for name, share in shares.items() if name != "strengths"}
+        closed = closure(legs, platform, shares.get("strengths"))
+        return cls(robot, legs, platform, closed, gravity, **others)
 
     def move_to_platform_frame(self, pose: Expression) -> tuple[Machine, Expression] | None:
         """Return the machine in the platform's axes, and these axes (3, 3); None if not cheaper.
@@ -122,8 +137,10 @@ class Machine:
         )
         if len(legs) < len(self.legs):
             return None
-        closure, gravity = type(self.closure)(legs, platform), ca.mtimes(axes.T, self.gravity)
-        return Machine(self.robot, legs, platform, closure, gravity), axes
+        closure = type(self.closure)(legs, platform, self.closure.strengths)
+        gravity = ca.mtimes(axes.T, self.gravity)
+        parts = {"legs": legs, "platform": platform, "closure": closure, "gravity": gravity}
+        return replace(self, **parts), axes
 
     def state(
         self,
@@ -168,7 +185,19 @@ def numbers(robot: Manipulator) -> list[float]:
         geometry += (*leg.platform_point, *leg.fixed_offset)
     for vector in (*robot.platform.frame, *robot.platform.quantities.values(), robot.gravity):
         geometry += vector
-    return geometry
+    return [*geometry, *chain.from_iterable(distribution_numbers(robot).values())]
+
+
+def distribution_numbers(robot: Manipulator) -> dict[str, tuple[float, ...]]:
+    """Return by name what a redundant machine shares forces by, (n,) each; {} if it is not one.
+
+    These are the drives' strengths and, where it has them, reference and greatest forces.
+    """
+    if not robot.redundancy:
+        return {}
+    reference = robot.distribution and robot.distribution.reference
+    numbers = {"reference": reference, "greatest": robot.greatest_forces}
+    return {"strengths": robot.drive_strengths} | {n: v for n, v in numbers.items() if v}
 
 
 def number_places(robot: Manipulator) -> list[dict[str, int]]:

@@ -41,6 +41,11 @@ STUCK = {f"stuck_{name}": name for name in ("acceleration", "growth", "friction"
 """Outputs that sticking joints change, by the name of the one without the holding friction."""
 
 
+_GIVE = 1e-9
+"""Mobility of each joint by itself, relative to the machine's greatest, where legs are redundant:
+what more than m joints that stick hold is then unique, and wrong by this share."""
+
+
 class Sides(NamedTuple):
     """The joints that slide, and how fast those that stick come to rest."""
 
@@ -155,6 +160,8 @@ def stick_slip_rates(
     scaled = reach / ca.repmat(pivots, 1, n)
     motor_mobility = [1 / drives.inertia[i] if kind.elastic[i] else ca.SX(0) for i in range(n)]
     mobility = ca.mtimes(reach.T, scaled) + ca.diag(ca.vertcat(*motor_mobility))
+    if n > machine.freedom:  # joints hold against each other: a slight give makes it unique
+        mobility += _GIVE * ca.mmax(ca.diag(mobility)) * ca.SX.eye(n)
     holding = _holding_friction(mobility, sides, rates, growth)
     growth += ca.mtimes(mobility, holding)
     motion["stuck_acceleration"] = acceleration + substitute_backward(

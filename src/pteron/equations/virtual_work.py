@@ -9,11 +9,20 @@ the regressor.
 
 from __future__ import annotations
 
+from copy import copy
+from typing import NamedTuple
+
 import casadi as ca
 
 from pteron.bodies.motion import Expression
 from pteron.equations.machine import Machine, State
 from pteron.legs.leg import Needs
+
+FEASIBLE = "feasible"
+"""Output that says whether forces are within their limits: part of the status, not of results."""
+
+_WITHIN = 1e-9
+"""Share of its limit by which a force may exceed it: rounding."""
 
 
 def inverse_dynamics(
@@ -33,18 +42,93 @@ def inverse_dynamics(
     joints, load = needed_forces(machine, state, parameters, carried)
     if wrench is not None:
         load = load - machine.platform.generalized_forces(state.platform, wrench)
+    if machine.closure.is_redundant:  # all of it is shared out, not the platform's part alone
+        joints, load = ca.SX(0), load + _platform_load(state, joints)
     forces = machine.closure.forces(load, state.platform, state.legs)
     return joints + forces  # Eq. (13), Contribution 2, Section 4
 
 
-def generalized_forces(machine: Machine, state: State, parameters: Expression) -> Expression:
-    """Return the generalized inertia, Coriolis and gravity forces M x'' + h (m, K) of a state."""
-    joints, total = needed_forces(machine, state, parameters)
+class SharedForces(NamedTuple):
+    """The actuator forces (n, 1) of a state, as a redundant machine shares them out."""
+
+    forces: Expression
+    is_feasible: Expression | None
+    """Whether they are within the drives' greatest forces; None where these do not matter."""
+
+    def plus(self, loads: Expression) -> SharedForces:
+        """Return the forces with what the drives need for themselves (n, 1)."""
+        return self._replace(forces=self.forces + loads)
+
+    def outputs(self, name: str = "forces") -> dict[str, Expression]:
+        """Return the forces by name, and whether they are feasible where that matters."""
+        known = {} if self.is_feasible is None else {FEASIBLE: self.is_feasible}
+        return {name: self.forces, **known}
+
+
+def rigid_forces(
+    machine: Machine,
+    state: State,
+    parameters: Expression,
+    wrench: Expression | None = None,
+    *,
+    carried: bool = True,
+    drive_loads: Expression | None = None,
+) -> SharedForces:
+    """Return the actuator forces of a state without those that the drives need for themselves.
+
+    `drive_loads` (n, 1), friction and rotors, count for the drives' greatest forces. A force that
+    leaves its limits is held there and the rest are solved again, n - m times: this finds most
+    forces within limits, but not all, so that infeasible means not found.
+    """
+    forces = inverse_dynamics(machine, state, parameters, wrench, carried=carried)
+    return share_forces(machine, state, forces, drive_loads)
+
+
+def share_forces(
+    machine: Machine, state: State, forces: Expression, drive_loads: Expression | None = None
+) -> SharedForces:
+    """Return forces of least norm (n, 1) as the machine shares them: see `rigid_forces`."""
+    reference = machine.reference
+    if reference is not None:
+        forces = forces + _internal_forces(machine, state, reference)
+    if machine.greatest is None:
+        return SharedForces(forces, None)
+    loads = ca.SX(len(machine.legs), 1) if drive_loads is None else drive_loads
+    low, high = -machine.greatest - loads, machine.greatest - loads
+    load, is_held, first_forces = _platform_load(state, forces), ca.SX(0), forces
+    for _ in range(len(machine.legs) - machine.freedom):
+        is_held = ca.if_else(ca.fmax(low - forces, forces - high) > 0, 1, is_held)
+        held = is_held * ca.fmin(ca.fmax(forces, low), high)
+        free = held if reference is None else held + (1 - is_held) * reference
+        closure = copy(machine.closure)
+        closure.strengths = (1 - is_held) * machine.closure.strengths
+        rest = load - _platform_load(state, free)
+        forces = free + closure.forces(rest, state.platform, state.legs)
+    excess = ca.mmax(ca.fmax(low - forces, forces - high) - _WITHIN * machine.greatest)
+    is_feasible = ca.if_else(excess <= 0, 1, 0)
+    return SharedForces(ca.if_else(is_feasible, forces, first_forces), is_feasible)
+
+
+def _internal_forces(machine: Machine, state: State, reference: Expression) -> Expression:
+    """Return the drive forces (n, 1), which move nothing, that a reference adds to the least."""
+    felt = _platform_load(state, reference)
+    return reference - machine.closure.forces(felt, state.platform, state.legs)
+
+
+def _platform_load(state: State, joints: Expression) -> Expression:
+    """Return the load J^T F (m, K) of joint forces (n, K) along the platform's quasi-velocities."""
+    load = ca.SX(0)
     for leg, matrix, force in zip(
         state.legs, state.platform.matrices, ca.vertsplit(joints), strict=True
     ):
-        total = total + ca.mtimes(ca.mtimes(matrix.T, leg.row.T / leg.divisor), force)
-    return state.platform.pose_forces(total)
+        load = load + ca.mtimes(ca.mtimes(matrix.T, leg.row.T / leg.divisor), force)
+    return load
+
+
+def generalized_forces(machine: Machine, state: State, parameters: Expression) -> Expression:
+    """Return the generalized inertia, Coriolis and gravity forces M x'' + h (m, K) of a state."""
+    joints, load = needed_forces(machine, state, parameters)
+    return state.platform.pose_forces(load + _platform_load(state, joints))
 
 
 def needed_forces(

@@ -107,8 +107,8 @@ def _drive_functions(robot: Manipulator) -> Iterator[ca.Function]:
 
     The form that controllers have, by an exponential and a sign, has derivative zero there.
     """
-    machine, n = Machine.numeric(robot), robot.freedom
-    sizes = dict.fromkeys(("pose", "velocity", "acceleration", "forces"), n)
+    machine, m, n = Machine.numeric(robot), robot.freedom, robot.joint_count
+    sizes = dict.fromkeys(("pose", "velocity", "acceleration"), m) | {"forces": n}
     sizes["wrench"] = len(robot.platform.wrench_columns)
     symbols = {name: ca.SX.sym(name, size) for name, size in sizes.items()}
     pose, velocity, acceleration, forces, wrench = symbols.values()
@@ -126,13 +126,13 @@ def _drive_functions(robot: Manipulator) -> Iterator[ca.Function]:
     )
     yield _function("drive_forces", symbols, ("acceleration",), forces=needed)
     yield _function("drive_accelerations", symbols, ("forces",), acceleration=moved)
-    state = ca.SX.sym("state", 2 * n)
-    parts = [state[:n], state[n:]]
+    state = ca.SX.sym("state", 2 * m)
+    parts = [state[:m], state[m:]]
     rates_of = ca.substitute([moved], [pose, velocity], parts)[0]
     yield ca.Function(
         "state_rates",
         [state, forces, wrench],
-        [ca.cse(ca.vertcat(state[n:], rates_of))],
+        [ca.cse(ca.vertcat(state[m:], rates_of))],
         ["state", "forces", "wrench"],
         ["rates"],
     )

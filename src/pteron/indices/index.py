@@ -41,6 +41,9 @@ class Index:
         Whether it measures rotation: only platforms with an angle have it.
     moving : bool
         Whether it measures translation: only platforms with a length have it.
+    single : bool
+        Whether it moves one joint while the others are held: only machines with as many legs as
+        freedoms have it.
     function : callable, optional
         Of an index that is not Pteron's own: returns its values (N,) from a machine and poses
         (N, m), all of them in reach.
@@ -61,6 +64,7 @@ class Index:
     better: Literal["more", "less"] = "more"
     turning: bool = False
     moving: bool = True
+    single: bool = False
     function: Callable[[Manipulator, Array], Any] | None = None
 
     @property
@@ -126,6 +130,8 @@ def _missing_motion(robot: Manipulator, index: Index) -> str:
         return "turning, but this {} platform does not turn"
     if index.moving and not robot.platform.lengths:
         return "translation, but this {} platform only turns"
+    if index.single and robot.redundancy:
+        return "joints that move alone, but this {} platform has more legs than freedoms"
     return ""
 
 

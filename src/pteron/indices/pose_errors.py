@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pteron.arguments import checked_arguments
+from pteron.dynamics.joint_space import rate_matrix
 from pteron.errors import DataError
 from pteron.indices.sensitivities import geometric_sensitivities, tool_pose_changes
 from pteron.kernels import Array
@@ -114,8 +115,8 @@ def pose_error(
     sensitivities = geometric_sensitivities(robot, poses, on_failure=on_failure)
     rows: Array = evaluate_kernel(robot, "jacobian", on_failure, poses)
     solvable = np.isfinite(sensitivities.matrix).all(axis=(-2, -1))
-    inverse_jacobian = np.full(rows.shape, np.nan)
-    inverse_jacobian[solvable] = np.linalg.inv(rows[solvable])
+    inverse_jacobian = np.full(rows.mT.shape, np.nan)
+    inverse_jacobian[solvable] = rate_matrix(rows[solvable], robot.drive_strengths)
     joints = _expand_tolerances(tolerances.joints, "joints", robot.joint_count)
     joints = joints + 0.5 * _expand_tolerances(tolerances.backlash, "backlash", robot.joint_count)
     unknown = sorted(set(tolerances.named) - set(sensitivities.names))

@@ -10,6 +10,7 @@ import casadi as ca
 import numpy as np
 
 from pteron.bodies.vectors import Vector, cross, dot
+from pteron.dynamics.joint_space import solve_rates
 from pteron.equations.machine import numbers
 from pteron.equations.variations import slope_matrix, slope_terms, variations
 from pteron.kernels import Array, general_program, layout_of
@@ -114,7 +115,8 @@ def geometric_sensitivities(
         slope_columns = np.array(slopes.map(geometry.shape[1])(geometry, flat[solvable].T))
         geometry_slopes = slope_columns.reshape(robot.joint_count, -1, len(geometry)).swapaxes(0, 1)
         jacobian = rows.reshape(-1, robot.joint_count, robot.freedom)[solvable]
-        derivatives[solvable] = -np.linalg.solve(jacobian, geometry_slopes @ np.array(directions).T)
+        changes = geometry_slopes @ np.array(directions).T
+        derivatives[solvable] = -solve_rates(jacobian, changes, robot.drive_strengths)
     matrix = derivatives.reshape((*poses.shape[:-1], *derivatives.shape[1:]))
     return Sensitivities(names, roles, units, matrix, tool_pose_changes(robot, poses, matrix))
 

@@ -28,7 +28,12 @@ from pteron.equations import (
 from pteron.equations.friction import passive_friction
 from pteron.equations.laws import LAWS
 from pteron.equations.machine import Machine
-from pteron.equations.virtual_work import generalized_forces, inverse_dynamics
+from pteron.equations.virtual_work import (
+    SharedForces,
+    generalized_forces,
+    inverse_dynamics,
+    rigid_forces,
+)
 from pteron.kernels.entries import (
     ANGLES as ANGLES,
     MOTION,
@@ -72,14 +77,18 @@ def _set_payload(m: Machine, v: Inputs) -> Outputs:
     return {"loaded_parameters": ca.vertcat(inertial[:start], inertial[start:] + ca.vertcat(*load))}
 
 
-def _rigid(m: Machine, v: Inputs, at: Any) -> Expression:
-    """Return the actuator forces (n, 1) of the rigid bodies in a motion state."""
-    return inverse_dynamics(m, at, v.parameters, v.wrench, carried=v.carried)
+def _rigid(m: Machine, v: Inputs, at: Any, drive_loads: Expression) -> SharedForces:
+    """Return the actuator forces (n, 1) in a motion state, with those of the drives themselves."""
+    shared = rigid_forces(
+        *(m, at, v.parameters, v.wrench), carried=v.carried, drive_loads=drive_loads
+    )
+    return shared.plus(drive_loads)
 
 
 def _inverse_dynamics(m: Machine, v: Inputs) -> Outputs:
     """Return the actuator forces (n,) of a motion, N or N m."""
-    return {"forces": _rigid(m, v, state(m, v))}
+    shared = rigid_forces(m, state(m, v), v.parameters, v.wrench, carried=v.carried)
+    return dict(shared.outputs())
 
 
 def _dynamics_arguments(m: Machine, v: Inputs) -> Any:
@@ -97,7 +106,8 @@ def _drive_forces(m: Machine, v: Inputs, *, smooth: bool) -> Outputs:
     """Return the drives' forces (n,): of rigid bodies, friction and rotors, N or N m."""
     at, drive_numbers = state(m, v), drives.Drives.from_vector(v.drives)
     moving = drives.joint_motion(at)
-    return {"forces": _rigid(m, v, at) + drives.drive_forces(drive_numbers, *moving, smooth=smooth)}
+    drive_loads = drives.drive_forces(drive_numbers, *moving, smooth=smooth)
+    return dict(_rigid(m, v, at, drive_loads).outputs())
 
 
 def _joint_feed_forward(m: Machine, v: Inputs) -> Outputs:
@@ -106,7 +116,8 @@ def _joint_feed_forward(m: Machine, v: Inputs) -> Outputs:
     pose, *_ = closing.direct_step(m, v.joints, v.pose, TYPE_II)
     at = m.state(pose, *kinematics.platform_rates(m, pose, *moving))
     drive_loads = drives.drive_forces(drives.Drives.from_vector(v.drives), *moving, smooth=True)
-    return {"forces": _rigid(m, v, at) + drive_loads, "found": pose}
+    forces, *feasible = _rigid(m, v, at, drive_loads).outputs().items()
+    return dict([forces, ("found", pose), *feasible])
 
 
 def _drive_accelerations(m: Machine, v: Inputs) -> Outputs:
@@ -121,9 +132,10 @@ def _control_outputs(m: Machine, v: Inputs, *, what: str) -> Outputs:
     """Return the drive forces and next memory of the control law `what`."""
     count = len(m.parameters)
     selection = ca.SX(count, 0) if v.selection is None else v.selection
-    estimates = control.estimate_count(what, m.freedom, selection.shape[1])
+    n = len(m.legs)
+    estimates = control.estimate_count(what, n, selection.shape[1])
     gains, memory = (
-        control.split_parts(vector, control.lengths(parts[what], m.freedom, estimates))
+        control.split_parts(vector, control.lengths(parts[what], m.freedom, n, estimates))
         for vector, parts in ((v.gains, control.GAINS), (v.memory, control.MEMORY))
     )
     sample = control.Sample(
@@ -138,8 +150,10 @@ def _control_outputs(m: Machine, v: Inputs, *, what: str) -> Outputs:
         selection,
         TYPE_II,
     )
-    forces, next_memory = LAWS[what](sample)
-    return {"forces": forces, "next_memory": ca.vertcat(*(next_memory[name] for name in memory))}
+    shared, next_memory = LAWS[what](sample)
+    forces, *feasible = shared.outputs().items()
+    memory_part = "next_memory", ca.vertcat(*(next_memory[name] for name in memory))
+    return dict([forces, memory_part, *feasible])
 
 
 def _law(name: str) -> Entry:
@@ -157,6 +171,12 @@ def _regressor(m: Machine, v: Inputs) -> Outputs:
     """Return the regressor (n, K): its product with the parameters is the actuator forces."""
     selection = ca.SX.eye(len(m.parameters)) if v.selection is None else v.selection
     return {"regressor": _as_matrix(inverse_dynamics(m, state(m, v), selection))}
+
+
+def _load_regressor(m: Machine, v: Inputs) -> Outputs:
+    """Return the regressor (m, K) of the load M x'' + h along the pose's coordinates."""
+    load = generalized_forces(m, state(m, v), ca.SX.eye(len(m.parameters)))
+    return {"regressor": _as_matrix(load)}
 
 
 def _paper_terms(m: Machine, v: Inputs) -> Outputs:
@@ -200,6 +220,7 @@ TABLE |= {
         lagrangian.potential_energy, _AT_REST, "energy", NEEDS_REACH
     ),
     **dict.fromkeys(("regressor", "base_regressor"), Entry(MOTION, _regressor, NEEDS_TYPE_II)),
+    "load_regressor": Entry(MOTION, _load_regressor, NEEDS_TYPE_I),
     "paper_regressor": Entry(
         MOTION, lambda m, v: {"regressor": regressor.paper_regressor(m, state(m, v))}, NEEDS_TYPE_II
     ),
@@ -220,7 +241,7 @@ def _driven_motion(m: Machine, v: Inputs) -> Outputs:
     drive_numbers = drives.Drives.from_vector(v.drives)
     if not kind.stribeck:  # a sixth of the operations less
         drive_numbers = drive_numbers._replace(stribeck=ca.SX.zeros(*drive_numbers.stribeck.shape))
-    zero, parts = ca.SX.zeros(m.freedom), (v.motor, v.motor_rate, v.current, v.bristle)
+    zero, parts = ca.SX.zeros(len(m.legs)), (v.motor, v.motor_rate, v.current, v.bristle)
     motor, motor_rate, current, bristle = (zero if part is None else part for part in parts)
     pace, numbers = (
         ca.SX(0) if v.pace is None else v.pace,
@@ -261,7 +282,7 @@ def _pad_rows(columns: Sequence[Expression], count: int) -> Expression:
 
 def _reactions(m: Machine, v: Inputs) -> Outputs:
     """Return the linear equations of the joint reaction forces, by name."""
-    equilibrium = reactions.equilibrium(m, state(m, v), v.parameters)
+    n, equilibrium = len(m.legs), reactions.equilibrium(m, state(m, v), v.parameters)
     wrenches = [
         [ca.vertcat(at.force, at.moment) for at in leg.wrenches] for leg in equilibrium.legs
     ]
@@ -278,8 +299,8 @@ def _reactions(m: Machine, v: Inputs) -> Outputs:
         "driven_rows": _as_matrix(equilibrium.driven_rows),
         "driven": equilibrium.driven,
         "ends": platform_points(m, v.pose),
-        "points": (points, (m.freedom, points.shape[0] // m.freedom, 3)),
-        "passed": (passed, (m.freedom, passed.shape[0] // m.freedom, 6)),
+        "points": (points, (n, points.shape[0] // n, 3)),
+        "passed": (passed, (n, passed.shape[0] // n, 6)),
     }
 
 

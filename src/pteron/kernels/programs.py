@@ -27,6 +27,7 @@ from pteron.equations.drives import Drives
 from pteron.equations.machine import Machine
 from pteron.equations.topology import stored_numbers, topology_of, with_stored_numbers
 from pteron.equations.transmissions import DriveKind, actuator_count
+from pteron.equations.virtual_work import FEASIBLE
 from pteron.errors import ModelError
 from pteron.kernels.functions import (
     ANGLES,
@@ -43,6 +44,7 @@ from pteron.kernels.kernel import Port, count_operations
 from pteron.kernels.passes import optimise_function
 from pteron.kernels.program_cache import Program, cached_program, shape_of
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.manipulator.distribution import Distribution
 
 _HUGE = 1e75
 """Inputs or outputs beyond this count as not finite: their squares might overflow."""
@@ -213,7 +215,12 @@ def _cached_geometry_only(robot: Manipulator) -> Manipulator:
         for leg in robot.legs
     )
     platform = robot.platform.with_total_inertia(plain(robot.platform.total_inertia))
-    return replace(robot, name="any", legs=legs, platform=platform, radii=None, tools=(), home=None)
+    shares = robot.distribution
+    if robot.redundancy:
+        reference, limits = shares and shares.reference, robot.greatest_forces
+        shares = Distribution(limits is not None, reference, robot.drive_strengths, limits)
+    named = replace(robot, name="any", legs=legs, platform=platform, distribution=shares)
+    return replace(named, radii=None, tools=(), home=None)
 
 
 class _Form(NamedTuple):
@@ -339,11 +346,14 @@ def _program(
             if form.wrench:
                 parts = ca.vertsplit(symbols["wrench"], 3)
                 known["wrench"] = ca.vertcat(*(ca.mtimes(axes.T, part) for part in parts))
-    built = definition.build(machine, Inputs(**known))
+    built = dict(definition.build(machine, Inputs(**known)))
+    feasible = built.pop(FEASIBLE, None)
     forms = [{name: _with_shape(unshaped) for name, unshaped in built.items()}]
     if form.guarded:
         results = [expression for expression, _ in forms[0].values()]
         statuses = _statuses(machine, definition, symbols, results)
+        if feasible is not None:
+            statuses = [ca.if_else(feasible, status, 0) for status in statuses]
         forms = [{**forms[0], "status": (status, ())} for status in statuses]
     everything = ca.veccat(*(expression for expression, _ in forms[0].values()))
     used = [n for n, v in vectors.items() if n == "geometry" or ca.depends_on(everything, v)]
@@ -374,7 +384,7 @@ def _input_symbols(
     """Return the inputs of a function as symbols by name, shared inputs last."""
     names = [name for name in TABLE[form.what].inputs if name not in constants]
     names += ["wrench"] if form.wrench else []
-    selected = constants.get("selection", ca.SX.eye(0)).shape[1]
+    n, selected = len(machine.legs), constants.get("selection", ca.SX.eye(0)).shape[1]
     sizes = {
         "parameters": len(machine.parameters),
         "wrench": machine.wrench_size,
@@ -382,8 +392,9 @@ def _input_symbols(
         "mass": 1,
         "center": 3,
         "inertia": inertia_count(machine.robot.platform.inertia.kinds),
-        "drives": len(Drives._fields) * machine.freedom,
-        **control.input_sizes(form.what, machine.freedom, selected),
+        **dict.fromkeys(("joints", "joint_rates", "joint_accelerations", "forces"), n),
+        "drives": len(Drives._fields) * n,
+        **control.input_sizes(form.what, machine.freedom, n, selected),
     }
     symbols = {name: ca.SX.sym(name, sizes.get(name, machine.freedom)) for name in names}
     symbols |= extra

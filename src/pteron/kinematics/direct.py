@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+from dataclasses import replace
 from functools import lru_cache
+from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from pteron.equations.machine import closure_of
-from pteron.errors import UnreachablePose
-from pteron.kernels import Array
+from pteron.errors import SingularPose, UnreachablePose
+from pteron.kernels import Array, numeric
 from pteron.kinematics.architecture import expect_regular
 from pteron.kinematics.assembly import every_pose, sort_poses
 from pteron.kinematics.evaluate import evaluate_kernel, evaluate_unchecked, finite_rows, place
+from pteron.kinematics.sampling import draw_poses
 from pteron.kinematics.unlikely_values import unlikely_values, warn_of_unlikely
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.manipulator.variants import with_elbows
@@ -20,12 +24,20 @@ from pteron.platforms.coordinates import wrap_angle
 from pteron.shapes import JointsLike, OnFailure, PerJoint, PoseLike, Poses
 from pteron.tolerances import SAME
 
+_FIT, _FIT_STEPS = 1e-6, 8
+"""Share of a leg's length by which a redundant machine's joint may miss a pose; steps of least
+squares, which square the error each."""
+
+_CHOICES, _DRAWN = 8, 64
+"""Greatest number of choices of legs that are tried; poses at which they are compared."""
+
 
 def direct_kinematics(
     robot: RobotLike,
     joints: JointsLike,
     *,
     all_branches: bool = False,
+    tolerance: float | None = None,
     on_failure: OnFailure = "raise",
 ) -> Poses:
     """Return every pose with the given joint coordinates: all assembly modes.
@@ -48,6 +60,9 @@ def direct_kinematics(
         Rods and planar legs close with either side of an elbow. By default only poses of the
         robot's own working mode are returned, those whose inverse kinematics are the joints; True
         returns those of the others as well.
+    tolerance : float, optional
+        With more legs than coordinates: by how much, m, each joint may miss the pose that fits all
+        of them best; by default 1e-6 of the leg's length.
     on_failure : {"raise", "nan"}
         What to do with joints that no pose has, or that are not finite: raise, or give NaN. Where
         there is a pose, further modes that are not real are NaN in either case.
@@ -86,7 +101,7 @@ def direct_kinematics(
     robot = as_manipulator(robot)
     expect_regular(robot)
     joint_array = finite_rows(robot, joints, "joints", on_failure)
-    poses = _rows(robot, joint_array, all_branches=all_branches)
+    poses = _rows(robot, joint_array, all_branches=all_branches, tolerance=tolerance)
     is_missing = np.isnan(poses).all(axis=(-2, -1))
     if on_failure == "raise" and is_missing.any():
         index = tuple(int(i) for i in np.argwhere(is_missing)[0])
@@ -144,7 +159,9 @@ def assembly_mode(
     return nearest(robot, _rows(robot, joints, all_branches=all_branches), poses)
 
 
-def working_mode(robot: RobotLike, pose: PoseLike, joints: JointsLike) -> NDArray[np.int64]:
+def working_mode(
+    robot: RobotLike, pose: PoseLike, joints: JointsLike, *, tolerance: ArrayLike = SAME
+) -> NDArray[np.int64]:
     """Return the sign of each leg's elbow, 1 or -1, with which a pose has joint coordinates.
 
     Parameters
@@ -155,6 +172,8 @@ def working_mode(robot: RobotLike, pose: PoseLike, joints: JointsLike) -> NDArra
         Poses, m and rad.
     joints : array, shape (..., n)
         Their joint coordinates, m or rad.
+    tolerance : float or array, shape (n,)
+        Greatest difference of joint coordinates that are equal, m or rad.
 
     Returns
     -------
@@ -178,16 +197,19 @@ def working_mode(robot: RobotLike, pose: PoseLike, joints: JointsLike) -> NDArra
         finite_rows(robot, pose, "pose", "nan"),
         finite_rows(robot, joints, "joints", "nan"),
     )
-    elbows = np.zeros(np.broadcast_shapes(poses.shape, joint_array.shape), dtype=np.int64)
+    lead = np.broadcast_shapes(poses.shape[:-1], joint_array.shape[:-1])
+    elbows = np.zeros((*lead, robot.joint_count), dtype=np.int64)
     file_signs = [leg.elbow for leg in robot.legs]
     other_signs = [-leg.elbow if -leg.elbow in leg.branches else leg.elbow for leg in robot.legs]
     for signs in (other_signs, file_signs):
         back = evaluate_unchecked(with_elbows(robot, signs), "inverse_kinematics", poses)
-        elbows = np.where(_same_joints(robot, back, joint_array), signs, elbows)
+        elbows = np.where(_same_joints(robot, back, joint_array, tolerance), signs, elbows)
     return elbows
 
 
-def assembly_modes(robot: RobotLike, joints: Array, *, all_branches: bool = False) -> Poses:
+def assembly_modes(
+    robot: RobotLike, joints: Array, *, all_branches: bool = False, tolerance: float | None = None
+) -> Poses:
     """Return the pose (..., k, m) of joint coordinates (..., n) in each assembly mode; else NaN.
 
     Poses in closed form are not sorted, unlike those of `direct_kinematics`: along a motion each
@@ -195,6 +217,8 @@ def assembly_modes(robot: RobotLike, joints: Array, *, all_branches: bool = Fals
     with other elbows.
     """
     robot = as_manipulator(robot)
+    if robot.redundancy:
+        return _fitting_poses(robot, joints, tolerance, all_branches=all_branches)
     closure = closure_of(robot)
     poses: Poses
     if closure.closed_form:
@@ -208,6 +232,55 @@ def assembly_modes(robot: RobotLike, joints: Array, *, all_branches: bool = Fals
         is_missing |= ~_same_joints(robot, back, joints[..., None, :]).all(axis=-1)
     poses[is_missing] = np.nan
     return poses
+
+
+def _fitting_poses(
+    robot: Manipulator, joints: Array, tolerance: float | None, *, all_branches: bool
+) -> Poses:
+    """Return the poses (..., k, m) of some legs, one for each coordinate, that the others meet.
+
+    Least squares sharpens them. The legs are those that hold the platform best at home; where these
+    give no pose, others are tried.
+    """
+    levers, sizes = (
+        np.array([getattr(leg, name) for leg in robot.legs]) for name in ("lever", "size")
+    )
+    allowed = (_FIT * sizes if tolerance is None else tolerance) / levers
+    poses = np.full((*joints.shape[:-1], closure_of(robot).modes, robot.freedom), np.nan)
+    for legs in _best_subsets(robot):
+        is_missing = np.isnan(poses).all(axis=(-2, -1))
+        if not is_missing.any():
+            break
+        given = joints[is_missing]
+        part = replace(robot, legs=tuple(robot.legs[i] for i in legs), distribution=None, home=None)
+        with suppress(SingularPose):  # these legs leave it a self-motion
+            tried = assembly_modes(part, given[:, list(legs)], all_branches=all_branches)
+            rows = np.broadcast_to(given[:, None], (*tried.shape[:-1], given.shape[-1]))
+            for _ in range(_FIT_STEPS):
+                tried = numeric(robot, "newton_step")(rows, tried)[0]
+            elbows = working_mode(robot, tried, rows, tolerance=allowed)
+            misses = (elbows == 0).any(axis=-1)
+            if not all_branches:
+                misses |= (elbows != [leg.elbow for leg in robot.legs]).any(axis=-1)
+            tried[misses | _is_repeated(robot, tried)] = np.nan
+            poses[is_missing, : tried.shape[1]] = tried[:, : poses.shape[-2]]
+    return poses
+
+
+def _is_repeated(robot: Manipulator, poses: Array) -> NDArray[np.bool_]:
+    """Return which poses (B, k, m) equal one before, to which least squares has moved them."""
+    size = max(leg.size for leg in robot.legs)
+    differences = np.abs(poses[:, :, None] - poses[:, None]).max(axis=-1)
+    return np.asarray((np.tril(differences <= _FIT * size, -1)).any(axis=-1))
+
+
+@lru_cache(maxsize=64)
+def _best_subsets(robot: Manipulator) -> tuple[tuple[int, ...], ...]:
+    """Return choices of m legs, those first whose forces hold the platform best at many poses."""
+    rows = numeric(robot, "jacobian")(draw_poses(robot, _DRAWN, np.random.default_rng(0)))[0]
+    choices = list(combinations(range(robot.joint_count), robot.freedom))
+    sizes = {legs: float(np.median(np.abs(np.linalg.det(rows[:, list(legs)])))) for legs in choices}
+    return tuple(sorted(choices, key=lambda legs: -sizes[legs])[:_CHOICES])
 
 
 def mode_of(robot: RobotLike, pose: tuple[float, ...]) -> int:
@@ -233,16 +306,20 @@ def nearest(robot: RobotLike, poses: Array, pose: Array) -> NDArray[np.int64]:
     return np.asarray(np.nan_to_num(distance, nan=np.inf).argmin(axis=-1))
 
 
-def _rows(robot: Manipulator, joints: Array, *, all_branches: bool) -> Poses:
+def _rows(
+    robot: Manipulator, joints: Array, *, all_branches: bool, tolerance: float | None = None
+) -> Poses:
     """Return poses (..., k, m) of joint coordinates, sorted where modes have no fixed order."""
-    poses = assembly_modes(robot, joints, all_branches=all_branches)
+    poses = assembly_modes(robot, joints, all_branches=all_branches, tolerance=tolerance)
     return poses if closure_of(robot).keeps_modes else sort_poses(poses)
 
 
-def _same_joints(robot: Manipulator, joints: Array, other: Array) -> NDArray[np.bool_]:
+def _same_joints(
+    robot: Manipulator, joints: Array, other: Array, tolerance: ArrayLike = SAME
+) -> NDArray[np.bool_]:
     """Return where joint coordinates (..., n) are equal, up to full turns of cranks: (..., n)."""
     differences = np.abs(joints - other)
     cranks = np.array([leg.joint.unit == "rad" for leg in robot.legs])
     turn = 2.0 * np.pi
     differences = np.where(cranks, np.abs((differences + np.pi) % turn - np.pi), differences)
-    return np.asarray(differences <= SAME)
+    return np.asarray(differences <= tolerance)

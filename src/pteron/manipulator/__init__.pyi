@@ -1,4 +1,5 @@
 from pteron.manipulator.dimensions import with_dimensions as with_dimensions
+from pteron.manipulator.distribution import Distribution as Distribution
 from pteron.manipulator.files import (
     catalog as catalog,
     from_dict as from_dict,

@@ -17,6 +17,7 @@ from pteron.errors import ModelError, shorten, warn_unlikely
 from pteron.legs import LegKind
 from pteron.legs.circles import perpendicular_to
 from pteron.legs.installed import kind_named, kind_names
+from pteron.manipulator.distribution import Distribution
 from pteron.manipulator.machine_warnings import machine_warnings
 from pteron.manipulator.manipulator import Manipulator, faults_of
 from pteron.manipulator.radii import Radii
@@ -256,7 +257,9 @@ def _machine(document: dict[str, Any], source: str) -> Manipulator:
         name = "?" if machine.name is None else machine.name
         legs_built = built if machine.legs is not None else [None] * len(platform.coordinates)
         home = None if machine.home is None else tuple(machine.home.pose or ())
-        reading.faults += faults_of(name, platform, legs_built, tools, home)
+        shares = machine.distribution
+        distribution = None if shares is None else Distribution(**shares.model_dump())
+        reading.faults += faults_of(name, platform, legs_built, tools, home, distribution)
         if not reading.faults:
             return Manipulator(
                 name,
@@ -266,6 +269,7 @@ def _machine(document: dict[str, Any], source: str) -> Manipulator:
                 radii,
                 tuple(tools),
                 home,
+                distribution,
                 machine.owner or {},
             )
     subject = shorten(source, bare=True, longest=1000)

@@ -18,6 +18,12 @@ from pteron.bodies.vectors import PARALLEL_TOLERANCE, Vector, complement, dot, p
 from pteron.errors import ModelError
 from pteron.legs import LegKind
 from pteron.legs.protocol import breaches
+from pteron.manipulator.distribution import (
+    Distribution,
+    distribution_faults,
+    greatest_forces,
+    strengths_of,
+)
 from pteron.manipulator.names import name_faults
 from pteron.manipulator.owner_data import OwnerData
 from pteron.manipulator.radii import Radii
@@ -44,7 +50,8 @@ class Manipulator:
     name : str
         What the machine is called.
     platform : Platform
-        The moving platform; its motion fixes how many legs there are: one for each freedom.
+        The moving platform; its motion fixes how many legs there are at least: one for each
+        freedom.
     legs : tuple of legs
         Of any kind in `pteron.legs`, in the order of the joint coordinates.
     gravity : vector
@@ -55,6 +62,8 @@ class Manipulator:
         Tools that the platform can carry; `pteron.motion.with_tool` mounts one.
     home : tuple of float, optional
         The pose, m and rad, where the machine stands; `pteron.workspace.home_pose` finds one.
+    distribution : Distribution, optional
+        How a machine with more legs than freedoms shares out its drives' forces.
     owner : mapping
         Data of the machine's owner, such as a serial number: kept in its file, without effect, and
         not compared.
@@ -62,8 +71,8 @@ class Manipulator:
     Raises
     ------
     ModelError
-        If the number of legs differs from the platform's freedom, or if the legs' constraints
-        leave the platform another freedom than `platform.motion` says.
+        If there are fewer legs than freedoms, or if the legs' constraints leave the platform
+        another freedom than `platform.motion` says.
     """
 
     name: str
@@ -73,6 +82,7 @@ class Manipulator:
     radii: Radii | None = None
     tools: tuple[Tool, ...] = ()
     home: tuple[float, ...] | None = None
+    distribution: Distribution | None = None
     owner: Mapping[str, Any] = field(default_factory=OwnerData, compare=False, repr=False)
 
     def __hash__(self) -> int:
@@ -91,7 +101,8 @@ class Manipulator:
 
     def __post_init__(self) -> None:
         legs = tuple(self.legs)
-        raise_faults(faults_of(self.name, self.platform, legs, self.tools, self.home))
+        others = self.tools, self.home, self.distribution
+        raise_faults(faults_of(self.name, self.platform, legs, *others))
         legs = tuple(leg.with_platform_frame(self.platform.frame) for leg in legs)
         object.__setattr__(self, "legs", legs)
         object.__setattr__(self, "tools", tuple(self.tools))
@@ -123,6 +134,21 @@ class Manipulator:
     def joint_count(self) -> int:
         """Number of actuated joints, n, one for each leg."""
         return len(self.legs)
+
+    @property
+    def redundancy(self) -> int:
+        """Number of legs beyond the freedoms, n - m."""
+        return self.joint_count - self.freedom
+
+    @cached_property
+    def drive_strengths(self) -> tuple[float, ...]:
+        """The strengths (n,) by which drives share forces, relative to the greatest."""
+        return strengths_of(self.legs, self.distribution)
+
+    @cached_property
+    def greatest_forces(self) -> tuple[float, ...] | None:
+        """The limits (n,) within which a redundant machine shares forces, N or N m; or None."""
+        return greatest_forces(self.legs, self.distribution)
 
     @property
     def units(self) -> tuple[Unit, ...]:
@@ -200,19 +226,23 @@ def faults_of(
     legs: Sequence[LegKind | None],
     tools: Sequence[Tool] = (),
     home: Sequence[float] | None = None,
+    distribution: Distribution | None = None,
 ) -> list[str]:
     """Return the faults of a machine's parts, one line each; None stands for a faulty leg."""
     faults = [*name_faults(name), *tool_faults(platform, tools), *_home_faults(platform, home)]
     freedom = len(platform.coordinates)
-    if len(legs) != freedom:
+    if len(legs) < freedom:
         faults.append(
             f"legs: {len(legs)} given, but a {platform.motion} platform has {freedom} freedoms and "
-            f"needs {freedom} legs"
+            f"needs {freedom} legs or more"
         )
     known_legs = {i: leg for i, leg in enumerate(legs, start=1) if leg is not None}
     faults += [
         f"leg {i}: {fault}" for i, leg in known_legs.items() for fault in _leg_faults(platform, leg)
     ]
+    if not faults and len(known_legs) == len(legs):
+        shares = list(known_legs.values()), distribution, len(legs) - freedom
+        faults += distribution_faults(*shares)
     if faults or len(known_legs) < freedom:
         return faults
     placed_legs = [leg.with_platform_frame(platform.frame) for leg in known_legs.values()]
@@ -365,13 +395,13 @@ def _unheld_freedoms(platform: Platform, legs: list[LegKind]) -> list[str]:
     if not len(free):
         return []
     if platform.plane_normal is not None and not platform.angles:
-        first, second = (_planar_point(platform, leg) for leg in legs)
-        distance = math.hypot(*(first - second))
+        first, *others = (_planar_point(platform, leg) for leg in legs)
+        distance = max(math.hypot(*(first - other)) for other in others)
         if distance <= ROUNDING:
             return []
         return [
             f"legs: their platform points are {distance:.4g} m apart, so that the platform is free "
-            "to turn about its axis; a 2T platform needs one point for both"
+            "to turn about its axis; a 2T platform needs one point for all"
         ]
     single = [
         i

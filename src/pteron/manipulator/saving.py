@@ -108,6 +108,9 @@ def document_of(robot: Manipulator) -> dict[str, Any]:
         ]
     if robot.home is not None:
         machine["home"] = {"pose": robot.home}
+    if robot.distribution is not None:
+        shares = asdict(robot.distribution).items()
+        machine["distribution"] = {k: v for k, v in shares if v is not None}
     if robot.owner:
         machine["owner"] = dict(robot.owner)
     machine |= {"platform": platform, "legs": legs}

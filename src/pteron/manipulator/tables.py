@@ -165,6 +165,23 @@ class HomeTable(TomlTable):
     pose: list[Number] = key("coordinates of the pose in their order, m and rad")
 
 
+class DistributionTable(TomlTable):
+    """`[distribution]`: how a machine with more legs than freedoms shares out its forces."""
+
+    limits: bool = key("whether each force stays within its drive's max_force", False)
+    reference: list[Number] | None = key(
+        "each drive's force along +q that forces are nearest to, N or N m; 0 if omitted",
+        None,
+        [10.0, 10.0, 10.0],
+    )
+    strengths: list[Number] | None = key(
+        "each drive's strength, N or N m, by which forces are shared; max_force or the rated force "
+        "if omitted",
+        None,
+        [100.0, 100.0, 50.0],
+    )
+
+
 class MachineTable(TomlTable):
     """The whole file; each of `legs` is read by its own kind."""
 
@@ -183,9 +200,12 @@ class MachineTable(TomlTable):
     home: HomeTable | None = key(
         "pose where motions begin; chosen by Pteron if omitted: see home_pose", None
     )
+    distribution: DistributionTable | None = key(
+        "how more legs than freedoms share out their forces", None
+    )
     owner: dict[str, Any] = key("data of the owner: kept, without effect", {}, {"serial": "Q-07"})
     platform: PlatformTable = key("the platform, which the legs carry")
-    legs: list[Any] = key("the legs: one table for each degree of freedom of the platform")
+    legs: list[Any] = key("the legs: one table for each degree of freedom of the platform, or more")
 
 
 class TiltingMachineTable(MachineTable):

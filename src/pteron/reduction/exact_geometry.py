@@ -18,6 +18,7 @@ from typing import TypeVar
 import casadi as ca
 import numpy as np
 
+from pteron.equations.machine import distribution_numbers
 from pteron.kernels import Array, Field, evaluate
 from pteron.legs.circles import plane_axis, pole
 from pteron.manipulator import Manipulator
@@ -102,6 +103,9 @@ class ExactGeometry:
         frame's own.
     recognised, approximated : tuple of str
         What was taken for a root, and what was approximated, each with the error made.
+    shares : int
+        How many numbers of a redundant machine's distribution of forces follow gravity; a base set
+        does not depend on them.
     lost : tuple of str
         Right angles between directions which the exact numbers do not keep.
     nearly : tuple of str
@@ -118,6 +122,7 @@ class ExactGeometry:
     approximated: tuple[str, ...]
     lost: tuple[str, ...]
     nearly: tuple[str, ...]
+    shares: int = 0
 
     @property
     def radicands(self) -> frozenset[int]:
@@ -144,7 +149,8 @@ class ExactGeometry:
             for number in elements
         ]
         vectors = (*self.axes, *self.platform.values(), self.gravity)
-        return numbers + [number.field_element(field) for vector in vectors for number in vector]
+        numbers += [number.field_element(field) for vector in vectors for number in vector]
+        return numbers + [field.number(Fraction(1))] * self.shares
 
 
 @lru_cache(maxsize=6)
@@ -187,8 +193,11 @@ def exact_geometry(robot: Manipulator) -> ExactGeometry:
     axes = _rational_rotation(frame) if "second_axis" in platform.quantities else UNIT
     quantities = {name: (platform_values | exact)[name] for name in platform.quantities}
     missed = lost_right_angles(distinct, exact), describe_near_relations(distinct)
-    remarks = map(tuple[str, ...], (notes.recognised, notes.approximated, *missed))
-    return ExactGeometry(legs, gravity, quantities, axes, platform.arm_axes, frame, *remarks)
+    lost, nearly = (tuple(texts) for texts in missed)
+    remarks = tuple(notes.recognised), tuple(notes.approximated), lost, nearly
+    parts = legs, gravity, quantities, axes, platform.arm_axes, frame
+    shares = sum(map(len, distribution_numbers(robot).values()))
+    return ExactGeometry(*parts, *remarks, shares)
 
 
 def _exact_leg(

@@ -58,7 +58,9 @@ def _cached_rows(
     field, rng = PrimeField(prime), random.Random()
     rng.setstate(state)
     deltas = Evaluation(general_program(topology, "discriminants").function, field, [vector])
-    program = Evaluation(general_program(topology, "regressor").function, field, [vector])
+    program = Evaluation(
+        general_program(topology, _regressor_name(topology)).function, field, [vector]
+    )
     rows: list[list[int]] = []
     for _ in range(_ATTEMPTS):
         pose = _draw(topology.freedom, prime, rng)
@@ -89,7 +91,7 @@ def rational_rows(
     field = RationalField()
     vector = geometry.field_elements(field)
     points = Evaluation(general_program(topology, "platform_points").function, field, [vector])
-    program = Evaluation(general_program(topology, "regressor").function, field)
+    program = Evaluation(general_program(topology, _regressor_name(topology)).function, field)
     places = number_places(topology)
     rows: list[list[Fraction]] = []
     while len(rows) < states * topology.freedom:
@@ -129,6 +131,14 @@ def _split_rows(entries: Sequence[Element], topology: Manipulator) -> list[list[
     """Return a regressor's entries as rows; the program gives them by columns."""
     n = len(parameter_data(topology))
     return [list(entries[i * n : (i + 1) * n]) for i in range(topology.freedom)]
+
+
+def _regressor_name(topology: Manipulator) -> str:
+    """Return the function that has the base set of a topology's regressor and fewest roots.
+
+    Of a redundant machine it is the regressor of the platform's load, whose forces have roots.
+    """
+    return "load_regressor" if topology.redundancy else "regressor"
 
 
 class _Degree(NamedTuple):
@@ -229,7 +239,7 @@ def degree_bound(topology: Manipulator) -> int:
 
 def _degree_bound(topology: Manipulator) -> int:
     """Return the degree bound of a topology's regressor, by evaluating it on degrees."""
-    program = general_program(topology, "regressor").function
+    program = general_program(topology, _regressor_name(topology)).function
     field = _DegreeField()
     constants = [field.number(Fraction(0))] * program.size1_in(0)
     constants = [c._replace(name=-1 - k) for k, c in enumerate(constants)]
@@ -246,5 +256,5 @@ def _degree_bound(topology: Manipulator) -> int:
 
 def roots(topology: Manipulator) -> int:
     """Return the number of square roots in the regressor's program."""
-    graph = graph_of(general_program(topology, "regressor").function)
+    graph = graph_of(general_program(topology, _regressor_name(topology)).function)
     return sum(node.operation == "sqrt" for node in graph.nodes)

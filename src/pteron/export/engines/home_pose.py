@@ -53,10 +53,10 @@ def _middle(robot: Manipulator) -> tuple[float, ...]:
     limits if any are.
     """
     ranges = np.array([leg.limits or (0.0, 0.0) for leg in robot.legs])
-    poses = direct_kinematics(robot, ranges.mean(axis=1), on_failure="nan").reshape(
-        -1, robot.freedom
-    )
-    poses = poses[np.isfinite(poses).all(axis=-1)]
+    poses = np.empty((0, robot.freedom))
+    if not robot.redundancy:  # whose mid-ranges belong to no pose
+        poses = direct_kinematics(robot, ranges.mean(axis=1), on_failure="nan")
+        poses = poses[np.isfinite(poses).all(axis=-1)]
     worth = _worth(robot, poses)
     if len(poses) and worth.max() >= _GOOD:
         return tuple((np.round(poses[_best(worth)], 12) + 0.0).tolist())

@@ -29,8 +29,9 @@ from pteron.shapes import PoseLike
 class LinearPlant(Result):
     """A machine with its drives, linearised: s' = A s + B F, with encoder readings C s.
 
-    s are small changes of (q, q'), then of the motors' coordinates and rates where transmissions
-    bend, and of the currents' forces where these lag: S numbers in all.
+    s are small changes of (q, q'), or with more joints than coordinates of (x, x'), then of the
+    motors' coordinates and rates where transmissions bend, and of the currents' forces where these
+    lag: S numbers in all.
 
     Attributes
     ----------
@@ -39,7 +40,7 @@ class LinearPlant(Result):
     pose : array, shape (m,)
         Where it was linearised.
     matrix : array, shape (S, S)
-        A, of the joints' coordinates and their rates first; SI units.
+        A, of the joints' coordinates and their rates first, or the platform's; SI units.
     inputs : array, shape (S, n)
         B, of the forces that are asked of the drives.
     outputs : array, shape (2 n, S)
@@ -143,18 +144,22 @@ def linearise(
     state_indices = np.flatnonzero([*[True] * (2 * m), *np.ravel(is_state)])
     system, driven = system[np.ix_(state_indices, state_indices)], driven[state_indices]
     # From the platform's (x, x') to the joints' (q, q'): q' = J x' changes with x too.
-    change = np.eye(len(state_indices) + 2 * (n - m), len(state_indices), 2 * (m - n))
-    change[: 2 * n, : 2 * m] = np.block([[rows, np.zeros((n, m))], [turned, rows]])
+    joint_motion = np.block([[rows, np.zeros((n, m))], [turned, rows]])
+    change = np.eye(len(state_indices))
+    if n == m:
+        change[: 2 * n, : 2 * m] = joint_motion
+        outputs = np.eye(2 * n, len(state_indices))
+    else:  # more joints than coordinates: the state is the platform's
+        outputs = np.hstack([joint_motion, np.zeros((2 * n, len(state_indices) - 2 * m))])
     matrix = np.linalg.solve(change.T, (change @ system).T).T
-    outputs = np.eye(2 * n, len(matrix))
     differenced = outputs[:n].copy()
     bends = np.flatnonzero(kind.elastic)
     for k, i in enumerate(bends):
         encoder = encoder_of(smooth.legs[i].drive)
         for rows_of, place, is_read in (
-            (outputs[i], 2 * n + k, encoder == "motor"),
-            (outputs[i + n], 2 * n + k + len(bends), encoder != "joint"),
-            (differenced[i], 2 * n + k, encoder != "joint"),
+            (outputs[i], 2 * m + k, encoder == "motor"),
+            (outputs[i + n], 2 * m + k + len(bends), encoder != "joint"),
+            (differenced[i], 2 * m + k, encoder != "joint"),
         ):
             if is_read:
                 rows_of[:] = 0.0
