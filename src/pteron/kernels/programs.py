@@ -217,7 +217,7 @@ def _cached_geometry_only(robot: Manipulator) -> Manipulator:
     platform = robot.platform.with_total_inertia(plain(robot.platform.total_inertia))
     shares = robot.distribution
     if robot.redundancy:
-        reference, limits = shares and shares.reference, robot.greatest_forces
+        reference, limits = None if shares is None else shares.reference, robot.greatest_forces
         shares = Distribution(limits is not None, reference, robot.drive_strengths, limits)
     named = replace(robot, name="any", legs=legs, platform=platform, distribution=shares)
     return replace(named, radii=None, tools=(), home=None)
