@@ -32,6 +32,7 @@ from pteron.calibration.unknowns import blocks_of
 from pteron.calibration.verdict import EVERY, Evidence, fitted_errors, rows_for_check, verdict_of
 from pteron.errors import DataError
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.manipulator.manipulator import refuse_redundant
 from pteron.progress import Progress, Steps
 from pteron.shapes import Seed, seed_number
 
@@ -119,6 +120,7 @@ def calibrate(
     array([-0.001,  0.   ,  0.   ])
     """
     robot = as_manipulator(robot)
+    refuse_redundant(robot, "calibration")
     _check_readings(robot.joint_count, measurements)
     blocks = blocks_of(robot, measurements, free, prior)
     start = Guess.drawn(robot, measurements)

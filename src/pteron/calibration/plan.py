@@ -22,6 +22,7 @@ from pteron.calibration.unknowns import blocks_of
 from pteron.calibration.verdict import rows_for_check
 from pteron.errors import DataError, ModelError
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
+from pteron.manipulator.manipulator import refuse_redundant
 from pteron.result import Result
 from pteron.shapes import Seed
 from pteron.tolerances import EXACT
@@ -143,6 +144,7 @@ def plan(
         If no region of poses around home, or on the plane, is proved to serve.
     """
     robot = as_manipulator(robot)
+    refuse_redundant(robot, "a plan for calibration")
     expect(count >= 1, "count", count, "1 or more")
     expect_one_of(get_args(Measure), measure=measure)
     expect_one_of(get_args(Criterion), criterion=criterion)

@@ -215,6 +215,7 @@ def _findings(robot: Manipulator) -> dict[str, Any]:
     from pteron.manipulator.template_masses import template_masses
     from pteron.workspace import home_poses, limited_joints, pose_margins
     from pteron.workspace.examination import examine
+    from pteron.workspace.redundancy import redundancy
 
     # Refuses a singular layout, and one without a common reach with by how much legs miss it
     both = home_poses(robot)
@@ -236,6 +237,7 @@ def _findings(robot: Manipulator) -> dict[str, Any]:
         "home_named": both.named,
         "mirror_pose": None if both.mirror is None else list(both.mirror),
         "holding": asdict(examination.holding),
+        **({"redundancy": redundancy(robot, home).as_dict()} if robot.redundancy else {}),
         "working_modes": [
             json_fields(
                 elbows=mode.signs,
@@ -290,6 +292,7 @@ def _show(robot: Manipulator, findings: dict[str, Any], further: str) -> None:
         *_drives(robot),
         *_pose_lines(robot, findings),
         _home_table(robot, findings),
+        *_redundancy(robot, findings),
         *_modes(findings["working_modes"]),
         *_passive(findings["limited_joints"]),
         *([f"Note: {text}"] if (text := findings["template_masses"]) else []),
@@ -386,6 +389,39 @@ def _home_table(robot: Manipulator, findings: dict[str, Any]) -> Table:
             ),
         ]
     return table("at the home pose", "value", "good if", rows=rows, numbers=("value", "good if"))
+
+
+def _redundancy(robot: Manipulator, findings: dict[str, Any]) -> list[Any]:
+    """Return a table of internal forces and lost drives, and a sentence; [] for n = m."""
+    import numpy as np
+
+    from pteron.thresholds import LEAST_SINGULAR_VALUE
+    from pteron.workspace.redundancy import ASSUMED_STIFFNESS, ZERO_ERROR
+
+    if (found := findings.get("redundancy")) is None:
+        return []
+    greatest = np.abs(found["internal_force"]).max(axis=1)
+    rows = []
+    for i, (leg, force, least) in enumerate(
+        zip(robot.legs, greatest, found["least_singular_value"], strict=True), start=1
+    ):
+        ratio = f"{1.0 / least:.2g}" if least > 0.0 else "-"
+        is_held = "held" if least >= LEAST_SINGULAR_VALUE else "not held"
+        rows.append((str(i), f"{force:.3g} {leg.joint.force_unit}", is_held, ratio))
+    error = f"{1e3 * ZERO_ERROR:g} mm"
+    stiffness = (
+        f" Drives without elastic.stiffness are taken as {1e-6 * ASSUMED_STIFFNESS:g} N/um along "
+        "their leg."
+        if found["assumed"]
+        else ""
+    )
+    headings = ("leg", "internal force", "without its drive", "leg force over load then")
+    return [
+        table(*headings, rows=rows, numbers=headings[:2] + headings[3:]),
+        f"{robot.joint_count} drives for {robot.freedom} freedoms fight under position control. "
+        f"Internal force: the greatest of any drive where this leg's zero is wrong by {error} "
+        f"along the leg.{stiffness}",
+    ]
 
 
 def _drives(robot: Manipulator) -> list[Table]:

@@ -142,7 +142,8 @@ class ClosureResiduals(NamedTuple):
     leg_rows: list[Expression]
     """(1, 6) each: the legs' part of `rows`, against (c', omega)."""
     contradiction: Expression = 0
-    """By how much a redundant machine's joints differ, relative to the legs' sizes."""
+    """Of a redundant machine, the largest residual: by how much its joints contradict each other.
+    `relative` is then the part of it that a step of least squares still changes."""
 
     @property
     def step(self) -> tuple[Expression, Expression]:
@@ -183,33 +184,14 @@ def closure_residuals(machine: Machine, joints: Expression, pose: Expression) ->
     ]
     share = ca.mmax(ca.vertcat(*length_residuals)) / ca.sum1(ca.vertcat(*sizes))
     largest = ca.mmax(ca.vertcat(share, *angles))
-    quasi_rows = rows_in_quasi_velocities(platform, rows)
-    return ClosureResiduals(ca.vertcat(*lengths), quasi_rows, largest, arms, platform, rows)
-
-
-def joint_residuals(machine: Machine, joints: Expression, pose: Expression) -> ClosureResiduals:
-    """Return a redundant machine's joint errors (n, 1) at a pose, in the robot's working mode.
-
-    More readings than coordinates contradict each other by their noise: `relative` is what a step
-    of least squares still changes, relative to the legs' sizes, and `contradiction` the rest.
-    """
-    state = machine.state(pose)
-    behind = ca.vertcat(*(leg.coordinate for leg in state.legs)) - joints
-    legs = list(zip(machine.robot.legs, ca.vertsplit(behind), strict=True))
-    errors = ca.vertcat(
-        *(
-            ca.atan2(ca.sin(error), ca.cos(error)) if leg.goes_round else error
-            for leg, error in legs
-        )
-    )
-    rows = [motion.row / motion.divisor for motion in state.legs]
-    matrix = rows_in_quasi_velocities(state.platform, rows)
-    scales = ca.SX([leg.lever / (leg.size or 1.0) for leg in machine.robot.legs])
-    change = ca.mtimes(matrix, solve(matrix, errors)[0])
-    relative, contradiction = (ca.mmax(scales * ca.fabs(part)) for part in (change, errors))
-    nothing: list[Expression | None] = [None] * len(rows)
-    parts = errors, matrix, relative, nothing, state.platform, rows
-    return ClosureResiduals(*parts, contradiction)
+    errors, quasi_rows = ca.vertcat(*lengths), rows_in_quasi_velocities(platform, rows)
+    parts = errors, quasi_rows, largest, arms, platform, rows
+    if not machine.closure.is_redundant:
+        return ClosureResiduals(*parts)
+    # More joints than coordinates contradict each other: what a step still changes is to vanish.
+    change = ca.mtimes(quasi_rows, solve(quasi_rows, errors)[0])
+    relative = ca.mmax(ca.fabs(change)) / ca.sum1(ca.vertcat(*sizes))
+    return ClosureResiduals(*parts, largest)._replace(relative=relative)
 
 
 def newton_step(
@@ -240,14 +222,13 @@ def converged_step(
     machine: Machine, joints: Expression, pose: Expression, least: float
 ) -> NewtonEnd:
     """Return the pose of joints (n, 1) by Newton's method from a start pose (m, 1)."""
-    residuals_at = joint_residuals if machine.closure.is_redundant else closure_residuals
-    residuals = residuals_at(machine, joints, pose)
+    residuals = closure_residuals(machine, joints, pose)
     step, divisor = residuals.step
     for _ in range(_STEPS - 1):
         previous_divisor, pose = divisor, pose + step / divisor
-        residuals = residuals_at(machine, joints, pose)
+        residuals = closure_residuals(machine, joints, pose)
         step, divisor = residuals.step
-    measure = _measure(machine, residuals, pose)
+    measure = machine.closure.measure_of(residuals.platform, residuals.leg_rows)
     validity = nan_below_zero(_CLOSED - residuals.relative)
     if machine.closure.is_redundant:
         validity += nan_below_zero(_AGREEMENT - residuals.contradiction)
@@ -263,14 +244,6 @@ def converged_step(
     return NewtonEnd(last_pose + validity, measure, divisor, residuals)
 
 
-def _measure(machine: Machine, residuals: ClosureResiduals, pose: Expression) -> Expression:
-    """Return the type-II measure where the residuals are taken, at a pose (m, 1)."""
-    if machine.closure.is_redundant:
-        state = machine.state(pose)
-        return machine.closure.measure(state.platform, state.legs)
-    return machine.closure.measure_of(residuals.platform, residuals.leg_rows)
-
-
 def direct_step(
     machine: Machine, joints: Expression, pose: Expression, least: float
 ) -> tuple[Expression, Expression, Expression]:
@@ -282,8 +255,6 @@ def direct_step(
     Newton's method does not converge.
     """
     end = converged_step(machine, joints, pose, least)
-    if machine.closure.is_redundant:  # whose residuals are those of the working mode alone
-        return end.pose, end.measure, ca.SX(0)
     # At the start pose the loci are those of the joints there, not of the given joints.
     start, rows = machine.state(pose), ca.vertsplit(closure_residuals(machine, joints, pose).rows)
     closed_rows = ca.vertsplit(plain_rows(start.platform, start.legs))

@@ -21,6 +21,7 @@ from pteron.identification.signals import Processing
 from pteron.json_values import json_fields
 from pteron.kernels import Array
 from pteron.manipulator import RobotLike, as_manipulator
+from pteron.manipulator.manipulator import refuse_redundant
 from pteron.reduction import BaseParameters
 from pteron.result import Result
 from pteron.tolerances import LAST_DIGITS
@@ -161,6 +162,7 @@ def identify_drive_gains(
     robots", Journal of Dynamic Systems, Measurement, and Control 136 (2014).
     """
     robot = as_manipulator(robot)
+    refuse_redundant(robot, "identification of drive gains")
     logs = [log] if with_payload is None else [log, with_payload]
     unit = _current_unit(logs)
     known = payload or logs[-1].description.payload or log.description.payload

@@ -128,8 +128,11 @@ def column_fault(model: Model, log: Log, preprocessing: Preprocessing) -> Column
 
     Of several that explain them equally well, one with positive friction and inertia is preferred,
     then the one of fewest changes. None if no exchange makes the error three times smaller, or
-    makes negative inertia or friction positive.
+    makes negative inertia or friction positive; and where legs are redundant, whose equations mix
+    all columns.
     """
+    if model.robot.redundancy:
+        return None
     # Without the mask of slow joints, which depends on the order of the joints.
     plain = replace(preprocessing, slow=np.zeros_like(preprocessing.slow))
     usual = observations_of(model, log, plain)

@@ -16,6 +16,7 @@ from pteron.arguments import checked_arguments, expect_one_of
 from pteron.bodies.parameters import unit_of
 from pteron.equations.friction import PassiveJoint, passive_joints
 from pteron.errors import ModelError
+from pteron.identification.felt_forces import felt_part
 from pteron.identification.observation import scale_columns
 from pteron.identification.signals import States
 from pteron.identification.signals.states import FullMotion
@@ -329,7 +330,9 @@ def identification_model(
 def _independent(model: Model) -> Model:
     """Return a model without the terms whose columns depend on others at every state."""
     names = model.names
-    flat = model._all_columns(_probes(model.robot)).reshape(-1, len(names))
+    probes = _probes(model.robot)
+    felt = felt_part(model.robot, probes.pose, model._all_columns(probes))
+    flat = felt.reshape(-1, len(names))
     columns, lengths = scale_columns(flat)
     factor: Array = np.linalg.qr(columns)[1]
     # The diagonal of R is what is left of each column once those before it are taken out of it.

@@ -14,6 +14,7 @@ import scipy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
 from pteron.identification.errors import LogSourceMixin
+from pteron.identification.felt_forces import felt_part, usable_samples
 from pteron.identification.logs import Log
 from pteron.identification.signals import Preprocessing, States
 from pteron.identification.signals.derivatives import EVEN, FourierFit
@@ -209,12 +210,15 @@ def _filter_block(
     settling = preprocessing.settling_rows
     inner = slice(settling, len(block.states) - settling)
     moving = motion_mask(block.states.joint_rates, preprocessing.slow, settling)
-    moving = (moving * block.smooth[:, None])[inner]
+    moving = usable_samples(model.robot, (moving * block.smooth[:, None])[inner])
     states, forces = block.states.part(inner), block.forces[inner]
+    matrix, forces = (
+        felt_part(model.robot, states.pose, part) for part in (model.matrix(states), forces)
+    )
     centers = decimation.centers(len(states))
     return assemble_observations(
         model,
-        decimation(moving[..., None] * model.matrix(states)),
+        decimation(moving[..., None] * matrix),
         decimation(moving * forces),
         decimation.noise(moving),
         states.time[centers],
@@ -281,6 +285,7 @@ def _periodic(
     moving = motion_mask(
         series.at(fine)[1], preprocessing.slow, preprocessing.settling_rows, wraps=True
     )
+    moving = usable_samples(model.robot, moving)
     count = 2 * harmonics + 1
     instants = np.linspace(start, start + period, count, endpoint=False)
 
@@ -291,19 +296,35 @@ def _periodic(
         # All periods have their samples at the same instants: one period is enough.
         time, shown = fine, moving
 
-    def regressor(part: slice) -> Array:
-        """Return the regressor (rows, n p) at a slice of the period's samples."""
+    def states_at(part: slice) -> States:
+        """Return the states at a slice of the period's samples."""
         phases = None if log.payload is None else np.full(len(time[part]), log.payload[0])
         about: dict[str, Any] = {"source": log.source, "first_row": log.first_row + part.start}
         motion, start = series.at(time[part]), preprocessing.start
-        states = States.from_joints(model.robot, motion, time[part], start, payload=phases, **about)
-        return np.asarray(shown[part][..., None] * model.matrix(states)).reshape(len(states), -1)
+        return States.from_joints(model.robot, motion, time[part], start, payload=phases, **about)
+
+    def regressor(part: slice) -> Array:
+        """Return the regressor (rows, n p) at a slice of the period's samples."""
+        states = states_at(part)
+        matrix = felt_part(model.robot, states.pose, model.matrix(states))
+        return np.asarray(shown[part][..., None] * matrix).reshape(len(states), -1)
+
+    def felt_forces(part: slice) -> Array:
+        """Return the forces (rows, n) at a slice of the log's samples."""
+        forces: Array = used[part] * log.forces[part]
+        if not model.robot.redundancy:
+            return forces
+        phase = np.mod(log.time[part] - start, period) + start
+        series_states = States.from_joints(
+            *(model.robot, series.at(phase), phase, preprocessing.start), source=log.source
+        )
+        return felt_part(model.robot, series_states.pose, forces)
 
     n, p = used.shape[1], len(model.names)
     basis = fourier_basis(instants, harmonics, period)
     projection, force_projection = (Projection(t, period, harmonics) for t in (time, log.time))
     matrix = (basis @ projection.coefficients(regressor, n * p)).reshape(count, n, p)
-    rows = basis @ force_projection.coefficients(lambda part: used[part] * log.forces[part], n)
+    rows = basis @ force_projection.coefficients(felt_forces, n)
     noise = projection.noise(shown, instants) * np.sqrt(len(time) / log.rows)
     payload = np.full(count, 0 if log.payload is None else log.payload[0], dtype=np.int64)
     return assemble_observations(

@@ -9,6 +9,7 @@ import numpy as np
 import scipy  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
+from pteron.identification.felt_forces import felt_part, usable_samples
 from pteron.identification.model import Model
 from pteron.identification.observation import motion_mask
 from pteron.identification.recordings import Recording
@@ -151,9 +152,12 @@ def predict(
     step = max(recording.rows // _KEPT, 1)
     for block in samples(model.robot, recording.samples(), preprocessing):
         states, measured = block.states.part(block.fresh), block.forces[block.fresh]
-        matrix = model.matrix(states)
+        matrix, measured = (
+            felt_part(model.robot, states.pose, part) for part in (model.matrix(states), measured)
+        )
         predicted, without = matrix @ beta, matrix @ plain
         used = motion_mask(states.joint_rates, preprocessing.slow, preprocessing.turning_rows)
+        used = usable_samples(model.robot, used)
         error, bare = measured - predicted, measured - without
         least = _LEAST_NOISE * np.sqrt((measured**2).mean(axis=0))
         out = used * _stands_out(error, np.maximum(preprocessing.force_noise, least))

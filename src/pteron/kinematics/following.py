@@ -6,9 +6,13 @@ import numpy as np
 
 from pteron.errors import DataError, UnreachablePose
 from pteron.kernels import Array, Kernel, numeric
+from pteron.kinematics.direct import assembly_modes, nearest
 from pteron.kinematics.evaluate import evaluate_unchecked, finite_rows
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.shapes import JointsLike, OnFailure, PerCoordinate, PoseLike
+
+_AGREEMENT = 1e-2
+"""Share of the legs' size within which readings of a redundant machine belong to one pose."""
 
 _HALVINGS = 12
 """Most halvings of the step between two samples."""
@@ -68,6 +72,8 @@ def follow(
         )
     step = numeric(robot, "followed_step")
     poses = np.full((len(joint_rows), robot.freedom), np.nan)
+    if robot.redundancy and len(joint_rows):
+        pose = _first_pose(robot, joint_rows[0], pose)
     previous, side = pose, 0.0
     for k, q in enumerate(joint_rows):
         ahead, measure, _ = step(q, 2.0 * pose - previous)
@@ -83,6 +89,22 @@ def follow(
     # Where samples are far apart the last of Newton's steps may leave some digits.
     refined: Array = step(joint_rows, poses)[0]
     return np.where(np.isnan(refined), poses, refined)
+
+
+def _first_pose(robot: Manipulator, joints: Array, start: Array) -> Array:
+    """Return the pose (m,) of a redundant machine's first joints (n,), nearest to a start pose.
+
+    On a straight path from there the joints would contradict each other.
+    """
+    step = numeric(robot, "followed_step")(joints, start)[0]
+    if np.isfinite(step).all():
+        return start
+    size = max(leg.size for leg in robot.legs)
+    poses = assembly_modes(robot, joints, tolerance=_AGREEMENT * size)
+    if np.isnan(poses).all():
+        return start
+    first: Array = poses[nearest(robot, poses, start)]
+    return first
 
 
 def _joints_of(robot: Manipulator, pose: Array, near: Array) -> Array:

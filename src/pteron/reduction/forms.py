@@ -35,6 +35,8 @@ def _virtual_work(
     for jacobian, matrix, columns in zip(factors.link_jacobians, factors.links, links, strict=True):
         total = total + ca.mtimes(jacobian.T, ca.mtimes(matrix, standard[columns]))  # J_b^T F_b
     sliding = ca.mtimes(factors.sliders[:, factors.with_slider], standard[sliders])  # F_p
+    if inverse.shape[0] > inverse.shape[1]:  # more legs than coordinates share all of it
+        return ca.mtimes(inverse, total + ca.mtimes(factors.jacobian.T, sliding))
     return ca.mtimes(inverse, total) - sliding  # Eq. (13)
 
 
@@ -104,7 +106,7 @@ def model_forms(base: BaseParameters) -> dict[tuple[str, str], Kernel]:
                 f"{form}, {name}",
                 function,
                 (*ports, Port("parameters", numbers.shape, shared=True)),
-                (Port("forces", (machine.freedom,)),),
+                (Port("forces", (len(machine.legs),)),),
                 {"parameters": numbers},
             )
     bases = {"complete": None, "reduced": base, "cheapest": cheapest_parameters(robot)}

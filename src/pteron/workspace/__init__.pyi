@@ -59,6 +59,7 @@ from pteron.workspace.reach_slices import (
     ReachSlice as ReachSlice,
     reach_slice as reach_slice,
 )
+from pteron.workspace.redundancy import Redundancy as Redundancy, redundancy as redundancy
 from pteron.workspace.regions import Box as Box, Cylinder as Cylinder, Region as Region
 from pteron.workspace.screw_lengths import screw_lengths as screw_lengths
 from pteron.workspace.tilts import (

@@ -10,6 +10,7 @@ import scipy  # type: ignore[import-untyped]
 from pteron.identification.estimators.estimate import Estimate, SearchRecord, estimate_of
 from pteron.identification.estimators.least_squares import weighted_least_squares
 from pteron.identification.estimators.qr import qr_factor
+from pteron.identification.felt_forces import felt_part, usable_samples
 from pteron.identification.logs import Log
 from pteron.identification.model import Model
 from pteron.identification.observation import (
@@ -154,7 +155,11 @@ def _sample_observations(
     states = States.from_log(model.robot, log, curve.motion, preprocessing.start)
     used = motion_mask(states.joint_rates, preprocessing.slow, preprocessing.settling_rows)
     used[: curve.ends] = used[len(used) - curve.ends :] = 0.0
-    rows = used[..., None] * model.matrix(states), used * log.forces
+    used = usable_samples(model.robot, used)
+    matrix, forces = (
+        felt_part(model.robot, states.pose, part) for part in (model.matrix(states), log.forces)
+    )
+    rows = used[..., None] * matrix, used * forces
     observations = assemble_observations(model, *rows, used, log.time, states.payload, 1.0)
     return replace(observations, source=log.source)
 
@@ -173,7 +178,7 @@ def _slopes(
         """Return the forces (T, n) with one derivative of the motion shifted."""
         q, dq, ddq = (part + shift if i == k else part for i, part in enumerate(motion))
         states = States.from_log(model.robot, log, (q, dq, ddq), start)
-        return np.asarray(model.matrix(states) @ smooth)
+        return felt_part(model.robot, states.pose, model.matrix(states) @ smooth)
 
     for k, size in enumerate(_STEPS):
         spread = scipy.sparse.kron(

@@ -21,6 +21,7 @@ from pteron.identification.faults.log_faults import LogFault
 from pteron.identification.faults.play import PlayRecord, backlash_signature
 from pteron.identification.faults.search import FoundFault, search_faults
 from pteron.identification.faults.searched_parts import SearchedPart, choose_parts, observe_parts
+from pteron.identification.felt_forces import felt_part
 from pteron.identification.model import Model
 from pteron.identification.observation import Observations, motion_mask
 from pteron.identification.plausibility import Factor, factor_of_forces, known_values
@@ -350,9 +351,12 @@ def _isolate_play(
         model, how = part.model.model, part.preprocessing
         carried = np.isin(model.kinds, ("base", "payload"))
         for block in samples(model.robot, part.log, how):
-            matrix = model.matrix(block.states)
+            matrix, measured = (
+                felt_part(model.robot, block.states.pose, part)
+                for part in (model.matrix(block.states), block.forces)
+            )
             moving = motion_mask(block.states.joint_rates, how.slow, how.turning_rows) > 0.0
-            residual = block.forces - matrix @ beta
+            residual = measured - matrix @ beta
             load = matrix @ np.where(carried, beta, 0.0)
             records.append(PlayRecord(block.states.time, load, residual, moving))
     signature = backlash_signature(records, band)
