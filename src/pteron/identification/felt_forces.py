@@ -3,8 +3,8 @@
 Drives may push against each other by any amount, which no model of motion tells. So both sides of
 F = W beta are mapped to the forces of least norm that act as they do, C^2 J (J^T C^2 J)^-1 J^T F
 with the drives' strengths C: the rigid bodies' columns stay as they are, those of friction mix. Of
-the n equations of a sample m are independent, and their noise is alike between actuators, which
-the covariance of the estimate takes from the residuals.
+the n equations of a sample m are independent, `Observations.independent`: squares of residuals are
+that share of the noise's, and the covariance is divided by it.
 """
 
 from __future__ import annotations

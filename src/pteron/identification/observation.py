@@ -83,6 +83,9 @@ class Observations(LogSourceMixin, Result):
         Name of their log in messages.
     kinds : tuple of str
         Kinds of the values, as `Model.kinds`; empty where they are not known.
+    independent : float
+        Share of a sample's n equations that are independent: m/n of a redundant machine, of whose
+        forces only what the platform feels counts.
     """
 
     ROWS = "time forces:1 matrix:2 payload"
@@ -96,6 +99,7 @@ class Observations(LogSourceMixin, Result):
     payload: NDArray[np.int64]
     source: str = "the log"
     kinds: tuple[str, ...] = ()
+    independent: float = 1.0
 
     @property
     def equation_counts(self) -> Array:
@@ -252,6 +256,7 @@ def assemble_observations(
         gain,
         payload,
         kinds=model.kinds,
+        independent=model.robot.freedom / model.robot.joint_count,
     )
 
 

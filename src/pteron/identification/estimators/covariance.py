@@ -51,6 +51,10 @@ class Noise:
     polynomials: tuple[Array, ...]
     root: Array
 
+    def independent_of_each_other(self) -> Noise:
+        """Return the noise without the correlation between actuators."""
+        return Noise(self.polynomials, np.diag(np.linalg.norm(self.root, axis=1)))
+
     def sum_covariance(self, matrix: Array, weights: Array | float = 1.0) -> Array:
         """Return the covariance (p, p) of W^T e for rows W (R, n, p) times weights (R, n)."""
         p = matrix.shape[-1]

@@ -239,7 +239,9 @@ def estimate_of(
     pulled = weights * residuals if pull is None else pull
     whitened = factor.inverse_triangle() if instruments is None else None
     noise_model = noise_of(rows, pulled, observations.gain > 0.0, weights, whitened)
-    middle = noise_model.sum_covariance(rows, weights)
+    if observations.independent < 1.0:
+        noise_model = noise_model.independent_of_each_other()
+    middle = noise_model.sum_covariance(rows, weights) / observations.independent
     covariance = bread @ (middle + extra) @ bread.T
     symmetric = 0.5 * (covariance + covariance.T)
     white = whiteness(residuals, observations.gain > 0.0)
