@@ -6,6 +6,7 @@ that is taken for one is seen; a grid runs thread after thread.
 
 import ctypes
 import hashlib
+import os
 import subprocess
 import sys
 import tempfile
@@ -32,7 +33,20 @@ extern "C" void set_thread(unsigned block, unsigned thread, unsigned blocks, uns
     blockIdx.x = block, threadIdx.x = thread, gridDim.x = blocks, blockDim.x = threads;
 }
 """
-FLAGS = ("-std=c++17", "-O1", "-ffp-contract=off", "-fPIC", "-shared", "-w")
+FLAGS = (
+    *("-std=c++17", "-O1", "-ffp-contract=off", "-fPIC", "-shared", "-w"),
+    *os.environ.get("EMULATED_GPU_FLAGS", "").split(),
+)
+"""Options of the compiler; the environment adds to them, see `sanitized`."""
+
+SANITIZERS = (
+    *("-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all", "-g1"),
+    # What is read before it is written is a number that the target "c" does not have.
+    "-ftrivial-auto-var-init=pattern",
+)
+# A compiler that a sanitized process starts is not sanitized.
+os.environ.pop("LD_PRELOAD", None)
+
 GRID, BLOCK = 2, 3
 """Blocks and threads of an emulated grid at most: states are evaluated in turns."""
 
@@ -105,6 +119,18 @@ def from_dlpack(array):
     return np.from_dlpack(array).view(DeviceArray)
 
 
+def far_apart(values, axis):
+    """Return a copy of values on the emulated GPU, which an axis spreads over 2^32 numbers."""
+    steps = list(np.array(values).strides)
+    steps[axis] = values.itemsize * (2**32 // values.shape[axis] + 1)
+    size = sum((n - 1) * step for n, step in zip(values.shape, steps, strict=True))
+    with tempfile.TemporaryFile() as file:  # one of holes, of which few pages are used
+        memory = np.memmap(file, values.dtype, shape=size // values.itemsize + 1)
+    array = np.lib.stride_tricks.as_strided(memory, values.shape, steps).view(DeviceArray)
+    array[...] = values
+    return array
+
+
 @cache
 def _library(code, flags=FLAGS):
     """Return the library of a source, compiled once."""
@@ -142,6 +168,7 @@ class RawModule:
                 else:
                     assert isinstance(argument, DeviceArray), type(argument)
                     values.append(ctypes.c_void_p(argument.ctypes.data))
+            assert 0 < grid[0] < 2**31, "no grid of CUDA"
             blocks, threads = min(grid[0], GRID), min(block[0], BLOCK)
             for k in range(blocks * threads):
                 self._library.set_thread(k // threads, k % threads, blocks, threads)
@@ -168,6 +195,22 @@ def module(available=True):
     runtime = SimpleNamespace(getDeviceProperties=lambda _: {"name": b"emulated"})
     cupy.cuda = SimpleNamespace(Device=lambda: device, runtime=runtime)
     return cupy
+
+
+def sanitized(command):
+    """Run a command whose emulated GPU traps what is undefined or outside of an array."""
+    names = ("libasan.so", "libubsan.so")
+    queries = [["g++", f"-print-file-name={name}"] for name in names]
+    paths = [subprocess.check_output(query, text=True).strip() for query in queries]
+    environment = {
+        "EMULATED_GPU_FLAGS": " ".join(SANITIZERS),
+        # An address space for shadows; what Python leaves at its end is no leak.
+        "ASAN_OPTIONS": "detect_leaks=0",
+        "LD_PRELOAD": " ".join(paths),
+    }
+    return subprocess.run(
+        command, env=os.environ | environment, capture_output=True, text=True, check=False
+    )
 
 
 @contextmanager

@@ -16,9 +16,9 @@ import numpy as np
 import nvrtc
 import pytest
 from commands import refused, run
-from emulated_gpu import BLOCK, GRID, DeviceArray, emulated
+from emulated_gpu import BLOCK, GRID, DeviceArray, emulated, far_apart, sanitized
 from exported_code import compiled
-from mechanisms import CATALOG, CLIENTS, NIGHTLY, gated
+from mechanisms import CATALOG, CLIENTS, gated
 
 import pteron
 from pteron.controllers import ComputedTorque, PDGravity
@@ -26,7 +26,7 @@ from pteron.export import export_cuda
 from pteron.export.functions import exported_functions
 from pteron.kernels import FUNCTIONS
 from pteron.kernels.loops import loop
-from pteron.legs import Drive
+from pteron.legs import Drive, Elastic
 from pteron.motion import Sensors, machines_about, pick_and_place, simulate_many
 
 GATE = ("quadrupteron", "delta", "3-rrr")
@@ -84,8 +84,8 @@ def test_kernels_have_the_bits_of_c(cupy, name):
     assert sum(expect_bits_of_c(cupy, CATALOG[name], what) for what in FEW) == 3
 
 
-@NIGHTLY
-@pytest.mark.parametrize("name", pteron.catalog())
+@CLIENTS
+@pytest.mark.parametrize("name", gated(pteron.catalog(), ["delta"]))
 def test_every_function_has_the_bits_of_c(cupy, name):
     assert sum(expect_bits_of_c(cupy, pteron.load(name), what) for what in FUNCTIONS) > 40
     for options in ({"dtype": "float32"}, {"grade": "parametric"}, {"grade": "general"}):
@@ -124,11 +124,24 @@ def test_leading_axes_broadcast(cupy):
     np.testing.assert_array_equal(present.get(), expected)
 
 
-def test_more_states_than_threads(cupy):
-    poses = np.tile(pteron.random_poses("delta", 100), (1000, 1))
+def test_a_million_states(cupy):
+    poses = np.tile(pteron.random_poses("delta", 100), (10_000, 1))
     assert len(poses) > GRID * BLOCK
     present = pteron.compile("delta", "inverse_kinematics", "cuda")(cupy.asarray(poses))
     np.testing.assert_array_equal(present.get(), pteron.inverse_kinematics("delta", poses))
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_offsets_may_exceed_32_bits(cupy, monkeypatch, tmp_path, axis):
+    poses = pteron.random_poses("delta", 3)
+    expected = pteron.inverse_kinematics("delta", poses)
+    module = exported(tmp_path, "delta", ["inverse_kinematics"])
+    joints, status = module.inverse_kinematics(far_apart(poses, axis))
+    np.testing.assert_array_equal(joints, expected)
+    assert not status.any()
+    kernel = pteron.compile("delta", "inverse_kinematics", "cuda")
+    monkeypatch.setattr(cupy, "empty", lambda shape, dtype: far_apart(np.zeros(shape), 0))
+    np.testing.assert_array_equal(kernel(far_apart(poses, axis)), expected)
 
 
 def test_arrays_of_other_libraries_come_back_as_they_were(cupy):
@@ -173,27 +186,34 @@ def test_fused_operations_are_for_the_gpu_alone():
 DRIVE = Drive(0.3, 0.4, 0.05, 1e-5)
 
 
-def driven(robot):
+def driven(robot, **drive):
     """Return a machine whose drives have dry friction, so that joints stick."""
-    return replace(robot, legs=tuple(replace(leg, drive=DRIVE) for leg in robot.legs))
+    drive = replace(DRIVE, **drive)
+    return replace(robot, legs=tuple(replace(leg, drive=drive) for leg in robot.legs))
 
 
 CASES = {
     "tripteron": (CATALOG["tripteron"], [0.0, 0.0, 0.0], PDGravity()),
     "delta with friction": (driven(CATALOG["delta"]), [0.0, 0.0, -0.9], ComputedTorque()),
+    "tripteron that bends": (
+        driven(CATALOG["tripteron"], rotor_inertia=0.2, elastic=Elastic(2e4, 50.0, encoder="both")),
+        [0.0, 0.0, 0.0],
+        ComputedTorque(),
+    ),
     "3-rrr": (driven(CATALOG["3-rrr"]), [0.0, 0.0, 0.29], PDGravity()),
     "quadrupteron": (driven(CATALOG["quadrupteron"]), [0.0] * 4, ComputedTorque()),
-    "par4": (driven(CATALOG["par4"]), [0.0, 0.0, -0.9, 0.0], ComputedTorque()),
+    "par4": (driven(CATALOG["par4"]), [0.0, 0.0, -0.45, 0.0], ComputedTorque()),
     "stewart": (driven(pteron.load("stewart")), [0.0, 0.0, 2.0, 0, 0, 0], ComputedTorque()),
 }
 
 
+@pytest.mark.parametrize("count", [1, 7])
 @pytest.mark.parametrize("name", gated(CASES, ["tripteron", "delta with friction"]))
-def test_simulations_have_the_bits_of_c(cupy, name):
+def test_simulations_have_the_bits_of_c(cupy, name, count):
     robot, home, law = CASES[name]
     motion = pick_and_place(robot, home)
-    machines = machines_about(robot, 7, masses=0.1, friction=0.2)
-    sensors = Sensors(noise=1e-5, samples=1)
+    machines = machines_about(robot, count, masses=0.1, friction=0.2)
+    sensors = Sensors(encoder=1e-6, noise=1e-5, cutoff=200.0, samples=2)
     options = {"duration": 0.03, "sensors": sensors, "delay": 2e-4}
     host, device = (
         simulate_many(machines, motion, law, device=place, **options) for place in ("cpu", "cuda")
@@ -203,10 +223,62 @@ def test_simulations_have_the_bits_of_c(cupy, name):
         np.testing.assert_array_equal(getattr(device, field), getattr(host, field))
 
 
+@pytest.mark.parametrize("axis", [0, 1])
+def test_machines_and_samples_may_lie_far_apart(cupy, monkeypatch, axis):
+    machines = machines_about("tripteron", 3, masses=0.1)
+    options = {"duration": 0.03, "sensors": Sensors(noise=1e-5, samples=2)}
+    arguments = machines, pick_and_place("tripteron", [0.0, 0.0, 0.0]), PDGravity()
+    host, asarray, shapes = simulate_many(*arguments, **options), cupy.asarray, []
+
+    def asarray_far(values):
+        """Return a copy on the emulated GPU; machines or samples lie far apart."""
+        if values.ndim < 3 or values.shape[axis] != (3, 31)[axis]:
+            return asarray(values)
+        shapes.append(values.shape)
+        return far_apart(values, axis)
+
+    monkeypatch.setattr(cupy, "asarray", asarray_far)
+    device = simulate_many(*arguments, device="cuda", **options)
+    assert len(shapes) > 5
+    np.testing.assert_array_equal(device.rms, host.rms)
+    np.testing.assert_array_equal(device.force, host.force)
+
+
 def test_an_unknown_device_is_refused():
     motion = pick_and_place("tripteron", [0.0, 0.0, 0.0])
     with pytest.raises(pteron.DataError, match="device: 'gpu' is not one of cpu, cuda"):
         simulate_many(machines_about("tripteron", 2), motion, PDGravity(), device="gpu")
+
+
+# Sanitizers: the tests above in a process of their own, on an emulated GPU that traps.
+
+
+def expect_clean(selection, *options):
+    """Run a selection of this file's tests under sanitizers; assert that all pass."""
+    command = [sys.executable, "-m", "pytest", "-qs", "-p", "no:cacheprovider", *options]
+    done = sanitized([*command, __file__, "-k", selection])
+    assert done.returncode == 0, (done.stdout + done.stderr)[-3000:]
+
+
+LINUX = pytest.mark.skipif(sys.platform != "linux", reason="sanitizers are loaded as on Linux")
+
+
+@LINUX
+def test_nothing_is_read_or_written_beyond_an_array():
+    expect_clean("kernels_have_the_bits or strides or broadcast or exported_functions")
+
+
+@LINUX
+@CLIENTS
+@pytest.mark.parametrize("name", gated(pteron.catalog(), ["delta"]))
+def test_no_machine_reads_or_writes_beyond_an_array(name):
+    expect_clean(f"[{name}] and (every_function or exported_functions_have)", "-m", "")
+
+
+@LINUX
+@CLIENTS
+def test_no_loop_reads_or_writes_beyond_an_array():
+    expect_clean("simulations", "-m", "")
 
 
 # NVIDIA's compiler.
@@ -282,6 +354,24 @@ def test_exported_parameters_are_the_default(cupy, tmp_path):
     np.testing.assert_allclose(heavier.get(), 2.0 * forces.get())
     with pytest.raises(ValueError, match=r"pose: shape \(2,\) given, \(..., 3\) expected"):
         module.inverse_dynamics([0.0, 0.0], zero, zero)
+
+
+@pytest.mark.parametrize(
+    "arrange",
+    [
+        np.asfortranarray,
+        lambda array: array.reshape(4, 6, 3),
+        lambda array: array[::2],
+        lambda array: array[5],
+        lambda array: array[:0],
+    ],
+)
+def test_exported_functions_take_any_layout(cupy, tmp_path, arrange):
+    module = exported(tmp_path, "delta", ["inverse_kinematics"])
+    poses = pteron.random_poses("delta", 24)
+    joints, status = module.inverse_kinematics(arrange(cupy.asarray(poses)))
+    np.testing.assert_array_equal(joints, arrange(pteron.inverse_kinematics("delta", poses)))
+    assert not status.any()
 
 
 @CLIENTS

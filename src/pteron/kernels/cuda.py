@@ -31,7 +31,7 @@ _THREADS = 128
 """Threads of a block: 65 536 registers of a multiprocessor are enough for 512 to 1024 threads with
 128 or 64 each, whole blocks of which fill it."""
 
-_PORT = np.dtype([("numbers", np.uintp), ("machine", "l"), ("sample", "l")], align=True)
+_PORT = np.dtype([("numbers", np.uintp), ("machine", "q"), ("sample", "q")], align=True)
 """An array of a loop: its place, and how many numbers its machines and samples lie apart."""
 
 _BLOCKS = 1 << 16

@@ -69,7 +69,12 @@ _LIBRARY = "pteron_loop" + SUFFIX
 
 
 class _Port(ctypes.Structure):
-    _fields_ = (("numbers", ctypes.c_void_p), ("machine", ctypes.c_long), ("sample", ctypes.c_long))
+    # A `long` of Windows has 32 bits, too few for where an array of 16 GB ends.
+    _fields_ = (
+        ("numbers", ctypes.c_void_p),
+        ("machine", ctypes.c_longlong),
+        ("sample", ctypes.c_longlong),
+    )
 
 
 @dataclass(frozen=True)
