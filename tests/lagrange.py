@@ -119,8 +119,13 @@ def bodies(machine, x):
         if leg.ratio is not None:
             uppers.append(_rod(leg.upper, fixed, direction))
         elif leg.upper is not None:
-            uppers.append(_link(leg.upper, fixed, at.upper, leg.d))
-        if leg.flat:
+            uppers.append(
+                _link(leg.upper, fixed, at.upper, leg.d if at.turn is None else at.turn[0])
+            )
+        if at.turn is not None:
+            axes = direction, at.turn[1], ca.cross(direction, at.turn[1])
+            lowers.append(Body(leg.lower.moments, at.point, axes))
+        elif leg.flat:
             lowers.append(_link(leg.lower, at.point, direction, leg.d))
         else:
             lowers.append(_rod(leg.lower, at.point, direction))

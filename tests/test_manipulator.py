@@ -336,6 +336,8 @@ CATALOGUED |= {
     "ankle": ("2R", "RSS RSS"),
     "ball-table": ("1T2R", "RRS RRS RRS"),
     "hexa": ("3T3R", "RSS RSS RSS RSS RSS RSS"),
+    "hexapteron": ("3T3R", "PRRS PRRS PRRS PRRS PRRS PRRS"),
+    "pentapteron": ("3T2R", "PRUR PRUR PRUR PRUR PRUR"),
     "hexaglide": ("3T3R", "PSS PSS PSS PSS PSS PSS"),
     "reachy-mini": ("3T3R", "RSS RSS RSS RSS RSS RSS"),
     "rubin-camera-hexapod": ("3T3R", "UPS UPS UPS UPS UPS UPS"),

@@ -63,10 +63,11 @@ class TiltingLoci(Closure):
             reduce(mul, sizes or [ca.SX(1)]),
         )
         if constraint_rows is None:
-            return determinant(rows_in_quasi_velocities(platform, rows)) / (self._bound(1) * size)
+            bound = self._bound(1, platform, rows) * size
+            return determinant(rows_in_quasi_velocities(platform, rows)) / bound
         pairs = zip(rows, platform.point_twists, strict=True)
         all_rows = ca.vertcat(*(ca.mtimes(row, twist) for row, twist in pairs), constraint_rows)
-        return determinant(all_rows) / (self._bound(2) * size)
+        return determinant(all_rows) / (self._bound(2, platform) * size)
 
     def measure_squares(
         self, platform: PlatformMotion, legs: Sequence[LegMotion]
@@ -74,17 +75,28 @@ class TiltingLoci(Closure):
         """Return equivalent expressions of the squared type-II measure, to choose the cheapest."""
         squares = super().measure_squares(platform, legs)
         if len(legs) == 6:
-            bound = reduce(mul, (leg.wrench_size for leg in legs), self._bound(1))
+            bound = self._bound(1, platform, [leg.row for leg in legs])
+            bound = reduce(mul, (leg.wrench_size for leg in legs), bound)
             squares.append(determinant_square(plain_rows(platform, legs)) / (bound * bound))
         return squares
 
-    def _bound(self, forces: int) -> Expression:
+    def _bound(
+        self, forces: int, platform: PlatformMotion, rows: Sequence[Expression] = ()
+    ) -> Expression:
         """Return an upper bound of the determinant of `forces` unit forces at each point.
 
-        It follows from Fischer's inequality and that of arithmetic and geometric means.
+        It follows from Fischer's inequality and that of arithmetic and geometric means. A force in
+        `rows` (1, 6) that has a moment about its platform point acts at the point nearest to it.
         """
         points, centred = self.platform.points, "z" not in self.platform.coordinates
+        if not all(row[3:].is_zero() for row in rows):
+            points = [c.position - platform.body.position for c in platform.points]
+            for i, row in enumerate(rows):
+                force, moment = row[:3].T, row[3:].T
+                points[i] = points[i] + ca.cross(force, moment) / ca.dot(force, force)
         center = ca.SX(3, 1) if centred else sum(points) / len(points)
         square = sum(ca.dot(s - center, s - center) for s in points)
-        turns = len(self.legs) if centred else 3
-        return (1.0 if centred else 2.0**1.5) * ca.sqrt(forces * square / turns) ** turns
+        lengths, count = 0 if centred else 3, forces * len(self.legs)
+        turns = count if centred else count - lengths
+        shares = (count / 3) ** (0.5 * lengths)
+        return shares * ca.sqrt(forces * square / turns) ** turns

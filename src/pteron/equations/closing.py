@@ -15,7 +15,14 @@ from pteron.closures.closure import nan_below_zero, plain_rows, rows_in_quasi_ve
 from pteron.closures.determinants import determinant, solve
 from pteron.equations.kinematics import reach
 from pteron.equations.machine import Machine
-from pteron.legs.leg import AngleLocus, CircleLocus, LegEquations, PlaneLocus, SphereLocus
+from pteron.legs.leg import (
+    AngleLocus,
+    CircleLocus,
+    CoordinateLocus,
+    LegEquations,
+    PlaneLocus,
+    SphereLocus,
+)
 from pteron.platforms.motion import PlatformMotion
 from pteron.tolerances import ROUNDING
 
@@ -79,6 +86,7 @@ def closure_rows(machine: Machine, joints: Expression) -> Rows:
             h[0] -= locus.offset
             scale = ca.norm_2(m[:, 0])
         else:
+            assert isinstance(locus, SphereLocus | CircleLocus)
             arm = _component_in_plane(machine, leg, locus, s - locus.center)
             w[0] = size**2
             m = 2 * size * ca.mtimes(directions.T, ca.horzcat(arm, a, b))
@@ -103,6 +111,15 @@ def _component_in_plane(
     return ca.mtimes(directions, ca.mtimes(directions.T, v))
 
 
+def holds_spheres(machine: Machine) -> bool:
+    """Return whether every leg whose joint is held keeps its platform point on a sphere or circle.
+
+    A circle is the sphere's part in the plane in which the leg keeps that point.
+    """
+    loci = (leg.locus(ca.SX(0)) for leg in machine.legs)
+    return all(isinstance(locus, SphereLocus | CircleLocus) for locus in loci)
+
+
 def held_spheres(machine: Machine, joints: Expression) -> tuple[Expression, Expression]:
     """Return centres (n, 3) and squared radii (n, 1) of the spheres that hold platform points.
 
@@ -111,9 +128,7 @@ def held_spheres(machine: Machine, joints: Expression) -> tuple[Expression, Expr
     centers, squares = [], []
     for leg, q in zip(machine.legs, ca.vertsplit(joints), strict=True):
         locus = leg.locus(q)
-        assert isinstance(
-            locus, SphereLocus | CircleLocus
-        )  # legs under platforms that tilt have no other
+        assert isinstance(locus, SphereLocus | CircleLocus)  # see `holds_spheres`
         center = locus.center
         if leg.holds is not None:
             away = ca.dot(leg.holds.normal, center - leg.holds.point)
@@ -161,6 +176,12 @@ def closure_residuals(machine: Machine, joints: Expression, pose: Expression) ->
         elif isinstance(locus, PlaneLocus):
             length, row = ca.dot(locus.normal, c) - locus.offset, point_rows(locus.normal.T)
             sizes.append(locus.size + ca.dot(ca.fabs(locus.normal), ca.fabs(c)))
+        elif isinstance(locus, CoordinateLocus):
+            motion = leg.motion(point, platform.rotation)
+            length, row = motion.coordinate - q, motion.row / motion.divisor
+            size = ca.norm_2(row[:3])  # of the force: the row of a unit force
+            length, row = length / size, row / size
+            sizes.append(ca.fabs(q) + ca.norm_1(c))
         else:
             b = _component_in_plane(machine, leg, locus, c - locus.center)
             length = 0.5 * (ca.dot(b, b) / locus.radius - locus.radius)

@@ -11,7 +11,9 @@ from pteron.legs.installed import KINDS as KINDS, Leg as Leg
 from pteron.legs.kind import LegKind as LegKind
 from pteron.legs.prr import PRR as PRR
 from pteron.legs.prrr import PRRR as PRRR
+from pteron.legs.prrs import PRRS as PRRS
 from pteron.legs.prs import PRS as PRS
+from pteron.legs.prur import PRUR as PRUR
 from pteron.legs.pss import PSS as PSS
 from pteron.legs.reading import Reading as Reading
 from pteron.legs.rpr import RPR as RPR

@@ -26,12 +26,13 @@ KeyRole = Literal[
     "slider",
     "planar",
     "rod",
+    "solid",
     "drive",
     "reading",
 ]
 """The content of a key: a vector, a unit vector, a length, a number, a whole number, +1 or -1, two
-limits, a ball joint's cone, a slider's mass (TOML key `slider`), a body in a plane, a
-rod, a drive, how the drive counts. Files and pages give a leg's keys in this order."""
+limits, a ball joint's cone, a slider's mass (TOML key `slider`), a body in a plane, a rod, a body
+in space, a drive, how the drive counts. Files and pages give a leg's keys in this order."""
 
 
 _TYPES: dict[KeyRole, str] = {
@@ -46,6 +47,7 @@ _TYPES: dict[KeyRole, str] = {
     "slider": "float",
     "planar": "PlanarInertia",
     "rod": "RodInertia",
+    "solid": "SpatialInertia",
     "drive": "Drive",
     "reading": "Reading",
 }

@@ -12,8 +12,18 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AliasChoices, BeforeValidator, Field, create_model
 
-from pteron.bodies.inertia import PlanarInertia, RodInertia
-from pteron.bodies.tables import Count, Number, PlanarBody, RodBody, Slider, Three, TomlTable, Two
+from pteron.bodies.inertia import PlanarInertia, RodInertia, SpatialInertia
+from pteron.bodies.tables import (
+    Count,
+    Number,
+    PlanarBody,
+    RodBody,
+    Slider,
+    SpatialBody,
+    Three,
+    TomlTable,
+    Two,
+)
 from pteron.errors import ModelError
 from pteron.legs import LegKind
 from pteron.legs.keys import Key, KeyRole
@@ -40,6 +50,7 @@ _TYPES: dict[KeyRole, Any] = {
     "slider": Slider,
     "planar": PlanarBody,
     "rod": RodBody,
+    "solid": SpatialBody,
     "drive": DriveTable,
     "reading": ReadingTable,
 }
@@ -89,6 +100,7 @@ _ORDINARY: dict[KeyRole, Any] = {
     "slider": 1.0,
     "planar": PlanarInertia(1.0, (0.0, 0.0), 1.0),
     "rod": RodInertia(1.0, (0.0,), 1.0),
+    "solid": SpatialInertia(1.0, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 1.0, 0.0, 1.0)),
 }
 """Substitutes of values with a fault, with which the other parts of the machine are checked."""
 
@@ -175,7 +187,9 @@ def _build_part(kind: Any, table: TomlTable, key: str) -> Any:
 
 def _end_fault(leg: LegKind, letter: str, body: Any) -> str | None:
     """Return a message if a body's centre of mass lies beyond the link's ends, else None."""
-    if not letter or body.center_of_mass is None or min(body.mass, body.inertia) <= 0.0:
+    if not letter or body.center_of_mass is None or isinstance(body, SpatialBody):
+        return None
+    if min(body.mass, body.inertia) <= 0.0:
         return None
     text = leg.center_of_mass_warning(letter, body.center_of_mass[0])
     return text and f"{text}; with it no real body has inertia {body.inertia:g} kg m^2"

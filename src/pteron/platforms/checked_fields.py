@@ -108,7 +108,9 @@ def _joint(platform: Any) -> dict[str, Any]:
             check = vector if name == "center" else unit_vector
             checked[name] = check(field_value, name)
     second = checked.get("second_axis")
-    if second and parallel(unit_vector(platform.axis, "axis"), second):
+    if second and parallel(axis := unit_vector(platform.axis, "axis"), second):
         faults.append("second_axis: along axis, so that both angles turn alike; turn one")
+    elif second and platform.kind.hold_rotation:
+        checked["second_axis"] = perpendicular(second, axis, "second_axis", "axis")
     raise_faults(faults)
     return checked

@@ -1,4 +1,4 @@
-"""Platforms that turn about any axis: 3T3R, and 3R and 2R about a centre that stays.
+"""Platforms that turn about any axis: 3T3R, 3T2R, and 3R and 2R about a centre that stays.
 
 R is a product of turns by one angle of the pose each, about axes that move with those before.
 `tripod` has the platform 1T2R, whose other coordinates follow from these.
@@ -186,7 +186,7 @@ class Tilting(PlatformEquations):
         return PlatformMotion(
             tuple(points),
             tuple(ca.mtimes(shift, twist) for shift in shifts),
-            RotationMotion(turns),
+            RotationMotion(turns, axes=turned.axes),
             axes,
             body,
             twist,
@@ -294,18 +294,43 @@ class CentredXYZ(_Centred):
     order = ("rx", "ry", "rz")
 
 
-class Universal(_Centred):
-    """2R: R = Rot(axis, alpha) Rot(second_axis, beta) about a universal joint."""
+class _TwoAxes(Tilting):
+    """A platform with R = Rot(axis, alpha) Rot(second_axis, beta)."""
 
-    motion_name = "2R"
     has_second_axis = True
-    coordinates = ("alpha", "beta")
-    freedom_text = "turns about two axes through a centre that stays (2R)"
     order = ("alpha", "beta")
 
     def axes_by_angle(self) -> dict[str, Expression]:
         """Return the rotation axes (3, 1) of alpha and beta, at angles zero, by these names."""
         return {"alpha": self.quantities["first_axis"], "beta": self.quantities["second_axis"]}
+
+
+class FiveFreedoms(_TwoAxes):
+    """3T2R: P moves freely; the quasi-velocities are the pose's rates."""
+
+    motion_name = "3T2R"
+    hold_rotation = True
+    coordinates = joints = ("x", "y", "z", "alpha", "beta")
+    freedom_text = "translates in space and turns about two axes (3T2R)"
+
+    def motion(
+        self, pose: Expression, velocity: Expression, acceleration: Expression
+    ) -> PlatformMotion:
+        """Return the motion of a platform whose point P moves freely."""
+        turned = self.pose_rotation(pose, velocity, acceleration)
+        place = PointMotion(pose[:3], velocity[:3], acceleration[:3])
+        return self.assemble_motion(place, turned, ca.diagcat(ca.SX.eye(3), turned.axes), None)
+
+    def change_to_platform_axes(self, pose: Expression) -> None:
+        """Return None: its legs have directions in the base frame."""
+
+
+class Universal(_TwoAxes, _Centred):
+    """2R: R = Rot(axis, alpha) Rot(second_axis, beta) about a universal joint."""
+
+    motion_name = "2R"
+    coordinates = ("alpha", "beta")
+    freedom_text = "turns about two axes through a centre that stays (2R)"
 
     def basis(self, turned: Rotation) -> tuple[Expression, Expression | None]:
         """Return the twists (6, 2) of unit angle rates (the quasi-velocities), and None."""
