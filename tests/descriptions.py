@@ -78,6 +78,8 @@ class Leg:
     lower: Body
     kappa: int | None = None
     """Of a leg whose lower link turns about the platform's second axis, its second elbow."""
+    piston: Body | None = None
+    """Of such a leg with a ram; its reference point is the ram's end."""
 
     @property
     def second(self):
@@ -175,8 +177,8 @@ def _leg(leg, k):
         # A shaft is hardly ever across the axis that it turns, nor a rod across its guide.
         first = k if e is None else e
         d = _across(first)
-    elif leg.type == "PRUR":
-        d = first = e
+    elif getattr(leg, "second_elbow", None) is not None:
+        d = first = np.zeros(3)  # they are the platform's
     elif leg.type == "UPS":
         first = d = np.eye(3)[0]  # nothing depends on them
     else:
@@ -198,6 +200,7 @@ def _leg(leg, k):
         upper=_body(leg.upper) if hasattr(leg, "upper") else None,
         lower=_body(leg.lower),
         kappa=getattr(leg, "second_elbow", None),
+        piston=_body(leg.piston) if hasattr(leg, "piston") else None,
     )
 
 
@@ -318,7 +321,16 @@ def _universal_place(machine, leg, c, pose):
     (a, i), (b0, _) = machine.axes
     turn = about(a, pose[i])
     b, n = turn @ ca.DM(b0), turn @ ca.DM(np.cross(a, b0))
-    a, w, e = ca.DM(a), c - ca.DM(leg.r), ca.DM(leg.e)
+    a, w = ca.DM(a), c - ca.DM(leg.r)
+    if leg.e is None:
+        lean = ca.asin(ca.dot(a, w) / leg.ll)
+        last = leg.ll * (ca.sin(lean) * a + leg.kappa * ca.cos(lean) * n)
+        ram = ca.norm_2(w - last)
+        upper = (w - last) / ram
+        force = ca.cross(ca.cross(a, upper), ca.cross(b, last))
+        bend = ca.fabs(ca.dot(force, upper)) / ca.norm_2(force)
+        return Place(ram, c, None, lean, upper, last, bend, (a, b))
+    e = ca.DM(leg.e)
     if abs(float(ca.dot(a, e))) < 0.5:
         lean = ca.asin(ca.dot(a, w) / leg.ll)
         last = leg.ll * (ca.sin(lean) * a + leg.kappa * ca.cos(lean) * n)

@@ -108,7 +108,7 @@ def _energies(body, parameters, x, dx, gravity):
 
 def bodies(machine, x):
     """Return the joint coordinates, the bodies in the paper's order, and the platform's parts."""
-    joints, sliders, uppers, lowers = [], [], [], []
+    joints, sliders, uppers, pistons, lowers = [], [], [], [], []
     for leg, at in zip(machine.legs, places(machine, x), strict=True):
         joints.append(at.joint)
         fixed = ca.SX(ca.DM(leg.r))
@@ -122,6 +122,8 @@ def bodies(machine, x):
             uppers.append(
                 _link(leg.upper, fixed, at.upper, leg.d if at.turn is None else at.turn[0])
             )
+        if leg.piston is not None:
+            pistons.append(_link(leg.piston, at.point - at.last, at.upper, at.turn[0]))
         if at.turn is not None:
             axes = direction, at.turn[1], ca.cross(direction, at.turn[1])
             lowers.append(Body(leg.lower.moments, at.point, axes))
@@ -137,7 +139,7 @@ def bodies(machine, x):
         Body((0.0, 0.0, inertia), p, (turned(machine, ratio * x[-1])[:, 0],))
         for inertia, ratio in machine.geared
     ]
-    return joints, [*sliders, *uppers, *lowers, platform], [*bars, *geared]
+    return joints, [*sliders, *uppers, *pistons, *lowers, platform], [*bars, *geared]
 
 
 def _link(body, point, x, d):

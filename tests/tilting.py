@@ -4,12 +4,12 @@ import numpy as np
 
 import pteron
 from pteron.bodies.inertia import PlanarInertia, RodInertia, SpatialInertia
-from pteron.legs import PRRS, PRS, PRUR, PSS, RPS, RRS, RSS, UPS
+from pteron.legs import PRRS, PRS, PRUR, PSS, RPS, RPUR, RRS, RSS, UPS
 from pteron.platforms import Platform
 
 LEGS = {"3T3R": ("UPS", "PSS", "RSS"), "3R": ("UPS", "PSS", "RSS"), "2R": ("UPS", "PSS", "RSS")}
 LEGS["1T2R"] = ("RPS", "PRS", "RRS")
-LEGS["3T2R"] = ("PRUR", "UPS", "RSS")
+LEGS["3T2R"] = ("PRUR", "RPUR", "UPS", "RSS")
 COUNT = {"3T3R": 6, "3T2R": 5, "3R": 3, "2R": 2, "1T2R": 3}
 
 
@@ -83,8 +83,8 @@ def leg(kind, rng, r, s0, n, c0):
     return RRS(**given, lower=planar(rng, ll, -1.0))
 
 
-def universal_leg(rng, s0, c0, a, b):
-    """Return a P-R-U-R leg at the platform point c0 whose links are across the axes a and b."""
+def universal_leg(kind, rng, s0, c0, a, b):
+    """Return a P-R-U-R or R-P-U-R leg at the point c0, its links across the axes a and b."""
     along, lengths = rng.random() < 0.3, rng.uniform(0.7, 1.0, 2)
     n, lean, swing = np.cross(a, b), rng.uniform(-0.6, 0.6), rng.uniform(-0.6, 0.6)
     signs = rng.choice([1, -1], 2)
@@ -100,18 +100,24 @@ def universal_leg(rng, s0, c0, a, b):
         upper = signs[0] * np.cos(swing) * np.array(e) + np.sin(swing) * np.cross(a, e)
         last = np.sin(lean), signs[1] * np.cos(lean)
     link = last[0] * a + last[1] * n
+    ends = {"platform_point": tuple(s0), "lower_length": lengths[1]}
+    ends |= {"lower": body(rng, 0.3 * lengths[1]), "second_elbow": int(signs[1])}
+    if kind == "RPUR":
+        upper, link = np.array(unit(np.cross(a, rng.normal(size=3)))), np.sin(lean) * a
+        link += signs[1] * np.cos(lean) * n
+        r = c0 - lengths[0] * upper - lengths[1] * link
+        bodies = {"upper": planar(rng, 0.4), "piston": planar(rng, 0.4, -1.0)}
+        limits = (0.5 * lengths[0], 1.6 * lengths[0])
+        return RPUR(guide_point=tuple(r), limits=limits, **bodies, **ends)
     r = c0 - lengths[0] * upper - lengths[1] * link + rng.uniform(-0.2, 0.2) * np.array(e)
     return PRUR(
         guide_point=tuple(r),
         slider_direction=tuple(e),
-        platform_point=tuple(s0),
         upper_length=lengths[0],
-        lower_length=lengths[1],
         slider_mass=0.7,
         upper=planar(rng, lengths[0]),
-        lower=body(rng, 0.3 * lengths[1]),
         elbow=int(signs[0]),
-        second_elbow=int(signs[1]),
+        **ends,
     )
 
 
@@ -137,9 +143,10 @@ def machine(motion, kinds, seed, angles="rpy"):
             r = r - normal * (normal @ (r - height - s0))
         local = (r, height + s0)
         point = base @ s0 if motion in ("2R", "3T2R") else s0
-        if kind == "PRUR":
-            c0, scatter = base @ local[1], 0.3 * rng.normal(size=3)
-            legs.append(universal_leg(rng, point + scatter, c0 + scatter, base[:, 2], base[:, 0]))
+        if kind in ("PRUR", "RPUR"):
+            apart = 0.3 * rng.normal(size=3)
+            at = point + apart, base @ local[1] + apart
+            legs.append(universal_leg(kind, rng, *at, base[:, 2], base[:, 0]))
             continue
         legs.append(leg(kind, rng, base @ local[0], point, unit(base @ normal), base @ local[1]))
     if motion in ("3R", "2R"):

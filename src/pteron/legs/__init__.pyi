@@ -18,6 +18,7 @@ from pteron.legs.pss import PSS as PSS
 from pteron.legs.reading import Reading as Reading
 from pteron.legs.rpr import RPR as RPR
 from pteron.legs.rps import RPS as RPS
+from pteron.legs.rpur import RPUR as RPUR
 from pteron.legs.rrr import RRR as RRR
 from pteron.legs.rrs import RRS as RRS
 from pteron.legs.rss import RSS as RSS

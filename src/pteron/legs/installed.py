@@ -17,6 +17,7 @@ from pteron.legs.prur import PRUR
 from pteron.legs.pss import PSS
 from pteron.legs.rpr import RPR
 from pteron.legs.rps import RPS
+from pteron.legs.rpur import RPUR
 from pteron.legs.rrr import RRR
 from pteron.legs.rrs import RRS
 from pteron.legs.rss import RSS
@@ -27,7 +28,7 @@ GROUP = "pteron.legs"
 
 KINDS: dict[str, type[LegKind]] = {
     kind.type: kind
-    for kind in (PRRR, PSS, RSS, RRR, PRR, RPR, RUPU, UPS, RPS, PRS, RRS, PRRS, PRUR)
+    for kind in (PRRR, PSS, RSS, RRR, PRR, RPR, RUPU, UPS, RPS, PRS, RRS, PRRS, PRUR, RPUR)
 }
 """The kinds of legs that are loaded, by their key `type`; add another here."""
 

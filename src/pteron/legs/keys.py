@@ -124,15 +124,16 @@ def sound_fields(
     """Return the valid fields, converted, and the faults of the others, one line each.
 
     Fields and conditions that depend on an invalid or missing field are not checked. `branches` are
-    the values that a sign may have.
+    the values that `elbow` may have.
     """
     sound: dict[str, Any] = {}
     faults: list[str] = []
     for name in sorted(fields, key=lambda name: bool(keys[name].across)):
         key, value = keys[name], fields[name]
         try:
-            if key.role == "sign" and (isinstance(value, bool) or value not in branches):
-                valid = "neither 1 nor -1" if len(branches) > 1 else "not 1, its only branch"
+            signs = branches if name == "elbow" else (1, -1)
+            if key.role == "sign" and (isinstance(value, bool) or value not in signs):
+                valid = "neither 1 nor -1" if len(signs) > 1 else "not 1, its only branch"
                 raise ModelError(f"{name}: {value!r} is {valid}")
             if value is None and key.default is None:
                 sound[name] = None
