@@ -80,6 +80,8 @@ class Leg:
     """Of a leg whose lower link turns about the platform's second axis, its second elbow."""
     piston: Body | None = None
     """Of such a leg with a ram; its reference point is the ram's end."""
+    arcs: tuple[float, float] | None = None
+    """Between the axes of crank and link of a leg whose axes meet in r."""
 
     @property
     def second(self):
@@ -88,7 +90,7 @@ class Leg:
     @property
     def crank(self):
         """Whether its joint coordinate is a crank's angle."""
-        return self.e is None and self.lu is not None
+        return self.arcs is not None or (self.e is None and self.lu is not None)
 
 
 @dataclass(frozen=True)
@@ -201,6 +203,7 @@ def _leg(leg, k):
         lower=_body(leg.lower),
         kappa=getattr(leg, "second_elbow", None),
         piston=_body(leg.piston) if hasattr(leg, "piston") else None,
+        arcs=(leg.crank_arc, leg.link_arc) if leg.type == "SRRR" else None,
     )
 
 
@@ -316,6 +319,21 @@ def places(machine, pose):
     ]
 
 
+def _spherical_place(leg, c):
+    """Return where a spherical R-R-R leg is: its crank by the law of cosines on a sphere."""
+    u, v = ca.DM(leg.d), (c - ca.DM(leg.r)) / ca.norm_2(c - ca.DM(leg.r))
+    first, second = leg.arcs
+    apart = ca.acos(ca.dot(u, v))
+    corner = (np.cos(second) - np.cos(first) * ca.cos(apart)) / (np.sin(first) * ca.sin(apart))
+    x, y = ca.dot(v, ca.DM(leg.first)), ca.dot(v, ca.DM(leg.second))
+    angle = ca.atan2(y, x) + leg.elbow * ca.acos(corner)
+    upper = ca.cos(angle) * leg.first + ca.sin(angle) * leg.second
+    w = np.cos(first) * u + np.sin(first) * upper
+    bend = ca.fabs(ca.dot(u, ca.cross(w, v))) / (np.sin(first) * np.sin(second))
+    across = (v - np.cos(second) * w) / np.sin(second)
+    return Place(angle, ca.DM(leg.r), None, angle, upper, w, bend, (u, across))
+
+
 def _universal_place(machine, leg, c, pose):
     """Return where a P-R-U-R leg is: its angles by arc functions, its links by turns of axes."""
     (a, i), (b0, _) = machine.axes
@@ -350,6 +368,8 @@ def _universal_place(machine, leg, c, pose):
 
 
 def _place(leg, c, phi):
+    if leg.arcs is not None:
+        return _spherical_place(leg, c)
     d, first, second, w = ca.DM(leg.d), ca.DM(leg.first), ca.DM(leg.second), c - ca.DM(leg.r)
     slide = angle = upper = None
     if leg.ratio is not None:

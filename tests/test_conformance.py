@@ -23,7 +23,7 @@ _LEGS = {
 }
 _TILTED = [
     leg
-    for motion, kinds in (*tilting.LEGS.items(), ("3T3R", ("PRRS",)))
+    for motion, kinds in (*tilting.LEGS.items(), ("3T3R", ("PRRS",)), ("3R", ("SRRR",)))
     for seed in range(3)
     for leg in tilting.machine(motion, kinds, seed)[0].legs
 ]

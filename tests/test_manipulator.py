@@ -339,6 +339,8 @@ CATALOGUED |= {
     "hexapteron": ("3T3R", "PRRS PRRS PRRS PRRS PRRS PRRS"),
     "pentapteron": ("3T2R", "PRUR PRUR PRUR PRUR PRUR"),
     "5-rpur": ("3T2R", "RPUR RPUR RPUR RPUR RPUR"),
+    "agile-eye": ("3R", "SRRR SRRR SRRR"),
+    "spherical-3-rrr": ("3R", "SRRR SRRR SRRR"),
     "hexaglide": ("3T3R", "PSS PSS PSS PSS PSS PSS"),
     "reachy-mini": ("3T3R", "RSS RSS RSS RSS RSS RSS"),
     "rubin-camera-hexapod": ("3T3R", "UPS UPS UPS UPS UPS UPS"),

@@ -4,7 +4,7 @@ import numpy as np
 
 import pteron
 from pteron.bodies.inertia import PlanarInertia, RodInertia, SpatialInertia
-from pteron.legs import PRRS, PRS, PRUR, PSS, RPS, RPUR, RRS, RSS, UPS
+from pteron.legs import PRRS, PRS, PRUR, PSS, RPS, RPUR, RRS, RSS, SRRR, UPS
 from pteron.platforms import Platform
 
 LEGS = {"3T3R": ("UPS", "PSS", "RSS"), "3R": ("UPS", "PSS", "RSS"), "2R": ("UPS", "PSS", "RSS")}
@@ -121,6 +121,28 @@ def universal_leg(kind, rng, s0, c0, a, b):
     )
 
 
+def spherical_leg(rng, s0, v):
+    """Return a spherical R-R-R leg whose last axis is along v, and along s0 on the platform."""
+    first, second = rng.uniform(0.9, 1.9, 2)
+    elbow, lean = int(rng.choice([1, -1])), rng.uniform(0.7, 2.4)
+    w = np.array(unit(np.cross(v, rng.normal(size=3))))
+    w = np.cos(second) * v + np.sin(second) * w  # the crank's end
+    side = np.array(unit(np.cross(w, v)))
+    # The axis u is turned about w from the plane of w and v, so that u . (w x v) has the elbow.
+    away = np.cos(lean) * np.cross(side, w) - elbow * np.sin(lean) * side
+    d = np.cos(first) * w + np.sin(first) * np.array(unit(away))
+    return SRRR(
+        direction=unit(d),
+        zero_direction=unit(np.cross(d, rng.normal(size=3))),
+        platform_point=tuple(s0),
+        crank_arc=first,
+        link_arc=second,
+        upper=planar(rng, 0.5),
+        lower=body(rng, 0.2),
+        elbow=elbow,
+    )
+
+
 def machine(motion, kinds, seed, angles="rpy"):
     """Return a random machine and a pose about which it moves."""
     rng = np.random.default_rng(seed)
@@ -143,6 +165,9 @@ def machine(motion, kinds, seed, angles="rpy"):
             r = r - normal * (normal @ (r - height - s0))
         local = (r, height + s0)
         point = base @ s0 if motion in ("2R", "3T2R") else s0
+        if kind == "SRRR":
+            legs.append(spherical_leg(rng, point, base @ np.array(unit(s0))))
+            continue
         if kind in ("PRUR", "RPUR"):
             apart = 0.3 * rng.normal(size=3)
             at = point + apart, base @ local[1] + apart

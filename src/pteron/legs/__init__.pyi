@@ -23,4 +23,5 @@ from pteron.legs.rrr import RRR as RRR
 from pteron.legs.rrs import RRS as RRS
 from pteron.legs.rss import RSS as RSS
 from pteron.legs.rupu import RUPU as RUPU
+from pteron.legs.srrr import SRRR as SRRR
 from pteron.legs.ups import UPS as UPS

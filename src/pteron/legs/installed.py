@@ -22,13 +22,14 @@ from pteron.legs.rrr import RRR
 from pteron.legs.rrs import RRS
 from pteron.legs.rss import RSS
 from pteron.legs.rupu import RUPU
+from pteron.legs.srrr import SRRR
 from pteron.legs.ups import UPS
 
 GROUP = "pteron.legs"
 
 KINDS: dict[str, type[LegKind]] = {
     kind.type: kind
-    for kind in (PRRR, PSS, RSS, RRR, PRR, RPR, RUPU, UPS, RPS, PRS, RRS, PRRS, PRUR, RPUR)
+    for kind in (PRRR, PSS, RSS, RRR, PRR, RPR, RUPU, UPS, RPS, PRS, RRS, PRRS, PRUR, RPUR, SRRR)
 }
 """The kinds of legs that are loaded, by their key `type`; add another here."""
 

@@ -70,6 +70,8 @@ class Key(NamedTuple):
     """The key whose value is an example, where the file gives it."""
     across: str = ""
     """The direction to which it is perpendicular, by its key."""
+    alias: str = ""
+    """Another name that files may have for it."""
     tilting: Any = None
     """Its value where a file of a platform that tilts does not give it; None: as of any other."""
 

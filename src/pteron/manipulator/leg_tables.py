@@ -55,8 +55,13 @@ _TYPES: dict[KeyRole, Any] = {
     "reading": ReadingTable,
 }
 
-FORMER = {"limits": "slider_limits"}
+_FORMER = {"limits": "slider_limits"}
 """Keys that had another name in files of version 0.1, with that name."""
+
+
+def alias_of(name: str, key: Key) -> str:
+    """Return another name that files may have for a key, such as a former one; '' without one."""
+    return key.alias or _FORMER.get(name, "")
 
 
 @lru_cache(maxsize=16)
@@ -64,7 +69,7 @@ def leg_table(kind: type[LegKind]) -> type[TomlTable]:
     """Return the pydantic model of a `[[legs]]` table for a kind of leg."""
     fields: dict[str, Any] = {"type": (str, Field(kind.type, description="the kind of leg"))}
     for key, about in kind.every_key().items():
-        field_type, former = _TYPES[about.role], FORMER.get(key)
+        field_type, alias = _TYPES[about.role], alias_of(key, about)
         fields[toml_key(key, about)] = (
             field_type | None if about.default is None else field_type,
             Field(
@@ -72,7 +77,7 @@ def leg_table(kind: type[LegKind]) -> type[TomlTable]:
                 description=about.help,
                 examples=None if about.example is None else [about.example],
                 json_schema_extra={"like": about.like} if about.like else None,
-                validation_alias=former and AliasChoices(key, former),
+                validation_alias=AliasChoices(key, alias) if alias else None,
             ),
         )
     return create_model(f"{kind.type}Table", __base__=TomlTable, **fields)

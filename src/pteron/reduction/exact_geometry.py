@@ -202,6 +202,9 @@ def _exact_leg(
         shift = shift + np.array(robot.platform.center or (0.0, 0.0, 0.0))
         x, y = notes.plane_vector(f"s{i + 1}", *leg.platform_point[:2])
         s0 = (x, y, notes.length(f"s{i + 1}.z", leg.platform_point[2]))
+        if leg.platform_center is not None:  # of its platform point the direction alone counts
+            way = np.array(leg.platform_point) / np.linalg.norm(leg.platform_point)
+            s0 = exact_directions({f"s{i + 1}": way}, notes)[f"s{i + 1}"]
     else:
         shift = shift + np.array(robot.platform.frame).T @ np.array(leg.platform_point)
         s0 = (ZERO, ZERO, ZERO)
