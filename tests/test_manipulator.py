@@ -341,6 +341,7 @@ CATALOGUED |= {
     "5-rpur": ("3T2R", "RPUR RPUR RPUR RPUR RPUR"),
     "agile-eye": ("3R", "SRRR SRRR SRRR"),
     "spherical-3-rrr": ("3R", "SRRR SRRR SRRR"),
+    "3-upu": ("3T", "UPU UPU UPU"),
     "hexaglide": ("3T3R", "PSS PSS PSS PSS PSS PSS"),
     "reachy-mini": ("3T3R", "RSS RSS RSS RSS RSS RSS"),
     "rubin-camera-hexapod": ("3T3R", "UPS UPS UPS UPS UPS UPS"),

@@ -25,3 +25,4 @@ from pteron.legs.rss import RSS as RSS
 from pteron.legs.rupu import RUPU as RUPU
 from pteron.legs.srrr import SRRR as SRRR
 from pteron.legs.ups import UPS as UPS
+from pteron.legs.upu import UPU as UPU

@@ -24,12 +24,30 @@ from pteron.legs.rss import RSS
 from pteron.legs.rupu import RUPU
 from pteron.legs.srrr import SRRR
 from pteron.legs.ups import UPS
+from pteron.legs.upu import UPU
 
 GROUP = "pteron.legs"
 
 KINDS: dict[str, type[LegKind]] = {
     kind.type: kind
-    for kind in (PRRR, PSS, RSS, RRR, PRR, RPR, RUPU, UPS, RPS, PRS, RRS, PRRS, PRUR, RPUR, SRRR)
+    for kind in (
+        PRRR,
+        PSS,
+        RSS,
+        RRR,
+        PRR,
+        RPR,
+        RUPU,
+        UPS,
+        RPS,
+        PRS,
+        RRS,
+        PRRS,
+        PRUR,
+        RPUR,
+        SRRR,
+        UPU,
+    )
 }
 """The kinds of legs that are loaded, by their key `type`; add another here."""
 

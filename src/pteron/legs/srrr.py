@@ -284,7 +284,7 @@ class SRRREquations(LegEquations):
         v, across, _, discriminant = self._closure(c)
         arm = c - self.r
         length = ca.sqrt(ca.dot(arm, arm))
-        a, b = (2 * ca.atan(t) for t in self.tangents)
+        a, b = (2 * ca.atan2(t, 1) for t in self.tangents)
         spread = ca.sqrt(ca.dot(across, across))
         angle = ca.atan2(spread, ca.dot(self.u, v))
         most = ca.fmin(a + b, 2 * ca.pi - a - b)
