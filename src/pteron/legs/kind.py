@@ -115,6 +115,9 @@ class LegKind(ABC):
     """The values that `elbow` may have."""
     follows_angle: ClassVar[bool] = False
     """Whether its joint follows the platform's angle, and not its platform point."""
+    couples_vary: ClassVar[bool] = False
+    """Whether its couples turn with the pose, so that they may leave its platform a turn within
+    reach: conditions on poses then count the constraint measure as they count type II."""
     account: ClassVar[str] = ""
     """Its construction in a few sentences for a report; vectors by their letters r, d, e, k, s0."""
     measure_text: ClassVar[str] = ""

@@ -26,6 +26,7 @@ class UPU(UniversalRamLeg):
     """
 
     type = "UPU"
+    couples_vary = True
     account = ACCOUNTS["UPU"]
 
     keys: ClassVar = keys_of("ram", "universal_ram", "UPU")
