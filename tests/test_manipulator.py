@@ -334,6 +334,7 @@ CATALOGUED = {
 
 CATALOGUED |= {
     "ankle": ("2R", "RSS RSS"),
+    "ankle-offset": ("2R", "RSS RSS"),
     "ball-table": ("1T2R", "RRS RRS RRS"),
     "hexa": ("3T3R", "RSS RSS RSS RSS RSS RSS"),
     "hexapteron": ("3T3R", "PRRS PRRS PRRS PRRS PRRS PRRS"),

@@ -96,6 +96,8 @@ class TiltingLoci(Closure):
                 points[i] = points[i] + ca.cross(force, moment) / ca.dot(force, force)
         center = ca.SX(3, 1) if centred else sum(points) / len(points)
         square = sum(ca.dot(s - center, s - center) for s in points)
+        if (distance := self.platform.axis_distance) is not None:
+            square = sum((ca.norm_2(s) + distance) ** 2 for s in points)
         lengths, count = 0 if centred else 3, forces * len(self.legs)
         turns = count if centred else count - lengths
         shares = (count / 3) ** (0.5 * lengths)

@@ -338,6 +338,7 @@ class _FileReader:
                 "angle_order": table.angles or "rpy",
             }
             required |= {"center": table.center, "second_axis": table.second_axis}
+            optional["axis_offset"] = table.axis_offset
         else:
             optional["bars"] = tuple(self.parts("platform.bars", table.bars or [], Bar))
             optional["geared"] = tuple(

@@ -236,7 +236,7 @@ def _home_faults(platform: Platform, home: Sequence[float] | None) -> Iterator[s
 def _placed_leg(platform: Platform, leg: LegKind) -> LegKind:
     """Return a leg with what it takes from its platform's frame, axes and center."""
     placed_leg = leg.with_platform_frame(platform.frame)
-    return placed_leg.with_platform_rotation(platform.rotation_axes, platform.center)
+    return placed_leg.with_platform_rotation(platform.rotation_axes, platform.fixed_point)
 
 
 def _leg_faults(platform: Platform, leg: object) -> Iterator[str]:

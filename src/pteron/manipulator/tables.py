@@ -134,6 +134,12 @@ class TiltingTable(SpatialBody, _Motion):
         None,
         [0.0, 1.0, 0.0],
     )
+    axis_offset: Three | None = key(
+        "for 2R whose axes do not meet: from center, on the first axis, to P on the second one, at "
+        "angles zero, m",
+        None,
+        [0.0, 0.0, 0.02],
+    )
     limits: list[Two] | None = key(
         "least and greatest value of each angle, rad", None, [[-0.5, 0.5], [-0.5, 0.5], [-0.5, 0.5]]
     )

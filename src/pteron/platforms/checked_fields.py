@@ -107,6 +107,10 @@ def _joint(platform: Any) -> dict[str, Any]:
         elif needed:
             check = vector if name == "center" else unit_vector
             checked[name] = check(field_value, name)
+    if platform.axis_offset is not None and not all(requirements.values()):
+        faults.append(f"axis_offset: a {platform.motion} platform has none; leave it out")
+    elif platform.axis_offset is not None:
+        checked["axis_offset"] = vector(platform.axis_offset, "axis_offset")
     second = checked.get("second_axis")
     if second and parallel(axis := unit_vector(platform.axis, "axis"), second):
         faults.append("second_axis: along axis, so that both angles turn alike; turn one")

@@ -162,6 +162,8 @@ class PlatformEquations(ABC):
     hold_rotation: ClassVar[bool] = False
     """Whether its legs, at least one, hold the rotation that a platform that tilts does not make:
     the one about the normal of its two axes, which are perpendicular."""
+    axis_distance: Expression | None = None
+    """The distance of P from the base's axis that it turns about, m; None where it does not."""
     keeps_points_in_planes: ClassVar[bool] = False
     """Whether planes, in which its legs keep its points, fix its dependent coordinates."""
     wrench_columns: ClassVar[tuple[str, ...]] = ()

@@ -79,10 +79,14 @@ class Platform:
     angle_order : {"rpy", "xyz"}
         Which angles a 3T3R or 3R platform has: roll, pitch and yaw, or rx, ry and rz.
     center : vector, optional
-        P of a 3R or 2R platform, on its joint with the base, m.
+        P of a 3R or 2R platform, on its joint with the base, m; with `axis_offset` a point on the
+        first axis.
     second_axis : unit vector, optional
         What a 2R or 3T2R platform turns about by beta, at alpha = 0; of a 3T2R platform
         perpendicular to `axis`.
+    axis_offset : vector, optional
+        Of a 2R platform whose axes do not meet: from `center`, on the first axis, to P on the
+        second one, at angles zero, m. P then moves as the platform turns about the first axis.
     planes : tuple of HeldPoint
         Of a 1T2R platform the planes in which its legs keep its points: the manipulator sets them.
     """
@@ -100,6 +104,7 @@ class Platform:
     center: Vector | None = None
     second_axis: Vector | None = None
     planes: tuple[HeldPoint, ...] = ()
+    axis_offset: Vector | None = None
 
     def __post_init__(self) -> None:
         if kind_of_motion(self.motion) is None:
@@ -300,6 +305,11 @@ class Platform:
         return bool(np.linalg.svd(centred, compute_uv=False)[1] <= size)
 
     @property
+    def fixed_point(self) -> Vector | None:
+        """The point P of a platform that only turns about it, m; None where P moves."""
+        return self.center if self.axis_offset is None else None
+
+    @property
     def rotation_axes(self) -> tuple[Vector, ...]:
         """Unit vectors that span the axes about which the platform turns."""
         if self.second_axis is not None:
@@ -386,6 +396,8 @@ class Platform:
         quantities: dict[str, tuple[float, ...]] = {}
         if self.center is not None:
             quantities["center"] = self.center
+        if self.axis_offset is not None:
+            quantities["axis_offset"] = self.axis_offset
         if self.second_axis is not None:
             quantities |= {"first_axis": self.axis, "second_axis": self.second_axis}
         return quantities
@@ -396,7 +408,9 @@ class Platform:
 
         For a planar platform the legs determine the axis.
         """
-        center = () if self.center is None else ("center",)
+        center = tuple(
+            name for name in ("center", "axis_offset") if getattr(self, name) is not None
+        )
         if self.second_axis is not None:
             return (*center, "axis", "second_axis")
         if self.center is not None:
@@ -440,6 +454,7 @@ class Platform:
             axis=turn(self.axis),
             second_axis=turn(self.second_axis),
             center=center,
+            axis_offset=self.axis_offset and turn(self.axis_offset),
             tool=turn(self.tool),
             inertia=self.inertia.turned(np.array([turn(v) for v in self.frame]).T),
         )

@@ -270,14 +270,8 @@ class _Centred(Tilting):
         turned = self.pose_rotation(pose, velocity, acceleration)
         zero = ca.SX(3, 1)
         place = PointMotion(self.quantities["center"], zero, zero)
-        return self.assemble_motion(place, turned, *self.basis(turned))
-
-    def basis(self, turned: Rotation) -> tuple[Expression, Expression | None]:
-        """Return the twists (6, k) of unit quasi-velocities.
-
-        The second result is the matrix from angle rates to quasi-velocities.
-        """
-        return ca.vertcat(ca.SX(3, 3), ca.SX.eye(3)), turned.axes
+        twist = ca.vertcat(ca.SX(3, 3), ca.SX.eye(3))
+        return self.assemble_motion(place, turned, twist, turned.axes)
 
 
 class CentredRollPitchYaw(_Centred):
@@ -332,6 +326,29 @@ class Universal(_TwoAxes, _Centred):
     coordinates = ("alpha", "beta")
     freedom_text = "turns about two axes through a centre that stays (2R)"
 
-    def basis(self, turned: Rotation) -> tuple[Expression, Expression | None]:
-        """Return the twists (6, 2) of unit angle rates (the quasi-velocities), and None."""
-        return ca.vertcat(ca.SX(3, 2), turned.axes), None
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*arguments)
+        if (offset := self.quantities.get("axis_offset")) is not None:
+            self.axis_distance = ca.norm_2(ca.cross(self.quantities["first_axis"], offset))
+
+    def motion(
+        self, pose: Expression, velocity: Expression, acceleration: Expression
+    ) -> PlatformMotion:
+        """Return the motion of a platform whose P stays, or turns about the first axis."""
+        turned = self.pose_rotation(pose, velocity, acceleration)
+        center, offset = self.quantities["center"], self.quantities.get("axis_offset")
+        zero = ca.SX(3, 1)
+        if offset is None:
+            twist = ca.vertcat(ca.SX(3, 2), turned.axes)
+            return self.assemble_motion(PointMotion(center, zero, zero), turned, twist, None)
+        a, cos, sin = self.quantities["first_axis"], ca.cos(pose[0]), ca.sin(pose[0])
+        along = a * ca.dot(a, offset)
+        arm = cos * (offset - along) + sin * ca.cross(a, offset)
+        lever = ca.cross(a, arm)
+        place = PointMotion(
+            center + along + arm,
+            lever * velocity[0],
+            lever * acceleration[0] - arm * (velocity[0] * velocity[0]),
+        )
+        twist = ca.vertcat(ca.horzcat(lever, zero), turned.axes)
+        return self.assemble_motion(place, turned, twist, None)

@@ -185,6 +185,9 @@ def exact_geometry(robot: Manipulator) -> ExactGeometry:
     }
     # The whole machine but its platform's frame turns with a joint that has axes of its own.
     axes = _rational_rotation(frame) if "second_axis" in platform.quantities else UNIT
+    if platform.axis_offset is not None:
+        offset = frame @ np.array(platform.axis_offset)
+        platform_values["axis_offset"] = tuple(_fraction(float(c)) for c in offset)
     quantities = {name: (platform_values | exact)[name] for name in platform.quantities}
     missed = lost_right_angles(distinct, exact), describe_near_relations(distinct)
     remarks = map(tuple[str, ...], (notes.recognised, notes.approximated, *missed))
