@@ -32,7 +32,12 @@ class TiltingLoci(Closure):
 
     @property
     def modes(self) -> int:
-        """The greatest number of poses of joint coordinates: 40 (six legs), 16 (tripod) or 8."""
+        """The greatest number of poses of joint coordinates: 40 (six legs), 16 (tripod) or 8.
+
+        It is 8 where all legs keep their points in planes.
+        """
+        if all(leg.row_is_constant for leg in self.legs):
+            return 8
         if len(self.legs) == 6:
             return 40
         return 16 if "z" in self.platform.coordinates else 8

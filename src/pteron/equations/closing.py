@@ -20,6 +20,7 @@ from pteron.legs.leg import (
     CircleLocus,
     CoordinateLocus,
     LegEquations,
+    Locus,
     PlaneLocus,
     SphereLocus,
 )
@@ -118,6 +119,30 @@ def holds_spheres(machine: Machine) -> bool:
     """
     loci = (leg.locus(ca.SX(0)) for leg in machine.legs)
     return all(isinstance(locus, SphereLocus | CircleLocus) for locus in loci)
+
+
+def plane_of_locus(locus: Locus) -> PlaneLocus | None:
+    """Return the plane that a locus is, or lies in whichever the leg's branch; None without one."""
+    if isinstance(locus, CoordinateLocus):
+        return locus.plane
+    return locus if isinstance(locus, PlaneLocus) else None
+
+
+def holds_planes(machine: Machine) -> bool:
+    """Return whether every leg whose joint is held keeps its platform point in a plane."""
+    return all(plane_of_locus(leg.locus(ca.SX(0))) is not None for leg in machine.legs)
+
+
+def held_planes(machine: Machine, joints: Expression) -> tuple[Expression, Expression]:
+    """Return the planes of held joints: normals, one after the other (3 n, 1), offsets (n, 1)."""
+    planes = [
+        plane_of_locus(leg.locus(q))
+        for leg, q in zip(machine.legs, ca.vertsplit(joints), strict=True)
+    ]
+    zero = 0 * joints[0]  # what is constant has a column for each of a batch of joints too
+    known = [plane for plane in planes if plane is not None]  # all, see `holds_planes`
+    normals = ca.vertcat(*(plane.normal for plane in known))
+    return ca.densify(normals) + zero, ca.vertcat(*(plane.offset for plane in known)) + zero
 
 
 def held_spheres(machine: Machine, joints: Expression) -> tuple[Expression, Expression]:

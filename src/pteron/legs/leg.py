@@ -199,6 +199,8 @@ class CoordinateLocus(NamedTuple):
     """The locus of c for a given joint of a leg that has none of the simple ones."""
 
     joint: Expression
+    plane: PlaneLocus | None = None
+    """A plane that holds c in either branch of the leg."""
 
 
 class AngleLocus(NamedTuple):

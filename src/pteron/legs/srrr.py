@@ -31,7 +31,7 @@ from pteron.legs.crank import TurningLeg
 from pteron.legs.drive import Drive
 from pteron.legs.keys import ACCOUNTS, FieldCondition, keys_of
 from pteron.legs.kind import LegQuantity, LegTransfer, ReachBound
-from pteron.legs.leg import CoordinateLocus, Joint, LegEquations, LegMotion, Reach
+from pteron.legs.leg import CoordinateLocus, Joint, LegEquations, LegMotion, PlaneLocus, Reach
 from pteron.legs.reading import Reading
 from pteron.legs.variables import angular_motion
 
@@ -134,6 +134,7 @@ class SRRR(TurningLeg):
             *self.zero_quantities,
             LegQuantity("crank_tangent", "number", (_half_tangent(self.crank_arc),)),
             LegQuantity("link_tangent", "number", (_half_tangent(self.link_arc),)),
+            LegQuantity("distance", "number", (self.size,)),
             LegQuantity("elbow", "sign", (self.elbow,)),
         )
 
@@ -198,8 +199,10 @@ class SRRREquations(LegEquations):
         middle: Expression,
         crank_tangent: Expression,
         link_tangent: Expression,
+        distance: Expression,
         elbow: Expression,
     ) -> None:
+        self.distance = distance
         self.r, self.u, self.middle, self.sigma = guide_point, direction, middle, elbow
         self.plane = plane_of(direction, zero_direction)
         self.tangents = crank_tangent, link_tangent
@@ -302,7 +305,11 @@ class SRRREquations(LegEquations):
 
     def locus(self, q: Expression) -> CoordinateLocus:
         """Return the locus of c, a circle about w on the sphere about the centre."""
-        return CoordinateLocus(q)
+        turn, (cosine, sine) = q - self.middle, self.crank
+        k = ca.mtimes(self.plane, ca.vertcat(ca.cos(turn), ca.sin(turn)))
+        w = cosine * self.u + sine * k
+        offset = self.distance * self.link[0] + ca.dot(w, self.r)
+        return CoordinateLocus(q, PlaneLocus(w, offset, self.distance))
 
 
 def _half_tangent(arc: float) -> float:
