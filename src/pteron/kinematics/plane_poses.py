@@ -119,8 +119,8 @@ def quadric_rotations(
     real = (np.abs(points.imag).max(axis=-1) < _NEARLY_REAL) & ~curve[:, None]
     which, _ = np.nonzero(real)
     sharp, residuals = _sharpened(quadrics[which], points.real[real])
-    kept = (residuals < _CLOSED) & ~_repeated(which, sharp)
-    return which[kept], _rotations(sharp[kept]), curve
+    single = (residuals < _CLOSED) & ~_repeated(which, sharp)
+    return which[single], _rotations(sharp[single]), curve
 
 
 def _quadrics(forms: Array, heights: Array) -> Array:

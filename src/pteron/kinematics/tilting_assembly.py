@@ -15,6 +15,7 @@ from pteron.equations.pose_paths import Closed
 from pteron.errors import ModelError
 from pteron.kernels import Array
 from pteron.kernels.path_programs import spheres_kernel
+from pteron.kinematics.offset_poses import offset_poses
 from pteron.kinematics.plane_poses import plane_poses
 from pteron.kinematics.pose_paths import generic, positions_and_rotations, real_poses
 from pteron.manipulator import Manipulator
@@ -37,13 +38,15 @@ def tilting_poses(
     machine = Machine.numeric(robot)
     if holds_planes(machine):
         return plane_poses(robot, joints)
-    if not (holds_spheres(machine) and robot.platform.fixed_point == robot.platform.center):
+    if not holds_spheres(machine):
         kinds = " and ".join(sorted({leg.type for leg in robot.legs}))
         raise ModelError(
             f"direct_kinematics: no method finds every pose of {kinds} legs under a "
             f"{robot.platform.motion} platform; `follow` and `direct_step` go on from a known pose",
             subject=robot.name,
         )
+    if robot.platform.axis_offset is not None:
+        return (*offset_poses(robot, joints), np.zeros(len(joints), dtype=bool))
     centers, squares = spheres_kernel(robot)(joints)
     good = np.flatnonzero(
         (np.abs(centers) < _HUGE).all(axis=(-2, -1)) & (np.abs(squares) < _HUGE).all(axis=-1)
