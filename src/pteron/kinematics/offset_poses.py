@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from pteron.kernels import Array
 from pteron.kernels.path_programs import spheres_kernel
+from pteron.kinematics.plane_poses import repeats
 from pteron.manipulator import Manipulator
 from pteron.platforms.coordinates import wrap_angle
 from pteron.tolerances import SAME
@@ -100,7 +101,13 @@ def offset_poses(robot: Manipulator, joints: Array) -> tuple[NDArray[np.int64], 
     closed = np.flatnonzero(residuals < _CLOSED)
     closed = closed[np.argsort(indices[closed], kind="stable")]
     rows, poses = indices[closed], wrap_angle(poses[closed])
-    single = ~_repeated(rows, poses)
+
+    def are_same(later: slice, earlier: slice) -> NDArray[np.bool_]:
+        """Return whether poses are equal up to full turns."""
+        away = np.abs(wrap_angle(poses[later] - poses[earlier]))
+        return np.asarray(away.max(axis=-1, initial=0.0) < SAME)
+
+    single = ~repeats(rows, are_same, 4 * _DEGREE)
     return rows[single], poses[single]
 
 
@@ -119,13 +126,3 @@ def _sharpened(closures: _Closures, which: NDArray[np.int64], x: Array) -> tuple
     c, s = np.cos(x[:, :1]), np.sin(x[:, :1])
     p, q, k = closures.terms(which, x[:, 1])
     return x, np.abs(p * c + q * s - k).max(axis=-1, initial=0.0) / size
-
-
-def _repeated(which: NDArray[np.int64], x: Array) -> NDArray[np.bool_]:
-    """Return whether a pose (K, 2) stands before in the same row."""
-    repeated = np.zeros(len(x), dtype=bool)
-    for k in range(len(x)):
-        before = (which[:k] == which[k]) & ~repeated[:k]
-        away = np.abs(wrap_angle(x[:k][before] - x[k])).max(axis=-1, initial=0.0)
-        repeated[k] = bool((away < SAME).any())
-    return repeated

@@ -10,6 +10,7 @@ chapter 3). Newton's method makes the real ones sharp.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import combinations_with_replacement
 
 import casadi as ca
@@ -119,7 +120,13 @@ def quadric_rotations(
     real = (np.abs(points.imag).max(axis=-1) < _NEARLY_REAL) & ~curve[:, None]
     which, _ = np.nonzero(real)
     sharp, residuals = _sharpened(quadrics[which], points.real[real])
-    single = (residuals < _CLOSED) & ~_repeated(which, sharp)
+
+    def are_same(later: slice, earlier: slice) -> NDArray[np.bool_]:
+        """Return whether quaternions are equal, or opposite."""
+        products = (sharp[later] * sharp[earlier]).sum(axis=-1)
+        return np.asarray(np.abs(products) > 1.0 - 0.5 * SAME**2)
+
+    single = (residuals < _CLOSED) & ~repeats(which, are_same, _POINTS)
     return which[single], _rotations(sharp[single]), curve
 
 
@@ -149,12 +156,18 @@ def _sharpened(quadrics: Array, x: Array) -> tuple[Array, Array]:
     return x, residuals
 
 
-def _repeated(which: NDArray[np.int64], x: Array) -> NDArray[np.bool_]:
-    """Return whether a quaternion (K, 4), of either sign, stands before in the same row."""
-    repeated = np.zeros(len(x), dtype=bool)
-    for k in range(len(x)):
-        before = (which[:k] == which[k]) & ~repeated[:k]
-        repeated[k] = bool((np.abs(x[:k][before] @ x[k]) > 1.0 - 0.5 * SAME**2).any())
+def repeats(
+    which: NDArray[np.int64], are_same: Callable[[slice, slice], NDArray[np.bool_]], most: int
+) -> NDArray[np.bool_]:
+    """Return whether an element (K,) is the same as one before it in its row.
+
+    Rows, `which` (K,), follow each other and have at most `most` elements; `are_same` compares the
+    elements of two slices.
+    """
+    repeated = np.zeros(len(which), dtype=bool)
+    for shift in range(1, most):
+        later, earlier = slice(shift, None), slice(None, -shift)
+        repeated[later] |= (which[later] == which[earlier]) & are_same(later, earlier)
     return repeated
 
 
