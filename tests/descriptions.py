@@ -12,10 +12,10 @@ import numpy as np
 MOTIONS = {"3T": (3, False), "3T1R": (3, True), "2T": (2, False), "2T1R": (2, True)}
 """How many ways the platform moves without turning, and whether it turns."""
 
-FLAT = {"PRRR", "RRR", "PRR", "RPR", "RPS", "PRS", "RRS"}
+FLAT = {"PRRR", "PRRS", "RRR", "PRR", "RPR", "RPS", "PRS", "RRS"}
 """The kinds whose last link moves in the plane perpendicular to d, as the others' swings."""
 
-TILTS = {"3T3R": 6, "3R": 3, "2R": 2, "1T2R": 3}
+TILTS = {"3T3R": 6, "3T2R": 5, "3R": 3, "2R": 2, "1T2R": 3}
 """The motions of platforms that turn about any axis, and how many coordinates they have."""
 
 LENGTH = 0.1
@@ -76,6 +76,12 @@ class Leg:
     slider_mass: float | None
     upper: Body | None
     lower: Body
+    kappa: int | None = None
+    """Of a leg whose lower link turns about the platform's second axis, its second elbow."""
+    piston: Body | None = None
+    """Of such a leg with a ram; its reference point is the ram's end."""
+    arcs: tuple[float, float] | None = None
+    """Between the axes of crank and link of a leg whose axes meet in r."""
 
     @property
     def second(self):
@@ -84,7 +90,7 @@ class Leg:
     @property
     def crank(self):
         """Whether its joint coordinate is a crank's angle."""
-        return self.e is None and self.lu is not None
+        return self.arcs is not None or (self.e is None and self.lu is not None)
 
 
 @dataclass(frozen=True)
@@ -132,8 +138,8 @@ def describe(robot):
         axes = [(axis, last - 2 + i) for i, axis in enumerate(turns)]
         if platform.motion == "1T2R":
             axes = [(turns[2], 3), (turns[1], 2), (turns[0], 1)]
-        elif platform.motion == "2R":
-            axes = [(platform.axis, 0), (platform.second_axis, 1)]
+        elif platform.second_axis is not None:
+            axes = [(platform.axis, last - 1), (platform.second_axis, last)]
         elif platform.angle_order == "rpy":
             axes = axes[::-1]
         body = platform.inertia
@@ -173,6 +179,8 @@ def _leg(leg, k):
         # A shaft is hardly ever across the axis that it turns, nor a rod across its guide.
         first = k if e is None else e
         d = _across(first)
+    elif getattr(leg, "second_elbow", None) is not None:
+        d = first = np.zeros(3)  # they are the platform's
     elif leg.type == "UPS":
         first = d = np.eye(3)[0]  # nothing depends on them
     else:
@@ -193,6 +201,9 @@ def _leg(leg, k):
         slider_mass=slider,
         upper=_body(leg.upper) if hasattr(leg, "upper") else None,
         lower=_body(leg.lower),
+        kappa=getattr(leg, "second_elbow", None),
+        piston=_body(leg.piston) if hasattr(leg, "piston") else None,
+        arcs=(leg.crank_arc, leg.link_arc) if leg.type == "SRRR" else None,
     )
 
 
@@ -202,6 +213,8 @@ def _across(v):
 
 
 def _body(body):
+    if isinstance(body.inertia, tuple):
+        return Solid(body.mass, np.array(body.first_moment), body.tensor)
     x, y = (*body.center_of_mass, 0.0)[:2]
     return Body(body.mass, x, y, body.inertia)
 
@@ -223,6 +236,8 @@ class Place(NamedTuple):
     bend: Any
     """1 at best, 0 where the leg is singular: the sine between the links, as seen along d, times
     the cosine between d and a guide; or the cosine between a rod and its guide."""
+    turn: Any = None
+    """The platform's first axis and its second one now, of a leg that has links across them."""
 
 
 def about(axis, angle):
@@ -237,7 +252,7 @@ def tilted(machine, pose):
         p, yaw = _held(machine, pose)
         pose = ca.vertcat(pose, yaw)
     else:
-        p = pose[:3] if machine.tilts == "3T3R" else ca.DM(machine.center)
+        p = pose[:3] if machine.tilts in ("3T3R", "3T2R") else ca.DM(machine.center)
     turn = ca.SX.eye(3)
     for axis, place in machine.axes:
         turn = turn @ about(axis, pose[place])
@@ -298,10 +313,63 @@ def places(machine, pose):
     p, turn = position(machine, pose), carried(machine, pose)
     phi = pose[-1] if machine.turns else None
     points = (p + ca.mtimes(turn, ca.DM(leg.s0)) + ca.DM(leg.t0) for leg in machine.legs)
-    return [_place(leg, c, phi) for leg, c in zip(machine.legs, points, strict=True)]
+    return [
+        _place(leg, c, phi) if leg.kappa is None else _universal_place(machine, leg, c, pose)
+        for leg, c in zip(machine.legs, points, strict=True)
+    ]
+
+
+def _spherical_place(leg, c):
+    """Return where a spherical R-R-R leg is: its crank by the law of cosines on a sphere."""
+    u, v = ca.DM(leg.d), (c - ca.DM(leg.r)) / ca.norm_2(c - ca.DM(leg.r))
+    first, second = leg.arcs
+    apart = ca.acos(ca.dot(u, v))
+    corner = (np.cos(second) - np.cos(first) * ca.cos(apart)) / (np.sin(first) * ca.sin(apart))
+    x, y = ca.dot(v, ca.DM(leg.first)), ca.dot(v, ca.DM(leg.second))
+    angle = ca.atan2(y, x) + leg.elbow * ca.acos(corner)
+    upper = ca.cos(angle) * leg.first + ca.sin(angle) * leg.second
+    w = np.cos(first) * u + np.sin(first) * upper
+    bend = ca.fabs(ca.dot(u, ca.cross(w, v))) / (np.sin(first) * np.sin(second))
+    across = (v - np.cos(second) * w) / np.sin(second)
+    return Place(angle, ca.DM(leg.r), None, angle, upper, w, bend, (u, across))
+
+
+def _universal_place(machine, leg, c, pose):
+    """Return where a P-R-U-R leg is: its angles by arc functions, its links by turns of axes."""
+    (a, i), (b0, _) = machine.axes
+    turn = about(a, pose[i])
+    b, n = turn @ ca.DM(b0), turn @ ca.DM(np.cross(a, b0))
+    a, w = ca.DM(a), c - ca.DM(leg.r)
+    if leg.e is None:
+        lean = ca.asin(ca.dot(a, w) / leg.ll)
+        last = leg.ll * (ca.sin(lean) * a + leg.kappa * ca.cos(lean) * n)
+        ram = ca.norm_2(w - last)
+        upper = (w - last) / ram
+        force = ca.cross(ca.cross(a, upper), ca.cross(b, last))
+        bend = ca.fabs(ca.dot(force, upper)) / ca.norm_2(force)
+        return Place(ram, c, None, lean, upper, last, bend, (a, b))
+    e = ca.DM(leg.e)
+    if abs(float(ca.dot(a, e))) < 0.5:
+        lean = ca.asin(ca.dot(a, w) / leg.ll)
+        last = leg.ll * (ca.sin(lean) * a + leg.kappa * ca.cos(lean) * n)
+        v, side = w - last, ca.cross(a, e)
+        angle = ca.asin(ca.dot(v, side) / leg.lu)
+        upper = leg.elbow * ca.cos(angle) * e + ca.sin(angle) * side
+        slide = ca.dot(w - last - leg.lu * upper, e)
+    else:
+        angle = ca.asin(ca.dot(b, w) / leg.lu)
+        upper = ca.sin(angle) * b + leg.elbow * ca.cos(angle) * n
+        lean = ca.asin(ca.dot(n, w - leg.lu * upper) / leg.ll)
+        last = leg.ll * (ca.sin(lean) * n + leg.kappa * ca.cos(lean) * a)
+        slide = ca.dot(w - last, e)
+    force = ca.cross(ca.cross(a, upper), ca.cross(b, last))
+    bend = ca.fabs(ca.dot(force, e)) / ca.norm_2(force)
+    return Place(slide, c, slide, angle, upper, last, bend, (a, b))
 
 
 def _place(leg, c, phi):
+    if leg.arcs is not None:
+        return _spherical_place(leg, c)
     d, first, second, w = ca.DM(leg.d), ca.DM(leg.first), ca.DM(leg.second), c - ca.DM(leg.r)
     slide = angle = upper = None
     if leg.ratio is not None:

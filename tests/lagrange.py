@@ -108,7 +108,7 @@ def _energies(body, parameters, x, dx, gravity):
 
 def bodies(machine, x):
     """Return the joint coordinates, the bodies in the paper's order, and the platform's parts."""
-    joints, sliders, uppers, lowers = [], [], [], []
+    joints, sliders, uppers, pistons, lowers = [], [], [], [], []
     for leg, at in zip(machine.legs, places(machine, x), strict=True):
         joints.append(at.joint)
         fixed = ca.SX(ca.DM(leg.r))
@@ -119,8 +119,15 @@ def bodies(machine, x):
         if leg.ratio is not None:
             uppers.append(_rod(leg.upper, fixed, direction))
         elif leg.upper is not None:
-            uppers.append(_link(leg.upper, fixed, at.upper, leg.d))
-        if leg.flat:
+            uppers.append(
+                _link(leg.upper, fixed, at.upper, leg.d if at.turn is None else at.turn[0])
+            )
+        if leg.piston is not None:
+            pistons.append(_link(leg.piston, at.point - at.last, at.upper, at.turn[0]))
+        if at.turn is not None:
+            axes = direction, at.turn[1], ca.cross(direction, at.turn[1])
+            lowers.append(Body(leg.lower.moments, at.point, axes))
+        elif leg.flat:
             lowers.append(_link(leg.lower, at.point, direction, leg.d))
         else:
             lowers.append(_rod(leg.lower, at.point, direction))
@@ -132,7 +139,7 @@ def bodies(machine, x):
         Body((0.0, 0.0, inertia), p, (turned(machine, ratio * x[-1])[:, 0],))
         for inertia, ratio in machine.geared
     ]
-    return joints, [*sliders, *uppers, *lowers, platform], [*bars, *geared]
+    return joints, [*sliders, *uppers, *pistons, *lowers, platform], [*bars, *geared]
 
 
 def _link(body, point, x, d):

@@ -23,9 +23,9 @@ _LEGS = {
 }
 _TILTED = [
     leg
-    for motion in ("3T3R", "1T2R")
+    for motion, kinds in (*tilting.LEGS.items(), ("3T3R", ("PRRS",)), ("3R", ("SRRR",)))
     for seed in range(3)
-    for leg in tilting.machine(motion, tilting.LEGS[motion], seed)[0].legs
+    for leg in tilting.machine(motion, kinds, seed)[0].legs
 ]
 
 

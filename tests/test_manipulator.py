@@ -169,7 +169,7 @@ def test_a_platform_has_a_motion_and_axes():
     def platform(motion="3T1R", **axes):
         return lambda: Platform(motion, BODY, **axes)
 
-    refused(platform("4T"), "motion: '4T' given, '3T', '3T1R', '2T', '2T1R', '3T3R', '3R'")
+    refused(platform("4T"), "motion: '4T' given, '3T', '3T1R', '2T', '2T1R', '3T3R', '3T2R', '3R'")
     refused(platform(axis=(0.0, 2.0, 0.0)), "axis: [0.0, 2.0, 0.0] has length 2, not 1; write")
     words = "x_axis: missing; axis [0.0, 1.0, 0.0] is not the base frame's z", "must say"
     refused(platform(axis=(0.0, 1.0, 0.0)), *words)
@@ -334,8 +334,15 @@ CATALOGUED = {
 
 CATALOGUED |= {
     "ankle": ("2R", "RSS RSS"),
+    "ankle-offset": ("2R", "RSS RSS"),
     "ball-table": ("1T2R", "RRS RRS RRS"),
     "hexa": ("3T3R", "RSS RSS RSS RSS RSS RSS"),
+    "hexapteron": ("3T3R", "PRRS PRRS PRRS PRRS PRRS PRRS"),
+    "pentapteron": ("3T2R", "PRUR PRUR PRUR PRUR PRUR"),
+    "5-rpur": ("3T2R", "RPUR RPUR RPUR RPUR RPUR"),
+    "agile-eye": ("3R", "SRRR SRRR SRRR"),
+    "spherical-3-rrr": ("3R", "SRRR SRRR SRRR"),
+    "3-upu": ("3T", "UPU UPU UPU"),
     "hexaglide": ("3T3R", "PSS PSS PSS PSS PSS PSS"),
     "reachy-mini": ("3T3R", "RSS RSS RSS RSS RSS RSS"),
     "rubin-camera-hexapod": ("3T3R", "UPS UPS UPS UPS UPS UPS"),
@@ -420,7 +427,7 @@ BAD_FILES = {
     "unknown motion": (
         '"3T1R"',
         '"4T"',
-        "platform.motion: '4T' given, '3T', '3T1R', '2T', '2T1R', '3T3R', '3R'",
+        "platform.motion: '4T' given, '3T', '3T1R', '2T', '2T1R', '3T3R', '3T2R', '3R'",
     ),
     "unknown kind": (
         "elbow = 1\n",

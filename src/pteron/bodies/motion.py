@@ -12,8 +12,15 @@ from typing import Any, NamedTuple
 
 import casadi as ca
 
-Expression = Any
-"""A CasADi SX matrix; CasADi has no types that a checker could read."""
+from pteron.bodies.inertia import SpatialInertia
+from pteron.bodies.spatial import (
+    Expression as Expression,
+    SpatialMoments,
+    SpatialMotion,
+    needed_twist_wrench,
+    spatial_moments,
+    twist_mass_matrix,
+)
 
 
 class PointMotion(NamedTuple):
@@ -64,6 +71,8 @@ class RotationMotion(NamedTuple):
     """phi, of a platform with one axis."""
     hinge: Expression | None = None
     """The point about which it turns against a leg, (3, 1); None: the platform point."""
+    axes: Expression | None = None
+    """(3, k): the axes now of the k angles by which a platform tilts, in the order of the pose."""
 
     @property
     def tilts(self) -> bool:
@@ -85,7 +94,7 @@ class Moments(NamedTuple):
 
 
 class BodyMotion(NamedTuple):
-    """Motion of a slider, a rod, or a rigid body in a plane.
+    """Motion of a slider, a rod, a rigid body in a plane, or one in space.
 
     A body is its reference point and its axes x and y. A rod has no y, a slider no axes.
     """
@@ -98,7 +107,7 @@ class BodyMotion(NamedTuple):
     """a, of the reference point, (3, 1)."""
     axes: Expression | None = None
     """(3, k): unit vectors at right angles about which it turns: z in a plane, all three for a rod,
-    whose angular velocity is perpendicular to x."""
+    whose angular velocity is perpendicular to x, and for a body in space."""
     rates_row: Expression | None = None
     """(k, 6): d rates / d (c', omega), the rates about the axes."""
     x: Expression | None = None
@@ -106,6 +115,8 @@ class BodyMotion(NamedTuple):
     y: Expression | None = None
     ddx: Expression | None = None
     ddy: Expression | None = None
+    solid: SpatialMotion | None = None
+    """Its axes, angular velocity and acceleration, of a body in space with ten parameters."""
 
     @property
     def turning_row(self) -> Expression:
@@ -116,20 +127,46 @@ class BodyMotion(NamedTuple):
 
     @property
     def kinds(self) -> tuple[str, ...]:
-        """The kinds of the body's inertial parameters: of "m", "mgx", "mgy" and "I"."""
+        """The kinds of the body's inertial parameters: of "m", "mgx", "mgy" and "I", or all ten."""
+        if self.solid is not None:
+            return SpatialInertia.kinds
         owners = {"m": self.position, "mgx": self.x, "mgy": self.y, "I": self.x}
         return tuple(kind for kind, owner in owners.items() if owner is not None)
 
 
-def moments_of(kinds: tuple[str, ...], rows: list[Expression]) -> Moments:
-    """Return a body's mass moments from rows (1, K) of its parameters, in the order of `kinds`."""
+def solid_body(
+    reference: tuple[Expression, Expression, Expression],
+    axes: tuple[Expression, Expression],
+    turning_row: Expression,
+    turning: Expression,
+    growth: Expression,
+) -> BodyMotion:
+    """Return the motion of a body in space from its reference point and its axes x and y (3, 1).
+
+    `reference` is the point's position, velocity row (3, 6) and acceleration; `turning_row` (3, 6)
+    is that of the angular velocity `turning`, `growth` the angular acceleration, (3, 1) each.
+    """
+    x, y = axes
+    ddx, ddy = (ca.cross(growth, v) + ca.cross(turning, ca.cross(turning, v)) for v in axes)
+    frame = ca.horzcat(x, y, ca.cross(x, y))
+    solid = SpatialMotion(frame, reference[2], turning, growth)
+    return BodyMotion(*reference, ca.SX.eye(3), turning_row, x, y, ddx, ddy, solid)
+
+
+def moments_of(kinds: tuple[str, ...], rows: list[Expression]) -> Any:
+    """Return a body's mass moments from rows (1, K) of its parameters, in the order of `kinds`.
+
+    They are `Moments`, or `SpatialMoments` of a body in space.
+    """
+    if kinds == SpatialInertia.kinds:
+        return spatial_moments(rows)
     by_kind = dict(zip(kinds, rows, strict=True))
     zero = ca.SX(1, rows[0].shape[1])
     return Moments(*(by_kind.get(kind, zero) for kind in ("m", "mgx", "mgy", "I")))
 
 
 def needed_wrench(
-    body: BodyMotion, inertia: Moments, gravity: Expression
+    body: BodyMotion, inertia: Moments | SpatialMoments, gravity: Expression
 ) -> tuple[Expression, Expression]:
     """Return force and moment, (3, K) each, required at a body's reference point.
 
@@ -137,6 +174,9 @@ def needed_wrench(
     planar body the last term is I theta'' z. The paper's F acts on the body and is the negative of
     this.
     """
+    if isinstance(inertia, SpatialMoments):
+        assert body.solid is not None
+        return needed_twist_wrench(body.solid, inertia, gravity)
     a_g = body.acceleration - gravity
     force = ca.mtimes(a_g, inertia.m)
     moment = ca.SX(3, inertia.m.shape[1])
@@ -157,12 +197,16 @@ def wrench_matrix(body: BodyMotion, gravity: Expression) -> Expression:
     return -ca.vertcat(*needed_wrench(body, inertia, gravity))  # Eq. (15), Omega of one body
 
 
-def mass_matrix(body: BodyMotion, inertia: Moments) -> Expression:
+def mass_matrix(body: BodyMotion, inertia: Moments | SpatialMoments) -> Expression:
     """Return the mass matrix (6, 6) of a body in (c', omega).
 
     T = m v.v / 2 + v.h' + I omega.omega / 2, omega being perpendicular to x.
     """
     v, rates = body.velocity_row, body.rates_row
+    if isinstance(inertia, SpatialMoments):
+        assert body.solid is not None
+        rows = ca.vertcat(v, body.turning_row)
+        return ca.mtimes(rows.T, ca.mtimes(twist_mass_matrix(body.solid.axes, inertia), rows))
     total = inertia.m * ca.mtimes(v.T, v)
     if rates is None:
         return total
@@ -174,9 +218,12 @@ def mass_matrix(body: BodyMotion, inertia: Moments) -> Expression:
     return total + coupling + coupling.T + inertia.i * ca.mtimes(rates.T, rates)
 
 
-def mass_moment(body: BodyMotion, inertia: Moments) -> Expression:
+def mass_moment(body: BodyMotion, inertia: Moments | SpatialMoments) -> Expression:
     """Return mass times centre of mass, (3, K), in the base frame: m r + h."""
     total = ca.mtimes(body.position, inertia.m)
+    if isinstance(inertia, SpatialMoments):
+        assert body.solid is not None
+        return total + ca.mtimes(body.solid.axes, inertia.h)
     if body.x is not None:
         total = total + ca.mtimes(body.x, inertia.hx)
     if body.y is not None:

@@ -12,8 +12,12 @@ LENGTH_POWERS = {
 }
 """The kinds of inertial parameters, and the power of length in their unit: kg, kg m, kg m^2."""
 
-LEG_BODIES = ("p", "u", "l")
-"""A leg's bodies by letter, in the order of the parameters: slider, upper link or crank, lower."""
+LEG_BODIES = ("p", "u", "t", "l")
+"""A leg's bodies by letter, in the order of the parameters: slider, upper link or crank, piston
+between two links, lower link."""
+
+LINK_BODIES = ("u", "l")
+"""The bodies that are a leg's links: upper link or crank, lower link."""
 
 PLATFORM = "e"
 """The letter of the platform."""
@@ -26,8 +30,11 @@ PREFERENCE = (
 
 TILTING_PREFERENCE = (
     *PREFERENCE[:6],
+    *((kind, "t") for kind in ("mgx", "mgy", "I")),
+    ("mgz", "l"),
     *((kind, "e") for kind in LENGTH_POWERS if kind != "I"),
-    *(("I", "l"), ("m", "l"), ("m", "u")),
+    *((kind, "l") for kind in LENGTH_POWERS if kind[0] == "I"),
+    *(("m", "l"), ("m", "t"), ("m", "u")),
 )
 """The same under a platform that tilts: its own parameters are kept, before masses on it."""
 

@@ -6,11 +6,12 @@ All of it is written in the body's own frame, where the inertia tensor is consta
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import casadi as ca
 
-from pteron.bodies.motion import Expression
+Expression = Any
+"""A CasADi SX matrix; CasADi has no types that a checker could read."""
 
 
 class SpatialMoments(NamedTuple):

@@ -118,7 +118,7 @@ class _ModularSlopes(MachineSlopes):
         self.prime, self.rng, self.field = prime, rng, PrimeField(prime)
         geometry = exact_geometry(robot)
         self.frame, self.vector = geometry.frame, geometry.field_elements(self.field)
-        deltas = general_program(geometry_only(robot), "discriminants").function
+        deltas = general_program(geometry_only(robot), "radicands").function
         self.deltas = Evaluation(deltas, self.field, [self.vector])
         self.turning_joints = [leg.joint.unit == "rad" for leg in robot.legs]
         full_program = slopes_program(robot).function

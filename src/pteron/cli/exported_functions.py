@@ -13,7 +13,7 @@ inverse_dynamics_base inverse_kinematics jacobian joint_accelerations joint_coor
 joint_feed_forward joint_feed_forward_base joint_points joint_rates joint_screws kinetic_energy
 least_clearances link_jacobians link_vectors mass_matrix newton_step paper_regressor paper_terms
 passive_friction passive_room pd_gravity pd_gravity_base platform_motion platform_points
-potential_energy reach regressor room set_payload set_payload_base squared_type_i twist
+potential_energy radicands reach regressor room set_payload set_payload_base squared_type_i twist
 twist_jacobian type_ii type_ii_distances velocity_of_twist
 """
 

@@ -10,7 +10,7 @@ from pteron.bodies.motion import Expression
 from pteron.closures.closure import nan_below_zero
 from pteron.closures.determinants import adjugate
 from pteron.legs.circles import quarter_turn
-from pteron.legs.leg import AngleLocus, Locus, PlaneLocus, SphereLocus
+from pteron.legs.leg import AngleLocus, CoordinateLocus, Locus, PlaneLocus, SphereLocus
 from pteron.platforms.motion import PlatformEquations
 
 _ROUNDING = 1e-14
@@ -19,7 +19,7 @@ _ROUNDING = 1e-14
 
 def shift_locus(locus: Locus, offset: Expression) -> Locus:
     """Return the locus of P, given the locus of the point P + offset."""
-    assert not isinstance(locus, AngleLocus)
+    assert not isinstance(locus, AngleLocus | CoordinateLocus)
     if isinstance(locus, PlaneLocus):
         return locus._replace(offset=locus.offset - ca.dot(locus.normal, offset))
     return locus._replace(center=locus.center - offset)
@@ -69,7 +69,7 @@ def _meeting_in_plane(
     """Return the common points (2, 2) of two circles or lines in a plane, and their validity."""
     circles, lines = [], []
     for locus in loci:
-        assert not isinstance(locus, AngleLocus)
+        assert not isinstance(locus, AngleLocus | CoordinateLocus)
         if isinstance(locus, PlaneLocus):
             lines.append((ca.mtimes(platform.directions.T, locus.normal), locus.offset))
             continue

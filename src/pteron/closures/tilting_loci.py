@@ -32,7 +32,12 @@ class TiltingLoci(Closure):
 
     @property
     def modes(self) -> int:
-        """The greatest number of poses of joint coordinates: 40 (six legs), 16 (tripod) or 8."""
+        """The greatest number of poses of joint coordinates: 40 (six legs), 16 (tripod) or 8.
+
+        It is 8 where all legs keep their points in planes.
+        """
+        if all(leg.row_is_constant for leg in self.legs):
+            return 8
         if len(self.platform.coordinates) == 6:
             return 40
         return 16 if "z" in self.platform.coordinates else 8
@@ -63,10 +68,11 @@ class TiltingLoci(Closure):
             reduce(mul, sizes or [ca.SX(1)]),
         )
         if constraint_rows is None:
-            return determinant(rows_in_quasi_velocities(platform, rows)) / (self._bound(1) * size)
+            bound = self._bound(1, platform, rows) * size
+            return determinant(rows_in_quasi_velocities(platform, rows)) / bound
         pairs = zip(rows, platform.point_twists, strict=True)
         all_rows = ca.vertcat(*(ca.mtimes(row, twist) for row, twist in pairs), constraint_rows)
-        return determinant(all_rows) / (self._bound(2) * size)
+        return determinant(all_rows) / (self._bound(2, platform) * size)
 
     def measure_squares(
         self, platform: PlatformMotion, legs: Sequence[LegMotion]
@@ -74,18 +80,30 @@ class TiltingLoci(Closure):
         """Return equivalent expressions of the squared type-II measure, to choose the cheapest."""
         squares = super().measure_squares(platform, legs)
         if len(legs) == 6 == len(self.platform.coordinates):
-            bound = reduce(mul, (leg.wrench_size for leg in legs), self._bound(1))
+            bound = self._bound(1, platform, [leg.row for leg in legs])
+            bound = reduce(mul, (leg.wrench_size for leg in legs), bound)
             squares.append(determinant_square(plain_rows(platform, legs)) / (bound * bound))
         return squares
 
-    def _bound(self, forces: int) -> Expression:
+    def _bound(
+        self, forces: int, platform: PlatformMotion, rows: Sequence[Expression] = ()
+    ) -> Expression:
         """Return an upper bound of the determinant of `forces` unit forces at each point.
 
-        It follows from Fischer's inequality and that of arithmetic and geometric means.
+        It follows from Fischer's inequality and that of arithmetic and geometric means. A force in
+        `rows` (1, 6) that has a moment about its platform point acts at the point nearest to it.
         """
         points, centred = self.platform.points, "z" not in self.platform.coordinates
+        if not all(row[3:].is_zero() for row in rows):
+            points = [c.position - platform.body.position for c in platform.points]
+            for i, row in enumerate(rows):
+                force, moment = row[:3].T, row[3:].T
+                points[i] = points[i] + ca.cross(force, moment) / ca.dot(force, force)
         center = ca.SX(3, 1) if centred else sum(points) / len(points)
         square = sum(ca.dot(s - center, s - center) for s in points)
-        turns = len(self.platform.coordinates) if centred else 3
-        translations = 1.0 if centred else (forces * len(self.legs) / 3.0) ** 1.5
-        return translations * ca.sqrt(forces * square / turns) ** turns
+        if (distance := self.platform.axis_distance) is not None:
+            square = sum((ca.norm_2(s) + distance) ** 2 for s in points)
+        lengths, count = 0 if centred else 3, forces * len(self.legs)
+        turns = count - forces * (len(self.legs) - len(self.platform.coordinates)) - lengths
+        shares = (count / 3) ** (0.5 * lengths)
+        return shares * ca.sqrt(forces * square / turns) ** turns

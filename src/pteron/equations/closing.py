@@ -15,7 +15,15 @@ from pteron.closures.closure import nan_below_zero, plain_rows, rows_in_quasi_ve
 from pteron.closures.determinants import determinant, solve
 from pteron.equations.kinematics import reach
 from pteron.equations.machine import Machine
-from pteron.legs.leg import AngleLocus, CircleLocus, LegEquations, PlaneLocus, SphereLocus
+from pteron.legs.leg import (
+    AngleLocus,
+    CircleLocus,
+    CoordinateLocus,
+    LegEquations,
+    Locus,
+    PlaneLocus,
+    SphereLocus,
+)
 from pteron.platforms.motion import PlatformMotion
 from pteron.tolerances import ROUNDING
 
@@ -83,6 +91,7 @@ def closure_rows(machine: Machine, joints: Expression) -> Rows:
             h[0] -= locus.offset
             scale = ca.norm_2(m[:, 0])
         else:
+            assert isinstance(locus, SphereLocus | CircleLocus)
             arm = _component_in_plane(machine, leg, locus, s - locus.center)
             w[0] = size**2
             m = 2 * size * ca.mtimes(directions.T, ca.horzcat(arm, a, b))
@@ -107,6 +116,39 @@ def _component_in_plane(
     return ca.mtimes(directions, ca.mtimes(directions.T, v))
 
 
+def holds_spheres(machine: Machine) -> bool:
+    """Return whether every leg whose joint is held keeps its platform point on a sphere or circle.
+
+    A circle is the sphere's part in the plane in which the leg keeps that point.
+    """
+    loci = (leg.locus(ca.SX(0)) for leg in machine.legs)
+    return all(isinstance(locus, SphereLocus | CircleLocus) for locus in loci)
+
+
+def plane_of_locus(locus: Locus) -> PlaneLocus | None:
+    """Return the plane that a locus is, or lies in whichever the leg's branch; None without one."""
+    if isinstance(locus, CoordinateLocus):
+        return locus.plane
+    return locus if isinstance(locus, PlaneLocus) else None
+
+
+def holds_planes(machine: Machine) -> bool:
+    """Return whether every leg whose joint is held keeps its platform point in a plane."""
+    return all(plane_of_locus(leg.locus(ca.SX(0))) is not None for leg in machine.legs)
+
+
+def held_planes(machine: Machine, joints: Expression) -> tuple[Expression, Expression]:
+    """Return the planes of held joints: normals, one after the other (3 n, 1), offsets (n, 1)."""
+    planes = [
+        plane_of_locus(leg.locus(q))
+        for leg, q in zip(machine.legs, ca.vertsplit(joints), strict=True)
+    ]
+    zero = 0 * joints[0]  # what is constant has a column for each of a batch of joints too
+    known = [plane for plane in planes if plane is not None]  # all, see `holds_planes`
+    normals = ca.vertcat(*(plane.normal for plane in known))
+    return ca.densify(normals) + zero, ca.vertcat(*(plane.offset for plane in known)) + zero
+
+
 def held_spheres(machine: Machine, joints: Expression) -> tuple[Expression, Expression]:
     """Return centres (n, 3) and squared radii (n, 1) of the spheres that hold platform points.
 
@@ -115,9 +157,7 @@ def held_spheres(machine: Machine, joints: Expression) -> tuple[Expression, Expr
     centers, squares = [], []
     for leg, q in zip(machine.legs, ca.vertsplit(joints), strict=True):
         locus = leg.locus(q)
-        assert isinstance(
-            locus, SphereLocus | CircleLocus
-        )  # legs under platforms that tilt have no other
+        assert isinstance(locus, SphereLocus | CircleLocus)  # see `holds_spheres`
         center = locus.center
         if leg.holds is not None:
             away = ca.dot(leg.holds.normal, center - leg.holds.point)
@@ -168,6 +208,12 @@ def closure_residuals(machine: Machine, joints: Expression, pose: Expression) ->
         elif isinstance(locus, PlaneLocus):
             length, row = ca.dot(locus.normal, c) - locus.offset, point_rows(locus.normal.T)
             sizes.append(locus.size + ca.dot(ca.fabs(locus.normal), ca.fabs(c)))
+        elif isinstance(locus, CoordinateLocus):
+            motion = leg.motion(point, platform.rotation)
+            length, row = motion.coordinate - q, motion.row / motion.divisor
+            size = ca.norm_2(row[:3])  # of the force: the row of a unit force
+            length, row = length / size, row / size
+            sizes.append(ca.fabs(q) + ca.norm_1(c))
         else:
             b = _component_in_plane(machine, leg, locus, c - locus.center)
             length = 0.5 * (ca.dot(b, b) / locus.radius - locus.radius)

@@ -30,7 +30,8 @@ def edges(machine: Machine, pose: Expression) -> list[Edge]:
     """Return the boundaries of the workspace at a pose: leg reach, joint and passive limits."""
     state = machine.state(pose)
     reach_edges, limits, passive = [], [], []
-    legs = zip(machine.robot.legs, machine.legs, state.platform.points, state.legs, strict=True)
+    equations = machine.legs_at(state.platform)
+    legs = zip(machine.robot.legs, equations, state.platform.points, state.legs, strict=True)
     for i, (leg, leg_equations, point, motion) in enumerate(legs, start=1):
         c = point.position
         reach_edges += [

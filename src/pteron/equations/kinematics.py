@@ -7,7 +7,7 @@ from collections.abc import Callable
 import casadi as ca
 
 from pteron.bodies.motion import Expression
-from pteron.bodies.parameters import LEG_BODIES
+from pteron.bodies.parameters import LINK_BODIES
 from pteron.bodies.vectors import norm
 from pteron.closures.closure import nan_below_zero
 from pteron.equations.machine import Machine, State
@@ -25,8 +25,17 @@ def inverse_position(machine: Machine, pose: Expression) -> Expression:
 def reach(machine: Machine, pose: Expression) -> list[Reach]:
     """Return each leg's discriminant of reach, reach margin (m) and type-I measure at a pose."""
     zero_rates = ca.SX.zeros(machine.freedom)
-    points = machine.platform.motion(pose, zero_rates, zero_rates).points
-    return [leg.reach(c.position) for leg, c in zip(machine.legs, points, strict=True)]
+    platform = machine.platform.motion(pose, zero_rates, zero_rates)
+    legs = zip(machine.legs_at(platform), platform.points, strict=True)
+    return [leg.reach(c.position) for leg, c in legs]
+
+
+def radicands(machine: Machine, pose: Expression) -> Expression:
+    """Return the radicands (k, 1) of all roots of the legs' closures, inner ones first."""
+    zero_rates = ca.SX.zeros(machine.freedom)
+    platform = machine.platform.motion(pose, zero_rates, zero_rates)
+    legs = zip(machine.legs_at(platform), platform.points, strict=True)
+    return ca.vertcat(*(square for leg, c in legs for square in leg.radicands(c.position)))
 
 
 def reach_validity(machine: Machine, pose: Expression) -> Expression:
@@ -156,7 +165,7 @@ def link_jacobians(state: State) -> tuple[list[Expression], list[Expression]]:
     m = state.platform.matrix.shape[1]
     upper, lower = (
         [ca.SX.nan(6, m) if j is None else j for j in jacobians]
-        for jacobians in ([body_jacobian(state, i, k) for i in range(n)] for k in LEG_BODIES[1:])
+        for jacobians in ([body_jacobian(state, i, k) for i in range(n)] for k in LINK_BODIES)
     )
     return upper, lower
 

@@ -9,13 +9,13 @@ from typing import Any
 
 import casadi as ca
 
-from pteron.bodies.motion import Expression, Moments, moments_of
+from pteron.bodies.motion import Expression, moments_of
 from pteron.bodies.parameters import PLATFORM, Parameter, parameter_list
 from pteron.closures import Closure, kind_for
 from pteron.legs.leg import LegEquations, LegMotion
 from pteron.manipulator import Manipulator
 from pteron.platforms import PlatformEquations
-from pteron.platforms.motion import PlatformMotion
+from pteron.platforms.motion import PlatformMoments, PlatformMotion
 
 
 @dataclass(frozen=True)
@@ -159,7 +159,12 @@ class Machine:
         legs = tuple(leg.motion(c, platform.rotation_at(c, fixed)) for leg, c, fixed in legs_points)
         return State(platform, legs)
 
-    def moments(self, parameters: Expression) -> tuple[list[dict[str, Moments]], Moments]:
+    def legs_at(self, platform: PlatformMotion) -> list[LegEquations]:
+        """Return the legs' equations at an orientation of the platform."""
+        axes = platform.rotation.axes
+        return [leg if axes is None else leg.at_axes(axes) for leg in self.legs]
+
+    def moments(self, parameters: Expression) -> tuple[list[dict[str, Any]], PlatformMoments]:
         """Return mass moments of each leg's bodies by letter, and of the platform, from (N, K)."""
         blocks: dict[tuple[str, tuple[int, ...]], list[Expression]] = {}
         for p, row in zip(self.parameters, ca.vertsplit(parameters), strict=True):

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import casadi as ca
 
 from pteron.bodies.motion import Expression, Moments, needed_wrench
-from pteron.bodies.parameters import LEG_BODIES
+from pteron.bodies.parameters import LINK_BODIES
 from pteron.bodies.vectors import Vector
 from pteron.equations.machine import Machine, State
 from pteron.legs.kind import LegKind
@@ -82,6 +82,8 @@ def equilibrium(machine: Machine, state: State, parameters: Expression) -> Equil
             for row in _passive_joint_rows(leg, motion, leg_forces, hinges)
         ]
         for k in range(len(motion.chain) - hinges, len(motion.chain)) if motion.pushes else ():
+            if motion.chain[k].driven:
+                continue
             hinge = _embed_row(_freedom_component(motion, leg_forces, k), i, count)
             if barred:  # at one platform point it is one bar, on one hinge
                 bars.setdefault(leg.platform_point, []).append(hinge)
@@ -127,7 +129,7 @@ def beams(machine: Machine, state: State) -> Beams:
     links = Beams([], [], [], [])
     for leg, motion in zip(machine.robot.legs, state.legs, strict=True):
         rows = []
-        for letter, way in zip(LEG_BODIES[1:], motion.links, strict=True):
+        for letter, way in zip(LINK_BODIES, motion.links, strict=True):
             if way is None:
                 rows.append(ca.SX.nan(3, 3))
                 continue

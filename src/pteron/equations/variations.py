@@ -101,7 +101,7 @@ def variations(robot: Manipulator) -> tuple[Variation, ...]:
                 candidates += _turns(robot, i, key, quantity.value)
         candidates += [Variation(i, "platform_point", axis, "points") for axis in range(3)]
     for key in robot.platform.turning_keys:
-        if key == "center":
+        if key in ("center", "axis_offset"):
             candidates += [Variation(-1, key, axis, "points") for axis in range(3)]
         else:
             candidates += _turns(robot, -1, key, getattr(robot.platform, key))

@@ -146,6 +146,7 @@ TABLE |= {
     "discriminants": equation_entry(
         _leg_equation(lambda leg: leg.discriminant), POSE, "discriminants"
     ),
+    "radicands": equation_entry(kinematics.radicands, POSE, "radicands"),
     # Finite and smooth out of reach too, where it is negative.
     "squared_type_i": equation_entry(
         _leg_equation(lambda leg: leg.discriminant / leg.scale), POSE, "squares"

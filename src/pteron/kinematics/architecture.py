@@ -239,7 +239,7 @@ def _reason(robot: Manipulator) -> str:
             "holds the platform"
         )
     if _points_are_in_line(robot):
-        where = " through P" if robot.platform.center else ""
+        where = " through P" if robot.platform.fixed_point else ""
         where = " along the platform's axis" if robot.platform.turning_axis else where
         return f"all platform points lie on one line{where}, about which no force then has a moment"
     if balance := balance_of_rams(robot):

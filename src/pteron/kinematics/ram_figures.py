@@ -11,6 +11,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from pteron.equations.closing import holds_spheres
+from pteron.equations.machine import Machine
 from pteron.kernels import Array
 from pteron.kernels.path_programs import spheres_kernel
 from pteron.manipulator import Manipulator
@@ -50,7 +52,7 @@ def ram_figures(robot: Manipulator) -> tuple[Array, Array] | None:
 
     The result is None for any other machine, or if all points of a figure coincide.
     """
-    if not robot.platform.moves_freely:
+    if not (robot.platform.moves_freely and holds_spheres(Machine.numeric(robot))):
         return None
     joints = np.array([[1.0], [2.0]]) * np.ones(robot.joint_count)
     base, other = spheres_kernel(robot)(joints)[0]

@@ -9,9 +9,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from pteron.equations.closing import holds_planes, holds_spheres
+from pteron.equations.machine import Machine
 from pteron.equations.pose_paths import Closed
+from pteron.errors import ModelError
 from pteron.kernels import Array
 from pteron.kernels.path_programs import spheres_kernel
+from pteron.kinematics.offset_poses import offset_poses
+from pteron.kinematics.plane_poses import plane_poses
 from pteron.kinematics.pose_paths import generic, positions_and_rotations, real_poses
 from pteron.manipulator import Manipulator
 from pteron.platforms.nearest_pose import nearest_pose
@@ -30,6 +35,18 @@ def tilting_poses(
     self-motion), for which no poses are listed. Poses of a tripod with the other solution of its
     yaw are excluded.
     """
+    machine = Machine.numeric(robot)
+    if holds_planes(machine):
+        return plane_poses(robot, joints)
+    if not holds_spheres(machine):
+        kinds = " and ".join(sorted({leg.type for leg in robot.legs}))
+        raise ModelError(
+            f"direct_kinematics: no method finds every pose of {kinds} legs under a "
+            f"{robot.platform.motion} platform; `follow` and `direct_step` go on from a known pose",
+            subject=robot.name,
+        )
+    if robot.platform.axis_offset is not None:
+        return (*offset_poses(robot, joints), np.zeros(len(joints), dtype=bool))
     centers, squares = spheres_kernel(robot)(joints)
     good = np.flatnonzero(
         (np.abs(centers) < _HUGE).all(axis=(-2, -1)) & (np.abs(squares) < _HUGE).all(axis=-1)

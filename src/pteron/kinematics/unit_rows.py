@@ -81,7 +81,7 @@ def unit_rows(robot: Manipulator, poses: Array) -> UnitRows:
 def row_frame(robot: Manipulator, poses: Array) -> RowFrame:
     """Return the scaling that makes Jacobian rows at poses (K, m) unit rows."""
     points = np.array([leg.platform_point for leg in robot.legs])
-    middle = np.zeros(3) if robot.platform.center else points.mean(axis=0)
+    middle = np.zeros(3) if robot.platform.fixed_point else points.mean(axis=0)
     length = float(np.linalg.norm(points - middle, axis=1).max())
     length = length if length > 0.0 else max(leg.size for leg in robot.legs)
     arm = middle @ np.nan_to_num(robot.platform.placement(poses)[1])

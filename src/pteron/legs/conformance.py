@@ -25,7 +25,14 @@ from pteron.bodies.motion import (
 from pteron.bodies.vectors import Vector
 from pteron.legs.ball_end import every_axis
 from pteron.legs.kind import LegKind
-from pteron.legs.leg import CircleLocus, LegEquations, LegMotion, PlaneLocus, SphereLocus
+from pteron.legs.leg import (
+    CircleLocus,
+    CoordinateLocus,
+    LegEquations,
+    LegMotion,
+    PlaneLocus,
+    SphereLocus,
+)
 from pteron.legs.protocol import breaches, point_in_reach
 
 
@@ -51,13 +58,41 @@ class _LegInMotion:
             for axis, (first, second) in zip(axes, moving, strict=False)
         )
         self.rotation = RotationMotion(turns, phi + rate * t + growth * t**2 / 2)
-        omega = sum((turn.rate * turn.axis for turn in turns), ca.SX(3, 1))
+        if leg.platform_axes:
+            self.rotation = _turn_about(leg.platform_axes, moving)
+        omega = sum((turn.rate * turn.axis for turn in self.rotation.turns), ca.SX(3, 1))
+        if leg.platform_center is not None:
+            self.point = _point_about(ca.SX(list(leg.platform_center)), ca.SX(ca.DM(c)), omega)
         self.twist = ca.vertcat(self.point.velocity, omega)
         self.equations: LegEquations = leg.equations()
         self.motion: LegMotion = self.equations.motion(self.point, self.rotation)
         kinds = self.equations.kinds
         parameters = {b: ca.SX(ca.DM(rng.uniform(0.5, 1.5, len(kinds[b])))) for b in kinds}
         self.inertia = {b: moments_of(kinds[b], ca.vertsplit(v)) for b, v in parameters.items()}
+
+
+def _turn_about(axes: Sequence[Vector], moving: Sequence[Sequence[float]]) -> RotationMotion:
+    """Return the rotation about two axes, one after the other, of these rates and accelerations.
+
+    Both angles are 0 at time 0.
+    """
+    (a, b), t = (ca.SX(list(axis)) for axis in axes), TIME
+    (rate, growth), (second_rate, second_growth) = moving[:2]
+    alpha = rate * t + growth * t**2 / 2
+    turned = ca.cos(alpha) * b + ca.sin(alpha) * ca.cross(a, b)
+    omega = (rate + growth * t) * a + (second_rate + second_growth * t) * turned
+    turns = tuple(Turn(ca.SX.eye(3)[:, i], omega[i], rate_of(omega[i])) for i in range(3))
+    return RotationMotion(turns, axes=ca.horzcat(a, turned))
+
+
+def _point_about(center: Expression, c: Expression, omega: Expression) -> PointMotion:
+    """Return the motion, to second order, of a point that turns about a center from c at time 0."""
+    arm, growth, t = c - center, rate_of(omega), TIME
+    now = ca.substitute(omega, t, 0)
+    bend = ca.cross(growth, arm) + ca.cross(now, ca.cross(now, arm))
+    place = arm + ca.cross(now, arm) * t + bend * t**2 / 2
+    acceleration = ca.cross(growth, place) + ca.cross(omega, ca.cross(omega, place))
+    return PointMotion(center + place, ca.cross(omega, place), acceleration)
 
 
 def faults(
@@ -187,6 +222,8 @@ def _locus_faults(at: _LegInMotion) -> Iterator[str]:
         pair = ca.dot(locus.normal, c), locus.offset
     elif isinstance(locus, SphereLocus):
         pair = ca.norm_2(c - locus.center), locus.radius
+    elif isinstance(locus, CoordinateLocus):
+        pair = at.motion.coordinate, locus.joint
     elif isinstance(locus, CircleLocus):
         normal = ca.SX(list(at.leg.plane_normal or ()))
         pair = ca.norm_2(ca.cross(normal, c - locus.center)), locus.radius

@@ -43,46 +43,27 @@ ELBOW: Mapping[tuple[str, str], tuple[int, tuple[str, ...]]] = {
 and the lengths that multiply it (`Transfer.entries`)."""
 
 
-@dataclass(frozen=True)
-class CrankLeg(LegKind):
-    """The data of a leg with a crank; its subclasses define the last link."""
+class TurningLeg(LegKind):
+    """The data of a leg whose driven body turns about a fixed axis, `direction`."""
 
-    guide_point: Vector
     direction: Vector
     zero_direction: Vector
-    platform_point: Vector
-    upper_length: float
-    lower_length: float
-    upper: PlanarInertia
-    lower: Any
-    elbow: int = 1
-    limits: tuple[float, float] | None = None
-    fixed_offset: Vector = (0.0, 0.0, 0.0)
-    drive: Drive | None = None
-    reading: Reading | None = field(default=None, kw_only=True)
 
     joint = CRANK
 
     @property
-    def quantities(self) -> tuple[LegQuantity, ...]:
-        """The leg's geometric quantities: points, directions, lengths, `middle` angle and elbow."""
-        # The crank's angle is the one nearest to the middle of its limits, else in (-pi, pi].
+    def zero_quantities(self) -> tuple[LegQuantity, LegQuantity]:
+        """The direction from which the joint's angle counts, and the `middle` angle there.
+
+        The angle is the one nearest to the middle of its limits, else in (-pi, pi].
+        """
         low, high = self.limits or (0.0, 0.0)
         inside = -math.pi < low and high <= math.pi
         middle = 0.0 if inside else 0.5 * (low + high)
+        zero = self.zero_direction if inside else self._direction_at(middle)
         return (
-            LegQuantity("guide_point", "point", self.guide_point),
-            LegQuantity("direction", "direction", self.direction, "d"),
-            LegQuantity(
-                "zero_direction",
-                "normal",
-                self.zero_direction if inside else self._direction_at(middle),
-            ),
-            LegQuantity("plane_axis", "normal", perpendicular_to(self.direction)),
-            LegQuantity("upper_length", "length", (self.upper_length,), "lu"),
-            LegQuantity("lower_length", "length", (self.lower_length,), "ll"),
+            LegQuantity("zero_direction", "normal", zero),
             LegQuantity("middle", "number", (middle,)),
-            LegQuantity("elbow", "sign", (self.elbow,)),
         )
 
     @property
@@ -104,6 +85,40 @@ class CrankLeg(LegKind):
         normal_direction = cross(self.direction, self.zero_direction)
         return shift_point(
             scale_vector(self.zero_direction, math.cos(angle)), normal_direction, math.sin(angle)
+        )
+
+
+@dataclass(frozen=True)
+class CrankLeg(TurningLeg):
+    """The data of a leg with a crank; its subclasses define the last link."""
+
+    guide_point: Vector
+    direction: Vector
+    zero_direction: Vector
+    platform_point: Vector
+    upper_length: float
+    lower_length: float
+    upper: PlanarInertia
+    lower: Any
+    elbow: int = 1
+    limits: tuple[float, float] | None = None
+    fixed_offset: Vector = (0.0, 0.0, 0.0)
+    drive: Drive | None = None
+    reading: Reading | None = field(default=None, kw_only=True)
+
+    @property
+    def quantities(self) -> tuple[LegQuantity, ...]:
+        """The leg's geometric quantities: points, directions, lengths, `middle` angle and elbow."""
+        zero_direction, middle = self.zero_quantities
+        return (
+            LegQuantity("guide_point", "point", self.guide_point),
+            LegQuantity("direction", "direction", self.direction, "d"),
+            zero_direction,
+            LegQuantity("plane_axis", "normal", perpendicular_to(self.direction)),
+            LegQuantity("upper_length", "length", (self.upper_length,), "lu"),
+            LegQuantity("lower_length", "length", (self.lower_length,), "ll"),
+            middle,
+            LegQuantity("elbow", "sign", (self.elbow,)),
         )
 
     @property

@@ -11,20 +11,43 @@ from pteron.extensions import extension_names, extension_value, load_extension
 from pteron.legs.kind import LegKind
 from pteron.legs.prr import PRR
 from pteron.legs.prrr import PRRR
+from pteron.legs.prrs import PRRS
 from pteron.legs.prs import PRS
+from pteron.legs.prur import PRUR
 from pteron.legs.pss import PSS
 from pteron.legs.rpr import RPR
 from pteron.legs.rps import RPS
+from pteron.legs.rpur import RPUR
 from pteron.legs.rrr import RRR
 from pteron.legs.rrs import RRS
 from pteron.legs.rss import RSS
 from pteron.legs.rupu import RUPU
+from pteron.legs.srrr import SRRR
 from pteron.legs.ups import UPS
+from pteron.legs.upu import UPU
 
 GROUP = "pteron.legs"
 
 KINDS: dict[str, type[LegKind]] = {
-    kind.type: kind for kind in (PRRR, PSS, RSS, RRR, PRR, RPR, RUPU, UPS, RPS, PRS, RRS)
+    kind.type: kind
+    for kind in (
+        PRRR,
+        PSS,
+        RSS,
+        RRR,
+        PRR,
+        RPR,
+        RUPU,
+        UPS,
+        RPS,
+        PRS,
+        RRS,
+        PRRS,
+        PRUR,
+        RPUR,
+        SRRR,
+        UPU,
+    )
 }
 """The kinds of legs that are loaded, by their key `type`; add another here."""
 

@@ -26,12 +26,13 @@ KeyRole = Literal[
     "slider",
     "planar",
     "rod",
+    "solid",
     "drive",
     "reading",
 ]
 """The content of a key: a vector, a unit vector, a length, a number, a whole number, +1 or -1, two
-limits, a ball joint's cone, a slider's mass (TOML key `slider`), a body in a plane, a
-rod, a drive, how the drive counts. Files and pages give a leg's keys in this order."""
+limits, a ball joint's cone, a slider's mass (TOML key `slider`), a body in a plane, a rod, a body
+in space, a drive, how the drive counts. Files and pages give a leg's keys in this order."""
 
 
 _TYPES: dict[KeyRole, str] = {
@@ -46,6 +47,7 @@ _TYPES: dict[KeyRole, str] = {
     "slider": "float",
     "planar": "PlanarInertia",
     "rod": "RodInertia",
+    "solid": "SpatialInertia",
     "drive": "Drive",
     "reading": "Reading",
 }
@@ -68,6 +70,8 @@ class Key(NamedTuple):
     """The key whose value is an example, where the file gives it."""
     across: str = ""
     """The direction to which it is perpendicular, by its key."""
+    alias: str = ""
+    """Another name that files may have for it."""
     tilting: Any = None
     """Its value where a file of a platform that tilts does not give it; None: as of any other."""
 
@@ -122,15 +126,16 @@ def sound_fields(
     """Return the valid fields, converted, and the faults of the others, one line each.
 
     Fields and conditions that depend on an invalid or missing field are not checked. `branches` are
-    the values that a sign may have.
+    the values that `elbow` may have.
     """
     sound: dict[str, Any] = {}
     faults: list[str] = []
     for name in sorted(fields, key=lambda name: bool(keys[name].across)):
         key, value = keys[name], fields[name]
         try:
-            if key.role == "sign" and (isinstance(value, bool) or value not in branches):
-                valid = "neither 1 nor -1" if len(branches) > 1 else "not 1, its only branch"
+            signs = branches if name == "elbow" else (1, -1)
+            if key.role == "sign" and (isinstance(value, bool) or value not in signs):
+                valid = "neither 1 nor -1" if len(signs) > 1 else "not 1, its only branch"
                 raise ModelError(f"{name}: {value!r} is {valid}")
             if value is None and key.default is None:
                 sound[name] = None

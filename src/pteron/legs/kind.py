@@ -115,6 +115,9 @@ class LegKind(ABC):
     """The values that `elbow` may have."""
     follows_angle: ClassVar[bool] = False
     """Whether its joint follows the platform's angle, and not its platform point."""
+    couples_vary: ClassVar[bool] = False
+    """Whether its couples turn with the pose, so that they may leave its platform a turn within
+    reach: conditions on poses then count the constraint measure as they count type II."""
     account: ClassVar[str] = ""
     """Its construction in a few sentences for a report; vectors by their letters r, d, e, k, s0."""
     measure_text: ClassVar[str] = ""
@@ -125,6 +128,8 @@ class LegKind(ABC):
     """Its own fields, which are its TOML keys, and their descriptions; see `every_key`."""
     base_cones: ClassVar[tuple[str, ...]] = ()
     """The keys of cones whose axis is in the base frame."""
+    platform_axes: tuple[Vector, ...] = ()
+    """The axes about which its platform must turn, one after the other; none where any will do."""
     conditions: ClassVar[tuple[FieldCondition, ...]] = ()
     """Conditions between its fields."""
     equations_class: ClassVar[_EquationsClass]
@@ -250,6 +255,14 @@ class LegKind(ABC):
         """Return the leg with a missing `direction` filled in from the platform's frame.
 
         `frame` is the platform's x, y and z at angles zero, in the base frame.
+        """
+        return self
+
+    def with_platform_rotation(self, axes: Sequence[Vector], center: Vector | None) -> Self:
+        """Return the leg with what it takes from its platform's rotation; raise if that is another.
+
+        `axes` are the platform's rotation axes at angles zero, `center` is the point that stays, or
+        None.
         """
         return self
 
@@ -382,6 +395,11 @@ class LegKind(ABC):
         if values is None:
             values = {q.name: ca.SX(ca.DM(list(q.value))) for q in self.quantities}
         return self.equations_class(**values)
+
+    @property
+    def platform_center(self) -> Vector | None:
+        """The point about which its platform must turn; None if any will do."""
+        return None
 
     def transfers(self, gravity: Vector) -> tuple[LegTransfer, ...]:
         """Return how inertial parameters transfer to others within the leg, and the reasons."""

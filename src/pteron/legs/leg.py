@@ -31,7 +31,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import Any, ClassVar, Literal, NamedTuple
+from typing import Any, ClassVar, Literal, NamedTuple, Self
 
 import casadi as ca
 
@@ -195,13 +195,21 @@ class CircleLocus(NamedTuple):
     radius: Expression
 
 
+class CoordinateLocus(NamedTuple):
+    """The locus of c for a given joint of a leg that has none of the simple ones."""
+
+    joint: Expression
+    plane: PlaneLocus | None = None
+    """A plane that holds c in either branch of the leg."""
+
+
 class AngleLocus(NamedTuple):
     """The platform's angle for a given joint of a leg that follows it; c may be anywhere."""
 
     angle: Expression
 
 
-Locus = PlaneLocus | SphereLocus | CircleLocus | AngleLocus
+Locus = PlaneLocus | SphereLocus | CircleLocus | CoordinateLocus | AngleLocus
 
 
 class LegEquations(ABC):
@@ -242,6 +250,14 @@ class LegEquations(ABC):
         """
         return None
 
+    def at_axes(self, axes: Expression) -> Self:
+        """Return the equations for the axes (3, k) now of the k angles by which the platform tilts.
+
+        `reach`, `edges`, `limit_margins` and `locus` of legs that depend on the orientation are
+        those at these axes.
+        """
+        return self
+
     def lever(self, length: Expression) -> Expression:
         """Return metres per unit of the leg's joint; 1 for a slider.
 
@@ -255,6 +271,13 @@ class LegEquations(ABC):
         The leg reaches c where none is negative; the names distinguish the causes.
         """
         return {"reach": self.reach(c).discriminant}
+
+    def radicands(self, c: Expression) -> tuple[Expression, ...]:
+        """Return the radicands of the closure's roots at c (3, 1), each after those inside it.
+
+        Exact arithmetic takes the states at which all of these roots exist.
+        """
+        return (self.reach(c).discriminant,)
 
     def limit_margins(
         self, c: Expression, q: Expression, low: float, high: float

@@ -29,7 +29,7 @@ class PRS(PRR):
 
     type = "PRS"
     account = ACCOUNTS["PRS"]
-    keys: ClassVar = {**PRR.keys, **keys_of("ball")}
+    keys: ClassVar = {**PRR.keys, **keys_of("ball", "ball_cone")}
 
     def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
         """Return three axes: the ball joint leaves every rotation of the platform free."""

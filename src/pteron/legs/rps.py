@@ -28,7 +28,7 @@ class RPS(RPR):
 
     type = "RPS"
     account = ACCOUNTS["RPS"]
-    keys: ClassVar = {**RPR.keys, **keys_of("ball")}
+    keys: ClassVar = {**RPR.keys, **keys_of("ball", "ball_cone")}
 
     def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
         """Return three axes: the ball joint leaves every rotation of the platform free."""

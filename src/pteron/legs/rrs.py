@@ -28,7 +28,7 @@ class RRS(RRR):
 
     type = "RRS"
     account = ACCOUNTS["RRS"]
-    keys: ClassVar = {**RRR.keys, **keys_of("ball")}
+    keys: ClassVar = {**RRR.keys, **keys_of("ball", "ball_cone")}
 
     def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
         """Return three axes: the ball joint leaves every rotation of the platform free."""

@@ -43,32 +43,11 @@ from pteron.legs.rods import rod_body, universal_joints
 
 
 @dataclass(frozen=True)
-class UPS(RamLeg):
-    """A U-P-S leg that carries one point of the platform.
-
-    Its joint coordinate is the length of the ram, from `guide_point` to the platform point.
-    """
+class UniversalRamLeg(RamLeg):
+    """The data of a ram that swings about a universal joint on the base."""
 
     upper: RodInertia
     lower: RodInertia
-    base_cone: Cone | None = None
-    platform_cone: Cone | None = None
-    screw_lead: float | None = None
-
-    type = "UPS"
-    base_cones: ClassVar = ("base_cone",)
-    account = ACCOUNTS["UPS"]
-
-    keys: ClassVar = keys_of("ram", "UPS")
-
-    def with_platform_frame(self, frame: Sequence[Vector]) -> Self:
-        """Return the leg with a missing `direction` set to the platform's x or y across the ram."""
-        if self.direction is not None:
-            return self
-        way = [a - b for a, b in zip(self.platform_point, self.guide_point, strict=True)]
-        x, y, _ = frame
-        leans = abs(dot(x, (way[0], way[1], way[2]))) > abs(dot(y, (way[0], way[1], way[2])))
-        return replace(self, direction=y if leans else x)
 
     @property
     def quantities(self) -> tuple[LegQuantity, ...]:
@@ -80,29 +59,10 @@ class UPS(RamLeg):
             LegQuantity("elbow", "sign", (self.elbow,)),
         )
 
-    def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
-        """Return three axes: the ball joint leaves every rotation of the platform free."""
-        return (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
-
     @property
     def base_axis(self) -> Vector | None:
         """The first axis of the universal joint on the base, a unit vector."""
         return self.direction
-
-    def passive_joints(
-        self, motion: LegMotion, zero_axes: Expression, axes: Expression
-    ) -> list[Passive]:
-        """Return the joints at the ram's two ends that have limit cones."""
-        (_, way), length = motion.links, self.limits[1]
-        assert way is not None
-        return [
-            *cone_limit("ram at the base", self.base_cone, ca.SX.eye(3), way, length),
-            *cone_limit("ram at the platform", self.platform_cone, axes, -way, length),
-        ]
-
-    def rod_couple(self, motion: LegMotion) -> Expression:
-        """Return a zero couple (3, 1): a ram transmits a force along itself alone."""
-        return ca.SX(3, 1)
 
     def transfers(self, gravity: Vector) -> tuple[LegTransfer, ...]:
         """Return how inertial parameters of cylinder and piston transfer to others, and why."""
@@ -119,6 +79,52 @@ class UPS(RamLeg):
     ) -> tuple[list[Fraction], int]:
         """Return a random rational ram vector (3,), and 1 for the elbow's sign."""
         return random_vector(abs(random_fraction(rng)), 3, rng), 1
+
+
+@dataclass(frozen=True)
+class UPS(UniversalRamLeg):
+    """A U-P-S leg that carries one point of the platform.
+
+    Its joint coordinate is the length of the ram, from `guide_point` to the platform point.
+    """
+
+    base_cone: Cone | None = None
+    platform_cone: Cone | None = None
+    screw_lead: float | None = None
+
+    type = "UPS"
+    base_cones: ClassVar = ("base_cone",)
+    account = ACCOUNTS["UPS"]
+
+    keys: ClassVar = keys_of("ram", "universal_ram", "UPS")
+
+    def with_platform_frame(self, frame: Sequence[Vector]) -> Self:
+        """Return the leg with a missing `direction` set to the platform's x or y across the ram."""
+        if self.direction is not None:
+            return self
+        way = [a - b for a, b in zip(self.platform_point, self.guide_point, strict=True)]
+        x, y, _ = frame
+        leans = abs(dot(x, (way[0], way[1], way[2]))) > abs(dot(y, (way[0], way[1], way[2])))
+        return replace(self, direction=y if leans else x)
+
+    def free_axes(self, axis: Vector | None) -> tuple[Vector, ...]:
+        """Return three axes: the ball joint leaves every rotation of the platform free."""
+        return (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+
+    def passive_joints(
+        self, motion: LegMotion, zero_axes: Expression, axes: Expression
+    ) -> list[Passive]:
+        """Return the joints at the ram's two ends that have limit cones."""
+        (_, way), length = motion.links, self.limits[1]
+        assert way is not None
+        return [
+            *cone_limit("ram at the base", self.base_cone, ca.SX.eye(3), way, length),
+            *cone_limit("ram at the platform", self.platform_cone, axes, -way, length),
+        ]
+
+    def rod_couple(self, motion: LegMotion) -> Expression:
+        """Return a zero couple (3, 1): a ram transmits a force along itself alone."""
+        return ca.SX(3, 1)
 
 
 class _Ram(NamedTuple):

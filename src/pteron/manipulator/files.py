@@ -342,6 +342,7 @@ class _FileReader:
                 "angle_order": table.angles or "rpy",
             }
             required |= {"center": table.center, "second_axis": table.second_axis}
+            optional["axis_offset"] = table.axis_offset
         else:
             optional["bars"] = tuple(self.parts("platform.bars", table.bars or [], Bar))
             optional["geared"] = tuple(
@@ -365,7 +366,7 @@ class _FileReader:
 
     def leg(self, i: int, raw_table: object) -> LegKind | None:
         """Return leg i, from 1, of a table; on faults a substitute for further checks, or None."""
-        from pteron.manipulator.leg_tables import FORMER, leg_of, leg_table
+        from pteron.manipulator.leg_tables import alias_of, leg_of, leg_table
 
         prefix = f"leg {i}: "
         if not isinstance(raw_table, dict):
@@ -381,12 +382,13 @@ class _FileReader:
             valid = ", ".join(kind_names())
             self.faults.append(f"{prefix}type: {shorten(name)} is not one of {valid}")
             return None
-        for key, former in FORMER.items():
-            if key in raw_table and former in raw_table:
+        for key, about in kind.every_key().items():
+            if (alias := alias_of(key, about)) in raw_table and key in raw_table:
+                what = "another" if about.alias else "the former"
                 self.faults.append(
-                    f"{prefix}{former}: the former name of {key}, which is given too; give one"
+                    f"{prefix}{alias}: {what} name of {key}, which is given too; give one"
                 )
-                raw_table = {k: v for k, v in raw_table.items() if k != former}
+                raw_table = {k: v for k, v in raw_table.items() if k != alias}
         leg, faults = leg_of(kind, self.table(leg_table(kind), raw_table, prefix), self.tilts)
         self.faults += [prefix + fault for fault in faults]
         return leg

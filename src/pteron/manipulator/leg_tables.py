@@ -12,8 +12,18 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AliasChoices, BeforeValidator, Field, create_model
 
-from pteron.bodies.inertia import PlanarInertia, RodInertia
-from pteron.bodies.tables import Count, Number, PlanarBody, RodBody, Slider, Three, TomlTable, Two
+from pteron.bodies.inertia import PlanarInertia, RodInertia, SpatialInertia
+from pteron.bodies.tables import (
+    Count,
+    Number,
+    PlanarBody,
+    RodBody,
+    Slider,
+    SpatialBody,
+    Three,
+    TomlTable,
+    Two,
+)
 from pteron.errors import ModelError
 from pteron.legs import LegKind
 from pteron.legs.keys import Key, KeyRole
@@ -40,12 +50,18 @@ _TYPES: dict[KeyRole, Any] = {
     "slider": Slider,
     "planar": PlanarBody,
     "rod": RodBody,
+    "solid": SpatialBody,
     "drive": DriveTable,
     "reading": ReadingTable,
 }
 
-FORMER = {"limits": "slider_limits"}
+_FORMER = {"limits": "slider_limits"}
 """Keys that had another name in files of version 0.1, with that name."""
+
+
+def alias_of(name: str, key: Key) -> str:
+    """Return another name that files may have for a key, such as a former one; '' without one."""
+    return key.alias or _FORMER.get(name, "")
 
 
 @lru_cache(maxsize=16)
@@ -53,7 +69,7 @@ def leg_table(kind: type[LegKind]) -> type[TomlTable]:
     """Return the pydantic model of a `[[legs]]` table for a kind of leg."""
     fields: dict[str, Any] = {"type": (str, Field(kind.type, description="the kind of leg"))}
     for key, about in kind.every_key().items():
-        field_type, former = _TYPES[about.role], FORMER.get(key)
+        field_type, alias = _TYPES[about.role], alias_of(key, about)
         fields[toml_key(key, about)] = (
             field_type | None if about.default is None else field_type,
             Field(
@@ -61,7 +77,7 @@ def leg_table(kind: type[LegKind]) -> type[TomlTable]:
                 description=about.help,
                 examples=None if about.example is None else [about.example],
                 json_schema_extra={"like": about.like} if about.like else None,
-                validation_alias=former and AliasChoices(key, former),
+                validation_alias=AliasChoices(key, alias) if alias else None,
             ),
         )
     return create_model(f"{kind.type}Table", __base__=TomlTable, **fields)
@@ -89,6 +105,7 @@ _ORDINARY: dict[KeyRole, Any] = {
     "slider": 1.0,
     "planar": PlanarInertia(1.0, (0.0, 0.0), 1.0),
     "rod": RodInertia(1.0, (0.0,), 1.0),
+    "solid": SpatialInertia(1.0, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 1.0, 0.0, 1.0)),
 }
 """Substitutes of values with a fault, with which the other parts of the machine are checked."""
 
@@ -175,7 +192,9 @@ def _build_part(kind: Any, table: TomlTable, key: str) -> Any:
 
 def _end_fault(leg: LegKind, letter: str, body: Any) -> str | None:
     """Return a message if a body's centre of mass lies beyond the link's ends, else None."""
-    if not letter or body.center_of_mass is None or min(body.mass, body.inertia) <= 0.0:
+    if not letter or body.center_of_mass is None or isinstance(body, SpatialBody):
+        return None
+    if min(body.mass, body.inertia) <= 0.0:
         return None
     text = leg.center_of_mass_warning(letter, body.center_of_mass[0])
     return text and f"{text}; with it no real body has inertia {body.inertia:g} kg m^2"

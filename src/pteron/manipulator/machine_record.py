@@ -161,6 +161,8 @@ def _dimensions(robot: Manipulator) -> Iterator[_Dimension]:
         yield _Dimension("platform.second_axis", "direction", platform.second_axis)
     if platform.center is not None:
         yield _Dimension("platform.center", "point", platform.center)
+    if platform.axis_offset is not None:
+        yield _Dimension("platform.axis_offset", "point", platform.axis_offset)
 
 
 def _digest(content: object) -> str:

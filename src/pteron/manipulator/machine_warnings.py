@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from pteron.bodies.inertia import PlanarInertia
+from pteron.bodies.inertia import PlanarInertia, SpatialInertia
 from pteron.bodies.vectors import Vector, cross
 from pteron.legs import LegKind
 from pteron.legs.drive_warnings import drive_warnings
@@ -240,12 +240,14 @@ def _inertia_warnings(body: Any, length: float) -> Iterator[str]:
     if beside > length:
         yield f"center_of_mass: {beside:g} m beside it: are these mm?"
         return
-    central = body.inertia - body.mass * sum(x * x for x in body.center_of_mass)
+    # About z, across the link.
+    inertia = body.tensor[2, 2] if isinstance(body, SpatialInertia) else body.inertia
+    central = inertia - body.mass * sum(x * x for x in body.center_of_mass[:2])
     # One by one: a product of small numbers may vanish.
     share = 12.0 * central / length / length / body.mass
     if not 1.0 / _UNLIKE <= share <= _UNLIKE:
         yield (
-            f"inertia: {body.inertia:g} kg m^2 leaves {central:.3g} about the centre of mass, "
+            f"inertia: {inertia:g} kg m^2 leaves {central:.3g} about the centre of mass, "
             f"{share:.2g} times that of a uniform bar: is it about the origin, in kg m^2?"
         )
 

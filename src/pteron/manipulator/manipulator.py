@@ -103,7 +103,7 @@ class Manipulator:
         legs = tuple(self.legs)
         others = self.tools, self.home, self.distribution
         raise_faults(faults_of(self.name, self.platform, legs, *others))
-        legs = tuple(leg.with_platform_frame(self.platform.frame) for leg in legs)
+        legs = tuple(_placed_leg(self.platform, leg) for leg in legs)
         object.__setattr__(self, "legs", legs)
         object.__setattr__(self, "tools", tuple(self.tools))
         object.__setattr__(self, "owner", OwnerData(self.owner))
@@ -254,7 +254,7 @@ def faults_of(
         faults += distribution_faults(*shares)
     if faults or len(known_legs) < freedom:
         return faults
-    placed_legs = [leg.with_platform_frame(platform.frame) for leg in known_legs.values()]
+    placed_legs = [_placed_leg(platform, leg) for leg in known_legs.values()]
     return (_unheld_tilting if platform.tilts else _unheld_freedoms)(platform, placed_legs)
 
 
@@ -270,6 +270,12 @@ def _home_faults(platform: Platform, home: Sequence[float] | None) -> Iterator[s
         )
     elif not all(map(math.isfinite, home)):
         yield f"home.pose: {list(home)} given, finite numbers expected"
+
+
+def _placed_leg(platform: Platform, leg: LegKind) -> LegKind:
+    """Return a leg with what it takes from its platform's frame, axes and center."""
+    placed_leg = leg.with_platform_frame(platform.frame)
+    return placed_leg.with_platform_rotation(platform.rotation_axes, platform.fixed_point)
 
 
 def _leg_faults(platform: Platform, leg: object) -> Iterator[str]:
@@ -289,7 +295,7 @@ def _leg_faults(platform: Platform, leg: object) -> Iterator[str]:
             "across it, so give 0"
         )
     try:
-        leg = leg.with_platform_frame(platform.frame)
+        leg = _placed_leg(platform, leg)
     except ModelError as error:
         yield str(error)
         return
@@ -331,7 +337,11 @@ def _tilting_leg_faults(platform: Platform, leg: LegKind) -> Iterator[str]:
     )
     if on_planes:
         takes = "legs that keep their points in planes and end in ball joints"
-    normal, free = leg.plane_normal, len(complement(leg.free_axes(None))) == 0
+    withheld = complement(leg.free_axes(None))
+    normal, free = leg.plane_normal, len(withheld) == 0
+    if platform.kind.hold_rotation and not free:
+        free = bool(np.abs(withheld @ np.transpose(platform.rotation_axes)).max() <= ROUNDING)
+        takes += ", or but the rotation about the normal of its two axes, as P-R-U-R legs do"
     if any(leg.fixed_offset):
         yield f"fixed_offset: a {platform.motion} platform tilts as one, and has none"
     if not free and getattr(leg, "rods", 1) > 1:
@@ -358,6 +368,13 @@ def _tilting_leg_faults(platform: Platform, leg: LegKind) -> Iterator[str]:
 
 def _unheld_tilting(platform: Platform, legs: Sequence[LegKind]) -> list[str]:
     """Return, in a list or [], the fault that legs leave a tilting platform a free motion."""
+    if platform.kind.hold_rotation and not any(
+        len(complement(leg.free_axes(None))) for leg in legs
+    ):
+        return [
+            f"legs: none keeps a {platform.motion} platform from turning about the normal of its "
+            "two axes; give it a PRUR or RPUR leg, or one with a passive chain of its own"
+        ]
     normals = [leg.plane_normal for leg in legs if leg.plane_normal is not None]
     if normals and all(parallel(normals[0], normal) for normal in normals[1:]):
         return [

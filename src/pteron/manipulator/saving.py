@@ -96,7 +96,7 @@ def document_of(robot: Manipulator) -> dict[str, Any]:
     if moving_platform.angle_order != "rpy":
         platform["angles"] = moving_platform.angle_order
     platform |= {"tool": moving_platform.tool, **asdict(moving_platform.inertia)}
-    for name in ("slides", "limits", "bars", "geared", "center", "second_axis"):
+    for name in ("slides", "limits", "bars", "geared", "center", "second_axis", "axis_offset"):
         if attribute := getattr(moving_platform, name):
             platform[name] = attribute
     radii = {} if robot.radii is None else {"radii": asdict(robot.radii)}

@@ -82,7 +82,8 @@ DriveTable, ReadingTable, RadiiTable = map(_table_of, (Drive, Reading, Radii))
 class _Motion(TomlTable):
     motion: str = key(
         '"3T": x, y, z. "3T1R": also phi, about axis. "2T": x, y in the plane across '
-        'axis. "2T1R": also phi. Tilting: "3T3R", "3R" and "2R" about center, "1T2R" of a tripod'
+        'axis. "2T1R": also phi. Tilting: "3T3R", "3T2R", "3R" and "2R" about center, "1T2R" of a '
+        "tripod"
     )
     axis: Three = key(
         "k, the axis about which the platform turns; for planar machines the normal of the plane; "
@@ -129,7 +130,15 @@ class TiltingTable(SpatialBody, _Motion):
         "for 3R and 2R: P, at the joint about which the platform turns, m", None, [0.0, 0.0, 0.1]
     )
     second_axis: Three | None = key(
-        "for 2R: the axis of beta at alpha = 0; the axis of alpha is axis", None, [0.0, 1.0, 0.0]
+        "for 2R and 3T2R: the axis of beta at alpha = 0; the axis of alpha is axis",
+        None,
+        [0.0, 1.0, 0.0],
+    )
+    axis_offset: Three | None = key(
+        "for 2R whose axes do not meet: from center, on the first axis, to P on the second one, at "
+        "angles zero, m",
+        None,
+        [0.0, 0.0, 0.02],
     )
     limits: list[Two] | None = key(
         "least and greatest value of each angle, rad", None, [[-0.5, 0.5], [-0.5, 0.5], [-0.5, 0.5]]

@@ -107,8 +107,14 @@ def _joint(platform: Any) -> dict[str, Any]:
         elif needed:
             check = vector if name == "center" else unit_vector
             checked[name] = check(field_value, name)
+    if platform.axis_offset is not None and not all(requirements.values()):
+        faults.append(f"axis_offset: a {platform.motion} platform has none; leave it out")
+    elif platform.axis_offset is not None:
+        checked["axis_offset"] = vector(platform.axis_offset, "axis_offset")
     second = checked.get("second_axis")
-    if second and parallel(unit_vector(platform.axis, "axis"), second):
+    if second and parallel(axis := unit_vector(platform.axis, "axis"), second):
         faults.append("second_axis: along axis, so that both angles turn alike; turn one")
+    elif second and platform.kind.hold_rotation:
+        checked["second_axis"] = perpendicular(second, axis, "second_axis", "axis")
     raise_faults(faults)
     return checked

@@ -15,6 +15,7 @@ from pteron.platforms.sliding import Sliding
 from pteron.platforms.tilting import (
     CentredRollPitchYaw,
     CentredXYZ,
+    FiveFreedoms,
     RollPitchYaw,
     TurnsXYZ,
     Universal,
@@ -36,6 +37,7 @@ KINDS: dict[str, type[PlatformEquations]] = {
         PlanarTranslating,
         PlanarTurning,
         RollPitchYaw,
+        FiveFreedoms,
         CentredRollPitchYaw,
         Universal,
         Tripod,

@@ -159,6 +159,11 @@ class PlatformEquations(ABC):
     """Whether P is at `center`, which files give, on a joint with the base."""
     has_second_axis: ClassVar[bool] = False
     """Whether it turns about `axis`, then about `second_axis`, which files give."""
+    hold_rotation: ClassVar[bool] = False
+    """Whether its legs, at least one, hold the rotation that a platform that tilts does not make:
+    the one about the normal of its two axes, which are perpendicular."""
+    axis_distance: Expression | None = None
+    """The distance of P from the base's axis that it turns about, m; None where it does not."""
     keeps_points_in_planes: ClassVar[bool] = False
     """Whether planes, in which its legs keep its points, fix its dependent coordinates."""
     wrench_columns: ClassVar[tuple[str, ...]] = ()

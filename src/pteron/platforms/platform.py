@@ -48,22 +48,22 @@ class Platform:
 
     Parameters
     ----------
-    motion : {"3T", "3T1R", "2T", "2T1R", "3T3R", "3R", "2R", "1T2R"} or str
+    motion : {"3T", "3T1R", "2T", "2T1R", "3T3R", "3T2R", "3R", "2R", "1T2R"} or str
         Its freedom. 3T: it only translates. 3T1R: it also turns about `axis` (Schoenflies motion).
-        2T and 2T1R: the same in the plane across `axis`. 3T3R: it moves freely. 3R and 2R: it turns
-        about `center`, on a ball joint or a universal joint. 1T2R: a tripod's. Installed packages
-        may have others.
+        2T and 2T1R: the same in the plane across `axis`. 3T3R: it moves freely. 3T2R: it translates
+        and turns about `axis` and `second_axis`. 3R and 2R: it turns about `center`, on a ball
+        joint or a universal joint. 1T2R: a tripod's. Installed packages may have others.
     inertia : PlanarInertia or SpatialInertia
         Mass, first moment in the platform frame and moment of inertia about `axis` through P; of a
         platform that tilts its inertia tensor about P.
     axis : unit vector
         k, the axis of rotation in the base frame, and the platform frame's z at angles zero; the
-        normal of the plane that a planar machine moves in; of a 2R platform the first axis that it
-        turns about.
+        normal of the plane that a planar machine moves in; of a 2R or 3T2R platform the first axis
+        that it turns about.
     x_axis : unit vector, optional
         The platform frame's x at angles zero, in the base frame. It may be left out where `axis` is
-        the base frame's z, the frames then coincide at angles zero, and of a 2R platform, where
-        they always do.
+        the base frame's z, the frames then coincide at angles zero, and of a 2R or 3T2R platform,
+        where they always do.
     slides : bool
         Whether phi slides the platform points, as the two halves of an I4's nacelle do, and turns
         nothing but the tool. Platform points then hold m/rad: c = p + t0 + phi (x_axis s_x + ...).
@@ -79,9 +79,14 @@ class Platform:
     angle_order : {"rpy", "xyz"}
         Which angles a 3T3R or 3R platform has: roll, pitch and yaw, or rx, ry and rz.
     center : vector, optional
-        P of a 3R or 2R platform, on its joint with the base, m.
+        P of a 3R or 2R platform, on its joint with the base, m; with `axis_offset` a point on the
+        first axis.
     second_axis : unit vector, optional
-        What a 2R platform turns about by beta, at alpha = 0.
+        What a 2R or 3T2R platform turns about by beta, at alpha = 0; of a 3T2R platform
+        perpendicular to `axis`.
+    axis_offset : vector, optional
+        Of a 2R platform whose axes do not meet: from `center`, on the first axis, to P on the
+        second one, at angles zero, m. P then moves as the platform turns about the first axis.
     planes : tuple of HeldPoint
         Of a 1T2R platform the planes in which its legs keep its points: the manipulator sets them.
     """
@@ -99,6 +104,7 @@ class Platform:
     center: Vector | None = None
     second_axis: Vector | None = None
     planes: tuple[HeldPoint, ...] = ()
+    axis_offset: Vector | None = None
 
     def __post_init__(self) -> None:
         if kind_of_motion(self.motion) is None:
@@ -115,7 +121,7 @@ class Platform:
     def frame(self) -> tuple[Vector, Vector, Vector]:
         """The platform's x, y and z axes at angles zero, in the base frame."""
         x = self.x_axis
-        if x is None:  # of a 2R platform
+        if x is None:  # of a platform with a second axis
             return (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), BASE_Z
         return (x, cross(self.axis, x), self.axis)
 
@@ -299,6 +305,11 @@ class Platform:
         return bool(np.linalg.svd(centred, compute_uv=False)[1] <= size)
 
     @property
+    def fixed_point(self) -> Vector | None:
+        """The point P of a platform that only turns about it, m; None where P moves."""
+        return self.center if self.axis_offset is None else None
+
+    @property
     def rotation_axes(self) -> tuple[Vector, ...]:
         """Unit vectors that span the axes about which the platform turns."""
         if self.second_axis is not None:
@@ -382,15 +393,14 @@ class Platform:
         """
         if self.keeps_points_in_planes:
             return {"side": (self._side,)}
-        if self.center is None:
-            return {}
-        if self.second_axis is None:
-            return {"center": self.center}
-        return {
-            "center": self.center,
-            "first_axis": self.axis,
-            "second_axis": self.second_axis,
-        }
+        quantities: dict[str, tuple[float, ...]] = {}
+        if self.center is not None:
+            quantities["center"] = self.center
+        if self.axis_offset is not None:
+            quantities["axis_offset"] = self.axis_offset
+        if self.second_axis is not None:
+            quantities |= {"first_axis": self.axis, "second_axis": self.second_axis}
+        return quantities
 
     @property
     def turning_keys(self) -> tuple[str, ...]:
@@ -398,10 +408,13 @@ class Platform:
 
         For a planar platform the legs determine the axis.
         """
+        center = tuple(
+            name for name in ("center", "axis_offset") if getattr(self, name) is not None
+        )
         if self.second_axis is not None:
-            return ("center", "axis", "second_axis")
+            return (*center, "axis", "second_axis")
         if self.center is not None:
-            return ("center",)
+            return center
         return ("axis",) if self.turns and not self.slides and not self.planar else ()
 
     def expressions(self) -> dict[str, Any]:
@@ -428,8 +441,8 @@ class Platform:
     def map_vectors(self, turn: Callable[[Vector], Vector]) -> Platform:
         """Return the platform with every base-frame vector v replaced by `turn(v)`.
 
-        The frame of a 2R platform is the base frame at angles zero: the platform's tool, inertia
-        and points are converted to the new frame.
+        The frame of a platform with a second axis is the base frame at angles zero: its tool,
+        inertia and points are converted to the new frame.
         """
         x, _, axis = self.frame
         center = self.center and turn(self.center)
@@ -441,6 +454,7 @@ class Platform:
             axis=turn(self.axis),
             second_axis=turn(self.second_axis),
             center=center,
+            axis_offset=self.axis_offset and turn(self.axis_offset),
             tool=turn(self.tool),
             inertia=self.inertia.turned(np.array([turn(v) for v in self.frame]).T),
         )

@@ -1,4 +1,4 @@
-"""Platforms that turn about any axis: 3T3R, and 3R and 2R about a centre that stays.
+"""Platforms that turn about any axis: 3T3R, 3T2R, and 3R and 2R about a centre that stays.
 
 R is a product of turns by one angle of the pose each, about axes that move with those before.
 `tripod` has the platform 1T2R, whose other coordinates follow from these.
@@ -186,7 +186,7 @@ class Tilting(PlatformEquations):
         return PlatformMotion(
             tuple(points),
             tuple(ca.mtimes(shift, twist) for shift in shifts),
-            RotationMotion(turns),
+            RotationMotion(turns, axes=turned.axes),
             axes,
             body,
             twist,
@@ -270,14 +270,8 @@ class _Centred(Tilting):
         turned = self.pose_rotation(pose, velocity, acceleration)
         zero = ca.SX(3, 1)
         place = PointMotion(self.quantities["center"], zero, zero)
-        return self.assemble_motion(place, turned, *self.basis(turned))
-
-    def basis(self, turned: Rotation) -> tuple[Expression, Expression | None]:
-        """Return the twists (6, k) of unit quasi-velocities.
-
-        The second result is the matrix from angle rates to quasi-velocities.
-        """
-        return ca.vertcat(ca.SX(3, 3), ca.SX.eye(3)), turned.axes
+        twist = ca.vertcat(ca.SX(3, 3), ca.SX.eye(3))
+        return self.assemble_motion(place, turned, twist, turned.axes)
 
 
 class CentredRollPitchYaw(_Centred):
@@ -294,19 +288,67 @@ class CentredXYZ(_Centred):
     order = ("rx", "ry", "rz")
 
 
-class Universal(_Centred):
-    """2R: R = Rot(axis, alpha) Rot(second_axis, beta) about a universal joint."""
+class _TwoAxes(Tilting):
+    """A platform with R = Rot(axis, alpha) Rot(second_axis, beta)."""
 
-    motion_name = "2R"
     has_second_axis = True
-    coordinates = ("alpha", "beta")
-    freedom_text = "turns about two axes through a centre that stays (2R)"
     order = ("alpha", "beta")
 
     def axes_by_angle(self) -> dict[str, Expression]:
         """Return the rotation axes (3, 1) of alpha and beta, at angles zero, by these names."""
         return {"alpha": self.quantities["first_axis"], "beta": self.quantities["second_axis"]}
 
-    def basis(self, turned: Rotation) -> tuple[Expression, Expression | None]:
-        """Return the twists (6, 2) of unit angle rates (the quasi-velocities), and None."""
-        return ca.vertcat(ca.SX(3, 2), turned.axes), None
+
+class FiveFreedoms(_TwoAxes):
+    """3T2R: P moves freely; the quasi-velocities are the pose's rates."""
+
+    motion_name = "3T2R"
+    hold_rotation = True
+    coordinates = joints = ("x", "y", "z", "alpha", "beta")
+    freedom_text = "translates in space and turns about two axes (3T2R)"
+
+    def motion(
+        self, pose: Expression, velocity: Expression, acceleration: Expression
+    ) -> PlatformMotion:
+        """Return the motion of a platform whose point P moves freely."""
+        turned = self.pose_rotation(pose, velocity, acceleration)
+        place = PointMotion(pose[:3], velocity[:3], acceleration[:3])
+        return self.assemble_motion(place, turned, ca.diagcat(ca.SX.eye(3), turned.axes), None)
+
+    def change_to_platform_axes(self, pose: Expression) -> None:
+        """Return None: its legs have directions in the base frame."""
+
+
+class Universal(_TwoAxes, _Centred):
+    """2R: R = Rot(axis, alpha) Rot(second_axis, beta) about a universal joint."""
+
+    motion_name = "2R"
+    coordinates = ("alpha", "beta")
+    freedom_text = "turns about two axes through a centre that stays (2R)"
+
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*arguments)
+        if (offset := self.quantities.get("axis_offset")) is not None:
+            self.axis_distance = ca.norm_2(ca.cross(self.quantities["first_axis"], offset))
+
+    def motion(
+        self, pose: Expression, velocity: Expression, acceleration: Expression
+    ) -> PlatformMotion:
+        """Return the motion of a platform whose P stays, or turns about the first axis."""
+        turned = self.pose_rotation(pose, velocity, acceleration)
+        center, offset = self.quantities["center"], self.quantities.get("axis_offset")
+        zero = ca.SX(3, 1)
+        if offset is None:
+            twist = ca.vertcat(ca.SX(3, 2), turned.axes)
+            return self.assemble_motion(PointMotion(center, zero, zero), turned, twist, None)
+        a, cos, sin = self.quantities["first_axis"], ca.cos(pose[0]), ca.sin(pose[0])
+        along = a * ca.dot(a, offset)
+        arm = cos * (offset - along) + sin * ca.cross(a, offset)
+        lever = ca.cross(a, arm)
+        place = PointMotion(
+            center + along + arm,
+            lever * velocity[0],
+            lever * acceleration[0] - arm * (velocity[0] * velocity[0]),
+        )
+        twist = ca.vertcat(ca.horzcat(lever, zero), turned.axes)
+        return self.assemble_motion(place, turned, twist, None)

@@ -191,6 +191,9 @@ def exact_geometry(robot: Manipulator) -> ExactGeometry:
     }
     # The whole machine but its platform's frame turns with a joint that has axes of its own.
     axes = _rational_rotation(frame) if "second_axis" in platform.quantities else UNIT
+    if platform.axis_offset is not None:
+        offset = frame @ np.array(platform.axis_offset)
+        platform_values["axis_offset"] = tuple(_fraction(float(c)) for c in offset)
     quantities = {name: (platform_values | exact)[name] for name in platform.quantities}
     missed = lost_right_angles(distinct, exact), describe_near_relations(distinct)
     lost, nearly = (tuple(texts) for texts in missed)
@@ -211,6 +214,9 @@ def _exact_leg(
         shift = shift + np.array(robot.platform.center or (0.0, 0.0, 0.0))
         x, y = notes.plane_vector(f"s{i + 1}", *leg.platform_point[:2])
         s0 = (x, y, notes.length(f"s{i + 1}.z", leg.platform_point[2]))
+        if leg.platform_center is not None:  # of its platform point the direction alone counts
+            way = np.array(leg.platform_point) / np.linalg.norm(leg.platform_point)
+            s0 = exact_directions({f"s{i + 1}": way}, notes)[f"s{i + 1}"]
     else:
         shift = shift + np.array(robot.platform.frame).T @ np.array(leg.platform_point)
         s0 = (ZERO, ZERO, ZERO)

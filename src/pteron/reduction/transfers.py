@@ -72,7 +72,7 @@ def transfers(robot: Manipulator, columns: Sequence[Parameter]) -> list[MassTran
             name = f"{legs[0].names[letter]}{mass.suffix}"
             entries = partial(_rider_entries, robot, mass, platform, group)
             grouped.append(MassTransfer(f"{name} and platform carry the platform point", entries))
-    if robot.platform.center is not None:
+    if robot.platform.fixed_point is not None:
         unfelt = partial(_unit_entry, platform["m"])
         grouped.append(MassTransfer("the platform turns about a fixed point", unfelt))
     if not robot.platform.angles:

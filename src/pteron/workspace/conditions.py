@@ -85,7 +85,8 @@ def conditions(
     type_i : float
         Least type-I measure of every leg; 0: it need only reach.
     type_ii : float
-        Least size of the type-II measure of the machine; 0: it does not matter.
+        Least size of the type-II measure of the machine, and of its constraint measure where its
+        legs' couples turn with the pose; 0: they do not matter.
 
     Returns
     -------
@@ -113,6 +114,9 @@ def conditions(
             for i in range(len(robot.legs))
         ]
     if type_ii > 0.0:
+        if any(leg.couples_vary for leg in robot.legs):
+            cause = "near a constraint singularity"
+            required.append(Condition(0, cause, "constraint", "constraint", 0, type_ii, sized=True))
         required.append(Condition(0, "near type II", "type_ii", "type_ii", 0, type_ii, sized=True))
     return tuple(required)
 

@@ -5,10 +5,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from pteron.kernels import Array
 from pteron.kinematics.architecture import Architecture, architecture
+from pteron.kinematics.constraints import constraint_measure
 from pteron.manipulator import Manipulator
 from pteron.manipulator.machine_warnings import machine_warnings
 from pteron.workspace.holding import Holding, holding_warnings, measure_holding
@@ -21,6 +23,10 @@ _TILTS = (
     "legs: parallel rods whose bars turn on hinges of their own leave the platform free to tilt in "
     "every pose (constraint singularity): do legs share their hinges?"
 )
+
+_LEAST_CONSTRAINT = 0.01
+"""Constraint measure at home below which the legs' couples do not hold the platform: then an error
+of a direction of 10 mrad lets it turn."""
 
 
 @dataclass(frozen=True)
@@ -45,6 +51,18 @@ class Examination:
     warnings: tuple[str, ...]
 
 
+def _constraint_warnings(robot: Manipulator, home: Array) -> Iterator[str]:
+    """Yield a warning if the legs' couples leave the platform a turn at its home pose (m,)."""
+    if any(leg.couples_vary for leg in robot.legs):
+        measure = abs(float(constraint_measure(robot, home)))
+        if not measure > _LEAST_CONSTRAINT:
+            yield (
+                "legs: at home their couples leave the platform free to turn (constraint "
+                f"singularity): measure {measure:.2g}, above {_LEAST_CONSTRAINT:g} expected; turn "
+                "a leg's direction, as from radial to tangential"
+            )
+
+
 def examine(robot: Manipulator, home: Array) -> Examination:
     """Return a machine's measures, working modes and warnings at its home pose (m,)."""
     measures, layout = measure_holding(robot, home), architecture(robot)
@@ -52,6 +70,7 @@ def examine(robot: Manipulator, home: Array) -> Examination:
     warnings = (
         *machine_warnings(robot),
         *((_TILTS,) if layout.holds is False else ()),
+        *_constraint_warnings(robot, home),
         *layout_warnings(robot, home),
         *holding_warnings(measures),
         *mode_warnings(modes),

@@ -39,6 +39,9 @@ class LegStance:
         platform, and no force on to a point, carries nothing of the leg, and is not among them.
     driven : int, optional
         The place in the chain of the driven joint, if it is among them.
+    hinge : array, shape (3,), optional
+        Axis of the revolute joint at the platform, where that alone joins the leg to a platform
+        that tilts: the cut then holds the axis too.
     """
 
     prismatic: tuple[bool, ...]
@@ -52,6 +55,7 @@ class LegStance:
     coordinate: Any
     numbers: tuple[int, ...]
     driven: int | None
+    hinge: Array | None = None
 
 
 def leg_stances(robot: Manipulator, poses: Array) -> list[LegStance]:
@@ -69,6 +73,8 @@ def leg_stances(robot: Manipulator, poses: Array) -> list[LegStance]:
     for i, motion in enumerate(_states(robot)[1].legs):
         numbers = _numbers_before_the_cut(robot, i, motion)
         joints = [motion.chain[k] for k in numbers]
+        beyond = range(numbers[-1] + 1, len(motion.chain))
+        hinged = robot.platform.tilts and len(beyond) == 1
         turning = [b for b, body in motion.bodies.items() if body.x is not None]
         stances.append(
             LegStance(
@@ -83,6 +89,7 @@ def leg_stances(robot: Manipulator, poses: Array) -> list[LegStance]:
                 vector(i, "coordinate")[..., 0],
                 numbers,
                 next((k for k in numbers if motion.chain[k].driven), None),
+                vector(i, "axis", beyond[0]) if hinged else None,
             )
         )
     return stances
@@ -135,7 +142,7 @@ def _function(robot: Manipulator) -> tuple[Any, list[tuple[Any, ...]]]:
             if body.x is not None:
                 parts[i, "x", letter] = body.x
             if body.y is not None:
-                parts[i, "z", letter] = body.axes
+                parts[i, "z", letter] = body.axes if body.solid is None else body.solid.axes[:, 2]
         parts[i, "end"], parts[i, "coordinate"] = point.position, motion.coordinate
     # What does not depend on the pose is made to: so that every output has a column for each pose.
     zero = 0 * pose[0]

@@ -151,7 +151,7 @@ def _sites(opened: Tree) -> list[list[tuple[str, Array]]]:
         sites[closing.one].append((f"{closing.name}_end", closing.point))
         sites[closing.other].append((f"{closing.name}_seat", closing.point))
     p, axes = opened.robot.platform.placement(opened.home)
-    sites[0].append(("tool", p + np.array(opened.robot.platform.tool) @ axes))
+    sites[opened.platform].append(("tool", p + np.array(opened.robot.platform.tool) @ axes))
     return sites
 
 

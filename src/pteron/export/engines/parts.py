@@ -200,6 +200,11 @@ class Tree:
         return tuple(joint for body in self.bodies for joint in body.joints)
 
     @property
+    def platform(self) -> int:
+        """The index of the platform's body."""
+        return next(i for i, body in enumerate(self.bodies) if body.name == "platform")
+
+    @property
     def free(self) -> tuple[TreeJoint, ...]:
         """Joints that are coupled to no other."""
         return tuple(joint for joint in self.joints if joint.follows is None)

@@ -16,6 +16,7 @@ from pteron.bodies.vectors import cross
 from pteron.export.engines.inertia import (
     central_inertia,
     cube_moments,
+    massless_inertia,
     plane_moments,
     shared_masses,
     spatial_moments,
@@ -47,6 +48,9 @@ def platform_bodies(robot: Manipulator, pose: Array) -> Pieces:
     joints = _joints(platform, pose)
     if isinstance(platform.total_inertia, SpatialInertia):
         body = _tilting_body(platform, pose, joints, platform.total_inertia)
+        if platform.axis_offset is not None:
+            beyond = replace(body, parent=0, joints=body.joints[1:])
+            return [_fork(platform, body), beyond], [1] * len(robot.legs), []
     else:
         body = _plane_body(platform, pose, joints, *central_inertia(platform.total_inertia))
     return [body], [0] * len(robot.legs), []
@@ -153,11 +157,15 @@ def _part_masses(
 
 def _joints(platform: Platform, pose: Array) -> list[TreeJoint]:
     """Return the joints by which the platform moves, the tool's where its halves slide."""
-    p, moved, joints = platform.placement(pose)[0], np.eye(4), []
+    joints: list[TreeJoint] = []
+    p, moved = platform.placement(pose)[0], np.eye(4)
     limits = platform.angle_limits
     for name, is_prismatic, axis, coordinate in platform_joints(platform, pose):
         axis = moved[:3, :3] @ axis
-        joint = TreeJoint(name, is_prismatic, axis, p, float(coordinate), limits.get(name))
+        # The first axis of a platform with an offset goes through its centre.
+        on_first = platform.axis_offset is not None and not joints
+        point = np.array(platform.center) if on_first else p
+        joint = TreeJoint(name, is_prismatic, axis, point, float(coordinate), limits.get(name))
         if not is_prismatic:
             moved = displacement(joint, float(coordinate)) @ moved
         joints.append(joint)
@@ -196,6 +204,13 @@ def _tilting_body(
     return TreeBody(
         "platform", BASE, tuple(joints), p, axes.T, inertia.mass, at, moments, 0, products
     )
+
+
+def _fork(platform: Platform, body: TreeBody) -> TreeBody:
+    """Return the body without mass between the two axes of a platform whose axes do not meet."""
+    mass, moments = massless_inertia(body.mass, body.moments)
+    joint, center = body.joints[0], np.array(platform.center)
+    return TreeBody("fork", BASE, (joint,), center, body.axes, mass, center, moments, 0)
 
 
 def _still_body(

@@ -90,12 +90,13 @@ def _platform(opened: Tree, looks: list[list[BodyShape]], thick: float) -> None:
             if bodies[k].color == 0:
                 looks[k].append(_arm(bodies[k].origin, closing.point, thick))
     hub = np.array([p - 0.8 * thick * axis, p + 0.8 * thick * axis])
-    looks[0].append(BodyShape("cylinder", hub, 2.2 * thick))
+    looks[opened.platform].append(BodyShape("cylinder", hub, 2.2 * thick))
     tool = p + np.array(platform.tool) @ axes
     if np.linalg.norm(tool - p) > SAME:
-        looks[0].append(_arm(p, tool, 0.8 * thick))
+        looks[opened.platform].append(_arm(p, tool, 0.8 * thick))
     for k, body in enumerate(bodies):
-        if body.color == 0 and body.parent != BASE and not body.joints[0].is_prismatic:
+        turns = body.parent != BASE and not body.joints[0].is_prismatic
+        if body.color == 0 and turns and k != opened.platform:
             # What turns about P: a block, so that it is seen to turn.
             half = 2.4 * thick * body.axes[:, 0]
             middle = body.origin - 2.2 * thick * axis

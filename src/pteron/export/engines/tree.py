@@ -15,10 +15,17 @@ from dataclasses import replace
 
 import numpy as np
 
+from pteron.bodies.inertia import SpatialInertia
 from pteron.errors import SingularPose
 from pteron.export.engines.chains import LegStance, leg_stances, shaft_ratio
 from pteron.export.engines.home_pose import chosen_home
-from pteron.export.engines.inertia import central_inertia, cube_moments, plane_moments, rod_moments
+from pteron.export.engines.inertia import (
+    central_inertia,
+    cube_moments,
+    plane_moments,
+    rod_moments,
+    spatial_moments,
+)
 from pteron.export.engines.parts import BASE, Closing, Tree, TreeBody, TreeJoint, TreeMotor
 from pteron.export.engines.platform import platform_bodies
 from pteron.kernels import Array
@@ -28,6 +35,10 @@ from pteron.manipulator import RobotLike, as_manipulator
 from pteron.manipulator.readings import refuse_readings
 from pteron.shapes import PoseLike
 from pteron.tolerances import ROUNDING
+
+_ALONG_HINGE = 0.1
+"""Distance of the second point of a hinge at the platform from the first, as a share of the
+machine's size: both points close the loop and hold the hinge's axis."""
 
 
 def tree(robot: RobotLike, home: PoseLike | None = None) -> Tree:
@@ -72,20 +83,23 @@ def tree(robot: RobotLike, home: PoseLike | None = None) -> Tree:
     size = _size(stances, robot.platform.placement(pose)[0])
     bodies, carriers, closings = platform_bodies(robot, pose)
     names = robot.joint_names
-    motors = []
+    motors, axis_closings = [], []
     for i, (leg, stance) in enumerate(zip(robot.legs, stances, strict=True)):
         chain = _leg(leg, i + 1, stance, names[i], len(bodies), size)
         bodies += chain
         closings.append(Closing(f"leg{i + 1}", len(bodies) - 1, carriers[i], stance.end))
+        if stance.hinge is not None:
+            on_axis = stance.end + _ALONG_HINGE * size * stance.hinge
+            axis_closings.append(Closing(f"leg{i + 1}_axis", len(bodies) - 1, carriers[i], on_axis))
         drive, ratio = leg.drive or Drive(), 1.0
         joint = names[i]
         if stance.driven is None:
             joint, ratio = bodies[0].joints[-1].name, shaft_ratio(robot, i)
             bodies[0] = _with_shaft(bodies[0], leg.limits, ratio)
         motors.append(TreeMotor(names[i], joint, ratio, drive))
-    # The legs' closings first: what the platform's parts add comes after.
+    # The legs' closings first: what the platform's parts and the legs' hinges add comes after.
     count = len(robot.legs)
-    closings = closings[-count:] + closings[:-count]
+    closings = closings[-count:] + closings[:-count] + axis_closings
     return Tree(robot, pose, tuple(bodies), tuple(closings), tuple(motors), (), size)
 
 
@@ -149,8 +163,13 @@ def _leg(
 
 def _body(leg: LegKind, stance: LegStance, letter: str, joint: TreeJoint, size: float) -> TreeBody:
     """Return the body that a joint carries; the caller sets its name, parent and joints."""
-    mass, (x, y), moment = central_inertia(leg.bodies[letter])
-    reference = stance.references[letter]
+    inertia, reference = leg.bodies[letter], stance.references[letter]
+    if isinstance(inertia, SpatialInertia):
+        axes = _frame_along(stance.along[letter], stance.across[letter])
+        moments, products = spatial_moments(inertia, size)
+        center = reference + axes @ inertia.center_of_mass
+        return TreeBody("", BASE, (), joint.point, axes, inertia.mass, center, moments, 0, products)
+    mass, (x, y), moment = central_inertia(inertia)
     if letter not in stance.along:
         axes = _frame_along(joint.axis)
         moments, center = cube_moments(mass, 0.05 * size), reference
