@@ -16,9 +16,9 @@ from pteron.equations.drives import Drives, drive_forces, joint_motion
 from pteron.equations.kinematics import platform_rates
 from pteron.equations.machine import State
 from pteron.equations.mixed import mixed_forces
-from pteron.equations.virtual_work import SharedForces, rigid_forces, share_forces
+from pteron.equations.virtual_work import rigid_forces, share_forces
 
-Answer = tuple[SharedForces, dict[str, Expression]]
+Answer = tuple[Expression, dict[str, Expression]]
 """Forces of the drives (n, 1), and the parts of the law's memory by name."""
 
 
@@ -29,10 +29,9 @@ def pd_gravity(s: Sample) -> Answer:
     return _forces(s, s.machine.state(pose), drive_loads), {"measured": pose}
 
 
-def _forces(s: Sample, state: State, drive_loads: Expression) -> SharedForces:
+def _forces(s: Sample, state: State, drive_loads: Expression) -> Expression:
     """Return the drive forces that move the bodies of a state, plus those of the drives."""
-    shared = rigid_forces(s.machine, state, s.parameters, drive_loads=drive_loads)
-    return shared.plus(drive_loads)
+    return drive_loads + rigid_forces(s.machine, state, s.parameters, drive_loads=drive_loads)
 
 
 def feed_forward_pd(s: Sample) -> Answer:
@@ -105,7 +104,7 @@ def _adaptive_law(s: Sample, estimate: Expression, drives: Drives) -> Answer:
     room = s.gains["room"]
     drive_loads += s.gains["derivative"] * z
     shared = share_forces(s.machine, s.machine.state(pose), needed, drive_loads)
-    return shared.plus(drive_loads), {
+    return shared + drive_loads, {
         "measured": pose,
         "acceleration": s.desired.acceleration,
         "learnt": updated * (room / ca.fmax(ca.norm_2(updated), room)),

@@ -10,19 +10,19 @@ the regressor.
 from __future__ import annotations
 
 from copy import copy
-from typing import NamedTuple
 
 import casadi as ca
 
 from pteron.bodies.motion import Expression
+from pteron.closures.closure import nan_below_zero
 from pteron.equations.machine import Machine, State
 from pteron.legs.leg import Needs
 
-FEASIBLE = "feasible"
-"""Output that says whether forces are within their limits: part of the status, not of results."""
-
 _WITHIN = 1e-9
 """Share of its limit by which a force may exceed it: rounding."""
+
+_MISSED = 1e-6
+"""Share of a load by which shared forces may miss it: rounding, also next to a singularity."""
 
 
 def inverse_dynamics(
@@ -48,23 +48,6 @@ def inverse_dynamics(
     return joints + forces  # Eq. (13), Contribution 2, Section 4
 
 
-class SharedForces(NamedTuple):
-    """The actuator forces (n, 1) of a state, as a redundant machine shares them out."""
-
-    forces: Expression
-    is_feasible: Expression | None
-    """Whether they are within the drives' greatest forces; None where these do not matter."""
-
-    def plus(self, loads: Expression) -> SharedForces:
-        """Return the forces with what the drives need for themselves (n, 1)."""
-        return self._replace(forces=self.forces + loads)
-
-    def outputs(self, name: str = "forces") -> dict[str, Expression]:
-        """Return the forces by name, and whether they are feasible where that matters."""
-        known = {} if self.is_feasible is None else {FEASIBLE: self.is_feasible}
-        return {name: self.forces, **known}
-
-
 def rigid_forces(
     machine: Machine,
     state: State,
@@ -73,12 +56,12 @@ def rigid_forces(
     *,
     carried: bool = True,
     drive_loads: Expression | None = None,
-) -> SharedForces:
-    """Return the actuator forces of a state without those that the drives need for themselves.
+) -> Expression:
+    """Return the actuator forces (n, 1) of a state, without those of the drives themselves.
 
-    `drive_loads` (n, 1), friction and rotors, count for the drives' greatest forces. A force that
-    leaves its limits is held there and the rest are solved again, n - m times: this finds most
-    forces within limits, but not all, so that infeasible means not found.
+    `drive_loads` (n, 1), friction and rotors, count for the drives' greatest forces. The
+    force farthest beyond its limit is held there and the rest are solved again, n - m times; forces
+    are NaN where that finds none within limits, which may exist all the same.
     """
     forces = inverse_dynamics(machine, state, parameters, wrench, carried=carried)
     return share_forces(machine, state, forces, drive_loads)
@@ -86,27 +69,29 @@ def rigid_forces(
 
 def share_forces(
     machine: Machine, state: State, forces: Expression, drive_loads: Expression | None = None
-) -> SharedForces:
+) -> Expression:
     """Return forces of least norm (n, 1) as the machine shares them: see `rigid_forces`."""
     reference = machine.reference
     if reference is not None:
         forces = forces + _internal_forces(machine, state, reference)
     if machine.greatest is None:
-        return SharedForces(forces, None)
+        return forces
     loads = ca.SX(len(machine.legs), 1) if drive_loads is None else drive_loads
     low, high = -machine.greatest - loads, machine.greatest - loads
-    load, is_held, first_forces = _platform_load(state, forces), ca.SX(0), forces
+    load, is_held = _platform_load(state, forces), ca.SX(0)
     for _ in range(len(machine.legs) - machine.freedom):
-        is_held = ca.if_else(ca.fmax(low - forces, forces - high) > 0, 1, is_held)
+        excess = ca.fmax(low - forces, forces - high) / machine.closure.strengths
+        is_held = ca.if_else(excess >= ca.fmax(ca.mmax(excess), _WITHIN), 1, is_held)
         held = is_held * ca.fmin(ca.fmax(forces, low), high)
         free = held if reference is None else held + (1 - is_held) * reference
         closure = copy(machine.closure)
         closure.strengths = (1 - is_held) * machine.closure.strengths
         rest = load - _platform_load(state, free)
         forces = free + closure.forces(rest, state.platform, state.legs)
-    excess = ca.mmax(ca.fmax(low - forces, forces - high) - _WITHIN * machine.greatest)
-    is_feasible = ca.if_else(excess <= 0, 1, 0)
-    return SharedForces(ca.if_else(is_feasible, forces, first_forces), is_feasible)
+    beyond = ca.fmax(low - forces, forces - high) - _WITHIN * machine.greatest
+    # Where too few forces are free, those that are found do not act as they should.
+    missed = ca.fabs(_platform_load(state, forces) - load) - _MISSED * ca.norm_1(load)
+    return forces + nan_below_zero(-ca.mmax(beyond)) + nan_below_zero(-ca.mmax(missed))
 
 
 def _internal_forces(machine: Machine, state: State, reference: Expression) -> Expression:

@@ -29,7 +29,6 @@ from pteron.equations.friction import passive_friction
 from pteron.equations.laws import LAWS
 from pteron.equations.machine import Machine
 from pteron.equations.virtual_work import (
-    SharedForces,
     generalized_forces,
     inverse_dynamics,
     rigid_forces,
@@ -77,18 +76,16 @@ def _set_payload(m: Machine, v: Inputs) -> Outputs:
     return {"loaded_parameters": ca.vertcat(inertial[:start], inertial[start:] + ca.vertcat(*load))}
 
 
-def _rigid(m: Machine, v: Inputs, at: Any, drive_loads: Expression) -> SharedForces:
+def _rigid(m: Machine, v: Inputs, at: Any, drive_loads: Expression) -> Expression:
     """Return the actuator forces (n, 1) in a motion state, with those of the drives themselves."""
-    shared = rigid_forces(
-        *(m, at, v.parameters, v.wrench), carried=v.carried, drive_loads=drive_loads
-    )
-    return shared.plus(drive_loads)
+    arguments = m, at, v.parameters, v.wrench
+    return drive_loads + rigid_forces(*arguments, carried=v.carried, drive_loads=drive_loads)
 
 
 def _inverse_dynamics(m: Machine, v: Inputs) -> Outputs:
     """Return the actuator forces (n,) of a motion, N or N m."""
-    shared = rigid_forces(m, state(m, v), v.parameters, v.wrench, carried=v.carried)
-    return dict(shared.outputs())
+    at = state(m, v)
+    return {"forces": rigid_forces(m, at, v.parameters, v.wrench, carried=v.carried)}
 
 
 def _dynamics_arguments(m: Machine, v: Inputs) -> Any:
@@ -107,7 +104,7 @@ def _drive_forces(m: Machine, v: Inputs, *, smooth: bool) -> Outputs:
     at, drive_numbers = state(m, v), drives.Drives.from_vector(v.drives)
     moving = drives.joint_motion(at)
     drive_loads = drives.drive_forces(drive_numbers, *moving, smooth=smooth)
-    return dict(_rigid(m, v, at, drive_loads).outputs())
+    return {"forces": _rigid(m, v, at, drive_loads)}
 
 
 def _joint_feed_forward(m: Machine, v: Inputs) -> Outputs:
@@ -116,8 +113,7 @@ def _joint_feed_forward(m: Machine, v: Inputs) -> Outputs:
     pose, *_ = closing.direct_step(m, v.joints, v.pose, TYPE_II)
     at = m.state(pose, *kinematics.platform_rates(m, pose, *moving))
     drive_loads = drives.drive_forces(drives.Drives.from_vector(v.drives), *moving, smooth=True)
-    forces, *feasible = _rigid(m, v, at, drive_loads).outputs().items()
-    return dict([forces, ("found", pose), *feasible])
+    return {"forces": _rigid(m, v, at, drive_loads), "found": pose}
 
 
 def _drive_accelerations(m: Machine, v: Inputs) -> Outputs:
@@ -150,10 +146,8 @@ def _control_outputs(m: Machine, v: Inputs, *, what: str) -> Outputs:
         selection,
         TYPE_II,
     )
-    shared, next_memory = LAWS[what](sample)
-    forces, *feasible = shared.outputs().items()
-    memory_part = "next_memory", ca.vertcat(*(next_memory[name] for name in memory))
-    return dict([forces, memory_part, *feasible])
+    forces, next_memory = LAWS[what](sample)
+    return {"forces": forces, "next_memory": ca.vertcat(*(next_memory[name] for name in memory))}
 
 
 def _law(name: str) -> Entry:

@@ -27,7 +27,6 @@ from pteron.equations.drives import Drives
 from pteron.equations.machine import Machine
 from pteron.equations.topology import stored_numbers, topology_of, with_stored_numbers
 from pteron.equations.transmissions import DriveKind, actuator_count
-from pteron.equations.virtual_work import FEASIBLE
 from pteron.errors import ModelError
 from pteron.kernels.functions import (
     ANGLES,
@@ -346,14 +345,11 @@ def _program(
             if form.wrench:
                 parts = ca.vertsplit(symbols["wrench"], 3)
                 known["wrench"] = ca.vertcat(*(ca.mtimes(axes.T, part) for part in parts))
-    built = dict(definition.build(machine, Inputs(**known)))
-    feasible = built.pop(FEASIBLE, None)
+    built = definition.build(machine, Inputs(**known))
     forms = [{name: _with_shape(unshaped) for name, unshaped in built.items()}]
     if form.guarded:
         results = [expression for expression, _ in forms[0].values()]
         statuses = _statuses(machine, definition, symbols, results)
-        if feasible is not None:
-            statuses = [ca.if_else(feasible, status, 0) for status in statuses]
         forms = [{**forms[0], "status": (status, ())} for status in statuses]
     everything = ca.veccat(*(expression for expression, _ in forms[0].values()))
     used = [n for n, v in vectors.items() if n == "geometry" or ca.depends_on(everything, v)]

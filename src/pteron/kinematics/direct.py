@@ -22,7 +22,7 @@ from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.manipulator.variants import with_elbows
 from pteron.platforms.coordinates import wrap_angle
 from pteron.shapes import JointsLike, OnFailure, PerJoint, PoseLike, Poses
-from pteron.tolerances import SAME
+from pteron.tolerances import LAST_DIGITS, SAME
 
 _FIT, _FIT_STEPS = 1e-6, 8
 """Share of a leg's length by which a redundant machine's joint may miss a pose; steps of least
@@ -257,9 +257,9 @@ def _fitting_poses(
             tried = assembly_modes(part, given[:, list(legs)], all_branches=all_branches)
             rows = np.broadcast_to(given[:, None], (*tried.shape[:-1], given.shape[-1]))
             for _ in range(_FIT_STEPS):
-                tried = numeric(robot, "newton_step")(rows, tried)[0]
+                tried, change, _ = numeric(robot, "newton_step")(rows, tried)
             elbows = working_mode(robot, tried, rows, tolerance=allowed)
-            misses = (elbows == 0).any(axis=-1)
+            misses = (elbows == 0).any(axis=-1) | ~(change < LAST_DIGITS)
             if not all_branches:
                 misses |= (elbows != [leg.elbow for leg in robot.legs]).any(axis=-1)
             tried[misses | _is_repeated(robot, tried)] = np.nan

@@ -259,6 +259,7 @@ def _fault_text(
         return (
             f"no forces are asked for at the joints {pose_text(joints[-1])}: they have no pose "
             "near the last one, or the wanted pose is out of the controller's reach"
+            + (", or no forces within limits move it so" if robot.greatest_forces else "")
         )
     if fault == _NOT_INTEGRATED:
         return why_not_further(robot, *np.split(arrays["state"].ravel(), [m, 2 * m])[:2])
