@@ -5,8 +5,8 @@ from collections import Counter
 import casadi as ca
 import numpy as np
 import pytest
-from mechanisms import CATALOG
 
+import pteron
 from pteron.kernels import program
 from pteron.kernels.graph import expression, function_like, graph_of
 from pteron.kernels.lifetimes import with_short_lifetimes
@@ -29,7 +29,7 @@ def most_alive(graph):
     [("delta", "forward_dynamics", 0.9), ("stewart", "inverse_dynamics", 0.7)],
 )
 def test_fewer_values_are_alive_and_results_equal(name, what, share):
-    function = program(CATALOG[name], what).function
+    function = program(pteron.load(name), what).function
     graph = graph_of(function)
     ordered = with_short_lifetimes(graph)
     assert most_alive(ordered) < share * most_alive(graph)

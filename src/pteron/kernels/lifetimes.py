@@ -16,7 +16,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pteron.kernels.graph import CONSTANT, INPUT, Graph
 from pteron.kernels.program_cache import cached_result
 
-_CLUSTER, _WORK = 40, 100_000
+_CLUSTER, _WORK = 40, 150_000
 """Most operations of a cluster, see `_by_clusters`, and most times the number of operations, so
 that the order of any graph takes some seconds. Measured on the forward dynamics of hexapods:
 clusters of 10 leave up to twice as many bytes spilled, clusters of 120 none fewer."""
