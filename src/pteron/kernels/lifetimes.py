@@ -11,9 +11,9 @@ from __future__ import annotations
 
 import heapq
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
-from pteron.kernels.graph import CONSTANT, INPUT, Graph
+from pteron.kernels.graph import CONSTANT, INPUT, LOAD, STORE, Graph, Node
 from pteron.kernels.program_cache import cached_result
 
 _CLUSTER, _WORK = 40, 150_000
@@ -24,36 +24,41 @@ clusters of 10 leave up to twice as many bytes spilled, clusters of 120 none few
 _FEW = 3
 """Unevaluated uses of a value from which on its last use is foreseen; 8 give the same orders."""
 
-_NUMBERS = 116
+NUMBERS = 116
 """Numbers of double precision in the registers of a thread: 255 of 32 bits, less some for addresses
-and intermediate results. Between 100 and 122 all choices of `_order` but one are the same."""
+and intermediate results."""
 
 _Operands = Mapping[int, Sequence[int]]
 """The operations that each operation reads, once each; operations are numbers of graph nodes."""
 
 
-def with_short_lifetimes(graph: Graph) -> Graph:
+def with_short_lifetimes(graph: Graph, numbers: int = NUMBERS) -> Graph:
     """Return the graph with its operations in an order in which few values are alive at once.
 
-    Operations that are computed before all others (shared ones, sines and cosines of inputs) remain
-    first. Those that no output needs are left out.
+    Where there are more than `numbers`, the one whose next use comes last is stored in memory
+    (operation `STORE`) and loaded before that use (`LOAD`). Operations that are computed before all
+    others (shared ones, sines and cosines of inputs) remain first. Those that no output needs are
+    left out.
     """
-    order = cached_result(("statement order", graph), (), lambda: _order(graph))
-    places = {k: place for place, k in enumerate(order)}
+    steps = cached_result(("statements", graph, numbers), (), lambda: _steps(graph, numbers))
+    nodes, places, stores = list[Node](), dict[int, int](), dict[int, int]()
+    for operation, k in steps:
+        node = graph.nodes[k]
+        if operation == LOAD:
+            node = Node(LOAD, (stores[k],))
+        elif operation == STORE:
+            stores[k] = len(nodes)
+            node = Node(STORE, (places[k],))
+        elif operation != INPUT:
+            node = node._replace(arguments=tuple(places[a] for a in node.arguments))
+        places[k] = len(nodes)
+        nodes.append(node)
+    outputs = (tuple(places[k] for k in part) for part in graph.outputs)
+    return Graph(tuple(nodes), tuple(outputs))
 
-    def renumbered(numbers: Iterable[int]) -> tuple[int, ...]:
-        """Return the new numbers of nodes."""
-        return tuple(places[k] for k in numbers)
 
-    nodes = (
-        node if node.operation == INPUT else node._replace(arguments=renumbered(node.arguments))
-        for node in (graph.nodes[k] for k in order)
-    )
-    return Graph(tuple(nodes), tuple(map(renumbered, graph.outputs)))
-
-
-def _order(graph: Graph) -> list[int]:
-    """Return the numbers of the nodes that outputs need, in the new order."""
+def _steps(graph: Graph, numbers: int) -> list[tuple[str, int]]:
+    """Return (operation, node) of the nodes that outputs need, of stores and of loads, in order."""
     nodes, results = graph.nodes, {k for part in graph.outputs for k in part}
     needed = set(results)
     for k in reversed(range(len(nodes))):
@@ -69,8 +74,9 @@ def _order(graph: Graph) -> list[int]:
     }
     starts = (_backward(operands, results & movable, sign) for sign in (1, -1))
     orders = [_by_clusters(start, operands, results) for start in starts]
-    order = min(orders, key=lambda order: _count_transfers(order, operands, results))
-    return [*sorted(needed - movable), *order]
+    steps = min((_with_transfers(order, operands, results, numbers) for order in orders), key=len)
+    first = [(k, "") for k in sorted(needed - movable)]
+    return [(operation or nodes[k].operation, k) for k, operation in (*first, *steps)]
 
 
 def _users(operands: _Operands) -> dict[int, list[int]]:
@@ -164,25 +170,30 @@ def _by_clusters(order: Sequence[int], operands: _Operands, results: set[int]) -
     return list(evaluated)
 
 
-def _count_transfers(order: Sequence[int], operands: _Operands, results: set[int]) -> int:
-    """Return how often numbers are stored and loaded for lack of registers.
+def _with_transfers(
+    order: Sequence[int], operands: _Operands, results: set[int], numbers: int
+) -> list[tuple[int, str]]:
+    """Return the order as pairs (operation, ""), with stores and loads where registers are full.
 
-    If all are full, the number whose next use comes last is stored (L. A. Belady, IBM Systems
-    Journal 5 (1966) 78-101).
+    The number whose next use comes last is stored (L. A. Belady, IBM Systems Journal 5 (1966)
+    78-101).
     """
     uses = {k: [len(order)] if k in results else [] for k in order}
     for place in reversed(range(len(order))):
         for a in operands[order[place]]:
             uses[a].append(place)
-    present, stored, loads = set[int](), set[int](), 0
+    present, stored, steps = set[int](), set[int](), list[tuple[int, str]]()
     for k in order:
-        for a in operands[k]:
-            loads += a not in present
-            uses[a].pop()
+        steps += ((a, LOAD) for a in operands[k] if a not in present)
+        steps.append((k, ""))
         present.update(operands[k], (k,))
+        for a in operands[k]:
+            uses[a].pop()
         present -= {a for a in operands[k] if not uses[a]}
-        while len(present) > _NUMBERS:
+        while len(present) > numbers:
             last = max(present, key=lambda a: uses[a][-1])
             present.remove(last)
-            stored.add(last)
-    return len(stored) + loads
+            if last not in stored:
+                stored.add(last)
+                steps.append((last, STORE))
+    return steps
