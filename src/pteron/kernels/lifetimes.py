@@ -3,8 +3,8 @@
 A thread has 255 registers, enough for some 120 numbers of double precision; values beyond these are
 *spilled* to memory. NVIDIA's compiler mostly preserves the order of statements. A graph's own order
 follows its outputs and keeps values of all legs alive until they are added up; the order here
-evaluates a leg's contributions together where the sums allow it. No sum is rearranged, so that the
-results have the same bits.
+evaluates a leg's contributions together where the sums allow it, and where registers are full it
+stores the numbers that are used last. No sum is rearranged, so that the results have the same bits.
 """
 
 from __future__ import annotations
