@@ -294,8 +294,8 @@ def test_nvidia_compiles_it(name, architecture):
     for what in ("inverse_dynamics", "forward_dynamics", "inverse_kinematics"):
         report = nvrtc.compiled(pteron.compile(robot, what, "cuda").source, architecture)
         assert report.registers <= 255
-        if robot.joint_count <= 4:
-            assert report.spilled == 0, (what, report)
+        most = 200 if robot.joint_count > 4 and what == "forward_dynamics" else 0
+        assert report.spilled <= most, (what, report)
     code = loop(robot, pteron.kernels.program(robot, "pd_gravity")).code(1)
     assert nvrtc.compiled(replace(code, device=True).source, architecture).registers <= 255
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Container, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 from pteron.kernels.c import c_language
@@ -11,6 +11,7 @@ from pteron.kernels.code import names_of, statements
 from pteron.kernels.exponential import with_lowered_exponentials
 from pteron.kernels.graph import Graph, graph_of
 from pteron.kernels.kernel import Port
+from pteron.kernels.lifetimes import with_short_lifetimes
 from pteron.kernels.program_cache import Program
 
 _ANGLES = {"sin": "sine", "cos": "cosine"}
@@ -24,13 +25,15 @@ class Block:
     `numbers` the machine's own, and `own` values that are computed from `numbers` once. An output
     whose name is a key of `later` replaces the output named there, in lanes that do not `slide`. If
     the block is `split`, these outputs are computed in a second part, which reads rows that the
-    first part has `kept`; else there is one part.
+    first part has `kept`; else there is one part. For a GPU, `needed` names the outputs that are
+    computed, by statements in an order that needs few registers.
     """
 
     name: str
     program: Program
     later: Mapping[str, str] | None = None
     split: bool = False
+    needed: Container[str] | None = None
 
     @cached_property
     def state_inputs(self) -> tuple[Port, ...]:
@@ -128,7 +131,12 @@ class Block:
     @cached_property
     def _graph(self) -> Graph:
         """The graph of the program's arithmetic, exponentials expanded into plain operations."""
-        return graph_of(with_lowered_exponentials(self.program.function), self.program.inputs)
+        graph = graph_of(with_lowered_exponentials(self.program.function), self.program.inputs)
+        if self.needed is None:
+            return graph
+        pairs = zip(self.program.outputs, graph.outputs, strict=True)
+        outputs = tuple(part if port.name in self.needed else () for port, part in pairs)
+        return with_short_lifetimes(replace(graph, outputs=outputs))
 
     @cached_property
     def _shared_nodes(self) -> frozenset[int]:

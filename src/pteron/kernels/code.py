@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pteron.kernels.exponential import exponential_function
-from pteron.kernels.graph import CONSTANT, INPUT, Graph, graph_of
+from pteron.kernels.graph import CONSTANT, INPUT, LOAD, STORE, Graph, graph_of
 from pteron.kernels.kernel import Port
 from pteron.kernels.sincos import LIMIT, reduced_sincos
 
@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     import jinja2
 
 C = {
+    STORE: "{0}",
+    LOAD: "{0}",
     "add": "{0} + {1}",
     "sub": "{0} - {1}",
     "mul": "{0} * {1}",
@@ -100,7 +102,9 @@ def statements(
         if node.operation not in printed:
             raise ValueError(f"operation {node.operation} has no printer")
         text = printed[node.operation].format(*(names[i] for i in node.arguments))
-        lines.append(form.format(names[k], text))
+        # A compiler does not keep a volatile variable in a register.
+        stated = form.replace("const ", "volatile ", 1) if node.operation == STORE else form
+        lines.append(stated.format(names[k], text))
     return lines
 
 

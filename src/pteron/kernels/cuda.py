@@ -25,6 +25,7 @@ from pteron.kernels.code import module_values
 from pteron.kernels.exponential import with_lowered_exponentials
 from pteron.kernels.graph import graph_of
 from pteron.kernels.kernel import Kernel, Port, broadcast_lead
+from pteron.kernels.lifetimes import NUMBERS, with_short_lifetimes
 from pteron.kernels.loop_code import RESULTS, STATE, LoopCode
 
 _THREADS = 128
@@ -53,6 +54,7 @@ class DeviceKernel(Kernel):
     def source(self) -> str:
         """The CUDA source of the kernel."""
         graph = graph_of(with_lowered_exponentials(self.function), self.ports)
+        graph = with_short_lifetimes(graph, NUMBERS * 8 // np.dtype(self.dtype).itemsize)
         language = c_language(self.dtype)
         texts = module_values(self.name, graph, self.ports, self.outputs, language)
         return module_of("kernel.cu.j2", texts, self.dtype)

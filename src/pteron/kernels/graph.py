@@ -22,6 +22,9 @@ Value = TypeVar("Value")
 INPUT, CONSTANT = "input", "constant"
 """Operations of nodes that compute nothing."""
 
+STORE, LOAD = "store", "load"
+"""Operations that put a value in memory and return it, for lack of registers: see `lifetimes`."""
+
 _CODES = {
     "add": ca.OP_ADD,
     "sub": ca.OP_SUB,

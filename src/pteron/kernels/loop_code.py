@@ -155,11 +155,29 @@ class LoopCode:
     def _blocks(self) -> list[Block]:
         """The blocks of C code: the plant, and sensors and law where the loop has them."""
         parts = {"sensed": self.sensed, "law": self.law}
-        blocks = [Block(name, part) for name, part in parts.items() if part is not None]
+        blocks = [
+            Block(name, part, needed=self._needed(part))
+            for name, part in parts.items()
+            if part is not None
+        ]
         # Machines side by side rarely slide all at once, and one part fills the pipeline better.
         later = STUCK if self.kind.dry else None
-        plant = Block("plant", self.plant, later, split=later is not None and self.lanes == 1)
+        split = later is not None and self.lanes == 1
+        plant = Block("plant", self.plant, later, split, self._needed(self.plant))
         return [plant, *blocks]
+
+    def _needed(self, part: Program) -> list[str] | None:
+        """Return the outputs of a program that the loop reads on a GPU; None on the processor.
+
+        The joints' growth, friction and breakaway are read where friction is dry.
+        """
+        if not self.device:
+            return None
+        names = [port.name for port in part.outputs]
+        if part is self.plant and not self.kind.dry:
+            growths = [growth for _, growth in self.kind.extra_states]
+            names = [name for name in names if name in ("acceleration", "status", *growths)]
+        return names
 
     @cached_property
     def source(self) -> str:
