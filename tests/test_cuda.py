@@ -255,8 +255,8 @@ def test_an_unknown_device_is_refused():
 
 def expect_clean(selection, *options):
     """Run a selection of this file's tests under sanitizers; assert that all pass."""
-    command = [sys.executable, "-m", "pytest", "-qs", "-p", "no:cacheprovider", *options]
-    done = sanitized([*command, __file__, "-k", selection])
+    command = [sys.executable, "-m", "pytest", "-qs", "--timeout", "0", "-p", "no:cacheprovider"]
+    done = sanitized([*command, *options, __file__, "-k", selection])
     assert done.returncode == 0, (done.stdout + done.stderr)[-3000:]
 
 
@@ -270,6 +270,7 @@ def test_nothing_is_read_or_written_beyond_an_array():
 
 @LINUX
 @CLIENTS
+@pytest.mark.timeout(3600)  # sanitized code of some fifty functions is compiled
 @pytest.mark.parametrize("name", gated(pteron.catalog(), ["delta"]))
 def test_no_machine_reads_or_writes_beyond_an_array(name):
     expect_clean(f"[{name}] and (every_function or exported_functions_have)", "-m", "")
