@@ -259,8 +259,10 @@ def test_legs_and_platforms_that_do_not_fit_are_refused_in_a_line():
             "crank_arc: 4 rad given, one between 0 and pi",
         ),
         (
-            lambda: replace(eye, legs=(replace(eye.legs[0], link_arc=0.3), *eye.legs[1:])),
-            "crank_arc, link_arc: 1.5708 and 0.3 rad do not close at angles zero",
+            lambda: replace(
+                eye, legs=(replace(eye.legs[0], crank_arc=0.4, link_arc=0.3), *eye.legs[1:])
+            ),
+            "leg 1: crank_arc, link_arc: 0.4 and 0.3 rad do not close at angles zero",
         ),
         (
             lambda: replace(
