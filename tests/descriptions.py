@@ -119,6 +119,8 @@ class Machine:
     """Of the turns by its angles in the order in which they follow each other, each with its
     angle's place in the pose; a tripod's yaw counts behind the pose."""
     center: np.ndarray | None = None
+    offset: np.ndarray | None = None
+    """From the center to P at angles zero, where P turns about the first axis."""
 
     @property
     def freedom(self):
@@ -156,6 +158,7 @@ def describe(robot):
             tilts=platform.motion,
             axes=tuple(axes),
             center=platform.center,
+            offset=platform.axis_offset,
         )
     count, turns = MOTIONS[platform.motion]
     return Machine(
@@ -181,7 +184,7 @@ def _leg(leg, k):
         d = _across(first)
     elif getattr(leg, "second_elbow", None) is not None:
         d = first = np.zeros(3)  # they are the platform's
-    elif leg.type == "UPS":
+    elif leg.type in ("UPS", "UPU"):
         first = d = np.eye(3)[0]  # nothing depends on them
     else:
         d = np.array(leg.direction)
@@ -253,6 +256,9 @@ def tilted(machine, pose):
         pose = ca.vertcat(pose, yaw)
     else:
         p = pose[:3] if machine.tilts in ("3T3R", "3T2R") else ca.DM(machine.center)
+    if machine.offset is not None:
+        axis, place = machine.axes[0]
+        p += about(axis, pose[place]) @ ca.DM(machine.offset)
     turn = ca.SX.eye(3)
     for axis, place in machine.axes:
         turn = turn @ about(axis, pose[place])

@@ -617,7 +617,7 @@ def test_a_missing_file_is_told_by_the_file_beside_it_that_may_be_meant(tmp_path
 
 def test_files_that_cannot_be_read_are_refused(tmp_path):
     missing = tmp_path / "nowhere.toml"
-    words = "neither a file nor a machine of the catalog (3-prr, 3-rpr, 3-rrr, ankle, "
+    words = "neither a file nor a machine of the catalog (3-prr, 3-rpr, 3-rrr, 3-upu, 5-rpur, "
     refused(lambda: pteron.load(missing), f"{missing}: {words}")
     refused(lambda: pteron.load("quadrupteorn"), 'did you mean "quadrupteron"?')
     refused(lambda: pteron.load("delta.toml"), 'did you mean "delta"?')

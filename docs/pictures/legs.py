@@ -18,9 +18,28 @@ from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrowPatch
 
 from pteron.bodies import PlanarInertia, RodInertia
+from pteron.bodies.inertia import SpatialInertia
 from pteron.bodies.motion import PointMotion, RotationMotion, Turn
 from pteron.kernels import Array
-from pteron.legs import PRR, PRRR, PRS, PSS, RPR, RPS, RRR, RRS, RSS, RUPU, UPS, LegKind
+from pteron.legs import (
+    PRR,
+    PRRR,
+    PRRS,
+    PRS,
+    PRUR,
+    PSS,
+    RPR,
+    RPS,
+    RPUR,
+    RRR,
+    RRS,
+    RSS,
+    RUPU,
+    SRRR,
+    UPS,
+    UPU,
+    LegKind,
+)
 
 INK, MUTED, PAPER = "#1c2630", "#8a949e", "#ffffff"
 UPPER, LOWER, PLATE, GIVEN = "#0072b2", "#d55e00", "#3d6b8f", "#00795a"
@@ -28,6 +47,7 @@ UPPER, LOWER, PLATE, GIVEN = "#0072b2", "#d55e00", "#3d6b8f", "#00795a"
 
 _BODY = PlanarInertia.of_body(1.0, (0.0, 0.0), 1.0)
 _ROD = RodInertia.of_body(1.0, (0.0,), 1.0)
+_SOLID = SpatialInertia(1.0, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 1.0, 0.0, 1.0))
 _FRAME = 0.055
 """Length of a frame's axes, m."""
 
@@ -230,9 +250,9 @@ def _lengths(sheet: Sheet, posed: Posed, upper: Way, lower: Way) -> None:
         sheet.name(posed.c - l_l - 0.35 * l_u, "$l_u$", UPPER, upper)
 
 
-def prrr() -> Sheet:
-    """Draw a P-R-R-R leg: the slider along y, the links in the plane of x and z."""
-    leg = PRRR((0.16, 0, 0.06), (0, 1, 0), (-0.08, 0, 0), 0.16, 0.17, 1.0, _BODY, _BODY)
+def prrr(kind: type[PRRR] = PRRR) -> Sheet:
+    """Draw a P-R-R-R leg, or one that ends in a ball joint: the slider along y."""
+    leg = kind((0.16, 0, 0.06), (0, 1, 0), (-0.08, 0, 0), 0.16, 0.17, 1.0, _BODY, _BODY)
     p = np.array([0.46, 0.13, 0.17])
     posed = Posed(leg, p + leg.platform_point)
     sheet = Sheet(-62.0, 20.0, (6.6, 4.4))
@@ -240,7 +260,7 @@ def prrr() -> Sheet:
     sheet.line([r - 0.08 * d, r + 0.26 * d], MUTED, 3.0)
     sheet.arrow(r + 0.22 * d, r + 0.32 * d, "$e$ (default: $d$)", GIVEN, (-1.0, 0.9), 1.0)
     _slider(sheet, r1, d)
-    for point in (r1, r2, posed.c):
+    for point in (r1, r2, *((posed.c,) if kind is PRRR else ())):
         sheet.axle(point, d, 0.06)
     sheet.arrow(r2, r2 + 0.08 * d, "$d$", GIVEN, (0.6, 0.3), 1.0)
     sheet.arrow(r, r1, "$q$", INK, (-0.7, 0.6), 0.4)
@@ -249,7 +269,7 @@ def prrr() -> Sheet:
     sheet.line([r2, posed.c], LOWER, 3.2)
     _lengths(sheet, posed, (-0.5, -0.9), (-0.8, 0.3))
     _scene(sheet, posed, p, [(-0.08, 0, 0), (0.05, -0.07, 0), (0.06, 0.06, 0)])
-    ankle = posed.c, "R3", (-1.2, 0.4)
+    ankle = posed.c, "R3" if kind is PRRR else "ball joint", (-1.2, 0.4)
     _ends(sheet, posed, (r1, "R1", (-0.4, 1.3)), (r2, "R2", (-0.2, -1.2)), ankle)
     return sheet
 
@@ -382,9 +402,9 @@ def rpr(kind: type[RPR] = RPR) -> Sheet:
     return sheet
 
 
-def ups() -> Sheet:
-    """Draw a U-P-S leg."""
-    leg = UPS((0.14, 0.05, 0.0), (-0.1, 0.03, 0.0), _ROD, _ROD, (0.2, 0.5), direction=(1, 0, 0))
+def ups(kind: type[UPS] | type[UPU] = UPS) -> Sheet:
+    """Draw a U-P-S leg, or a U-P-U leg."""
+    leg = kind((0.14, 0.05, 0.0), (-0.1, 0.03, 0.0), _ROD, _ROD, (0.2, 0.5), direction=(1, 0, 0))
     p = np.array([0.36, 0.02, 0.26])
     posed = Posed(leg, p + leg.platform_point)
     sheet = Sheet(-60.0, 20.0, (5.6, 4.6))
@@ -398,7 +418,99 @@ def ups() -> Sheet:
     both: dict[str, Any] = {"arrowstyle": "<|-|>", "linewidth": 0.9}
     sheet.arrow(r + beside, posed.c + beside, "$q$", INK, (0.8, -0.2), **both)
     _scene(sheet, posed, p, _plate(0.1, 0.06))
-    _ends(sheet, posed, (r, "base joint", (-0.6, -1.2)), (posed.c, "ball joint", (-2.4, 0.6)))
+    end = "ball joint"
+    if kind is UPU:
+        end = "universal joint"
+        sheet.axle(posed.c, d, 0.05)
+        sheet.axle(posed.c, np.cross(d, n), 0.05)
+        sheet.arrow(r, r + 0.08 * d, "$u$", GIVEN, (0.8, -0.4), 1.0)
+    _ends(sheet, posed, (r, "base joint", (-0.6, -1.2)), (posed.c, end, (-2.4, 0.6)))
+    return sheet
+
+
+_AXES = (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)
+"""The axes a and b of a platform with five freedoms."""
+
+
+def prur() -> Sheet:
+    """Draw a P-R-U-R leg with a slider across a."""
+    ends = (0.1, -0.1, 0.05), (0, 1, 0), (-0.08, 0.0, 0.0)
+    leg = PRUR(*ends, 0.2, 0.2, 1.0, _BODY, _SOLID).with_platform_rotation(_AXES, None)
+    p = np.array([0.36, 0.36, 0.14])
+    posed = Posed(leg, p + leg.platform_point)
+    sheet = Sheet(-62.0, 22.0, (6.6, 4.8))
+    r, e = np.array(leg.guide_point), np.array(leg.slider_direction)
+    r1, center = posed.points[1:3]
+    sheet.line([r - 0.06 * e, r + 0.3 * e], MUTED, 3.0)
+    sheet.arrow(r + 0.26 * e, r + 0.35 * e, "$e$", GIVEN, (0.6, 0.3), 1.0)
+    _slider(sheet, r1, e)
+    sheet.arrow(r, r1, "$q$", INK, (-0.7, 0.6), 0.4)
+    sheet.line([r1, center], UPPER, 3.2)
+    _five_axes(sheet, posed, p, (r1, "R1", (-0.4, 1.2)), center)
+    return sheet
+
+
+def rpur() -> Sheet:
+    """Draw an R-P-U-R leg."""
+    ends = (0.1, 0.0, 0.05), (-0.08, 0.0, 0.0), _BODY, _SOLID, (0.1, 0.5)
+    leg = RPUR(*ends, lower_length=0.2, piston=_BODY).with_platform_rotation(_AXES, None)
+    p = np.array([0.42, 0.36, 0.14])
+    posed = Posed(leg, p + leg.platform_point)
+    sheet = Sheet(-62.0, 22.0, (6.6, 4.8))
+    r, center = posed.points[0], posed.points[2]
+    sheet.line([r, r + 0.6 * (center - r)], UPPER, 6.5)
+    sheet.line([center, center - 0.6 * (center - r)], LOWER, 2.8)
+    beside = np.array([0.0, 0.0, -0.03])
+    both: dict[str, Any] = {"arrowstyle": "<|-|>", "linewidth": 0.9}
+    sheet.arrow(r + beside, center + beside, "$q$", INK, (0.6, -0.8), **both)
+    _five_axes(sheet, posed, p, (r, "base joint", (-0.4, 1.2)), center)
+    return sheet
+
+
+def _five_axes(
+    sheet: Sheet, posed: Posed, p: Array, first: tuple[Array, str, Way], center: Array
+) -> None:
+    """Draw the last link of a leg with five axes, its axes a and b, and the platform."""
+    a, b = (np.array(axis) for axis in _AXES)
+    for point in (first[0], center):
+        sheet.axle(point, a, 0.06)
+    for point in (center, posed.c):
+        sheet.axle(point, b, 0.06)
+    sheet.arrow(center, center + 0.09 * a, "$a$", GIVEN, (0.7, 0.3), 1.0)
+    sheet.arrow(center, center + 0.09 * b, "$b$", GIVEN, (0.5, -0.7), 1.0)
+    sheet.line([center, posed.c], LOWER, 3.2)
+    _lengths(sheet, posed, (0.3, 0.9), (-0.9, 0.5))
+    _scene(sheet, posed, p, _plate(0.1, 0.06))
+    _ends(sheet, posed, first, (center, "U", (-0.9, -0.7)), (posed.c, "R4", (0.3, 1.2)))
+
+
+def srrr() -> Sheet:
+    """Draw a spherical R-R-R leg about its centre."""
+    frame = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    leg = SRRR((0, 0, -1), (1, 0, 0), (-0.06, 0.17, 0.06), 1.2, 1.4, _BODY, _SOLID)
+    center = np.array([0.3, 0.2, 0.3])
+    leg = leg.with_platform_rotation(frame, tuple(center))
+    posed = Posed(leg, center + leg.platform_point)
+    sheet = Sheet(-52.0, 22.0, (5.6, 5.0))
+    start, knee, _ = (point - center for point in posed.points)
+    for arm, color, name in (
+        (start, UPPER, "$u$"),
+        (knee, INK, "$w$"),
+        (posed.c - center, LOWER, "$v$"),
+    ):
+        sheet.line([center, center + 1.25 * arm], MUTED, 1.0, linestyle=(0, (6, 2, 1, 2)))
+        sheet.name(center + 1.3 * arm, name, color, (0.5, 0.5))
+    for one, other, color, name in (
+        (start, knee, UPPER, "crank"),
+        (knee, posed.c - center, LOWER, "link"),
+    ):
+        ways = [(1 - t) * one + t * other for t in np.linspace(0.0, 1.0, 30)]
+        arc = [center + np.linalg.norm(one) * v / np.linalg.norm(v) for v in ways]
+        sheet.line(arc, color, 3.2)
+        sheet.name(arc[15], name, color, (1.6, 0.3))
+    sheet.arrow(center, center + 0.15 * np.array([1.0, 0.0, 0.0]), "$a_0$", GIVEN, (0.8, 0.0), 1.0)
+    _scene(sheet, posed, center, _plate(0.08, 0.06))
+    _ends(sheet, posed, *((point, "", (0.0, 0.0)) for point in posed.points))
     return sheet
 
 
@@ -438,6 +550,11 @@ DRAWINGS: dict[str, Callable[[], Sheet]] = {
     "RPS": partial(rpr, RPS),
     "PRS": partial(prr, PRS),
     "RRS": partial(rrr, RRS),
+    "PRRS": partial(prrr, PRRS),
+    "PRUR": prur,
+    "RPUR": rpur,
+    "SRRR": srrr,
+    "UPU": partial(ups, UPU),
 }
 
 

@@ -16,7 +16,7 @@ from pteron.bodies.motion import Expression
 from pteron.closures.closure import Closure, plain_rows, rows_in_quasi_velocities
 from pteron.closures.determinants import determinant, determinant_square
 from pteron.errors import ModelError
-from pteron.legs.leg import LegEquations, LegMotion
+from pteron.legs.leg import LegEquations, LegMotion, force_arm
 from pteron.platforms.motion import PlatformEquations, PlatformMotion
 
 
@@ -97,8 +97,8 @@ class TiltingLoci(Closure):
         if not all(row[3:].is_zero() for row in rows):
             points = [c.position - platform.body.position for c in platform.points]
             for i, row in enumerate(rows):
-                force, moment = row[:3].T, row[3:].T
-                points[i] = points[i] + ca.cross(force, moment) / ca.dot(force, force)
+                arm = force_arm(row)
+                points[i] = points[i] if arm is None else points[i] + arm
         center = ca.SX(3, 1) if centred else sum(points) / len(points)
         square = sum(ca.dot(s - center, s - center) for s in points)
         if (distance := self.platform.axis_distance) is not None:

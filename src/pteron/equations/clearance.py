@@ -147,7 +147,7 @@ def _leg_segments(
         yield Body("guide", i, f"leg {i} guide"), [(r + low * e, r + high * e)]
     upper, lower = motion.links
     if upper is not None:
-        start = motion.bodies["u"].position
+        start = next(joint.point for joint in motion.chain if joint.body == "u")
         yield Body("upper", i, f"leg {i} {leg.names['u']}"), [(start, start + upper)]
     if lower is not None:
         half = _half_bar(leg)

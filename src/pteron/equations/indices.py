@@ -20,6 +20,7 @@ from pteron.closures.determinants import adjugate, determinant, solve
 from pteron.equations.machine import Machine, State
 from pteron.equations.singular_values import largest, singular_values, smallest
 from pteron.errors import ModelError
+from pteron.legs.leg import force_arm
 
 
 class Homogeneous(NamedTuple):
@@ -259,14 +260,16 @@ def pressure_angle(machine: Machine, state: State) -> Expression:
         direction = joint.axis
         if joint.kind == "R":
             direction = ca.cross(joint.axis, next_joint.point - joint.point)
-        angles.append(_angle_between_lines(leg.row[:3].T, direction))
+        thrust = leg.row[:3].T if leg.thrust is None else leg.thrust
+        angles.append(_angle_between_lines(thrust, direction))
     return reduce(ca.fmax, angles)
 
 
 def output_pressure_angle(machine: Machine, state: State) -> Expression:
     """Return the greatest angle between a leg's force and its point's motion, rad.
 
-    The motion is that with the other joints held: a column of J^-1.
+    The motion is that with the other joints held: a column of J^-1. Where the force does not pass
+    through the platform point, it is the motion of the point of its line that is nearest to it.
     """
     if machine.closure.is_redundant:
         raise ModelError(
@@ -276,7 +279,10 @@ def output_pressure_angle(machine: Machine, state: State) -> Expression:
     adj, angles = adjugate(plain_rows(state.platform, state.legs)), [ca.SX(0)]
     for i, (leg, matrix) in enumerate(zip(state.legs, state.platform.matrices, strict=True)):
         if leg.pushes:
-            angles.append(_angle_between_lines(leg.row[:3].T, ca.mtimes(matrix[:3, :], adj[:, i])))
+            motion = ca.mtimes(matrix[:3, :], adj[:, i])
+            if (arm := force_arm(leg.row)) is not None:  # at the force's line
+                motion += ca.cross(ca.mtimes(matrix[3:, :], adj[:, i]), arm)
+            angles.append(_angle_between_lines(leg.row[:3].T, motion))
     return reduce(ca.fmax, angles)
 
 

@@ -95,6 +95,8 @@ class LegMotion(NamedTuple):
     row_size: Expression | None = None
     """The norm in space of the force that `row` is, where it is known without computation: the
     length of the link that `row` lies along."""
+    thrust: Expression | None = None
+    """The direction (3, 1) of that force at the driven body's end, where it is another there."""
 
     @property
     def actuated_joint(self) -> Joint:
@@ -143,6 +145,15 @@ class Needs(NamedTuple):
     def zeros(cls, columns: int) -> Needs:
         """Return the required forces of a leg without bodies: zeros with this number of columns."""
         return cls(ca.SX(1, columns), ca.SX(6, columns), ca.SX(1, columns))
+
+
+def force_arm(row: Expression) -> Expression | None:
+    """Return the vector (3, 1) from the platform point to the line of the force of a row (1, 6).
+
+    The result is None for a force through the platform point.
+    """
+    force, moment = row[:3].T, row[3:].T
+    return None if moment.is_zero() else ca.cross(force, moment) / ca.dot(force, force)
 
 
 def force_wrench(force: Expression) -> Expression:

@@ -1,8 +1,8 @@
 """Spherical R-R-R legs, of the Agile Eye and of wrists: three revolute axes meet at the centre.
 
 The crank leads by an arc from its axis u to w, the link by another to v, which the platform
-carries: w . u = cos(crank_arc), w . v = cos(link_arc). As a force the leg's row is -w at the
-platform point; about the centre it is the moment w x v.
+carries: w . u = cos(crank_arc), w . v = cos(link_arc). As a force across v at the platform point
+the leg's row is cos(link_arc) v - w; about the centre it is the moment w x v.
 """
 
 from __future__ import annotations
@@ -238,7 +238,8 @@ class SRRREquations(LegEquations):
         rate = -ca.dot(w, dv) / divisor
         pull = 2 * rate * ca.dot(side, dv) + rate * rate * ca.dot(ca.cross(u, side), v)
         acceleration = -(ca.dot(w, ddv) + pull) / divisor
-        row = point_rows(-w.T)
+        cosine, sine = self.link
+        row = point_rows((cosine * v - w).T)
         joint_row = row / (divisor * length)
         # omega = q' u + p' w + s' v.
         omega, growth = angular_motion(rotation)
@@ -255,7 +256,6 @@ class SRRREquations(LegEquations):
         ddk, ddy = acceleration * y - square * k, -acceleration * k - square * y
         fixed = self.r, ca.SX(3, 6), ca.SX(3, 1)
         crank = BodyMotion(*fixed, u, joint_row, k, y, ddk, ddy)
-        cosine, sine = self.link
         link_row = ca.mtimes(u, joint_row) + ca.mtimes(w, second[0])
         turning = rate * u + rates[0] * w
         growing = acceleration * u + second[2] * w + swing
@@ -279,7 +279,8 @@ class SRRREquations(LegEquations):
             chain,
             (knee - start, point.position - knee),
             ((rate, acceleration), None),
-            ca.SX(1),
+            sine,
+            v - cosine * w,
         )
 
     def reach(self, c: Expression) -> Reach:

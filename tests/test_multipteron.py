@@ -1,0 +1,326 @@
+"""The rest of the multipteron family and its kin: five freedoms, spherical legs, axes that do not
+meet; on machines drawn at random, against Lagrange's equations, engines and dense searches."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import tilting
+import trees
+from lagrange import Lagrange
+from mechanisms import NIGHTLY, relative_error, scaled, several
+from scipy.optimize import least_squares
+
+import pteron
+from pteron.errors import ModelError
+from pteron.kernels import numeric
+from pteron.legs import UPU
+from pteron.legs.conformance import faults
+from pteron.platforms import Platform
+from pteron.workspace import conditions
+from pteron.workspace.examination import examine
+
+COUNT, MOST = 20, 200
+"""States of each machine, in the gate and in all."""
+
+DRAWN = {
+    "PRUR": ("3T2R", ("PRUR",)),
+    "RPUR": ("3T2R", ("RPUR",)),
+    "five freedoms, mixed": ("3T2R", ("PRUR", "UPS", "RPUR", "RSS", "PSS")),
+    "PRRS": ("3T3R", ("PRRS",)),
+    "six freedoms, mixed": ("3T3R", ("PRRS", "UPS", "RSS")),
+    "SRRR": ("3R", ("SRRR",)),
+    "a wrist, mixed": ("3R", ("SRRR", "UPS", "PSS")),
+}
+
+
+def upu(seed):
+    """Return a machine with three U-P-U legs, and its home."""
+    rng = np.random.default_rng(seed)
+    base, height = tilting.rotation(rng), np.array([0.0, 0.0, 1.0])
+    legs = []
+    for k in range(3):
+        angle = 2 * np.pi * k / 3 + 0.3 * rng.normal()
+        way = np.array([np.cos(angle), np.sin(angle), 0.2 * rng.normal()])
+        around = tilting.unit(np.cross([0.0, 0.0, 1.0], way) + 0.3 * rng.normal(size=3))
+        s0 = 0.3 * way + 0.1 * rng.normal(size=3)
+        length = float(np.linalg.norm(height + s0 - way))
+        bodies = tilting.rod(rng, 0.4 * length), tilting.rod(rng, 0.4 * length, -1.0)
+        point, direction = tuple(s0.tolist()), tuple((base @ around).tolist())
+        limits = 0.5 * length, 1.6 * length
+        legs.append(UPU(tuple(base @ way), point, *bodies, limits, direction=direction))
+    axes = tuple(base[:, 2]), tuple(base[:, 0])
+    platform = Platform("3T", tilting.planar(rng, 0.3), *axes)
+    gravity = tuple(9.81 * np.array(tilting.unit(rng.normal(size=3))))
+    return pteron.Manipulator("3-upu", platform, tuple(legs), gravity), base @ height
+
+
+def offset(seed):
+    """Return a machine of two legs under a platform whose axes do not meet, and its home."""
+    kinds = [("RSS",), ("UPS",), ("PSS", "RSS")][seed % 3]
+    robot, home = tilting.machine("2R", kinds, seed)
+    away = 0.15 * np.random.default_rng(seed).normal(size=3)
+    center = tuple((np.array(robot.platform.center) - away).tolist())
+    platform = replace(robot.platform, center=center, axis_offset=tuple(away.tolist()))
+    return replace(robot, platform=platform), home
+
+
+def drawn(name, seed):
+    """Return a machine drawn at random, and a pose about which it moves."""
+    if name == "UPU":
+        return upu(seed)
+    return offset(seed) if name == "axis_offset" else tilting.machine(*DRAWN[name], seed)
+
+
+NAMES = [*DRAWN, "UPU", "axis_offset"]
+ALL = [(name, seed) for name in NAMES for seed in range(10)]
+EVERY = pytest.mark.parametrize(
+    ("name", "seed"), several(ALL, [(name, k % 3) for k, name in enumerate(NAMES)])
+)
+
+
+@EVERY
+def test_a_machine_moves_as_lagrange_and_mujoco_say(name, seed):
+    robot, home = drawn(name, seed)
+    for leg in robot.legs:
+        assert faults(leg, tilts=robot.platform.tilts, seed=seed) == ()
+    states = tilting.states(robot, home, COUNT if seed < 3 else MOST, seed)
+    forces = pteron.inverse_dynamics(robot, *states)
+    assert relative_error(Lagrange(robot).forces(*states), forces) < 1e-9
+    engine = trees.MuJoCo(robot, states[0][0], spin=False)
+    projected, jacobian, gap = trees.projected(robot, engine, *states)
+    assert gap < 1e-13
+    assert relative_error(jacobian, pteron.jacobian(robot, states[0])) < 1e-10
+    assert relative_error(projected, forces) < 1e-8
+    regressed = pteron.regressor(robot, *states) @ pteron.parameters(robot)
+    np.testing.assert_allclose(regressed, forces, atol=1e-9 * np.abs(forces).max())
+
+
+@EVERY
+def test_forward_inverts_inverse_and_a_file_holds_the_machine(name, seed, tmp_path):
+    robot, home = drawn(name, seed)
+    poses = tilting.states(robot, home, COUNT, seed)[0]
+    poses = poses[np.abs(numeric(robot, "type_ii")(poses)[0]) > 0.02]
+    joints = pteron.inverse_kinematics(robot, poses)
+    if robot.platform.tilts:
+        back = numeric(robot, "direct_step")(joints, poses + 0.003)[0]
+    else:
+        modes = pteron.direct_kinematics(robot, joints)
+        nearest = np.nanargmin(np.abs(modes - poses[:, None]).max(axis=-1), axis=1)
+        back = modes[np.arange(len(poses)), nearest]
+    np.testing.assert_allclose(back, poses, atol=1e-10)
+    assert pteron.load(pteron.save(robot, tmp_path / "machine.toml")) == robot
+
+
+@pytest.mark.parametrize("name", ["PRUR", "RPUR", "SRRR", "UPU", "axis_offset"])
+def test_a_machine_turned_as_a_whole_needs_the_same_forces(name):
+    robot, home = drawn(name, 1)
+    states = tilting.states(robot, home, 5)
+    turn = tilting.rotation(np.random.default_rng(8))
+    moved = [np.array(v) for v in states]
+    if (lengths := len(robot.platform.lengths)) and name != "UPU":  # whose frame turns with it
+        for v in moved:
+            v[:, :lengths] = v[:, :lengths] @ turn.T
+    for v in moved if name == "UPU" else ():
+        v[:] = v @ turn.T
+    np.testing.assert_allclose(
+        pteron.inverse_dynamics(pteron.turned(robot, turn), *moved),
+        pteron.inverse_dynamics(robot, *states),
+        atol=1e-9,
+    )
+
+
+BASE = {
+    "pentapteron": (85, 57, 55),
+    "5-rpur": (100, 66, 56),
+    "hexapteron": (64, 46, 42),
+    "3-upu": (22, 10, 10),
+    "agile-eye": (52, 33, 31),
+    "spherical-3-rrr": (52, 33, 33),
+    "ankle-offset": (24, 18, 18),
+}
+"""Parameters, and base parameters with gravity at random and along -z."""
+
+ASKEW = (3.1, -5.2, 7.7)
+
+
+@pytest.mark.parametrize(
+    ("name", "method"),
+    several(
+        [(name, method) for name in BASE for method in ("exact", "svd", "qr")],
+        [("hexapteron", "exact"), ("agile-eye", "exact"), ("ankle-offset", "svd"), ("3-upu", "qr")],
+    ),
+)
+def test_base_parameters_are_as_many_as_derived(name, method):
+    robot = pteron.load(name)
+    count, general, upright = BASE[name]
+    assert len(pteron.parameters(robot)) == count
+    assert pteron.base_parameters(robot, method).rank == upright
+    askew = replace(robot, gravity=ASKEW)
+    assert pteron.base_parameters(askew, method).rank == general
+    turned = pteron.turned(askew, tilting.rotation(np.random.default_rng(2)))
+    assert pteron.base_parameters(turned, "svd").rank == general
+
+
+def dense(robot, joints, count, seed):
+    """Return the poses (K, m) of joints (n,) that a search from random poses finds."""
+    rng = np.random.default_rng(seed)
+    lengths = len(robot.platform.lengths)
+    found = []
+    for _ in range(count):
+        start = np.concatenate(
+            [rng.normal(size=lengths), rng.uniform(-3, 3, robot.freedom - lengths)]
+        )
+        best = least_squares(lambda x: closures(robot, x, joints), start, xtol=1e-15, ftol=1e-15)
+        if np.abs(best.fun).max() < 1e-10:
+            found.append(best.x)
+    return np.array(found)
+
+
+def closures(robot, pose, joints):
+    """Return how far platform points are from the planes of held sliders or cranks."""
+    p, axes = robot.platform.placement(pose)
+    missed = []
+    for leg, q in zip(robot.legs, joints, strict=True):
+        c = p + np.array(leg.platform_point) @ axes
+        if leg.type == "PRRS":
+            d = np.array(leg.direction)
+            missed.append(d @ (c - leg.guide_point - q * np.array(leg.e)))
+            continue
+        u, a = np.array(leg.direction), np.array(leg.zero_direction)
+        lean = np.cos(q) * a + np.sin(q) * np.cross(u, a)
+        w = np.cos(leg.crank_arc) * u + np.sin(leg.crank_arc) * lean
+        v = (c - p) / np.linalg.norm(c - p)
+        missed.append(w @ v - np.cos(leg.link_arc))
+    return missed
+
+
+@pytest.mark.parametrize(
+    ("name", "seed"),
+    several(
+        [(name, seed) for name in ("PRRS", "SRRR") for seed in range(50)],
+        [("PRRS", 2), ("SRRR", 1)],
+    ),
+)
+def test_every_pose_is_found_and_none_is_false(name, seed):
+    robot, home = drawn(name, seed)
+    pose = tilting.states(robot, home, 1, seed)[0][0]
+    joints = pteron.inverse_kinematics(robot, pose)
+    listed = pteron.direct_kinematics(robot, joints, all_branches=True)
+    listed = listed[np.isfinite(listed).all(axis=-1)]
+    assert 0 < len(listed) <= 8
+    assert np.abs(listed - pose).max(axis=-1).min() < 1e-9
+    for other in listed:
+        assert np.abs(closures(robot, other, joints)).max() < 1e-9
+    places = [robot.platform.placement(other) for other in listed]
+    for found in dense(robot, joints, 60, seed):
+        if not np.isfinite(pteron.inverse_kinematics(robot, found, on_failure="nan")).all():
+            continue  # out of a leg's reach
+        p, axes = robot.platform.placement(found)
+        away = [np.abs(p - q).max() + np.abs(axes - other).max() for q, other in places]
+        assert min(away) < 1e-6
+
+
+@pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=NIGHTLY) for k in range(1, 50))])
+def test_every_pose_of_axes_that_do_not_meet(seed):
+    robot, home = offset(seed)
+    pose = tilting.states(robot, home, 1, seed)[0][0]
+    joints = pteron.inverse_kinematics(robot, pose)
+    listed = pteron.direct_kinematics(robot, joints, all_branches=True)
+    assert np.nanmin(np.abs(listed - pose).max(axis=-1)) < 1e-9
+    angles = np.linspace(-np.pi, np.pi, 13)[1:]
+    for start in np.stack(np.meshgrid(angles, angles), axis=-1).reshape(-1, 2):
+        found, _, bent, *_ = numeric(robot, "direct_step")(joints[None], start[None])
+        if np.isfinite(found).all() and not bent[0]:
+            away = np.abs(np.angle(np.exp(1j * (listed - found[0])))).max(axis=-1)
+            assert np.nanmin(away) < 1e-7
+
+
+def test_legs_and_platforms_that_do_not_fit_are_refused_in_a_line():
+    penta, eye = pteron.load("pentapteron"), pteron.load("agile-eye")
+    tsai, platform = pteron.load("3-upu"), penta.platform
+    first = penta.legs[0]
+    hexapod = pteron.load("stewart").legs
+    for change, words in (
+        (
+            lambda: replace(
+                penta, legs=(replace(first, slider_direction=(0.6, 0.0, 0.8)), *penta.legs[1:])
+            ),
+            "leg 1: slider_direction: [0.6, 0.0, 0.8] is 36.87 degrees from the platform's axis",
+        ),
+        (lambda: replace(platform, second_axis=(0.8, 0.0, 0.6)), "is not perpendicular to axis"),
+        (lambda: replace(platform, x_axis=(1.0, 0.0, 0.0)), "x_axis: a 3T2R platform's frame"),
+        (lambda: replace(penta, legs=penta.legs[:4]), "4 given, but a 3T2R platform has 5"),
+        (lambda: replace(penta, legs=hexapod[:5]), "legs: none keeps a 3T2R platform from turning"),
+        (lambda: replace(eye, legs=(first, *eye.legs[1:])), 'make the platform\'s motion "3T2R"'),
+        (lambda: replace(penta, legs=(*penta.legs[:4], eye.legs[0])), 'make its motion "3R"'),
+        (
+            lambda: replace(eye.legs[0], crank_arc=4.0),
+            "crank_arc: 4 rad given, one between 0 and pi",
+        ),
+        (
+            lambda: replace(
+                eye, legs=(replace(eye.legs[0], crank_arc=0.4, link_arc=0.3), *eye.legs[1:])
+            ),
+            "leg 1: crank_arc, link_arc: 0.4 and 0.3 rad do not close at angles zero",
+        ),
+        (
+            lambda: replace(
+                tsai, legs=tuple(replace(leg, direction=(0.0, 0.0, 1.0)) for leg in tsai.legs)
+            ),
+            "legs: the platform is free to turn about [0.0, 0.0, 1.0]",
+        ),
+        (
+            lambda: replace(eye.platform, axis_offset=(0.0, 0.0, 0.1)),
+            "axis_offset: a 3R platform has none",
+        ),
+    ):
+        with pytest.raises(ModelError) as refused:
+            change()
+        assert words in str(refused.value)
+        assert "\n" not in str(refused.value)
+
+
+def test_a_guide_within_the_tolerance_of_a_file_is_made_exact():
+    penta = pteron.load("pentapteron")
+    rough = replace(penta.legs[0], slider_direction=(1.0, 0.0, 5e-7))
+    (leg, *_) = replace(penta, legs=(rough, *penta.legs[1:])).legs
+    assert leg.slider_direction == (1.0, 0.0, 0.0)
+
+
+def test_radial_universal_joints_leave_the_platform_free_to_turn():
+    tsai = pteron.load("3-upu")
+    legs = [replace(leg, direction=tilting.unit(leg.guide_point)) for leg in tsai.legs]
+    radial = replace(tsai, name="radial", legs=tuple(legs))
+    assert abs(pteron.kinematics.constraint_measure(radial, [0.0, 0.0, 0.4])) < 1e-12
+    assert abs(pteron.kinematics.constraint_measure(tsai, [0.0, 0.0, 0.4])) > 0.4
+    assert "near a constraint singularity" in map(str, conditions(tsai, type_ii=0.1))
+    warnings = examine(radial, np.array([0.0, 0.0, 0.4])).warnings
+    assert any("constraint singularity" in warning for warning in warnings)
+
+
+@pytest.mark.parametrize("name", ["pentapteron", "5-rpur"])
+def test_a_machine_without_a_method_for_all_poses_says_so(name):
+    robot = pteron.load(name)
+    joints = pteron.inverse_kinematics(robot, np.zeros(5))
+    with pytest.raises(ModelError, match="`follow` and `direct_step` go on from a known pose"):
+        pteron.direct_kinematics(robot, joints)
+
+
+@pytest.mark.parametrize("name", ["pentapteron", "5-rpur", "hexapteron", "agile-eye"])
+def test_follow_keeps_to_random_motions(name):
+    robot = pteron.load(name)
+    rng = np.random.default_rng(0)
+    size = np.where(robot.platform.angular, 0.15, 0.03)
+    time = np.linspace(0.0, 1.0, 200)[:, None, None]
+    waves = rng.normal(size=(2, 3, robot.freedom)) * size / np.arange(1, 4)[:, None] / 2
+    turns = 2.0 * np.pi * np.arange(1, 4)[:, None] * time
+    poses = (waves[0] * np.sin(turns) + waves[1] * (np.cos(turns) - 1.0)).sum(axis=1)
+    joints = pteron.inverse_kinematics(robot, poses)
+    followed = pteron.kinematics.follow(robot, joints, poses[0])
+    np.testing.assert_allclose(followed, poses, atol=1e-9)
+
+
+def test_counts_are_those_of_a_machine_of_another_size():
+    robot = replace(pteron.load("pentapteron"), gravity=ASKEW)
+    assert pteron.base_parameters(scaled(robot, 0.37), "svd").rank == 57
