@@ -14,6 +14,7 @@ from pteron.legs import KINDS
 from pteron.manipulator.leg_tables import leg_table
 from pteron.manipulator.tables import (
     ConeTable,
+    DistributionTable,
     DriveTable,
     ElasticTable,
     HomeTable,
@@ -34,6 +35,7 @@ TABLES: dict[str, type[TomlTable]] = {
     "radii": RadiiTable,
     "tools": ToolTable,
     "home": HomeTable,
+    "distribution": DistributionTable,
     "platform": PlatformTable,
     "a platform that tilts": TiltingTable,
     "bars": BarTable,

@@ -142,6 +142,23 @@ def segments() -> Sheet:
     return sheet
 
 
+def rams() -> Sheet:
+    """Draw three rams at 120 degrees that hold a point, and its weight."""
+    sheet = Sheet(-90.0, 90.0, (3.8, 3.4))
+    angles = np.radians([90.0, 210.0, 330.0])
+    p = np.zeros(3)
+    for k, angle in enumerate(angles, start=1):
+        r = 0.5 * np.array([np.cos(angle), np.sin(angle), 0.0])
+        sheet.line([r, 0.45 * r], UPPER, 5.0)
+        sheet.line([0.45 * r, p], LOWER, 2.6)
+        sheet.mark(r, INK)
+        sheet.name(1.1 * r, f"$r_{k}$", INK, (0.0, 0.0))
+    sheet.arrow(p, np.array([0.0, -0.22, 0.0]), "30 N", GIVEN, (1.1, 0.0), 0.7)
+    sheet.mark(p, INK)
+    sheet.name(p, "P", INK, (0.9, 0.5))
+    return sheet
+
+
 DRAWINGS: dict[str, Callable[[], Sheet]] = {
-    one.__name__: one for one in (ram, spheres, ellipse, longer, segments)
+    one.__name__: one for one in (ram, spheres, ellipse, longer, segments, rams)
 }
