@@ -63,6 +63,8 @@ class Lagrange:
 
     def _whole_regressor(self, motion):
         generalized, jacobian = (_batch(v, motion) for v in self._forces(*_columns(motion)))
+        if jacobian.shape[1] > jacobian.shape[2]:  # more legs than coordinates: of least norm
+            return np.linalg.pinv(jacobian.swapaxes(1, 2)) @ generalized
         return np.linalg.solve(jacobian.swapaxes(1, 2), generalized)
 
     def jacobian(self, pose):

@@ -72,7 +72,7 @@ def error(found, expected):
 
 def loaded(forces, jacobian, wrench):
     """Return the actuator forces where a wrench helps them."""
-    return forces - np.linalg.solve(jacobian.swapaxes(1, 2), wrench[..., None])[..., 0]
+    return forces - (np.linalg.pinv(jacobian.swapaxes(1, 2)) @ wrench[..., None])[..., 0]
 
 
 @EVERY

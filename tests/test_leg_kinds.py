@@ -113,11 +113,10 @@ def test_engines_refuse_a_leg_without_bodies(struts, tmp_path):
         pteron.export.export_mjcf(struts, tmp_path)
 
 
-@pytest.mark.parametrize("count", [2, 4])
-def test_other_numbers_of_legs_than_coordinates_are_refused_by_closures(count):
+def test_fewer_legs_than_coordinates_are_refused_by_closures():
     robot = CATALOG["delta"]
-    with pytest.raises(pteron.ModelError, match=f"legs: {count} given, 3 expected, one for each"):
-        of_closures.faults((robot.legs * 2)[:count], robot.platform, [0.1, 0.0, -0.9])
+    with pytest.raises(pteron.ModelError, match="legs: 2 given, 3 or more expected, one for each"):
+        of_closures.faults(robot.legs[:2], robot.platform, [0.1, 0.0, -0.9])
 
 
 @dataclass(frozen=True)
@@ -226,7 +225,7 @@ def named(tmp_path, monkeypatch):
 
 
 def test_a_kind_of_an_installed_package_is_known(named, tmp_path):
-    with pytest.raises(pteron.ModelError, match=r"'FromElsewhere' is not one of PRRR, .*RRS$"):
+    with pytest.raises(pteron.ModelError, match=r"'FromElsewhere' is not one of PRRR, .*UPU$"):
         pteron.load(named)
     installed(tmp_path, KIND, "own_legs:FromElsewhere")
     result = CliRunner().invoke(app, ["check", str(named)])

@@ -119,6 +119,8 @@ def driven(robot, drive=DRIVE, **more):
 # The searches for home poses would take most of the time.
 HOMES = {
     "3-prr": (0.0, 0.0, -0.087),
+    "3-rrr-point": (0.3, 0.25),
+    "delta-redundant": (0.0, 0.0, -0.635),
     "3-rrr": (0.0, 0.0, 0.0),
     "delta": (0.0, 0.0, -1.0),
     "delta-4": (0.0, 0.0, -1.0, 0.0),

@@ -58,7 +58,8 @@ def projected(robot, engine, pose, velocity, acceleration):
         ddq[bound] -= solve @ drift
         jacobians.append(drives @ complement)
         tree_forces = complement.T @ engine.inverse(q, dq, ddq)
-        forces.append(np.linalg.solve(jacobians[-1].T, tree_forces))
+        # Of the least norm where there are more legs than coordinates.
+        forces.append(np.linalg.pinv(jacobians[-1].T) @ tree_forces)
     return np.array(forces), np.array(jacobians), np.abs(gaps).max()
 
 

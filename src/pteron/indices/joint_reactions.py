@@ -8,6 +8,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pteron.dynamics import inverse_dynamics
 from pteron.equations.machine import Machine
 from pteron.errors import DataError
 from pteron.indices.internal_forces import (
@@ -204,6 +205,11 @@ def _solve_reactions(
     right, presumed = solvable_balance.right.copy(), solvable_balance.presumed_right.copy()
     right[:, : robot.freedom] -= apply_matrices(solvable_balance.loads, wrench[solvable])
     presumed[:, :6] -= load[solvable][:, : presumed.shape[-1]]
+    if robot.redundancy:  # statics leaves the drives' forces open: they are as they are shared
+        shared = inverse_dynamics(robot, *state, wrench, on_failure="nan")[solvable]
+        right = np.concatenate([right, shared - solvable_balance.driven], axis=1)
+        rows = [solvable_balance.rows, solvable_balance.driven_rows]
+        solvable_balance = solvable_balance._replace(rows=np.concatenate(rows, axis=1))
     balanced = balance_loads(robot, solvable_balance, right[..., None], presumed[..., None])
     forces, redundancy = balanced.forces[..., 0], balanced.stresses.shape[-1]
     present = np.isfinite(solvable_balance.passed[..., 0])
