@@ -88,6 +88,12 @@ class Leg:
         return np.cross(self.d, self.first)
 
     @property
+    def swings(self):
+        """Whether it is a ram on a universal joint, a rod from end to end."""
+        no_links = self.e is None and self.lu is None and self.ratio is None
+        return no_links and self.kappa is None and self.arcs is None and not self.flat
+
+    @property
     def crank(self):
         """Whether its joint coordinate is a crank's angle."""
         return self.arcs is not None or (self.e is None and self.lu is not None)

@@ -120,6 +120,8 @@ def bodies(machine, x):
         direction = at.last / ca.norm_2(at.last)
         if leg.ratio is not None:
             uppers.append(_rod(leg.upper, fixed, direction))
+        elif leg.swings:
+            uppers.append(_rod(leg.upper, fixed, at.upper))
         elif leg.upper is not None:
             uppers.append(
                 _link(leg.upper, fixed, at.upper, leg.d if at.turn is None else at.turn[0])

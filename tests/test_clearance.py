@@ -4,6 +4,7 @@ from dataclasses import replace
 from itertools import pairwise, product
 
 import casadi as ca
+import descriptions
 import numpy as np
 import pytest
 import tilting
@@ -97,6 +98,28 @@ def test_bodies_are_where_they_are_drawn(name, distance):
             assert value == pytest.approx(distance(pairs).min(), abs=1e-12), (one, other)
 
 
+def link_lines(robot, pose, i, q):
+    """Return the lines of leg i, from 1, with two links in space: where trigonometry has them."""
+    leg = robot.legs[i - 1]
+    machine = descriptions.describe(robot)
+    at = descriptions.places(machine, ca.SX(ca.DM(pose)))[i - 1]
+    point, last, upper = (np.array(ca.evalf(v)).ravel() for v in (at.point, at.last, at.upper))
+    names = [f"leg {i} {leg.names[letter]}" for letter in "ul"]
+    if leg.type == "SRRR":  # the straight lines between its axes, at one distance from the centre
+        size, p = np.linalg.norm(leg.platform_point), np.array(robot.platform.center)
+        end = p + np.array(leg.platform_point) @ robot.platform.placement(pose)[1]
+        start, knee = p + size * np.array(leg.direction), p + size * last
+        return {names[0]: [(start, knee)], names[1]: [(knee, end)]}
+    length = q if leg.type == "RPUR" else leg.upper_length
+    knee = point - last
+    start = knee - length * upper
+    lines = {names[0]: [(start, knee)], names[1]: [(knee, point)]}
+    if "p" in leg.names:
+        ends = [np.array(leg.guide_point) + v * np.array(leg.joint_axis) for v in leg.limits]
+        lines[f"leg {i} guide"] = [ends]
+    return lines
+
+
 def lines_of(robot, pose):
     """Return the lines of a tilting machine's bodies, by formulas of textbooks."""
     p, axes = robot.platform.placement(pose)
@@ -105,6 +128,9 @@ def lines_of(robot, pose):
     joints = pteron.inverse_kinematics(robot, pose)
     for i, (leg, q, point) in enumerate(zip(robot.legs, joints, points, strict=True), start=1):
         start = np.array(leg.guide_point)
+        if leg.type in ("PRRS", "PRUR", "RPUR", "SRRR"):
+            found |= link_lines(robot, pose, i, q)
+            continue
         if leg.names.get("u") == "cylinder":
             found[f"leg {i}"] = [(start, point)]
             continue
@@ -123,7 +149,7 @@ def lines_of(robot, pose):
 def test_bodies_of_tilting_machines_are_as_far_apart_as_least_squares_find(name):
     turn = tilting.rotation(np.random.default_rng(1))
     thick = {"guide": 0.001, "upper": 0.004, "lower": 0.003, "platform": 0.002}
-    radii = {"guide": 0.001, "crank": 0.004, "platform": 0.002}
+    radii = {"guide": 0.001, "crank": 0.004, "cylinder": 0.004, "platform": 0.002}
     for robot in (TILTED[name], pteron.turned(TILTED[name], turn)):
         poses = pteron.random_poses(robot, 3, seed=1, type_ii=0.0)
         found = clearance(robot, poses, thick)
@@ -139,6 +165,8 @@ def test_bodies_of_tilting_machines_are_as_far_apart_as_least_squares_find(name)
                 # A ram has the thicker of its two parts.
                 taken = sum(
                     radii.get(word.split()[-1], 0.003 if word.split()[2:] else 0.004)
+                    if "upper" not in word
+                    else 0.004
                     for word in (one, other)
                 )
                 assert value == pytest.approx(min(apart) - taken, abs=1e-9), (one, other)

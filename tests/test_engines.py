@@ -28,7 +28,13 @@ RANDOM = ["PPP", "SSS", "PRSU", "PRSSI", "RRRR", "CL", "CCU", "CPR"]
 
 TILTING = [f"{motion} {' '.join(kinds)}" for motion, kinds in tilting.LEGS.items()]
 XYZ = "3T3R UPS xyz"
-EACH = [f"{motion} {kind}" for motion, kinds in tilting.LEGS.items() for kind in kinds]
+EACH = [
+    f"{motion} {kind}"
+    for motion, kinds in tilting.LEGS.items()
+    for kind in kinds
+    if motion != "3T2R" or kind in ("PRUR", "RPUR")  # others do not hold it alone
+]
+EACH += ["3T3R PRRS", "3R SRRR"]
 
 GATE = ("quadrupteron", "tripteron", "delta-4", "par4", "five-bar", "3-prr", "PRSU", "PRSSI", "CL")
 GATE += tuple(TILTING)

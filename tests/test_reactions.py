@@ -93,8 +93,10 @@ def test_a_platform_that_tilts_gets_from_its_legs_what_newton_and_euler_ask(moti
     found = reactions(robot, pose, velocity, acceleration, wrench)
     forces = pteron.inverse_dynamics(robot, pose, velocity, acceleration, wrench)
     np.testing.assert_allclose(found.actuators, forces, rtol=0, atol=1e-11 * np.abs(forces).max())
-    assert found.redundancy == 0
-    assert found.unheld < 1e-9
+    # The legs of a platform with five freedoms hold the sixth together.
+    holders = sum(leg.type in ("PRUR", "RPUR") for leg in robot.legs)
+    assert found.redundancy == max(holders - 1, 0)
+    assert found.unheld < (1e-8 if holders > 1 else 1e-9)  # by least squares where several do
     if robot.platform.center:  # the joint there gives the rest
         return
     step = 2e-4
@@ -119,10 +121,12 @@ def test_a_platform_that_tilts_gets_from_its_legs_what_newton_and_euler_ask(moti
         np.array([leg[k] for leg, k in zip(part, last, strict=True)])
         for part in (found.points, found.forces, found.moments)
     )
-    np.testing.assert_allclose(moments, 0.0, atol=1e-9)
-    np.testing.assert_allclose(passed.sum(0) + wrench[:3], needed, atol=1e-5)
-    whole = np.cross(points, passed).sum(0) + np.cross(here, wrench[:3]) + wrench[3:]
-    np.testing.assert_allclose(whole, about, atol=1e-5)
+    on_balls = [leg.type not in ("PRUR", "RPUR") for leg in robot.legs]
+    np.testing.assert_allclose(moments[on_balls], 0.0, atol=1e-9)
+    left = 1e-7 * np.abs(forces).max() if holders else 1e-5  # where forces are large
+    np.testing.assert_allclose(passed.sum(0) + wrench[:3], needed, atol=left)
+    whole = np.cross(points, passed).sum(0) + moments.sum(0) + np.cross(here, wrench[:3])
+    np.testing.assert_allclose(whole + wrench[3:], about, atol=left)
 
 
 def test_least_norm_and_what_is_no_load():

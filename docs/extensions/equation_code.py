@@ -71,6 +71,17 @@ CODE: dict[str, tuple[str, ...]] = {
     "O4": (f"{_L}.ups.UPSEquations.needs",),
     "O5": ("pteron.bodies.spatial.needed_twist_wrench",),
     "O6": ("pteron.platforms.tripod.Tripod.motion",),
+    # Five freedoms and spherical legs.
+    "W1": ("pteron.platforms.tilting.FiveFreedoms.motion", "pteron.legs.variables.attached_vector"),
+    "W2": (f"{_L}.prur.PRUREquations.motion",),
+    "W3": (
+        *(f"{_L}.universal_link.UniversalLinkEquations.link_across",),
+        f"{_L}.prur.AcrossEquations.links",
+    ),
+    "W4": (f"{_L}.prur.AlongEquations.links",),
+    "W5": (f"{_L}.universal_link.UniversalLinkEquations.force",),
+    "W6": (f"{_L}.srrr.SRRREquations.locus",),
+    "W7": (f"{_L}.srrr.SRRREquations.motion",),
     # Direct position.
     "P1": ("pteron.closures.constant_rows.ConstantRows.poses",),
     "P2": (f"{_E}.closing.closure_rows",),

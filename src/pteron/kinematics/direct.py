@@ -47,8 +47,9 @@ def direct_kinematics(
     form, except for platforms with an angle on legs with rods or planar legs: there phi is a root
     of a polynomial of degree k, refined by Newton's method to about 1e-14. The poses of platforms
     that tilt are the ends of k paths from a machine whose poses are known: each is proved, and none
-    is missed except, by rounding, next to a singularity. If the poses form a curve (self-motion),
-    an error is raised.
+    is missed except, by rounding, next to a singularity. Where their legs keep points in planes, as
+    P-R-R-S and spherical R-R-R legs do, and where their axes do not meet, they are eigenvalues or
+    roots. If the poses form a curve (self-motion), an error is raised.
 
     Parameters
     ----------
@@ -75,11 +76,12 @@ def direct_kinematics(
         with k = 2 where the platform has no angle, or where a leg holds it (1 with P-R-R-R legs
         alone); else k = 8 for four legs and 6 for three, but 4 where all but one are P-R-R-R; where
         the platform slides k = 2 for each leg of another kind. Platforms that tilt: k = 40 for six
-        legs, 16 for a tripod, 8 about a centre, in the order of the coordinates from the last to
-        the first; of a tripod with the yaw on the side that it has when level. A row is NaN where
-        the closures have no further real solution, or where a leg does not reach the pose that
-        solves them. Angles lie in (-pi, pi] unless a leg holds phi or the platform slides; the
-        middle one of roll, pitch and yaw, or of rx, ry and rz, within +-pi/2.
+        legs, 16 for a tripod, 8 about a centre or on six P-R-R-S legs, in the order of the
+        coordinates from the last to the first; of a tripod with the yaw on the side that it has
+        when level. A row is NaN where the closures have no further real solution, or where a leg
+        does not reach the pose that solves them. Angles lie in (-pi, pi] unless a leg holds phi or
+        the platform slides; the middle one of roll, pitch and yaw, or of rx, ry and rz, within
+        +-pi/2.
 
     Raises
     ------
@@ -88,6 +90,9 @@ def direct_kinematics(
         held (a self-motion), whatever `on_failure`.
     UnreachablePose
         If joints have no pose, unless `on_failure` is "nan".
+    ModelError
+        If no method finds every pose of such legs, as of P-R-U-R legs, or of P-R-R-S legs mixed
+        with others.
 
     Examples
     --------

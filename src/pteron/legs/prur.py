@@ -23,6 +23,7 @@ from pteron.legs.kind import SLIDER, LegQuantity, ReachBound
 from pteron.legs.leg import Joint, LegMotion
 from pteron.legs.reading import Reading
 from pteron.legs.universal_link import (
+    TINY,
     LinkState,
     NestedClosure,
     Root,
@@ -202,9 +203,10 @@ class AcrossEquations(PRUREquations):
         outer = self.lu * self.lu - aside * aside
         ahead = self.sigma * root(outer)
         normal_part = ahead * ca.dot(self.e, n) + aside * ca.dot(across, n)
-        divisor = (h * normal_part) ** 2 + m * m * self.lu * self.lu
+        share = m * m * ahead * ahead
+        size = ca.fmax((h * normal_part) ** 2 + m * m * self.lu * self.lu, TINY)
         margin = ca.fmin(self.ll - ca.fabs(h), self.lu - ca.fabs(aside))
-        return NestedClosure((inner, outer), margin, m * m * outer / divisor)
+        return NestedClosure((inner, outer), margin, share / size)
 
 
 class AlongEquations(PRUREquations):
@@ -226,9 +228,10 @@ class AlongEquations(PRUREquations):
         w, n = c - self.r, ca.cross(self.a, self.b)
         along_b = ca.dot(self.b, w)
         inner = self.lu * self.lu - along_b * along_b
-        m = ca.dot(n, w) - self.sigma * root(inner)
+        first = root(inner)
+        m = ca.dot(n, w) - self.sigma * first
         outer = self.ll * self.ll - m * m
-        product = inner * outer
+        share = (first * root(outer)) ** 2
         margin = ca.fmin(self.lu - ca.fabs(along_b), self.ll - ca.fabs(m))
-        square = product / (m * m * self.lu * self.lu + product)
+        square = share / ca.fmax(m * m * self.lu * self.lu + share, TINY)
         return NestedClosure((inner, outer), margin, square)

@@ -21,6 +21,7 @@ from pteron.legs.planar_links import LinkRotation
 from pteron.legs.ram import RamLeg
 from pteron.legs.reading import Reading
 from pteron.legs.universal_link import (
+    TINY,
     NestedClosure,
     Root,
     UniversalLinkEquations,
@@ -153,7 +154,8 @@ class RPUREquations(UniversalLinkEquations):
         outer = ca.dot(v, v)
         share = m * m * outer
         margin = ca.fmin(self.ll - ca.fabs(h), root(outer))
-        return NestedClosure((inner, outer), margin, share / ((h * ca.dot(v, n)) ** 2 + share))
+        size = ca.fmax((h * ca.dot(v, n)) ** 2 + share, TINY)
+        return NestedClosure((inner, outer), margin, share / size)
 
 
 RPUR.equations_class = RPUREquations

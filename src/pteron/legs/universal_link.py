@@ -33,6 +33,9 @@ from pteron.legs.variables import (
     point_variable,
 )
 
+TINY = 1e-300
+"""Least divisor of a measure that is 0: out of reach both may be."""
+
 
 class UniversalLinkLeg(LegKind):
     """The data of a leg that ends in such a link, under a 3T2R platform."""
@@ -82,7 +85,7 @@ class NestedClosure(NamedTuple):
     margin: Expression
     """The reach margin, m."""
     square: Expression
-    """The squared type-I measure where both radicands are positive."""
+    """The squared type-I measure; 0 where a radicand is negative and its root taken for 0."""
 
 
 class UniversalLinkEquations(LegEquations):
@@ -168,8 +171,8 @@ class UniversalLinkEquations(LegEquations):
     def reach(self, c: Expression) -> Reach:
         """Return the reach: what the links' lengths have left under both roots, m."""
         (inner, outer), margin, square = self.closure(c, clipped_root)
-        measure = ca.if_else(inner < 0, inner, ca.if_else(outer < 0, outer, square))
-        return Reach(margin, measure, ca.SX(1), self.ll)
+        beyond = ca.fmin(ca.fmin(inner, outer), 0)  # where it is not 0 the square is
+        return Reach(margin, beyond + square, ca.SX(1), self.ll)
 
     def edges(self, c: Expression) -> dict[str, Expression]:
         """Return both radicands, m^2, by the link whose length is too short where one is negative.

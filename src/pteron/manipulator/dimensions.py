@@ -10,6 +10,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from pteron.bodies.inertia import SpatialInertia
 from pteron.bodies.vectors import Vector, interval, positive, vector
 from pteron.errors import ModelError
 from pteron.legs import LegKind
@@ -67,6 +68,9 @@ class Stock:
         area = math.pi / 4.0 * (self.outer**2 - self.inner**2)
         mass, middle = count * self.density * area * length, (low + high) / 2.0
         inertia = mass * (3.0 * squares / 4.0 + length**2) / 12.0 + mass * middle**2
+        if kind is SpatialInertia:
+            tensor = mass * squares / 8.0, 0.0, 0.0, inertia, 0.0, inertia
+            return kind.of_body(mass, (middle, 0.0, 0.0), tensor)
         return kind.of_body(mass, (middle, 0.0)[: len(kind.kinds) - 2], inertia)
 
 

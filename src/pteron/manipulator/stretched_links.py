@@ -11,6 +11,9 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
+from pteron.bodies.inertia import SpatialInertia
 from pteron.legs import LegKind
 
 
@@ -36,6 +39,8 @@ def stretch_link(body: Any, factor: float) -> Any:
     (2.0, -2.0, 2.6666666666666665)
     """
     by_kind = dict(zip(body.kinds, body.values, strict=True))
+    if isinstance(body, SpatialInertia):
+        return _stretch_solid(body, by_kind, factor)
     offset_inertia = by_kind.get("mgy", 0.0) ** 2 / by_kind["m"]
     stretched_by_kind = {
         "m": by_kind["m"] * factor,
@@ -44,3 +49,14 @@ def stretch_link(body: Any, factor: float) -> Any:
         "I": (by_kind["I"] - offset_inertia) * factor**3 + offset_inertia * factor,
     }
     return type(body).of_values([stretched_by_kind[kind] for kind in body.kinds])
+
+
+def _stretch_solid(
+    body: SpatialInertia, by_kind: dict[str, float], factor: float
+) -> SpatialInertia:
+    """Return the inertia of a body in space after stretching it along x by a factor."""
+    stretch = np.diag([factor, 1.0, 1.0, 1.0])
+    moments = factor * stretch @ np.array(body.second_moments(by_kind)) @ stretch
+    (xx, xy, xz, hx), (_, yy, yz, hy), (_, _, zz, hz), (*_, mass) = moments.tolist()
+    tensor = yy + zz, -xy, -xz, xx + zz, -yz, xx + yy
+    return SpatialInertia(mass, (hx, hy, hz), tensor)

@@ -87,7 +87,10 @@ def mode_places(robot: Manipulator, home: Array) -> tuple[ModePlace, ...]:
     candidates = []
     for signs in modes:
         mode = with_elbows(robot, signs)
-        margins = np.nan_to_num(pose_margins(mode, poses).least, nan=-1.0)
+        least_margins = pose_margins(mode, poses).least
+        if np.isnan(least_margins).all():
+            continue  # its reach depends on its elbows, and with these it reaches no pose
+        margins = np.nan_to_num(least_margins, nan=-np.inf)
         best = len(poses) - 1 if signs == file_elbows else int(margins.argmax())
         depth = _depth(mode, poses[best])
         place = "below" if depth > least else "above" if depth < -least else "inside"

@@ -36,7 +36,7 @@ from pteron.manipulator.readings import refuse_readings
 from pteron.shapes import PoseLike
 from pteron.tolerances import ROUNDING
 
-_ALONG_HINGE = 0.1
+_ALONG_HINGE = 0.04
 """Distance of the second point of a hinge at the platform from the first, as a share of the
 machine's size: both points close the loop and hold the hinge's axis."""
 
