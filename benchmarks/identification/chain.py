@@ -30,6 +30,7 @@ import plant
 import pteron
 from pteron.identification import Identification, Log, Processing, identify, preprocessing_for_log
 from pteron.identification.excitation import FourierMotion, Limits, optimal_excitation
+from pteron.identification.felt_forces import felt_part
 from pteron.identification.observation import motion_mask
 from pteron.identification.signals import samples
 from pteron.kernels import Array
@@ -74,6 +75,18 @@ CASES = (
     Case(
         "delta",
         plant.Friction((4.0, 4.3, 4.6), (1.0, 1.1, 1.2), (0.0, 0.1, 0.2)),
+        2.0 * np.pi / 2**20,
+        Limits(speed=6.0, acceleration=80.0),
+    ),
+    Case(
+        "3-rrr-point",
+        plant.Friction((0.05, 0.06, 0.07), (0.02, 0.025, 0.03), (0.0, 0.01, 0.02)),
+        2.0 * np.pi / 2**20,
+        Limits(speed=8.0, acceleration=80.0),
+    ),
+    Case(
+        "delta-redundant",
+        plant.Friction((0.4, 0.45, 0.5, 0.55), (0.15, 0.16, 0.17, 0.18), (0.0, 0.05, 0.1, 0.15)),
         2.0 * np.pi / 2**20,
         Limits(speed=6.0, acceleration=80.0),
     ),
@@ -211,7 +224,7 @@ def run(
     The exciting motion, whose search takes `seconds`, is recorded for `duration` s.
     """
     drawn = pteron.load(case.name)
-    built, n = plant.as_built(drawn), drawn.freedom
+    built, n = plant.as_built(drawn), drawn.joint_count
     simulated = twins(case)[twin]
     exciting, placing = Excited(exciting_motion(case, seconds)), Cycles(drawn)
     length = cycles * (placing.duration + _REST)
@@ -248,7 +261,8 @@ def run(
     )
     true = recordings["pick-and-place cycle"]
     moving = motion_mask(true.rates, preprocessing.slow, preprocessing.turning_rows)
-    off = (controller(true.joints, true.rates, true.accelerations) - held_out.forces) / noise
+    predicted = controller(true.joints, true.rates, true.accelerations)
+    off = _felt(drawn, true.joints, predicted - held_out.forces) / noise
     (block,) = samples(drawn, held_out, preprocessing)
     states, forces = block.states.part(block.fresh), block.forces[block.fresh]
     known = motion_mask(states.joint_rates, preprocessing.slow, preprocessing.turning_rows)
@@ -278,7 +292,7 @@ def run(
         recordings,
         _rms(off, moving),
         _rms(off),
-        _rms((by_encoders - forces) / noise, known),
+        _rms(felt_part(drawn, states.pose, by_encoders - forces) / noise, known),
         float((1.0 - moving.mean(axis=0)).max()),
         tracking,
     )
@@ -291,10 +305,19 @@ def _rms(values: Array, counted: Array | float = 1.0) -> Array:
     )
 
 
+def _felt(robot: pteron.Manipulator, joints: Array, forces: Array) -> Array:
+    """Return the part of forces (T, n) that the platform feels, at joints (T, n)."""
+    if not robot.redundancy:
+        return forces
+    pose = pteron.follow(robot, joints, pteron.workspace.home_pose(robot))
+    return felt_part(robot, pose, forces)
+
+
 def main() -> None:
     """Print what each machine's chain gave."""
     quick = "--quick" in sys.argv[1:]
-    cases = CASES[1:] if quick else CASES
+    named = [case for case in CASES if case.name in sys.argv[1:]]
+    cases = named or (CASES[1:2] if quick else CASES)
     duration, seconds, cycles = (5.0, 2.0, 1) if quick else (20.0, 20.0, 3)
     print(
         f"{duration:g} s of an exciting motion at 1 kHz are recorded, and a pick-and-place cycle; "

@@ -11,6 +11,7 @@ from plant.friction import Friction
 from plant.inverse import platform_state
 from plant.model import Array
 from plant.reference import Reference
+from pteron.dynamics.joint_space import moved_inertias
 
 __all__ = ["BANDWIDTH", "Controller", "FeedForward"]
 
@@ -45,8 +46,7 @@ class Controller:
         time = start + spacing * instants
         joints, rates, accelerations = reference(time)
         home: Array = pteron.workspace.home_pose(robot)
-        inverse: Array = np.linalg.inv(pteron.jacobian(robot, home))
-        masses = np.diag(inverse.T @ pteron.mass_matrix(drawn, home) @ inverse)
+        masses = moved_inertias(pteron.jacobian(robot, home), pteron.mass_matrix(drawn, home))
         self.position_gain = masses * bandwidth**2
         self.rate_gain = 2.0 * masses * bandwidth
         if feed_forward is None:

@@ -8,6 +8,7 @@ import numpy as np
 
 import pteron
 from plant.model import Array
+from pteron.dynamics.joint_space import solve_rates
 
 __all__ = ["State", "platform_state"]
 
@@ -36,7 +37,7 @@ def platform_state(
     """
     pose = pteron.follow(robot, joints, pteron.workspace.home_pose(robot))
     jacobian = pteron.jacobian(robot, pose)
-    velocity = np.linalg.solve(jacobian, rates[..., None])[..., 0]
+    velocity = solve_rates(jacobian, rates[..., None])[..., 0]
     drift = pteron.kinematics.joint_accelerations(robot, pose, velocity, np.zeros_like(pose))
-    acceleration = np.linalg.solve(jacobian, (accelerations - drift.actuated)[..., None])[..., 0]
+    acceleration = solve_rates(jacobian, (accelerations - drift.actuated)[..., None])[..., 0]
     return State(pose, velocity, acceleration)
