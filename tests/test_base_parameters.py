@@ -13,6 +13,7 @@ import pytest
 import sympy
 import tilting
 from mechanisms import (
+    CLIENTS,
     MACHINES,
     MECHANISMS,
     NIGHTLY,
@@ -709,3 +710,23 @@ def test_a_base_of_another_layout_is_refused():
 def test_groups_that_are_none_are_refused(shared):
     with pytest.raises(pteron.PteronError, match=r"^shared: "):
         pteron.base_parameters(machine("quadrupteron"), shared=shared)
+
+
+TIED = {
+    "quadrupteron-oblique": 11,
+    "tripteron-oblique": 8,
+    "3-rrr": 10,
+    "3-rpr": 10,
+    "3-prr": 8,
+    "stewart": 24,
+    "hexa": 27,
+    "hexaglide": 21,
+}
+"""Machines whose legs share their parameters, and the minimal parameters that M. Schappler's
+robsynth-parroblib (github.com/SchapplM) lists for their topologies, grouped along a leg alone."""
+
+
+@pytest.mark.parametrize("name", gated(TIED, ["3-rrr", "stewart"], CLIENTS))
+def test_tied_legs_have_at_most_the_parameters_of_one_leg_and_the_platform(name):
+    """The loop may group more than a leg by itself does, and never less."""
+    assert pteron.base_parameters(name, shared=True).rank <= TIED[name]
