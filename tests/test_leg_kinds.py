@@ -226,7 +226,7 @@ def named(tmp_path, monkeypatch):
 
 
 def test_a_kind_of_an_installed_package_is_known(named, tmp_path):
-    with pytest.raises(pteron.ModelError, match=r"'FromElsewhere' is not one of PRRR, .*RRS$"):
+    with pytest.raises(pteron.ModelError, match=r"'FromElsewhere' is not one of PRRR, .*UPU$"):
         pteron.load(named)
     installed(tmp_path, KIND, "own_legs:FromElsewhere")
     result = CliRunner().invoke(app, ["check", str(named)])
