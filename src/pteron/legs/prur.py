@@ -15,7 +15,15 @@ import casadi as ca
 
 from pteron.bodies.inertia import PlanarInertia, PointMass, SpatialInertia
 from pteron.bodies.motion import BodyMotion, Expression, PointMotion, RotationMotion
-from pteron.bodies.vectors import UNIT_TOLERANCE, Vector, dot, norm, scale_vector, shift_point
+from pteron.bodies.vectors import (
+    UNIT_TOLERANCE,
+    Vector,
+    dot,
+    norm,
+    perpendicular,
+    scale_vector,
+    shift_point,
+)
 from pteron.errors import ModelError
 from pteron.legs.drive import Drive
 from pteron.legs.jets import Jet
@@ -75,7 +83,7 @@ class PRUR(UniversalLinkLeg):
         share = dot(a, e)
         normal_part = shift_point(e, a, -share)
         if abs(share) <= UNIT_TOLERANCE:
-            exact = scale_vector(normal_part, 1.0 / norm(normal_part)) if share else e
+            exact = perpendicular(e, a, "slider_direction", "axis")
         elif norm(normal_part) <= UNIT_TOLERANCE:
             exact = scale_vector(a, 1.0 if share > 0.0 else -1.0)
         else:
