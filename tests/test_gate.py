@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import tilting
 from mechanisms import CATALOG, GATE, MACHINES, MIXTURES, NIGHTLY, TURNS, random_machine
+from test_multipteron import NAMES, drawn
 
 from pteron.closures import KINDS as CLOSURES
 from pteron.closures.redundant_loci import RedundantLoci
@@ -16,6 +17,7 @@ from pteron.legs import KINDS as LEGS
 CHOSEN = [MACHINES[name] for name in GATE]
 TILTED = [tilting.machine(*case, 3)[0] for case in tilting.LEGS.items()]  # those of test_tilting
 CHOSEN += TILTED
+CHOSEN += [drawn(name, seed % 3)[0] for seed, name in enumerate(NAMES)]  # of test_multipteron
 
 
 def served(robots):
@@ -32,7 +34,7 @@ def served(robots):
 
 def test_every_closure_is_there_under_each_platform_that_it_serves():
     every = [*CATALOG.values(), *MACHINES.values(), *(random_machine(0, k) for k in MIXTURES)]
-    every += TILTED
+    every += CHOSEN
     assert served(CHOSEN) == served(every)
     assert {closure for closure, _ in served(CHOSEN)} == set(CLOSURES) - {RedundantLoci}
 

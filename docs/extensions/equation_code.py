@@ -72,7 +72,7 @@ CODE: dict[str, tuple[str, ...]] = {
     "O5": ("pteron.bodies.spatial.needed_twist_wrench",),
     "O6": ("pteron.platforms.tripod.Tripod.motion",),
     # Five freedoms and spherical legs.
-    "W1": ("pteron.platforms.tilting.FiveFreedoms.motion", "pteron.legs.variables.attached_vector"),
+    "W1": ("pteron.platforms.tilting.FiveFreedoms.motion", "pteron.legs.jets.platform_vector"),
     "W2": (f"{_L}.prur.PRUREquations.motion",),
     "W3": (
         *(f"{_L}.universal_link.UniversalLinkEquations.link_across",),

@@ -162,7 +162,7 @@ class Machine:
     def legs_at(self, platform: PlatformMotion) -> list[LegEquations]:
         """Return the legs' equations at an orientation of the platform."""
         axes = platform.rotation.axes
-        return [leg if axes is None else leg.at_axes(axes) for leg in self.legs]
+        return [leg if axes is None else leg.with_axes(axes) for leg in self.legs]
 
     def moments(self, parameters: Expression) -> tuple[list[dict[str, Any]], PlatformMoments]:
         """Return mass moments of each leg's bodies by letter, and of the platform, from (N, K)."""

@@ -49,7 +49,9 @@ def direct_kinematics(
     that tilt are the ends of k paths from a machine whose poses are known: each is proved, and none
     is missed except, by rounding, next to a singularity. Where their legs keep points in planes, as
     P-R-R-S and spherical R-R-R legs do, and where their axes do not meet, they are eigenvalues or
-    roots. If the poses form a curve (self-motion), an error is raised.
+    roots. Of P-R-U-R and R-P-U-R legs, and of legs in planes mixed with others, no method finds
+    every pose: they are those that Newton's method finds from fixed starts, and others may exist.
+    If the poses form a curve (self-motion), an error is raised.
 
     Parameters
     ----------
@@ -90,9 +92,6 @@ def direct_kinematics(
         held (a self-motion), whatever `on_failure`.
     UnreachablePose
         If joints have no pose, unless `on_failure` is "nan".
-    ModelError
-        If no method finds every pose of such legs, as of P-R-U-R legs, or of P-R-R-S legs mixed
-        with others.
 
     Examples
     --------

@@ -47,9 +47,9 @@ class _Closures:
             )
         )
         centers, squares = spheres_kernel(robot)(joints)
-        along = (a @ o) * a
-        self.a, self.offset, self.b0 = a, o - along, b0
-        self.arms = centers - center - along  # (B, 2, 3)
+        axial_part = (a @ o) * a
+        self.a, self.offset, self.b0 = a, o - axial_part, b0
+        self.arms = centers - center - axial_part  # (B, 2, 3)
         self.squares = squares
         self.points = np.array([leg.platform_point for leg in robot.legs]) @ np.array(
             platform.frame
@@ -57,17 +57,17 @@ class _Closures:
 
     def terms(self, which: NDArray[np.int64], beta: Array) -> tuple[Array, Array, Array]:
         """Return P, Q and K (K, 2) at angles beta (K,) of rows `which` (K,)."""
-        arms, b = self.arms[which], self.offset + self._turned(beta)
-        across = arms - (arms @ self.a)[..., None] * self.a
-        p, q = (across * b).sum(-1), (arms * np.cross(self.a, b)).sum(-1)
+        arms, b = self.arms[which], self.offset + self._rotate_points(beta)
+        normal_part = arms - (arms @ self.a)[..., None] * self.a
+        p, q = (normal_part * b).sum(-1), (arms * np.cross(self.a, b)).sum(-1)
         sizes = (arms**2).sum(-1) + (b**2).sum(-1) - self.squares[which]
         return p, q, 0.5 * sizes - (arms @ self.a) * (b @ self.a)
 
-    def _turned(self, beta: Array) -> Array:
+    def _rotate_points(self, beta: Array) -> Array:
         """Return the platform points (K, 2, 3) from P, turned by beta about the second axis."""
         s, c, n = self.points, np.cos(beta)[:, None, None], np.sin(beta)[:, None, None]
-        along = (s @ self.b0)[:, None] * self.b0
-        return np.asarray(along + c * (s - along) + n * np.cross(self.b0, s))
+        axial_part = (s @ self.b0)[:, None] * self.b0
+        return np.asarray(axial_part + c * (s - axial_part) + n * np.cross(self.b0, s))
 
 
 def offset_poses(robot: Manipulator, joints: Array) -> tuple[NDArray[np.int64], Array]:
@@ -80,8 +80,8 @@ def offset_poses(robot: Manipulator, joints: Array) -> tuple[NDArray[np.int64], 
     (p1, p2), (q1, q2), (k1, k2) = (
         part.T for part in closures.terms(rows, np.tile(sampled, len(good)))
     )
-    values = (k1 * q2 - k2 * q1) ** 2 + (p1 * k2 - p2 * k1) ** 2 - (p1 * q2 - p2 * q1) ** 2
-    waves = np.fft.fft(values.reshape(-1, count)) / count
+    samples = (k1 * q2 - k2 * q1) ** 2 + (p1 * k2 - p2 * k1) ** 2 - (p1 * q2 - p2 * q1) ** 2
+    waves = np.fft.fft(samples.reshape(-1, count)) / count
     coefficients = np.roll(waves, _DEGREE, axis=1)[:, : 2 * _DEGREE + 1]  # of z^-4 to z^4
     which, betas = [], []
     for row, polynomial in zip(good, coefficients, strict=True):
@@ -97,7 +97,7 @@ def offset_poses(robot: Manipulator, joints: Array) -> tuple[NDArray[np.int64], 
     middle = np.arctan2(q, p)
     indices = np.concatenate([indices, indices])
     starts = np.concatenate([middle + opening, middle - opening]), np.concatenate([beta, beta])
-    poses, residuals = _sharpened(closures, indices, np.stack(starts, axis=-1))
+    poses, residuals = _refine_poses(closures, indices, np.stack(starts, axis=-1))
     closed = np.flatnonzero(residuals < _CLOSED)
     closed = closed[np.argsort(indices[closed], kind="stable")]
     rows, poses = indices[closed], wrap_angle(poses[closed])
@@ -111,7 +111,7 @@ def offset_poses(robot: Manipulator, joints: Array) -> tuple[NDArray[np.int64], 
     return rows[single], poses[single]
 
 
-def _sharpened(closures: _Closures, which: NDArray[np.int64], x: Array) -> tuple[Array, Array]:
+def _refine_poses(closures: _Closures, which: NDArray[np.int64], x: Array) -> tuple[Array, Array]:
     """Return poses (K, 2) after Newton's method, and their largest relative residual (K,)."""
     size = closures.squares[which].max(axis=-1)
     for _ in range(_STEPS):

@@ -112,14 +112,14 @@ def quadric_rotations(
     first, second = np.einsum("fi,bijk->fbjk", _FORMS, shifted)
     vectors = np.linalg.eig(np.linalg.pinv(second) @ first)[1]
     scale = second @ vectors
-    values = np.einsum("bijk,bkl->bijl", shifted, vectors)
-    points = np.einsum("bijl,bjl->bli", values, scale.conj())  # up to scale, (B, 8, 4)
+    products = np.einsum("bijk,bkl->bijl", shifted, vectors)
+    points = np.einsum("bijl,bjl->bli", products, scale.conj())  # up to scale, (B, 8, 4)
     largest = np.take_along_axis(points, np.abs(points).argmax(-1)[..., None], axis=-1)
     points = points / largest
     points /= np.linalg.norm(points, axis=-1, keepdims=True)
     real = (np.abs(points.imag).max(axis=-1) < _NEARLY_REAL) & ~curve[:, None]
     which, _ = np.nonzero(real)
-    sharp, residuals = _sharpened(quadrics[which], points.real[real])
+    sharp, residuals = _refine_quaternions(quadrics[which], points.real[real])
 
     def are_same(later: slice, earlier: slice) -> NDArray[np.bool_]:
         """Return whether quaternions are equal, or opposite."""
@@ -143,7 +143,7 @@ def _quadrics(forms: Array, heights: Array) -> Array:
     return np.asarray(quadrics / sizes)
 
 
-def _sharpened(quadrics: Array, x: Array) -> tuple[Array, Array]:
+def _refine_quaternions(quadrics: Array, x: Array) -> tuple[Array, Array]:
     """Return unit quaternions (K, 4) after Newton's method, and their largest residual (K,)."""
     for _ in range(_STEPS):
         products = np.einsum("kqij,kj->kqi", quadrics, x)

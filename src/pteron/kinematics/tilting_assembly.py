@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 from pteron.equations.closing import holds_planes, holds_spheres
 from pteron.equations.machine import Machine
 from pteron.equations.pose_paths import Closed
-from pteron.errors import ModelError
 from pteron.kernels import Array
 from pteron.kernels.path_programs import spheres_kernel
 from pteron.kinematics.offset_poses import offset_poses
 from pteron.kinematics.plane_poses import plane_poses
 from pteron.kinematics.pose_paths import generic, positions_and_rotations, real_poses
+from pteron.kinematics.searched_poses import searched_poses
 from pteron.manipulator import Manipulator
 from pteron.platforms.nearest_pose import nearest_pose
 from pteron.tolerances import SAME
@@ -38,15 +38,11 @@ def tilting_poses(
     machine = Machine.numeric(robot)
     if holds_planes(machine):
         return plane_poses(robot, joints)
+    still = np.zeros(len(joints), dtype=bool)
     if not holds_spheres(machine):
-        kinds = " and ".join(sorted({leg.type for leg in robot.legs}))
-        raise ModelError(
-            f"direct_kinematics: no method finds every pose of {kinds} legs under a "
-            f"{robot.platform.motion} platform; `follow` and `direct_step` go on from a known pose",
-            subject=robot.name,
-        )
+        return (*searched_poses(robot, joints), still)
     if robot.platform.axis_offset is not None:
-        return (*offset_poses(robot, joints), np.zeros(len(joints), dtype=bool))
+        return (*offset_poses(robot, joints), still)
     centers, squares = spheres_kernel(robot)(joints)
     good = np.flatnonzero(
         (np.abs(centers) < _HUGE).all(axis=(-2, -1)) & (np.abs(squares) < _HUGE).all(axis=-1)

@@ -261,7 +261,7 @@ class LegEquations(ABC):
         """
         return None
 
-    def at_axes(self, axes: Expression) -> Self:
+    def with_axes(self, axes: Expression) -> Self:
         """Return the equations for the axes (3, k) now of the k angles by which the platform tilts.
 
         `reach`, `edges`, `limit_margins` and `locus` of legs that depend on the orientation are

@@ -15,9 +15,18 @@ import casadi as ca
 
 from pteron.bodies.inertia import PlanarInertia, PointMass, SpatialInertia
 from pteron.bodies.motion import BodyMotion, Expression, PointMotion, RotationMotion
-from pteron.bodies.vectors import UNIT_TOLERANCE, Vector, dot, norm, scale_vector, shift_point
+from pteron.bodies.vectors import (
+    UNIT_TOLERANCE,
+    Vector,
+    dot,
+    norm,
+    perpendicular,
+    scale_vector,
+    shift_point,
+)
 from pteron.errors import ModelError
 from pteron.legs.drive import Drive
+from pteron.legs.jets import Jet
 from pteron.legs.keys import ACCOUNTS, keys_of
 from pteron.legs.kind import SLIDER, LegQuantity, ReachBound
 from pteron.legs.leg import Joint, LegMotion
@@ -31,7 +40,6 @@ from pteron.legs.universal_link import (
     UniversalLinkLeg,
     turn_about,
 )
-from pteron.legs.variables import Variable
 
 
 @dataclass(frozen=True)
@@ -73,10 +81,10 @@ class PRUR(UniversalLinkLeg):
         leg = super().with_platform_rotation(axes, center)
         a, e = axes[0], self.slider_direction
         share = dot(a, e)
-        across = shift_point(e, a, -share)
+        normal_part = shift_point(e, a, -share)
         if abs(share) <= UNIT_TOLERANCE:
-            exact = scale_vector(across, 1.0 / norm(across)) if share else e
-        elif norm(across) <= UNIT_TOLERANCE:
+            exact = perpendicular(e, a, "slider_direction", "axis")
+        elif norm(normal_part) <= UNIT_TOLERANCE:
             exact = scale_vector(a, 1.0 if share > 0.0 else -1.0)
         else:
             raise ModelError(
@@ -145,13 +153,13 @@ class PRUREquations(UniversalLinkEquations):
         super().__init__(**others)
         self.e, self.lu = slider_direction, upper_length
 
-    def links(self, w: Variable, b: Variable, n: Variable) -> tuple[Variable, Variable, LinkState]:
+    def links(self, w: Jet, b: Jet, n: Jet) -> tuple[Jet, Jet, LinkState]:
         """Return the coordinate q, the upper link l_u and the lower link in motion."""
         raise NotImplementedError
 
     def motion(self, point: PointMotion, rotation: RotationMotion) -> LegMotion:
         """Return the motion of slider, links and joints."""
-        leg = self.rotated(rotation)
+        leg = self.with_rotation(rotation)
         q, upper, at = leg.links(*leg.vectors(point, rotation))
         f, row = leg.force(upper.value, at.link.value)
         divisor = ca.dot(f, self.e)
@@ -182,27 +190,27 @@ class PRUREquations(UniversalLinkEquations):
 class AcrossEquations(PRUREquations):
     """The equations of a leg whose slider moves across a: it fixes l_l first, then l_u."""
 
-    def links(self, w: Variable, b: Variable, n: Variable) -> tuple[Variable, Variable, LinkState]:
+    def links(self, w: Jet, b: Jet, n: Jet) -> tuple[Jet, Jet, LinkState]:
         """Return the coordinate q, the upper link l_u and the lower link in motion."""
         at = self.link_across(w, n)
         v = w - at.link
-        ahead = v.mapped(self.e.T)
-        aside = v.mapped(ca.cross(self.a, self.e).T)  # v is across a
+        ahead = v.transform(self.e.T)
+        aside = v.transform(ca.cross(self.a, self.e).T)  # v is across a
         root = aside.complement(self.lu, self.sigma)
         q = ahead - root
-        return q, v - q.scaled(self.e), at
+        return q, v - q.multiply(self.e), at
 
     def closure(self, c: Expression, root: Root) -> NestedClosure:
         """Return what the reach of c (3, 1) depends on; `root` returns a number's square root."""
-        w, n, across = c - self.r, ca.cross(self.a, self.b), ca.cross(self.a, self.e)
+        w, n, side = c - self.r, ca.cross(self.a, self.b), ca.cross(self.a, self.e)
         h = ca.dot(self.a, w)
         inner = self.ll * self.ll - h * h
         m = self.kappa * root(inner)
         v = w - h * self.a - m * n
-        aside = ca.dot(v, across)
+        aside = ca.dot(v, side)
         outer = self.lu * self.lu - aside * aside
         ahead = self.sigma * root(outer)
-        normal_part = ahead * ca.dot(self.e, n) + aside * ca.dot(across, n)
+        normal_part = ahead * ca.dot(self.e, n) + aside * ca.dot(side, n)
         share = m * m * ahead * ahead
         size = ca.fmax((h * normal_part) ** 2 + m * m * self.lu * self.lu, TINY)
         margin = ca.fmin(self.ll - ca.fabs(h), self.lu - ca.fabs(aside))
@@ -212,14 +220,14 @@ class AcrossEquations(PRUREquations):
 class AlongEquations(PRUREquations):
     """The equations of a leg whose slider moves along a: it fixes l_u first, then l_l."""
 
-    def links(self, w: Variable, b: Variable, n: Variable) -> tuple[Variable, Variable, LinkState]:
+    def links(self, w: Jet, b: Jet, n: Jet) -> tuple[Jet, Jet, LinkState]:
         """Return the coordinate q, the upper link l_u and the lower link in motion."""
         along_b = w.dot(b)
         upper = along_b * b + along_b.complement(self.lu, self.sigma) * n
         m = n.dot(w - upper)
         h = m.complement(self.ll, self.kappa)
-        link = m * n + h.scaled(self.a)
-        return (w - link).mapped(self.e.T), upper, LinkState(link, h, m)
+        link = m * n + h.multiply(self.a)
+        return (w - link).transform(self.e.T), upper, LinkState(link, h, m)
 
     first_link, second_link = "upper link", "lower link"
 

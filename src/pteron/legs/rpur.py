@@ -113,7 +113,7 @@ class RPUREquations(UniversalLinkEquations):
 
     def motion(self, point: PointMotion, rotation: RotationMotion) -> LegMotion:
         """Return the motion of cylinder, piston, link and joints."""
-        leg = self.rotated(rotation)
+        leg = self.with_rotation(rotation)
         w, _, n = leg.vectors(point, rotation)
         at = leg.link_across(w, n)
         v = w - at.link

@@ -29,11 +29,11 @@ from pteron.legs.ball_end import every_axis
 from pteron.legs.circles import plane_of
 from pteron.legs.crank import TurningLeg
 from pteron.legs.drive import Drive
+from pteron.legs.jets import angular_motion
 from pteron.legs.keys import ACCOUNTS, FieldCondition, keys_of
 from pteron.legs.kind import LegQuantity, LegTransfer, ReachBound
 from pteron.legs.leg import CoordinateLocus, Joint, LegEquations, LegMotion, PlaneLocus, Reach
 from pteron.legs.reading import Reading
-from pteron.legs.variables import angular_motion
 
 _RIGHT = 1e-15
 """Rounding of the tangent of a quarter turn's half, which is 1."""
@@ -212,16 +212,18 @@ class SRRREquations(LegEquations):
         """Return v, its part across u (2, 1), what k . v must be, and the discriminant."""
         arm = c - self.r
         v = arm / ca.sqrt(ca.dot(arm, arm))
-        across, (cosine, sine) = ca.mtimes(self.plane.T, v), self.crank
+        plane_part, (cosine, sine) = ca.mtimes(self.plane.T, v), self.crank
         height = (self.link[0] - cosine * ca.dot(self.u, v)) / sine
-        return v, across, height, ca.dot(across, across) - height * height
+        return v, plane_part, height, ca.dot(plane_part, plane_part) - height * height
 
     def _state(self, c: Expression) -> _State:
         """Return the axes of the leg's joints."""
-        v, across, height, square = self._closure(c)
+        v, plane_part, height, square = self._closure(c)
         root, (cosine, sine) = self.sigma * ca.sqrt(square), self.crank
-        turned = ca.vertcat(-across[1], across[0])
-        k = ca.mtimes(self.plane, height * across + root * turned) / ca.dot(across, across)
+        turned = ca.vertcat(-plane_part[1], plane_part[0])
+        k = ca.mtimes(self.plane, height * plane_part + root * turned) / ca.dot(
+            plane_part, plane_part
+        )
         return _State(cosine * self.u + sine * k, v, k, -sine * root)
 
     def motion(self, point: PointMotion, rotation: RotationMotion) -> LegMotion:
@@ -246,10 +248,10 @@ class SRRREquations(LegEquations):
         spins = [ca.cross(v, u).T / divisor, side.T / divisor]
         rates = [ca.mtimes(spin, omega) for spin in spins]
         swing = rates[0] * rate * side
-        rest = growth - swing - rates[1] * ca.cross(omega, v)
+        remainder = growth - swing - rates[1] * ca.cross(omega, v)
         none = ca.SX(1, 3)
         second, third = (
-            (ca.horzcat(none, spin), spin_rate, ca.mtimes(spin, rest))
+            (ca.horzcat(none, spin), spin_rate, ca.mtimes(spin, remainder))
             for spin, spin_rate in zip(spins, rates, strict=True)
         )
         y, square = ca.cross(u, k), rate * rate
@@ -285,11 +287,11 @@ class SRRREquations(LegEquations):
 
     def reach(self, c: Expression) -> Reach:
         """Return the reach margin: the arcs' range less the angle between u and v, in m at c."""
-        v, across, _, discriminant = self._closure(c)
+        v, plane_part, _, discriminant = self._closure(c)
         arm = c - self.r
         length = ca.sqrt(ca.dot(arm, arm))
         a, b = (2 * ca.atan2(t, 1) for t in self.tangents)
-        spread = ca.sqrt(ca.dot(across, across))
+        spread = ca.sqrt(ca.dot(plane_part, plane_part))
         angle = ca.atan2(spread, ca.dot(self.u, v))
         most = ca.fmin(a + b, 2 * ca.pi - a - b)
         margin = ca.fmin(angle - ca.fabs(a - b), most - angle)

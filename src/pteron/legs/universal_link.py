@@ -23,15 +23,15 @@ from pteron.bodies.motion import (
 )
 from pteron.bodies.vectors import Vector
 from pteron.errors import ModelError
+from pteron.legs.jets import (
+    Jet,
+    angular_motion,
+    platform_vector,
+    point_jet,
+)
 from pteron.legs.kind import LegKind
 from pteron.legs.leg import CoordinateLocus, Joint, LegEquations, Reach
 from pteron.legs.planar_links import LinkRotation
-from pteron.legs.variables import (
-    Variable,
-    angular_motion,
-    attached_vector,
-    point_variable,
-)
 
 TINY = 1e-300
 """Least divisor of a measure that is 0: out of reach both may be."""
@@ -62,16 +62,16 @@ class UniversalLinkLeg(LegKind):
     def equations(self, values: Any = None) -> LegEquations:
         """Return the leg's equations, for its platform's axes at angles zero."""
         axes = ca.horzcat(*(ca.SX(list(axis)) for axis in self.platform_axes))
-        return super().equations(values).at_axes(axes)
+        return super().equations(values).with_axes(axes)
 
 
 class LinkState(NamedTuple):
     """The last link in motion."""
 
-    link: Variable
+    link: Jet
     """l_l."""
-    h: Variable
-    m: Variable
+    h: Jet
+    m: Jet
 
 
 Root = Callable[[Expression], Expression]
@@ -100,28 +100,26 @@ class UniversalLinkEquations(LegEquations):
         self.sigma, self.kappa = signs["elbow"], signs["second_elbow"]
         self.a, self.b = ca.SX(3, 1), ca.SX(3, 1)
 
-    def at_axes(self, axes: Expression) -> Self:
+    def with_axes(self, axes: Expression) -> Self:
         """Return the equations for the platform's axes a and b now, the columns of (3, 2)."""
         changed = object.__new__(type(self))
         vars(changed).update(vars(self), a=axes[:, 0], b=axes[:, 1])
         return changed
 
-    def rotated(self, rotation: RotationMotion) -> Self:
+    def with_rotation(self, rotation: RotationMotion) -> Self:
         """Return the equations for the axes that a platform's rotation has now."""
-        return self if rotation.axes is None else self.at_axes(rotation.axes)
+        return self if rotation.axes is None else self.with_axes(rotation.axes)
 
-    def vectors(
-        self, point: PointMotion, rotation: RotationMotion
-    ) -> tuple[Variable, Variable, Variable]:
+    def vectors(self, point: PointMotion, rotation: RotationMotion) -> tuple[Jet, Jet, Jet]:
         """Return w = c - r, b and n in motion."""
-        b = attached_vector(self.b, rotation)
-        return point_variable(point, self.r), b, b.mapped(ca.skew(self.a))
+        b = platform_vector(self.b, rotation)
+        return point_jet(point, self.r), b, b.transform(ca.skew(self.a))
 
-    def link_across(self, w: Variable, n: Variable) -> LinkState:
+    def link_across(self, w: Jet, n: Jet) -> LinkState:
         """Return the link whose part along a, h, is that of w, as where the rest is across a."""
-        h = w.mapped(self.a.T)
+        h = w.transform(self.a.T)
         m = h.complement(self.ll, self.kappa)
-        return LinkState(h.scaled(self.a) + m * n, h, m)
+        return LinkState(h.multiply(self.a) + m * n, h, m)
 
     def last_parts(
         self, point: PointMotion, rotation: RotationMotion, at: LinkState, first: LinkRotation
@@ -131,7 +129,7 @@ class UniversalLinkEquations(LegEquations):
         `first` is the rotation about a of what carries the universal joint.
         """
         a, b, link = self.a, self.b, at.link
-        turn = attached_vector(b, rotation)
+        turn = platform_vector(b, rotation)
         omega, growth = angular_motion(rotation)
         none = ca.SX(1, 3)
         alpha = LinkRotation(ca.horzcat(none, a.T), ca.dot(a, omega), ca.dot(a, growth))
@@ -191,7 +189,7 @@ class UniversalLinkEquations(LegEquations):
         return CoordinateLocus(q)
 
 
-def turn_about(axis: Expression, vector: Variable, square: Expression) -> LinkRotation:
+def turn_about(axis: Expression, vector: Jet, square: Expression) -> LinkRotation:
     """Return the rotation about a fixed axis of a vector of fixed length across it."""
     swing = ca.cross(axis, vector.value).T / square
     return LinkRotation(*(ca.mtimes(swing, part) for part in vector.parts[1:]))

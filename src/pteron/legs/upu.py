@@ -41,8 +41,8 @@ class UPU(UniversalRamLeg):
         if axis is not None:
             return []
         u, ram = ca.SX(list(self.direction or ())), motion.links[1]
-        across = ram - ca.dot(u, ram) * u
-        return [across / ca.norm_2(across)]
+        normal_part = ram - ca.dot(u, ram) * u
+        return [normal_part / ca.norm_2(normal_part)]
 
 
 class UPUEquations(UPSEquations):

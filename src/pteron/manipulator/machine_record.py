@@ -140,6 +140,7 @@ def _layout(robot: Manipulator) -> str:
         legs.append(leg.type + "".join("+" if sign > 0.0 else "-" for sign in signs))
     angles = f" {platform.angle_order}" if platform.has_angle_order else ""
     slides = ", slides" if platform.slides else ""
+    slides += ", axes apart" if platform.axis_offset is not None else ""
     return f"{platform.motion}{angles}{slides}: {' '.join(legs)}"
 
 
