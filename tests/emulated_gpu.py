@@ -126,9 +126,9 @@ def far_apart(values, axis):
     size = sum((n - 1) * step for n, step in zip(values.shape, steps, strict=True))
     with tempfile.TemporaryFile() as file:  # one of holes, of which few pages are used
         memory = np.memmap(file, values.dtype, shape=size // values.itemsize + 1)
-    array = np.lib.stride_tricks.as_strided(memory, values.shape, steps).view(DeviceArray)
-    array[...] = values
-    return array
+    array = np.lib.stride_tricks.as_strided(memory, values.shape, steps)
+    array[...] = np.asarray(values)
+    return array.view(DeviceArray)
 
 
 @cache

@@ -39,7 +39,7 @@ from pteron.kernels.code import (
 )
 from pteron.kernels.compilers import compile_library, run
 from pteron.kernels.exponential import with_lowered_exponentials
-from pteron.kernels.graph import Graph, graph_of
+from pteron.kernels.graph import LOAD, STORE, Graph, graph_of
 from pteron.kernels.kernel import SHARE, Array, ArrayKernel, Port
 from pteron.kernels.program_cache import cached_result, is_stored
 
@@ -126,6 +126,8 @@ def c_language(dtype: str) -> Language:
     return Language(
         printed
         | {
+            STORE: "{0}",
+            LOAD: "{0}",
             "sin": "sincos_({0}).sine",
             "cos": "sincos_({0}).cosine",
             "fmin": "fmin_({0}, {1})",

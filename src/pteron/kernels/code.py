@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pteron.kernels.exponential import exponential_function
-from pteron.kernels.graph import CONSTANT, INPUT, LOAD, STORE, Graph, graph_of
+from pteron.kernels.graph import CONSTANT, INPUT, STORE, Graph, graph_of
 from pteron.kernels.kernel import Port
 from pteron.kernels.sincos import LIMIT, reduced_sincos
 
@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     import jinja2
 
 C = {
-    STORE: "{0}",
-    LOAD: "{0}",
     "add": "{0} + {1}",
     "sub": "{0} - {1}",
     "mul": "{0} * {1}",

@@ -8,6 +8,7 @@ name. Masses, drives and limits do not count.
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import fields
 from hashlib import sha256
@@ -99,6 +100,9 @@ def _largest_difference(
         raise DataError(f"{source}: machine.dimensions: missing; make the file anew")
     dimensions = list(_dimensions(robot))
     size = max(np.linalg.norm(d.values) for d in dimensions if d.role in ("length", "point"))
+    optional = {"platform.axis_offset"} & ({d.name for d in dimensions} ^ set(numbers))
+    if optional:
+        return math.inf, f"one of them has no {optional.pop()}"
     worst, text = 0.0, ""
     for dimension in dimensions:
         here = np.array(dimension.values)
