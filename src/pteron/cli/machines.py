@@ -398,12 +398,12 @@ def _redundancy(robot: Manipulator, findings: dict[str, Any]) -> list[Any]:
     from pteron.thresholds import LEAST_SINGULAR_VALUE
     from pteron.workspace.redundancy import ASSUMED_STIFFNESS, ZERO_ERROR
 
-    if (found := findings.get("redundancy")) is None:
+    if (analysis := findings.get("redundancy")) is None:
         return []
-    greatest = np.abs(found["internal_force"]).max(axis=1)
+    greatest = np.abs(analysis["internal_force"]).max(axis=1)
     rows = []
     for i, (leg, force, least) in enumerate(
-        zip(robot.legs, greatest, found["least_singular_value"], strict=True), start=1
+        zip(robot.legs, greatest, analysis["least_singular_value"], strict=True), start=1
     ):
         ratio = f"{1.0 / least:.2g}" if least > 0.0 else "-"
         is_held = "held" if least >= LEAST_SINGULAR_VALUE else "not held"
@@ -412,7 +412,7 @@ def _redundancy(robot: Manipulator, findings: dict[str, Any]) -> list[Any]:
     stiffness = (
         f" Drives without elastic.stiffness are taken as {1e-6 * ASSUMED_STIFFNESS:g} N/um along "
         "their leg."
-        if found["assumed"]
+        if analysis["assumed"]
         else ""
     )
     headings = ("leg", "internal force", "without its drive", "leg force over load then")

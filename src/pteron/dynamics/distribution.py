@@ -98,8 +98,8 @@ def forces_within_limits(
         If no forces within limits move the platform so.
     """
     greatest, strengths = np.array(robot.greatest_forces), np.array(robot.drive_strengths)
-    given = robot.distribution and robot.distribution.reference
-    reference = np.zeros(len(strengths)) if given is None else np.array(given)
+    own_reference = robot.distribution and robot.distribution.reference
+    reference = np.zeros(len(strengths)) if own_reference is None else np.array(own_reference)
     beyond = np.argwhere((np.abs(forces) > (1.0 + _WITHIN) * greatest).any(axis=-1))
     if not len(beyond):
         return forces

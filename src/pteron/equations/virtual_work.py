@@ -82,12 +82,12 @@ def share_forces(
     for _ in range(len(machine.legs) - machine.freedom):
         excess = ca.fmax(low - forces, forces - high) / machine.closure.strengths
         is_held = ca.if_else(excess >= ca.fmax(ca.mmax(excess), _WITHIN), 1, is_held)
-        held = is_held * ca.fmin(ca.fmax(forces, low), high)
-        free = held if reference is None else held + (1 - is_held) * reference
+        held_forces = is_held * ca.fmin(ca.fmax(forces, low), high)
+        free = held_forces if reference is None else held_forces + (1 - is_held) * reference
         closure = copy(machine.closure)
         closure.strengths = (1 - is_held) * machine.closure.strengths
-        rest = load - _platform_load(state, free)
-        forces = free + closure.forces(rest, state.platform, state.legs)
+        remainder = load - _platform_load(state, free)
+        forces = free + closure.forces(remainder, state.platform, state.legs)
     beyond = ca.fmax(low - forces, forces - high) - _WITHIN * machine.greatest
     # Where too few forces are free, those that are found do not act as they should.
     missed = ca.fabs(_platform_load(state, forces) - load) - _MISSED * ca.norm_1(load)

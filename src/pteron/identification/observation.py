@@ -301,16 +301,18 @@ def _periodic(
         # All periods have their samples at the same instants: one period is enough.
         time, shown = fine, moving
 
-    def states_at(part: slice) -> States:
-        """Return the states at a slice of the period's samples."""
-        phases = None if log.payload is None else np.full(len(time[part]), log.payload[0])
-        about: dict[str, Any] = {"source": log.source, "first_row": log.first_row + part.start}
-        motion, start = series.at(time[part]), preprocessing.start
-        return States.from_joints(model.robot, motion, time[part], start, payload=phases, **about)
+    def states_at(at: Array, first: int) -> States:
+        """Return the states at times (R,), s, of the period; the first is row `first` of the log."""
+        phases = None if log.payload is None else np.full(len(at), log.payload[0])
+        about: dict[str, Any] = {"source": log.source, "first_row": log.first_row + first}
+        motion = series.at(at)
+        return States.from_joints(
+            model.robot, motion, at, preprocessing.start, payload=phases, **about
+        )
 
     def regressor(part: slice) -> Array:
         """Return the regressor (rows, n p) at a slice of the period's samples."""
-        states = states_at(part)
+        states = states_at(time[part], part.start)
         matrix = felt_part(model.robot, states.pose, model.matrix(states))
         return np.asarray(shown[part][..., None] * matrix).reshape(len(states), -1)
 
@@ -319,11 +321,8 @@ def _periodic(
         forces: Array = used[part] * log.forces[part]
         if not model.robot.redundancy:
             return forces
-        phase = np.mod(log.time[part] - start, period) + start
-        series_states = States.from_joints(
-            *(model.robot, series.at(phase), phase, preprocessing.start), source=log.source
-        )
-        return felt_part(model.robot, series_states.pose, forces)
+        states = states_at(np.mod(log.time[part] - start, period) + start, part.start)
+        return felt_part(model.robot, states.pose, forces)
 
     n, p = used.shape[1], len(model.names)
     basis = fourier_basis(instants, harmonics, period)

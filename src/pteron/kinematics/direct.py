@@ -255,11 +255,11 @@ def _fitting_poses(
         is_missing = np.isnan(poses).all(axis=(-2, -1))
         if not is_missing.any():
             break
-        given = joints[is_missing]
+        readings = joints[is_missing]
         part = replace(robot, legs=tuple(robot.legs[i] for i in legs), distribution=None, home=None)
         with suppress(SingularPose):  # these legs leave it a self-motion
-            tried = assembly_modes(part, given[:, list(legs)], all_branches=all_branches)
-            rows = np.broadcast_to(given[:, None], (*tried.shape[:-1], given.shape[-1]))
+            tried = assembly_modes(part, readings[:, list(legs)], all_branches=all_branches)
+            rows = np.broadcast_to(readings[:, None], (*tried.shape[:-1], readings.shape[-1]))
             for _ in range(_FIT_STEPS):
                 tried, change, _ = numeric(robot, "newton_step")(rows, tried)
             elbows = working_mode(robot, tried, rows, tolerance=allowed)

@@ -38,11 +38,11 @@ def tilting_poses(
     machine = Machine.numeric(robot)
     if holds_planes(machine):
         return plane_poses(robot, joints)
-    still = np.zeros(len(joints), dtype=bool)
+    none_moves = np.zeros(len(joints), dtype=bool)
     if not holds_spheres(machine):
-        return (*searched_poses(robot, joints), still)
+        return (*searched_poses(robot, joints), none_moves)
     if robot.platform.axis_offset is not None:
-        return (*offset_poses(robot, joints), still)
+        return (*offset_poses(robot, joints), none_moves)
     centers, squares = spheres_kernel(robot)(joints)
     good = np.flatnonzero(
         (np.abs(centers) < _HUGE).all(axis=(-2, -1)) & (np.abs(squares) < _HUGE).all(axis=-1)

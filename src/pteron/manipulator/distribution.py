@@ -78,9 +78,9 @@ def distribution_faults(
         if distribution is None:
             return []
         return ["distribution: as many legs as freedoms, whose forces are unique; remove it"]
-    faults, given = [], distribution or Distribution()
+    faults, shares = [], distribution or Distribution()
     for name in ("reference", "strengths", "greatest"):
-        numbers = getattr(given, name)
+        numbers = getattr(shares, name)
         if numbers is None:
             continue
         if len(numbers) != len(legs):
@@ -94,12 +94,12 @@ def distribution_faults(
             faults.append(
                 f"distribution.{name}: {list(numbers)} given, finite numbers{above} expected"
             )
-    if given.strengths is None:
+    if shares.strengths is None:
         faults += _unknown_strengths(legs)
     missing = [
         i for i, leg in enumerate(legs, start=1) if leg.drive is None or not leg.drive.max_force
     ]
-    if given.limits and given.greatest is None and missing:
+    if shares.limits and shares.greatest is None and missing:
         faults.append(
             f"distribution.limits: max_force is missing in the drive of legs {_listed(missing)}"
         )

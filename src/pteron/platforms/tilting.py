@@ -342,11 +342,11 @@ class Universal(_TwoAxes, _Centred):
             twist = ca.vertcat(ca.SX(3, 2), turned.axes)
             return self.assemble_motion(PointMotion(center, zero, zero), turned, twist, None)
         a, cos, sin = self.quantities["first_axis"], ca.cos(pose[0]), ca.sin(pose[0])
-        along = a * ca.dot(a, offset)
-        arm = cos * (offset - along) + sin * ca.cross(a, offset)
+        axial = a * ca.dot(a, offset)
+        arm = cos * (offset - axial) + sin * ca.cross(a, offset)
         lever = ca.cross(a, arm)
         place = PointMotion(
-            center + along + arm,
+            center + axial + arm,
             lever * velocity[0],
             lever * acceleration[0] - arm * (velocity[0] * velocity[0]),
         )
