@@ -67,21 +67,21 @@ def inverse_dynamics(
     array([31.082, -1.881,  2.566,  0.685])
     """
     inputs = [pose, velocity, acceleration, *([] if wrench is None else [wrench])]
-    robot = _distributed(robot, distribution)
+    robot = _replace_distribution(robot, distribution)
     forces: PerJoint = evaluate_kernel(
-        _without_limits(robot), "inverse_dynamics", on_failure, *inputs, wrench=wrench is not None
+        _remove_limits(robot), "inverse_dynamics", on_failure, *inputs, wrench=wrench is not None
     )
-    return _within_limits(robot, pose, forces, lambda: np.zeros(forces.shape[-1]), on_failure)
+    return _apply_limits(robot, pose, forces, lambda: np.zeros(forces.shape[-1]), on_failure)
 
 
-def _distributed(robot: RobotLike, distribution: Distribution | None) -> RobotLike:
+def _replace_distribution(robot: RobotLike, distribution: Distribution | None) -> RobotLike:
     """Return the machine with another distribution of forces; as it is for None."""
     if distribution is None:
         return robot
     return replace(as_manipulator(robot), distribution=distribution)
 
 
-def _without_limits(robot: RobotLike) -> RobotLike:
+def _remove_limits(robot: RobotLike) -> RobotLike:
     """Return the machine whose forces are shared without limits."""
     shares = as_manipulator(robot).distribution
     if shares is None or not shares.limits:
@@ -89,7 +89,7 @@ def _without_limits(robot: RobotLike) -> RobotLike:
     return replace(as_manipulator(robot), distribution=replace(shares, limits=False))
 
 
-def _within_limits(
+def _apply_limits(
     robot: RobotLike,
     pose: PoseLike,
     forces: PerJoint,
@@ -222,8 +222,8 @@ def drive_forces(
     """
     inputs = [pose, velocity, acceleration, *([] if wrench is None else [wrench])]
     what = "feed_forward" if smooth else "drive_forces"
-    robot = _distributed(robot, distribution)
-    unlimited, loaded = _without_limits(robot), wrench is not None
+    robot = _replace_distribution(robot, distribution)
+    unlimited, loaded = _remove_limits(robot), wrench is not None
     forces: PerJoint = evaluate_kernel(unlimited, what, on_failure, *inputs, wrench=loaded)
 
     def drive_loads() -> PerJoint:
@@ -233,7 +233,7 @@ def drive_forces(
         )
         return np.asarray(forces - rigid)
 
-    return _within_limits(robot, pose, forces, drive_loads, on_failure)
+    return _apply_limits(robot, pose, forces, drive_loads, on_failure)
 
 
 def drive_accelerations(

@@ -14,7 +14,7 @@ from pteron.environments.world import World
 from pteron.errors import ModelError
 from pteron.kernels import Array
 from pteron.kernels.choice import kernel_with_status
-from pteron.kernels.cuda import DeviceKernel, device_library, in_library, on_device
+from pteron.kernels.cuda import DeviceKernel, convert_to_library, device_library, move_to_device
 from pteron.kernels.device_random import DeviceGenerators
 from pteron.kernels.loops import loop
 from pteron.manipulator import Manipulator
@@ -35,7 +35,7 @@ class DeviceWorld(World):
 
     def tensor(self, array: Any, library: str) -> Any:
         """Return a CuPy array as one of a library, "cupy", "torch" or "jax", in the same memory."""
-        return in_library(array, library)
+        return convert_to_library(array, library)
 
     def host_state(self, state: EpisodeState) -> EpisodeState:
         """Return a state in NumPy's arrays."""
@@ -87,7 +87,7 @@ class DeviceWorld(World):
 
     def _action_array(self, action: Any) -> Array:
         """Return an action, of float32, as an array of double precision."""
-        array: Array = on_device(action, "action", "float32").astype(np.float64)
+        array: Array = move_to_device(action, "action", "float32").astype(np.float64)
         return array
 
 

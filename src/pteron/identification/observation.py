@@ -302,7 +302,7 @@ def _periodic(
         time, shown = fine, moving
 
     def states_at(at: Array, first: int) -> States:
-        """Return the states at times (R,), s, of the period; the first is row `first` of the log."""
+        """Return the states at times (R,), s, of the period; the first is the row `first`."""
         phases = None if log.payload is None else np.full(len(at), log.payload[0])
         about: dict[str, Any] = {"source": log.source, "first_row": log.first_row + first}
         motion = series.at(at)

@@ -68,7 +68,7 @@ class DeviceKernel(Kernel):
         """Evaluate the kernel on GPU arrays, after checks of shapes and types."""
         cupy = device_library()
         by_port = self._values_by_port(values, fixed)
-        arrays = {port.name: self._on_device(by_port[port.name], port) for port in self.ports}
+        arrays = {port.name: self._move_input(by_port[port.name], port) for port in self.ports}
         lead = broadcast_lead(
             {
                 port.name: arrays[port.name].shape[: arrays[port.name].ndim - len(port.shape)]
@@ -98,9 +98,9 @@ class DeviceKernel(Kernel):
         present = tuple(like(array, values[0] if values else None) for array in results)
         return present[0] if len(present) == 1 else present
 
-    def _on_device(self, array: Any, port: Port) -> Any:
+    def _move_input(self, array: Any, port: Port) -> Any:
         """Return an input as a CuPy array; raise DataError if its shape or type is wrong."""
-        array = on_device(array, port.name, self.dtype)
+        array = move_to_device(array, port.name, self.dtype)
         shape = array.shape
         if port.shared and shape != port.shape:
             raise DataError(
@@ -173,7 +173,7 @@ def compiled_module(source: str, fast: bool = False) -> Any:
     return device_library().RawModule(code=source, options=options)
 
 
-def on_device(array: Any, name: str, dtype: str) -> Any:
+def move_to_device(array: Any, name: str, dtype: str) -> Any:
     """Return an array as a CuPy array: the same memory if on the GPU, else a copy there."""
     cupy = device_library()
     if isinstance(array, cupy.ndarray):
@@ -195,10 +195,10 @@ def on_device(array: Any, name: str, dtype: str) -> Any:
 
 def like(array: Any, other: Any) -> Any:
     """Return a CuPy array as an array of the library of `other`, sharing its memory."""
-    return in_library(array, type(other).__module__.partition(".")[0])
+    return convert_to_library(array, type(other).__module__.partition(".")[0])
 
 
-def in_library(array: Any, library: str) -> Any:
+def convert_to_library(array: Any, library: str) -> Any:
     """Return a CuPy array as an array of PyTorch or JAX, sharing its memory; else as it is."""
     names = {"torch": "torch", "jax": "jax.numpy", "jaxlib": "jax.numpy"}
     return import_module(names[library]).from_dlpack(array) if library in names else array

@@ -17,8 +17,8 @@ from pteron.kernels.graph import CONSTANT, INPUT, LOAD, STORE, Graph, Node
 from pteron.kernels.program_cache import cached_result
 
 _CLUSTER, _WORK = 40, 150_000
-"""Most operations of a cluster, see `_by_clusters`, and most times the number of operations, so
-that the order of any graph takes some seconds. Measured on the forward dynamics of hexapods:
+"""Most operations of a cluster, see `_order_by_clusters`, and of all times the number of operations,
+so that the order of any graph takes some seconds. Measured on the forward dynamics of hexapods:
 clusters of 10 leave up to twice as many bytes spilled, clusters of 120 none fewer."""
 
 _FEW = 3
@@ -73,7 +73,7 @@ def _steps(graph: Graph, numbers: int) -> list[tuple[str, int]]:
         k: [a for a in dict.fromkeys(nodes[k].arguments) if a in movable] for k in sorted(movable)
     }
     starts = (_backward(operands, results & movable, sign) for sign in (1, -1))
-    orders = [_by_clusters(start, operands, results) for start in starts]
+    orders = [_order_by_clusters(start, operands, results) for start in starts]
     steps = min((_with_transfers(order, operands, results, numbers) for order in orders), key=len)
     first = [(k, "") for k in sorted(needed - movable)]
     return [(operation or nodes[k].operation, k) for k, operation in (*first, *steps)]
@@ -114,7 +114,7 @@ def _backward(operands: _Operands, results: set[int], sign: int) -> list[int]:
     return order[::-1]
 
 
-def _by_clusters(order: Sequence[int], operands: _Operands, results: set[int]) -> list[int]:
+def _order_by_clusters(order: Sequence[int], operands: _Operands, results: set[int]) -> list[int]:
     """Return the operations in an order improved by clusters.
 
     A cluster is an operation with all that must be evaluated before it. The next one is always the
