@@ -17,10 +17,9 @@ from pteron.kernels.graph import CONSTANT, INPUT, LOAD, STORE, Graph, Node
 from pteron.kernels.program_cache import cached_result
 
 _CLUSTER, _WORK = 40, 150_000
-"""Most operations of a cluster, see `_order_by_clusters`; for large graphs less, so that the product
-with the number of operations is at most the second number and the order takes some seconds.
-Measured on the forward dynamics of hexapods: clusters of 10 leave up to twice as many bytes
-spilled, clusters of 120 none fewer."""
+"""Most operations of a cluster, see `_order_by_clusters`, and the most that this number times the
+number of all operations may be, so that the order takes some seconds. Measured on the forward
+dynamics of hexapods: clusters of 10 leave up to twice as many bytes spilled, of 120 none fewer."""
 
 _FEW = 3
 """Unevaluated uses of a value from which on its last use is foreseen; 8 give the same orders."""
