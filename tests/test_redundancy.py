@@ -16,6 +16,7 @@ import pteron
 from pteron.controllers import ComputedTorque
 from pteron.dynamics import bias_forces, null_space
 from pteron.identification import Log, Terms, identify, optimal_excitation
+from pteron.indices import Elasticity
 from pteron.kinematics import joint_rates
 from pteron.manipulator import Distribution, Manipulator, dumps, loads
 from pteron.motion import pick_and_place, simulate
@@ -353,6 +354,17 @@ def test_internal_forces_of_a_wrong_zero_are_those_of_springs():
         np.testing.assert_allclose(found.internal_force[i], expected, atol=1e-9)
         np.testing.assert_allclose(expected @ rows, 0.0, atol=1e-9)
     assert (found.least_singular_value > 0.1).all()
+
+
+@pytest.mark.parametrize("name", ["3-rrr-point", "delta-redundant"])
+def test_compliance_is_that_of_all_drives_springs(name):
+    robot = MACHINES[name]
+    springs = np.linspace(1e4, 5e4, robot.joint_count)
+    pose = home_pose(robot) + 0.01
+    rows = pteron.jacobian(robot, pose)
+    found = pteron.indices.stiffness(robot, pose, Elasticity(actuators=tuple(springs)))
+    expected = np.linalg.inv(rows.T @ (springs[:, None] * rows))
+    np.testing.assert_allclose(found.compliance, expected, atol=1e-12 * np.abs(expected).max())
 
 
 def test_mixed_legs_and_a_crank_more_are_machines_too():
