@@ -18,6 +18,8 @@ from pteron.dynamics import bias_forces, null_space
 from pteron.identification import Log, Terms, identify, optimal_excitation
 from pteron.indices import Elasticity
 from pteron.kinematics import joint_rates
+from pteron.kinematics.sampling import type_ii_sizes
+from pteron.kinematics.unit_rows import unit_rows
 from pteron.manipulator import Distribution, Manipulator, dumps, loads
 from pteron.motion import pick_and_place, simulate
 from pteron.workspace import home_pose, redundancy
@@ -365,6 +367,21 @@ def test_compliance_is_that_of_all_drives_springs(name):
     found = pteron.indices.stiffness(robot, pose, Elasticity(actuators=tuple(springs)))
     expected = np.linalg.inv(rows.T @ (springs[:, None] * rows))
     np.testing.assert_allclose(found.compliance, expected, atol=1e-12 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_the_type_ii_measure_is_that_of_unit_wrenches(name):
+    """It is 1 at most, and does not depend on a crank's or a ram's unit."""
+    robot = MACHINES[name]
+    poses = pteron.random_poses(robot, 2000, seed=4)
+    measures = type_ii_sizes(robot, poses)
+    assert 0.05 < measures.max() <= 1.0
+    if robot.platform.angles:
+        return
+    unit = unit_rows(robot, poses).rows
+    bound = (robot.joint_count / robot.freedom) ** (robot.freedom / 2)
+    expected = np.sqrt(np.linalg.det(unit.mT @ unit)) / bound
+    np.testing.assert_allclose(measures, expected, rtol=1e-9)
 
 
 def test_mixed_legs_and_a_crank_more_are_machines_too():

@@ -138,6 +138,9 @@ class Closure(ABC):
         elif self.is_redundant and self.platform.angles():
             moments = len(self.legs) - forces
             bound = bound * ca.sqrt(self._moment_bound**2 + moments)
+        if self.is_redundant:  # whose subsets of rows have products of their own
+            rows = [row / size for row, size in zip(rows, sizes, strict=True)]
+            return determinant(rows_in_quasi_velocities(platform, rows)) / bound
         return determinant(rows_in_quasi_velocities(platform, rows)) / (bound * reduce(mul, sizes))
 
     def measure_squares(

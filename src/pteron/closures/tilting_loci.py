@@ -63,10 +63,11 @@ class TiltingLoci(Closure):
         squared distances of the points from their mean, or from P. `stewart` reaches 0.84 of the
         bound.
         """
-        constraint_rows, size = (
-            self.platform.plane_wrenches(platform),
-            reduce(mul, sizes or [ca.SX(1)]),
-        )
+        constraint_rows, size = self.platform.plane_wrenches(platform), ca.SX(1)
+        if self.is_redundant and sizes:  # whose subsets of rows have products of their own
+            rows = [row / divisor for row, divisor in zip(rows, sizes, strict=True)]
+        else:
+            size = reduce(mul, sizes or [ca.SX(1)])
         if constraint_rows is None:
             bound = self._bound(1, platform, rows) * size
             return determinant(rows_in_quasi_velocities(platform, rows)) / bound
