@@ -72,7 +72,8 @@ class Worst:
 
 def main() -> None:
     """Print a row for each combination; exit with 1 if a bound is broken or counts differ."""
-    motions = reversed(tilting.LEGS)  # those with few legs first
+    # Those with few legs first; machines of five freedoms are in `test_multipteron`.
+    motions = [motion for motion in reversed(tilting.LEGS) if motion != "3T2R"]
     cases = [(motion, kind) for motion in motions for kind in tilting.LEGS[motion]]
     named = [case for case in cases if "-".join(case) in sys.argv]
     faults = []

@@ -198,6 +198,7 @@ MADE = {
     "motor": lambda: motion.choose_common(_sizing(), [_MOTOR]),
     "observations": _observations,
     "paving": _paving,
+    "redundancy": lambda: workspace.redundancy("3-rrr-point", [0.3, 0.25]),
     "payload": _payload,
     "peaks": lambda: motion.peaks(
         pteron.load("delta"), *_rest(), motion.limits_of(pteron.load("delta"), force=5.0)

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pteron.kernels import Array
 
@@ -57,7 +58,7 @@ def climb(
 
 def _step_simplices(
     worth: Callable[[Array], Array], simplex: Array, height: Array
-) -> tuple[Array, Array, Array]:
+) -> tuple[Array, Array, NDArray[np.int64]]:
     """Return simplices (S, k + 1, k) after one Nelder-Mead step, values, evaluation counts.
 
     In each simplex the best point is first.
