@@ -97,7 +97,6 @@ CODE: dict[str, tuple[str, ...]] = {
     "R1": (f"{_E}.virtual_work.generalized_forces",),
     "R2": ("pteron.closures.closure.Closure.forces",),
     "R3": (f"{_E}.virtual_work.share_forces",),
-    "R4": ("pteron.workspace.redundancy.redundancy",),
     "C2": (f"{_E}.clearance.squared_distance",),
     # Indices, reactions, stiffness, errors.
     "G1": (f"{_E}.indices.homogeneous", f"{_E}.singular_values.singular_values"),
