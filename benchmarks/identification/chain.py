@@ -339,7 +339,7 @@ def main() -> None:
         "verdict; their noise is added"
     )
     print(
-        f"{'':<28}{'verdict':<16}{'error':>12}{'left out':>10}{'with these':>12}{'by encoders':>14}"
+        f"{'':<30}{'verdict':<16}{'error':>12}{'left out':>10}{'with these':>12}{'by encoders':>14}"
     )
     for names, one in outcomes.items():
         print(
@@ -347,7 +347,7 @@ def main() -> None:
             f"{one.left_out:>10.0%}{one.everywhere.max():>12.2f}{one.sensed.max():>14.2f}"
         )
     print("\nTracking of that cycle: root mean square error of all joints (um or urad)")
-    print(f"{'feed-forward:':<28}{'nothing':>12}{'the drawing':>14}{'exported C':>14}", end="")
+    print(f"{'feed-forward:':<30}{'nothing':>12}{'the drawing':>14}{'exported C':>14}", end="")
     print(f"{'better than nothing':>24}{'worst joint':>14}")
     for names, one in outcomes.items():
         size = {key: float(np.sqrt((rms**2).mean())) for key, rms in one.tracking.items()}
@@ -363,7 +363,7 @@ def main() -> None:
         "encoders, that is an error"
     )
     print("\nPteron's motion less MuJoCo's: root mean squares, over MuJoCo's, worst joint")
-    print(f"{'':<28}{'joints':>12}{'rates':>14}{'accelerations':>16}{'forces':>12}")
+    print(f"{'':<30}{'joints':>12}{'rates':>14}{'accelerations':>16}{'forces':>12}")
     for case in cases:
         theirs, ours = (outcomes[case.name, twin].recordings for twin in ("MuJoCo", "Pteron"))
         for name, recorded in theirs.items():
@@ -373,12 +373,12 @@ def main() -> None:
                 for given in [getattr(recorded, k)]
             ]
             print(
-                f"{case.name:<13}{name:<23}{cells[0]:>4}{cells[1]:>14}{cells[2]:>16}{cells[3]:>12}"
+                f"{case.name:<16}{name:<23}{cells[0]:>4}{cells[1]:>14}{cells[2]:>16}{cells[3]:>12}"
             )
 
 
 def _row(names: tuple[str, str]) -> str:
-    return f"{names[0]:<14}{names[1]:<14}"
+    return f"{names[0]:<16}{names[1]:<14}"
 
 
 if __name__ == "__main__":
