@@ -142,7 +142,7 @@ _TRIED = {
     "encoder": ("encoder step (u{unit})", 1e6),
     "stiffness": ("transmission stiffness over the file's", 1.0),
 }
-"""What the trials change, in words with its unit, and the factor to that unit."""
+"""Quantities that the trials change, in words with the unit, and the factor to that unit."""
 
 
 def _show(tuning: Tuning, controller: str, tried: pl.DataFrame) -> None:

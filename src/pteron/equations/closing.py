@@ -182,7 +182,7 @@ class ClosureResiduals(NamedTuple):
     leg_rows: list[Expression]
     """(1, 6) each: the legs' part of `rows`, against (c', omega)."""
     contradiction: Expression = 0
-    """Of a redundant machine, the largest residual: by how much its joints contradict each other.
+    """The largest residual of a redundant machine: by how much its joints contradict each other.
     `relative` is then the part of it that a step of least squares still changes."""
 
     @property

@@ -20,7 +20,7 @@ from pteron.platforms.coordinates import wrap_angle
 from pteron.tolerances import SAME
 
 _DEGREE = 4
-"""Of the trigonometric polynomial."""
+"""Degree of the trigonometric polynomial."""
 
 _MARGIN = 1e-3
 """Imaginary part of beta, rad, up to which it may be real: a double one loses half its digits."""

@@ -6,6 +6,7 @@ it; for any other direction its coordinate is the root of an equation of degree 
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from math import acos, degrees
@@ -153,9 +154,9 @@ class PRUREquations(UniversalLinkEquations):
         super().__init__(**others)
         self.e, self.lu = slider_direction, upper_length
 
+    @abstractmethod
     def links(self, w: Jet, b: Jet, n: Jet) -> tuple[Jet, Jet, LinkState]:
         """Return the coordinate q, the upper link l_u and the lower link in motion."""
-        raise NotImplementedError
 
     def motion(self, point: PointMotion, rotation: RotationMotion) -> LegMotion:
         """Return the motion of slider, links and joints."""

@@ -6,6 +6,7 @@ platform; b turns about the first axis a, which is fixed in the base: l_l = h a 
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple, Self
@@ -162,9 +163,9 @@ class UniversalLinkEquations(LegEquations):
         f = ca.cross(ca.cross(self.a, first), ca.cross(self.b, link))
         return f, ca.horzcat(f.T, -ca.cross(link, f).T)
 
+    @abstractmethod
     def closure(self, c: Expression, root: Root) -> NestedClosure:
-        """Return what the reach of c (3, 1) depends on; `root` returns a number's square root."""
-        raise NotImplementedError
+        """Return the nested closure at c (3, 1); `root` returns the square root of a number."""
 
     def reach(self, c: Expression) -> Reach:
         """Return the reach: what the links' lengths have left under both roots, m."""

@@ -78,7 +78,7 @@ def pose_margins(robot: RobotLike, pose: PoseLike) -> PoseMargins:
 
 
 class MarginScales(NamedTuple):
-    """What measures are divided by to give margins: leg sizes (n,), m, and joint limits (n,)."""
+    """Divisors that turn measures into margins: leg sizes (n,), m, and joint limits (n,)."""
 
     sizes: Array
     low: Array

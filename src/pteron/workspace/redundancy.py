@@ -1,4 +1,4 @@
-"""What more legs than coordinates cost and give: drives that fight each other, one drive lost."""
+"""Redundant machines: internal forces due to errors of joint zeros, and the loss of one drive."""
 
 from __future__ import annotations
 
@@ -24,21 +24,21 @@ ASSUMED_STIFFNESS = 1e6
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Redundancy(Result):
-    """What one joint's wrong zero does to the drives of a redundant machine, and one lost drive.
+    """Internal forces of a redundant machine due to an error of one zero, and loss of a drive.
 
     Attributes
     ----------
     stiffness : array, shape (n,)
-        Of each drive at its joint, N/m or N m/rad: that of its elastic transmission, or
-        `ASSUMED_STIFFNESS`.
+        Stiffness of each drive at its joint, N/m or N m/rad: that of its elastic transmission,
+        or `ASSUMED_STIFFNESS`.
     assumed : bool
-        Whether it is assumed for a drive.
+        Whether the stiffness of any drive is `ASSUMED_STIFFNESS`.
     internal_force : array, shape (n, n)
         Force of each drive (column), N or N m, due to an error of `ZERO_ERROR` in one joint's zero
         (row), the motors being held.
     least_singular_value : array, shape (n,)
-        Of the unit rows of the other legs, where one drive is lost: a load takes forces along the
-        legs up to its inverse times as great.
+        Least singular value of the unit rows of the other legs, where one drive is lost: a load
+        takes forces along the legs up to its inverse times as great.
     """
 
     ROWS = "stiffness internal_force:1 least_singular_value"
