@@ -8,6 +8,7 @@ import signal
 import sys
 import threading
 import tomllib
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
@@ -38,6 +39,7 @@ from pteron.identification.excitation.limits import UNITS
 from pteron.identification.excitation.random_motions import shrink_into_limits
 from pteron.identification.excitation.search_program import measure
 from pteron.identification.logs import read_log
+from pteron.processes import LostWorkerError, WorkerPool
 
 MACHINES = {
     **CATALOG,
@@ -492,6 +494,16 @@ def test_starts_whose_processes_fail_are_improved_here():
     finally:
         multiprocessing.set_executable(sys.executable)
     assert found.gain > 1.5
+
+
+@pytest.mark.parametrize("error", [OSError("handle is closed"), ValueError("bad fds_to_keep")])
+def test_a_pool_that_breaks_while_a_process_starts_has_lost_a_worker(error, monkeypatch):
+    def start(self):
+        raise error
+
+    monkeypatch.setattr(ProcessPoolExecutor, "_spawn_process", start)
+    with pytest.raises(LostWorkerError), WorkerPool(2, script=False) as pool:
+        pool.start(print)
 
 
 @CLIENTS

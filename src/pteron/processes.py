@@ -67,7 +67,10 @@ class WorkerPool(ProcessPoolExecutor):
                 if not self._script:
                     sys.modules["__main__"] = ModuleType("__main__")
                 return super().submit(function, *arguments, **options)
-            except (BrokenProcessPool, OSError):
+            except (BrokenProcessPool, OSError, ValueError):
+                # Python 3.10 and 3.11 close the pipes of a pool whose first process has ended while
+                # another one starts: it then finds a closed pipe (OSError), or its descriptor used
+                # twice (ValueError).
                 raise _lost_worker() from None
             finally:
                 sys.modules["__main__"] = main
