@@ -4,7 +4,8 @@ Dietmaier's machine with its 40 real poses; then 1000 random machines of 6 U-P-S
 coordinates that a pose has, of which `direct_position_counts.txt` has the number of real poses by
 other solvers: general ones, with the base or both figures in a plane, with platform points that
 coincide in pairs (6-3), every third of them turned as a whole; and 200 beside Dietmaier's. On 50 of
-them, and on wrists, ankles and tripods, Newton's steps from many poses look for what is missing.
+them, and on wrists, ankles and tripods, Newton's steps from many poses look for what is missing. Of five machines with five freedoms the poses in a box are proved
+by intervals.
 Times are of one machine a call, and of a batch. `--quick` takes fewer.
 """
 
@@ -25,6 +26,7 @@ from pteron.bodies.inertia import RodInertia, SpatialInertia
 from pteron.kernels import Array, numeric
 from pteron.legs import UPS
 from pteron.platforms import Platform
+from pteron.workspace import proved_poses
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 
@@ -39,6 +41,7 @@ _TOP = """
 _LENGTHS = [1.0, 0.645275, 1.086284, 1.503439, 1.281933, 0.771071]
 _COUNTS = Path(__file__).with_name("direct_position_counts.txt")
 _KINDS = (*5 * ("general",), *2 * ("base plane",), "plane", "6-3", "6-3 plane")
+_FIVE = (*2 * (("PRUR",),), *2 * (("RPUR",),), ("PRUR", "UPS", "RPUR", "RSS", "PSS"))
 _MOST = 1000
 _STARTS = 100_000
 _SAME = 1e-6
@@ -147,6 +150,8 @@ def main() -> None:
     for motion, kinds in tilting.LEGS.items():
         if motion != "3T2R":  # of which not all poses are claimed
             others(motion, kinds)
+    for seed, kinds in enumerate(_FIVE[: 1 if quick() else None]):
+        proved_in_box(kinds, seed)
     robot, joints = drawn(0)
     states = pteron.direct_kinematics(robot, joints)[0]
     rng = np.random.default_rng(0)
@@ -156,6 +161,25 @@ def main() -> None:
     pteron.direct_kinematics(robot, joints)
     spent = time.process_time() - begin
     print(f"in a batch of {len(joints)}: {1e3 * spent / len(joints):.2f} ms each")
+
+
+def proved_in_box(kinds: tuple[str, ...], seed: int) -> None:
+    """Print the poses of a 3T2R machine in a box, proved, and those of Newton's method in it."""
+    robot, home = tilting.machine("3T2R", kinds, seed)
+    pose = tilting.states(robot, home, 1, seed)[0][0]
+    joints = pteron.inverse_kinematics(robot, pose)
+    size = float(np.mean([leg.size for leg in robot.legs]))
+    half = np.where(robot.platform.angular, np.radians(30.0), 0.2 * size)
+    begin = time.process_time()
+    proved = proved_poses(robot, joints, [pose - half, pose + half])
+    spent = time.process_time() - begin
+    listed = pteron.direct_kinematics(robot, joints)
+    within = int((np.abs(listed - pose) <= half).all(axis=-1).sum())
+    print(
+        f"3T2R, {' '.join(kinds)}: {len(proved.poses)} poses within 20 % of {size:.2f} m and 30 deg, "
+        f"all: {proved.is_complete}; {proved.examined} boxes, {spent:.1f} s; by Newton's method "
+        f"{within}"
+    )
 
 
 def others(motion: str, kinds: tuple[str, ...]) -> None:

@@ -5,9 +5,9 @@ against those of the library.
 """
 
 _NAMES = """\
-adaptive adaptive_drives bias_forces clearances closure_poses closure_rows computed_torque
-computed_torque_base constraint coriolis_matrix direct_kinematics direct_step discriminants
-drive_accelerations drive_forces drive_forces_base feed_forward feed_forward_base
+adaptive adaptive_drives bias_forces clearances closure_errors closure_poses closure_rows
+computed_torque computed_torque_base constraint coriolis_matrix direct_kinematics direct_step
+discriminants drive_accelerations drive_forces drive_forces_base feed_forward feed_forward_base
 feed_forward_pd feed_forward_pd_base followed_step forward_dynamics gravity_forces
 inverse_dynamics inverse_dynamics_base inverse_kinematics jacobian joint_accelerations
 joint_coordinates joint_feed_forward joint_feed_forward_base joint_points joint_rates

@@ -240,6 +240,32 @@ def closure_residuals(machine: Machine, joints: Expression, pose: Expression) ->
     return ClosureResiduals(*parts, largest)._replace(relative=relative)
 
 
+def closure_errors(
+    machine: Machine, joints: Expression, pose: Expression
+) -> tuple[Expression, Expression]:
+    """Return two forms (n, 1) of what vanishes where joints (n, 1) have a pose (m, 1).
+
+    The first one vanishes whatever the elbows are, but has the sign of the inner one of two roots;
+    the second one vanishes in every branch. Both are smooth where an elbow is stretched.
+    """
+    residuals = closure_residuals(machine, joints, pose)
+    legs, platform = machine.legs_at(residuals.platform), residuals.platform
+    lengths = ca.vertsplit(residuals.lengths)
+    forms = list(lengths), list(lengths)
+    for i, (leg, q, point) in enumerate(
+        zip(legs, ca.vertsplit(joints), platform.points, strict=True)
+    ):
+        locus = leg.locus(q)
+        if not isinstance(locus, CoordinateLocus):
+            continue
+        for form, any_branch in zip(forms, (False, True), strict=True):
+            if locus.closure is not None:
+                form[i] = locus.closure(point.position, any_branch)
+            elif locus.plane is not None:
+                form[i] = ca.dot(locus.plane.normal, point.position) - locus.plane.offset
+    return ca.vertcat(*forms[0]), ca.vertcat(*forms[1])
+
+
 def newton_step(
     machine: Machine, joints: Expression, pose: Expression
 ) -> tuple[Expression, Expression]:

@@ -97,6 +97,18 @@ class Bounded:
             most[places] = np.fmin(most[places], inner.high)
         return least, most, defined
 
+    def slopes(
+        self, low: Array, high: Array, rows: Sequence[int], columns: Sequence[int]
+    ) -> tuple[Array, Array]:
+        """Return bounds (B, R, C) of output elements' slopes; infinite where they are undefined."""
+        graph, size = self._graph, low.shape[1]
+        nodes = [graph.outputs[-1][r * size + i] for r in rows for i in columns]
+        least, most, defined, _ = enclose_nodes(graph, nodes, [low], [high], len(low))
+        shape = len(low), len(rows), len(columns)
+        known = defined & ~np.isnan(least)
+        least, most = np.where(known, least, -np.inf), np.where(known, most, np.inf)
+        return least.reshape(shape), most.reshape(shape)
+
 
 def _mean_values(
     graph: Graph, nodes: Sequence[int], slopes: Mapping[int, Sequence[int]], low: Array, high: Array

@@ -135,6 +135,7 @@ TABLE |= {
     "direct_kinematics": Entry(("joints",), partial(_poses, reached=True)),
     "closure_poses": Entry(("joints",), partial(_poses, reached=False)),
     "closure_rows": Entry(("joints",), _closure_rows),
+    "closure_errors": equation_entry(closing.closure_errors, _STEP, "errors any_branch"),
     "newton_step": equation_entry(closing.newton_step, _STEP, "stepped missed"),
     "direct_step": equation_entry(_direct_step, _STEP, "found type_ii bent"),
     "followed_step": equation_entry(_followed_step, _STEP, "found type_ii"),

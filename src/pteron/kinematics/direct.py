@@ -207,7 +207,7 @@ def working_mode(
     other_signs = [-leg.elbow if -leg.elbow in leg.branches else leg.elbow for leg in robot.legs]
     for signs in (other_signs, file_signs):
         back = evaluate_unchecked(with_elbows(robot, signs), "inverse_kinematics", poses)
-        elbows = np.where(_same_joints(robot, back, joint_array, tolerance), signs, elbows)
+        elbows = np.where(same_joints(robot, back, joint_array, tolerance), signs, elbows)
     return elbows
 
 
@@ -233,7 +233,7 @@ def assembly_modes(
     back: PerJoint = evaluate_kernel(robot, "inverse_kinematics", "nan", poses)
     is_missing = np.isnan(back).any(axis=-1)
     if not closure.keeps_modes and not all_branches:
-        is_missing |= ~_same_joints(robot, back, joints[..., None, :]).all(axis=-1)
+        is_missing |= ~same_joints(robot, back, joints[..., None, :]).all(axis=-1)
     poses[is_missing] = np.nan
     return poses
 
@@ -318,7 +318,7 @@ def _rows(
     return poses if closure_of(robot).keeps_modes else sort_poses(poses)
 
 
-def _same_joints(
+def same_joints(
     robot: Manipulator, joints: Array, other: Array, tolerance: ArrayLike = SAME
 ) -> NDArray[np.bool_]:
     """Return where joint coordinates (..., n) are equal, up to full turns of cranks: (..., n)."""

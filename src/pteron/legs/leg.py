@@ -30,7 +30,7 @@ of an elbow is a quantity, +1 or -1.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, ClassVar, Literal, NamedTuple, Self
 
 import casadi as ca
@@ -212,6 +212,9 @@ class CoordinateLocus(NamedTuple):
     joint: Expression
     plane: PlaneLocus | None = None
     """A plane that holds c in either branch of the leg."""
+    closure: Callable[[Expression, bool], Expression] | None = None
+    """A function of c (3, 1) that vanishes on the locus, for the inner root's sign and either of
+    the outer one's; with True, for either sign of both."""
 
 
 class AngleLocus(NamedTuple):

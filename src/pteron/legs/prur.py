@@ -34,6 +34,7 @@ from pteron.legs.leg import Joint, LegMotion
 from pteron.legs.reading import Reading
 from pteron.legs.universal_link import (
     TINY,
+    HeldClosure,
     LinkState,
     NestedClosure,
     Root,
@@ -154,6 +155,10 @@ class PRUREquations(UniversalLinkEquations):
         super().__init__(**others)
         self.e, self.lu = slider_direction, upper_length
 
+    def first_end(self, q: Expression) -> tuple[Expression, Expression]:
+        """Return the slider's end of the upper link (3, 1), and the link's length."""
+        return self.r + q * self.e, self.lu
+
     @abstractmethod
     def links(self, w: Jet, b: Jet, n: Jet) -> tuple[Jet, Jet, LinkState]:
         """Return the coordinate q, the upper link l_u and the lower link in motion."""
@@ -231,6 +236,11 @@ class AlongEquations(PRUREquations):
         return (w - link).transform(self.e.T), upper, LinkState(link, h, m)
 
     first_link, second_link = "upper link", "lower link"
+
+    def held_closure(self, u: Expression, length: Expression) -> HeldClosure:
+        """Return what u = l_u + l_l satisfies: the upper link's part along n has the root."""
+        h, along_b = ca.dot(self.a, u), ca.dot(self.b, u)
+        return HeldClosure(self.sigma, length**2 - along_b * along_b, h * h - self.ll * self.ll)
 
     def closure(self, c: Expression, root: Root) -> NestedClosure:
         """Return what the reach of c (3, 1) depends on; `root` returns a number's square root."""

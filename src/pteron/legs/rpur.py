@@ -111,6 +111,10 @@ class RPUREquations(UniversalLinkEquations):
         "l": SpatialInertia.kinds,
     }
 
+    def first_end(self, q: Expression) -> tuple[Expression, Expression]:
+        """Return where the ram begins (3, 1), and its length."""
+        return self.r, q
+
     def motion(self, point: PointMotion, rotation: RotationMotion) -> LegMotion:
         """Return the motion of cylinder, piston, link and joints."""
         leg = self.with_rotation(rotation)

@@ -89,6 +89,17 @@ class NestedClosure(NamedTuple):
     """The squared type-I measure; 0 where a radicand is negative and its root taken for 0."""
 
 
+class HeldClosure(NamedTuple):
+    """The closure of both links from a given beginning."""
+
+    sign: Expression
+    """Of the root: the sign of that link's part along n."""
+    square: Expression
+    """The root's radicand, m^2."""
+    rest: Expression
+    """m^2: the square of the other link's part across n, less that of its length."""
+
+
 class UniversalLinkEquations(LegEquations):
     """The equations of such a leg; those of its first links are its subclasses'."""
 
@@ -185,9 +196,30 @@ class UniversalLinkEquations(LegEquations):
         """Return the radicands of both roots, the one of the inner root first."""
         return self.closure(c, ca.sqrt).radicands
 
+    @abstractmethod
+    def first_end(self, q: Expression) -> tuple[Expression, Expression]:
+        """Return where the link before this one begins (3, 1), and its length, with q held."""
+
+    def held_closure(self, u: Expression, length: Expression) -> HeldClosure:
+        """Return what u = l_u + l_l satisfies: the last link's part along n has the root."""
+        h, along_b = ca.dot(self.a, u), ca.dot(self.b, u)
+        return HeldClosure(self.kappa, self.ll * self.ll - h * h, along_b * along_b - length**2)
+
     def locus(self, q: Expression) -> CoordinateLocus:
-        """Return the locus of c, of which only the joint's coordinate is known."""
-        return CoordinateLocus(q)
+        """Return the locus of c: both links together lead there from the first one's beginning."""
+        start, length = self.first_end(q)
+
+        def closure(c: Expression, any_branch: bool) -> Expression:
+            """Return |u - l|^2 - l'^2 for the links' lengths l and l', l with the root's sign."""
+            u = c - start
+            sign, square, rest = self.held_closure(u, length)
+            part = ca.dot(ca.cross(self.a, self.b), u)
+            even = square + part * part + rest
+            if any_branch:
+                return even * even - 4 * square * part * part
+            return even - 2 * sign * ca.sqrt(square) * part
+
+        return CoordinateLocus(q, closure=closure)
 
 
 def turn_about(axis: Expression, vector: Jet, square: Expression) -> LinkRotation:

@@ -48,6 +48,7 @@ from pteron.workspace.orientations import (
     volumes_over_angles as volumes_over_angles,
 )
 from pteron.workspace.paving import Paving as Paving, paving as paving
+from pteron.workspace.pose_proofs import ProvedPoses as ProvedPoses, proved_poses as proved_poses
 from pteron.workspace.proofs import Proof as Proof, prove as prove
 from pteron.workspace.quadrature import (
     Quadrature as Quadrature,
