@@ -4,9 +4,9 @@ Dietmaier's machine with its 40 real poses; then 1000 random machines of 6 U-P-S
 coordinates that a pose has, of which `direct_position_counts.txt` has the number of real poses by
 other solvers: general ones, with the base or both figures in a plane, with platform points that
 coincide in pairs (6-3), every third of them turned as a whole; and 200 beside Dietmaier's. On 50 of
-them, and on wrists, ankles and tripods, Newton's steps from many poses look for what is missing. Of five machines with five freedoms the poses in a box are proved
-by intervals.
-Times are of one machine a call, and of a batch. `--quick` takes fewer.
+them, and on wrists, ankles and tripods, Newton's steps from many poses look for what is missing. Of
+five machines with five freedoms the poses in a box are proved by intervals. Times are of one
+machine a call, and of a batch. `--quick` takes fewer.
 """
 
 from __future__ import annotations
@@ -176,9 +176,9 @@ def proved_in_box(kinds: tuple[str, ...], seed: int) -> None:
     listed = pteron.direct_kinematics(robot, joints)
     within = int((np.abs(listed - pose) <= half).all(axis=-1).sum())
     print(
-        f"3T2R, {' '.join(kinds)}: {len(proved.poses)} poses within 20 % of {size:.2f} m and 30 deg, "
-        f"all: {proved.is_complete}; {proved.examined} boxes, {spent:.1f} s; by Newton's method "
-        f"{within}"
+        f"3T2R, {' '.join(kinds)}: {len(proved.poses)} poses within 20 % of {size:.2f} m and "
+        f"30 deg, proved to be all: {proved.is_complete}; {proved.examined} boxes, {spent:.1f} s; "
+        f"Newton's method finds {within}"
     )
 
 
