@@ -7,12 +7,14 @@ is not proved that no other pose exists.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from contextlib import nullcontext
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pteron.kernels import Array, numeric
+from pteron.kernels import Array, numeric, sharing_programs
 from pteron.kinematics.plane_poses import repeats
 from pteron.kinematics.sampling import sample_poses
 from pteron.manipulator import Manipulator
@@ -33,25 +35,32 @@ _CLOSED = 1e-10
 """Largest relative closure error of a pose."""
 
 
-def searched_poses(robot: Manipulator, joints: Array) -> tuple[NDArray[np.int64], Array]:
+def searched_poses(
+    robot: Manipulator, joints: Array, modes: Sequence[Manipulator] = ()
+) -> tuple[NDArray[np.int64], Array]:
     """Return poses (K, m) of joint coordinates (B, n) that Newton's method finds, and their rows.
 
-    Joint coordinates are those of the robot's working mode. Other poses may exist.
+    They are poses of the robot's working mode, or of `modes`. Other poses may exist.
     """
     starts = _starts(robot)
     size = float(np.mean([leg.size for leg in robot.legs]))
     most = _MOST * np.where(robot.platform.angular, 1.0, size)
     count = len(starts)
-    rows = np.repeat(np.arange(len(joints)), count)
-    poses, repeated = np.tile(starts, (len(joints), 1)), joints[rows]
-    with np.errstate(all="ignore"):
-        for _ in range(_STEPS):
-            step = numeric(robot, "newton_step")(repeated, poses)[0] - poses
-            longest = np.abs(step / most).max(axis=-1, keepdims=True)
-            poses = poses + step / np.maximum(longest, 1.0)
-        residuals = numeric(robot, "newton_step")(repeated, poses)[1]
-    closed = np.flatnonzero(residuals.reshape(-1) < _CLOSED)
-    rows, poses = rows[closed], poses[closed]
+    all_rows = np.repeat(np.arange(len(joints)), count)
+    repeated = joints[all_rows]
+    rows, poses = np.empty(0, dtype=np.int64), np.empty((0, robot.freedom))
+    with sharing_programs() if modes else nullcontext(), np.errstate(all="ignore"):
+        for machine in modes or (robot,):
+            newton_step, tried = numeric(machine, "newton_step"), np.tile(starts, (len(joints), 1))
+            for _ in range(_STEPS):
+                step = newton_step(repeated, tried)[0] - tried
+                longest = np.abs(step / most).max(axis=-1, keepdims=True)
+                tried = tried + step / np.maximum(longest, 1.0)
+            residuals = newton_step(repeated, tried)[1]
+            closed = np.flatnonzero(residuals.reshape(-1) < _CLOSED)
+            rows, poses = np.append(rows, all_rows[closed]), np.vstack([poses, tried[closed]])
+    order = np.argsort(rows, kind="stable")
+    rows, poses = rows[order], poses[order]
     turning = robot.wraps
     poses[:, turning] = wrap_angle(poses[:, turning])
 
@@ -61,7 +70,7 @@ def searched_poses(robot: Manipulator, joints: Array) -> tuple[NDArray[np.int64]
         away[:, turning] = wrap_angle(away[:, turning])
         return np.asarray(np.abs(away).max(axis=-1, initial=0.0) < SAME)
 
-    single = ~repeats(rows, are_same, count)
+    single = ~repeats(rows, are_same, int(np.bincount(rows, minlength=1).max()))
     return rows[single], poses[single]
 
 

@@ -216,7 +216,7 @@ def _both_sides(robot: Manipulator) -> tuple[tuple[float, ...], tuple[float, ...
 
 def _are_mirrored(robot: Manipulator, poses: Array, margins: Array, side: Array) -> bool:
     """Return whether good poses (K, m) lie on both sides of the base, without a path across."""
-    branched = any(len(leg.branches) > 1 for leg in robot.legs)
+    branched = any(len(leg.sign_choices()) > 1 for leg in robot.legs)
     most = margins.max()
     good = margins >= (_BRANCHED_SIDE if branched else _SIDE) * most
     above, below = (poses[good & (side == sign)] for sign in (1.0, -1.0))
