@@ -355,9 +355,7 @@ def test_every_sign_of_five_freedoms_is_a_working_mode(name):
         signs, mode = list(modes.items())[k]
         count = len(signs) // 5
         own = [leg[signs[count * i : count * i + count]] for i, leg in enumerate(legs)]
-        joints = numeric(mode, "joint_coordinates")(pose)[
-            0
-        ]  # NaN where this branch is out of reach
+        joints = numeric(mode, "joint_coordinates")(pose)[0]  # NaN out of reach
         np.testing.assert_allclose(joints, own, rtol=0, atol=1e-13)
         told = working_mode(robot, pose, np.nan_to_num(joints)).reshape(5, count)
         reached = np.isfinite(joints)
