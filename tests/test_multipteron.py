@@ -13,15 +13,22 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 import pteron
-from pteron.errors import ModelError
+from pteron.environments import PteronEnv
+from pteron.errors import DataError, ModelError, SingularPose
+from pteron.identification.excitation import Limits, random_excitation
 from pteron.kernels import numeric
-from pteron.kinematics import working_mode
+from pteron.kinematics import constraint_measure, working_mode
+from pteron.kinematics.singularities import best_holding
 from pteron.legs import UPU
 from pteron.legs.conformance import faults
 from pteron.manipulator.variants import elbows_of, with_elbows
+from pteron.motion import point_to_point
+from pteron.motion.simulation.stops import first_singular, singularity_text
+from pteron.motion.trajectories.scaling import keeps_margin
 from pteron.platforms import Platform
-from pteron.workspace import conditions, paving
+from pteron.workspace import conditions, paving, pose_margins
 from pteron.workspace.examination import examine
+from pteron.workspace.margins import least_margin_text
 from pteron.workspace.modes import mode_contacts
 
 COUNT, MOST = 20, 200
@@ -292,15 +299,53 @@ def test_a_guide_within_the_tolerance_of_a_file_is_made_exact():
     assert leg.slider_direction == (1.0, 0.0, 0.0)
 
 
-def test_radial_universal_joints_leave_the_platform_free_to_turn():
+def radial_upu():
+    """Return the 3-UPU with radial outer axes: its platform is free to turn on the middle line."""
     tsai = pteron.load("3-upu")
     legs = [replace(leg, direction=tilting.unit(leg.guide_point)) for leg in tsai.legs]
-    radial = replace(tsai, name="radial", legs=tuple(legs))
-    assert abs(pteron.kinematics.constraint_measure(radial, [0.0, 0.0, 0.4])) < 1e-12
-    assert abs(pteron.kinematics.constraint_measure(tsai, [0.0, 0.0, 0.4])) > 0.4
+    return replace(tsai, name="radial", legs=tuple(legs))
+
+
+def test_radial_universal_joints_leave_the_platform_free_to_turn():
+    tsai, radial = pteron.load("3-upu"), radial_upu()
+    assert abs(constraint_measure(radial, [0.0, 0.0, 0.4])) < 1e-12
+    assert abs(constraint_measure(tsai, [0.0, 0.0, 0.4])) > 0.4
     assert "near a constraint singularity" in map(str, conditions(tsai, type_ii=0.1))
     warnings = examine(radial, np.array([0.0, 0.0, 0.4])).warnings
     assert any("constraint singularity" in warning for warning in warnings)
+
+
+def test_all_that_keeps_away_from_type_ii_keeps_away_from_a_constraint_singularity():
+    robot, middle = radial_upu(), np.array([0.0, 0.0, 0.4])
+    best = float(best_holding(robot)[1])
+    grid = np.stack(np.meshgrid(*np.linspace([-0.3, -0.3, 0.2], [0.3, 0.3, 0.6], 25).T), -1)
+    shares = np.abs(constraint_measure(robot, grid.reshape(-1, 3))) / best
+    assert 0.7 < shares.max() <= 1.0
+    margins = pose_margins(robot, grid.reshape(-1, 3))
+    np.testing.assert_allclose(margins.constraint, shares, rtol=1e-9)
+    assert (margins.least <= shares + 1e-12).all()
+    assert (pose_margins("stewart", pteron.workspace.home_pose("stewart")).constraint == 1.0).all()
+    assert least_margin_text(robot, middle)[1].startswith("a constraint singularity")
+    home = pteron.workspace.home_pose(robot)
+    assert pose_margins(robot, home).constraint > 0.3
+    drawn = pteron.random_poses(robot, 50, type_ii=0.1)
+    assert np.abs(constraint_measure(robot, drawn)).min() >= 0.1
+    path = np.linspace([0.1, 0.0, 0.4], [-0.1, 0.0, 0.4], 101)
+    with pytest.raises(SingularPose, match="comes to a constraint singularity") as refused:
+        point_to_point(robot, path[0], path[-1], duration=1.0)
+    assert refused.value.kind == "constraint"
+    assert first_singular(robot, path) == 50
+    assert "let the platform turn" in singularity_text(robot, path[50])
+    assert first_singular(pteron.load("3-upu"), path) is None
+    assert not keeps_margin(robot, path, 0.01)
+    assert keeps_margin(robot, path[:15], 0.01)
+    limits = Limits(type_ii=0.25)
+    states = random_excitation(robot, harmonics=2, limits=limits).states(np.linspace(0, 5, 400))
+    assert np.abs(constraint_measure(robot, states.pose)).min() >= 0.25 * best
+    env = PteronEnv(robot)
+    with pytest.raises(DataError, match="singular"):
+        env.reset(options={"pose": [1e-4, 0.0, 0.4]})
+    assert "constraint" in env.world.end_reason(middle, np.zeros(3))
 
 
 @pytest.mark.parametrize("name", ["pentapteron", "5-rpur"])
