@@ -253,6 +253,7 @@ NOT_RUN = {
     r"python docs/notebooks/run\.py": ("takes minutes", "test_notebooks.py"),
     r"halcompile .*": ("is a part of LinuxCNC", "test_tilting_exports.py"),
     r"python benchmarks/genhexkins\.py .*": ("loads LinuxCNC's module", "test_tilting_exports.py"),
+    r"python benchmarks/linuxcnc_moves\.py .*": ("runs LinuxCNC", "test_tilting_exports.py"),
     r"python benchmarks/mujoco_convergence\.py": ("takes minutes", "test_benchmarks.py"),
     r"python benchmarks/environment\.py": ("prints times alone", "test_benchmarks.py"),
     r"pteron design .*": ("searches for minutes", "test_design.py"),

@@ -483,6 +483,12 @@ def test_the_working_mode_may_be_chosen():
     assert np.abs(back.select("x", "y", "z").to_numpy() - [0, 0, -0.9]).max(axis=1).min() < 1e-9
     pteron.save(pteron.load("tripteron"), "robot.toml")
     assert json.loads(done("check robot.toml --elbows --+ --json"))["working_mode"] == "--+"
+    # A P-R-U-R leg has two signs: the first of each leg alone, or all of them.
+    five = json.loads(done("inverse pentapteron 0 0 0 0 0 --elbows --+-+ --json"))
+    assert five == json.loads(done("inverse pentapteron 0 0 0 0 0 --elbows ---+++--+- --json"))
+    refused(
+        "inverse pentapteron 0 0 0 0 0 --elbows --+-", "5 or 10 signs + or - expected, one or two"
+    )
 
 
 @pytest.mark.parametrize("robot", ["quadrupteron", "delta", "five-bar", "3-rrr"])

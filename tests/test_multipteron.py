@@ -10,15 +10,26 @@ import trees
 from lagrange import Lagrange
 from mechanisms import NIGHTLY, relative_error, scaled, several
 from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
 
 import pteron
-from pteron.errors import ModelError
+from pteron.environments import PteronEnv
+from pteron.errors import DataError, ModelError, SingularPose
+from pteron.identification.excitation import Limits, random_excitation
 from pteron.kernels import numeric
+from pteron.kinematics import constraint_measure, working_mode
+from pteron.kinematics.singularities import best_holding
 from pteron.legs import UPU
 from pteron.legs.conformance import faults
+from pteron.manipulator.variants import elbows_of, with_elbows
+from pteron.motion import point_to_point
+from pteron.motion.simulation.stops import first_singular, singularity_text
+from pteron.motion.trajectories.scaling import keeps_margin
 from pteron.platforms import Platform
-from pteron.workspace import conditions
+from pteron.workspace import conditions, paving, pose_margins
 from pteron.workspace.examination import examine
+from pteron.workspace.margins import least_margin_text
+from pteron.workspace.modes import mode_contacts
 
 COUNT, MOST = 20, 200
 """States of each machine, in the gate and in all."""
@@ -288,15 +299,53 @@ def test_a_guide_within_the_tolerance_of_a_file_is_made_exact():
     assert leg.slider_direction == (1.0, 0.0, 0.0)
 
 
-def test_radial_universal_joints_leave_the_platform_free_to_turn():
+def radial_upu():
+    """Return the 3-UPU with radial outer axes: its platform is free to turn on the middle line."""
     tsai = pteron.load("3-upu")
     legs = [replace(leg, direction=tilting.unit(leg.guide_point)) for leg in tsai.legs]
-    radial = replace(tsai, name="radial", legs=tuple(legs))
-    assert abs(pteron.kinematics.constraint_measure(radial, [0.0, 0.0, 0.4])) < 1e-12
-    assert abs(pteron.kinematics.constraint_measure(tsai, [0.0, 0.0, 0.4])) > 0.4
+    return replace(tsai, name="radial", legs=tuple(legs))
+
+
+def test_radial_universal_joints_leave_the_platform_free_to_turn():
+    tsai, radial = pteron.load("3-upu"), radial_upu()
+    assert abs(constraint_measure(radial, [0.0, 0.0, 0.4])) < 1e-12
+    assert abs(constraint_measure(tsai, [0.0, 0.0, 0.4])) > 0.4
     assert "near a constraint singularity" in map(str, conditions(tsai, type_ii=0.1))
     warnings = examine(radial, np.array([0.0, 0.0, 0.4])).warnings
     assert any("constraint singularity" in warning for warning in warnings)
+
+
+def test_all_that_keeps_away_from_type_ii_keeps_away_from_a_constraint_singularity():
+    robot, middle = radial_upu(), np.array([0.0, 0.0, 0.4])
+    best = float(best_holding(robot)[1])
+    grid = np.stack(np.meshgrid(*np.linspace([-0.3, -0.3, 0.2], [0.3, 0.3, 0.6], 25).T), -1)
+    shares = np.abs(constraint_measure(robot, grid.reshape(-1, 3))) / best
+    assert 0.7 < shares.max() <= 1.0
+    margins = pose_margins(robot, grid.reshape(-1, 3))
+    np.testing.assert_allclose(margins.constraint, shares, rtol=1e-9)
+    assert (margins.least <= shares + 1e-12).all()
+    assert (pose_margins("stewart", pteron.workspace.home_pose("stewart")).constraint == 1.0).all()
+    assert least_margin_text(robot, middle)[1].startswith("a constraint singularity")
+    home = pteron.workspace.home_pose(robot)
+    assert pose_margins(robot, home).constraint > 0.3
+    drawn = pteron.random_poses(robot, 50, type_ii=0.1)
+    assert np.abs(constraint_measure(robot, drawn)).min() >= 0.1
+    path = np.linspace([0.1, 0.0, 0.4], [-0.1, 0.0, 0.4], 101)
+    with pytest.raises(SingularPose, match="comes to a constraint singularity") as refused:
+        point_to_point(robot, path[0], path[-1], duration=1.0)
+    assert refused.value.kind == "constraint"
+    assert first_singular(robot, path) == 50
+    assert "let the platform turn" in singularity_text(robot, path[50])
+    assert first_singular(pteron.load("3-upu"), path) is None
+    assert not keeps_margin(robot, path, 0.01)
+    assert keeps_margin(robot, path[:15], 0.01)
+    limits = Limits(type_ii=0.25)
+    states = random_excitation(robot, harmonics=2, limits=limits).states(np.linspace(0, 5, 400))
+    assert np.abs(constraint_measure(robot, states.pose)).min() >= 0.25 * best
+    env = PteronEnv(robot)
+    with pytest.raises(DataError, match="singular"):
+        env.reset(options={"pose": [1e-4, 0.0, 0.4]})
+    assert "constraint" in env.world.end_reason(middle, np.zeros(3))
 
 
 @pytest.mark.parametrize("name", ["pentapteron", "5-rpur"])
@@ -310,6 +359,83 @@ def test_poses_of_five_freedoms_are_searched(name):
     for one, q in zip(listed, joints, strict=True):
         real = one[np.isfinite(one).all(axis=-1)]
         np.testing.assert_allclose(pteron.inverse_kinematics(robot, real) - q, 0.0, atol=1e-9)
+
+
+@np.errstate(invalid="ignore")
+def closed(leg, c, a, b):
+    """Return the joint coordinate of each branch of a P-R-U-R or R-P-U-R leg, by its signs."""
+    w, n = c - leg.guide_point, np.cross(a, b)
+    coordinates = {}
+    for sigma, kappa in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
+        if leg.type == "PRUR" and leg.slides_along_axis:
+            upper = (b @ w) * b + sigma * np.sqrt(leg.upper_length**2 - (b @ w) ** 2) * n
+            m = n @ (w - upper)
+            lower = m * n + kappa * np.sqrt(leg.lower_length**2 - m**2) * a
+            coordinates[sigma, kappa] = (w - lower) @ leg.slider_direction
+            continue
+        h = a @ w
+        v = w - h * a - kappa * np.sqrt(leg.lower_length**2 - h**2) * n
+        if leg.type == "RPUR":
+            coordinates[(kappa,)] = np.linalg.norm(v)
+            continue
+        ahead = v @ leg.slider_direction
+        across = leg.upper_length**2 - v @ v + ahead**2
+        coordinates[sigma, kappa] = ahead - sigma * np.sqrt(across)
+    return coordinates
+
+
+@pytest.mark.parametrize("name", ["pentapteron", "5-rpur"])
+def test_every_sign_of_five_freedoms_is_a_working_mode(name):
+    robot = pteron.load(name)
+    modes = {elbows_of(mode): mode for mode in pteron.working_modes(robot)}
+    assert len(modes) == {"pentapteron": 4**5, "5-rpur": 2**5}[name]
+    assert next(iter(modes)) == (1,) * len(elbows_of(robot))
+    rng = np.random.default_rng(4)
+    pose = rng.uniform(-1, 1, 5) * [0.03, 0.03, 0.03, 0.2, 0.2]
+    a, b = np.array(robot.platform.axis), np.array(robot.platform.second_axis)
+    first, second = Rotation.from_rotvec(pose[3] * a), Rotation.from_rotvec(pose[4] * b)
+    points = [pose[:3] + (first * second).apply(leg.platform_point) for leg in robot.legs]
+    legs = [closed(leg, c, a, first.apply(b)) for leg, c in zip(robot.legs, points, strict=True)]
+    for k in rng.choice(len(modes), 24, replace=False):
+        signs, mode = list(modes.items())[k]
+        count = len(signs) // 5
+        own = [leg[signs[count * i : count * i + count]] for i, leg in enumerate(legs)]
+        joints = numeric(mode, "joint_coordinates")(pose)[0]  # NaN out of reach
+        np.testing.assert_allclose(joints, own, rtol=0, atol=1e-13)
+        told = working_mode(robot, pose, np.nan_to_num(joints)).reshape(5, count)
+        reached = np.isfinite(joints)
+        assert reached.any()
+        np.testing.assert_array_equal(told[reached], np.reshape(signs, (5, count))[reached])
+        assert not told[~reached].any()
+
+
+@pytest.mark.parametrize("name", ["5-rpur", pytest.param("pentapteron", marks=NIGHTLY)])
+def test_poses_of_all_branches_of_five_freedoms(name):
+    robot = pteron.load(name)
+    poses = np.random.default_rng(5).uniform(-1, 1, (3, 5)) * [0.03, 0.03, 0.03, 0.2, 0.2]
+    other = with_elbows(robot, [*elbows_of(robot)[:-1], -elbows_of(robot)[-1]])
+    joints = pteron.inverse_kinematics(other, poses)
+    every = pteron.direct_kinematics(robot, joints, all_branches=True)
+    away = np.abs(every - poses[:, None]).max(axis=-1)
+    np.testing.assert_allclose(np.nanmin(away, axis=1), 0.0, atol=1e-9)
+    signs = working_mode(robot, every, joints[:, None])
+    nearest = signs[np.arange(3), np.nanargmin(away, axis=1)]
+    np.testing.assert_array_equal(nearest, [elbows_of(other)] * 3)
+    np.testing.assert_array_equal(signs.all(axis=-1), np.isfinite(every[..., 0]))
+    own = pteron.direct_kinematics(robot, joints, on_failure="nan")
+    assert np.isfinite(own[..., 0]).sum() < np.isfinite(every[..., 0]).sum()
+
+
+def test_modes_of_a_pentapteron_meet_where_one_link_is_stretched():
+    robot = pteron.load("pentapteron")
+    robot = replace(robot, legs=tuple(replace(leg, limits=(-0.6, 0.6)) for leg in robot.legs))
+    signs = elbows_of(robot)
+    modes = [robot, with_elbows(robot, [-signs[0], *signs[1:]])]
+    pavings = {elbows_of(mode): paving(mode, np.zeros(5), tolerance=0.5) for mode in modes}
+    (contact,) = mode_contacts(pavings)
+    assert (contact.leg, contact.cause, contact.proved) == (1, "first link", True)
+    first, second = (pteron.inverse_kinematics(mode, contact.pose) for mode in modes)
+    np.testing.assert_allclose(first, second, rtol=0, atol=1e-6)
 
 
 @pytest.mark.parametrize("name", ["pentapteron", "5-rpur", "hexapteron", "agile-eye"])

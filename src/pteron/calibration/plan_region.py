@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from pteron.errors import ModelError
 from pteron.kernels import numeric
 from pteron.kinematics import random_poses
+from pteron.kinematics.sampling import holding_measures
 from pteron.manipulator import Manipulator
 from pteron.workspace import Box, Cylinder, prove
 
@@ -64,9 +65,10 @@ def proved_box(robot: Manipulator, center: Array, flat: bool = False) -> Box:
 
 
 def _floors(robot: Manipulator, center: Array) -> tuple[float, float]:
-    """Return the least type-I and type-II measures that a region about a pose must keep."""
-    type_i, type_ii = numeric(robot, "reach")(center)[1], numeric(robot, "type_ii")(center)[0]
-    floors = _SHARE * float(type_i.min()), _SHARE * abs(float(type_ii))
+    """Return the least type-I and holding measures that a region about a pose must keep."""
+    type_i = numeric(robot, "reach")(center)[1]
+    measures = [abs(float(numeric(robot, name)(center)[0])) for name in holding_measures(robot)]
+    floors = _SHARE * float(type_i.min()), _SHARE * min(measures)
     if not np.isfinite(floors).all():
         raise _no_region(robot, center)
     return floors

@@ -180,10 +180,12 @@ def load_robot(name_or_path: str, elbows: str | None = None, *, quiet: bool = Fa
         return robot
     from pteron.manipulator.variants import with_elbows
 
-    if set(elbows) - set("+-") or len(elbows) != len(robot.legs):
+    text, count = elbows_text(robot), len(robot.legs)
+    if set(elbows) - set("+-") or len(elbows) not in (count, len(text)):
+        several = len(text) > count
         raise DataError(
-            f"--elbows: {elbows!r} given, {len(robot.legs)} signs + or - expected, one for each "
-            f"leg of {robot.name}, such as {elbows_text(robot)}"
+            f"--elbows: {elbows!r} given, {count}{f' or {len(text)}' * several} signs + or - "
+            f"expected, one{' or two' * several} for each leg of {robot.name}, such as {text}"
         )
     return with_elbows(robot, [int(f"{sign}1") for sign in elbows])
 
@@ -195,7 +197,7 @@ def check_rate(rate: float) -> None:
 
 
 def elbows_text(robot: Manipulator) -> str:
-    """Return a machine's working mode as text: + or - for each leg."""
-    from pteron.manipulator.variants import elbow_signs
+    """Return a machine's working mode as text: + or -, one or two for each leg."""
+    from pteron.manipulator.variants import elbow_signs, elbows_of
 
-    return elbow_signs(leg.elbow for leg in robot.legs)
+    return elbow_signs(elbows_of(robot))

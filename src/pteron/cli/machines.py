@@ -265,7 +265,7 @@ def _leg(leg: LegKind) -> dict[str, Any]:
         "joint": leg.joint.noun,
         **json_fields(axis=leg.joint_axis),
         "lengths": {q.name: q.value[0] for q in leg.quantities if q.role == "length"},
-        **json_fields(elbow=leg.elbow, limits=leg.limits),
+        **json_fields(**{"elbow": leg.elbow, **leg.signs}, limits=leg.limits),
         **json_fields(unit=leg.joint.unit, force_unit=leg.joint.force_unit),
         **json_fields(drive=leg.drive, reading=leg.reading),
     }
@@ -278,7 +278,7 @@ def _show(robot: Manipulator, findings: dict[str, Any], further: str) -> None:
     joints = dict.fromkeys(leg.joint for leg in robot.legs)
     counts = re.findall(r"(\d)([TR])", robot.platform.motion)
     nouns = {"T": "translation", "R": "rotation"}
-    bends = any(len(leg.branches) > 1 for leg in robot.legs)
+    bends = any(len(leg.sign_choices()) > 1 for leg in robot.legs)
     elbows = f", elbow signs {elbows_text(robot)} (side to which each leg bends)" * bends
     freedoms = " and ".join(f"{n} {nouns[letter]}{'s' * (n != '1')}" for n, letter in counts)
     show(

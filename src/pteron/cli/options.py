@@ -37,8 +37,8 @@ _SHARED = f"""\
 ROBOT: A machine of the catalog (see pteron catalog) or a TOML file.
 --table FILE: Read the rows of a .csv or .parquet file; - reads CSV from standard input.
 --out FILE: Write the result to a .csv or .parquet file.
---elbows SIGNS: Working mode: the side to which each leg bends, one sign a leg, such as ++-+.
-    [default: the file's]
+--elbows SIGNS: Working mode: the side to which each leg bends, one sign a leg, such as ++-+, or
+    two for each PRUR leg. [default: the file's]
 --on-failure: Stop at a row that fails (raise), or leave its results empty (nan).
 --payload MASS@X,Y,Z: Payload of the platform: its mass, kg, such as 0.5, at the tool's centre
     point; its centre of mass in the platform's frame, m, as in 0.5@0,0,-0.03; and its moment of

@@ -28,6 +28,7 @@ from pteron.errors import ModelError, PteronError
 from pteron.indices import Section
 from pteron.kernels import Array, numeric
 from pteron.kinematics import inverse_kinematics, jacobian, joint_accelerations
+from pteron.kinematics.sampling import holding_measures
 from pteron.legs import Drive
 from pteron.manipulator import Manipulator
 
@@ -173,16 +174,18 @@ class KindEvaluator:
         robot, poses, floors = rating.machine, rating.middle + self.visited, self.job.floors
         least = float(np.min(numeric(robot, "squared_type_i")(poses)[0]))
         if least >= 0.0:
-            sign = np.sign(np.median(numeric(robot, "type_ii")(poses)[0]))
+            names = holding_measures(robot)
+            signs = [np.sign(np.median(numeric(robot, name)(poses)[0])) for name in names]
 
             def measures(places: Array) -> Array:
                 """Return type-I (squared), type-II and passive-joint measures (N, k) at N poses."""
                 poses = rating.middle + places
-                squares, determinant, room = (
+                squares, room, *holding = (
                     numeric(robot, name)(poses)[0]
-                    for name in ("squared_type_i", "type_ii", "passive_room")
+                    for name in ("squared_type_i", "passive_room", *names)
                 )
-                signed = sign * np.asarray(determinant)
+                pairs = zip(signs, holding, strict=True)
+                signed = np.minimum.reduce([sign * np.asarray(held) for sign, held in pairs])
                 every = np.column_stack([squares, signed, room])
                 return np.asarray(np.nan_to_num(every, nan=1.0))
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, reduce
 from math import hypot
+from operator import or_
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from pteron.environments.state import Bools, EpisodeState, HostGenerators
 from pteron.errors import DataError
 from pteron.kernels import Array, as_array, numeric
+from pteron.kinematics.sampling import holding_measures
 from pteron.manipulator import Manipulator
 from pteron.motion import Machines, Motion, advance
 from pteron.motion.simulation.plant import drive_states
@@ -242,15 +244,20 @@ class World:
         return feasible
 
     def margin_of(self, poses: Array) -> Array:
-        """Return the singularity margins (...) of poses, negative beyond a type-II singularity."""
-        beyond = self._kernel("type_ii")(poses)[0] * self._side < 0.0
+        """Return the singularity margins (...) of poses, negative beyond a singularity.
+
+        It is one of type II, or of the legs' constraints.
+        """
         smallest = margins_from(self._kernel, self._constants.margins, poses).least
+        sides = self._sides.items()
+        beyond = reduce(or_, (self._kernel(name)(poses)[0] * side < 0.0 for name, side in sides))
         return np.where(beyond, -np.abs(smallest), smallest)
 
     @cached_property
-    def _side(self) -> float:
-        """The type-II measure at the home pose, whose sign margins refer to."""
-        return float(numeric(self.robot, "type_ii")(self.home)[0])
+    def _sides(self) -> dict[str, float]:
+        """The `holding_measures` at the home pose, whose signs margins refer to."""
+        names = holding_measures(self.robot)
+        return {name: float(numeric(self.robot, name)(self.home)[0]) for name in names}
 
     def _pose(self, key: str, option: Any) -> Array:
         """Return the pose (m,) in the option `key` of a reset; raise if it is not feasible."""
@@ -370,6 +377,8 @@ class World:
             return f"faster than {SPEED:g} m/s or {TURN:g} rad/s"
         margins = pose_margins(self.robot, pose)
         leg = int(margins.type_i.argmin()) + 1
+        if margins.constraint < ENDS:
+            return "next to a constraint singularity: the legs hardly hold the platform"
         if self.margin_of(pose[None])[0] < 0.0 <= margins.least or margins.type_ii < ENDS:
             return "next to a singularity of type II: the actuators hardly hold the platform"
         if margins.joints.min() < ENDS <= margins.type_i.min():

@@ -276,6 +276,19 @@ def newton_step(
     return pose + step / determinant, residuals.relative + _NO_CHANGE * ca.norm_1(residuals.lengths)
 
 
+def any_branch_step(
+    machine: Machine, joints: Expression, pose: Expression
+) -> tuple[Expression, Expression]:
+    """Return the pose (m, 1) after a Newton step in whatever branch, and the step's largest part.
+
+    `pose` is a symbol.
+    """
+    errors = closure_errors(machine, joints, pose)[1]
+    step, determinant = solve(ca.jacobian(errors, pose), -errors)
+    change = step / determinant
+    return pose + change, ca.mmax(ca.fabs(change)) + _NO_CHANGE * ca.norm_1(errors)
+
+
 class NewtonEnd(NamedTuple):
     """The pose after Newton's steps, and how far they converged."""
 

@@ -195,7 +195,7 @@ def export_linuxcnc(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
     seen[~platform.angular] += platform.directions @ (platform.tool @ platform.placement(home)[1])
     tilted = _TurnedArm.from_platform(platform, home) if platform.tilts else None
     arm = None if tilted else _Arm.from_platform(platform)
-    places = {a.letter: f"{a.scale * at:.6f}" for a, at in zip(axes, seen, strict=True)}
+    places = {a.letter: f"{a.scale * at:z.6f}" for a, at in zip(axes, seen, strict=True)}
     variables = {
         "banner": [line for line in banner(robot, "LinuxCNC") if "SI units" not in line],
         "prefix": prefix,

@@ -9,6 +9,7 @@ from pteron.errors import ModelError
 from pteron.kernels import Array
 from pteron.kinematics import inverse_kinematics, random_poses
 from pteron.kinematics.evaluate import evaluate_unchecked
+from pteron.kinematics.sampling import holding_measures
 from pteron.manipulator import Manipulator
 from pteron.workspace import home_pose
 from pteron.workspace.home import has_exact_home
@@ -70,10 +71,11 @@ def measures_of(robot: Manipulator, poses: Array) -> Array:
 
 
 def _measures(robot: Manipulator, poses: Array) -> Array:
-    """Return min(type-I measure, twice the type-II measure) at poses (..., m) in reach."""
+    """Return min(type-I measure, twice the holding measures) at poses (..., m) in reach."""
     bent = np.sqrt(evaluate_unchecked(robot, "squared_type_i", poses).min(axis=-1))
-    type_ii = 2.0 * np.abs(evaluate_unchecked(robot, "type_ii", poses))
-    return np.asarray(np.minimum(bent, type_ii))
+    measures = [evaluate_unchecked(robot, name, poses) for name in holding_measures(robot)]
+    least: Array = np.minimum.reduce([bent, *(2.0 * np.abs(measure) for measure in measures)])
+    return least
 
 
 def keeps_limits(robot: Manipulator, poses: Array) -> NDArray[np.bool_]:

@@ -136,6 +136,7 @@ TABLE |= {
     "closure_poses": Entry(("joints",), partial(_poses, reached=False)),
     "closure_rows": Entry(("joints",), _closure_rows),
     "closure_errors": equation_entry(closing.closure_errors, _STEP, "errors any_branch"),
+    "any_branch_step": equation_entry(closing.any_branch_step, _STEP, "stepped change"),
     "newton_step": equation_entry(closing.newton_step, _STEP, "stepped missed"),
     "direct_step": equation_entry(_direct_step, _STEP, "found type_ii bent"),
     "followed_step": equation_entry(_followed_step, _STEP, "found type_ii"),

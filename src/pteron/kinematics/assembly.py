@@ -93,7 +93,7 @@ def every_pose(robot: Manipulator, joints: Array, most: int) -> Array:
                 measure=0.0,
                 index=index,
             )
-        poses_by_state[part] = sort_poses(_table(poses, which, most, len(moving)))[:, :most]
+        poses_by_state[part] = sort_poses(table_poses(poses, which, most, len(moving)))[:, :most]
     return poses_by_state.reshape(*shape, most, robot.freedom)
 
 
@@ -112,7 +112,7 @@ def _poses(robot: Manipulator, joints: Array, most: int) -> Array:
     poses[:, around] = wrap_angle(poses[:, around])
     same = _are_duplicates(robot, joints, which, poses, residuals, size)
     which, poses = which[~same], poses[~same]
-    return sort_poses(_table(poses, which, most, len(joints)))[:, :most]
+    return sort_poses(table_poses(poses, which, most, len(joints)))[:, :most]
 
 
 def _orthonormal_rows(rows: Array) -> Array:
@@ -267,7 +267,7 @@ def _are_duplicates(
     return is_duplicate
 
 
-def _table(poses: Array, which: NDArray[np.int64], most: int, states: int) -> Array:
+def table_poses(poses: Array, which: NDArray[np.int64], most: int, states: int) -> Array:
     """Return poses (K, m) arranged by state (B, k, m), k >= `most`, padded with NaN."""
     counts = np.bincount(which, minlength=states)
     columns = np.arange(len(which)) - np.repeat(np.cumsum(counts) - counts, counts)

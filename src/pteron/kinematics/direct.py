@@ -14,12 +14,20 @@ from pteron.equations.machine import closure_of
 from pteron.errors import SingularPose, UnreachablePose
 from pteron.kernels import Array, numeric
 from pteron.kinematics.architecture import expect_regular
-from pteron.kinematics.assembly import every_pose, sort_poses
-from pteron.kinematics.evaluate import evaluate_kernel, evaluate_unchecked, finite_rows, place
+from pteron.kinematics.assembly import every_pose, sort_poses, table_poses
+from pteron.kinematics.evaluate import (
+    evaluate_kernel,
+    evaluate_unchecked,
+    finite_rows,
+    place,
+    same_joints,
+)
 from pteron.kinematics.sampling import draw_poses
+from pteron.kinematics.searched_poses import searched_poses
+from pteron.kinematics.tilting_assembly import is_searched
 from pteron.kinematics.unlikely_values import unlikely_values, warn_of_unlikely
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
-from pteron.manipulator.variants import with_elbows
+from pteron.manipulator.variants import elbows_of, with_elbows
 from pteron.platforms.coordinates import wrap_angle
 from pteron.shapes import JointsLike, OnFailure, PerJoint, PoseLike, Poses
 from pteron.tolerances import LAST_DIGITS, SAME
@@ -166,7 +174,7 @@ def assembly_mode(
 def working_mode(
     robot: RobotLike, pose: PoseLike, joints: JointsLike, *, tolerance: ArrayLike = SAME
 ) -> NDArray[np.int64]:
-    """Return the sign of each leg's elbow, 1 or -1, with which a pose has joint coordinates.
+    """Return the signs of the legs' branches, 1 or -1, with which a pose has joint coordinates.
 
     Parameters
     ----------
@@ -181,10 +189,11 @@ def working_mode(
 
     Returns
     -------
-    array of int, shape (..., n)
-        The legs' `elbow`, 1 or -1, with which inverse kinematics of the pose gives the joint
-        coordinates; the robot's own where either does, as for P-R-R-R legs; 0 where neither does,
-        and where the pose is NaN.
+    array of int, shape (..., k)
+        The legs' signs, 1 or -1, with which inverse kinematics of the pose gives the joint
+        coordinates: `elbow` of each leg, but `elbow` and `second_elbow` of a P-R-U-R leg, and
+        `second_elbow` of an R-P-U-R leg. They are the robot's own where several do, as for P-R-R-R
+        legs; 0 where none does, and where the pose is NaN.
 
     Examples
     --------
@@ -202,12 +211,17 @@ def working_mode(
         finite_rows(robot, joints, "joints", "nan"),
     )
     lead = np.broadcast_shapes(poses.shape[:-1], joint_array.shape[:-1])
-    elbows = np.zeros((*lead, robot.joint_count), dtype=np.int64)
-    file_signs = [leg.elbow for leg in robot.legs]
-    other_signs = [-leg.elbow if -leg.elbow in leg.branches else leg.elbow for leg in robot.legs]
-    for signs in (other_signs, file_signs):
+    counts = [len(leg.signs) for leg in robot.legs]
+    elbows = np.zeros((*lead, sum(counts)), dtype=np.int64)
+    # The robot's own branch of each leg comes last.
+    choices = [
+        sorted(leg.sign_choices(), key=tuple(leg.signs.values()).__eq__) for leg in robot.legs
+    ]
+    for k in range(-max(map(len, choices)), 0):
+        signs = [sign for branches in choices for sign in branches[max(k, -len(branches))]]
         back = evaluate_unchecked(with_elbows(robot, signs), "inverse_kinematics", poses)
-        elbows = np.where(same_joints(robot, back, joint_array, tolerance), signs, elbows)
+        same = same_joints(robot, back, joint_array, tolerance)
+        elbows = np.where(np.repeat(same, counts, axis=-1), signs, elbows)
     return elbows
 
 
@@ -265,7 +279,7 @@ def _fitting_poses(
             elbows = working_mode(robot, tried, rows, tolerance=allowed)
             misses = (elbows == 0).any(axis=-1) | ~(change < LAST_DIGITS)
             if not all_branches:
-                misses |= (elbows != [leg.elbow for leg in robot.legs]).any(axis=-1)
+                misses |= (elbows != elbows_of(robot)).any(axis=-1)
             tried[misses | _is_repeated(robot, tried)] = np.nan
             poses[is_missing, : tried.shape[1]] = tried[:, : poses.shape[-2]]
     return poses
@@ -314,16 +328,25 @@ def _rows(
     robot: Manipulator, joints: Array, *, all_branches: bool, tolerance: float | None = None
 ) -> Poses:
     """Return poses (..., k, m) of joint coordinates, sorted where modes have no fixed order."""
+    if all_branches and not robot.redundancy and is_searched(robot):
+        rows = joints.reshape(-1, robot.joint_count)
+        which, searched = searched_poses(robot, rows, any_branch=True)
+        good = are_poses(robot, searched, rows[which], all_branches=True)
+        table = table_poses(searched[good], which[good], closure_of(robot).modes, len(rows))
+        return sort_poses(table.reshape(*joints.shape[:-1], *table.shape[1:]))
     poses = assembly_modes(robot, joints, all_branches=all_branches, tolerance=tolerance)
     return poses if closure_of(robot).keeps_modes else sort_poses(poses)
 
 
-def same_joints(
-    robot: Manipulator, joints: Array, other: Array, tolerance: ArrayLike = SAME
+def are_poses(
+    robot: Manipulator, poses: Array, joints: Array, *, all_branches: bool = False
 ) -> NDArray[np.bool_]:
-    """Return where joint coordinates (..., n) are equal, up to full turns of cranks: (..., n)."""
-    differences = np.abs(joints - other)
-    cranks = np.array([leg.joint.unit == "rad" for leg in robot.legs])
-    turn = 2.0 * np.pi
-    differences = np.where(cranks, np.abs((differences + np.pi) % turn - np.pi), differences)
-    return np.asarray(differences <= tolerance)
+    """Return which poses (..., m) have joint coordinates (..., n), in the robot's working mode.
+
+    With `all_branches` in any: the poses then satisfy the closures, and must be in reach.
+    """
+    back = evaluate_unchecked(robot, "inverse_kinematics", poses)
+    if not all_branches:
+        return np.asarray(same_joints(robot, back, joints).all(axis=-1))
+    is_elsewhere = (working_mode(robot, poses, joints) != 0).all(axis=-1)
+    return np.asarray(np.isfinite(back).all(axis=-1) | is_elsewhere)

@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from pteron.equations.machine import closure_of
 from pteron.errors import DataError, PteronError, SingularPose, UnreachablePose
@@ -224,3 +225,14 @@ def _bad_pose(
         measure=measure,
         index=index,
     )
+
+
+def same_joints(
+    robot: Manipulator, joints: Array, other: Array, tolerance: ArrayLike = SAME
+) -> NDArray[np.bool_]:
+    """Return where joint coordinates (..., n) are equal, up to full turns of cranks: (..., n)."""
+    differences = np.abs(joints - other)
+    cranks = np.array([leg.joint.unit == "rad" for leg in robot.legs])
+    turn = 2.0 * np.pi
+    differences = np.where(cranks, np.abs((differences + np.pi) % turn - np.pi), differences)
+    return np.asarray(differences <= tolerance)

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pteron.kernels import Array, numeric
-from pteron.kinematics.sampling import sample_poses, type_ii_sizes
+from pteron.kinematics.sampling import holding_sizes, sample_poses
 from pteron.manipulator import Manipulator
 from pteron.tolerances import ROUNDING
 
@@ -63,9 +63,10 @@ def median_floors(robot: Manipulator, limits: bool = True) -> Floors:
 
 @lru_cache(maxsize=64)
 def _measures(robot: Manipulator, type_i: float, limits: bool) -> tuple[Array, Array]:
-    """Return the least type-I measure over legs (K,) and the type-II measure (K,) of poses."""
+    """Return the least type-I measure over legs (K,) and the least holding measure (K,)."""
     poses = sample_poses(robot, _SAMPLE, np.random.default_rng(0), type_i, limits=limits)
-    return numeric(robot, "reach")(poses)[1].min(axis=-1), type_ii_sizes(robot, poses)
+    type_i_measures = numeric(robot, "reach")(poses)[1].min(axis=-1)
+    return type_i_measures, holding_sizes(robot, poses).min(axis=-1)
 
 
 def _usual(measures: Array) -> float:

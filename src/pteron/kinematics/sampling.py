@@ -168,7 +168,7 @@ class _Conditions(NamedTuple):
             least = measures[within].min(axis=-1).max(initial=0.0)
             sample.type_i = max(sample.type_i, float(least))
         if self.type_ii > 0.0 and len(poses):
-            sizes = type_ii_sizes(robot, poses)
+            sizes = holding_sizes(robot, poses).min(axis=-1)
             poses = poses[sizes >= self.type_ii]
             if sample is not None:
                 sample.type_ii = max(sample.type_ii, float(sizes.max()))
@@ -437,12 +437,22 @@ def search_ball(robot: Manipulator) -> tuple[Array, float]:
     return np.asarray(center, dtype=float), 1.5 * reach
 
 
-def type_ii_sizes(robot: Manipulator, poses: PoseLike) -> Array:
-    """Return the absolute type-II measure (...) at poses (..., m); 0 where it is not finite.
+def holding_measures(robot: Manipulator) -> tuple[str, ...]:
+    """Return the functions of a pose that vanish where drives or legs do not hold the platform.
+
+    They are the type-II measure and, where the legs' couples turn with the pose, the constraint
+    measure.
+    """
+    return ("type_ii", *["constraint"] * any(leg.couples_vary for leg in robot.legs))
+
+
+def holding_sizes(robot: Manipulator, poses: PoseLike) -> Array:
+    """Return the absolute `holding_measures` (..., k) at poses (..., m); 0 where not finite.
 
     A pose out of reach, or where a leg transmits no force, thus fails any threshold.
     """
-    return finite_sizes(numeric(robot, "type_ii")(poses)[0])
+    names = holding_measures(robot)
+    return np.stack([finite_sizes(numeric(robot, name)(poses)[0]) for name in names], axis=-1)
 
 
 def finite_sizes(measures: Array) -> Array:

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,7 +16,7 @@ from pteron.kernels import Array, as_array, geometry_only, numeric
 from pteron.kernels.bisection import bisect_condition
 from pteron.kernels.program_cache import cached_result
 from pteron.kinematics.architecture import expect_regular, is_singular_everywhere
-from pteron.kinematics.sampling import draw_poses, type_ii_sizes
+from pteron.kinematics.sampling import draw_poses, finite_sizes, holding_measures
 from pteron.kinematics.simplex_ascent import climb
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.tolerances import ROUNDING
@@ -47,24 +47,34 @@ _HALVINGS = 50
 """Bisections between two samples, half a degree apart: down to rounding."""
 
 
-@lru_cache(maxsize=64)
 def best_type_ii(robot: Manipulator) -> float:
     """Return the largest absolute type-II measure over poses in reach; 1 if all are singular.
 
     The best of many random poses are improved by the Nelder-Mead method. Joint limits are ignored,
     so that the value depends on the geometry alone.
     """
-    key = "best_type_ii", geometry_only(robot)
-    return cached_result(key, ("kinematics",), lambda: _best_type_ii(robot))
+    return float(best_holding(robot)[0])
 
 
-def _best_type_ii(robot: Manipulator) -> float:
-    """Return the largest absolute type-II measure, by local searches from random poses."""
+@lru_cache(maxsize=64)
+def best_holding(robot: Manipulator) -> Array:
+    """Return the largest absolute value of each of the `holding_measures` (k,), as for type II."""
+    geometry = geometry_only(robot)
+    return np.array(
+        [
+            cached_result((f"best_{name}", geometry), ("kinematics",), partial(_best, robot, name))
+            for name in holding_measures(robot)
+        ]
+    )
+
+
+def _best(robot: Manipulator, name: str) -> float:
+    """Return the largest absolute value of a measure, by local searches from random poses."""
 
     def measure(poses: Array) -> Array:
-        """Return the type-II measures (K,) of poses (K, m); 0 out of reach."""
+        """Return the measures (K,) of poses (K, m); 0 out of reach."""
         reached = ~np.isnan(numeric(robot, "reach")(poses)[1]).any(axis=-1)
-        return np.where(reached, type_ii_sizes(robot, poses), 0.0)
+        return np.where(reached, finite_sizes(numeric(robot, name)(poses)[0]), 0.0)
 
     if is_singular_everywhere(robot):
         return 1.0  # no share of rounding
@@ -79,7 +89,8 @@ def _best_type_ii(robot: Manipulator) -> float:
         gain=_IMPROVED,
         evaluations=_TRIES,
     )
-    return float(sizes.max())
+    largest = float(sizes.max())
+    return 1.0 if largest <= _VANISHING else largest
 
 
 def singular_orientations(robot: RobotLike, position: ArrayLike | None = None) -> Array:

@@ -26,6 +26,12 @@ _HUGE = 1e30
 """Size of the spheres' centres and radii beyond which joints have no pose."""
 
 
+def is_searched(robot: Manipulator) -> bool:
+    """Return whether a machine's poses are searched by Newton's method, as none finds all."""
+    machine = Machine.numeric(robot)
+    return robot.platform.tilts and not (holds_planes(machine) or holds_spheres(machine))
+
+
 def tilting_poses(
     robot: Manipulator, joints: Array
 ) -> tuple[NDArray[np.int64], Array, NDArray[np.bool_]]:
@@ -39,7 +45,7 @@ def tilting_poses(
     if holds_planes(machine):
         return plane_poses(robot, joints)
     none_moves = np.zeros(len(joints), dtype=bool)
-    if not holds_spheres(machine):
+    if is_searched(robot):
         return (*searched_poses(robot, joints), none_moves)
     if robot.platform.axis_offset is not None:
         return (*offset_poses(robot, joints), none_moves)

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cache
+from itertools import product
 from random import Random
 from typing import Any, ClassVar, Literal, NamedTuple, Self, get_args
 
@@ -113,6 +114,11 @@ class LegKind(ABC):
     """The names of its bodies, by letter."""
     branches: ClassVar[tuple[int, ...]] = (1, -1)
     """The values that `elbow` may have."""
+    sign_edges: ClassVar[Mapping[str, tuple[str, ...]]] = {
+        "elbow": ("stretched", "folded", "reach")
+    }
+    """The fields that hold the signs of its branch, with the edges of its reach, by their names in
+    `LegEquations.edges`, where the branches of both signs meet."""
     follows_angle: ClassVar[bool] = False
     """Whether its joint follows the platform's angle, and not its platform point."""
     couples_vary: ClassVar[bool] = False
@@ -165,6 +171,17 @@ class LegKind(ABC):
         """Return all keys of this kind of leg by name, in the order of files and pages."""
         roles, keys = get_args(KeyRole), {**COMMON, **cls.keys}
         return dict(sorted(keys.items(), key=lambda named_key: roles.index(named_key[1].role)))
+
+    @classmethod
+    def sign_choices(cls) -> list[tuple[int, ...]]:
+        """Return the values of `signs` in each branch of this kind of leg."""
+        values = (cls.branches if name == "elbow" else (1, -1) for name in cls.sign_edges)
+        return list(product(*values))
+
+    @property
+    def signs(self) -> dict[str, int]:
+        """The signs of the leg's branch, 1 or -1, by their fields."""
+        return {name: getattr(self, name) for name in self.sign_edges}
 
     @property
     def bodies(self) -> dict[str, Inertia]:

@@ -53,6 +53,7 @@ class RPUR(UniversalLinkLeg, RamLeg):
     platform_axes: tuple[Vector, ...] = field(default=(), kw_only=True)
 
     type = "RPUR"
+    sign_edges: ClassVar = {"second_elbow": ("lower link",)}
     account = ACCOUNTS["RPUR"]
     names: ClassVar = {"u": "cylinder", "t": "piston", "l": "lower link"}
     measure_text = "the cosine between the ram and the force that its joints transmit"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from itertools import product
+from itertools import chain, product
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,7 +17,7 @@ from pteron.tolerances import ROUNDING
 
 
 def working_modes(robot: RobotLike) -> tuple[Manipulator, ...]:
-    """Return the machine in each of its 2^n working modes (signs of n elbows).
+    """Return the machine in each of its working modes: 2^k of k signs, one or two for each leg.
 
     Parameters
     ----------
@@ -27,7 +27,8 @@ def working_modes(robot: RobotLike) -> tuple[Manipulator, ...]:
     Returns
     -------
     tuple of Manipulator
-        In binary order of the elbows, leg 1 first: all +1 comes first, all -1 last.
+        In binary order of the signs, leg 1 first: all +1 comes first, all -1 last. A P-R-U-R leg
+        has two signs, `elbow` and `second_elbow`; an R-P-U-R leg `second_elbow`; others `elbow`.
 
     Examples
     --------
@@ -37,21 +38,40 @@ def working_modes(robot: RobotLike) -> tuple[Manipulator, ...]:
     (16, [1, 1, 1, -1])
     """
     robot = as_manipulator(robot)
-    branches = (leg.branches for leg in robot.legs)
-    return tuple(with_elbows(robot, signs) for signs in product(*branches))
+    return tuple(with_elbows(robot, signs) for signs in mode_elbows(robot))
+
+
+def elbows_of(robot: Manipulator) -> tuple[int, ...]:
+    """Return the signs of a machine's working mode, +1 or -1: one or two for each leg, in order."""
+    return tuple(sign for leg in robot.legs for sign in leg.signs.values())
+
+
+def mode_elbows(robot: Manipulator) -> list[tuple[int, ...]]:
+    """Return the signs of each working mode of a machine, in the order of `working_modes`."""
+    return [tuple(chain(*signs)) for signs in product(*(leg.sign_choices() for leg in robot.legs))]
 
 
 def with_elbows(robot: Manipulator, signs: Sequence[int]) -> Manipulator:
-    """Return the machine in the working mode with these elbows, +1 or -1 for each leg.
+    """Return the machine in the working mode with these signs, +1 or -1.
 
-    The home in the machine's file applies to the file's working mode only.
+    They are those of `elbows_of`, or one for each leg, its first. The home in the machine's file
+    applies to the file's working mode only.
     """
-    legs = tuple(replace(leg, elbow=sign) for leg, sign in zip(robot.legs, signs, strict=True))
+    names = [list(leg.signs) for leg in robot.legs]
+    if len(signs) == len(names):
+        names = [leg_names[:1] for leg_names in names]
+    if len(signs) != (count := sum(map(len, names))):
+        raise ModelError(f"elbows: {len(signs)} signs given, {count} expected", subject=robot.name)
+    remaining = iter(signs)
+    legs = tuple(
+        replace(leg, **{name: next(remaining) for name in leg_names})
+        for leg, leg_names in zip(robot.legs, names, strict=True)
+    )
     return replace(robot, legs=legs, home=robot.home if legs == robot.legs else None)
 
 
 def elbow_signs(elbows: Iterable[float]) -> str:
-    """Return a working mode's elbows as text, + or - for each leg."""
+    """Return a working mode's signs as text, + or - each."""
     return "".join("+" if elbow > 0 else "-" for elbow in elbows)
 
 

@@ -86,7 +86,7 @@ def page(report: Report) -> str:
         joint=nouns(joints),
         joint_units=dict.fromkeys(joint.unit for joint in joints),
         passive=[(joint, joint.limits_text(readable)) for joint in report.passive],
-        modes=prod(len(leg.branches) for leg in robot.legs),
+        modes=prod(len(leg.sign_choices()) for leg in robot.legs),
         figures=_figures(report),
         sizing=report.sizing,
         motors=report.sizing.table().to_dicts(),

@@ -12,6 +12,7 @@ from pteron.atomic import checked_file, write_text, write_texts
 from pteron.errors import OutputError, shorten
 from pteron.json_values import fields_as_json, json_fields, json_text
 from pteron.manipulator import RobotLike, as_manipulator
+from pteron.manipulator.variants import elbows_of
 
 if TYPE_CHECKING:
     from pteron.playback import Given
@@ -188,7 +189,7 @@ def numbers(report: Report) -> dict[str, Any]:
         **json_fields(coordinates=robot.coordinates),
         "joints": [vars(leg.joint) for leg in robot.legs],
         "drives": [asdict(leg.drive) if leg.drive else None for leg in robot.legs],
-        "elbows": [leg.elbow for leg in robot.legs],
+        "elbows": list(elbows_of(robot)),
         **json_fields(gravity=robot.gravity),
         **json_fields(tool=robot.platform.tool),
         **json_fields(doubts=report.doubts),

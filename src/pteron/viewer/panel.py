@@ -14,7 +14,7 @@ import numpy as np
 from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
-from pteron.manipulator.variants import elbow_signs
+from pteron.manipulator.variants import elbow_signs, elbows_of
 from pteron.platforms.coordinates import SHOWN
 from pteron.report.motion_frames import view_frame
 from pteron.report.typeset import format_fixed
@@ -74,7 +74,7 @@ def values(session: Session, joints: Array) -> dict[str, Any]:
         "joints": _tenths(np.array(joints_in_display_units(state.robot, joints))),
         "payload": f"{state.payload:g}",
         "payloadDoubt": state.payload_doubt,
-        "mode": elbow_signs(leg.elbow for leg in state.robot.legs),
+        "mode": elbow_signs(elbows_of(state.robot)),
         "screws": session.screws,
         "plane": session.plane,
         "speed": next(name for name, factor in SPEEDS.items() if factor == session.speed),

@@ -45,7 +45,8 @@ class Readings:
     type_i : array, shape (n,)
         Each leg's type-I measure: 1 at best, 0 where the leg is stretched or folded.
     type_ii : float
-        The type-II measure as a share of its best: 0 where the actuators hold the platform no more.
+        The type-II or the constraint measure, the lesser share of its best: 0 where the platform
+        is held no more.
     clearances : array, shape (n,)
         From each leg's joints to the nearest limit, over half its range; 1 without limits.
     fault : str
@@ -93,7 +94,7 @@ def readings(state: ViewerState, forces: Array | None = None) -> Readings:
         shares=shares,
         condition=condition,
         type_i=at.type_i,
-        type_ii=float(at.type_ii),
+        type_ii=float(min(at.type_ii, at.constraint)),
         clearances=at.joints,
         fault=fault,
     )

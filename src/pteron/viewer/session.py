@@ -15,7 +15,8 @@ from pteron.dynamics import drive_forces
 from pteron.errors import DataError, ModelError, warn_unlikely
 from pteron.kernels import Array
 from pteron.kinematics import inverse_kinematics, random_poses
-from pteron.manipulator import Manipulator, working_modes
+from pteron.manipulator import Manipulator
+from pteron.manipulator.variants import mode_elbows
 from pteron.motion import Motion, pick_and_place
 from pteron.motion.payload import payload_warning
 from pteron.motion.trajectories.checks import check_motion
@@ -205,8 +206,8 @@ class Session:
         self.state = move_home(self.state)
 
     def modes(self) -> list[tuple[int, ...]]:
-        """Return the sides of the elbows of every working mode."""
-        return [tuple(leg.elbow for leg in robot.legs) for robot in working_modes(self._first)]
+        """Return the signs of every working mode."""
+        return mode_elbows(self._first)
 
     def set_working_mode(self, elbows: Sequence[int]) -> bool:
         """Set the elbows' sides; return whether the machine has changed."""

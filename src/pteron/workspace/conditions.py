@@ -69,8 +69,9 @@ _CAUSES = {
 }
 
 
-EDGES = ("stretched", "folded", _CAUSES["reach"])
-"""The causes that are edges of a leg's reach, where its elbow may change its side."""
+def edge_causes(edges: Sequence[str]) -> tuple[str, ...]:
+    """Return the causes of the conditions that are these edges of a leg's reach."""
+    return tuple(_CAUSES.get(edge, edge) for edge in edges)
 
 
 def conditions(

@@ -17,7 +17,7 @@ from pteron.errors import ModelError
 from pteron.kernels import Array, geometry_only
 from pteron.kernels.program_cache import cached_result
 from pteron.kinematics import inverse_kinematics, singular_orientations
-from pteron.kinematics.singularities import best_type_ii
+from pteron.kinematics.singularities import best_holding
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.result import Result
 from pteron.workspace.holding import expect_regular
@@ -187,7 +187,7 @@ def _both_sides(robot: Manipulator) -> tuple[tuple[float, ...], tuple[float, ...
     """Return the home pose, and the best one on the base's other side if it is mirrored."""
     singular_orientations(robot)  # refuses a machine that is singular everywhere
     try:
-        best_type_ii(robot)
+        best_holding(robot)
     except ModelError:
         raise why_unreachable(robot) from None
     candidates = _candidates(robot)
@@ -216,7 +216,7 @@ def _both_sides(robot: Manipulator) -> tuple[tuple[float, ...], tuple[float, ...
 
 def _are_mirrored(robot: Manipulator, poses: Array, margins: Array, side: Array) -> bool:
     """Return whether good poses (K, m) lie on both sides of the base, without a path across."""
-    branched = any(len(leg.branches) > 1 for leg in robot.legs)
+    branched = any(len(leg.sign_choices()) > 1 for leg in robot.legs)
     most = margins.max()
     good = margins >= (_BRANCHED_SIDE if branched else _SIDE) * most
     above, below = (poses[good & (side == sign)] for sign in (1.0, -1.0))

@@ -14,7 +14,7 @@ from pteron.arguments import expect
 from pteron.kernels import Array, numeric
 from pteron.kinematics import inverse_kinematics
 from pteron.kinematics.sampling import finite_sizes, joint_limits
-from pteron.kinematics.singularities import best_type_ii
+from pteron.kinematics.singularities import best_holding
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.renamed import former_attribute
 from pteron.result import Result
@@ -37,15 +37,19 @@ class PoseMargins(Result):
     joints : array, shape (..., n)
         The least over each leg's joints, passive ones too, of the distance from the nearer limit
         over half the range; negative beyond it, and 1 for a leg without limits.
+    constraint : array, shape (...)
+        The size of the constraint measure over the best that the geometry allows: 0 where the legs
+        let the platform turn. It is 1 for legs whose couples do not turn with the pose.
     least : array, shape (...)
         The least of them all, which is what `home_pose` makes as large as it can.
     """
 
-    ROWS = "least type_ii type_i:1 joints:1"
+    ROWS = "least type_ii constraint type_i:1 joints:1"
 
     type_i: PerJoint
     type_ii: Numbers
     joints: PerJoint
+    constraint: Numbers
     least: Numbers
 
     clearances = former_attribute("clearances", "joints")
@@ -78,13 +82,16 @@ def pose_margins(robot: RobotLike, pose: PoseLike) -> PoseMargins:
 
 
 class MarginScales(NamedTuple):
-    """Divisors that turn measures into margins: leg sizes (n,), m, and joint limits (n,)."""
+    """Divisors that turn measures into margins: leg sizes (n,), m, and joint limits (n,).
+
+    `holding` (k,) are the best values of the type-II measure and, of k = 2, the constraint measure.
+    """
 
     sizes: Array
     low: Array
     high: Array
     half_range: Array
-    type_ii: float
+    holding: Array
 
 
 @lru_cache(maxsize=64)
@@ -94,7 +101,7 @@ def margin_scales(robot: Manipulator) -> MarginScales:
     half_range = np.where(np.isinf(low), 1.0, (high - low) / 2.0)
     # A shaft without lengths reaches everywhere.
     sizes = np.array([leg.size or 1.0 for leg in robot.legs])
-    return MarginScales(sizes, low, high, half_range, best_type_ii(robot))
+    return MarginScales(sizes, low, high, half_range, best_holding(robot))
 
 
 def margins_from(
@@ -103,14 +110,19 @@ def margins_from(
     """Return the margins of poses from kernels by name, on arrays of any library like NumPy."""
     reach, measure, _, _ = kernel_of("reach")(pose)
     type_i = np.where(reach < 0.0, reach / scales.sizes, np.nan_to_num(measure))
-    type_ii = np.minimum(finite_sizes(kernel_of("type_ii")(pose)[0]) / scales.type_ii, 1.0)
+    type_ii, *couples = (
+        np.minimum(finite_sizes(kernel_of(name)(pose)[0]) / best, 1.0)
+        for name, best in zip(("type_ii", "constraint"), scales.holding, strict=False)
+    )
+    constraint = couples[0] if couples else np.ones_like(type_ii)
     joints = kernel_of("joint_coordinates")(pose)[0]
     distances = np.minimum(joints - scales.low, scales.high - joints)
     shares = np.where(np.isinf(distances), 1.0, distances / scales.half_range)
     shares = np.where(np.isnan(shares), np.minimum(type_i, 0.0), shares)
     shares = np.fmin(shares, kernel_of("passive_room")(pose)[0])
-    least = np.minimum(np.minimum(type_i, shares).min(axis=-1), type_ii)
-    return PoseMargins(type_i, type_ii, shares, least)
+    held = np.minimum(type_ii, constraint)
+    least = np.minimum(np.minimum(type_i, shares).min(axis=-1), held)
+    return PoseMargins(type_i, type_ii, shares, constraint, least)
 
 
 def least_margin_text(robot: Manipulator, pose: Array) -> tuple[str, str]:
@@ -119,6 +131,8 @@ def least_margin_text(robot: Manipulator, pose: Array) -> tuple[str, str]:
     least = float(margins.least)
     if float(margins.type_ii) <= least:
         cause = "a type-II singularity, where the drives cannot hold the platform (100 % is best)"
+    elif float(margins.constraint) <= least:
+        cause = "a constraint singularity, where the platform can turn (100 % is best)"
     elif float(margins.type_i.min()) <= least:
         cause = f"leg {_first_least(margins.type_i)} stretched or folded (100 % is best)"
     else:

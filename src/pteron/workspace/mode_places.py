@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import prod
 
 import numpy as np
 
 from pteron.kernels import Array, geometry_only
 from pteron.kinematics import inverse_kinematics, random_poses
-from pteron.manipulator import Manipulator, working_modes
-from pteron.manipulator.variants import elbow_signs, with_elbows
+from pteron.manipulator import Manipulator
+from pteron.manipulator.variants import elbow_signs, elbows_of, mode_elbows, with_elbows
 from pteron.tolerances import ROUNDING
 from pteron.workspace.margins import pose_margins
 
@@ -36,7 +35,7 @@ class ModePlace:
     Attributes
     ----------
     elbows : tuple of int
-        The sides of its elbows.
+        The signs of its legs' branches: one or two for each leg, in their order.
     place : {"above", "below", "inside"}
         Where the platform is there, seen along gravity from the base: the guide points, or where
         sliders are on their guides.
@@ -72,25 +71,25 @@ def mode_places(robot: Manipulator, home: Array) -> tuple[ModePlace, ...]:
 
     None of a machine that has one mode, or that gravity does not tell above from below.
     """
-    file_elbows = tuple(leg.elbow for leg in robot.legs)
-    choices = [leg.branches for leg in robot.legs]
+    file_elbows, modes = elbows_of(robot), mode_elbows(robot)
     down, directions = np.array(robot.gravity), robot.platform.directions
     upright = ROUNDING * float(np.linalg.norm(down))
-    if prod(map(len, choices)) == 1 or not np.linalg.norm(directions @ down) > upright:
+    if len(modes) == 1 or not np.linalg.norm(directions @ down) > upright:
         return ()
-    modes = [tuple(leg.elbow for leg in mode.legs) for mode in working_modes(robot)]
     if len(modes) > _MOST:
-        other = tuple(-s if len(c) > 1 else s for s, c in zip(file_elbows, choices, strict=True))
+        columns = zip(file_elbows, zip(*modes, strict=True), strict=True)
+        other = tuple(-s if -s in column else s for s, column in columns)
         modes = list(dict.fromkeys([file_elbows, other, modes[0], modes[-1]]))
     poses = np.vstack([random_poses(geometry_only(robot), _DRAWN, type_i=0.0, type_ii=0.0), home])
     least = _UPRIGHT * max(leg.size for leg in robot.legs)
     candidates = []
     for signs in modes:
         mode = with_elbows(robot, signs)
-        least_margins = pose_margins(mode, poses).least
-        if np.isnan(least_margins).all():
+        reached = ~np.isnan(inverse_kinematics(mode, poses, on_failure="nan")).any(axis=-1)
+        if not reached.any():
             continue  # its reach depends on its elbows, and with these it reaches no pose
-        margins = np.nan_to_num(least_margins, nan=-np.inf)
+        least_margins = np.nan_to_num(pose_margins(mode, poses).least, nan=-np.inf)
+        margins = np.where(reached, least_margins, -np.inf)
         best = len(poses) - 1 if signs == file_elbows else int(margins.argmax())
         depth = _depth(mode, poses[best])
         place = "below" if depth > least else "above" if depth < -least else "inside"

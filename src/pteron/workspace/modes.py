@@ -1,6 +1,6 @@
 """The workspace of each working mode, and contacts of modes: poses where an elbow changes side.
 
-A leg changes the side of its elbow at an edge of its reach that both modes' workspaces meet.
+A leg changes a sign of its branch at an edge of its reach that both modes' workspaces meet.
 """
 
 from __future__ import annotations
@@ -14,10 +14,16 @@ from pteron.kernels import Array
 from pteron.kernels.bisection import bisect_condition
 from pteron.kinematics.evaluate import finite_pose
 from pteron.manipulator import RobotLike, as_manipulator, working_modes
+from pteron.manipulator.variants import elbows_of
 from pteron.result import Result
 from pteron.shapes import PoseLike
 from pteron.workspace.boxes import halve_boxes
-from pteron.workspace.conditions import EDGES, IntervalTest, condition_margins, interval_test
+from pteron.workspace.conditions import (
+    IntervalTest,
+    condition_margins,
+    edge_causes,
+    interval_test,
+)
 from pteron.workspace.paving import Paving, paving
 
 _HALVINGS = 50
@@ -37,7 +43,7 @@ class Contact(Result):
     Attributes
     ----------
     elbows : pair of tuple of int
-        The two modes, which differ in one leg.
+        The two modes, which differ in one sign of one leg.
     leg : int
         The leg, from 1: it is stretched or folded where they meet.
     cause : str
@@ -75,16 +81,13 @@ def mode_pavings(
     """
     robot = as_manipulator(robot)
     at = finite_pose(robot, pose, "pose")
-    return {
-        tuple(leg.elbow for leg in mode.legs): paving(mode, at, tolerance=tolerance)
-        for mode in working_modes(robot)
-    }
+    return {elbows_of(mode): paving(mode, at, tolerance=tolerance) for mode in working_modes(robot)}
 
 
 def mode_contacts(pavings: dict[tuple[int, ...], Paving]) -> tuple[Contact, ...]:
-    """Return whether the workspaces of each two modes that differ in a single leg meet.
+    """Return whether the workspaces of each two modes that differ in a single sign meet.
 
-    They meet where that leg is at the edge of its reach and all else is kept in both. In a box in
+    They meet where its leg is at an edge of its reach and all else is kept in both. In a box in
     which nothing but this edge is undecided, and beyond which two corners lie on either side of it,
     there is such a pose. Where no box may hold one they do not meet at this orientation.
 
@@ -99,20 +102,30 @@ def mode_contacts(pavings: dict[tuple[int, ...], Paving]) -> tuple[Contact, ...]
     """
     contacts = []
     for first, second in combinations(pavings, 2):
-        differs = [i for i, (a, b) in enumerate(zip(first, second, strict=True)) if a != b]
+        signs = [
+            (i + 1, edge_causes(edges))
+            for i, leg in enumerate(pavings[first].robot.legs)
+            for edges in leg.sign_edges.values()
+        ]
+        differs = [sign for sign, a, b in zip(signs, first, second, strict=True) if a != b]
         if len(differs) == 1:
-            contacts.append(
-                _contact(pavings[first], pavings[second], (first, second), differs[0] + 1)
-            )
+            pair = pavings[first], pavings[second]
+            contacts.append(_contact(*pair, (first, second), *differs[0]))
     return tuple(contacts)
 
 
 def _contact(
-    first: Paving, second: Paving, elbows: tuple[tuple[int, ...], tuple[int, ...]], leg: int
+    first: Paving,
+    second: Paving,
+    elbows: tuple[tuple[int, ...], tuple[int, ...]],
+    leg: int,
+    causes_of_edges: tuple[str, ...],
 ) -> Contact:
     """Return the contact of two working modes at a leg, by bisection of both pavings' boxes."""
     first_test, second_test = (interval_test(s.robot, s.conditions) for s in (first, second))
-    edges = [k for k, c in enumerate(first.conditions) if c.leg == leg and c.cause in EDGES]
+    edges = [
+        k for k, c in enumerate(first.conditions) if c.leg == leg and c.cause in causes_of_edges
+    ]
     boxes = np.concatenate([first.inner, first.boundary])
     for _ in range(_ROUNDS):
         low, high = first.corners(boxes)

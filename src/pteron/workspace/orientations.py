@@ -11,6 +11,7 @@ from pteron.errors import DataError, ModelError
 from pteron.kernels import Array
 from pteron.kinematics.evaluate import finite_pose
 from pteron.manipulator import RobotLike, as_manipulator, working_modes
+from pteron.manipulator.variants import elbows_of
 from pteron.result import Result
 from pteron.shapes import PoseLike
 from pteron.workspace.paving import paving
@@ -25,7 +26,7 @@ class VolumesOverAngles(Result):
     angles : array, shape (A,)
         The platform's angle, rad.
     elbows : tuple of tuple of int
-        The S working modes: the elbow, 1 or -1, of each leg.
+        The S working modes: the signs, 1 or -1, of the legs' branches.
     inner, outer : array, shape (S, A)
         Proved lower and upper bounds on the volume, in `unit`; 0 where no position is in reach.
     unit : {"m^3", "m^2"}
@@ -111,5 +112,5 @@ def volumes_over_angles(
         np.array([[getattr(paving_of_mode, name) for paving_of_mode in row] for row in pavings])
         for name in ("inner_volume", "outer_volume")
     )
-    elbows = tuple(tuple(leg.elbow for leg in machine.legs) for machine in machines)
+    elbows = tuple(map(elbows_of, machines))
     return VolumesOverAngles(angle_row, elbows, inner, outer, pavings[0][0].unit)

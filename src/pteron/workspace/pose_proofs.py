@@ -26,8 +26,8 @@ from pteron.errors import DataError, ModelError
 from pteron.kernels import Array
 from pteron.kernels.bounds import Bounded
 from pteron.kernels.programs import numeric_program
-from pteron.kinematics.direct import same_joints, working_mode
-from pteron.kinematics.evaluate import evaluate_unchecked, finite_rows
+from pteron.kinematics.direct import are_poses
+from pteron.kinematics.evaluate import finite_rows
 from pteron.kinematics.pose_conversions import pose_of, position_of, rotation_of
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.manipulator.manipulator import refuse_redundant
@@ -137,12 +137,7 @@ def proved_poses(
     sides = whole[1] - whole[0]
     zeros, undecided, examined = _zeros(closures, whole, most_boxes)
     zeros = zeros[((zeros >= whole[0]) & (zeros <= whole[1])).all(axis=-1)]
-    back = evaluate_unchecked(robot, "inverse_kinematics", zeros)
-    if all_branches:  # a leg that holds no point in a sphere may not reach
-        is_pose = np.isfinite(back) | (working_mode(robot, zeros, readings) != 0)
-    else:
-        is_pose = same_joints(robot, back, readings)
-    zeros = zeros[is_pose.all(axis=-1)]
+    zeros = zeros[are_poses(robot, zeros, readings, all_branches=all_branches)]
     if box is None:  # three angles give an orientation twice
         zeros = pose_of(robot, position_of(robot, zeros), rotation_of(robot, zeros))
     return ProvedPoses(_distinct(robot, zeros, 2.0 * _WIDE * sides), undecided, examined)

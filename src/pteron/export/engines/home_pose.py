@@ -11,7 +11,7 @@ from pteron.errors import ModelError
 from pteron.kernels import Array, numeric
 from pteron.kinematics import direct_kinematics, inverse_kinematics, random_poses
 from pteron.kinematics.evaluate import finite_pose
-from pteron.kinematics.sampling import type_ii_sizes
+from pteron.kinematics.sampling import holding_sizes
 from pteron.manipulator import Manipulator
 from pteron.shapes import PoseLike
 from pteron.tolerances import ROUNDING
@@ -86,9 +86,8 @@ def _worth(robot: Manipulator, poses: Array) -> Array:
     if not len(poses):
         return np.empty(0)
     bent = numeric(robot, "reach")(poses)[1].min(axis=-1)
-    type_ii = type_ii_sizes(robot, poses)
     passive = numeric(robot, "passive_room")(poses)[0].min(axis=-1)
-    worth = np.minimum(bent, type_ii)
+    worth = np.minimum(bent, holding_sizes(robot, poses).min(axis=-1))
     # A machine seldom works the wrong way round.
     turned = np.abs(poses[:, robot.platform.angular]).max(axis=1, initial=0.0)
     worth = np.minimum(worth, 1.0 - turned / np.pi)

@@ -64,7 +64,8 @@ class Limits:
         Least type-I measure of each leg, in (0, 1): the distance from stretched and folded legs.
     type_ii : float
         Least share, in (0, 1), of the best type-II measure that the machine has: the distance from
-        poses where the actuators do not hold the platform. Without meaning where J is constant.
+        poses where the actuators do not hold the platform. Without meaning where J is constant. The
+        same share of the best constraint measure holds for legs whose couples turn with the pose.
     joint_clearance : float
         Least distance of the actuated joints from their limits, m or rad; without effect on a joint
         that has none.

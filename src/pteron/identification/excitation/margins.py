@@ -24,7 +24,8 @@ from pteron.identification.signals.states import FullMotion, home
 from pteron.kernels import Array
 from pteron.kinematics.evaluate import evaluate_unchecked
 from pteron.kinematics.limits import limited_joints
-from pteron.kinematics.singularities import best_type_ii
+from pteron.kinematics.sampling import holding_measures
+from pteron.kinematics.singularities import best_holding
 from pteron.manipulator import Manipulator
 from pteron.result import Result
 from pteron.workspace.margins import joint_distances
@@ -168,11 +169,12 @@ def _has_passive_limits(robot: Manipulator) -> bool:
 
 
 def _margins_of(robot: Manipulator, limits: Limits, state: FullMotion) -> dict[str, Array]:
-    """Return every limit's margins (T, n) or (T, 1), -inf at poses out of reach."""
+    """Return every limit's margins (T, n), or (T, k) to k singularities; -inf out of reach."""
     margins = {"type_i": evaluate_unchecked(robot, "reach", state.pose)[1] - limits.type_i}
     if closure_of(robot).vanishes() is None or robot.platform.angles:
-        type_ii = np.abs(evaluate_unchecked(robot, "type_ii", state.pose))[:, None]
-        margins["type_ii"] = type_ii / best_type_ii(robot) - limits.type_ii
+        measures = [evaluate_unchecked(robot, n, state.pose) for n in holding_measures(robot)]
+        shares = np.abs(np.stack(measures, axis=-1)) / best_holding(robot)
+        margins["type_ii"] = shares - limits.type_ii
     if any(leg.limits for leg in robot.legs):
         clearances = joint_clearances(limits, robot)
         margins["joint_clearance"] = joint_distances(robot, state.joints) - clearances

@@ -29,7 +29,8 @@ from pteron.identification.excitation.sequential import NonlinearProgram, sequen
 from pteron.identification.signals.states import home, home_mode
 from pteron.kernels import Array, Columns, program
 from pteron.kinematics.evaluate import evaluate_unchecked
-from pteron.kinematics.singularities import best_type_ii
+from pteron.kinematics.sampling import holding_measures
+from pteron.kinematics.singularities import best_holding
 from pteron.manipulator import Manipulator, parameters
 from pteron.motion.trajectories.fourier import fourier_bases
 
@@ -193,10 +194,14 @@ def _path(
     limit_terms: dict[str, tuple[Expression, float | Array, float | Array]] = {}
     squares = program(robot, "squared_type_i").function(pose).T
     limit_terms["type_i"] = squares, (limits.type_i + _BACK_OFF) ** 2, np.inf
-    # An assembly mode keeps the sign that the measure has in the home pose.
-    sign = float(np.sign(evaluate_unchecked(robot, "type_ii", np.array(home(robot)))))
-    type_ii = sign * program(robot, "type_ii").function(pose)
-    limit_terms["type_ii"] = type_ii / best_type_ii(robot), limits.type_ii + _BACK_OFF, np.inf
+    # An assembly mode keeps the signs that the measures have in the home pose.
+    measures = [
+        float(np.sign(evaluate_unchecked(robot, name, np.array(home(robot)))))
+        * program(robot, name).function(pose)
+        / best
+        for name, best in zip(holding_measures(robot), best_holding(robot).tolist(), strict=True)
+    ]
+    limit_terms["type_ii"] = ca.vertcat(*measures), limits.type_ii + _BACK_OFF, np.inf
     if setting.space == "joints":
         joints, rates, seconds = q
     else:

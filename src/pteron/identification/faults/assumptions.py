@@ -25,7 +25,7 @@ from pteron.kernels import Array
 from pteron.kinematics import assembly_modes, direct_kinematics, follow
 from pteron.kinematics.evaluate import evaluate_unchecked
 from pteron.manipulator import Manipulator
-from pteron.manipulator.variants import working_modes
+from pteron.manipulator.variants import elbows_of, mode_elbows, with_elbows
 
 _LOOK = 12_000
 """Most rows of the log from which these samples are drawn."""
@@ -275,25 +275,36 @@ def _other_modes(
     robot: Manipulator, s: _Samples
 ) -> Iterator[tuple[Literal["mode"], tuple[str, str], Manipulator, _Samples]]:
     """Yield the machine in its other working modes, with the message for each."""
-    count = len(robot.legs)
-    modes: list[tuple[list[int], Manipulator]] = []
-    for mode in working_modes(robot):
-        pairs = zip(mode.legs, robot.legs, strict=True)
-        changed = [i for i, (other, drawn) in enumerate(pairs) if other != drawn]
-        if changed:
-            modes.append((changed, mode))
-    # One leg is most often wrong, or all of them.
-    most = max((len(changed) for changed, _ in modes), default=count)
+    drawn = elbows_of(robot)
+    fields = [(i + 1, name) for i, leg in enumerate(robot.legs) for name in leg.signs]
+    modes = [
+        ([k for k, sign in enumerate(elbows) if sign != drawn[k]], elbows)
+        for elbows in mode_elbows(robot)
+        if elbows != drawn
+    ]
+    # One elbow is most often wrong, or all of them.
+    most = max((len(changed) for changed, _ in modes), default=0)
     modes.sort(key=lambda pair: (len(pair[0]) not in (1, most), len(pair[0]), pair[0]))
-    for chosen, other in modes[:_MODES]:
-        names = ", ".join(str(i + 1) for i in chosen)
-        plural = "s" if len(chosen) > 1 else ""
-        message = (
-            f"The machine works in another working mode: the elbow{plural} of leg{plural} {names} "
-            f"{'are' if plural else 'is'} on the other side",
-            f"change the sign of elbow in leg{plural} {names} of the file",
+    for changed, elbows in modes[:_MODES]:
+        legs: dict[str, list[str]] = {}
+        for leg, name in (fields[k] for k in changed):
+            legs.setdefault(name, []).append(str(leg))
+        places = {
+            name: ("s" * (len(numbers) > 1), ", ".join(numbers)) for name, numbers in legs.items()
+        }
+        sides = (
+            f"the {name.replace('_', ' ')}{plural} of leg{plural} {numbers}"
+            for name, (plural, numbers) in places.items()
         )
-        yield "mode", message, other, s
+        signs = (
+            f"of {name} in leg{plural} {numbers}" for name, (plural, numbers) in places.items()
+        )
+        message = (
+            f"The machine works in another working mode: {' and '.join(sides)} "
+            f"{'are' if len(changed) > 1 else 'is'} on the other side",
+            f"change the sign {' and '.join(signs)} of the file",
+        )
+        yield "mode", message, with_elbows(robot, elbows), s
 
 
 def _unexplained_share(robot: Manipulator, s: _Samples) -> float:

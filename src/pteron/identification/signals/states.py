@@ -20,6 +20,7 @@ from pteron.identification.logs import Log
 from pteron.kernels import Array
 from pteron.kinematics import assembly_modes, direct_kinematics, follow, mode_of
 from pteron.kinematics.evaluate import evaluate_unchecked
+from pteron.kinematics.sampling import holding_measures
 from pteron.manipulator import Manipulator
 from pteron.result import Result
 from pteron.shapes import PoseLike, Poses
@@ -246,9 +247,8 @@ def _check_regular(robot: Manipulator, pose: Array, source: str, first_row: int)
         "a leg is all but stretched or folded": evaluate_unchecked(robot, "reach", pose)[1].min(-1)
     }
     if robot.platform.angles or closure_of(robot).vanishes() is None:
-        measures["the pose is all but singular"] = np.abs(
-            evaluate_unchecked(robot, "type_ii", pose)
-        )
+        sizes = [np.abs(evaluate_unchecked(robot, n, pose)) for n in holding_measures(robot)]
+        measures["the pose is all but singular"] = np.minimum.reduce(sizes)
     for what, size in measures.items():
         lost = ~(size >= _REGULAR)  # NaN is none
         if lost.any():

@@ -7,7 +7,8 @@ import numpy as np
 from pteron.kernels import Array, numeric
 from pteron.kernels.functions import TYPE_II
 from pteron.kinematics.limits import limited_joints
-from pteron.kinematics.singularities import best_type_ii
+from pteron.kinematics.sampling import holding_measures, holding_sizes
+from pteron.kinematics.singularities import best_holding
 from pteron.manipulator import Manipulator
 from pteron.motion.motion import pose_text
 from pteron.shapes import PerJoint
@@ -52,14 +53,20 @@ def limit_text(robot: Manipulator, pose: Array) -> str:
 
 
 def first_singular(robot: Manipulator, poses: Array) -> int | None:
-    """Return the first index of poses (T, m) at or beyond a type-II singularity, or None."""
-    measure = numeric(robot, "type_ii")(poses)[0]
-    beyond = ~(measure * np.sign(measure[0]) > TYPE_II * best_type_ii(robot))
+    """Return the first index of poses (T, m) at or beyond a singularity, or None.
+
+    It is one of type II, or a constraint singularity of legs whose couples turn with the pose.
+    """
+    names = holding_measures(robot)
+    measures = np.stack([numeric(robot, name)(poses)[0] for name in names], axis=-1)
+    beyond = ~(measures * np.sign(measures[0]) > TYPE_II * best_holding(robot)).all(axis=-1)
     return int(beyond.argmax()) if beyond.any() else None
 
 
-def singularity_text(_: Manipulator, pose: Array) -> str:
-    """Return the sentence that a pose (m,) is a type-II singularity."""
+def singularity_text(robot: Manipulator, pose: Array) -> str:
+    """Return the sentence that a pose (m,) is a type-II singularity, or one of the constraints."""
+    if (holding_sizes(robot, pose) / best_holding(robot)).argmin():
+        return f"constraint singularity at pose {pose_text(pose)}: the legs let the platform turn"
     return (
         f"singular (type II) at pose {pose_text(pose)}: the actuators no longer hold the platform"
     )

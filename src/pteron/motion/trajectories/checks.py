@@ -17,6 +17,7 @@ from pteron.kernels import Array, numeric
 from pteron.kernels.functions import TYPE_I, TYPE_II
 from pteron.kinematics.architecture import expect_regular
 from pteron.kinematics.limits import limited_joints
+from pteron.kinematics.sampling import holding_measures
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.motion import Motion, pose_text
 from pteron.motion.trajectories.minima import first_below, least_along
@@ -230,20 +231,30 @@ def _limit_failure(curve: _Curve, at: float, leg: int, fault: str, metres: float
 
 
 def _type_ii_failure(curve: _Curve, marks: Array) -> _Failure | None:
-    """Return the first failure where the type-II measure changes its sign, or None."""
-    if closure_of(curve.robot).vanishes() is False and not curve.robot.platform.angles:
+    """Return the first failure where a holding measure changes its sign, or None."""
+    robot = curve.robot
+    if closure_of(robot).vanishes() is False and not robot.platform.angles:
         return None
-    # Its sign is that of the beginning, as far as the actuators hold the platform.
-    side = 1.0 if float(curve.value("type_ii", marks[:1])[0]) > 0.0 else -1.0
-    first = first_below(lambda at: side * curve.value("type_ii", at)[:, None], marks, TYPE_II)
+
+    def values(at: Array) -> Array:
+        """Return the `holding_measures` (K, k) at curve parameters (K,)."""
+        return np.stack([curve.value(name, at) for name in holding_measures(robot)], axis=-1)
+
+    # Their signs are those of the beginning, as far as the platform is held there.
+    side = np.where(values(marks[:1]) > 0.0, 1.0, -1.0)
+    first = first_below(lambda at: side * values(at), marks, TYPE_II)
     if first is None:
         return None
-    at = first[0]
+    at, k, _ = first
+    kind, cause = (
+        ("constraint", "a constraint singularity, where the legs let the platform turn")
+        if k
+        else ("II", "a singularity (type II), where the actuators no longer hold the platform")
+    )
     error = SingularPose(
-        f"{curve.place_text(at)}: comes to a singularity (type II), where the actuators no longer "
-        "hold the platform; take another path, or go round it",
-        kind="II",
-        measure=float(np.abs(curve.value("type_ii", np.array([at])))[0]),
+        f"{curve.place_text(at)}: comes to {cause}; take another path, or go round it",
+        kind=kind,
+        measure=float(np.abs(values(np.array([at])))[0, k]),
         index=(),
     )
     return _Failure(at, error)

@@ -13,8 +13,8 @@ from pteron.errors import ModelError
 from pteron.kernels import Array, numeric
 from pteron.kinematics import inverse_kinematics
 from pteron.kinematics.evaluate import finite_pose
-from pteron.kinematics.sampling import type_ii_sizes
-from pteron.kinematics.singularities import best_type_ii
+from pteron.kinematics.sampling import holding_sizes
+from pteron.kinematics.singularities import best_holding
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.trajectories.cycle import Cycle, moves
 from pteron.shapes import PoseLike
@@ -160,8 +160,8 @@ def keeps_margin(robot: Manipulator, poses: Array, least: float) -> bool:
     if not (type_i >= least + _DIP).all():  # NaN, out of reach, compares false
         return False
     if closure_of(robot).vanishes() is not False or robot.platform.angles:
-        type_ii = type_ii_sizes(robot, poses) / best_type_ii(robot)
-        if not (type_ii >= least + _DIP).all():
+        shares = holding_sizes(robot, poses) / best_holding(robot)
+        if not (shares >= least + _DIP).all():
             return False
     actuated = joint_distances(robot, numeric(robot, "joint_coordinates")(poses)[0])
     passive = numeric(robot, "passive_room")(poses)[1]
