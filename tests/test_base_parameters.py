@@ -730,3 +730,35 @@ robsynth-parroblib (github.com/SchapplM) lists for their topologies, grouped alo
 def test_tied_legs_have_at_most_the_parameters_of_one_leg_and_the_platform(name):
     """The loop may group more than a leg by itself does, and never less."""
     assert pteron.base_parameters(name, shared=True).rank <= TIED[name]
+
+
+ONE_LENGTH = {"quadrupteron-oblique": 10, "tripteron-oblique": 7, "3-rrr": 9, "3-rpr": 9} | {
+    "3-prr": 7,
+    "stewart": 13,
+    "hexa": 14,
+    "hexaglide": 12,
+}
+"""The same with links of one length: each has one parameter less than its legs alone tell."""
+
+
+@pytest.mark.parametrize("name", gated(ONE_LENGTH, ["quadrupteron-oblique", "hexaglide"], CLIENTS))
+def test_the_loop_of_tied_legs_moves_their_mass_at_platform_points_to_the_platform(name):
+    robot = pteron.load(name)
+    if "oblique" in name:
+        legs = (replace(leg, upper_length=0.19, lower_length=0.2) for leg in robot.legs)
+        robot = replace(robot, legs=tuple(legs), home=None)
+    base = pteron.base_parameters(robot, shared=True)
+    assert base.rank == ONE_LENGTH[name]
+    x, y, z = np.array([leg.platform_point for leg in robot.legs]).T
+    moved = dict.fromkeys(pteron.parameter_names(robot), 0.0)
+    moved |= {name: -1.0 for name in moved if name.startswith("m_l")}
+    moved |= {
+        "m_e": float(len(x)),
+        "mgx_e": x.sum(),
+        "mgy_e": y.sum(),
+        "I_e": (x * x + y * y).sum(),
+    }
+    moved |= {"mgz_e": z.sum(), "Ixx_e": (y * y + z * z).sum(), "Iyy_e": (x * x + z * z).sum()}
+    moved |= {"Izz_e": moved["I_e"], "Ixy_e": -x @ y, "Ixz_e": -x @ z, "Iyz_e": -y @ z}
+    change = [moved[name] for name in pteron.parameter_names(robot)]
+    np.testing.assert_allclose(base.grouping @ change, 0.0, atol=1e-12)

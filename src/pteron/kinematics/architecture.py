@@ -22,7 +22,7 @@ from pteron.kinematics.jacobian_keys import alternatives, jacobian_keys
 from pteron.kinematics.modular_geometry import modular_geometry
 from pteron.kinematics.ram_figures import balance_of_rams
 from pteron.kinematics.ram_motions import self_motions_of_rams
-from pteron.kinematics.sampling import draw_poses, finite_sizes, joints_limit_reach
+from pteron.kinematics.sampling import draw_poses, joints_limit_reach, type_ii_sizes
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.result import Result
 
@@ -121,7 +121,7 @@ def architecture(robot: RobotLike) -> Architecture:
 def _architecture(robot: Manipulator) -> Architecture:
     """Return whether a machine is singular at every pose, with reason, proof and measures."""
     poses = _poses(robot)
-    measures = finite_sizes(numeric(robot, "type_ii")(poses)[0])
+    measures = type_ii_sizes(robot, poses)
     constraints = np.abs(numeric(robot, "constraint")(poses)[0])
     most, constraint = (float(v.max(initial=0.0)) for v in (measures, constraints))
     holds = None if np.isnan(constraint) else constraint > _VANISHING
@@ -176,7 +176,7 @@ def _is_singular_everywhere(robot: Manipulator) -> bool:
     poses = _poses(robot)
     if not len(poses):
         return False  # no pose is in reach: functions that take a pose raise that
-    if (finite_sizes(numeric(robot, "type_ii")(poses)[0]) > _VANISHING).any():
+    if (type_ii_sizes(robot, poses) > _VANISHING).any():
         return False
     # Where legs are far longer than the platform is wide, det J is small but its rank is full.
     points = np.array([leg.platform_point for leg in robot.legs])

@@ -437,6 +437,14 @@ def search_ball(robot: Manipulator) -> tuple[Array, float]:
     return np.asarray(center, dtype=float), 1.5 * reach
 
 
+def type_ii_sizes(robot: Manipulator, poses: PoseLike) -> Array:
+    """Return the absolute type-II measure (...) at poses (..., m); 0 where it is not finite.
+
+    A pose out of reach, or where a leg transmits no force, thus fails any threshold.
+    """
+    return finite_sizes(numeric(robot, "type_ii")(poses)[0])
+
+
 def holding_measures(robot: Manipulator) -> tuple[str, ...]:
     """Return the functions of a pose that vanish where drives or legs do not hold the platform.
 
@@ -447,10 +455,7 @@ def holding_measures(robot: Manipulator) -> tuple[str, ...]:
 
 
 def holding_sizes(robot: Manipulator, poses: PoseLike) -> Array:
-    """Return the absolute `holding_measures` (..., k) at poses (..., m); 0 where not finite.
-
-    A pose out of reach, or where a leg transmits no force, thus fails any threshold.
-    """
+    """Return the absolute `holding_measures` (..., k) at poses (..., m); 0 where not finite."""
     names = holding_measures(robot)
     return np.stack([finite_sizes(numeric(robot, name)(poses)[0]) for name in names], axis=-1)
 
