@@ -80,6 +80,7 @@ CODE: dict[str, tuple[str, ...]] = {
     ),
     "W4": (f"{_L}.prur.AlongEquations.links",),
     "W5": (f"{_L}.universal_link.UniversalLinkEquations.force",),
+    "W5a": (f"{_L}.universal_link.UniversalLinkEquations.held_closure",),
     "W6": (f"{_L}.srrr.SRRREquations.locus",),
     "W7": (f"{_L}.srrr.SRRREquations.motion",),
     # Direct position.
