@@ -65,7 +65,8 @@ def direct_kinematics(
         Rods and planar legs close with either side of an elbow. By default only poses of the
         robot's own working mode are returned, those whose inverse kinematics are the joints; True
         returns those of the others as well. Poses that Newton's method finds are searched in each
-        of the `working_modes`, 1024 of a Pentapteron (seconds), unless legs are redundant.
+        of the `working_modes`, 1024 of a Pentapteron (seconds), unless legs are redundant; k is
+        then as large as needed.
     tolerance : float, optional
         With more legs than coordinates: by how much, m, each joint may miss the pose that fits all
         of them best; by default 1e-6 of the leg's length.
