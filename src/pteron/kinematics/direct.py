@@ -70,7 +70,8 @@ def direct_kinematics(
     all_branches : bool
         Rods and planar legs close with either side of an elbow. By default only poses of the
         robot's own working mode are returned, those whose inverse kinematics are the joints; True
-        returns those of the others as well.
+        returns those of the others as well. Of poses that Newton's method finds k is then as large
+        as needed; with more legs than coordinates they are those of the own mode.
     tolerance : float, optional
         With more legs than coordinates: by how much, m, each joint may miss the pose that fits all
         of them best; by default 1e-6 of the leg's length.

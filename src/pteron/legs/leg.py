@@ -19,9 +19,10 @@ That is all: Jacobian, dynamics, regressor, energies, limits, drawings, logs, ex
 files for other engines follow.
 `examples/new_leg.py` is a complete kind of leg. More may be overridden: `needs`, a cheaper form of
 the same forces; `exported_terms`, names in exported code; and of the data `conditions`, what must
-hold between its fields, `passive_joints`, those that have limits, `zero_at`, the geometry that
-moves the zero of its coordinate, `unlikely_values`, warnings about its numbers, and `transfers`,
-the mass transfers that explain base parameters in symbols.
+hold between its fields, `sign_edges`, the signs of its branches if they are not `elbow` alone,
+`passive_joints`, those that have limits, `zero_at`, the geometry that moves the zero of its
+coordinate, `unlikely_values`, warnings about its numbers, and `transfers`, the mass transfers that
+explain base parameters in symbols.
 
 All vectors are in the base frame, columns (3, 1). An expression has no branch on a value: the side
 of an elbow is a quantity, +1 or -1.
