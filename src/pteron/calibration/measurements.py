@@ -182,9 +182,9 @@ class Measurements:
     def __post_init__(self) -> None:
         """Complete the closures, none by default, and their noise, which is the readings'."""
         noise = self.setup.noise
-        if not self.closures.size:
+        if self.closures.ndim < 2:
             object.__setattr__(self, "closures", np.empty((len(self.readings), 0)))
-        elif "readings" in noise and "closure" not in noise:
+        if self.closures.shape[1] and "readings" in noise and "closure" not in noise:
             noise = {**noise, "closure": noise["readings"]}
             object.__setattr__(self, "setup", replace(self.setup, noise=noise))
 

@@ -199,14 +199,14 @@ def identify_drive_gains(
     # All columns of the payload: none is solved for, so that none need be independent.
     model = Model(plain.base, replace(plain.terms, payload=True), plain.joins)
     arguments = log, with_payload, processing
-    observations, felt = observations_with_payload(model, *arguments), None
+    observations, felt_currents = observations_with_payload(model, *arguments), None
     if robot.redundancy:
-        felt = _felt_currents(robot, *arguments)
+        felt_currents = _felt_currents(robot, *arguments)
     carried = observations.matrix[..., -len(known.values) :] @ np.array(known.values)
     observations = observations.columns(range(len(plain.names)))
-    start, condition, gap = _fit_total_least_squares(observations, carried, felt)
+    start, condition, gap = _fit_total_least_squares(observations, carried, felt_currents)
     units = [f"{leg.joint.force_unit}/{unit}" for leg in robot.legs]
-    estimate = _fit_likelihood(observations, carried, start, units, felt)
+    estimate = _fit_likelihood(observations, carried, start, units, felt_currents)
     n = observations.actuators
     return DriveGains(
         gains=estimate.values[:n],
@@ -262,8 +262,8 @@ class _FeltCurrents(NamedTuple):
         variances, axes = np.linalg.eigh(across @ across.mT)
         root = (axes / np.sqrt(np.maximum(variances, _UNUSED))[:, None]).mT
         whitened = root @ self.directions.mT
-        missed = self.currents @ gains - observations.matrix @ beta[len(noise) :] - carried
-        residuals = (whitened @ missed[..., None])[..., 0]
+        misfits = self.currents @ gains - observations.matrix @ beta[len(noise) :] - carried
+        residuals = (whitened @ misfits[..., None])[..., 0]
         errors = noise * ((root @ across).mT @ residuals[..., None])[..., 0]
         currents = self.currents - self.maps * errors[:, None]
         tangent = whitened @ np.concatenate([currents * gains**2, observations.matrix], axis=-1)
@@ -279,11 +279,11 @@ class _FeltCurrents(NamedTuple):
     def noise(self, beta: Array, noise: Array, errors: Array) -> Array:
         """Return the noise (n,) of currents, from their errors with a former noise (Helmert)."""
         across = self.directions.mT @ self.maps / beta[: len(noise)] * noise
-        shown = np.einsum("rin,rin->rn", np.linalg.pinv(across).mT, across).sum(axis=0)
-        spent = 1.0 - len(beta) / shown.sum()
-        after = np.sqrt((errors**2).sum(axis=0) / shown / spent)
-        exact = (after <= _NOISELESS * np.abs(self.currents).max(axis=(0, 1))).all()
-        return noise if exact else np.maximum(after, _LEAST_NOISE * after.max())
+        shares = np.einsum("rin,rin->rn", np.linalg.pinv(across).mT, across).sum(axis=0)
+        degrees = 1.0 - len(beta) / shares.sum()
+        deviations = np.sqrt((errors**2).sum(axis=0) / shares / degrees)
+        is_exact = (deviations <= _NOISELESS * np.abs(self.currents).max(axis=(0, 1))).all()
+        return noise if is_exact else np.maximum(deviations, _LEAST_NOISE * deviations.max())
 
 
 class _AnyForces(NamedTuple):
@@ -309,23 +309,22 @@ def _felt_currents(
     observations = observations_with_payload(*arguments)
     # The filter has scaled them where it has left samples out: the trace of a projection is m.
     trace = np.trace(observations.matrix, axis1=1, axis2=2)[:, None, None]
-    used = trace > 0.0
-    maps = np.where(used, robot.freedom * observations.matrix / np.where(used, trace, 1.0), 0.0)
+    maps = robot.freedom * observations.matrix / np.where(trace > 0.0, trace, 1.0)
     directions = np.linalg.svd(maps)[0][..., : robot.freedom]
     return _FeltCurrents(currents_by_drive(*arguments), maps, directions)
 
 
 def _fit_total_least_squares(
-    observations: Observations, carried: Array, felt: _FeltCurrents | None
+    observations: Observations, carried: Array, felt_currents: _FeltCurrents | None
 ) -> tuple[Array, float, float]:
     """Return (g, beta) by total least squares (n + p,), the condition number and the gap."""
     # The columns W are exact, as in the likelihood: noise is in the currents alone. Else the
     # weakest of dozens of inertial parameters would pass for the null vector.
     n, p = observations.actuators, len(observations.names)
     currents, sizes_of_noise = observations.forces[..., None] * np.eye(n), np.ones(n)
-    if felt is not None:
-        currents = felt.currents
-        sizes_of_noise = np.sqrt((felt.maps**2).sum(axis=1).mean(axis=0))
+    if felt_currents is not None:
+        currents = felt_currents.currents
+        sizes_of_noise = np.sqrt((felt_currents.maps**2).sum(axis=1).mean(axis=0))
     homogeneous = replace(
         observations,
         names=(*observations.names, *(f"g{i}" for i in range(1, n + 1))),
@@ -360,7 +359,7 @@ def _fit_likelihood(
     carried: Array,
     start: Array,
     units: Sequence[str],
-    felt: _FeltCurrents | None,
+    felt_currents: _FeltCurrents | None,
 ) -> Estimate:
     """Return the maximum-likelihood estimate of (g, beta), with noise in the currents alone."""
     n = observations.actuators
@@ -370,7 +369,7 @@ def _fit_likelihood(
     beta, noise, steady = np.r_[1.0 / start[:n], start[n:]], np.ones(n), True
     size = LAST_DIGITS * np.linalg.norm(observations.forces)
     for iteration in count(1):
-        if felt is None:
+        if felt_currents is None:
             inverse, inertia = beta[:n], beta[n:]
             force = observations.matrix @ inertia + carried
             tangent = np.concatenate(
@@ -382,8 +381,8 @@ def _fit_likelihood(
             noise = actuator_noise(linear, beta)
             weights, residuals = 1.0 / noise, observations.forces - inverse * force
         else:
-            linear, errors = felt.linear_model(observations, carried, beta, noise)
-            last_noise, noise = noise, felt.noise(beta, noise, errors)
+            linear, errors = felt_currents.linear_model(observations, carried, beta, noise)
+            last_noise, noise = noise, felt_currents.noise(beta, noise, errors)
             weights, residuals = np.ones(linear.actuators), linear.forces - linear.matrix @ beta
             steady = bool(np.abs(noise / last_noise - 1.0).max() < _STEADY)
         linear = replace(linear, names=names, units=named)
@@ -396,7 +395,7 @@ def _fit_likelihood(
             raise observations.fault(
                 "unsettled", "the gains do not settle; record longer, or carry a heavier payload"
             )
-    if felt is None:
+    if felt_currents is None:
         estimate = weighted_least_squares(linear)
     else:  # the equations are whitened
         estimate = replace(ordinary(linear), noise=noise, residuals=errors)

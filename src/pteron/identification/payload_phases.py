@@ -44,8 +44,8 @@ def currents_by_drive(
     logs = [recording.head() for recording in read_phases(without, with_payload, processing)]
     plans = [preprocessing_for_log(model.robot, log, processing) for log in logs]
     columns = []
-    for alone in np.eye(model.robot.joint_count):
-        parts = [replace(log, forces=log.forces * alone) for log in logs]
+    for drive in np.eye(model.robot.joint_count):
+        parts = [replace(log, forces=log.forces * drive) for log in logs]
         rows = [observations_of(model, *pair) for pair in zip(parts, plans, strict=True)]
         columns.append(stack_observations(rows).forces)
     return np.stack(columns, axis=-1)

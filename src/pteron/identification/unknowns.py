@@ -173,7 +173,7 @@ def search_speeds(model: Model, observe: Observe, usual: Array) -> Array:
         """Return the model's columns and those of falling friction at the states."""
         rates = states.joint_rates[..., None]
         falls = np.sign(rates) * np.exp(-((rates / (usual[:, None] * shares)) ** 2))
-        if mixed:
+        if is_mixed:
             falls = each_alone(falls).reshape(*falls.shape[:2], -1)
         return np.concatenate([model.matrix(states), falls], axis=-1)
 
@@ -181,12 +181,12 @@ def search_speeds(model: Model, observe: Observe, usual: Array) -> Array:
         """Return joints' columns (R, n, c) as those of all forces by joint (R, n, n, c)."""
         return np.asarray(np.einsum("ric,ij->rijc", of_joints, np.eye(n)))
 
-    mixed = model.robot.redundancy > 0  # a joint's friction is then in the equations of all
-    rows = observe(extend_model(model, _COLUMNS * (n if mixed else 1), columns))
+    is_mixed = model.robot.redundancy > 0  # a joint's friction is then in the equations of all
+    rows = observe(extend_model(model, _COLUMNS * (n if is_mixed else 1), columns))
     plain = rows.columns(range(p))
     noise = weighted_least_squares(plain).noise
     falling = rows.matrix[..., p:]
-    falling = falling.reshape(-1, n, n, _COLUMNS) if mixed else each_alone(falling)
+    falling = falling.reshape(-1, n, n, _COLUMNS) if is_mixed else each_alone(falling)
     tried = np.geomspace(_SLOWEST, _FASTEST, _FINE)
     spline = scipy.interpolate.make_interp_spline(np.log(shares), np.eye(_COLUMNS), k=5)(
         np.log(tried)
