@@ -80,7 +80,7 @@ class Setup:
     noise : mapping
         Standard deviation of a `position`'s coordinates, of an `angle`, a `height`, a `distance`
         and of the joints' `readings`, m or rad. What is missing has its noise found from the
-        residuals; the readings' counts as none.
+        residuals; the readings' counts as none, except in closures, whose noise is then found.
     marks, planes, anchors : mapping
         By name. The tool is the mark `TOOL`; the plane `TOOL` is z = 0 unless it is given.
     frame_known : bool
