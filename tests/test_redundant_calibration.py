@@ -76,10 +76,10 @@ def test_intervals_cover_the_true_values(robot, kind):
     if kind == "heights" and robot is POINT:
         return
     errors = []
-    for seed in range(200):
+    for seed in range(200 if kind == "poses" else 40):
         _, changes, given = trial(robot, kind, seed, KNOWN)
         errors.append(standard_errors(calibrate(robot, given, free=GEOMETRY), changes))
-    assert 0.935 < (np.abs(errors) < 1.96).mean() < 0.97
+    assert 0.93 < (np.abs(errors) < 1.96).mean() < 0.975
 
 
 @pytest.mark.parametrize("kind", ["heights", "distances", "x alone", "nothing"])
