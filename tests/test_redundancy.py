@@ -6,16 +6,24 @@ another solver of quadratic programs check the forces.
 
 from dataclasses import replace
 
+import loaded_logs
+import logs_of_motions
 import numpy as np
 import pytest
 import quadprog
 from exported_code import compiled
+from loaded_logs import LOAD, base_of, make_log
+from logs_of_motions import log_of, machine
 from mechanisms import CATALOG, CLIENTS, rod_leg, slider_leg
+from scipy.interpolate import make_interp_spline
 
 import pteron
 from pteron.controllers import ComputedTorque
 from pteron.dynamics import bias_forces, null_space
 from pteron.identification import Log, Terms, identify, optimal_excitation
+from pteron.identification.drive_gains import identify_drive_gains
+from pteron.identification.logs.description import KnownPayload
+from pteron.identification.payload import identify_payload
 from pteron.indices import Elasticity
 from pteron.kinematics import joint_rates
 from pteron.kinematics.sampling import type_ii_sizes
@@ -284,6 +292,84 @@ def test_values_are_within_their_intervals_however_drives_fight(robot):
     assert (np.abs(standard) < 2.0).mean() > 0.9
 
 
+def fighting(name, draw, share=0.01):
+    """Return a log with and without a payload, with noise, whose drives push against each other."""
+    robot, rng, log = machine(name), np.random.default_rng(draw), make_log(name, 2, (1e-6, 0.0))
+    pose = loaded_logs.motion(name, 2)[1][0]
+    size = 0.3 * np.abs(log.forces).mean()
+    fight = np.cumsum(rng.normal(size=(len(pose), robot.redundancy)), axis=0)
+    internal = np.einsum("tnk,tk->tn", null_space(robot, pose), size * (1.0 + 0.02 * fight))
+    forces = log.forces + internal
+    noise = share * np.sqrt((forces**2).mean(axis=0))
+    return replace(log, forces=forces + noise * rng.normal(size=forces.shape)), noise
+
+
+@pytest.mark.parametrize("name", ["3-rrr-point", pytest.param("delta-redundant", marks=CLIENTS)])
+def test_a_payload_is_found_however_drives_fight(name):
+    robot, base, standard = machine(name), base_of(name), []
+    exact = identify_payload(robot, fighting(name, 0, 0.0)[0], base=base)
+    assert exact.mass == pytest.approx(LOAD.mass, rel=1e-4)
+    for draw in range(4):
+        found = identify_payload(robot, fighting(name, draw)[0], base=base)
+        standard.append((found.mass - LOAD.mass) / found.deviations[0])
+        assert found.deviations[0] < 0.06 * LOAD.mass
+    assert np.abs(standard).max() < 3.5
+    assert np.sqrt(np.square(standard).mean()) < 2.0
+
+
+@pytest.mark.parametrize("name", ["3-rrr-point", pytest.param("delta-redundant", marks=CLIENTS)])
+def test_drive_gains_are_found_however_drives_fight(name):
+    robot, base, standard = machine(name), base_of(name), []
+    gains = np.array([31.0, -24.0, 40.0, 10.0])[: robot.joint_count]
+    payload = KnownPayload(LOAD.mass)
+
+    def in_currents(log):
+        about = replace(log.description, column_force_unit="A", payload=payload)
+        return replace(log, forces=log.forces / gains, description=about)
+
+    found = identify_drive_gains(robot, in_currents(make_log(name)), base=base)
+    np.testing.assert_allclose(found.gains, gains, rtol=1e-9)
+    for draw in range(4):
+        log, noise = fighting(name, draw)
+        found = identify_drive_gains(robot, in_currents(log), base=base)
+        standard.append((found.gains - gains) / found.deviations)
+        assert (found.deviations < 0.08 * np.abs(gains)).all()
+        np.testing.assert_allclose(found.residual, noise / np.abs(gains), rtol=0.5)
+    assert np.abs(standard).max() < 3.5
+    assert np.sqrt(np.square(standard).mean()) < 2.0
+
+
+@CLIENTS
+@pytest.mark.parametrize("name", ["3-rrr-point", "delta-redundant"])
+def test_the_speeds_of_friction_that_falls_are_found(name):
+    robot = machine(name)
+    speeds, falls = np.array([0.1, 0.15, 0.08, 0.12]), np.array([1.5, 2.0, 1.0, 1.7])
+    speeds, falls = speeds[: robot.joint_count], falls[: robot.joint_count]
+    for noise in (0.0, 0.02):
+        logs = []
+        for slower, rate in ((1.0, 1000.0), (4.0, 500.0)):
+            about = {"period": 4.0 * slower, "size": 0.08}
+            plain = log_of(robot, duration=8.0 * slower, rate=rate, **about)
+            rates = make_interp_spline(plain.time, plain.joints, k=7)(plain.time, 1)
+            forces = plain.forces + falls * np.sign(rates) * np.exp(-((rates / speeds) ** 2))
+            rng = np.random.default_rng(int(slower))
+            forces += noise * rng.normal(size=forces.shape)
+            pose = logs_of_motions.motion(robot, plain.time, **about)[0]
+            forces += np.einsum("tnk->tn", null_space(robot, pose))  # drives that fight
+            logs.append(replace(plain, source=f"{slower:g}.csv", forces=forces))
+        found = identify(robot, logs, terms=Terms(stribeck="auto"), cad=None)
+        friction = logs_of_motions.Friction.of(robot.joint_count)
+        truth = np.r_[found.model.base.values(robot), friction.values, falls]
+        if not noise:
+            np.testing.assert_allclose(found.unknowns.speeds, speeds, rtol=1e-4)
+            np.testing.assert_allclose(found.estimate.values, truth, atol=2e-4)
+            continue
+        standard = (found.estimate.values - truth) / found.estimate.deviations
+        assert (np.abs(standard) < 2.0).mean() > 0.85
+        low, high = found.unknowns.speed_intervals()
+        assert ((low < speeds) & (speeds < high)).mean() > 0.6
+
+
 def true_values(robot, model):
     """Return the values of a model's terms for the machine as it is."""
     drive = robot.legs[0].drive
@@ -331,16 +417,14 @@ def test_a_mistake_is_one_line(robot, change, words):
         replace(robot, **change)
 
 
-def test_what_takes_no_redundant_machine_says_so():
-    log = Log.of(POINT, np.arange(9.0), np.zeros((9, 3)), np.zeros((9, 3)))
-    for refused in (
-        lambda: pteron.indices.evaluate(POINT, "output_pressure_angle", [0.3, 0.25]),
-        lambda: pteron.calibration.plan(POINT, 10),
-        lambda: identify(POINT, log, terms=Terms(stribeck="auto")),
-        lambda: redundancy(CATALOG["delta"], [0.0, 0.0, -0.9]),
-    ):
-        with pytest.raises(pteron.PteronError):
-            refused()
+def test_an_index_that_no_redundant_machine_has_says_why():
+    with pytest.raises(pteron.ModelError, match="is about joints that move alone"):
+        pteron.indices.evaluate(POINT, "output_pressure_angle", [0.3, 0.25])
+
+
+def test_a_machine_that_is_not_redundant_has_no_internal_forces():
+    with pytest.raises(pteron.PteronError):
+        redundancy(CATALOG["delta"], [0.0, 0.0, -0.9])
 
 
 def test_internal_forces_of_a_wrong_zero_are_those_of_springs():

@@ -32,7 +32,6 @@ from pteron.calibration.unknowns import blocks_of
 from pteron.calibration.verdict import EVERY, Evidence, fitted_errors, rows_for_check, verdict_of
 from pteron.errors import DataError
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
-from pteron.manipulator.manipulator import refuse_redundant
 from pteron.progress import Progress, Steps
 from pteron.shapes import Seed, seed_number
 
@@ -120,8 +119,7 @@ def calibrate(
     array([-0.001,  0.   ,  0.   ])
     """
     robot = as_manipulator(robot)
-    refuse_redundant(robot, "calibration")
-    _check_readings(robot.joint_count, measurements)
+    _check_readings(robot, measurements)
     blocks = blocks_of(robot, measurements, free, prior)
     start = Guess.drawn(robot, measurements)
     seed = seed_number(seed)
@@ -253,10 +251,12 @@ def _select_fitting_rows(
     return measurements.rows(some if some.any() else chosen)
 
 
-def _check_readings(joints: int, measurements: Measurements) -> None:
+def _check_readings(robot: Manipulator, measurements: Measurements) -> None:
     """Raise where readings are not finite numbers of shape (N, n), or nothing was measured."""
-    shape = measurements.readings.shape
+    shape, joints = measurements.readings.shape, robot.joint_count
     expect(len(shape) == 2 and shape[1] == joints, "readings", f"shape {shape}", f"(N, {joints})")
+    shape, closures = measurements.closures.shape, (shape[0], robot.redundancy)
+    expect(shape == closures, "closures", f"shape {shape}", f"{closures}, all 0")
     if not np.isfinite(measurements.readings).all():
         row = int(np.argwhere(~np.isfinite(measurements.readings))[0, 0])
         raise DataError(f"{measurements.places[row]}: a reading is missing or not finite")

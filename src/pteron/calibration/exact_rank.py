@@ -213,6 +213,16 @@ class _ModularSlopes(MachineSlopes):
         columns = zip(*(self.known[tuple(pose)] for pose in poses), strict=True)
         return [np.stack(residues) for residues in columns]
 
+    def _square_jacobian(self, jacobian: Residues) -> Residues:
+        """Return Jacobians (N, n, m) with random columns that make them square.
+
+        The rank is that with columns across: both choices change a row by multiples of closures'.
+        """
+        rows, n, m = jacobian.shape
+        outside = [self.rng.randrange(self.prime) for _ in range(rows * n * (n - m))]
+        columns = np.array(outside, dtype=object).reshape(rows, n, n - m)
+        return np.concatenate([jacobian, columns], axis=-1)
+
     def _matrix(self, guess: Guess) -> Residues:
         """Return the slopes of the geometry's numbers against its variations."""
         return self.steps

@@ -17,8 +17,8 @@ from pteron.calibration.calibration_fit import CalibrationFit
 from pteron.calibration.guess import Guess, UnknownBlock, tolerances_of
 from pteron.calibration.measurements import KINDS, Measurements, spread_rows
 from pteron.calibration.residuals import MachineSlopes, ResidualRows
+from pteron.calibration.start import fitting_poses
 from pteron.errors import DataError
-from pteron.kinematics import direct_kinematics
 
 Array = NDArray[np.float64]
 
@@ -163,9 +163,7 @@ class Fitter:
         if not len(lost):
             return at
         joints, poses = at.guess.joints(self.measurements.readings)[lost], at.poses.copy()
-        for i, modes in zip(
-            lost, direct_kinematics(at.guess.robot, joints, on_failure="nan"), strict=True
-        ):
+        for i, modes in zip(lost, fitting_poses(at.guess.robot, joints), strict=True):
             off = np.abs(modes - self.begin_poses[i]).max(axis=-1)
             if np.isfinite(off).any():
                 poses[i] = modes[np.nanargmin(off)]
@@ -291,6 +289,7 @@ class Fitter:
         pushed = at.by_reading * (self.readings_noise * np.tile(guess.scales, 2))
         if not self.readings_noise:
             return at.residuals / sizes, at.slopes / sizes[:, None], pushed
+        sizes[self.kind_of == "closure"] = FLOOR  # their noise is that of the readings
         covariance = pushed @ np.swapaxes(pushed, -1, -2) + np.diag(sizes**2)
         root = np.linalg.cholesky(covariance)
         both = np.concatenate([at.residuals[..., None], at.slopes, pushed], axis=-1)

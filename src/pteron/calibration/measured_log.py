@@ -213,7 +213,9 @@ def _read_rows(robot: Manipulator, opened: _Opened, source: str) -> Measurements
     if faults:
         raise DataError(joined_faults(list(dict.fromkeys(faults))), subject=table.source)
     names = texts("mark"), texts("plane"), anchors, _places(table, source)
-    return Measurements(readings, *measured_columns, distances, origins, *names, times)
+    closures = np.zeros((n, robot.redundancy))
+    columns_of_rows = readings, *measured_columns, distances, origins, *names, times
+    return Measurements(*columns_of_rows, closures=closures)
 
 
 def _numbers(table: Table, column: str, faults: list[str]) -> Array:

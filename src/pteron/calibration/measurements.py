@@ -1,7 +1,8 @@
 """Measurements of a machine at many poses: the joints' readings and an instrument's values there.
 
 A row is a pose. A position, angles, a height and a distance may be measured in it; what is not, is
-NaN. `Setup` has what they refer to: marks on the platform, planes, anchors, the instrument's frame.
+NaN. With more legs than coordinates the readings alone show how far they contradict each other.
+`Setup` has what they refer to: marks on the platform, planes, anchors, the instrument's frame.
 """
 
 from __future__ import annotations
@@ -20,8 +21,11 @@ from pteron.manipulator import Manipulator
 from pteron.renamed import former_attribute
 from pteron.shapes import JointsLike, PoseLike
 
-KINDS = ("position", "angle", "height", "distance")
-"""Kinds of measurements, each with a noise of its own."""
+KINDS = ("position", "angle", "closure", "height", "distance")
+"""Kinds of measurements, each with a noise of its own.
+
+A closure is the misfit of n readings at the pose that fits them best, n - m numbers that should be
+0; its noise is that of the readings."""
 
 VALUES, TEXTS = tuple(f"{kind}s" for kind in KINDS), ("marks", "planes", "anchors", "places")
 """Fields with what was measured in each row, by kind, and what each row is called by."""
@@ -76,7 +80,7 @@ class Setup:
     noise : mapping
         Standard deviation of a `position`'s coordinates, of an `angle`, a `height`, a `distance`
         and of the joints' `readings`, m or rad. What is missing has its noise found from the
-        residuals; the readings' counts as none.
+        residuals; the readings' counts as none, except in closures, whose noise is then found.
     marks, planes, anchors : mapping
         By name. The tool is the mark `TOOL`; the plane `TOOL` is z = 0 unless it is given.
     frame_known : bool
@@ -92,7 +96,7 @@ class Setup:
 
 def error_unit(kind: str) -> str:
     """Return the unit in which errors of a kind of measurement are shown: mrad or mm."""
-    return "mrad" if kind == "angle" else "mm"
+    return {"angle": "mrad", "closure": "mm or mrad"}.get(kind, "mm")
 
 
 def spread_rows(count: int, most: int) -> NDArray[np.int64]:
@@ -156,6 +160,9 @@ class Measurements:
         s, in the order taken.
     setup : Setup
         What they refer to.
+    closures : array, shape (N, n - m)
+        Of a machine with more legs than coordinates: 0, as its legs meet in one platform; NaN where
+        a row's readings do not count.
     """
 
     readings: Array
@@ -170,6 +177,16 @@ class Measurements:
     places: tuple[str, ...]
     times: Array | None = None
     setup: Setup = Setup()
+    closures: Array = field(default_factory=lambda: np.empty(0))
+
+    def __post_init__(self) -> None:
+        """Complete the closures, none by default, and their noise, which is the readings'."""
+        noise = self.setup.noise
+        if self.closures.ndim < 2:
+            object.__setattr__(self, "closures", np.empty((len(self.readings), 0)))
+        if self.closures.shape[1] and "readings" in noise and "closure" not in noise:
+            noise = {**noise, "closure": noise["readings"]}
+            object.__setattr__(self, "setup", replace(self.setup, noise=noise))
 
     @classmethod
     def from_readings(
@@ -225,6 +242,7 @@ class Measurements:
             anchors=unnamed,
             places=tuple(f"row {i + 1}" for i in range(n)),
             setup=setup or Setup(),
+            closures=np.zeros((n, robot.redundancy)),
         )
 
     of = former_attribute("of", "from_readings")
@@ -235,8 +253,8 @@ class Measurements:
     @property
     def parts(self) -> dict[str, Array]:
         """The measured numbers by kind, (N, k) each; NaN where nothing was measured."""
-        arrays = self.positions, self.angles, self.heights[:, None], self.distances[:, None]
-        return dict(zip(KINDS, arrays, strict=True))
+        lengths = self.heights[:, None], self.distances[:, None]
+        return dict(zip(KINDS, (self.positions, self.angles, self.closures, *lengths), strict=True))
 
     @property
     def kinds(self) -> list[str]:

@@ -22,7 +22,6 @@ from pteron.calibration.unknowns import blocks_of
 from pteron.calibration.verdict import rows_for_check
 from pteron.errors import DataError, ModelError
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
-from pteron.manipulator.manipulator import refuse_redundant
 from pteron.result import Result
 from pteron.shapes import Seed
 from pteron.tolerances import EXACT
@@ -144,7 +143,6 @@ def plan(
         If no region of poses around home, or on the plane, is proved to serve.
     """
     robot = as_manipulator(robot)
-    refuse_redundant(robot, "a plan for calibration")
     expect(count >= 1, "count", count, "1 or more")
     expect_one_of(get_args(Measure), measure=measure)
     expect_one_of(get_args(Criterion), criterion=criterion)
@@ -173,7 +171,7 @@ def plan(
     start = Guess.drawn(robot, measurements)
     slopes = MachineSlopes(robot, blocks)
     rows = slopes.rows(start, measurements, poses, np.arange(len(poses)))
-    noise = {**_NOISE, **setup.noise}
+    noise = {**_NOISE, **measurements.setup.noise}
     seen = rows.slopes / np.array([noise[kind] for kind in measurements.kind_of])[:, None]
     used = rows.measured.any(axis=0)
     # Of a machine that turns only, the angles are what goes wrong.

@@ -163,7 +163,7 @@ def hidden_order(
 
     Heights over the bed of a symmetric machine are those of its mirror image.
     """
-    if not set(measurements.kinds) <= {"height", "distance"}:
+    if not set(measurements.kinds) <= {"height", "distance", "closure"}:
         return None
     misfit = _misfit(_sample_rows(measurements), blocks, robot_guess)
     legs: set[int] = set()

@@ -23,7 +23,7 @@ from pteron.calibration.fault_trials import (
     tilt_trials,
 )
 from pteron.calibration.fit import BEYOND, Fitter
-from pteron.calibration.measurements import Measurements, spread_rows
+from pteron.calibration.measurements import Measurements, error_unit, spread_rows
 from pteron.calibration.result import CalibrationFinding
 from pteron.calibration.score_test import MOST_ROWS, ScoreTest
 from pteron.calibration.thresholds import OFF_TOLERANCES, ORDINARY_ERROR
@@ -98,22 +98,23 @@ def _outliers(
     if not len(rows):
         return ()
     worst = rows[np.argsort(-fit.distances[rows])][:_LISTED]
+    kinds = measurements.kind_of
     named = ", ".join(
-        f"{measurements.places[i]} ({reasons.get(int(i)) or _residual_text(fit, i)})" for i in worst
+        f"{measurements.places[i]} ({reasons.get(int(i)) or _residual_text(fit, i, kinds)})"
+        for i in worst
     )
     others = f" and {len(rows) - len(worst)} more" if len(rows) > len(worst) else ""
     text = f"Left out, as {'they do' if len(rows) > 1 else 'it does'} not fit: {named}{others}."
     return (CalibrationFinding("outlier", text, float((fit.distances[rows] ** 2).sum())),)
 
 
-def _residual_text(fit: CalibrationFit, row: int) -> str:
+def _residual_text(fit: CalibrationFit, row: int, kinds: NDArray[np.str_]) -> str:
     """Return a row's largest residual in words, or that its readings lead to no pose."""
     if fit.distances[row] == BEYOND:
         return "its readings lead to no pose"
     residuals = fit.residuals[row]
     k = int(np.abs(residuals).argmax())
-    angle = 3 <= k < len(residuals) - 2
-    return f"off by {1e3 * abs(residuals[k]):.3g} {'mrad' if angle else 'mm'}"
+    return f"off by {1e3 * abs(residuals[k]):.3g} {error_unit(str(kinds[k]))}"
 
 
 def _find_fault(

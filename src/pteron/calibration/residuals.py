@@ -2,7 +2,9 @@
 
 The pose x of a row follows from its readings q by direct kinematics, so that unknowns theta move it
 by dx = -J^-1 (dq/dtheta) dtheta. Every measurement is a function of that pose and of a mark on the
-platform.
+platform. With more legs than coordinates no pose has all readings exactly: q = q(x) + N s, with the
+pose x that fits them best, misfits s, and columns N across those of J. The misfits, or closures,
+should be 0, which counts as measured; and the square matrix [J N] takes the place of J.
 """
 
 from __future__ import annotations
@@ -32,8 +34,9 @@ _CLOSED = 1e-12
 
 
 class ResidualRows(NamedTuple):
-    """Residuals (N, K) of N rows: three of position, k of angles, one of height, one of distance.
+    """Residuals (N, K) of N rows: of position, angles, closure, height and distance.
 
+    Three are of position, k of angles, n - m of closure, and one each of height and distance.
     What was not measured has a residual and slopes of zero.
     """
 
@@ -69,6 +72,8 @@ class MachineSlopes:
         self._owner = np.array([change.leg for change in self._changes], dtype=int)
         self.size = max(leg.size for leg in robot.legs) or 1.0
         self._angular = np.flatnonzero(robot.platform.angular)
+        self._angle_part = slice(3, 3 + len(self._angular))
+        self._closure_part = slice(3 + len(self._angular), -2)
         self._lengths = length_columns(robot)
         self._axes = position_axes(robot)
         self._frame = next((b.where for b in blocks if b.kind == "frame"), None)
@@ -80,7 +85,8 @@ class MachineSlopes:
         for _ in range(_STEPS):
             joints_at, jacobian, *_ = self._kernel(geometry, poses[open_rows])
             residuals = self._wrap_angles(joints[open_rows] - joints_at)
-            step = self._solve_stack(jacobian, residuals[..., None])[..., 0]
+            square = self._square_jacobian(jacobian)
+            step = self._solve_stack(square, residuals[..., None])[:, : poses.shape[1], 0]
             poses[open_rows] += step
             unconverged = np.abs(step).max(axis=-1, initial=0.0) > _CLOSED * max(self.size, 1.0)
             open_rows = open_rows[unconverged | np.isnan(step).any(axis=-1)]
@@ -97,6 +103,10 @@ class MachineSlopes:
         """Return the joints' slopes (N, n, m) against the pose."""
         return self._outputs(guess, poses)[1]
 
+    def misfits(self, guess: Guess, joints: Array, poses: Array) -> Array:
+        """Return joint coordinates (N, n) less those at poses, m and rad."""
+        return self._wrap_angles(joints - self.joints(guess, poses))
+
     def pose_slopes(
         self, guess: Guess, measurements: Measurements, poses: Array
     ) -> tuple[Array, Array]:
@@ -104,6 +114,7 @@ class MachineSlopes:
         _, mark_slopes, slopes = self._marks(guess, measurements, poses, np.arange(len(poses)))
         lengths = self._axes[self._lengths] @ slopes[:, :3]
         pose_slopes = np.concatenate([lengths, slopes[:, 6:]], axis=1)
+        pose_slopes = pose_slopes[:, : poses.shape[1]]
         return pose_slopes[..., : self.count], mark_slopes[..., : self.count]
 
     def _wrap_angles(self, missed: Array) -> Array:
@@ -121,8 +132,15 @@ class MachineSlopes:
         if measured[:, :3].any():
             full = np.where(measured[:, :3], measurements.positions[chosen], 0.0) @ self._axes
             residuals[:, :3] = ((point - guess.shift) @ guess.turn - full) @ self._axes.T
-        if measured[:, 3:-2].any():
-            residuals[:, 3:-2] = self._angles(guess, poses[chosen], measurements.angles[chosen])
+        if measured[:, self._angle_part].any():
+            angles = self._angles(guess, poses[chosen], measurements.angles[chosen])
+            residuals[:, self._angle_part] = angles
+        if measured[:, self._closure_part].any():
+            joints = guess.joints(measurements.readings[chosen])
+            misfits = self.misfits(guess, joints, poses[chosen])
+            square = self._square_jacobian(self.jacobian(guess, poses[chosen]))
+            across = square[..., poses.shape[1] :]
+            residuals[:, self._closure_part] = np.einsum("nij,ni->nj", across, misfits)
         if measured[:, -2].any():
             planes = np.stack([guess.planes[measurements.planes[i]] for i in chosen])
             over = np.einsum("ni,ni->n", planes[:, :3], point) - planes[:, 3]
@@ -164,7 +182,7 @@ class MachineSlopes:
             row_slopes[:, 3:-2] = moves[:, 6:]
             if frame is not None:
                 rates = self._rates(guess, poses[chosen])
-                slopes[:, 3:-2, frame.start + 3 : frame.stop] -= rates
+                slopes[:, self._angle_part, frame.start + 3 : frame.stop] -= rates
         if measured[:, -2].any():
             normals = np.stack([guess.planes[measurements.planes[i]][:3] for i in chosen])
             row_slopes[:, -2] = np.einsum("ni,nik->nk", self._base_vectors(normals), moved)
@@ -201,15 +219,18 @@ class MachineSlopes:
         """Return the rows' marks (N, 3) in the base frame, and slopes against all unknowns.
 
         Behind these against the joint coordinates: the marks' (N, 3, p + n), and those of the
-        platform's twist and of the pose's angles (N, 6 + k, p + n).
+        platform's twist, the pose's angles and the closures (N, 6 + k + n - m, p + n).
         """
         outputs = self._outputs(guess, poses[chosen])
         joints, jacobian, raw, twists, place, turned, *shifts = outputs
-        rates = np.eye(len(guess.robot.coordinates), dtype=twists.dtype)[self._angular]
-        angle_rates = np.broadcast_to(rates, (len(chosen), *rates.shape))
-        moves = np.concatenate([twists, angle_rates], axis=1)
+        square, angles = self._square_jacobian(jacobian), 6 + len(self._angular)
+        n, m = jacobian.shape[1:]
+        moves = np.zeros((len(chosen), angles + n - m, n), dtype=twists.dtype)
+        moves[:, :6, :m] = twists
+        moves[:, 6:angles, :m] = np.eye(m, dtype=twists.dtype)[self._angular]
+        moves[:, angles:, m:] = np.eye(n - m, dtype=twists.dtype)
         by_joint = np.swapaxes(
-            self._solve_stack(np.swapaxes(jacobian, -1, -2), np.swapaxes(moves, -1, -2)), -1, -2
+            self._solve_stack(np.swapaxes(square, -1, -2), np.swapaxes(moves, -1, -2)), -1, -2
         )
         slopes = np.zeros((*moves.shape[:2], self.count), dtype=moves.dtype)
         for block in self.blocks:
@@ -272,6 +293,14 @@ class MachineSlopes:
     def _outputs(self, guess: Guess, poses: Array) -> list[Array]:
         """Return the kernel's outputs at poses: joint coordinates, Jacobians, slopes, frames."""
         return [*self._kernel(np.array(numbers(guess.robot)), poses)]
+
+    def _square_jacobian(self, jacobian: Array) -> Array:
+        """Return Jacobians (N, n, m) with n - m columns of unit length across theirs: (N, n, n)."""
+        n, m = jacobian.shape[1:]
+        if n == m:
+            return jacobian
+        outside = np.linalg.qr(jacobian, mode="complete")[0][..., m:]
+        return np.concatenate([jacobian, outside], axis=-1)
 
     def _matrix(self, guess: Guess) -> Array:
         """Return the slopes of the geometry's numbers against its variations."""

@@ -24,7 +24,8 @@ _OF_A_MANIPULATOR = {"platform", "legs"}
 
 def _noise_by_kind(noise: Any) -> Any:
     """Return a mapping of noise by kind; a single number is the noise of every kind."""
-    return noise if isinstance(noise, dict) else dict.fromkeys(KINDS, noise)
+    kinds = [kind for kind in KINDS if kind in NoiseTable.model_fields]
+    return noise if isinstance(noise, dict) else dict.fromkeys(kinds, noise)
 
 
 Noise = Annotated[Number, Field(gt=0.0)]

@@ -13,6 +13,7 @@ from pteron.calibration.measurements import Measurements, length_columns, positi
 from pteron.calibration.residuals import MachineSlopes
 from pteron.errors import DataError
 from pteron.kinematics import direct_kinematics
+from pteron.manipulator import Manipulator
 from pteron.workspace.home import home_pose
 
 Array = NDArray[np.float64]
@@ -50,30 +51,30 @@ def starting_poses(guess: Guess, measurements: Measurements, *, modes: bool = Tr
     robot, joints = guess.robot, guess.joints(measurements.readings)
     home = home_pose(robot)
     slopes = MachineSlopes(robot, ())
-    side = np.sign(np.linalg.det(slopes.jacobian(guess, home[None])))
+    side = _sides(slopes.jacobian(guess, home[None]))
     begin, fully_measured = _measured_poses(guess, measurements, home)
     poses = slopes.poses(guess, joints, begin)
     with np.errstate(invalid="ignore"):  # of a pose that was not found
-        sides = np.sign(np.linalg.det(slopes.jacobian(guess, poses)))
+        sides = _sides(slopes.jacobian(guess, poses))
     far = np.abs(poses - begin) > np.where(robot.platform.angular, _TURNED, 0.2 * slopes.size)
     other = np.isnan(poses).any(axis=-1)
     other |= np.where(fully_measured, far.any(axis=-1), sides != side)
-    off = np.abs(_height_residuals(guess, measurements, poses, np.arange(len(measurements))))
+    off = _mode_errors(slopes, guess, measurements, poses, np.arange(len(measurements)))
     other |= ~(off <= _OTHER_MODE * slopes.size)
     if not modes:
         poses[other] = np.nan
     sought = np.flatnonzero(other if modes else np.zeros_like(other))
-    for i, assembly_modes in zip(
-        sought, direct_kinematics(robot, joints[sought], on_failure="nan"), strict=True
-    ):
+    for i, assembly_modes in zip(sought, fitting_poses(robot, joints[sought]), strict=True):
+        if robot.redundancy:  # with large misfits, as of a wrong zero, no mode may be found
+            assembly_modes = np.vstack([assembly_modes, poses[i]])
         several = assembly_modes[~np.isnan(assembly_modes).any(axis=-1)]
         if not len(several):
             poses[i] = np.nan
             continue
-        # Of a row without a height all residuals are 0.
-        off = np.abs(_height_residuals(guess, measurements, several, np.full(len(several), i)))
+        # Of a row without a height all residuals are 0, but with more legs than coordinates.
+        off = _mode_errors(slopes, guess, measurements, several, np.full(len(several), i))
         several = several[off <= off.min() + _OTHER_MODE * slopes.size]
-        same = np.sign(np.linalg.det(slopes.jacobian(guess, several))) == side
+        same = _sides(slopes.jacobian(guess, several)) == side
         several = several[same] if same.any() and not fully_measured[i] else several
         poses[i] = several[np.abs(several - begin[i]).max(axis=-1).argmin()]
     lost: NDArray[np.bool_] = np.asarray(np.isnan(poses).any(axis=-1))
@@ -107,6 +108,36 @@ def _measured_poses(
     begin[:, at] = np.where(np.isnan(places), begin[:, at], places)
     fully_measured = seen.all(axis=-1) & ~np.isnan(places).any(axis=-1)
     return begin, np.asarray(fully_measured)
+
+
+def fitting_poses(robot: Manipulator, joints: Array) -> Array:
+    """Return the poses (N, k, m) of joint coordinates in each assembly mode; NaN where none.
+
+    Of more legs than coordinates, on a machine that differs from its drawing, they fit roughly.
+    """
+    tolerance = _OTHER_MODE * max(leg.size for leg in robot.legs) if robot.redundancy else None
+    return direct_kinematics(robot, joints, tolerance=tolerance, on_failure="nan")
+
+
+def _sides(jacobian: Array) -> Array:
+    """Return the sides (N,) of type-II singularities, 1 or -1; 1 of redundant machines.
+
+    Where n legs of m coordinates are more, singularities divide no space of poses.
+    """
+    n, m = jacobian.shape[1:]
+    return np.asarray(np.sign(np.linalg.det(jacobian)) if n == m else np.ones(len(jacobian)))
+
+
+def _mode_errors(
+    slopes: MachineSlopes, guess: Guess, measurements: Measurements, poses: Array, rows: Numbers
+) -> Array:
+    """Return the greatest errors (K,), m, of heights of rows at poses, and of redundant joints."""
+    errors = np.abs(_height_residuals(guess, measurements, poses, rows))
+    if not guess.robot.redundancy:
+        return errors
+    levers = np.array([leg.lever for leg in guess.robot.legs])
+    misfits = slopes.misfits(guess, guess.joints(measurements.readings[rows]), poses)
+    return np.asarray(np.maximum(errors, np.abs(levers * misfits).max(axis=-1)))
 
 
 def _height_residuals(

@@ -5,7 +5,8 @@ They are absolute, m and rad: a geometry that is 1 mm off is 1 mm off, however f
 
 from __future__ import annotations
 
-ORDINARY_ERROR = {"position": 1e-3, "height": 1e-3, "distance": 1e-3, "angle": 3.5e-3}
+ORDINARY_ERROR = dict.fromkeys(("position", "closure", "height", "distance"), 1e-3)
+ORDINARY_ERROR["angle"] = 3.5e-3
 """Error, m and rad, above which a calibration is not trustworthy.
 
 The ordinary tolerance of a length and of a direction (`unknowns.TOLERANCES`): parts that nobody

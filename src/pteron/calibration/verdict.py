@@ -206,6 +206,7 @@ def _open_error_reasons(evidence: Evidence) -> Iterator[_Reason]:
                 f"{coordinates} may be off by {_size_text(most, kind)} (95 %): "
                 f"{measured}{where} do not show {them}{rods}{order}.",
                 f"Measure {coordinates} too: positions, or distances across the work space.",
+                "usable with care" if kinds == ["closure"] else "trustworthy",
             )
 
 

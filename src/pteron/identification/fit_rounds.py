@@ -33,7 +33,6 @@ from pteron.identification.signals import Preprocessing, Processing
 from pteron.identification.unknowns import Unknowns, fit_nonlinear_terms, search_speeds
 from pteron.identification.verdict import predict_held_out, verdict_of
 from pteron.kernels import Array
-from pteron.manipulator.manipulator import refuse_redundant
 
 
 @dataclass(frozen=True)
@@ -138,7 +137,6 @@ def _stack_equations(task: FitTask) -> FitEquations:
     preprocessing = tuple(choose_preprocessing(robot, log, processing) for log in task.motions.fit)
     observe, unknowns = partial(task.observe, preprocessing), Unknowns()
     if model.terms.stribeck == "auto":
-        refuse_redundant(robot, "the search for Stribeck speeds")
         usual = np.max([how.usual for how in preprocessing], axis=0)
         unknowns = Unknowns(search_speeds(model, observe, usual))
         model = model.with_speeds(np.asarray(unknowns.speeds))

@@ -36,7 +36,6 @@ from pteron.identification.signals import Processing
 from pteron.json_values import json_fields
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
-from pteron.manipulator.manipulator import refuse_redundant
 from pteron.motion.payload import with_payload
 from pteron.reduction import BaseParameters
 from pteron.renamed import former_attribute
@@ -285,7 +284,6 @@ def identify_payload(
     industrial manipulators", ICRA 2007: the logs with and without payload solved as one system.
     """
     robot = as_manipulator(robot)
-    refuse_redundant(robot, "identification of a payload")
     model = identification_model(robot, replace(terms or Terms(), payload=True), base=base)
     without = convert_to_newtons(without, robot)
     if with_payload is not None:

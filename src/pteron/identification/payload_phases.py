@@ -11,22 +11,44 @@ import numpy as np
 from pteron.identification.errors import LogError
 from pteron.identification.fitting import NO_COLUMN, append_findings
 from pteron.identification.logs import Log
-from pteron.identification.model import Model
-from pteron.identification.observation import Observations, observations_of, stack_observations
+from pteron.identification.observation import (
+    LinearModel,
+    Observations,
+    observations_of,
+    stack_observations,
+)
 from pteron.identification.recordings import Recording, read_recording
 from pteron.identification.signals import Preprocessing, Processing, preprocessing_for_log
+from pteron.kernels import Array
 
 if TYPE_CHECKING:
     pass
 
 
 def observations_with_payload(
-    model: Model, without: Log, with_payload: Log | None, processing: Processing | None
+    model: LinearModel, without: Log, with_payload: Log | None, processing: Processing | None
 ) -> Observations:
     """Return the observations of a log with both phases, or of two logs, as one."""
     fit = read_phases(without, with_payload, processing)
     with append_findings(fit):
         return stack_observations(observe_phases(model, fit, processing)[0])
+
+
+def currents_by_drive(
+    model: LinearModel, without: Log, with_payload: Log | None, processing: Processing | None
+) -> Array:
+    """Return what the platform feels of each drive's currents alone, (R, n, n), at the rows of all.
+
+    Columns are drives. Only of machines with more legs than coordinates are they no diagonal.
+    """
+    logs = [recording.head() for recording in read_phases(without, with_payload, processing)]
+    plans = [preprocessing_for_log(model.robot, log, processing) for log in logs]
+    columns = []
+    for drive in np.eye(model.robot.joint_count):
+        parts = [replace(log, forces=log.forces * drive) for log in logs]
+        rows = [observations_of(model, *pair) for pair in zip(parts, plans, strict=True)]
+        columns.append(stack_observations(rows).forces)
+    return np.stack(columns, axis=-1)
 
 
 def read_phases(
@@ -43,7 +65,7 @@ def read_phases(
 
 
 def observe_phases(
-    model: Model, fit: Sequence[Recording], processing: Processing | None
+    model: LinearModel, fit: Sequence[Recording], processing: Processing | None
 ) -> tuple[list[Observations], list[Preprocessing]]:
     """Return observations and preprocessing of each recording; both phases must be in them."""
     logs = [recording.head() for recording in fit]

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from pteron.identification.estimators import weighted_least_squares
 from pteron.identification.estimators.least_squares import actuator_noise
-from pteron.identification.model import Model, diagonal, extend_model
+from pteron.identification.model import Model, extend_model
 from pteron.identification.observation import LinearModel, Observations, scale_columns
 from pteron.identification.signals import States
 from pteron.identification.signals.preprocessing import LATEST
@@ -172,12 +172,21 @@ def search_speeds(model: Model, observe: Observe, usual: Array) -> Array:
     def columns(states: States) -> Array:
         """Return the model's columns and those of falling friction at the states."""
         rates = states.joint_rates[..., None]
-        falls = np.exp(-((rates / (usual[:, None] * shares)) ** 2))
-        return np.concatenate([model.matrix(states), np.sign(rates) * falls], axis=-1)
+        falls = np.sign(rates) * np.exp(-((rates / (usual[:, None] * shares)) ** 2))
+        if is_mixed:
+            falls = each_alone(falls).reshape(*falls.shape[:2], -1)
+        return np.concatenate([model.matrix(states), falls], axis=-1)
 
-    rows = observe(extend_model(model, _COLUMNS, columns))
+    def each_alone(of_joints: Array) -> Array:
+        """Return joints' columns (R, n, c) as those of all forces by joint (R, n, n, c)."""
+        return np.asarray(np.einsum("ric,ij->rijc", of_joints, np.eye(n)))
+
+    is_mixed = model.robot.redundancy > 0  # a joint's friction is then in the equations of all
+    rows = observe(extend_model(model, _COLUMNS * (n if is_mixed else 1), columns))
     plain = rows.columns(range(p))
     noise = weighted_least_squares(plain).noise
+    falling = rows.matrix[..., p:]
+    falling = falling.reshape(-1, n, n, _COLUMNS) if is_mixed else each_alone(falling)
     tried = np.geomspace(_SLOWEST, _FASTEST, _FINE)
     spline = scipy.interpolate.make_interp_spline(np.log(shares), np.eye(_COLUMNS), k=5)(
         np.log(tried)
@@ -188,21 +197,20 @@ def search_speeds(model: Model, observe: Observe, usual: Array) -> Array:
         weighed = plain.matrix / noise[:, None]
         basis = np.linalg.qr(scale_columns(weighed.reshape(-1, p))[0])[0]
         forces = (plain.forces / noise).ravel()
-        each = rows.matrix[..., p:] / noise[:, None]
-        joint_columns = np.einsum("ric,ij->rijc", each, np.eye(n)).reshape(len(forces), -1)
+        each = falling / noise[:, None, None]
+        joint_columns = each.reshape(len(forces), -1)
         inner = basis.T @ joint_columns
         gram = (joint_columns.T @ joint_columns - inner.T @ inner).reshape(n, _COLUMNS, n, _COLUMNS)
         image = (joint_columns.T @ forces - inner.T @ (basis.T @ forces)).reshape(n, _COLUMNS)
-        chosen = _coordinatewise(spline, gram, image)
+        chosen = _coordinatewise(spline, gram, image, _CLEAR / rows.independent)
         speeds = np.where(chosen >= 0, usual * tried[np.maximum(chosen, 0)], np.inf)
-        falls = np.einsum("ric,ic->ri", rows.matrix[..., p:], spline[chosen])
-        extra = diagonal(falls)[..., chosen >= 0]
+        extra = np.einsum("rijc,jc->rij", falling, spline[chosen])[..., chosen >= 0]
         with_friction = plain.with_matrix(np.concatenate([plain.matrix, extra], axis=-1))
         noise = actuator_noise(with_friction, weighted_least_squares(with_friction).values)
     return speeds
 
 
-def _coordinatewise(spline: Array, gram: Array, image: Array) -> NDArray[np.int64]:
+def _coordinatewise(spline: Array, gram: Array, image: Array, clear: float) -> NDArray[np.int64]:
     """Return the index of each joint's best speed (n,), joint by joint; -1: none is significant."""
     n = len(image)
     chosen = np.full(n, -1)
@@ -229,7 +237,7 @@ def _coordinatewise(spline: Array, gram: Array, image: Array) -> NDArray[np.int6
                 gains.append(gain(without))
             without[i] = -1
             best = int(np.argmax(gains))
-            chosen[i] = best if gains[best] > gain(without) + _CLEAR else -1
+            chosen[i] = best if gains[best] > gain(without) + clear else -1
         if (chosen == previous).all():
             break
     return chosen

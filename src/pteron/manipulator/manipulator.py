@@ -220,15 +220,6 @@ class Manipulator:
         return {n: u for what in names for n, u in zip(names[what], units[what], strict=True)}
 
 
-def refuse_redundant(robot: Manipulator, what: str) -> None:
-    """Raise ModelError for a machine with more legs than freedoms, which `what` does not take."""
-    if robot.redundancy:
-        raise ModelError(
-            f"{robot.name}: {what} takes machines with as many legs as freedoms; this one has "
-            f"{robot.joint_count} legs for {robot.freedom} freedoms"
-        )
-
-
 def faults_of(
     name: object,
     platform: Platform,

@@ -36,7 +36,11 @@ from pteron.workspace import home_pose
 _SHOWN = 0.05
 """Least length to which the greatest difference is enlarged, as a share of the machine's size."""
 
-_RESIDUALS = {"position": "position (mm)", "angle": "angles (mrad)"}
+_RESIDUALS = {
+    "position": "position (mm)",
+    "angle": "angles (mrad)",
+    "closure": "closure (mm or mrad)",
+}
 """Names of kinds of residuals with their units; others are in mm under their own names."""
 
 

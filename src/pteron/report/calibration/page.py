@@ -115,8 +115,7 @@ def levels(errors: Array) -> list[float]:
 def _figures(calibration: Calibration) -> dict[str, Any]:
     """Return the figures of the page by name; None for those that the machine does not allow."""
     fit, robot = calibration.fit, calibration.drawn
-    kinds = [*["position"] * 3, *["angle"] * int(robot.platform.angular.sum())]
-    rows = [*kinds, "height", "distance"]
+    rows = calibration.measurements.kind_of.tolist()
     residuals = row_residuals_figure(fit.residuals, rows, fit.measured, fit.kept, calibration.noise)
     figures: dict[str, Any] = {"residuals": residuals, "machine": None, "arrows": None}
     with suppress(PteronError):  # the found machine does not reach the drawn one's home
