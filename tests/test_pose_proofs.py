@@ -121,7 +121,7 @@ def test_a_search_that_ends_early_says_so():
         ("delta", [0.1] * 3, [[0, 0, 0], [0, 1, 1]], DataError, "not below"),
         ("par4", [0.1] * 4, [[0, 0, 0, 0], [0, 1, 1, np.inf]], DataError, "finite"),
         ("delta-4", [0.1] * 4, None, ModelError, "box: missing"),
-        ("3-rrr-point", [0.1] * 3, None, ModelError, "3 legs for 2 freedoms"),
+        ("3-rrr-point", [0.1] * 3, None, ModelError, "3 legs for 2 coordinates"),
     ],
 )
 def test_nonsense_is_refused_in_a_line(name, joints, box, error, message):

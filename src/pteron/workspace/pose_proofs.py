@@ -30,7 +30,6 @@ from pteron.kinematics.direct import are_poses
 from pteron.kinematics.evaluate import finite_rows
 from pteron.kinematics.pose_conversions import pose_of, position_of, rotation_of
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
-from pteron.manipulator.manipulator import refuse_redundant
 from pteron.platforms.coordinates import wrap_angle
 from pteron.result import Result
 from pteron.shapes import JointsLike, Poses
@@ -128,7 +127,12 @@ def proved_poses(
     (True, array([[ 0.02,  0.01,  0.03,  0.1 , -0.2 ]]))
     """
     robot = as_manipulator(robot)
-    refuse_redundant(robot, "the proof that no pose is missed")
+    if robot.redundancy:
+        raise ModelError(
+            f"a proof that no pose is missed needs as many legs as coordinates: {robot.joint_count} "
+            f"legs for {robot.freedom} coordinates; leave legs out of the file",
+            subject=robot.name,
+        )
     readings = finite_rows(robot, joints, "joints", "raise")
     if readings.shape != (robot.joint_count,):
         raise DataError(f"joints: one row of {robot.joint_count} is expected: {readings.shape}")
