@@ -129,8 +129,8 @@ def proved_poses(
     robot = as_manipulator(robot)
     if robot.redundancy:
         raise ModelError(
-            f"a proof that no pose is missed needs as many legs as coordinates: {robot.joint_count} "
-            f"legs for {robot.freedom} coordinates; leave legs out of the file",
+            "a proof that no pose is missed needs as many legs as coordinates, not "
+            f"{robot.joint_count} legs for {robot.freedom} coordinates; leave legs out of the file",
             subject=robot.name,
         )
     readings = finite_rows(robot, joints, "joints", "raise")
