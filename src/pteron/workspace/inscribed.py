@@ -9,7 +9,7 @@ import numpy as np
 
 from pteron.arguments import expect, expect_share
 from pteron.equations.machine import numbers
-from pteron.errors import ModelError
+from pteron.errors import ModelError, PteronError
 from pteron.kernels import Array
 from pteron.kinematics.evaluate import finite_pose
 from pteron.kinematics.sampling import search_ball
@@ -18,6 +18,7 @@ from pteron.result import Result
 from pteron.shapes import PoseLike
 from pteron.workspace.conditions import Condition, conditions
 from pteron.workspace.fit import Fit, largest_fit, proved_fit
+from pteron.workspace.home import home_poses
 from pteron.workspace.proofs import Proof, expect_space, prove
 from pteron.workspace.regions import Box, Cylinder, Region
 from pteron.workspace.shape_samples import Shape, cube
@@ -220,7 +221,11 @@ def _largest_shape(
         shares = (1.0 - tolerance) ** np.arange(1, _SHARES + 1)
         proved_shape = proved_fit(search, proofs, shape, shares.tolist(), len(reference))
         if proved_shape is not None:
-            return inscribed_shape(proved_shape[0], *proved_shape[1])
+            fit, (proof,) = proved_shape
+            image = replace(fit, center=_center_at_home(robot, fit.center))
+            if (image.center != fit.center).any() and (proofs_of_image := proofs(image))[0].holds:
+                fit, (proof,) = image, proofs_of_image
+            return inscribed_shape(fit, proof)
     else:
         fit = search(np.empty((0, len(reference))))
         if fit.edge > 0.0:
@@ -230,3 +235,17 @@ def _largest_shape(
         f"{reference.tolist()}",
         subject=robot.name,
     )
+
+
+def _center_at_home(robot: Manipulator, center: Array) -> Array:
+    """Return a centre (k,), m, or its mirror image if that is on home's side of the base."""
+    try:
+        poses = home_poses(robot)
+    except PteronError:  # some pose is in reach, but none that would do as home
+        return center
+    if poses.mirror is None:
+        return center
+    home, mirror = (np.array(pose[: len(center)]) for pose in (poses.pose, poses.mirror))
+    normal = (home - mirror) / np.linalg.norm(home - mirror)
+    height = float((center - 0.5 * (home + mirror)) @ normal)
+    return np.asarray(center - 2.0 * min(height, 0.0) * normal)

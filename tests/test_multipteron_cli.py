@@ -1,0 +1,66 @@
+"""The machines of five freedoms, spherical legs and more legs than coordinates, as a person meets
+them at the command line and on pages."""
+
+import json
+
+import numpy as np
+import pytest
+from commands import done, read
+
+import pteron
+from pteron.manipulator.commented_file import commented_text
+from pteron.motion import with_payload
+from pteron.report.page import geometry
+from pteron.workspace import largest_cube
+
+
+def sentences(line):
+    """Return the output of a command on one line."""
+    return " ".join(read(line, COLUMNS="140").split())
+
+
+def test_check_states_arcs_and_that_spherical_legs_have_no_ball_joint():
+    text = sentences("check agile-eye")
+    assert "90 deg, 90 deg" in text
+    assert "Joints from base to platform: R revolute; actuated: the first R of SRRR." in text
+    assert "SRRR: spherical, all axes meet." in text
+    assert "Cranks at 0: horizontal, 90 deg above horizontal." in text
+    arcs = json.loads(done("check spherical-3-rrr --json"))["legs"][0]["arcs"]
+    assert arcs == {"crank_arc": 1.25, "link_arc": 1.4}
+
+
+def test_check_names_the_angle_whose_limit_is_nearest():
+    assert "to a limit of alpha (100 % is mid-range)" in sentences("check ankle-offset")
+
+
+@pytest.mark.parametrize("name", ["agile-eye", "quadrupteron"])
+def test_every_key_of_a_new_file_has_a_comment_once(name):
+    first_leg = commented_text(name).partition("[[legs]] # 1")[2].partition("[[legs]] # 2")[0]
+    lines = [line for line in first_leg.splitlines() if line.partition("=")[1]]
+    assert not [line for line in lines if line.endswith("# ")]
+    keys = [line.partition(" =")[0].lstrip("#") for line in lines]
+    assert len(keys) == len(set(keys))
+
+
+def test_the_largest_cube_is_on_homes_side_of_the_base():
+    cube = largest_cube("3-upu", [0.0, 0.0, 0.4])
+    assert cube.proof is not None
+    assert cube.proof.holds
+    assert cube.center[2] > 0.3
+
+
+def test_a_payload_at_the_point_of_rotation_is_doubted():
+    with pytest.warns(pteron.UnlikelyValue, match="0.3 kg at P, .* has no effect: give its centre"):
+        with_payload("agile-eye", 0.3)
+    robot = pteron.load("agile-eye")
+    loaded = with_payload(robot, 0.3, (0.05, 0.0, 0.0))
+    forces = [pteron.inverse_dynamics(one, *np.zeros((3, 3))) for one in (robot, loaded)]
+    assert np.abs(forces[1] - forces[0]).max() > 0.1
+    with_payload("ankle-offset", 0.3)  # its P moves about the first axis
+
+
+def test_the_page_shows_arcs_in_degrees_and_second_elbows():
+    assert dict(geometry(pteron.load("agile-eye")))["crank arc"] == ["90\u00b0"] * 3
+    assert dict(geometry(pteron.load("pentapteron")))["second elbow"] == [
+        *("\u22121", "+1", "+1", "\u22121", "\u22121")
+    ]
