@@ -16,8 +16,10 @@ from pteron.errors import ModelError
 from pteron.kernels import numeric
 from pteron.legs import UPU
 from pteron.legs.conformance import faults
+from pteron.motion import check_path, line_path
+from pteron.motion.simulation.stops import first_singular, singularity_text
 from pteron.platforms import Platform
-from pteron.workspace import conditions
+from pteron.workspace import conditions, home_pose, pose_margins
 from pteron.workspace.examination import examine
 
 COUNT, MOST = 20, 200
@@ -290,12 +292,10 @@ def test_a_guide_within_the_tolerance_of_a_file_is_made_exact():
 
 def test_radial_universal_joints_leave_the_platform_free_to_turn():
     tsai = pteron.load("3-upu")
-    legs = [replace(leg, direction=tilting.unit(leg.guide_point)) for leg in tsai.legs]
-    radial = replace(tsai, name="radial", legs=tuple(legs))
-    assert abs(pteron.kinematics.constraint_measure(radial, [0.0, 0.0, 0.4])) < 1e-12
+    assert abs(pteron.kinematics.constraint_measure(radial(), [0.0, 0.0, 0.4])) < 1e-12
     assert abs(pteron.kinematics.constraint_measure(tsai, [0.0, 0.0, 0.4])) > 0.4
     assert "near a constraint singularity" in map(str, conditions(tsai, type_ii=0.1))
-    warnings = examine(radial, np.array([0.0, 0.0, 0.4])).warnings
+    warnings = examine(radial(), np.array([0.0, 0.0, 0.4])).warnings
     assert any("constraint singularity" in warning for warning in warnings)
 
 
@@ -329,3 +329,63 @@ def test_follow_keeps_to_random_motions(name):
 def test_counts_are_those_of_a_machine_of_another_size():
     robot = replace(pteron.load("pentapteron"), gravity=ASKEW)
     assert pteron.base_parameters(scaled(robot, 0.37), "svd").rank == 57
+
+
+def radial():
+    """Return a 3-UPU whose outer axes are radial: it may turn on the axis of its base."""
+    tsai = pteron.load("3-upu")
+    legs = [replace(leg, direction=tilting.unit(leg.guide_point)) for leg in tsai.legs]
+    return replace(tsai, name="radial", legs=tuple(legs))
+
+
+def test_margins_paths_and_simulations_count_the_constraint_singularity():
+    robot, tsai = radial(), pteron.load("3-upu")
+    home = home_pose(robot)
+    measure = abs(float(pteron.kinematics.constraint_measure(robot, home)))
+    assert pose_margins(robot, home).least <= measure
+    assert measure > 0.2
+    np.testing.assert_allclose(home_pose(tsai), [0.0, 0.0, 0.395], atol=1e-12)
+    named = replace(robot, home=(0.0, 0.0, 0.395))
+    with pytest.raises(ModelError, match=r"home.pose: .* \(type-II or constraint singularity\)"):
+        home_pose(named)
+    across = line_path(robot, [[-0.1, 0.0, 0.4], [0.1, 0.0, 0.4]])
+    with pytest.raises(pteron.SingularPose, match="comes to a constraint singularity, where"):
+        check_path(robot, across)
+    check_path(tsai, across)
+    poses = np.linspace([-0.1, 0.0, 0.4], [0.1, 0.0, 0.4], 51)
+    assert first_singular(tsai, poses) is None
+    k = first_singular(robot, poses)
+    assert "constraint singularity" in singularity_text(robot, poses[k])
+
+
+def along_the_axis(seed):
+    """Return a Pentapteron all of whose sliders move along the platform's first axis."""
+    rng = np.random.default_rng(seed)
+    penta, legs = pteron.load("pentapteron"), []
+    for k in range(5):
+        s0 = rng.uniform(-0.1, 0.1, 3)
+        azimuth = 2.0 * np.pi * k / 5 + rng.uniform(-0.2, 0.2)
+        w = -np.array([0.15 * np.cos(azimuth), 0.2 * np.sin(azimuth)])
+        upper = np.sign(w[1]) * np.sqrt(0.25**2 - w[0] ** 2)
+        drop = np.sqrt(0.25**2 - (w[1] - upper) ** 2)
+        point = (*(s0[:2] - w), float(s0[2] + drop))
+        signs = {"elbow": int(np.sign(w[1])), "second_elbow": -1}
+        way = {"guide_point": point, "slider_direction": (0.0, 0.0, 1.0)}
+        legs.append(replace(penta.legs[0], platform_point=tuple(s0), **way, **signs))
+    return replace(penta, name="along", legs=tuple(legs), home=None)
+
+
+def test_sliders_all_along_the_axis_hold_five_freedoms():
+    # In 50 digits such machines have rank 5 at random poses, also where all platform points are in
+    # one plane or on one circle; not where they are on one line along the second axis.
+    for seed in range(3):
+        robot = along_the_axis(seed)
+        home = home_pose(robot)
+        assert np.linalg.svd(pteron.jacobian(robot, home))[1][-1] > 1e-3
+        examined = examine(robot, home)
+        assert examined.modes
+        assert examined.holding.least_singular_value > 0.02
+    points = ((0.02 * k - 0.05, 0.0, 0.0) for k in range(5))
+    straight = [replace(leg, platform_point=s0) for leg, s0 in zip(robot.legs, points, strict=True)]
+    with pytest.raises(pteron.SingularPose, match=r"\(0, 0, 0, 0, 1\)"):
+        home_pose(replace(robot, legs=tuple(straight)))

@@ -118,11 +118,13 @@ class SingularPose(PteronError):
     ----------
     kind : str
         ``"I"`` (a leg stretched or folded), ``"II"`` (the actuators do not hold the platform),
-        ``"elbow"`` (the two ends of a leg coincide, so that its elbow may be anywhere) or
+        ``"constraint"`` (the legs leave the platform a turn that it must not have), ``"elbow"``
+        (the two ends of a leg coincide, so that its elbow may be anywhere) or
         ``"angles"`` (two of the pose's angles turn alike, while the machine may hold the platform).
     measure : float
-        The type-I measure of the leg, the type-II measure of the machine, or the cosine of the
-        pose's second angle: a number without unit that is 0 at the singularity and 1 at best.
+        The type-I measure of the leg, the type-II or constraint measure of the machine, or the
+        cosine of the pose's second angle: a number without unit that is 0 at the singularity and 1
+        at best.
     index : tuple of int
         Which element of the batch; empty for a single pose.
     leg : int

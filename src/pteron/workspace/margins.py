@@ -34,7 +34,8 @@ class PoseMargins(Result):
         negative: the missing metres over the leg's size.
     type_ii : array, shape (...)
         The size of the type-II measure over the best that the machine's geometry allows, limits or
-        not: 0 where the actuators do not hold the platform.
+        not: 0 where the actuators do not hold the platform. If the legs' couples vary with the
+        pose (U-P-U), at most the constraint measure: 0 where the platform is free to turn.
     joints : array, shape (..., n)
         The least over each leg's joints, passive ones too, of the distance from the nearer limit
         over half the range; negative beyond it, and 1 for a leg without limits.
@@ -79,13 +80,17 @@ def pose_margins(robot: RobotLike, pose: PoseLike) -> PoseMargins:
 
 
 class MarginScales(NamedTuple):
-    """Divisors that turn measures into margins: leg sizes (n,), m, and joint limits (n,)."""
+    """Divisors that turn measures into margins: leg sizes (n,), m, and joint limits (n,).
+
+    `couples_vary` states whether the constraint measure counts.
+    """
 
     sizes: Array
     low: Array
     high: Array
     half_range: Array
     type_ii: float
+    couples_vary: bool
 
 
 @lru_cache(maxsize=64)
@@ -95,7 +100,8 @@ def margin_scales(robot: Manipulator) -> MarginScales:
     half_range = np.where(np.isinf(low), 1.0, (high - low) / 2.0)
     # A shaft without lengths reaches everywhere.
     sizes = np.array([leg.size or 1.0 for leg in robot.legs])
-    return MarginScales(sizes, low, high, half_range, best_type_ii(robot))
+    couples_vary = any(leg.couples_vary for leg in robot.legs)
+    return MarginScales(sizes, low, high, half_range, best_type_ii(robot), couples_vary)
 
 
 def margins_from(
@@ -105,6 +111,8 @@ def margins_from(
     reach, measure, _, _ = kernel_of("reach")(pose)
     type_i = np.where(reach < 0.0, reach / scales.sizes, np.nan_to_num(measure))
     type_ii = np.minimum(finite_sizes(kernel_of("type_ii")(pose)[0]) / scales.type_ii, 1.0)
+    if scales.couples_vary:
+        type_ii = np.minimum(type_ii, finite_sizes(kernel_of("constraint")(pose)[0]))
     joints = kernel_of("joint_coordinates")(pose)[0]
     distances = np.minimum(joints - scales.low, scales.high - joints)
     shares = np.where(np.isinf(distances), 1.0, distances / scales.half_range)
@@ -119,7 +127,13 @@ def least_margin_text(robot: Manipulator, pose: Array) -> tuple[str, str]:
     margins = pose_margins(robot, pose)
     least = float(margins.least)
     if float(margins.type_ii) <= least:
-        cause = "a type-II singularity, where the drives cannot hold the platform (100 % is best)"
+        type_ii = abs(float(numeric(robot, "type_ii")(pose)[0])) / best_type_ii(robot)
+        what = (
+            "a type-II singularity, where the drives cannot hold the platform"
+            if type_ii <= least + ROUNDING
+            else "a constraint singularity, where the legs leave the platform free to turn"
+        )
+        cause = f"{what} (100 % is best)"
     elif float(margins.type_i.min()) <= least:
         cause = f"leg {_first_least(margins.type_i)} stretched or folded (100 % is best)"
     else:

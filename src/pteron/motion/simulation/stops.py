@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pteron.kernels import Array, numeric
 from pteron.kernels.functions import TYPE_II
@@ -52,14 +53,32 @@ def limit_text(robot: Manipulator, pose: Array) -> str:
 
 
 def first_singular(robot: Manipulator, poses: Array) -> int | None:
-    """Return the first index of poses (T, m) at or beyond a type-II singularity, or None."""
-    measure = numeric(robot, "type_ii")(poses)[0]
-    beyond = ~(measure * np.sign(measure[0]) > TYPE_II * best_type_ii(robot))
+    """Return the first index of poses (T, m) at or beyond a type-II singularity, or None.
+
+    Of legs whose couples vary with the pose, constraint singularities count too.
+    """
+    beyond = _has_crossed(robot, "type_ii", poses, TYPE_II * best_type_ii(robot))
+    if any(leg.couples_vary for leg in robot.legs):
+        beyond |= _has_crossed(robot, "constraint", poses, TYPE_II)
     return int(beyond.argmax()) if beyond.any() else None
 
 
-def singularity_text(_: Manipulator, pose: Array) -> str:
-    """Return the sentence that a pose (m,) is a type-II singularity."""
+def _has_crossed(robot: Manipulator, what: str, poses: Array, least: float) -> NDArray[np.bool_]:
+    """Return whether a measure has no longer the sign of the first pose and a size of `least`."""
+    measure = numeric(robot, what)(poses)[0]
+    return np.asarray(~(measure * np.sign(measure[0]) > least))
+
+
+def singularity_text(robot: Manipulator, pose: Array) -> str:
+    """Return the sentence that a pose (m,) is a type-II or a constraint singularity."""
+    type_ii = float(np.abs(numeric(robot, "type_ii")(pose)[0])) / best_type_ii(robot)
+    if any(leg.couples_vary for leg in robot.legs) and type_ii > float(
+        np.abs(numeric(robot, "constraint")(pose)[0])
+    ):
+        return (
+            f"constraint singularity at pose {pose_text(pose)}: the legs leave the platform free "
+            "to turn"
+        )
     return (
         f"singular (type II) at pose {pose_text(pose)}: the actuators no longer hold the platform"
     )

@@ -110,7 +110,7 @@ def check_curve(
         marks = np.append(marks[before_failure], failures[0].at)
     if len(marks) > 1:
         failures += [_joint_failure(curve, marks), _passive_failure(curve, marks)]
-        failures.append(_type_ii_failure(curve, marks))
+        failures += [_type_ii_failure(curve, marks), _constraint_failure(curve, marks)]
     raised = [failure for failure in failures if failure is not None]
     if raised:
         raise min(raised, key=lambda failure: failure.at).error
@@ -244,6 +244,25 @@ def _type_ii_failure(curve: _Curve, marks: Array) -> _Failure | None:
         "hold the platform; take another path, or go round it",
         kind="II",
         measure=float(np.abs(curve.value("type_ii", np.array([at])))[0]),
+        index=(),
+    )
+    return _Failure(at, error)
+
+
+def _constraint_failure(curve: _Curve, marks: Array) -> _Failure | None:
+    """Return the first failure where varying couples leave the platform a turn, or None."""
+    if not any(leg.couples_vary for leg in curve.robot.legs):
+        return None
+    side = 1.0 if float(curve.value("constraint", marks[:1])[0]) > 0.0 else -1.0
+    first = first_below(lambda at: side * curve.value("constraint", at)[:, None], marks, TYPE_II)
+    if first is None:
+        return None
+    at = first[0]
+    error = SingularPose(
+        f"{curve.place_text(at)}: comes to a constraint singularity, where the legs leave the "
+        "platform free to turn; take another path, or go round it",
+        kind="constraint",
+        measure=float(np.abs(curve.value("constraint", np.array([at])))[0]),
         index=(),
     )
     return _Failure(at, error)
