@@ -183,6 +183,8 @@ class KindEvaluator:
                     for name in ("squared_type_i", "type_ii", "passive_room")
                 )
                 signed = sign * np.asarray(determinant)
+                if any(leg.couples_vary for leg in robot.legs):  # floors of type II hold for it
+                    signed = np.minimum(signed, np.abs(numeric(robot, "constraint")(poses)[0]))
                 every = np.column_stack([squares, signed, room])
                 return np.asarray(np.nan_to_num(every, nan=1.0))
 
