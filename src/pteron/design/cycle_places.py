@@ -13,8 +13,8 @@ from itertools import product
 import numpy as np
 
 from pteron.design.job import Job
-from pteron.design.requirement_tables import ToolCycleTable
 from pteron.design.kinds import angle_counts
+from pteron.design.requirement_tables import ToolCycleTable
 from pteron.design.workspace_samples import (
     INSIDE,
     angles_of_directions,

@@ -149,7 +149,7 @@ def _poses_at(job: Job, robot: Manipulator, places: Array) -> Array:
     count = len(robot.platform.lengths)
     angles = places[:, count:]
     if job.workspace.tilt is not None:
-        tilting, turning = angle_counts(robot.platform)
+        tilting, _ = angle_counts(robot.platform)
         angles = _tilted_angles(robot, angles[:, :tilting])
         angles[:, tilting:] += places[:, count + tilting :]
     poses = poses_about_tool(robot, angles)
