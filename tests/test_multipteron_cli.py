@@ -2,10 +2,12 @@
 them at the command line and on pages."""
 
 import json
+import subprocess
 
 import numpy as np
 import pytest
-from commands import done, read
+from commands import done, read, refused
+from exported_code import COMPILER
 
 import pteron
 from pteron.manipulator.commented_file import commented_text
@@ -64,3 +66,18 @@ def test_the_page_shows_arcs_in_degrees_and_second_elbows():
     assert dict(geometry(pteron.load("pentapteron")))["second elbow"] == [
         *("\u22121", "+1", "+1", "\u22121", "\u22121")
     ]
+
+
+def test_klipper_has_no_motor_for_a_fourth_arm(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    refused("export delta-redundant --klipper printer", "one motor for each of x, y and z", "has 4")
+
+
+@pytest.mark.skipif(COMPILER is None, reason="no C compiler")
+def test_the_test_of_exported_code_forgives_rounding_where_a_column_is_zero(tmp_path):
+    written = pteron.export_c("agile-eye", folder=tmp_path)
+    files = [path for path in written if path.suffix == ".c"]
+    program = tmp_path / "test"
+    subprocess.run([COMPILER, "-std=c99", *files, "-lm", "-o", program], check=True)
+    said = subprocess.run([program], check=True, capture_output=True, text=True).stdout
+    assert said == "all functions agree with the library\n"
