@@ -81,3 +81,12 @@ def test_the_test_of_exported_code_forgives_rounding_where_a_column_is_zero(tmp_
     subprocess.run([COMPILER, "-std=c99", *files, "-lm", "-o", program], check=True)
     said = subprocess.run([program], check=True, capture_output=True, text=True).stdout
     assert said == "all functions agree with the library\n"
+
+
+def test_the_page_states_where_axes_that_do_not_meet_are(tmp_path):
+    done(f"report ankle-offset --out {tmp_path}")
+    text = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "turns about two axes that do not meet (2R)" in text
+    assert "The first axis passes through (0, 0, 0) mm" in text
+    assert "P is on the second one, (0, 0, \u221220) mm from there at" in text
+    assert "P stays at" not in text
