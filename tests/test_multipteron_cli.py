@@ -90,3 +90,8 @@ def test_the_page_states_where_axes_that_do_not_meet_are(tmp_path):
     assert "The first axis passes through (0, 0, 0) mm" in text
     assert "P is on the second one, (0, 0, \u221220) mm from there at" in text
     assert "P stays at" not in text
+
+
+def test_direct_does_not_claim_every_pose_of_five_freedoms():
+    assert "others may exist" in sentences("direct 5-rpur 0.3 0.3 0.3 0.3 0.3")
+    assert "all assembly modes" in sentences("direct hexapteron 0 0 0 0 0 0")
