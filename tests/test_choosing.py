@@ -450,8 +450,12 @@ def test_a_cycle_that_tilts_suits_two_rotation_axes():
 def test_machines_of_five_freedoms_and_redundant_ones_are_chosen_and_proved(name, space):
     motion, search = {"speed": 0.2, "acceleration": 2.0}, {"evaluations": 150}
     keys = {"workspace": space, "motion": motion, "cycles": [], "accuracy": None}
-    (best,) = choose_machine(of(kinds=[name], search=search, **keys)).candidates
+    choice = choose_machine(of(kinds=[name], search=search, **keys))
+    (best,) = choice.candidates
     assert best.serves
+    assert "energy per cycle (J)" not in best.figure_texts  # there is no cycle
+    (place,) = re.findall(r"P is at \(([^)]*)\) mm", page(choice))
+    assert len(place.split(",")) == len(space["size"])
     robot = loaded(best)
     assert robot.platform.motion == pteron.load(name).platform.motion
     assert all(leg.drive is not None for leg in robot.legs)
