@@ -205,8 +205,8 @@ def _largest_shape(
         return largest_fit(smooth, geometry, reference[None], ball, failing, shape, _STARTS)
 
     def search(failing: Array) -> Fit:
-        """Return the largest shape without failing positions, in the search ball or the box."""
-        fit = fit_in_ball(search_ball(robot), failing)
+        """Return the largest shape without failing positions, at home's side or in the box."""
+        fit = fit_in_ball(_ball_at_home(robot), failing)
         if fit.edge > 0.0:
             return fit
         # A grid for all orientations may miss the small part that one of them leaves.
@@ -221,11 +221,7 @@ def _largest_shape(
         shares = (1.0 - tolerance) ** np.arange(1, _SHARES + 1)
         proved_shape = proved_fit(search, proofs, shape, shares.tolist(), len(reference))
         if proved_shape is not None:
-            fit, (proof,) = proved_shape
-            image = replace(fit, center=_center_at_home(robot, fit.center))
-            if (image.center != fit.center).any() and (proofs_of_image := proofs(image))[0].holds:
-                fit, (proof,) = image, proofs_of_image
-            return inscribed_shape(fit, proof)
+            return inscribed_shape(proved_shape[0], *proved_shape[1])
     else:
         fit = search(np.empty((0, len(reference))))
         if fit.edge > 0.0:
@@ -237,15 +233,19 @@ def _largest_shape(
     )
 
 
-def _center_at_home(robot: Manipulator, center: Array) -> Array:
-    """Return a centre (k,), m, or its mirror image if that is on home's side of the base."""
+def _ball_at_home(robot: Manipulator) -> tuple[Array, float]:
+    """Return centre (k,) and radius, m, of the places to search: on home's side of the base.
+
+    Machines of rams alone reach the mirror images of their poses, on the other side, too.
+    """
+    if any(len(leg.branches) > 1 for leg in robot.legs):
+        return search_ball(robot)
     try:
         poses = home_poses(robot)
     except PteronError:  # some pose is in reach, but none that would do as home
-        return center
+        return search_ball(robot)
     if poses.mirror is None:
-        return center
-    home, mirror = (np.array(pose[: len(center)]) for pose in (poses.pose, poses.mirror))
-    normal = (home - mirror) / np.linalg.norm(home - mirror)
-    height = float((center - 0.5 * (home + mirror)) @ normal)
-    return np.asarray(center - 2.0 * min(height, 0.0) * normal)
+        return search_ball(robot)
+    count = len(robot.platform.lengths)
+    home, mirror = (np.array(pose[:count]) for pose in (poses.pose, poses.mirror))
+    return home, 0.5 * float(np.linalg.norm(home - mirror))
