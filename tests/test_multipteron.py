@@ -1,18 +1,30 @@
 """The rest of the multipteron family and its kin: five freedoms, spherical legs, axes that do not
 meet; on machines drawn at random, against Lagrange's equations, engines and dense searches."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
+import polars as pl
 import pytest
 import tilting
 import trees
+from commands import done
 from lagrange import Lagrange
-from mechanisms import NIGHTLY, relative_error, scaled, several
+from mechanisms import CLIENTS, NIGHTLY, relative_error, scaled, several
 from scipy.optimize import least_squares
 
 import pteron
+from pteron.equations.machine import numbers
+from pteron.equations.variations import (
+    slope_matrix,
+    slope_terms,
+    variations,
+    varied_numbers,
+    vary_geometry,
+)
 from pteron.errors import ModelError
+from pteron.indices import geometric_sensitivities
 from pteron.kernels import numeric
 from pteron.legs import UPU
 from pteron.legs.conformance import faults
@@ -389,3 +401,54 @@ def test_sliders_all_along_the_axis_hold_five_freedoms():
     straight = [replace(leg, platform_point=s0) for leg, s0 in zip(robot.legs, points, strict=True)]
     with pytest.raises(pteron.SingularPose, match=r"\(0, 0, 0, 0, 1\)"):
         home_pose(replace(robot, legs=tuple(straight)))
+
+
+def test_arcs_vary_as_their_slopes_say():
+    robot = pteron.load("spherical-3-rrr")
+    changes = variations(robot)
+    arcs = [k for k, change in enumerate(changes) if change.is_arc]
+    assert [changes[k].name for k in arcs[:2]] == ["legs[1].crank_arc", "legs[1].link_arc"]
+    assert changes[arcs[0]].value(robot) == 1.25
+    slopes = slope_matrix(robot, changes, slope_terms(robot, changes), np.array(numbers(robot)))
+    steps = 1e-6 * np.eye(len(changes))
+    ahead, back = (varied_numbers(robot, changes, sign * steps) for sign in (1.0, -1.0))
+    np.testing.assert_allclose(slopes, (ahead - back).T / 2e-6, atol=1e-9)
+    varied = vary_geometry(robot, [changes[arcs[1]]], np.array([0.01]))
+    assert varied.legs[0].link_arc == pytest.approx(1.41, abs=1e-15)
+    np.testing.assert_allclose(
+        numbers(varied), varied_numbers(robot, changes, 0.01 * np.eye(len(changes)))[arcs[1]]
+    )
+
+
+def test_an_error_of_an_arc_turns_the_platform():
+    robot, pose = pteron.load("agile-eye"), np.array([0.1, 0.2, 0.1])
+    found = geometric_sensitivities(robot, pose)
+    slope = found.matrix[..., found.names.index("leg 2: link_arc")]
+    legs = list(robot.legs)
+    legs[1] = replace(legs[1], link_arc=legs[1].link_arc + 1e-6)
+    joints = pteron.inverse_kinematics(robot, pose)
+    moved = pteron.kinematics.follow(replace(robot, legs=tuple(legs)), joints[None], pose)[0]
+    np.testing.assert_allclose((moved - pose) / 1e-6, slope, atol=1e-5)
+
+
+@CLIENTS
+def test_wrong_arcs_are_calibrated(tmp_path):
+    robot, rng = pteron.load("spherical-3-rrr"), np.random.default_rng(2)
+    arcs = np.array([[leg.crank_arc, leg.link_arc] for leg in robot.legs])
+    arcs = arcs + rng.normal(0.0, 3e-3, (3, 2))
+    legs = (
+        replace(leg, crank_arc=float(a), link_arc=float(b))
+        for leg, (a, b) in zip(robot.legs, arcs, strict=True)
+    )
+    true = replace(robot, legs=tuple(legs))
+    poses = rng.uniform(-0.3, 0.3, (40, 3))
+    columns = *robot.joint_names, *robot.coordinates
+    rows = np.hstack([pteron.inverse_kinematics(true, poses), poses + rng.normal(0, 3e-5, (40, 3))])
+    log = tmp_path / "log.csv"
+    pl.DataFrame(rows, schema=columns).write_csv(log)
+    done(f"calibrate {log} --robot spherical-3-rrr --out {tmp_path / 'out'}")
+    record = json.loads((tmp_path / "out" / "calibration.json").read_text(encoding="utf-8"))
+    assert record["verdict"]["grade"] == "trustworthy"
+    found = pteron.load(tmp_path / "out" / "robot.toml")
+    away = np.array([[leg.crank_arc, leg.link_arc] for leg in found.legs]) - arcs
+    assert np.abs(away).max() < 1.5e-3
