@@ -100,3 +100,11 @@ def test_the_page_states_where_axes_that_do_not_meet_are(tmp_path):
 def test_direct_does_not_claim_every_pose_of_five_freedoms():
     assert "others may exist" in sentences("direct 5-rpur 0.3 0.3 0.3 0.3 0.3")
     assert "all assembly modes" in sentences("direct hexapteron 0 0 0 0 0 0")
+
+
+def test_a_fault_has_the_name_that_the_file_uses(tmp_path):
+    file = tmp_path / "eye.toml"
+    text = commented_text("agile-eye").replace("[0.0, 0.0, -0.08]", "[0.0, 0.0, 0.0]")
+    file.write_text(text, encoding="utf-8")
+    with pytest.raises(pteron.ModelError, match="leg 1: platform_direction: zero has no direction"):
+        pteron.load(file)
