@@ -11,6 +11,7 @@ from commands import done, read, refused
 from exported_code import COMPILER
 
 import pteron
+from pteron.identification.excitation import Limits, margins, random_excitation
 from pteron.manipulator.commented_file import commented_text
 from pteron.motion import with_payload
 from pteron.report.page import geometry
@@ -108,3 +109,10 @@ def test_a_fault_has_the_name_that_the_file_uses(tmp_path):
     file.write_text(text, encoding="utf-8")
     with pytest.raises(pteron.ModelError, match="leg 1: platform_direction: zero has no direction"):
         pteron.load(file)
+
+
+def test_a_limit_of_the_platforms_angles_is_no_legs():
+    motion = random_excitation(pteron.load("agile-eye"), harmonics=2, seed=1)
+    each = {margin.limit: margin.leg for margin in margins(motion, Limits())}
+    assert each["passive_clearance"] is None
+    assert each["type_i"] in (1, 2, 3)
