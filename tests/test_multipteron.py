@@ -24,6 +24,7 @@ from pteron.equations.variations import (
     vary_geometry,
 )
 from pteron.errors import ModelError
+from pteron.identification.excitation import Limits, margins, random_excitation
 from pteron.indices import geometric_sensitivities
 from pteron.kernels import numeric
 from pteron.legs import UPU
@@ -368,6 +369,10 @@ def test_margins_paths_and_simulations_count_the_constraint_singularity():
     assert first_singular(tsai, poses) is None
     k = first_singular(robot, poses)
     assert "constraint singularity" in singularity_text(robot, poses[k])
+    motion = random_excitation(tsai, harmonics=2, seed=1)
+    at_poses = motion.states(np.linspace(0.0, motion.duration, 500)).pose
+    measure = np.abs(pteron.kinematics.constraint_measure(tsai, at_poses)).min()
+    assert margins(motion, Limits())["type_ii"].least <= measure - Limits().type_ii
 
 
 def along_the_axis(seed):

@@ -175,7 +175,11 @@ def _margins_of(robot: Manipulator, limits: Limits, state: FullMotion) -> dict[s
     margins = {"type_i": evaluate_unchecked(robot, "reach", state.pose)[1] - limits.type_i}
     if closure_of(robot).vanishes() is None or robot.platform.angles:
         type_ii = np.abs(evaluate_unchecked(robot, "type_ii", state.pose))[:, None]
-        margins["type_ii"] = type_ii / best_type_ii(robot) - limits.type_ii
+        share = type_ii / best_type_ii(robot)
+        if any(leg.couples_vary for leg in robot.legs):
+            constraint = np.abs(evaluate_unchecked(robot, "constraint", state.pose))
+            share = np.minimum(share, constraint[:, None])
+        margins["type_ii"] = share - limits.type_ii
     if any(leg.limits for leg in robot.legs):
         clearances = joint_clearances(limits, robot)
         margins["joint_clearance"] = joint_distances(robot, state.joints) - clearances

@@ -196,7 +196,11 @@ def _path(
     # An assembly mode keeps the sign that the measure has in the home pose.
     sign = float(np.sign(evaluate_unchecked(robot, "type_ii", np.array(home(robot)))))
     type_ii = sign * program(robot, "type_ii").function(pose)
-    limit_terms["type_ii"] = type_ii / best_type_ii(robot), limits.type_ii + _BACK_OFF, np.inf
+    share = type_ii / best_type_ii(robot)
+    if any(leg.couples_vary for leg in robot.legs):
+        sign = float(np.sign(evaluate_unchecked(robot, "constraint", np.array(home(robot)))))
+        share = ca.fmin(share, sign * program(robot, "constraint").function(pose))
+    limit_terms["type_ii"] = share, limits.type_ii + _BACK_OFF, np.inf
     if setting.space == "joints":
         joints, rates, seconds = q
     else:
