@@ -320,10 +320,11 @@ def test_guides_tools_and_thin_posts_count_as_room():
         assert not lacks(point - center + 0.03, point - center + 0.032)
 
 
-def test_tilts_fill_a_cone():
-    job = of(workspace={**JOB["workspace"], "tilt": 0.2}, kinds=["stewart"])
-    evaluator = evaluators_of(job)["stewart"]
-    axes = pteron.rotation_of("stewart", evaluator.poses)[..., 2]
+@pytest.mark.parametrize("name", ["stewart", "hexapteron", "pentapteron", "5-rpur"])
+def test_tilts_fill_a_cone(name):
+    job = of(workspace={**JOB["workspace"], "tilt": 0.2}, kinds=[name])
+    evaluator = evaluators_of(job)[name]
+    axes = pteron.rotation_of(evaluator.kind.robot, evaluator.poses)[..., 2]
     tilts = np.arccos(np.clip(axes[:, 2], -1.0, 1.0))
     assert set(np.round(tilts, 9)) == {0.0, 0.2}
     assert len(np.unique(np.round(axes, 9), axis=0)) == 7
@@ -414,6 +415,55 @@ def test_kinds_are_those_that_can_do_the_motion():
     with pytest.raises(DataError, match="five-bar moves along x y only") as caught:
         choose_machine(turning)
     assert "delta does not turn" in str(caught.value)
+    five = of(workspace={**JOB["workspace"], "turn": [-1, 1]}, kinds=["pentapteron", "par4"])
+    with pytest.raises(DataError, match="pentapteron does not turn, but"):
+        choose_machine(five)
+    tilting = of(workspace={**JOB["workspace"], "tilt": 0.1}, kinds=["par4", "5-rpur"])
+    with pytest.raises(DataError, match="par4 does not tilt, but"):
+        choose_machine(tilting)
+
+
+def test_a_cycle_that_tilts_suits_two_rotation_axes():
+    space = {"size": [0.08, 0.08, 0.04], "tilt": 0.2}
+    points = [[-0.03, 0.0, 0.0, 0.1, 0.05, 0.0], [0.03, 0.0, 0.0, -0.1, 0.05, 0.0]]
+    cycles = [{"points": points, "duration": 0.5, "anywhere": False}]
+    job = of(workspace=space, cycles=cycles, kinds=["pentapteron", "hexapteron"])
+    ends = []
+    for evaluator in evaluators_of(job).values():
+        (cycle,) = evaluator.cycles
+        poses = cycle.states[0][0]
+        ends.append(pteron.rotation_of(evaluator.kind.robot, poses[[0, -1]])[..., 2])
+    np.testing.assert_allclose(ends[0], ends[1], atol=1e-9)
+
+
+@CLIENTS
+@pytest.mark.parametrize(
+    ("name", "space"),
+    [
+        ("3-rrr-point", {"size": [0.2, 0.2]}),
+        ("3-upu", {"size": [0.2, 0.2, 0.1]}),
+        ("delta-redundant", {"size": [0.2, 0.2, 0.1]}),
+        ("hexapteron", {"size": [0.08, 0.08, 0.04], "tilt": 0.1}),
+        ("pentapteron", {"size": [0.06, 0.06, 0.03], "tilt": 0.1}),
+    ],
+)
+def test_machines_of_five_freedoms_and_redundant_ones_are_chosen_and_proved(name, space):
+    motion, search = {"speed": 0.2, "acceleration": 2.0}, {"evaluations": 150}
+    keys = {"workspace": space, "motion": motion, "cycles": [], "accuracy": None}
+    choice = choose_machine(of(kinds=[name], search=search, **keys))
+    (best,) = choice.candidates
+    assert best.serves
+    assert "energy per cycle (J)" not in best.figure_texts  # there is no cycle
+    (place,) = re.findall(r"P is at \(([^)]*)\) mm", page(choice))
+    assert len(place.split(",")) == len(space["size"])
+    robot = loaded(best)
+    assert robot.platform.motion == pteron.load(name).platform.motion
+    assert all(leg.drive is not None for leg in robot.legs)
+    poses = np.array(best.middle) + evaluators_of(of(kinds=[name], **keys))[name].poses
+    margins = pose_margins(robot, poses)
+    assert margins.least.min() > 0.0
+    if name == "3-upu":
+        assert np.abs(pteron.kinematics.constraint_measure(robot, poses)).min() > 0.05
 
 
 @pytest.mark.parametrize(

@@ -1,32 +1,44 @@
 """The rest of the multipteron family and its kin: five freedoms, spherical legs, axes that do not
 meet; on machines drawn at random, against Lagrange's equations, engines and dense searches."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
+import polars as pl
 import pytest
 import tilting
 import trees
+from commands import done
 from lagrange import Lagrange
-from mechanisms import NIGHTLY, relative_error, scaled, several
+from mechanisms import CLIENTS, NIGHTLY, relative_error, scaled, several
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 import pteron
 from pteron.environments import PteronEnv
+from pteron.equations.machine import numbers
+from pteron.equations.variations import (
+    slope_matrix,
+    slope_terms,
+    variations,
+    varied_numbers,
+    vary_geometry,
+)
 from pteron.errors import DataError, ModelError, SingularPose
-from pteron.identification.excitation import Limits, random_excitation
+from pteron.identification.excitation import Limits, margins, random_excitation
+from pteron.indices import geometric_sensitivities
 from pteron.kernels import numeric
 from pteron.kinematics import constraint_measure, working_mode
 from pteron.kinematics.singularities import best_holding
 from pteron.legs import UPU
 from pteron.legs.conformance import faults
 from pteron.manipulator.variants import elbows_of, with_elbows
-from pteron.motion import point_to_point
+from pteron.motion import check_path, line_path, point_to_point
 from pteron.motion.simulation.stops import first_singular, singularity_text
 from pteron.motion.trajectories.scaling import keeps_margin
 from pteron.platforms import Platform
-from pteron.workspace import conditions, paving, pose_margins
+from pteron.workspace import conditions, home_pose, paving, pose_margins
 from pteron.workspace.examination import examine
 from pteron.workspace.margins import least_margin_text
 from pteron.workspace.modes import mode_contacts
@@ -455,3 +467,111 @@ def test_follow_keeps_to_random_motions(name):
 def test_counts_are_those_of_a_machine_of_another_size():
     robot = replace(pteron.load("pentapteron"), gravity=ASKEW)
     assert pteron.base_parameters(scaled(robot, 0.37), "svd").rank == 57
+
+
+def test_margins_paths_and_simulations_count_the_constraint_singularity():
+    robot, tsai = radial_upu(), pteron.load("3-upu")
+    home = home_pose(robot)
+    measure = abs(float(pteron.kinematics.constraint_measure(robot, home)))
+    assert pose_margins(robot, home).least <= measure
+    assert measure > 0.2
+    np.testing.assert_allclose(home_pose(tsai), [0.0, 0.0, 0.395], atol=1e-12)
+    named = replace(robot, home=(0.0, 0.0, 0.395))
+    with pytest.raises(ModelError, match=r"home.pose: .* \(type-II or constraint singularity\)"):
+        home_pose(named)
+    across = line_path(robot, [[-0.1, 0.0, 0.4], [0.1, 0.0, 0.4]])
+    with pytest.raises(pteron.SingularPose, match="comes to a constraint singularity, where"):
+        check_path(robot, across)
+    check_path(tsai, across)
+    poses = np.linspace([-0.1, 0.0, 0.4], [0.1, 0.0, 0.4], 51)
+    assert first_singular(tsai, poses) is None
+    k = first_singular(robot, poses)
+    assert "constraint singularity" in singularity_text(robot, poses[k])
+    motion = random_excitation(tsai, harmonics=2, seed=1)
+    at_poses = motion.states(np.linspace(0.0, motion.duration, 500)).pose
+    measure = np.abs(pteron.kinematics.constraint_measure(tsai, at_poses)).min()
+    assert margins(motion, Limits())["type_ii"].least <= measure - Limits().type_ii
+
+
+def along_the_axis(seed):
+    """Return a Pentapteron all of whose sliders move along the platform's first axis."""
+    rng = np.random.default_rng(seed)
+    penta, legs = pteron.load("pentapteron"), []
+    for k in range(5):
+        s0 = rng.uniform(-0.1, 0.1, 3)
+        azimuth = 2.0 * np.pi * k / 5 + rng.uniform(-0.2, 0.2)
+        w = -np.array([0.15 * np.cos(azimuth), 0.2 * np.sin(azimuth)])
+        upper = np.sign(w[1]) * np.sqrt(0.25**2 - w[0] ** 2)
+        drop = np.sqrt(0.25**2 - (w[1] - upper) ** 2)
+        point = (*(s0[:2] - w), float(s0[2] + drop))
+        signs = {"elbow": int(np.sign(w[1])), "second_elbow": -1}
+        way = {"guide_point": point, "slider_direction": (0.0, 0.0, 1.0)}
+        legs.append(replace(penta.legs[0], platform_point=tuple(s0), **way, **signs))
+    return replace(penta, name="along", legs=tuple(legs), home=None)
+
+
+def test_sliders_all_along_the_axis_hold_five_freedoms():
+    # In 50 digits such machines have rank 5 at random poses, also where all platform points are in
+    # one plane or on one circle; not where they are on one line along the second axis.
+    for seed in range(3):
+        robot = along_the_axis(seed)
+        home = home_pose(robot)
+        assert np.linalg.svd(pteron.jacobian(robot, home))[1][-1] > 1e-3
+        examined = examine(robot, home)
+        assert examined.modes
+        assert examined.holding.least_singular_value > 0.02
+    points = ((0.02 * k - 0.05, 0.0, 0.0) for k in range(5))
+    straight = [replace(leg, platform_point=s0) for leg, s0 in zip(robot.legs, points, strict=True)]
+    with pytest.raises(pteron.SingularPose, match=r"\(0, 0, 0, 0, 1\)"):
+        home_pose(replace(robot, legs=tuple(straight)))
+
+
+def test_arcs_vary_as_their_slopes_say():
+    robot = pteron.load("spherical-3-rrr")
+    changes = variations(robot)
+    arcs = [k for k, change in enumerate(changes) if change.is_arc]
+    assert [changes[k].name for k in arcs[:2]] == ["legs[1].crank_arc", "legs[1].link_arc"]
+    assert changes[arcs[0]].value(robot) == 1.25
+    slopes = slope_matrix(robot, changes, slope_terms(robot, changes), np.array(numbers(robot)))
+    steps = 1e-6 * np.eye(len(changes))
+    ahead, back = (varied_numbers(robot, changes, sign * steps) for sign in (1.0, -1.0))
+    np.testing.assert_allclose(slopes, (ahead - back).T / 2e-6, atol=1e-9)
+    varied = vary_geometry(robot, [changes[arcs[1]]], np.array([0.01]))
+    assert varied.legs[0].link_arc == pytest.approx(1.41, abs=1e-15)
+    np.testing.assert_allclose(
+        numbers(varied), varied_numbers(robot, changes, 0.01 * np.eye(len(changes)))[arcs[1]]
+    )
+
+
+def test_an_error_of_an_arc_turns_the_platform():
+    robot, pose = pteron.load("agile-eye"), np.array([0.1, 0.2, 0.1])
+    found = geometric_sensitivities(robot, pose)
+    slope = found.matrix[..., found.names.index("leg 2: link_arc")]
+    legs = list(robot.legs)
+    legs[1] = replace(legs[1], link_arc=legs[1].link_arc + 1e-6)
+    joints = pteron.inverse_kinematics(robot, pose)
+    moved = pteron.kinematics.follow(replace(robot, legs=tuple(legs)), joints[None], pose)[0]
+    np.testing.assert_allclose((moved - pose) / 1e-6, slope, atol=1e-5)
+
+
+@CLIENTS
+def test_wrong_arcs_are_calibrated(tmp_path):
+    robot, rng = pteron.load("spherical-3-rrr"), np.random.default_rng(2)
+    arcs = np.array([[leg.crank_arc, leg.link_arc] for leg in robot.legs])
+    arcs = arcs + rng.normal(0.0, 3e-3, (3, 2))
+    legs = (
+        replace(leg, crank_arc=float(a), link_arc=float(b))
+        for leg, (a, b) in zip(robot.legs, arcs, strict=True)
+    )
+    true = replace(robot, legs=tuple(legs))
+    poses = rng.uniform(-0.3, 0.3, (40, 3))
+    columns = *robot.joint_names, *robot.coordinates
+    rows = np.hstack([pteron.inverse_kinematics(true, poses), poses + rng.normal(0, 3e-5, (40, 3))])
+    log = tmp_path / "log.csv"
+    pl.DataFrame(rows, schema=columns).write_csv(log)
+    done(f"calibrate {log} --robot spherical-3-rrr --out {tmp_path / 'out'}")
+    record = json.loads((tmp_path / "out" / "calibration.json").read_text(encoding="utf-8"))
+    assert record["verdict"]["grade"] == "trustworthy"
+    found = pteron.load(tmp_path / "out" / "robot.toml")
+    away = np.array([[leg.crank_arc, leg.link_arc] for leg in found.legs]) - arcs
+    assert np.abs(away).max() < 1.5e-3

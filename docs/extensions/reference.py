@@ -23,6 +23,7 @@ from sphinx.ext import autosummary
 from sphinx.pycode import ModuleAnalyzer
 
 import pteron
+from pteron import dynamics
 
 TOPICS: dict[str, tuple[str, ...]] = {
     "Robots": ("load", "save", "catalog", "Manipulator", "turned", "working_modes"),
@@ -83,9 +84,9 @@ def by_topic() -> dict[str, tuple[str, ...]]:
 
 
 def public_modules() -> list[ModuleType]:
-    """Return the modules that `pteron` hands on."""
+    """Return the modules that `pteron` exports, and others with public names of their own."""
     values = [getattr(pteron, name) for name in _PUBLIC]
-    return [value for value in values if isinstance(value, ModuleType)]
+    return [*(value for value in values if isinstance(value, ModuleType)), dynamics]
 
 
 def parts(package: str) -> list[str]:

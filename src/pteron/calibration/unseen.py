@@ -166,7 +166,7 @@ def _rigid_motions(
                         point = getattr(owners[change.leg], change.key)
                         moved = np.cross(direction, point) if turn else direction
                         part[k] = moved[change.axis or 0]
-                    elif change.group == "directions" and turn:
+                    elif change.group == "directions" and turn and not change.is_arc:
                         part[k] = np.array(start.robot.platform.frame)[change.axis or 0][axis]
             elif block.kind == "frame":
                 moved = np.cross(direction, start.shift) if turn else direction

@@ -215,6 +215,8 @@ def _proof(proof: Proof, floors: dict[str, float]) -> dict[str, Any]:
 
 def _show(paved: Paving, pose: Array, floors: dict[str, float], cube: Inscribed | None) -> None:
     """Print the proved volumes, the largest cube, and the share of the boundary by cause."""
+    from pteron.workspace import home_poses
+
     robot, shares, (noun, shape) = paved.robot, paved.boundary_shares, _SHAPES[len(paved.axes)]
     show(_heading(robot, _angles(robot, pose), floors))
     if not paved.outer_volume:
@@ -225,6 +227,8 @@ def _show(paved: Paving, pose: Array, floors: dict[str, float], cube: Inscribed 
         f"{paved.outer_volume:.5g} {paved.unit}, gap {percent(paved.gap)} "
         f"({len(paved.inner)} boxes inside, {len(paved.boundary)} undecided)"
     )
+    if home_poses(robot).mirror is not None:
+        show("Poses on both sides of the base count; home is on one of them.")
     if cube is None:
         show(f"No {shape} inside the workspace was found.")
     else:

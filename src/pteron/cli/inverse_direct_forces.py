@@ -88,7 +88,8 @@ def direct(
 
     A table has the columns rho1, theta2, ... as the machine's joints are; the result has one row
     for each real pose, with the table's row (from 1) and its columns, the assembly mode (from 1)
-    and x y z phi, those that the machine has. Without a real pose, these are empty.
+    and x y z phi, those that the machine has. Without a real pose, these are empty. Of a machine
+    with five freedoms (3T2R) a search finds poses, and others may exist.
 
     Arguments
     ---------
@@ -123,9 +124,9 @@ def direct(
     _note_limits(machine, from_readings(machine, rows.table.numbers(columns, failure)))
     with_poses = _modes(rows.table, poses, machine.coordinates)
     shown = added[1:] if rows.single else added
-    caption = (
-        f"[bold]{plain(machine.name)}[/bold]: poses of these joint coordinates, all assembly modes"
-    )
+    is_search = bool(machine.platform.second_axis and machine.platform.lengths)
+    modes = "others may exist" if is_search else "all assembly modes"
+    caption = f"[bold]{plain(machine.name)}[/bold]: poses of these joint coordinates, {modes}"
     deliver(machine, with_poses, shown, out=out, as_json=json, caption=caption)
 
 

@@ -64,14 +64,18 @@ def catalog() -> CommandResult:
 
 def _legs_text(legs: Sequence[LegKind]) -> str:
     """Return sentences on the letters of the legs' types, and which of their joints is actuated."""
-    letters = [letter for letter in _JOINTS if any(letter in leg.type for leg in legs)]
+    # The S of SRRR is no joint: its axes meet in a point.
+    spherical = dict.fromkeys(leg.type for leg in legs if leg.platform_center is not None)
+    joint_types = [leg.type[leg.type in spherical :] for leg in legs]
+    letters = [letter for letter in _JOINTS if any(letter in name for name in joint_types)]
     joints = ", ".join(f"{letter} {_JOINTS[letter]}" for letter in letters)
     actuated: dict[str, list[str]] = {}
     for leg in legs:
         types = actuated.setdefault("P" if leg.joint.unit == "m" else "first R", [])
         types += [leg.type] * (leg.type not in types)
     texts = (f"the {joint} of {', '.join(types)}" for joint, types in actuated.items())
-    return f"Joints from base to platform: {joints}; actuated: {'; '.join(texts)}."
+    text = f"Joints from base to platform: {joints}; actuated: {'; '.join(texts)}."
+    return " ".join([text, *(f"{kind}: spherical, all axes meet." for kind in spherical)])
 
 
 def new(
@@ -265,6 +269,7 @@ def _leg(leg: LegKind) -> dict[str, Any]:
         "joint": leg.joint.noun,
         **json_fields(axis=leg.joint_axis),
         "lengths": {q.name: q.value[0] for q in leg.quantities if q.role == "length"},
+        "arcs": {name: getattr(leg, name) for name, key in leg.keys.items() if key.role == "angle"},
         **json_fields(**{"elbow": leg.elbow, **leg.signs}, limits=leg.limits),
         **json_fields(unit=leg.joint.unit, force_unit=leg.joint.force_unit),
         **json_fields(drive=leg.drive, reading=leg.reading),
@@ -317,7 +322,9 @@ def _legs_table(legs: list[dict[str, Any]]) -> Table:
     rows = (
         (
             *(str(i), leg["type"], _vector(leg["axis"], 2) if leg["axis"] else "along the leg"),
-            ", ".join(f"{length:g}" for length in leg["lengths"].values()) or "-",
+            ", ".join(f"{length:g}" for length in leg["lengths"].values())
+            or ", ".join(f"{math.degrees(arc):.4g} deg" for arc in leg["arcs"].values())
+            or "-",
             "{:.4g} to {:.4g} {}".format(*leg["limits"], leg["unit"]) if leg["limits"] else "none",
             f"{round(leg['at_home'], 4) + 0.0:g} {leg['unit']}",
         )

@@ -105,7 +105,8 @@ class Candidate(Result):
         """Rounded figures of the machine as text, by table heading (mass, footprint, margin)."""
         row = {"drive margin": _ratio(self.least_margin)}
         for name, (heading, factor) in _FIGURES.items():
-            if (figure := self.figures.get(name)) is not None and (name != "cycle_time" or figure):
+            figure = self.figures.get(name)
+            if figure is not None and (figure or name not in ("cycle_time", "energy")):
                 row[heading] = (
                     f"{factor * figure:.0f}" if figure > 1e3 else f"{factor * figure:.3g}"
                 )

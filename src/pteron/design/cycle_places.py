@@ -13,8 +13,16 @@ from itertools import product
 import numpy as np
 
 from pteron.design.job import Job
+from pteron.design.kinds import angle_counts
 from pteron.design.requirement_tables import ToolCycleTable
-from pteron.design.workspace_samples import INSIDE, pad_to_xyz, platform_curve, tilts, turn_angles
+from pteron.design.workspace_samples import (
+    INSIDE,
+    angles_of_directions,
+    pad_to_xyz,
+    platform_curve,
+    tilts,
+    turn_angles,
+)
 from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
@@ -138,8 +146,7 @@ def _cycle_places(job: Job, robot: Manipulator, cycle: ToolCycleTable, k: int) -
     points = np.zeros((len(cycle.points), robot.freedom))
     rows = np.array(cycle.points)
     points[:, : job.lengths] = rows[:, : job.lengths]
-    angles = rows[:, job.lengths :]
-    points[:, robot.freedom - angles.shape[1] :] = angles
+    points[:, len(robot.platform.lengths) :] = _platform_angles(robot, rows[:, job.lengths :])
     # The path is that of the tool, which is at P of this machine.
     bare = replace(robot, platform=replace(robot.platform, tool=(0.0, 0.0, 0.0)))
     path: Path = line_path(bare, points, cycle.corner)
@@ -197,6 +204,22 @@ def neighbour_places(job: Job, cycle: Places, chosen: Iterable[int], part: float
     )
 
 
+def _platform_angles(robot: Manipulator, angles: Array) -> Array:
+    """Return platform angles (K, a), rad, of a cycle's: none, a turn, or roll, pitch and yaw.
+
+    A platform with two angles takes the direction of its z axis from roll and pitch.
+    """
+    count, stated = len(robot.platform.angles), angles.shape[1]
+    if angle_counts(robot.platform) == (2, 0):
+        rpy = np.column_stack([angles[:, :-1], np.zeros((len(angles), 4 - max(stated, 1)))])
+        roll, pitch = rpy[:, :2].T
+        way = [np.cos(roll) * np.sin(pitch), -np.sin(roll), np.cos(roll) * np.cos(pitch)]
+        return angles_of_directions(robot, np.column_stack(way))
+    every, shared = np.zeros((len(angles), count)), min(count, stated)
+    every[:, count - shared :] = angles[:, stated - shared :]
+    return every
+
+
 def _plane(turns: Array) -> Array:
     """Return the rotation matrices (2, 2, K) of turns (K,) in rad."""
     c, s = np.cos(turns), np.sin(turns)
@@ -239,9 +262,10 @@ def _angles(job: Job, robot: Manipulator, angles: Array) -> Iterator[Array]:
 
     A cycle whose poses tilt keeps its own tilts.
     """
-    tilted = np.zeros((1, angles.shape[1])) if angles[:, :-1].any() else tilts(job, robot)
+    tilting, turning = angle_counts(robot.platform)
+    tilted = np.zeros((1, angles.shape[1])) if angles[:, :tilting].any() else tilts(job, robot)
     last, ends = angles[:, -1], {0.0}
-    if job.workspace.turn is not None:
+    if job.workspace.turn is not None and turning:
         ends = {job.workspace.turn[0] - last.min(), job.workspace.turn[1] - last.max()}
     for end in sorted(ends):
         yield from turn_angles(tilted, float(end))

@@ -16,6 +16,8 @@ from pteron.kernels import Array
 from pteron.kinematics.sampling import search_ball
 from pteron.manipulator import Manipulator, Radii, load
 from pteron.manipulator.dimensions import Stock, cut_links
+from pteron.manipulator.variants import turned
+from pteron.platforms import Platform
 from pteron.toml import joined_faults
 from pteron.workspace import home_pose
 
@@ -35,9 +37,18 @@ KINDS: dict[str, tuple[str, str]] = {
     "3-rrr": ("base_radius platform_radius crank", "xy"),
     "3-prr": ("base_radius platform_radius", "xy"),
     "3-rpr": ("base_radius platform_radius", "xy"),
+    "3-rrr-point": ("base_radius crank", "xy"),
+    "3-upu": ("base_radius platform_radius", "z"),
+    "delta-redundant": ("base_radius platform_radius crank", "z"),
+    "hexapteron": ("crank", ""),
+    "pentapteron": ("platform_radius", ""),
+    "5-rpur": ("base_radius platform_radius", "xyz"),
 }
 """The dimensions of each kind that vary beside the size, and the coordinates of its place that do:
-the others are those of its plane or axis of symmetry."""
+the others are those of its plane or axis of symmetry, or of its home pose."""
+
+_LAID = ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+"""Rotation of machines that turn about z and x: about x and y, so that z tilts to every side."""
 
 _POWERS = {"m": 3, "g": 4, "I": 5}
 """Exponents of the size by which masses, first and second moments scale."""
@@ -47,6 +58,10 @@ _RATIO = 0.4, 2.5
 
 _SIZE = 0.25, 8.0
 """Least and greatest size of a machine over that of the workspace."""
+
+_LARGEST = {"pentapteron": 20.0, "5-rpur": 40.0}
+"""Greatest size of kinds whose workspace is a smaller share of their reach than that of others: the
+largest level cube of the catalog's machines is a sixth and a fourteenth of the radius."""
 
 _ALUMINIUM = 2700.0
 """kg/m^3."""
@@ -83,14 +98,14 @@ class Kind:
         Sliders' limits follow from the task, and the cones of ball joints, also left out, from a
         machine's proportions.
         """
-        template = load(self.name)
+        template = _template(self.name)
         legs = []
         for leg in template.legs:
             cones = (f"{end}_cone" for end in ("base", "tip", "platform"))
             ends = dict.fromkeys(cone for cone in cones if hasattr(leg, cone))
             legs.append(replace(leg, **ends | ({"limits": None} if slides(leg) else {})))
         platform = replace(template.platform, tool=self.tool)
-        return replace(template, legs=tuple(legs), platform=platform, radii=None)
+        return replace(template, legs=tuple(legs), platform=platform, radii=None, home=None)
 
     @cached_property
     def like(self) -> Manipulator:
@@ -100,7 +115,7 @@ class Kind:
     @cached_property
     def reach(self) -> tuple[Array, float]:
         """The catalog machine's home pose, and the radius of its reach, m."""
-        template = load(self.name)
+        template = _template(self.name)
         return home_pose(template), float(search_ball(template)[1])
 
     @cached_property
@@ -108,7 +123,8 @@ class Kind:
         """Lower and upper bound of each design variable, by name; sizes and times as logarithms."""
         dimensions, places = KINDS[self.name]
         size = self.needed / self.reach[1]
-        ranges = {"size": (np.log(_SIZE[0] * size), np.log(_SIZE[1] * size))}
+        most = _LARGEST.get(self.name, _SIZE[1])
+        ranges = {"size": (np.log(_SIZE[0] * size), np.log(most * size))}
         ranges |= dict.fromkeys(dimensions.split(), (np.log(_RATIO[0]), np.log(_RATIO[1])))
         ranges |= dict.fromkeys(places, (-0.6, 0.6))
         ranges |= {key: (0.0, len(stock) - 1e-9) for key, stock in self._choices.items()}
@@ -177,9 +193,15 @@ class Kind:
         return limited.with_bodies(_bodies(limited, 1.0, self._stock(point), self.links))
 
 
+def _template(name: str) -> Manipulator:
+    """Return the catalog's machine of a kind; one with two rotation axes has both level."""
+    robot = load(name)
+    return robot if robot.platform.second_axis is None else turned(robot, _LAID, gravity=False)
+
+
 def slides(leg: Any) -> bool:
     """Return whether a leg's joint slides on a guide, whose length follows from the travel."""
-    return leg.joint.unit == "m" and bool(_lengths(leg))
+    return leg.joint.unit == "m" and leg.joint_axis is not None
 
 
 def _lengths(leg: Any) -> set[str]:
@@ -249,6 +271,15 @@ def _bodies(
     return bodies | cut_links(leg, stocks)
 
 
+def angle_counts(platform: Platform) -> tuple[int, int]:
+    """Return how many of a platform's last angles tilt its z axis, and how many turn about it.
+
+    Those that tilt come first: (0, 0), (0, 1), (2, 0) or (2, 1).
+    """
+    count = len(platform.angles)
+    return 2 * (count >= 2), count % 2
+
+
 def fitting_kinds(names: Sequence[str] | None, lengths: int, turn: bool, tilt: bool) -> list[str]:
     """Return the names of the kinds of machine with a task's degrees of freedom; raise if none.
 
@@ -260,12 +291,13 @@ def fitting_kinds(names: Sequence[str] | None, lengths: int, turn: bool, tilt: b
     faults, kinds = [], []
     for name in KINDS if names is None else names:
         platform = load(name).platform
+        tilting, turning = angle_counts(platform)
         lacks = [
             text
             for text, holds in (
                 (f"moves along {' '.join(platform.lengths)} only", len(platform.lengths) < lengths),
-                ("does not turn", turn and not platform.angles),
-                ("does not tilt", tilt and len(platform.angles) < 3),
+                ("does not turn", turn and not turning),
+                ("does not tilt", tilt and not tilting),
             )
             if holds
         ]

@@ -14,7 +14,7 @@ from pteron.manipulator import Manipulator
 _WRITTEN = re.compile(r"(-?)legs(?:\[([\d\s,]*)\])?\.(\w+)(?:\.(\w+))?")
 """Pattern of a path: sign, legs, key, component."""
 
-_GEOMETRIC = ("point", "direction", "length", "number")
+_GEOMETRIC = ("point", "direction", "length", "number", "angle")
 """Roles of keys that a search may vary."""
 
 _SHAPE = 'a path such as "legs.platform_point" or "legs[1,3].guide_point.x"'
@@ -109,7 +109,7 @@ def _places_in_leg(
             f"{', '.join(known)}{guess}"
         )
     role = leg.every_key()[key].role
-    scalar = role in ("length", "number")
+    scalar = role in ("length", "number", "angle")
     if scalar and part is not None:
         raise ModelError(f"{shorten(path)}: {key} is one number; leave out .{part}")
     if part is not None and part not in ("x", "y", "z"):

@@ -91,7 +91,8 @@ class Task:
             faults.append(f"motors: {error}")
         if faults:
             raise DataError(joined_faults(faults), subject=spec.source)
-        if spec.payload is not None and (text := payload_warning(robot, spec.payload.mass)):
+        payload = spec.payload
+        if payload and (text := payload_warning(robot, payload.mass, payload.center)):
             warn_unlikely(text)
         return cls(spec, robot, variables, motors)
 

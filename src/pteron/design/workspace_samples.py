@@ -12,6 +12,7 @@ import numpy as np
 
 from pteron.bodies.vectors import rotation_matrices
 from pteron.design.job import Job
+from pteron.design.kinds import angle_counts
 from pteron.kernels import Array
 from pteron.kinematics import pose_of
 from pteron.manipulator import Manipulator
@@ -139,7 +140,7 @@ def _places(job: Job, robot: Manipulator, count: int) -> Array:
     angles = orientations(job, robot)
     if job.workspace.tilt is not None:
         leans = [(*lean, turn) for turn in _turns(job) for lean in _leans(job.workspace.tilt)]
-        angles = np.array(leans)
+        angles = np.array(leans)[:, : len(robot.platform.angles)]
     return np.hstack([np.tile(points, (len(angles), 1)), np.repeat(angles, len(points), axis=0)])
 
 
@@ -148,8 +149,9 @@ def _poses_at(job: Job, robot: Manipulator, places: Array) -> Array:
     count = len(robot.platform.lengths)
     angles = places[:, count:]
     if job.workspace.tilt is not None:
-        angles = _tilted_angles(robot, angles[:, :2])
-        angles[:, -1] += places[:, -1]
+        tilting, _ = angle_counts(robot.platform)
+        angles = _tilted_angles(robot, angles[:, :tilting])
+        angles[:, tilting:] += places[:, count + tilting :]
     poses = poses_about_tool(robot, angles)
     poses[:, :count] += places[:, :count]
     return poses
@@ -209,10 +211,29 @@ def _leans(tilt: float) -> Array:
 
 
 def _tilted_angles(robot: Manipulator, leans: Array) -> Array:
-    """Return platform angles (L, a), rad, of leans (L, 2) towards x and y by the shortest turn."""
+    """Return platform angles (L, a), rad, of leans (L, 2) towards x and y by the shortest turn.
+
+    Two angles give its z axis the same direction.
+    """
     vectors = np.c_[-leans[:, 1], leans[:, 0], np.zeros(len(leans))]
     matrices = rotation_matrices(vectors)
+    if angle_counts(robot.platform) == (2, 0):
+        return angles_of_directions(robot, matrices[..., 2])
     return np.array(pose_of(robot, np.zeros(3), matrices)[:, -len(robot.platform.angles) :])
+
+
+def angles_of_directions(robot: Manipulator, directions: Array) -> Array:
+    """Return alpha and beta (L, 2), rad, that give a platform's z axis directions (L, 3).
+
+    Both axes are level at angles zero: with n their normal, z is sin(beta) axis + cos(beta)
+    (cos(alpha) n - sin(alpha) second_axis), up to the sign of n . z.
+    """
+    first, second = (np.array(axis) for axis in robot.platform.rotation_axes)
+    normal = np.cross(first, second)
+    side = normal[2]
+    sine = np.clip(side * directions @ first, -1.0, 1.0)
+    alpha = np.arctan2(-side * directions @ second, side * directions @ normal)
+    return np.column_stack([alpha, np.arcsin(sine)])
 
 
 def turn_angles(angles: Array, turn: float) -> Array:

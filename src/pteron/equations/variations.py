@@ -1,7 +1,8 @@
 """Variations of a machine's geometry from its drawing, and machines with varied geometry.
 
 Points, lengths and directions of every leg vary, as `LegKind.quantities` names them; a direction
-rotates, and directions that are perpendicular to it by definition rotate with it. Variations that
+rotates, and directions that are perpendicular to it by definition rotate with it. Arcs between axes
+vary too, whose number in the geometry is the tangent of their half. Variations that
 the machine's kind excludes, such as a tilt of a planar leg's axis, are left out.
 """
 
@@ -48,10 +49,11 @@ class Variation:
         The key of the robot's file that changes.
     axis : int or None
         Which component of a point; about which axis of the platform's frame a direction turns; None
-        for a length.
+        for a length and for an arc.
     group : str
-        "points", "lengths" or "directions"; or, of guide points about the platform's axis through
-        the origin, as a printer's firmware counts them, the "radius" of all and the "angles".
+        "points", "lengths" or "directions", which have the arcs; or, of guide points about the
+        platform's axis through the origin, as a printer's firmware counts them, the "radius" of all
+        and the "angles".
     """
 
     leg: int
@@ -71,19 +73,34 @@ class Variation:
         return f"{place}{' about ' if self.group == 'directions' else '.'}{_AXES[self.axis]}"
 
     @property
+    def is_arc(self) -> bool:
+        """Whether an arc between two axes of a leg varies."""
+        return self.group == "directions" and self.axis is None
+
+    @property
+    def number(self) -> str:
+        """The name of the leg's or platform's number in the geometry that varies."""
+        return arc_number(self.key) if self.is_arc else self.key
+
+    @property
     def unit(self) -> str:
         """The unit of the variation: "m" or "rad"."""
         return "rad" if self.group in ("directions", "angles") else "m"
 
     def value(self, robot: Manipulator) -> float:
-        """Return the nominal value on a machine, m, of the length that varies; 0 for an angle."""
+        """Return the nominal value on a machine of what varies, m or rad; 0 for a rotation."""
         if self.group == "radius":
             point, axis = np.array(robot.legs[0].guide_point), np.array(robot.platform.axis)
             return float(np.linalg.norm(np.cross(axis, point)))
-        if self.unit == "rad":
+        if self.unit == "rad" and not self.is_arc:
             return 0.0
         quantity = getattr(robot.platform if self.leg < 0 else robot.legs[self.leg], self.key)
         return float(quantity if self.axis is None else quantity[self.axis])
+
+
+def arc_number(key: str) -> str:
+    """Return the name of an arc's number in the geometry, the tangent of its half."""
+    return key.replace("_arc", "_tangent")
 
 
 @lru_cache(maxsize=32)
@@ -100,6 +117,8 @@ def variations(robot: Manipulator) -> tuple[Variation, ...]:
             elif role == "direction" and getattr(leg, key, None) is not None:
                 candidates += _turns(robot, i, key, quantity.value)
         candidates += [Variation(i, "platform_point", axis, "points") for axis in range(3)]
+        arcs = (name for name, key in leg.every_key().items() if key.role == "angle")
+        candidates += [Variation(i, name, None, "directions") for name in arcs]
     for key in robot.platform.turning_keys:
         if key in ("center", "axis_offset"):
             candidates += [Variation(-1, key, axis, "points") for axis in range(3)]
@@ -160,7 +179,7 @@ def vary_geometry(robot: Manipulator, changes: Sequence[Variation], amounts: Arr
                 changed_fields[i]["guide_point"] = tuple(new_point.tolist())
             continue
         owner, fields = owners[change.leg], changed_fields[change.leg]
-        if change.group == "directions":
+        if change.group == "directions" and not change.is_arc:
             turn = turns.setdefault((change.leg, change.key), np.zeros(3))
             turn += amount * frame[change.axis or 0]
         elif change.axis is None:
@@ -208,7 +227,10 @@ def varied_numbers(robot: Manipulator, changes: Sequence[Variation], amounts: Ar
     geometry = np.tile(numbers(robot), (len(amounts), 1))
     turns: dict[tuple[int, str], Array] = {}
     for change, amount in zip(changes, amounts.T, strict=True):
-        if change.group == "directions":
+        if change.is_arc:
+            row = places[change.leg][change.number]
+            geometry[:, row] = np.tan(np.arctan(geometry[:, row]) + 0.5 * amount)
+        elif change.group == "directions":
             turn = turns.setdefault((change.leg, change.key), np.zeros((len(amounts), 3)))
             turn += amount[:, None] * frame[change.axis or 0]
         else:
@@ -258,6 +280,10 @@ def slope_terms(robot: Manipulator, changes: Sequence[Variation]) -> list[Term]:
         if change.group in AXIAL:
             continue
         at = places[change.leg]
+        if change.is_arc:  # twice d tan(arc / 2)/d arc = 1 + tan(arc / 2)^2
+            row = at[change.number]
+            terms += [(row, k, (), 1), (row, k, (row, row), 1)]
+            continue
         if change.group != "directions":
             terms.append((at[change.key] + (change.axis or 0), k, (), 1))
             continue
@@ -301,8 +327,9 @@ def slope_matrix(
 ) -> NDArray[Any]:
     """Return the matrix (G, K) of d(geometry)/d(variations), in floats or numbers of a field.
 
-    In a field, `radial` has for each leg the unit vector from the platform's axis to its guide
-    point, and the vector axis x point, along which it moves when it turns about the axis.
+    In a field the columns of arcs are doubled, so that they need no fraction, and `radial` has for
+    each leg the unit vector from the platform's axis to its guide point, and the vector axis x
+    point, along which it moves when it turns about the axis.
     """
     matrix = np.zeros((len(geometry), len(changes)), dtype=geometry.dtype)
     places = number_places(robot)
@@ -317,4 +344,6 @@ def slope_matrix(
                 matrix[at : at + 3, k] = vectors[change.group == "angles"]
     for row, k, factors, sign in terms:
         matrix[row, k] += sign * np.prod(geometry[list(factors)])
+    if matrix.dtype == float:
+        matrix[:, [change.is_arc for change in changes]] *= 0.5
     return matrix

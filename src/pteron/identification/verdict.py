@@ -55,8 +55,8 @@ _HIDDEN: dict[str, tuple[str, str]] = {
         "description): it gives the scale of the forces.",
     ),
     "clock": (
-        "These logs cannot show a log's clock that runs too fast or too slow: no weight acts on "
-        "the drives to distinguish it from inertia.",
+        "These logs cannot show a log's clock that runs too fast or too slow: the weight on "
+        "the drives does not fix the scale of their inertia.",
         "Compare the duration of the log with another clock.",
     ),
     "scale": (

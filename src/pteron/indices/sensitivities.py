@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
@@ -12,7 +13,7 @@ import numpy as np
 from pteron.bodies.vectors import Vector, cross, dot
 from pteron.dynamics.joint_space import solve_rates
 from pteron.equations.machine import numbers
-from pteron.equations.variations import slope_matrix, slope_terms, variations
+from pteron.equations.variations import arc_number, slope_matrix, slope_terms, variations
 from pteron.kernels import Array, general_program, layout_of
 from pteron.kinematics import twist
 from pteron.kinematics.evaluate import evaluate_kernel, finite_rows
@@ -200,6 +201,10 @@ def _leg_dimensions(leg: LegKind) -> Iterator[tuple[str, str, dict[str, tuple[fl
     for quantity in leg.quantities:
         if quantity.role == "length":
             yield quantity.name, "length", {quantity.name: (1.0,)}
+    for name, key in leg.every_key().items():
+        if key.role == "angle":
+            tangent = math.tan(0.5 * getattr(leg, name))
+            yield name, "angle", {arc_number(name): (0.5 * (1.0 + tangent * tangent),)}
     points = [q.name for q in leg.quantities if q.role == "point"] + ["platform_point"]
     points += ["fixed_offset"] if any(leg.fixed_offset) else []
     for name in points:

@@ -49,6 +49,11 @@ class LimitedJoint(Result):
 
     told_limits = former_attribute("told_limits", "limits_text")
 
+    @property
+    def margin(self) -> float:
+        """The distance to the nearer limit over half the range: 1 in the middle."""
+        return min(self.value - self.least, self.most - self.value) * 2 / (self.most - self.least)
+
     def limits_text(self, text: Callable[..., str]) -> str:
         """Return the joint's limits as text; `text` formats a value with its unit."""
         most = text(self.most, self.unit)

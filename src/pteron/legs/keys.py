@@ -19,6 +19,7 @@ KeyRole = Literal[
     "direction",
     "length",
     "number",
+    "angle",
     "count",
     "sign",
     "limits",
@@ -30,9 +31,10 @@ KeyRole = Literal[
     "drive",
     "reading",
 ]
-"""The content of a key: a vector, a unit vector, a length, a number, a whole number, +1 or -1, two
-limits, a ball joint's cone, a slider's mass (TOML key `slider`), a body in a plane, a rod, a body
-in space, a drive, how the drive counts. Files and pages give a leg's keys in this order."""
+"""The content of a key: a vector, a unit vector, a length, a number, an angle, a whole number, +1
+or -1, two limits, a ball joint's cone, a slider's mass (TOML key `slider`), a body in a plane, a
+rod, a body in space, a drive, how the drive counts. Files and pages give a leg's keys in this
+order."""
 
 
 _TYPES: dict[KeyRole, str] = {
@@ -40,6 +42,7 @@ _TYPES: dict[KeyRole, str] = {
     "direction": "unit vector",
     "length": "float",
     "number": "float",
+    "angle": "float",
     "count": "int",
     "sign": "int",
     "limits": "(float, float)",
@@ -162,7 +165,7 @@ def _check_value(value: Any, name: str, role: KeyRole) -> Any:
         return unit_vector(value, name)
     if role == "length":
         return positive(value, name, "m")
-    if role == "number":
+    if role in ("number", "angle"):
         return number(value, name)
     if role == "count" and (type(value) is not int or value < 1):
         raise ModelError(f"{name}: {value!r} is not a whole number of at least 1")

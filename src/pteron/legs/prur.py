@@ -151,6 +151,7 @@ class PRUR(UniversalLinkLeg):
 class PRUREquations(UniversalLinkEquations):
     """The equations of a P-R-U-R leg, whose slider is across a or along it."""
 
+    second_link = "upper link"
     kinds: ClassVar = {"p": PointMass.kinds, "u": PlanarInertia.kinds, "l": SpatialInertia.kinds}
 
     def __init__(

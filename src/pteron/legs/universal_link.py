@@ -104,7 +104,7 @@ class UniversalLinkEquations(LegEquations):
     """The equations of such a leg; those of its first links are its subclasses'."""
 
     rides = ("l",)
-    first_link, second_link = "lower link", "first link"
+    first_link, second_link = "lower link", "ram"
     """The links whose lengths the inner and the outer root depend on."""
 
     def __init__(self, guide_point: Expression, lower_length: Expression, **signs: Expression):

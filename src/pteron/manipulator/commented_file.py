@@ -124,8 +124,11 @@ def crank_direction_text(robot: Manipulator) -> str:
     angles = np.degrees(np.arcsin(np.clip(sines, -1.0, 1.0))).round(2) + 0.0
     if not angles.any():
         return LEVEL
-    distinct = dict.fromkeys(angles.tolist())
-    return f"{', '.join(f'{angle:g}' for angle in distinct)} deg below horizontal"
+    texts = dict.fromkeys(
+        f"{abs(angle):g} deg {'below' if angle > 0.0 else 'above'} horizontal" if angle else LEVEL
+        for angle in angles.tolist()
+    )
+    return ", ".join(texts)
 
 
 def _dimension_text(dimension: Any) -> str:

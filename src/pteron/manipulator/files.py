@@ -390,5 +390,8 @@ class _FileReader:
                 )
                 raw_table = {k: v for k, v in raw_table.items() if k != alias}
         leg, faults = leg_of(kind, self.table(leg_table(kind), raw_table, prefix), self.tilts)
+        for key, about in kind.every_key().items():
+            if about.alias and about.alias in raw_table:  # the file's own name of the key
+                faults = [fault.replace(key, about.alias) for fault in faults]
         self.faults += [prefix + fault for fault in faults]
         return leg

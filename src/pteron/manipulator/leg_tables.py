@@ -43,6 +43,7 @@ _TYPES: dict[KeyRole, Any] = {
     "direction": Three,
     "length": Number,
     "number": Number,
+    "angle": Number,
     "count": Count,
     "sign": Annotated[Literal[1, -1], BeforeValidator(_no_truth)],
     "limits": Two,
@@ -102,6 +103,7 @@ def toml_key(name: str, key: Key) -> str:
 _ORDINARY: dict[KeyRole, Any] = {
     "length": 1.0,
     "number": 1.0,
+    "angle": 1.0,
     "slider": 1.0,
     "planar": PlanarInertia(1.0, (0.0, 0.0), 1.0),
     "rod": RodInertia(1.0, (0.0,), 1.0),

@@ -86,7 +86,7 @@ def _block(
     name: str, model: type[TomlTable], table: Mapping[str, Any], explained: bool
 ) -> list[str]:
     """Return the TOML lines of the table `name`, and of the lists of tables in it."""
-    fields, lines, inner = model.model_fields, [f"[{name}]"] if name else [], []
+    fields, lines, inner = _fields_of(model, table), [f"[{name}]"] if name else [], []
     entries = []
     for key, content in table.items():
         if isinstance(content, list) and content and isinstance(content[0], Mapping):
@@ -107,6 +107,15 @@ def _block(
         ]
         return [*lines, *_comment_lines(entries), *inner]
     return [*lines, *(text for text, _ in entries), *inner]
+
+
+def _fields_of(model: type[TomlTable], table: Mapping[str, Any]) -> dict[str, FieldInfo]:
+    """Return the fields of `model` by key, by the name that `table` has for it."""
+    fields = {}
+    for key, field in model.model_fields.items():
+        names = getattr(field.validation_alias, "choices", [key])
+        fields[next((name for name in names if name in table), key)] = field
+    return fields
 
 
 def _example(field: FieldInfo, table: Mapping[str, Any]) -> Any:

@@ -19,8 +19,17 @@ _HEAVY = 20.0
 carry up to their own moving mass, presses and simulators up to ten times it."""
 
 
-def payload_warning(robot: Manipulator, mass: float) -> str:
-    """Return a warning if a payload of `mass` kg is unlikely for the machine; else ''."""
+def payload_warning(robot: Manipulator, mass: float, center: Sequence[float] | None = None) -> str:
+    """Return a warning if a payload of `mass` kg is unlikely for the machine; else ''.
+
+    `center` is its centre of mass in the platform's frame, m; by default the tool's centre point.
+    """
+    place = robot.platform.tool if center is None else center
+    if mass > 0.0 and robot.platform.fixed_point is not None and not any(place):
+        return (
+            f"a payload of {mass:g} kg at P, about which the platform turns, has no effect: give "
+            "its centre of mass, or the machine a tool"
+        )
     bodies = [body for leg in robot.legs for body in leg.bodies.values()]
     moving = sum(body.values[0] for body in (*bodies, robot.platform.total_inertia))
     if mass <= _HEAVY * moving:
@@ -119,7 +128,7 @@ def with_payload(
     Warns
     -----
     UnlikelyValue
-        If the mass is likely in grams.
+        If the mass is likely in grams, or has no effect since the platform turns about it.
 
     Examples
     --------
@@ -131,7 +140,7 @@ def with_payload(
     """
     machine = as_manipulator(robot)
     loaded = add_payload(machine, mass, center, inertia)
-    if warning := payload_warning(machine, float(mass)):
+    if warning := payload_warning(machine, float(mass), center):
         warn_unlikely(warning)
     return loaded
 

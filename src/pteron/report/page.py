@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from functools import partial
 from importlib.metadata import version
-from math import prod
+from math import degrees, prod
 from typing import Any
 
 import numpy as np
@@ -126,9 +126,12 @@ def geometry(robot: Manipulator) -> list[tuple[str, list[str]]]:
     roles["platform_point"] = "point of the platform"
     if any(any(leg.fixed_offset) for leg in robot.legs):
         roles["fixed_offset"] = "point of the platform"
-    order = ("point", "direction", "point of the platform", "length", "number", "count")
+    order = (
+        *("point", "direction", "point of the platform"),
+        *("length", "number", "angle", "count", "sign"),
+    )
     rows = []
-    shown = [name for name, role in roles.items() if role in order]
+    shown = [name for name, role in roles.items() if role in order and name != "elbow"]
     for name in sorted(shown, key=lambda name: order.index(roles[name])):
         role, texts = roles[name], []
         for leg in robot.legs:
@@ -141,8 +144,12 @@ def geometry(robot: Manipulator) -> list[tuple[str, list[str]]]:
                 texts.append("\u2013")
             elif role in ("length", "number"):
                 texts.append(format_fixed(1e3 * size) if role == "length" else compact(size))
+            elif role == "angle":
+                texts.append(f"{compact(degrees(size))}\u00b0")
             elif role == "count":
                 texts.append(str(size))
+            elif role == "sign":
+                texts.append(f"{size:+d}".replace("-", "\u2212"))
             else:
                 # Micrometres, and directions to a ten-thousandth: no rounding is shown beyond.
                 exact = np.round(size, 6 if "point" in role else 4) + 0.0

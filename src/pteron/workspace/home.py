@@ -20,6 +20,7 @@ from pteron.kinematics import inverse_kinematics, singular_orientations
 from pteron.kinematics.singularities import best_holding
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.result import Result
+from pteron.tolerances import ROUNDING
 from pteron.workspace.holding import expect_regular
 from pteron.workspace.home_search import (
     FIRST_STEPS,
@@ -163,12 +164,14 @@ def home_poses(robot: RobotLike) -> HomePoses:
 def expect_usable(robot: Manipulator, pose: Array) -> None:
     """Raise ModelError where a file's home pose (m,) is out of reach or beyond limits."""
     least = float(home_margins(robot, pose[None])[0])
-    if least <= 0.0:
+    if least <= ROUNDING:
         margins = pose_margins(robot, pose)
         legs = np.minimum(margins.type_i, margins.joints)
         where = f"leg {int(legs.argmin()) + 1} is out of reach or beyond a limit there"
         if legs.min() > 0.0:
             where = "the drives do not hold the platform there (type II), or it is turned back"
+            if any(leg.couples_vary for leg in robot.legs):
+                where = "the platform is not held there (type-II or constraint singularity)"
         raise ModelError(
             f"home.pose: {pose.tolist()}: {where}; give a pose in reach, within limits, or leave "
             "[home] out",

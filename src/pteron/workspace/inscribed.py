@@ -9,7 +9,7 @@ import numpy as np
 
 from pteron.arguments import expect, expect_share
 from pteron.equations.machine import numbers
-from pteron.errors import ModelError
+from pteron.errors import ModelError, PteronError
 from pteron.kernels import Array
 from pteron.kinematics.evaluate import finite_pose
 from pteron.kinematics.sampling import search_ball
@@ -18,6 +18,7 @@ from pteron.result import Result
 from pteron.shapes import PoseLike
 from pteron.workspace.conditions import Condition, conditions
 from pteron.workspace.fit import Fit, largest_fit, proved_fit
+from pteron.workspace.home import home_poses
 from pteron.workspace.proofs import Proof, expect_space, prove
 from pteron.workspace.regions import Box, Cylinder, Region
 from pteron.workspace.shape_samples import Shape, cube
@@ -204,8 +205,8 @@ def _largest_shape(
         return largest_fit(smooth, geometry, reference[None], ball, failing, shape, _STARTS)
 
     def search(failing: Array) -> Fit:
-        """Return the largest shape without failing positions, in the search ball or the box."""
-        fit = fit_in_ball(search_ball(robot), failing)
+        """Return the largest shape without failing positions, at home's side or in the box."""
+        fit = fit_in_ball(_ball_at_home(robot), failing)
         if fit.edge > 0.0:
             return fit
         # A grid for all orientations may miss the small part that one of them leaves.
@@ -230,3 +231,21 @@ def _largest_shape(
         f"{reference.tolist()}",
         subject=robot.name,
     )
+
+
+def _ball_at_home(robot: Manipulator) -> tuple[Array, float]:
+    """Return centre (k,) and radius, m, of the places to search: on home's side of the base.
+
+    Machines of rams alone reach the mirror images of their poses, on the other side, too.
+    """
+    if any(len(leg.branches) > 1 for leg in robot.legs):
+        return search_ball(robot)
+    try:
+        poses = home_poses(robot)
+    except PteronError:  # some pose is in reach, but none that would do as home
+        return search_ball(robot)
+    if poses.mirror is None:
+        return search_ball(robot)
+    count = len(robot.platform.lengths)
+    home, mirror = (np.array(pose[:count]) for pose in (poses.pose, poses.mirror))
+    return home, 0.5 * float(np.linalg.norm(home - mirror))

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from pteron.arguments import expect
 from pteron.kernels import Array, numeric
 from pteron.kinematics import inverse_kinematics
+from pteron.kinematics.limits import limited_joints
 from pteron.kinematics.sampling import finite_sizes, joint_limits
 from pteron.kinematics.singularities import best_holding
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
@@ -33,7 +34,8 @@ class PoseMargins(Result):
         negative: the missing metres over the leg's size.
     type_ii : array, shape (...)
         The size of the type-II measure over the best that the machine's geometry allows, limits or
-        not: 0 where the actuators do not hold the platform.
+        not: 0 where the actuators do not hold the platform. If the legs' couples vary with the
+        pose (U-P-U), at most the constraint measure: 0 where the platform is free to turn.
     joints : array, shape (..., n)
         The least over each leg's joints, passive ones too, of the distance from the nearer limit
         over half the range; negative beyond it, and 1 for a leg without limits.
@@ -136,7 +138,11 @@ def least_margin_text(robot: Manipulator, pose: Array) -> tuple[str, str]:
     elif float(margins.type_i.min()) <= least:
         cause = f"leg {_first_least(margins.type_i)} stretched or folded (100 % is best)"
     else:
-        cause = f"a joint limit of leg {_first_least(margins.joints)} (100 % is mid-range)"
+        leg = _first_least(margins.joints)
+        joints = [at for at in limited_joints(robot, pose) if at.leg in (0, leg)]
+        nearest = min(joints, key=lambda at: at.margin)
+        limit = f"a joint limit of leg {leg}" if nearest.leg else f"a limit of {nearest.noun}"
+        cause = f"{limit} (100 % is mid-range)"
     return f"{100.0 * least:.0f} %", cause
 
 

@@ -85,11 +85,9 @@ def mode_places(robot: Manipulator, home: Array) -> tuple[ModePlace, ...]:
     candidates = []
     for signs in modes:
         mode = with_elbows(robot, signs)
-        reached = ~np.isnan(inverse_kinematics(mode, poses, on_failure="nan")).any(axis=-1)
-        if not reached.any():
+        margins = _margins_in_reach(mode, poses)
+        if not np.isfinite(margins).any():
             continue  # its reach depends on its elbows, and with these it reaches no pose
-        least_margins = np.nan_to_num(pose_margins(mode, poses).least, nan=-np.inf)
-        margins = np.where(reached, least_margins, -np.inf)
         best = len(poses) - 1 if signs == file_elbows else int(margins.argmax())
         depth = _depth(mode, poses[best])
         place = "below" if depth > least else "above" if depth < -least else "inside"
@@ -106,6 +104,15 @@ def mode_places(robot: Manipulator, home: Array) -> tuple[ModePlace, ...]:
         ModePlace(*candidate, candidate[0] == file_elbows, candidate[0] == likely)
         for candidate in candidates
     )
+
+
+def _margins_in_reach(robot: Manipulator, poses: Array) -> Array:
+    """Return the least margin at poses (K, m), which is negative beyond limits; -inf elsewhere."""
+    reached = np.isfinite(inverse_kinematics(robot, poses, on_failure="nan")).all(axis=-1)
+    margins = np.full(len(poses), -np.inf)
+    if reached.any():
+        margins[reached] = np.nan_to_num(pose_margins(robot, poses[reached]).least, nan=-np.inf)
+    return margins
 
 
 def _depth(robot: Manipulator, pose: Array) -> float:

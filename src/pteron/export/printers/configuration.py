@@ -68,6 +68,11 @@ def export_klipper(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
             f"{robot.name}: Klipper moves x, y and z alone, and this machine's pose is {pose}; "
             f"{INSTEAD}"
         )
+    if robot.redundancy:
+        raise ModelError(
+            f"{robot.name}: Klipper has one motor for each of x, y and z, and this machine has "
+            f"{robot.joint_count}; {INSTEAD}"
+        )
     text = render_template(
         "pteron.export",
         "klipper.cfg.j2",

@@ -116,7 +116,10 @@ def margins(motion: Movement, limits: Limits, samples: int = 4000) -> Margins:
         near = tightest + np.linspace(-step, step, _REFINED)
         of_limit = _margins_of(robot, limits, motion.states(near))[name]
         k, leg = np.unravel_index(int(of_limit.argmin()), of_limit.shape)
-        owner, unit = None if name == "type_ii" else int(leg) + 1, unit_of(robot, name, int(leg))
+        # An angle of the platform counts for every leg alike.
+        of_platform = name == "passive_clearance" and robot.platform.limits is not None
+        has_owner = name != "type_ii" and not (of_platform and np.ptp(of_limit[k]) == 0.0)
+        owner, unit = int(leg) + 1 if has_owner else None, unit_of(robot, name, int(leg))
         when = float(near[k] % motion.duration)
         least_margins.append(Margin(name, float(of_limit[k, leg]), owner, when, unit))
     return Margins(tuple(least_margins), samples)

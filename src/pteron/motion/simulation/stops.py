@@ -47,9 +47,9 @@ def limit_text(robot: Manipulator, pose: Array) -> str:
         limited_joints(robot, pose),
         key=lambda joint: max(joint.least - joint.value, joint.value - joint.most),
     )
-    where = f"leg {worst.leg}: " if worst.leg else ""
+    joint = f"leg {worst.leg}: the {worst.noun}" if worst.leg else worst.noun
     limits = worst.limits_text(lambda number, _: f"{number:g}")
-    return f"{where}the {worst.noun} comes to its limit, {worst.value:.5g} {worst.unit} of {limits}"
+    return f"{joint} comes to its limit, {worst.value:.5g} {worst.unit} of {limits}"
 
 
 def first_singular(robot: Manipulator, poses: Array) -> int | None:

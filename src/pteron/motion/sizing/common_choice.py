@@ -54,7 +54,7 @@ def alike_legs(robot: RobotLike) -> tuple[tuple[int, ...], ...]:
 
 def _dimensions(leg: LegKind) -> dict[str, float]:
     """Return a leg's lengths and other numeric parameters, by their keys."""
-    roles = ("length", "number", "count")
+    roles = ("length", "number", "angle", "count")
     keys = [name for name, key in leg.every_key().items() if key.role in roles]
     settings = {name: getattr(leg, name) for name in keys}
     return {name: float(number) for name, number in settings.items() if number is not None}
