@@ -71,10 +71,7 @@ class PRUR(UniversalLinkLeg):
     """Whether the slider moves along a, and not across it; the manipulator sets it."""
 
     type = "PRUR"
-    sign_edges: ClassVar = {
-        "elbow": ("first link", "upper link"),
-        "second_elbow": ("lower link",),
-    }
+    sign_edges: ClassVar = {"elbow": ("upper link",), "second_elbow": ("lower link",)}
     joint = SLIDER
     account = ACCOUNTS["PRUR"]
     measure_text = "the cosine between the slider and the force that its joints transmit"
