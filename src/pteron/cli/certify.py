@@ -12,6 +12,7 @@ from pteron.cli.pose_ranges import box_of, pose_ranges, pose_spans, pose_text, s
 from pteron.cli.progress import progress_bar, spinner
 from pteron.cli.result import CommandResult
 from pteron.cli.terminal import note, percent, plain, show, table, warn
+from pteron.cli.travels import travel_result
 from pteron.errors import DataError, ModelError
 from pteron.json_values import json_fields
 
@@ -50,6 +51,8 @@ class RequestedProofs:
         Greatest undecided share of the workspace.
     type_i, type_ii : float or None
         Least singularity measures; None for no bound.
+    start : str or None
+        A pose, as typed, from which the travel is to prove.
     """
 
     certify: bool
@@ -57,11 +60,12 @@ class RequestedProofs:
     tolerance: float | None
     type_i: float | None
     type_ii: float | None
+    start: str | None = None
 
     @property
     def has_requests(self) -> bool:
         """Whether there is anything to prove."""
-        return self.certify or self.prove is not None
+        return self.certify or self.prove is not None or self.start is not None
 
     @property
     def floors(self) -> dict[str, float]:
@@ -71,13 +75,16 @@ class RequestedProofs:
     def check(self, maps: Mapping[str, object], slice_: str | None) -> None:
         """Raise DataError on options that have no effect together, or numbers out of range."""
         numbers = {"tolerance": self.tolerance, "type-i": self.type_i, "type-ii": self.type_ii}
-        if self.prove is not None:
-            _expect_none({**maps, "slice": slice_, "certify": self.certify or None}, "--prove")
+        other = {**maps, "slice": slice_, "certify": self.certify or None}
+        if self.start is not None:
+            _expect_none({**other, "prove": self.prove, "tolerance": self.tolerance}, "--from")
+        elif self.prove is not None:
+            _expect_none(other, "--prove")
             _expect_none({"tolerance": self.tolerance}, "--prove, but with --certify")
         elif self.certify:
             _expect_none(maps, "--certify")
         else:
-            _expect_none(numbers, "a map, but with --certify or --prove")
+            _expect_none(numbers, "a map, but with --certify, --prove or --from")
         for name, number in numbers.items():
             least = "above 0" if name == "tolerance" else "of 0 or more"
             if number is not None and not (number > 0.0 or (number == 0.0 and name != "tolerance")):
@@ -85,6 +92,8 @@ class RequestedProofs:
 
     def result(self, robot: Manipulator, slice_: str | None, warnings: list[str]) -> CommandResult:
         """Run the proof and return its result; the exit code is 1 if a box is not proved."""
+        if self.start is not None:
+            return travel_result(robot, self.start, self.floors, warnings)
         if self.prove is None:
             pose = _orientation(robot, slice_)
             proved = self._certify if robot.platform.lengths else self._certify_tilt

@@ -60,6 +60,7 @@ def workspace(
     scheduler: str | None = None,
     certify: bool = False,
     prove: str | None = None,
+    from_: str | None = None,
     tolerance: float | None = None,
     type_i: float | None = None,
     type_ii: float | None = None,
@@ -73,9 +74,11 @@ def workspace(
     Coordinates that --slice does not name vary over the workspace. Surfaces need three that vary; a
     film goes through the last of three.
 
-    With --certify or --prove nothing is mapped: interval arithmetic proves, rounding included, how
-    large the workspace is at an orientation (--slice phi=VALUE), or that every pose of a box is in
-    reach and within limits. If not, the output names a pose and the reason, and the exit code is 1.
+    With --certify, --prove or --from nothing is mapped: interval arithmetic proves, rounding
+    included, how large the workspace is at an orientation (--slice phi=VALUE), that every pose of a
+    box is in reach and within limits, or how far the machine can go from a pose along and about
+    each axis. If a box is not proved, the output names a pose and the reason, and the exit code is
+    1.
 
     A .zarr store grows chunk by chunk: the same command resumes after an interruption. Workers of a
     cluster write to it, so they must reach it by the same path.
@@ -94,6 +97,8 @@ def workspace(
     --certify: Prove the size of the workspace, what limits it, and a cube inside.
     --prove NAME=LEAST:GREATEST,...: Prove that all poses of a box can be used:
         x=-0.05:0.05,y=0:0.1,z=0; m and rad.
+    --from POSE: Prove how far it can go from a pose along each coordinate, and what stops it;
+        numbers in m and rad, such as 0,0,-0.9.
     --tolerance SHARE: With --certify: largest undecided share of the volume. [default: 0.05]
     --type-i FLOOR: In a proof: least type-I measure of every leg, 0 stretched or folded, 1 at best.
     --type-ii FLOOR: In a proof: least type-II measure, 0 where the drives cannot hold the platform.
@@ -105,9 +110,10 @@ def workspace(
     pteron workspace quadrupteron --index condition --slice phi=0 --out condition.vtk
     pteron workspace robot.toml --index kappa --slice z=0 --points 400 --out kappa.zarr
     pteron workspace delta --certify
+    pteron workspace delta --from 0,0,-0.9
     pteron workspace delta --prove x=-0.2:0.2,y=-0.2:0.2,z=-1.0:-0.8
     """
-    proofs = RequestedProofs(certify, prove, tolerance, type_i, type_ii)
+    proofs = RequestedProofs(certify, prove, tolerance, type_i, type_ii, from_)
     maps = {"index": index, "points": points, "out": out, "workers": workers}
     other = {"scheduler": scheduler, "engine": None if engine == "auto" else engine}
     proofs.check({**maps, **other}, slice_)

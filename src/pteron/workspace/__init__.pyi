@@ -69,6 +69,11 @@ from pteron.workspace.tilts import (
     largest_ball as largest_ball,
     largest_tilt as largest_tilt,
 )
+from pteron.workspace.travels import (
+    Travel as Travel,
+    largest_box as largest_box,
+    travel as travel,
+)
 from pteron.workspace.volume import (
     ReachVolume as ReachVolume,
     bounding_box as bounding_box,
