@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import tilting
-from mechanisms import CATALOG, NIGHTLY, TILTED, gated, several
+from mechanisms import CATALOG, TILTED, gated, several
 from test_multipteron import drawn
 
 import pteron
@@ -143,13 +143,3 @@ def test_closures_vanish_at_poses_and_nowhere_else(name):
         "errors",
         "any_branch",
     ]
-
-
-@NIGHTLY
-def test_dietmaiers_forty_poses_are_proved():
-    direct_position = pytest.importorskip("direct_position")
-    base, top = direct_position.dietmaiers()
-    robot = direct_position.hexapod(base, top)
-    box = [[-3, -3, -3, -np.pi, -np.pi / 2, -np.pi], [3, 3, 3, np.pi, np.pi / 2, np.pi]]
-    proved = proved_poses(robot, direct_position._LENGTHS, box, most_boxes=20_000_000)
-    assert len(proved.poses) == 40
