@@ -47,6 +47,10 @@ KINDS: dict[str, tuple[str, str]] = {
 """The dimensions of each kind that vary beside the size, and the coordinates of its place that do:
 the others are those of its plane or axis of symmetry, or of its home pose."""
 
+FOR_TILTS = ("hexapteron", "pentapteron", "5-rpur")
+"""Kinds that are tried only for a job that tilts, or by name: each takes a minute or more, and for
+a job without tilts there are simpler machines."""
+
 _LAID = ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
 """Rotation of machines that turn about z and x: about x and y, so that z tilts to every side."""
 
@@ -289,7 +293,8 @@ def fitting_kinds(names: Sequence[str] | None, lengths: int, turn: bool, tilt: b
         If one that is asked for cannot do it, or none can.
     """
     faults, kinds = [], []
-    for name in KINDS if names is None else names:
+    usual = [name for name in KINDS if tilt or name not in FOR_TILTS]
+    for name in usual if names is None else names:
         platform = load(name).platform
         tilting, turning = angle_counts(platform)
         lacks = [
