@@ -498,10 +498,10 @@ def test_starts_whose_processes_fail_are_improved_here():
 
 @pytest.mark.parametrize("error", [OSError("handle is closed"), ValueError("bad fds_to_keep")])
 def test_a_pool_that_breaks_while_a_process_starts_has_lost_a_worker(error, monkeypatch):
-    def start(self):
+    def submit(*_):
         raise error
 
-    monkeypatch.setattr(ProcessPoolExecutor, "_spawn_process", start)
+    monkeypatch.setattr(ProcessPoolExecutor, "submit", submit)
     with pytest.raises(LostWorkerError), WorkerPool(2, script=False) as pool:
         pool.start(print)
 

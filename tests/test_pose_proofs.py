@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import tilting
-from mechanisms import CATALOG, TILTED, gated, several
+from mechanisms import CATALOG, TILTED, gated, random_machine, several
 from test_multipteron import drawn
 
 import pteron
@@ -11,6 +11,7 @@ from pteron.errors import DataError, ModelError, PteronError
 from pteron.kernels import numeric
 from pteron.kernels.programs import numeric_program
 from pteron.workspace import proved_poses
+from pteron.workspace.enclosing import enclosing_box
 
 LOADED = CATALOG | TILTED
 FIVE = "PRUR", "RPUR", "five freedoms, mixed"
@@ -143,3 +144,13 @@ def test_closures_vanish_at_poses_and_nowhere_else(name):
         "errors",
         "any_branch",
     ]
+
+
+def test_the_box_about_a_sliding_platforms_reach_grows_with_its_angle():
+    # Its halves part by as much as phi says, while a turned point stays as far from the center.
+    slides = random_machine(5, "RRRRI")
+    assert slides.platform.slides
+    for robot, grows in ((slides, True), (LOADED["quadrupteron"], False)):
+        phi = np.where(robot.platform.angular, 1.0, 0.0)
+        sides = [np.ptp(enclosing_box(robot, -half * phi, half * phi), axis=0) for half in (3, 4)]
+        assert (sides[1] > sides[0] + 1e-3).any() == grows

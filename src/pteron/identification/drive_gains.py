@@ -240,7 +240,7 @@ def _current_unit(logs: list[Log]) -> str:
 
 
 class _FeltCurrents(NamedTuple):
-    """What the platform of a machine with more legs than coordinates feels of currents."""
+    """The load that currents put on the platform of a machine with more legs than coordinates."""
 
     currents: Array
     """Each drive's alone, (R, n, n)."""

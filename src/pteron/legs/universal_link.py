@@ -93,7 +93,7 @@ class HeldClosure(NamedTuple):
     """The closure of both links from a given beginning."""
 
     sign: Expression
-    """Of the root: the sign of that link's part along n."""
+    """The sign of the root: that of its link's part along n."""
     square: Expression
     """The root's radicand, m^2."""
     rest: Expression

@@ -28,7 +28,9 @@ def enclosing_box(robot: Manipulator, low: Array, high: Array, *, limits: bool =
     size = len(directions)
     # The platform points at the middle of the interval, and how far they are from there at most.
     middle = 0.5 * (low + high)
-    half = min(0.5 * float((high - low)[robot.platform.angular].sum()), 2.0)
+    half = 0.5 * float((high - low)[robot.platform.angular].sum())
+    if robot.platform.rotation_axes:  # a turned point is within twice its distance from the center
+        half = min(half, 2.0)
     points = np.array([leg.platform_point for leg in robot.legs])
     arms = robot.platform.arms(points, middle)
     slacks = np.linalg.norm(points, axis=1) * half

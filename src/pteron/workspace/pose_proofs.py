@@ -262,8 +262,8 @@ def _zeros(closures: _Closures, whole: Array, most: int) -> tuple[Array, Array, 
             batch, cut = batch[met], cut[met]
             widths, before = cut[:, 1] - cut[:, 0], batch[:, 1] - batch[:, 0]
             is_large = np.asarray((widths > _SMALL * sides).any(axis=1))
-            found, doubtful = _prove_zeros(closures, cut[~is_large], sides)
-            zeros.append(found)
+            proved, doubtful = _prove_zeros(closures, cut[~is_large], sides)
+            zeros.append(proved)
             undecided.append(doubtful)
             is_narrower = np.asarray((widths < _NARROWER * before).any(axis=1))
             halves = halve_boxes(cut[is_large & ~is_narrower], sides)
@@ -283,11 +283,11 @@ def _prove_zeros(closures: _Closures, boxes: Array, sides: Array) -> tuple[Array
 
 def _distinct(robot: Manipulator, poses: Array, near: Array) -> Poses:
     """Return poses (K, m), those found on both sides of a wall once, in the order of the first."""
-    kept: list[Array] = []
+    distinct: list[Array] = []
     for pose in poses[np.lexsort(poses.T)]:
-        away = [pose - other for other in kept]
+        away = [pose - other for other in distinct]
         for difference in away:
             difference[robot.wraps] = wrap_angle(difference[robot.wraps])
         if not any((np.abs(difference) <= near).all() for difference in away):
-            kept.append(pose)
-    return np.array(kept).reshape(-1, robot.freedom)
+            distinct.append(pose)
+    return np.array(distinct).reshape(-1, robot.freedom)
