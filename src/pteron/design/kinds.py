@@ -280,8 +280,7 @@ def angle_counts(platform: Platform) -> tuple[int, int]:
 
     Those that tilt come first: (0, 0), (0, 1), (2, 0) or (2, 1).
     """
-    count = len(platform.angles)
-    return 2 * (count >= 2), count % 2
+    return 2 * platform.tilts, int(platform.spin_angle is not None)
 
 
 def fitting_kinds(names: Sequence[str] | None, lengths: int, turn: bool, tilt: bool) -> list[str]:
