@@ -7,7 +7,7 @@ from dataclasses import asdict
 from functools import partial
 from typing import TYPE_CHECKING, Literal
 
-from pteron.cli.arguments import MachineArgument, check_rate, parsed_list
+from pteron.cli.arguments import MachineArgument, about_pivot, check_rate, parsed_list
 from pteron.cli.motion_argument import Carried, given_pose, read_motion
 from pteron.cli.motion_table import motion_frame, peaks_table, travel_text
 from pteron.cli.planned_motions import joint_motion, line_motion, standard_motion
@@ -77,6 +77,7 @@ def cycle(
     tool_speed: float | None = None,
     tool_acceleration: float | None = None,
     carried: Carried,
+    pivot: str | None = None,
     out: str | None = None,
 ) -> CommandResult:
     """Plan a motion within limits, and compute the speeds and forces that it needs of the drives.
@@ -134,7 +135,7 @@ def cycle(
     """
     from pteron.motion import limits_of
 
-    machine = carried.load_machine(machine)
+    machine = about_pivot(carried.load_machine(machine), pivot)
     check_rate(rate)
     if out is not None:
         from pteron.tables import check_output
