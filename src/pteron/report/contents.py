@@ -19,6 +19,7 @@ from pteron.kinematics.singularities import best_type_ii
 from pteron.manipulator import Manipulator
 from pteron.manipulator.template import template_sentence
 from pteron.motion import Motion, PickAndPlace, Sizing, least_margin, pick_and_place, size
+from pteron.motion.sizing.friction_sentence import friction_sentence
 from pteron.playback import Playback
 from pteron.reduction import BaseParameters, base_parameters
 from pteron.report.costs import Cost, costs
@@ -114,6 +115,7 @@ class Report:
     source: str
     shown: Frames
     sizing: Sizing
+    friction: str
     joints: JointRanges
     passive: tuple[LimitedJoint, ...]
     slices: tuple[ReachSlice, ...]
@@ -190,6 +192,7 @@ def contents(robot: Manipulator, motion: Playback | None = None) -> Report:
         source="" if motion is None else motion.source,
         shown=frames(robot, cycle, sizing.forces[::2], home),
         sizing=sizing,
+        friction=friction_sentence(robot),
         joints=joint_ranges(robot, cycle.pose),
         passive=tuple(joint for joint in limited_joints(robot, home) if not joint.actuated),
         slices=_slices(robot, home, volume),
