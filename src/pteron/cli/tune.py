@@ -49,7 +49,7 @@ def tune(
     encoders: str = _ENCODERS,
     out: str | None = None,
 ) -> CommandResult:
-    """Choose gains of a controller with stability margins that hold in a cycle and the workspace.
+    """Choose a controller's gains, with stability margins in a cycle and the workspace.
 
     The loop of machine, drives, encoders, controller and delay is linearised at moments of the
     cycle and at poses of the workspace, with all coupling of the closed chain, and discretised
