@@ -1,4 +1,4 @@
-"""Rows of a report's tables: those of equal legs merged, vectors by component, strokes of joints."""
+"""Rows of a report's tables: equal legs merged, vectors by component, strokes of joints."""
 
 from __future__ import annotations
 
