@@ -212,8 +212,9 @@ def svg(figure: Figure, *, name: str, title: str, widest: float = _ON_PAGE) -> M
     It holds no date, no random identifier and no address, and its colours are CSS variables with
     the printed colours as defaults. Text stays text, in the page's font. The name, of letters and
     digits, is put before every identifier, which must be unique in a page; the title says what the
-    picture shows to those who cannot see it. Over time it tells a page's script where time is. A wider figure is made as narrow as is said (inches),
-    its letters as they are, so that they can be read in a column and on a phone.
+    picture shows to those who cannot see it. Of curves over time it tells a page's script where the
+    time is. A wider figure is made as narrow as is said (inches), its letters as they are, so that
+    they can be read in a column and on a phone.
     """
     if figure.get_size_inches()[0] > widest:
         _set_width(figure, widest)

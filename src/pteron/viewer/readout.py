@@ -71,11 +71,13 @@ def readout(state: ViewerState, numbers: Readings) -> str:
 
 def _strokes(state: ViewerState, numbers: Readings) -> list[float]:
     """Return where each ram stands between its shortest and its longest, %; [] for other legs."""
-    legs = state.robot.legs
-    if not all(leg.has_constant_measure and leg.limits for leg in legs):
-        return []
-    pairs = zip(numbers.joints, (leg.limits for leg in legs), strict=True)
-    return [100.0 * float((at - low) / (high - low)) for at, (low, high) in pairs]
+    rams = [(leg.has_constant_measure, leg.limits) for leg in state.robot.legs]
+    shares = [
+        100.0 * float((length - limits[0]) / (limits[1] - limits[0]))
+        for length, (is_ram, limits) in zip(numbers.joints, rams, strict=True)
+        if is_ram and limits
+    ]
+    return shares if len(shares) == len(rams) else []
 
 
 @cache

@@ -320,7 +320,7 @@ class Session:
         return ends
 
     def joint_spans(self, busy: Callable[[], bool] = lambda: False) -> Array | None:
-        """Return the free range of each joint from here (2, n); None if `busy` says so meanwhile."""
+        """Return the free range of each joint from here (2, n); None as soon as `busy` says so."""
         robot, pose = self.state.robot, self.state.pose
         joints = self.state.joints
         joint_ends = np.array([joints, joints])
