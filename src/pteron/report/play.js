@@ -22,6 +22,12 @@
   });
   let frame = 0, playing = false, now = 0, last = null, shown = true;
 
+  // A line in every curve over time, at the moment that the picture shows.
+  const cursors = [...document.querySelectorAll("svg[data-time]")].map((svg) => {
+    const [start, end, left, right, top, bottom] = svg.dataset.time.split(" ").map(Number), line = document.createElementNS("http://www.w3.org/2000/svg", "line");
+    line.setAttribute("class", "cursor"); line.setAttribute("y1", top); line.setAttribute("y2", bottom); svg.append(line);
+    return (time) => { for (const name of ["x1", "x2"]) line.setAttribute(name, left + ((right - left) * (time - start)) / (end - start)); };
+  });
   const put = (id, text) => { document.getElementById(id).textContent = text; };
   picture.drawn = () => {
     const k = frame;
@@ -33,7 +39,7 @@
     }
     data.pose[k].forEach((value, j) => put("pose" + j, minus(value * data.scales[j], 1)));
     put("clock", data.time[k].toFixed(2) + " of " + data.duration.toFixed(2) + " s");
-    seek.value = k;
+    seek.value = k; cursors.forEach((move) => move(data.time[k]));
     seek.setAttribute("aria-valuetext", data.time[k].toFixed(2) + " seconds");
   };
   function show(k) {
