@@ -12,7 +12,7 @@ import socket
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
@@ -100,10 +100,11 @@ class _Loop:
         """Run until the cue is stopped, or a time is over, and the platform rests at home."""
         import numpy as np
 
-        begin, slots, phase = time.monotonic(), 0, self.cue.phase
-        end = math.inf if duration is None else begin + duration
+        self._drop_backlog()
         gc.collect()
         gc.disable()  # nothing here makes cycles, and a collection takes milliseconds
+        begin, slots, phase = time.monotonic(), 0, self.cue.phase
+        end = math.inf if duration is None else begin + duration
         try:
             while not (self.cue.is_stopping and self.cue.at_home):
                 slots += 1
@@ -126,6 +127,12 @@ class _Loop:
         finally:
             gc.enable()
         self.seconds = time.monotonic() - begin
+
+    def _drop_backlog(self) -> None:
+        """Discard the datagrams that came before the first tick."""
+        while select.select([self._receiver], [], [], 0.0)[0]:
+            with suppress(OSError):
+                self._receiver.recv(1)
 
     def _receive(self, deadline: float) -> tuple[float, ...] | None:
         """Return the newest sample that arrives up to a time, s; None without one."""

@@ -191,7 +191,7 @@ def _even_times(time: Array, source: str) -> tuple[Array, str]:
     """Return even times, at most `_STEP` apart, from 0 to the last one, s; why, in words."""
     steps, count, text = np.diff(time), len(time), ""
     median = float(np.median(steps))
-    is_uneven = np.ptp(steps) > SAME * steps.mean()
+    is_uneven = bool(np.ptp(steps) > SAME * steps.mean())
     if is_uneven or median > _STEP:
         count = int(np.ceil(time[-1] / min(median, _STEP))) + 1
         lost = int((np.rint(steps / median) - 1.0).clip(0.0).sum())

@@ -14,9 +14,9 @@ import numpy as np
 
 from pteron.dynamics import drive_forces
 from pteron.errors import DataError, ModelError
-from pteron.kernels import Array
+from pteron.kernels import Array, numeric
 from pteron.kinematics import joint_rates
-from pteron.kinematics.evaluate import evaluate_unchecked, finite_pose
+from pteron.kinematics.evaluate import finite_pose
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.manipulator.readings import to_readings
 from pteron.motion.cueing import WITHIN, Cue, expect_free_platform, prove_box
@@ -35,7 +35,7 @@ TIMEOUT = 0.3
 """Time without a sample, s, after which the platform returns: 18 datagrams at 60 Hz."""
 
 _GENTLE = 0.3
-"""Share of the limits that starting and returning take."""
+"""Share of the acceleration that starting and returning take."""
 
 _SPAN = 3.0
 """Time constant of the follower's linear zone in ticks: from 2 on its discrete poles are stable and
@@ -88,6 +88,7 @@ class Follower:
     def place(self, position: Array) -> None:
         """Set the point at rest at a position."""
         self.position, self.velocity = position, np.zeros_like(position)
+        self.acceleration = np.zeros_like(position)
         self._target = None
 
     def retarget(self) -> None:
@@ -95,19 +96,19 @@ class Follower:
         self._target = None
 
     def advance(self, target: Array, rate: Array, share: float = 1.0) -> None:
-        """Advance by a tick towards a target and its rate (k,), with a share of the limits."""
+        """Advance by a tick towards a target and its rate (k,), at a share of the acceleration."""
         h, y, v = self._step, self.position, self.velocity
         before, rate_before = (target, rate) if self._target is None else self._target
         self._target = target, rate
-        most, fastest = share * self._most, np.maximum(share * self._speed, np.abs(v))
+        most = share * self._most
         wanted = (rate - rate_before) / h
         wanted = wanted + _time_optimal(y - before, v - rate_before, most, _SPAN * h)
         wanted = np.minimum(np.maximum(wanted, -most), most)
         a, halfway = self._most, 0.5 * h * v
         upper = a * (np.sqrt(h * h + 2.0 * np.maximum(self._half - y - halfway, 0.0) / a) - h)
         lower = -a * (np.sqrt(h * h + 2.0 * np.maximum(self._half + y + halfway, 0.0) / a) - h)
-        velocity = np.minimum(v + h * wanted, np.minimum(upper, fastest))
-        velocity = np.maximum(velocity, np.maximum(lower, -fastest))
+        velocity = np.minimum(v + h * wanted, np.minimum(upper, self._speed))
+        velocity = np.maximum(velocity, np.maximum(lower, -self._speed))
         self.position = y + 0.5 * h * (v + velocity)
         self.velocity, self.acceleration = velocity, (velocity - v) / h
 
@@ -322,6 +323,8 @@ class LiveCue:
         self._patience = math.ceil(timeout * rate)
         self._silent, self._held = self._patience + 1, np.zeros(6)
         self._stopping = False
+        self._inverse = numeric(self._robot, "inverse_kinematics")
+        self._inverse.tier.fetch(at_any_cost=True)  # now, not in the middle of a motion
         self.phase = "home"
         self._set_pose()
 
@@ -405,7 +408,7 @@ class LiveCue:
         self.pose = self._center + follower.position + offset * self._way
         self.velocity = follower.velocity + 0.5 * share.velocity[0] * self._way
         self.acceleration = follower.acceleration + 0.5 * share.acceleration[0] * self._way
-        joints = evaluate_unchecked(self._robot, "inverse_kinematics", self.pose)
+        joints, _ = self._inverse(self.pose)
         self.joints = to_readings(self._robot, joints)
 
     pose: Array
