@@ -12,12 +12,15 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
+import os
 import socket
 import struct
 import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -31,6 +34,7 @@ Received = tuple[float, dict[str, Any]]
 RATE = 250
 LOST, DAMAGED = 0.02, 0.05
 PAUSES, PAUSE = (0.25, 0.5, 0.75), 2.0
+INTERRUPTED = 5e-4
 FLOOD, FLOOD_SECONDS, FLOOD_RATE = 0.6, 5.0, 10_000
 _NANOSECONDS = getattr(socket, "SO_TIMESTAMPNS", 35)
 
@@ -56,6 +60,8 @@ def main() -> None:
             command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
         ) as live:
             _await_first(here)
+            with suppress(AttributeError, OSError):  # so that it sends in time under load
+                os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))
             sent, set_points = _drive(here, ("127.0.0.1", port), seconds)
             live.terminate()
             output, _ = live.communicate()
@@ -123,8 +129,11 @@ def _drive(
             if rng.uniform() < DAMAGED:
                 out.sendto(_damaged(rng, sample, t), address)
             elif rng.uniform() >= LOST:
-                sent[t] = time.time()
+                begin_sending = time.time()
                 out.sendto(_datagram(sample, t), address)
+                # A sender that was interrupted meanwhile does not know when it sent.
+                is_known = time.time() - begin_sending < INTERRUPTED
+                sent[t] = begin_sending if is_known else math.nan
     return sent, set_points
 
 
@@ -153,7 +162,7 @@ def _print_figures(
     newest = None
     for arrival, point in set_points:
         if point["stamp"] != newest and point["stamp"] in sent and point["phase"] == "cueing":
-            delays.append(arrival - sent[point["stamp"]])
+            delays.append(1e3 * (arrival - sent[point["stamp"]]))
         newest = point["stamp"]
     low, high = np.array([record["box"][name] for name in robot.coordinates]).T
     poses = np.array([[p["pose"][name] for name in robot.coordinates] for _, p in set_points])
@@ -168,7 +177,9 @@ def _print_figures(
     step = 1.0 / RATE
     speed = np.abs(np.diff(poses, axis=0)).max(axis=0) / step
     change = np.abs(np.diff(poses, 2, axis=0)).max(axis=0) / step**2
-    ms = 1e3 * np.array(delays)
+    ms = np.array(delays)
+    ms, unknown = ms[~np.isnan(ms)], int(np.isnan(ms).sum())
+    own = {name: 1e3 * seconds for name, seconds in record["delay"].items()}
     print(f"{robot.name}: {record['duration']:.0f} s, {record['set_points']} set points, of which")
     print(f"  {len(set_points)} received; left out by the clock: {record['late']}")
     print(f"datagrams: {len(sent)} samples sent, {record['accepted']} used; not used:")
@@ -177,7 +188,11 @@ def _print_figures(
     print(
         f"delay from sending a sample to its set points: median {np.median(ms):.2f} ms, "
         f"99 % {np.quantile(ms, 0.99):.2f} ms, longest {ms.max():.2f} ms, "
-        f"over 5 ms: {(ms > 5.0).sum()} of {len(ms)}"
+        f"over 5 ms: {(ms > 5.0).sum()} of {len(ms)}; sender interrupted: {unknown}"
+    )
+    print(
+        f"from its arrival, by the command's own clock: median {own['median']:.2f} ms, "
+        f"99 % {own['p99']:.2f} ms, longest {own['longest']:.2f} ms"
     )
     print(
         f"poses outside the box and the way home: {outside.sum()}; joints beyond limits: {beyond}"

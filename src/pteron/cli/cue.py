@@ -63,8 +63,6 @@ def cue(
     --robot FILE: A machine whose platform moves and turns freely.
     --around POSE: Middle of the box, or home. [default: where the largest box of the motion's
         proportions fits]
-    --pivot POINT: Point of the platform that poses and accelerations refer to, such as the rider's
-        head: x y z in the platform's frame, m. [default: the file's]
     --out FILE: Write poses and joints to a .csv or .parquet file.
     --page FILE: Write a page that shows the motion, a .html file.
     --type-ii: Least type-II measure of the poses used: 0 where the drives cannot hold the platform.
