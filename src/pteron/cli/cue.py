@@ -210,7 +210,8 @@ def _result(
         f"[bold]{plain(machine.name)}[/bold]{plain(str(carried))}, motion of {plain(motion)}: "
         f"{cued.duration:.4g} s ({len(cued.time)} samples)",
         *box_lines(machine, cued.region),
-        f"Amplitudes are reduced by at most {percent(cued.pressed)} to stay in the box."
+        f"Amplitudes are reduced by at most {percent(cued.pressed)} to stay in the box; a smaller "
+        "--scale asks for less."
         if cued.pressed >= _REDUCED
         else "Amplitudes are not reduced: the motion fits into the box.",
         peaks_table(largest),

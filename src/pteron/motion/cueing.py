@@ -195,7 +195,8 @@ def _even_times(time: Array, source: str) -> tuple[Array, str]:
     if is_uneven or median > _STEP:
         count = int(np.ceil(time[-1] / min(median, _STEP))) + 1
         lost = int((np.rint(steps / median) - 1.0).clip(0.0).sum())
-        text = f"time stamps {1e3 * steps.min():.3g} to {1e3 * steps.max():.3g} ms apart"
+        spread = f"{1e3 * steps.min():.3g} to {1e3 * steps.max():.3g} ms"
+        text = f"time stamps {spread if is_uneven else f'{1e3 * median:.3g} ms'} apart"
         text += f" ({lost} missing)" * (is_uneven and lost > 0)
         text += f", interpolated linearly to steps of {1e3 * time[-1] / (count - 1):.3g} ms"
     if count > _MANY:
