@@ -133,8 +133,11 @@ def cycle(
     pteron cycle tripteron --to 0.1 0 0.05 --back --acceleration 10 --out line.csv
     pteron cycle delta --via poses.csv --corner 0.02 --duration 2 --out path.csv
     """
+    from pteron.manipulator.template import template_sentence
     from pteron.motion import limits_of
 
+    if text := template_sentence(machine):
+        note(f"Note: {text}")
     machine = about_pivot(carried.load_machine(machine), pivot)
     check_rate(rate)
     if out is not None:
@@ -190,11 +193,8 @@ def _result(
     """Write the motion's table if a file is named, and return its summary with the peak loads."""
     import numpy as np
 
-    from pteron.manipulator.template_masses import template_masses
     from pteron.motion import peaks
 
-    if text := template_masses(machine):
-        note(f"Note: {text}")
     count = _DENSE * (len(motion.time) - 1) + 1
     fine = np.linspace(float(motion.time[0]), float(motion.time[-1]), count)
     largest = peaks(machine, *motion.at(fine), limits)

@@ -191,6 +191,15 @@ class DistributionTable(TomlTable):
     )
 
 
+class TemplateTable(TomlTable):
+    """`[template]`: the machine of the catalog that the file was made from."""
+
+    kind: str = key("name of the machine in the catalog")
+    confirmed: list[str] = key(
+        "keys of values that are meant to be as in the template: pteron check lists the others", []
+    )
+
+
 class MachineTable(TomlTable):
     """The whole file; each of `legs` is read by its own kind."""
 
@@ -212,6 +221,7 @@ class MachineTable(TomlTable):
     distribution: DistributionTable | None = key(
         "how more legs than freedoms share out their forces", None
     )
+    template: TemplateTable | None = key("machine of the catalog that the file was made from", None)
     owner: dict[str, Any] = key("data of the owner: kept, without effect", {}, {"serial": "Q-07"})
     platform: PlatformTable = key("the platform, which the legs carry")
     legs: list[Any] = key("the legs: one table for each degree of freedom of the platform, or more")

@@ -17,7 +17,7 @@ from pteron.kinematics import singular_orientations
 from pteron.kinematics.jacobian_at import JacobianAtPose, jacobian_at
 from pteron.kinematics.singularities import best_type_ii
 from pteron.manipulator import Manipulator
-from pteron.manipulator.template_masses import template_masses
+from pteron.manipulator.template import template_sentence
 from pteron.motion import Motion, PickAndPlace, Sizing, least_margin, pick_and_place, size
 from pteron.playback import Playback
 from pteron.reduction import BaseParameters, base_parameters
@@ -180,7 +180,7 @@ def contents(robot: Manipulator, motion: Playback | None = None) -> Report:
         robot=robot,
         doubts=(
             *examine(robot, home).warnings,
-            *([masses] if (masses := template_masses(robot)) else []),
+            *([kept] if (kept := template_sentence(robot)) else []),
             *(() if motion is None else force_doubts(robot, motion)),
         ),
         home=home,
