@@ -173,7 +173,7 @@ _COMMANDS: dict[str, tuple[Callable[..., CommandResult | None], ...]] = {
 }
 """The subcommands of each panel of the help."""
 
-_NUMERIC = (inverse, direct, forces, cycle)
+_NUMERIC = (inverse, direct, forces, cycle, cue)
 """Subcommands whose arguments may be negative numbers."""
 
 _GENERAL = (check, report, workspace, base, table1, export)
