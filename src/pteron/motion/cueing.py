@@ -61,7 +61,7 @@ _TRIES = 30
 """Sizes for which a proof is tried, each nine tenths of the one before; if none is proved, the cue
 is refused."""
 
-_FIRST, _LAST, _BETTER = 0.25, 2e-3, 1.002
+_FIRST, _LAST, _BETTER = 0.25, 2e-3, 1.005
 """The search of the box's middle: first and last step, in mean leg sizes, and the factor by which
 the box must grow: its size is bisected to 0.1 %."""
 
