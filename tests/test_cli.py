@@ -59,6 +59,27 @@ def test_the_bare_command_shows_its_help():
     text = done("")
     assert text == done("--help")
     assert all(name in text for name in COMMANDS)
+    assert len(text.splitlines()) <= 40, "it fits one screen"
+
+
+@pytest.mark.parametrize("name", ["stewart", "rubin-m2-hexapod"])
+def test_check_shows_equal_legs_in_one_row(name: str):
+    text, each = done(f"check {name}", COLUMNS="100"), done(f"check {name} --all", COLUMNS="100")
+    assert len(text.splitlines()) <= 30
+    assert sum("UPS   " in line for line in text.splitlines()) == 1
+    assert sum("UPS   " in line for line in each.splitlines()) == 6
+    assert "1 to 6  ram at the base" in text
+    assert each.count("ram at the base") == 6
+
+
+def test_check_shows_the_range_of_legs_that_differ_at_home_alone(tmp_path):
+    lines = run("new stewart").stdout.replace("[home]", "# [home]")
+    file = tmp_path / "shifted.toml"
+    file.write_text(f"{lines}\n[home]\npose = [0.1, 0.0, 2.0, 0.0, 0.0, 0.0]\n")
+    text = done(f"check {file}", COLUMNS="100")
+    at_home = json.loads(done(f"check {file} --json"))["legs"]
+    lengths = [leg["at_home"] for leg in at_home]
+    assert f"{min(lengths):.5g} to {max(lengths):.5g} m" in text
 
 
 @pytest.mark.parametrize("command", COMMANDS)

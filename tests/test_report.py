@@ -248,11 +248,11 @@ def test_the_page_shows_the_numbers(name):
     for noun in ("slider", "crank", "shaft"):
         assert (noun in text.replace("the slider is tilted", "")) == (noun in joints)
     assert ("torque" in text) == ("crank" in joints)
-    for words in ("in a plane", "Area in reach", "dm²", "lies in the machine's plane"):
+    for words in ("in a plane", "Workspace area", "dm²", "lies in the machine's plane"):
         assert (words in text) == (name == "planar")
     for words in ("counts as a point mass", "way of the tool's centre point", "Passive joints"):
         assert (words in text) == (name == "shaft")
-    for words in ("Drives, at the joints", "4.626 4.626", "Drive forces,"):
+    for words in ("Drives, at the joints", "4.626 4.626"):
         assert (words in text) == (name == "driven"), words
     assert ("friction is left out" in text) == (name != "driven")
     assert all(line in text for line in loads.overloads)

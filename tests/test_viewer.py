@@ -242,6 +242,17 @@ def test_a_torques_arrow_goes_round_its_axis_from_the_crank_on(homes):
     assert picture.legend(np.full(3, 18.04)).endswith("half a turn stands for 18.0 N m")
 
 
+def test_rams_have_a_place_in_their_stroke_and_no_type_i_singularity():
+    rams, cranks = (state_at_rest(pteron.load(name)) for name in ("3-rpr", "five-bar"))
+    text = readout(rams, readings(rams))
+    (low, high), length = rams.robot.legs[0].limits, rams.joints[0]
+    assert f"left:{100.0 * (length - low) / (high - low):.1f}%" in text
+    assert "type-I singularity" not in text
+    assert "to a type-II singularity" in text
+    assert "stroke" not in readout(cranks, readings(cranks))
+    assert "to a type-I singularity" in readout(cranks, readings(cranks))
+
+
 def test_where_the_forces_are_not_determined_the_page_says_why():
     robot = pteron.load("quadrupteron")
     state = state_at_rest(robot, np.array([0.0, 0.0, 0.0, np.pi / 2.0]))
@@ -444,8 +455,8 @@ def test_what_was_done_is_undone_and_spans_end_where_the_machine_stops(homes):
     assert np.array_equal(session.state.pose, session.home)
     session.undo()
     assert session.state.message == "There is nothing to undo."
-    assert session.spans(lambda: True) is None
-    poses, joints = session.spans()
+    assert session.joint_spans(lambda: True) is None
+    poses, joints = session.pose_spans(), session.joint_spans()
     for i, (low, high) in enumerate(poses.T):
         ends = np.tile(session.home, (2, 1))
         ends[:, i] = low, high
@@ -598,7 +609,7 @@ def test_hosts_that_only_this_machine_reaches(host, here):
 
 
 SHOWN = """values => {
-    const sliders = [...document.querySelectorAll('input[type=range]')];
+    const sliders = [...document.querySelectorAll('#panel input[type=range]')];
     return values.every((value, i) => Math.abs(Number(sliders[i].value) - value) < 0.051);
 }"""
 """Whether the first sliders of a page stand at values."""
@@ -754,6 +765,60 @@ def test_the_machine_is_in_sight_at_any_size(browser, viewer, width, height):
             assert tab.locator("#panel").bounding_box()["y"] >= other["height"] - 1
         wide = tab.evaluate("document.documentElement.scrollWidth")
         assert wide <= width
+
+
+@CLIENTS
+def test_a_motion_has_its_controls_below_the_picture_and_the_ranges_follow_it(browser):
+    with view("five-bar", port=0, motion="adept") as viewer, opened(browser, viewer.url) as tab:
+        pause = tab.get_by_role("button", name="Pause")
+        pause.wait_for()
+        picture, bar = (tab.locator(name).bounding_box() for name in ("#view", "#transport"))
+        assert bar["y"] + bar["height"] <= picture["y"] + picture["height"] <= 900
+        for name in ("pose0", "joint0"):
+            band = f"document.getElementById('{name}').style.getPropertyValue('--from')"
+            first = tab.evaluate(band)
+            wait_for(tab, f"first => {band} !== '' && {band} !== first", first)
+        pause.click()
+        assert viewer.wait(10.0)
+        assert viewer.faults == ()
+    with view("five-bar", port=0) as viewer, opened(browser, viewer.url) as tab:
+        assert not tab.locator("#transport").is_visible()
+
+
+@CLIENTS
+def test_a_hint_at_the_ring_is_there_until_it_was_dragged_once(browser, viewer):
+    viewer.move_to([0.0, 0.0, 0.0, 0.0])
+    assert viewer.wait(10.0)
+    with opened(browser, viewer.url, 390, 844) as tab:
+        tab.locator("#first").wait_for()
+        box = tab.locator("#view").bounding_box()
+        x, y = tab.evaluate("() => document.getElementById('view').platform()")
+        hint = tab.locator("#first").bounding_box()
+        assert abs(hint["y"] - y) < 30
+        assert 0 <= hint["x"] < hint["x"] + hint["width"] <= 390
+        tab.mouse.move(box["x"] + x, box["y"] + y)
+        tab.mouse.down()
+        tab.mouse.move(box["x"] + x + 5, box["y"] + y)
+        tab.mouse.up()
+        assert not tab.locator("#first").is_visible()
+        tab.reload()
+        tab.locator("table.legs").wait_for(state="attached")
+        tab.wait_for_timeout(300)
+        assert not tab.locator("#first").is_visible()
+
+
+@CLIENTS
+def test_while_the_panel_is_folded_the_drives_forces_stand_over_the_picture(browser, viewer):
+    viewer.move_to([0.0, 0.0, 0.0, 0.0])
+    assert viewer.wait(10.0)
+    forces = pteron.drive_forces(viewer.state.robot, np.zeros(4), np.zeros(4), np.zeros(4))
+    shown = " ".join(
+        f"{i} {format_fixed(force, 1 if abs(force) < 100.0 else 0)} N"
+        for i, force in enumerate(forces, start=1)
+    )
+    with opened(browser, viewer.url, 390, 844) as tab:
+        tab.locator("#given .leg4").wait_for()
+        assert " ".join(tab.inner_text("#given").split()) == shown
 
 
 @CLIENTS

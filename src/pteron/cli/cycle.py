@@ -194,6 +194,7 @@ def _result(
     import numpy as np
 
     from pteron.motion import peaks
+    from pteron.motion.sizing.friction_sentence import friction_sentence
 
     count = _DENSE * (len(motion.time) - 1) + 1
     fine = np.linspace(float(motion.time[0]), float(motion.time[-1]), count)
@@ -231,9 +232,12 @@ def _result(
     )
     if bound is not None:
         text += f"; a polynomial of degree 5 along the same path takes {bound:.4g} s"
+    friction = friction_sentence(machine)
     text += f". Travel: {travel_text(machine, motion)}."
     return CommandResult(
-        record, partial(_show, [text, peaks_table(largest)], out), [out] if out else []
+        record | {"friction": friction},
+        partial(_show, [text, peaks_table(largest), friction], out),
+        [out] if out else [],
     )
 
 

@@ -125,7 +125,7 @@ def excite(
     search: _SearchOptions,
     json: bool = False,
 ) -> CommandResult:
-    """Find a periodic trajectory whose forces determine the base parameters best.
+    """Find a motion for identification: periodic, its forces determine the base parameters best.
 
     The motion leads in from rest, repeats the trajectory, and leads out to rest in the pose where
     it began, all on the same path: move the machine to the first row, and play the file. All limits

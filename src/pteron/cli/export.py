@@ -37,18 +37,18 @@ def export(
     *,
     c: str | None = None,
     st: str | None = None,
+    klipper: str | None = None,
+    marlin: str | None = None,
+    reprap: str | None = None,
+    linuxcnc: str | None = None,
     cuda: str | None = None,
+    target: str | None = None,
     mjcf: str | None = None,
     sdf: str | None = None,
     urdf: str | None = None,
     pinocchio: str | None = None,
     casadi: str | None = None,
     fmu: str | None = None,
-    klipper: str | None = None,
-    marlin: str | None = None,
-    reprap: str | None = None,
-    linuxcnc: str | None = None,
-    target: str | None = None,
     function: list[str] | None = None,
     float_: bool = False,
     specialised: bool = False,
@@ -73,18 +73,25 @@ def export(
     -------
     --c DIR: Write C99 to this folder.
     --st DIR: Write Structured Text to this folder.
+    --klipper DIR: Write the kinematics of a Klipper configuration.
+    --marlin DIR: Write M665 and M666 of a linear Delta for Marlin.
+    --reprap DIR: Write M665 and M666 of a linear Delta for RepRapFirmware.
+    --linuxcnc DIR: Write kinematics for LinuxCNC.
     --cuda DIR: Write CUDA, for many states at once on an NVIDIA GPU, and a module for CuPy.
+    --target NAME=DIR: Write with the export NAME of an installed package.
+
+    Models
+    ------
     --mjcf DIR: Write MuJoCo's MJCF.
     --sdf DIR: Write SDF, for Gazebo.
     --urdf DIR: Write URDF of the tree, and its closures.
     --pinocchio DIR: Write a module that makes Pinocchio's model.
     --casadi DIR: Write CasADi functions, for acados and the like.
     --fmu DIR: Write an FMU of FMI 3.0.
-    --klipper DIR: Write the kinematics of a Klipper configuration.
-    --marlin DIR: Write M665 and M666 of a linear Delta for Marlin.
-    --reprap DIR: Write M665 and M666 of a linear Delta for RepRapFirmware.
-    --linuxcnc DIR: Write kinematics for LinuxCNC.
-    --target NAME=DIR: Write with the export NAME of an installed package.
+
+    Contents
+    --------
+    --function
     --float: C, CUDA: float instead of double.
     --specialised: C, CUDA: insert the inertial parameters as constants.
     --wrench: Dynamics take an external wrench on the platform as input.

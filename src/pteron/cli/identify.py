@@ -55,7 +55,6 @@ def identify(
     out: str,
     held_out: list[str] | None = None,
     description: str | None = None,
-    estimator: Estimator = "weighted",
     without: str | None = None,
     joints: Passive = "none",
     stribeck: str | None = None,
@@ -63,6 +62,7 @@ def identify(
     rotors: bool = False,
     payload: bool = False,
     shared: bool = False,
+    estimator: Estimator = "weighted",
     derivatives: Derivatives | None = None,
     cutoff: float | None = None,
     band: float | None = None,
@@ -91,7 +91,9 @@ def identify(
     --held-out LOG: Log that validates the model; repeat for several. [default: the last 30 % of
         every log]
     --description TOML: Description of all logs. [default: the one beside each, or logs.toml]
-    --estimator: Estimator that solves the equations.
+
+    Model
+    -----
     --without TERMS: Terms to leave out of the model: coulomb,viscous,offset.
     --joints: Viscous friction in the passive joints: none, one value for all, or one each.
     --stribeck SPEED,...|auto: Friction that falls with speed, with these Stribeck speeds, m/s or
@@ -101,10 +103,17 @@ def identify(
     --rotors: Include the inertia of the motors.
     --payload: Identify a payload: logs with and without it, column payload 1 and 0.
     --shared: All legs have the same inertial parameters.
+
+    Processing
+    ----------
+    --estimator: Estimator that solves the equations.
     --derivatives: Method by which positions are differentiated. [default: chosen by the data]
     --cutoff HZ: Cut-off of the filter on positions. [default: chosen by the data]
     --band HZ: Cut-off of the filter on forces and regressor. [default: chosen by the data]
     --period S: Period of the motion. [default: the description's]
+
+    Bodies
+    ------
     --cad WHICH: Choose the bodies as near as possible to those of: robot, none, or a machine's
         file.
     --box BODY=X0,X1,Y0,Y1: Box, m, that contains all mass of the body u1, l3, e, u, ...

@@ -17,6 +17,7 @@ from pteron.cli.result import CommandResult
 from pteron.cli.terminal import complain, plain, show, table, warn
 from pteron.errors import ModelError, PteronError
 from pteron.json_values import json_fields
+from pteron.short_numbers import runs_text
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -85,7 +86,7 @@ def _machine(robot: Manipulator) -> dict[str, Any]:
     }
 
 
-def check(file: str, *, elbows: str | None = None) -> CommandResult:
+def check(file: str, *, elbows: str | None = None, all_: bool = False) -> CommandResult:
     """Check a machine's file and describe the machine.
 
     The check fails, with exit code 2, if the file is not valid (all faults are reported), if the
@@ -96,11 +97,15 @@ def check(file: str, *, elbows: str | None = None) -> CommandResult:
     The output shows the legs, the home pose, how well the drives hold the platform there, beside
     the thresholds (docs/verdicts.md explains them), and where the platform is in each working mode:
     above the base, below or inside. Of more than eight modes it shows the file's, its opposite, and
-    those with all elbow signs equal.
+    those with all elbow signs equal. Equal legs share a row.
 
     Arguments
     ---------
     FILE: A machine's TOML file.
+
+    Options
+    -------
+    --all: Show a row for every leg and joint, even if all are equal.
 
     Examples
     --------
@@ -124,7 +129,7 @@ def check(file: str, *, elbows: str | None = None) -> CommandResult:
         raise ModelError(error.message, subject=file) from None
     place = plain(file)
     further = f"Next: pteron cycle {place}, pteron size {place}, pteron report {place} --out DIR"
-    return CommandResult(findings, partial(_show, robot, findings, further))
+    return CommandResult(findings, partial(_show, robot, findings, further, each=all_))
 
 
 def _findings(robot: Manipulator) -> dict[str, Any]:
@@ -192,8 +197,11 @@ def _leg(leg: LegKind) -> dict[str, Any]:
     }
 
 
-def _show(robot: Manipulator, findings: dict[str, Any], further: str) -> None:
-    """Print the results of a machine's examination: verdict, tables, sentences, what is next."""
+def _show(robot: Manipulator, findings: dict[str, Any], further: str, *, each: bool) -> None:
+    """Print the results of a machine's examination: verdict, tables, sentences, what is next.
+
+    Equal legs share a row unless `each` has one.
+    """
     from pteron.manipulator.commented_file import crank_direction_text
 
     joints = dict.fromkeys(leg.joint for leg in robot.legs)
@@ -206,16 +214,16 @@ def _show(robot: Manipulator, findings: dict[str, Any], further: str) -> None:
         f"[bold]{plain(robot.name)}[/bold]: {_verdict(findings)}",
         f"Platform: {robot.platform.motion} ({freedoms}), pose {' '.join(robot.coordinates)}. "
         f"{len(robot.legs)} legs{elbows}.",
-        _legs_table(findings["legs"]),
+        _legs_table(findings["legs"], each=each),
         _legs_text(robot.legs),
         *(f"Coordinate of a {joint.noun}: {joint.zero}." for joint in joints if joint.zero),
         *([f"Cranks at 0: {zero}."] if (zero := crank_direction_text(robot)) else []),
-        *_drives(robot),
+        *_drives(robot, each=each),
         *_pose_lines(robot, findings),
         _home_table(robot, findings),
         *_redundancy(robot, findings),
         *_modes(findings["working_modes"]),
-        *_passive(findings["limited_joints"]),
+        *_passive(findings["limited_joints"], each=each),
         *([f"Note: {text}"] if (text := findings["template"]) else []),
         *(
             f"The platform can move with its rams locked {text}"
@@ -233,21 +241,35 @@ def _verdict(findings: dict[str, Any]) -> str:
     return f"[yellow]the file is valid; this machine can work. Check {warnings} above.[/yellow]"
 
 
-def _legs_table(legs: list[dict[str, Any]]) -> Table:
+def _legs_table(legs: list[dict[str, Any]], *, each: bool) -> Table:
     """Return a table of the legs: type, axis of the actuated joint, lengths, limits, coordinate."""
-    rows = (
-        (
-            *(str(i), leg["type"], _vector(leg["axis"], 2) if leg["axis"] else "along the leg"),
+    rows: dict[tuple[str, ...], list[tuple[int, float]]] = {}
+    for i, leg in enumerate(legs, start=1):
+        row = (
+            *(leg["type"], _vector(leg["axis"], 2) if leg["axis"] else "along the leg"),
             ", ".join(f"{length:g}" for length in leg["lengths"].values())
             or ", ".join(f"{math.degrees(arc):.4g} deg" for arc in leg["arcs"].values())
             or "-",
             "{:.4g} to {:.4g} {}".format(*leg["limits"], leg["unit"]) if leg["limits"] else "none",
-            f"{round(leg['at_home'], 4) + 0.0:g} {leg['unit']}",
+            leg["unit"],
         )
-        for i, leg in enumerate(legs, start=1)
+        rows.setdefault((*row, str(i)) if each else row, []).append((i, leg["at_home"]))
+    cells = (
+        (
+            runs_text([i for i, _ in members]),
+            *row[:4],
+            _range([at_home for _, at_home in members], row[4]),
+        )
+        for row, members in rows.items()
     )
     headings = ("leg", "joints", "actuated axis", "links (m)", "joint limits", "at home")
-    return table(*headings, rows=rows, numbers=("leg",))
+    return table(*headings, rows=cells, numbers=("leg",))
+
+
+def _range(coordinates: Sequence[float], unit: str) -> str:
+    """Return the range of the coordinates of equal joints as text, one number if all are equal."""
+    rounded = (round(coordinate, 4) + 0.0 for coordinate in (min(coordinates), max(coordinates)))
+    return f"{' to '.join(dict.fromkeys(f'{coordinate:g}' for coordinate in rounded))} {unit}"
 
 
 def _pose_lines(robot: Manipulator, findings: dict[str, Any]) -> list[str]:
@@ -347,14 +369,18 @@ def _redundancy(robot: Manipulator, findings: dict[str, Any]) -> list[Any]:
     ]
 
 
-def _drives(robot: Manipulator) -> list[Table]:
-    """Return a table of the joints' drives; none if the file has none."""
+def _drives(robot: Manipulator, *, each: bool) -> list[Table]:
+    """Return a table of the joints' drives, equal ones in one column; none if the file has none."""
     from pteron.legs.drive_rows import drive_rows
 
-    legs = tuple(f"leg {i}" for i in range(1, robot.joint_count + 1))
-    rows = drive_rows(robot.legs)
-    cells = ((name, *texts) for name, texts in rows)
-    return [table("drive", *legs, rows=cells, numbers=legs)] if rows else []
+    if not (rows := drive_rows(robot.legs)):
+        return []
+    columns: dict[tuple[str, ...], list[int]] = {}
+    for i, texts in enumerate(zip(*(texts for _, texts in rows), strict=True), start=1):
+        columns.setdefault((*texts, str(i)) if each else texts, []).append(i)
+    headings = [f"leg{'s' * (len(legs) > 1)} {runs_text(legs)}" for legs in columns.values()]
+    cells = ((name, *(texts[k] for texts in columns)) for k, (name, _) in enumerate(rows))
+    return [table("drive", *headings, rows=cells, numbers=tuple(headings))]
 
 
 def _modes(modes: list[dict[str, Any]]) -> list[Table]:
@@ -371,18 +397,26 @@ def _modes(modes: list[dict[str, Any]]) -> list[Table]:
     return [table(*headings, rows=rows, numbers=headings[:4])] if rows else []
 
 
-def _passive(joints: list[dict[str, Any]]) -> list[Table]:
+def _passive(joints: list[dict[str, Any]], *, each: bool) -> list[Table]:
     """Return a table of the passive joints with limits at home, equal joints in one row."""
     from pteron.workspace import LimitedJoint
 
-    rows: dict[tuple[str, str, str], list[str]] = {}
+    rows: dict[tuple[str, ...], list[tuple[int, float]]] = {}
     for joint in (joint for joint in joints if not joint["actuated"]):
         limits = LimitedJoint(**joint).limits_text(lambda coordinate, unit: f"{coordinate:.4g}")
-        at, unit = f"{round(joint['value'], 4) + 0.0:g}", joint["unit"]
-        legs = rows.setdefault((joint["noun"], f"{at} {unit}", f"{limits} {unit}"), [])
-        legs += [str(joint["leg"])] if joint["leg"] else []
+        row = (joint["noun"], joint["unit"], f"{limits} {joint['unit']}")
+        members = rows.setdefault((*row, str(joint["leg"])) if each else row, [])
+        members.append((joint["leg"] or 0, joint["value"]))
+    cells = (
+        (
+            runs_text([leg for leg, _ in members if leg]),
+            row[0],
+            _range([coordinate for _, coordinate in members], row[1]),
+            row[2],
+        )
+        for row, members in rows.items()
+    )
     headings = ("legs", "passive joint", "at home", "limits")
-    cells = ((", ".join(legs), *row) for row, legs in rows.items())
     return [table(*headings, rows=cells, numbers=("at home",))] if rows else []
 
 

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from io import StringIO
+from textwrap import wrap
 from traceback import walk_tb
 from typing import Any
 
-from typer import Abort, Context, Exit, Typer, echo
+from typer import Abort, Context, Exit, Typer, echo, style
 from typer.core import TyperGroup
 from typer.main import get_command
 
@@ -42,6 +44,9 @@ from pteron.cli.view import view
 from pteron.cli.workspace import workspace
 from pteron.errors import PteronError, UnlikelyValue
 
+_FIRST = "pteron catalog, pteron view delta, pteron new delta --out robot.toml"
+"""Commands with which a new user begins."""
+
 _USER_ERROR = 2
 """Exit code for a user's error."""
 
@@ -61,6 +66,17 @@ class CommandGroup(TyperGroup):
     def get_params(self, ctx: Any) -> list[Any]:
         """Return the parameters, flags without a type in the help."""
         return hide_flag_types(super().get_params(ctx))
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """Write what the commands do, a line each in groups: all of it is to fit one screen."""
+        lines = ["Usage: pteron COMMAND ...; pteron COMMAND --help explains a command.", ""]
+        lines += [*wrap(" ".join((self.help or "").split()), formatter.width), ""]
+        for panel, functions in _COMMANDS.items():
+            lines.append(style(panel, bold=True))
+            lines += [f"  {f.__name__:<10}{_clause(f.__doc__ or '')}" for f in functions]
+        options = ", ".join(parameter.opts[0] for parameter in self.get_params(ctx))
+        end = f"Options: {options}", f"Begin with: {_FIRST}"
+        formatter.write("\n".join([*lines, "", *end, ""]))
 
     def main(self, *args: Any, **extra: Any) -> Any:
         """Run a subcommand and exit."""
@@ -97,6 +113,11 @@ class CommandGroup(TyperGroup):
             complain(_usage(error))
             status = _USER_ERROR
         sys.exit(status if isinstance(status, int) else 0)
+
+
+def _clause(docstring: str) -> str:
+    """Return the first clause of a docstring, as a sentence."""
+    return f"{re.split('[:;,.]', docstring, maxsplit=1)[0]}."
 
 
 def _note_warnings(message: Warning | str, category: type[Warning], *place: Any, **_: Any) -> None:
@@ -184,21 +205,14 @@ class Commands(Mapping[str, Any]):
 
 
 def pteron(context: Context, *, version: bool = False) -> None:
-    """Kinematics, dynamics and base parameters of parallel manipulators (Quadrupteron, Delta, ...).
+    """Kinematics, dynamics and base parameters of parallel manipulators (Delta, hexapod, ...).
 
-    All quantities are in SI units and radians. Output to a pipe or a file has tables of poses and
-    indices as CSV, without the sentences of the screen; --json prints data for programs.
+    Quantities are in SI units and radians. Tables go to a pipe or a file as CSV; --json prints data
+    for programs.
 
     Options
     -------
     --version: Print the version and exit.
-
-    Examples
-    --------
-    pteron catalog
-    pteron new delta --out robot.toml
-    pteron report quadrupteron --out report
-    pteron inverse quadrupteron 0.01 0.02 -0.03 0.1
     """
     if version:
         from pteron import __version__

@@ -16,6 +16,7 @@ from pteron.cli.terminal import plain, write
 from pteron.errors import DataError, OutputError
 
 if TYPE_CHECKING:
+    from pteron.legs.screw import Screw
     from pteron.manipulator import Manipulator
     from pteron.manipulator.joint_pairs import Plate
 
@@ -67,6 +68,8 @@ class Transmission:
 
     lead: str | None = None
     gear: str | None = None
+    screw: str | None = None
+    efficiency: str | None = None
     rotor_inertia: str | None = None
 
 
@@ -126,6 +129,9 @@ def new(
     ------------
     --lead LENGTH: Travel of a ball screw or belt per turn of its shaft, such as 5mm.
     --gear RATIO: Turns of the motor per turn of the screw's shaft or of the crank.
+    --screw DIAMETER:LENGTH: Root diameter of the ball screw and its length between the bearings,
+        for its inertia and critical speed, such as 16mm:600mm.
+    --efficiency SHARE: Efficiency of the screw, such as 0.9.
     --rotor-inertia INERTIA: Moment of inertia of the motor and what turns with it, kg m^2.
 
     Options
@@ -370,7 +376,17 @@ def _rider(text: str | None) -> tuple[float | None, tuple[float, ...]]:
     return _needed("--rider", mass, "kg"), center
 
 
-def _drive(robot: Manipulator, transmission: Transmission) -> dict[str, float]:
+def _screw(transmission: Transmission, lead: float) -> Screw:
+    """Return the ball screw of the options, of this lead, m a turn."""
+    from pteron.legs.screw import Screw
+
+    size = transmission.screw and _range("--screw", transmission.screw, "m")
+    share = _number("--efficiency", transmission.efficiency, "")
+    diameter, length = size or (None, None)
+    return Screw(lead, diameter, length, 1.0 if share is None else share)
+
+
+def _drive(robot: Manipulator, transmission: Transmission) -> dict[str, Any]:
     """Return the values of the drives by key: the motor's angle per joint coordinate, inertia."""
     lead = _number("--lead", transmission.lead, "m")
     gear = _number("--gear", transmission.gear, "")
@@ -380,7 +396,11 @@ def _drive(robot: Manipulator, transmission: Transmission) -> dict[str, float]:
         raise DataError(f"--lead: the actuated joints of {robot.name} turn; give --gear")
     if slides and gear is not None and lead is None:
         raise DataError("--gear: give --lead too, the travel per turn of the gear's shaft")
-    values: dict[str, float] = {}
+    values: dict[str, Any] = {}
+    if transmission.screw is not None or transmission.efficiency is not None:
+        if lead is None:
+            raise DataError("--screw, --efficiency: give --lead too")
+        values["screw"] = _screw(transmission, lead)
     if lead is not None or gear is not None:
         values["ratio"] = (gear or 1.0) * (2.0 * math.pi / lead if lead else 1.0)
     if inertia is not None:

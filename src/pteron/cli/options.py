@@ -1,6 +1,7 @@
 """Arguments and options of a subcommand, made from its parameters and its docstring.
 
-A section of the docstring is a panel of the help, and a line in it an option or an argument::
+A section of the docstring is a panel of the help, and a line in it an option or an argument, or
+the name of an option that several subcommands share::
 
     --speed NUMBERS: Of the joints, m/s or rad/s. [default: the drives']
 
@@ -141,7 +142,8 @@ def help_of(command: Callable[..., None]) -> dict[str, Any]:
     help_by_name: dict[str, dict[str, Any]] = {}
     for title, lines in [("Options", _SHARED), *parts.items()]:
         for line in re.sub(r"\n +", " ", lines).splitlines():
-            name, about = _read(line)
+            # An option that several subcommands share stands in a panel by its name alone.
+            name, about = (line, help_by_name[line]) if line in help_by_name else _read(line)
             help_by_name[name] = about if title in _OPTIONS else about | {"rich_help_panel": title}
     hints, options = get_type_hints(command), []
     for name, parameter in signature(command).parameters.items():

@@ -42,20 +42,20 @@ def simulate(
     machine: MachineArgument,
     *,
     cycle: str = STANDARD,
+    out: str | None = None,
     controller: Name = "computed-torque",
+    gains: str | None = None,
+    bandwidth: float | None = None,
+    rate: float = 1000.0,
     carried: Carried,
     cycles: int = 1,
     duration: float | None = None,
-    rate: float = 1000.0,
-    bandwidth: float | None = None,
-    gains: str | None = None,
     model: str | None = None,
+    anyway: bool = False,
     encoder: float = 0.0,
     delay: float = 0.0,
     step: float = 1e-4,
     method: Literal["rk4", "dop853"] = "rk4",
-    anyway: bool = False,
-    out: str | None = None,
     elbows: str | None = None,
 ) -> CommandResult:
     """Simulate a machine with its drives under a controller.
@@ -71,18 +71,24 @@ def simulate(
 
     Options
     -------
+    --out DIR|FILE: Write a table and figures to a folder, or the table to a file.
     --controller: Control law; see docs/controllers.md.
-    --cycles: Number of cycles, one after the other.
-    --rate: Sample rate of the controller, Hz.
-    --bandwidth: Bandwidth of the controller, rad/s. [default: a tenth of the rate]
     --gains FILE: Use the controller in pteron tune's gains.toml, with its law, gains and rate.
+    --bandwidth: Bandwidth of the controller, rad/s. [default: a tenth of the rate]
+    --rate: Sample rate of the controller, Hz.
+    --cycles: Number of cycles, one after the other.
     --model ROBOT: Model of the machine in the controller. [default: the machine, with its payload]
+    --anyway: Simulate even a cycle beyond what the drives can do.
+
+    Sensors
+    -------
     --encoder: Resolution of the joints' encoders, m or rad; 0 is exact.
     --delay: Delay from a sample to the drives' force, s.
+
+    Integration
+    -----------
     --step: Step of the integration, s.
     --method: Integrator: compiled Runge-Kutta of fixed step (rk4), or SciPy's DOP853.
-    --anyway: Simulate even a cycle beyond what the drives can do.
-    --out DIR|FILE: Write a table and figures to a folder, or the table to a file.
 
     Examples
     --------

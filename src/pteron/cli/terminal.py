@@ -88,14 +88,17 @@ def show(*things: str | Table) -> None:
 
 
 def _fit(shown_table: Table, console: Console) -> None:
-    """Break the headings of a table at their blanks if it is wider than the screen."""
+    """Break the headings that are wider than their cells if a table is wider than the screen."""
     from rich.measure import Measurement
 
     wide = console.options.update(max_width=_ANY_WIDTH)
     if Measurement.get(console, wide, shown_table).maximum <= console.width:
         return
     for column in shown_table.columns:
-        column.header = str(column.header).replace(" ", "\n")
+        heading = str(column.header)
+        widths = [Measurement.get(console, wide, cell).maximum for cell in column.cells]
+        if len(heading) > max(widths[1:], default=0):
+            column.header = heading.replace(" ", "\n")
 
 
 def write(text: str) -> None:

@@ -35,6 +35,7 @@ def tune(
     machine: MachineArgument,
     *,
     cycle: str = STANDARD,
+    out: str | None = None,
     controller: Name = "feed-forward",
     carried: Carried,
     duration: float | None = None,
@@ -47,9 +48,8 @@ def tune(
     cutoff: float | None = None,
     delay: float = 0.0,
     encoders: str = _ENCODERS,
-    out: str | None = None,
 ) -> CommandResult:
-    """Choose gains of a controller with stability margins that hold in a cycle and the workspace.
+    """Choose a controller's gains, with stability margins in a cycle and the workspace.
 
     The loop of machine, drives, encoders, controller and delay is linearised at moments of the
     cycle and at poses of the workspace, with all coupling of the closed chain, and discretised
@@ -64,17 +64,23 @@ def tune(
 
     Options
     -------
+    --out DIR|FILE: Write gains, margins and page to a folder, or the table of margins to a file.
     --controller: Control law to tune; see docs/controllers.md.
     --rate: Sample rate of the controller, Hz.
     --bandwidth: Use this bandwidth, rad/s; an error if it lacks the margins.
+
+    Margins
+    -------
     --gain-margin: Required factor on one drive's force, or on all, before the loop is unstable.
     --phase-margin: Required phase margin at each drive, degrees.
     --delay-margin: Required further delay, s, beyond --delay; 0 requires none.
+
+    Sensors
+    -------
     --encoder: Resolution of the joints' encoders, m or rad; rates are then differences.
     --cutoff: Cut-off of the filter on these rates, Hz. [default: no filter]
     --delay: Delay from a sample to the drives' force, s.
     --encoders STEPS: Resolutions of the encoders in the trials, m or rad.
-    --out DIR|FILE: Write gains, margins and page to a folder, or the table of margins to a file.
 
     Examples
     --------

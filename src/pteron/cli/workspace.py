@@ -55,9 +55,6 @@ def workspace(
     slice_: str | None = None,
     points: int | None = None,
     out: str | None = None,
-    engine: Literal["auto", "jax"] = "auto",
-    workers: int | None = None,
-    scheduler: str | None = None,
     certify: bool = False,
     prove: str | None = None,
     from_: str | None = None,
@@ -65,6 +62,9 @@ def workspace(
     type_i: float | None = None,
     type_ii: float | None = None,
     pivot: str | None = None,
+    engine: Literal["auto", "jax"] = "auto",
+    workers: int | None = None,
+    scheduler: str | None = None,
 ) -> CommandResult:
     """Map the workspace: its extent, what limits it, and an index of performance in it.
 
@@ -93,8 +93,9 @@ def workspace(
     --points: Points along each coordinate that varies. [default: 200 in a plane, 100 in space]
     --out FILE: A picture (.png .svg .pdf), data (.csv .parquet .npz .zarr), surfaces (.vtk .vtu
         .ply .stl) or a film (.mp4 .gif).
-    --engine: Engine that computes: jax uses an accelerator.
-    --workers: Number of processes on this computer.
+
+    Proofs
+    ------
     --certify: Prove the size of the workspace, what limits it, and a cube inside.
     --prove NAME=LEAST:GREATEST,...: Prove that all poses of a box can be used:
         x=-0.05:0.05,y=0:0.1,z=0; m and rad.
@@ -103,6 +104,12 @@ def workspace(
     --tolerance SHARE: With --certify: largest undecided share of the volume. [default: 0.05]
     --type-i FLOOR: In a proof: least type-I measure of every leg, 0 stretched or folded, 1 at best.
     --type-ii FLOOR: In a proof: least type-II measure, 0 where the drives cannot hold the platform.
+
+    Computing
+    ---------
+    --engine: Engine that computes: jax uses an accelerator.
+    --workers: Number of processes on this computer.
+    --scheduler
 
     Examples
     --------

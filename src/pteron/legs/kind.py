@@ -128,6 +128,8 @@ class LegKind(ABC):
     """Its construction in a few sentences for a report; vectors by their letters r, d, e, k, s0."""
     measure_text: ClassVar[str] = ""
     """The meaning of its type-I measure, as a clause for a report."""
+    has_constant_measure: ClassVar[bool] = False
+    """Whether its type-I measure is 1 in every pose."""
     singular_text: ClassVar[str] = "it is stretched or folded"
     """Its configuration where that is zero, as a clause for messages."""
     keys: ClassVar[Mapping[str, Key]]

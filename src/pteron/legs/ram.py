@@ -41,6 +41,7 @@ class RamLeg(LegKind):
     branches = (1,)
     names: ClassVar = {"u": "cylinder", "l": "piston"}
     measure_text = "1 everywhere, as a ram pushes the platform point in every pose"
+    has_constant_measure = True
     conditions = (FieldCondition(("limits",), _check_limits),)
 
     @property

@@ -76,6 +76,7 @@ class RUPU(LegKind):
     follows_angle = True
     names: ClassVar = {"u": "upper part of the shaft", "l": "lower part of the shaft"}
     measure_text = "1 everywhere, as a shaft turns the platform in every pose"
+    has_constant_measure = True
     account = ACCOUNTS["RUPU"]
 
     keys: ClassVar = keys_of("RUPU")

@@ -30,6 +30,7 @@ from pteron.bodies.tables import (
 from pteron.legs.cones import Cone
 from pteron.legs.drive import Drive, Elastic, LuGre, Stribeck, Wave, Winding
 from pteron.legs.reading import Reading
+from pteron.legs.screw import Screw
 from pteron.manipulator.manipulator import STANDARD_GRAVITY
 from pteron.manipulator.radii import Radii
 from pteron.platforms.kinds import AngleOrder, kind_of_motion
@@ -76,6 +77,7 @@ def _field_type(hint: Any) -> Any:
 
 ConeTable, StribeckTable, LuGreTable = map(_table_of, (Cone, Stribeck, LuGre))
 ElasticTable, WindingTable, WaveTable = map(_table_of, (Elastic, Winding, Wave))
+ScrewTable = _table_of(Screw)
 DriveTable, ReadingTable, RadiiTable = map(_table_of, (Drive, Reading, Radii))
 
 

@@ -212,8 +212,9 @@ def svg(figure: Figure, *, name: str, title: str, widest: float = _ON_PAGE) -> M
     It holds no date, no random identifier and no address, and its colours are CSS variables with
     the printed colours as defaults. Text stays text, in the page's font. The name, of letters and
     digits, is put before every identifier, which must be unique in a page; the title says what the
-    picture shows to those who cannot see it. A wider figure is made as narrow as is said (inches),
-    its letters as they are, so that they can be read in a column and on a phone.
+    picture shows to those who cannot see it. Of curves over time it tells a page's script where the
+    time is. A wider figure is made as narrow as is said (inches), its letters as they are, so that
+    they can be read in a column and on a phone.
     """
     if figure.get_size_inches()[0] > widest:
         _set_width(figure, widest)
@@ -235,10 +236,27 @@ def svg(figure: Figure, *, name: str, title: str, widest: float = _ON_PAGE) -> M
     _, _, width, height = box[1].split()
     head = (
         f'<svg class="plot" role="img" aria-label="{escape(title)}" viewBox="{box[1]}" '
+        f"{_time_scale(figure, float(width), float(height))}"
         f'style="--width: {width}px; aspect-ratio: {width} / {height}">'
         f"<title>{escape(title)}</title>"
     )
     return Markup(head + text[text.index(">") + 1 :])
+
+
+def _time_scale(figure: Figure, width: float, height: float) -> str:
+    """Return the place of a time scale in a picture, for a page's cursor; "" without one.
+
+    That is the time and x at its beginning and at its end, and y of its panels' top and bottom.
+    """
+    panels = figure.axes
+    if not panels or panels[-1].get_xlabel() != "time (s)":
+        return ""
+    boxes = [axes.get_position() for axes in panels]
+    (start, end), last = panels[-1].get_xlim(), boxes[-1]
+    top, bottom = max(box.y1 for box in boxes), min(box.y0 for box in boxes)
+    scale = (start, end, width * last.x0, width * last.x1)
+    numbers = (*scale, height * (1.0 - top), height * (1.0 - bottom))
+    return f'data-time="{" ".join(f"{number:.5g}" for number in numbers)}" '
 
 
 def svg_file(figure: Figure) -> str:

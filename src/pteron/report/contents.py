@@ -19,6 +19,7 @@ from pteron.kinematics.singularities import best_type_ii
 from pteron.manipulator import Manipulator
 from pteron.manipulator.template import template_sentence
 from pteron.motion import Motion, PickAndPlace, Sizing, least_margin, pick_and_place, size
+from pteron.motion.sizing.friction_sentence import friction_sentence
 from pteron.playback import Playback
 from pteron.reduction import BaseParameters, base_parameters
 from pteron.report.costs import Cost, costs
@@ -26,6 +27,7 @@ from pteron.report.given_forces import force_doubts
 from pteron.report.motion_frames import Frames, frames
 from pteron.workspace import (
     BEYOND_LIMITS,
+    REACHABLE,
     JointRanges,
     LimitedJoint,
     PoseMargins,
@@ -102,7 +104,7 @@ class Report:
     is proved to tilt to every side at the home position; None where it does not tilt from the
     level. `orientations` is there where the type-II measure depends on one angle, `measures` where
     it depends on the position; neither where J is constant. `passive` has the passive joints with
-    limits, at the home pose.
+    limits, at the home pose. `workspace_joints` has the range of each joint over the slices.
     """
 
     robot: Manipulator
@@ -114,7 +116,9 @@ class Report:
     source: str
     shown: Frames
     sizing: Sizing
+    friction: str
     joints: JointRanges
+    workspace_joints: JointRanges
     passive: tuple[LimitedJoint, ...]
     slices: tuple[ReachSlice, ...]
     volume: ReachVolume | None
@@ -139,6 +143,17 @@ class Report:
     def shows_joint_limits(self) -> bool:
         """Whether a slice shows poses that only joint limits exclude."""
         return any(bool((cut.status == BEYOND_LIMITS).any()) for cut in self.slices)
+
+    @property
+    def missing_legs(self) -> tuple[int, ...]:
+        """The legs, from 0, by which a slice shows poses out of reach, or their end of reach."""
+        edges = [cut.leg_margins.reshape(-1, self.robot.joint_count) for cut in self.slices]
+        return tuple(
+            i
+            for i in range(self.robot.joint_count)
+            if any(bool((cut.status == i + 1).any()) for cut in self.slices)
+            or any(edge[:, i].min() < 0.0 < edge[:, i].max() for edge in edges)
+        )
 
     @property
     def forces(self) -> Array:
@@ -176,6 +191,8 @@ def contents(robot: Manipulator, motion: Playback | None = None) -> Report:
     sizing = size(robot, cycle)
     volume = _volume(robot, home) if len(robot.platform.lengths) > 1 else None
     base = base_parameters(robot)
+    slices = _slices(robot, home, volume)
+    reached = [cut.poses[cut.status == REACHABLE] for cut in slices]
     return Report(
         robot=robot,
         doubts=(
@@ -190,9 +207,11 @@ def contents(robot: Manipulator, motion: Playback | None = None) -> Report:
         source="" if motion is None else motion.source,
         shown=frames(robot, cycle, sizing.forces[::2], home),
         sizing=sizing,
+        friction=friction_sentence(robot),
         joints=joint_ranges(robot, cycle.pose),
+        workspace_joints=joint_ranges(robot, np.vstack([home[None], *reached])),
         passive=tuple(joint for joint in limited_joints(robot, home) if not joint.actuated),
-        slices=_slices(robot, home, volume),
+        slices=slices,
         volume=volume,
         tilt=_tilt(robot, home),
         jacobian=jacobian_at(robot, home),

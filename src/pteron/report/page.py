@@ -33,10 +33,13 @@ from pteron.reduction.expressions import html_symbol
 from pteron.report.contents import Report
 from pteron.report.costs import PAPER_CLAIM
 from pteron.report.drive_figures import force_speed, power
+from pteron.report.equal_rows import MergedSum, by_component, merge_legs, merge_sums, strokes
 from pteron.report.motion_frames import line_samples
 from pteron.report.moving_picture import stage
 from pteron.report.quantities import SYMBOLS, angles_text, force, nouns, readable, speed
-from pteron.report.typeset import compact, format_fixed, template, triple
+from pteron.report.typeset import compact, format_fixed, significant, template, triple
+from pteron.short_numbers import runs_text
+from pteron.tolerances import ROUNDING
 
 _LONGEST = 200
 """Most characters of a sum that is shown; those of an oblique Quadrupteron have thousands."""
@@ -51,6 +54,8 @@ def page(report: Report) -> str:
         degrees=lambda angle, places=1: format_fixed(float(np.degrees(angle)), places),
         typeset_account=typeset_account,
         readable=readable,
+        runs=runs_text,
+        signed_one=lambda sign: "+1" if sign > 0 else "\u22121",
         signed=lambda text: re.sub(r"(?<![\w.-])-(?=\d)", "\u2212", text),
         typeset=lambda text: escape(text).replace("J^-T", Markup("<b>J</b><sup>\u2212T</sup>")),
         zip=zip,
@@ -66,7 +71,7 @@ def page(report: Report) -> str:
             doing="on its pick-and-place cycle" if standard else "in motion",
             still=f"The {home}, with the way of {point} on the {way}.",
             picture_title=f"{robot.name} in its home pose",
-            force_title=f"{'Drive' if report.has_drives else 'Actuator'} {force(joints).name}",
+            force_title=f"Drive {force(joints).name}",
         ),
         report=report,
         paper_claim=PAPER_CLAIM,
@@ -76,25 +81,25 @@ def page(report: Report) -> str:
         farthest=farthest_point(robot),
         kinds=kinds(robot),
         followers=_followers(robot),
-        geometry=geometry(robot),
+        geometry=by_component(geometry(robot)),
         drives=drive_rows(robot.legs),
-        bodies=bodies(robot),
+        bodies=_merged_bodies(robot),
+        strokes=strokes(report),
+        measured=[i for i, leg in enumerate(robot.legs) if not leg.has_constant_measure],
         letters=_letters(robot),
         reasons=_reasons(robot),
         angle_measures=_angle_measures(report),
         speed=speed(joints),
         joint=nouns(joints),
         joint_units=dict.fromkeys(joint.unit for joint in joints),
-        passive=[(joint, joint.limits_text(readable)) for joint in report.passive],
+        passive=_merged_passive(report),
         modes=prod(len(leg.sign_choices()) for leg in robot.legs),
         figures=_figures(report),
         sizing=report.sizing,
         motors=report.sizing.table().to_dicts(),
         total=report.sizing.power.sum(axis=1),
-        units=[report.base.parameters[k].unit for k in report.base.kept],
-        values=_zero_rounding(report.base),
-        sums=[Markup(line) for line in report.base.expressions("html")],
-        symbols=symbolic_sums(report.base),
+        sums=_merged_sums(report.base),
+        symbols=_merged_symbols(report.base),
     )
 
 
@@ -179,6 +184,35 @@ def bodies(robot: Manipulator) -> list[tuple[str, int | None, dict[str, float]]]
     return rows
 
 
+def _merged_bodies(robot: Manipulator) -> list[tuple[str, list[int], dict[str, float]]]:
+    """Return the bodies of `bodies`, those of equal legs once, with the legs, from 1."""
+    legs = merge_legs(((name, tuple(found.items())), i) for name, i, found in bodies(robot))
+    return [(name, numbers, dict(inertia)) for (name, inertia), numbers in legs.items()]
+
+
+def _merged_passive(report: Report) -> list[tuple[list[int], str, str, str]]:
+    """Return the passive joints with limits, equal ones once: legs, name, place and limits."""
+    rows = merge_legs(
+        (
+            (
+                joint.noun if joint.leg or report.robot.platform.tilts else "\u03c6",
+                readable(joint.value, joint.unit),
+                joint.limits_text(readable),
+            ),
+            joint.leg - 1 if joint.leg else None,
+        )
+        for joint in report.passive
+    )
+    return [(legs, *row) for row, legs in rows.items()]
+
+
+def _merged_sums(base: BaseParameters) -> list[MergedSum]:
+    """Return the base parameters with their values, those that differ by the leg alone once."""
+    values = [significant(float(value), 4) for value in _zero_rounding(base)]
+    units = [base.parameters[k].unit for k in base.kept]
+    return merge_sums(list(map(str, base.expressions("html"))), values, units)
+
+
 def _letters(robot: Manipulator) -> list[tuple[str, str]]:
     """Return the letters of the legs' bodies with the bodies' names."""
     names_of_letters: dict[str, list[str]] = {}
@@ -235,8 +269,7 @@ def _figures(report: Report) -> dict[str, Any]:
     machine = robot_figure(
         shown.still, shown.guides, gravity=gravity_of(robot), path=shown.points.tool[out]
     )
-    whose = "drive" if report.has_drives else "actuator"
-    label = f"{whose} {force([leg.joint for leg in robot.legs]).axis}"
+    label = f"drive {force([leg.joint for leg in robot.legs]).axis}"
     half = cycle.duration / 2.0 if standard else None
     some = line_samples(len(cycle.time))
     forces = forces_figure(cycle.time[some], report.forces[some], turning_point=half, ylabel=label)
@@ -257,7 +290,10 @@ def _figures(report: Report) -> dict[str, Any]:
     if report.measures is not None:
         measures = report.measures.type_i, report.measures.type_ii
         cut = report.measures.cut
-        figures["measures"] = [measure_figure(cut, measure, path=path) for measure in measures]
+        figures["measures"] = [
+            measure_figure(cut, measure, path=path) if np.nanmin(measure) < 1.0 - ROUNDING else None
+            for measure in measures
+        ]
     return figures
 
 
@@ -281,6 +317,14 @@ def symbolic_sums(base: BaseParameters) -> dict[str, list[Any]] | None:
         "sums": [Markup(line) for line in sums],
         "lengths": [(Markup(name), length) for name, length in lengths],
     }
+
+
+def _merged_symbols(base: BaseParameters) -> dict[str, list[Any]] | None:
+    """Return `symbolic_sums` with the sums that differ by the leg alone merged."""
+    if (symbols := symbolic_sums(base)) is None:
+        return None
+    blank = [""] * len(symbols["sums"])
+    return symbols | {"sums": merge_sums(symbols["sums"], blank, blank)}
 
 
 def _symbolic_texts(base: BaseParameters) -> tuple[list[str], list[tuple[str, float]]] | None:

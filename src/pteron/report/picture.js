@@ -105,8 +105,8 @@ class Picture {
     const ratio = window.devicePixelRatio || 1, { canvas } = this;
     this.width = canvas.clientWidth; this.height = canvas.clientHeight;
     // A bar over the picture covers none of the machine: `level` is the middle of what it leaves.
-    const covered = this.bar ? this.bar.offsetHeight : 0;
-    this.clear = this.height - covered; this.level = covered + this.clear / 2;
+    const covered = this.bar ? this.bar.offsetHeight : 0, under = this.foot && this.foot.offsetHeight ? this.foot.offsetHeight + 20 : 0;
+    this.clear = this.height - covered - under; this.level = covered + this.clear / 2;
     canvas.width = Math.round(this.width * ratio); canvas.height = Math.round(this.height * ratio);
     this.pen.setTransform(ratio, 0, 0, ratio, 0, 0);
     this.frameAll();
@@ -115,26 +115,32 @@ class Picture {
   #hull() {
     const { gridLow, gridHigh, size } = this;
     const corners = [gridLow, [gridLow[0], gridHigh[1]], gridHigh, [gridHigh[0], gridLow[1]]].map((p) => [...p, this.floor]);
-    const base = this.baseAxes.map((axis) => add(this.corner, axis, 0.17 * size)), found = new Set(base), all = this.cloud.concat(corners, base);
+    const base = this.baseAxes.map((axis) => add(this.corner, axis, 0.17 * size));
+    this.outer = [...base, ...this.#farthest(this.cloud.concat(corners, base))];
+    this.body = this.machine.planar ? this.outer : this.#farthest(this.cloud.concat([[this.center[0], this.center[1], this.floor]]));
+  }
+  #farthest(all) {
+    const found = new Set();
     for (let i = 0; i < 12; i++) {
       for (const rise of [-1, -0.5, 0, 0.5, 1]) {
         const way = [Math.cos((i * Math.PI) / 6), Math.sin((i * Math.PI) / 6), 2 * rise];
         found.add(all.reduce((best, p) => (dot(p, way) > dot(best, way) ? p : best)));
       }
     }
-    this.outer = [...found];
+    return [...found];
   }
   // The size that holds the machine at this tilt, however far it is turned; a planar one only as it is turned.
+  // Where directions stand in the picture's corner (`compass`) the ground may end at its edges.
   frameAll() {
     let wide = 0, top = Infinity, bottom = -Infinity;
     for (let turn = 0; turn < (this.machine.planar ? 1 : 24); turn++) {
-      for (const p of this.outer) {
+      for (const p of this.compass ? this.body : this.outer) {
         const q = this.project(p, this.camera.yaw + (turn * Math.PI) / 12);
         wide = Math.max(wide, Math.abs(q[0])); top = Math.min(top, q[1]); bottom = Math.max(bottom, q[1]);
       }
     }
     // Half the breadth of a leg's number is kept free on every side.
-    this.scale = Math.max(1, Math.min((this.width / 2 - 16) / wide, (this.clear - 32) / (bottom - top)));
+    this.scale = Math.max(1, Math.min((this.width / 2 - (this.compass ? 28 : 16)) / wide, (this.clear - 32) / (bottom - top)));
     this.middle = (top + bottom) / 2;
     this.redraw();
   }
@@ -218,16 +224,27 @@ class Picture {
     pen.lineCap = "butt"; pen.strokeStyle = colors.grid; pen.lineWidth = 1;
     for (let x = gridLow[0]; x <= gridHigh[0] + 1e-9; x += step) { this.path([[x, gridLow[1], floor], [x, gridHigh[1], floor]]); pen.stroke(); }
     for (let y = gridLow[1]; y <= gridHigh[1] + 1e-9; y += step) { this.path([[gridLow[0], y, floor], [gridHigh[0], y, floor]]); pen.stroke(); }
-    const corner = this.corner;
-    this.baseAxes.forEach((axis, k) => {
-      this.line(corner, add(corner, axis, 0.13 * size), colors.ink, 1.8);
-      this.label(add(corner, axis, 0.17 * size), "xyz"[k], colors.ink);
-    });
+    if (!this.compass) {
+      this.baseAxes.forEach((axis, k) => {
+        this.line(this.corner, add(this.corner, axis, 0.13 * size), colors.ink, 1.8);
+        this.label(add(this.corner, axis, 0.17 * size), "xyz"[k], colors.ink);
+      });
+    }
     if (!machine.planar || !Math.hypot(...machine.gravity)) return;
     const from = [gridLow[0] + 0.05 * size, gridHigh[1] - 0.06 * size, floor], down = machine.gravity, across = [-down[1], down[0], 0];
     const tip = add(from, down, 0.15 * size);
     for (const end of [from, add(add(tip, down, -0.04 * size), across, 0.025 * size), add(add(tip, down, -0.04 * size), across, -0.025 * size)]) this.line(tip, end, colors.muted, 1.8);
     this.label(add(from, down, -0.04 * size), "g", colors.muted);
+  }
+  // The directions of the base frame in the picture's lower right corner, out of the way of everything.
+  directionsInCorner() {
+    const { pen } = this, from = [this.width - 58, this.level + this.clear / 2 - 42], about = this.project(this.center);
+    this.baseAxes.forEach((axis, k) => {
+      const q = this.project(add(this.center, axis, 0.01 * this.size)), way = [q[0] - about[0], q[1] - about[1]].map((w) => (100 * w) / this.size);
+      pen.beginPath(); pen.moveTo(...from); pen.lineTo(from[0] + 26 * way[0], from[1] + 26 * way[1]);
+      pen.lineCap = "round"; pen.strokeStyle = this.colors.ink; pen.lineWidth = 1.8; pen.stroke();
+      this.write(from[0] + 37 * way[0], from[1] + 37 * way[1], "xyz"[k], this.colors.ink);
+    });
   }
   shadow(m) {
     const { pen, colors, size } = this, drop = (p) => [p[0], p[1], this.floor];
@@ -303,7 +320,10 @@ class Picture {
     if (!m || !this.width) return;
     pen.clearRect(0, 0, this.width, this.height);
     this.written = [];
-    this.ground();
+    if (this.compass) {
+      pen.save(); pen.beginPath(); pen.rect(0, this.level - this.clear / 2, this.width, this.height); pen.clip(); this.ground(); pen.restore();
+      this.directionsInCorner();
+    } else this.ground();
     if (!machine.planar) this.shadow(m);
     for (const { color, rings } of extra.slice || []) {
       pen.beginPath();

@@ -12,8 +12,22 @@
   const peaks = data.units.map((unit) =>
     data.forces.reduce((most, row) => Math.max(most, ...row.filter((_, i) => data.units[i] === unit).map(Math.abs)), 1e-9));
   const picture = new Picture(canvas, data, data.chains.flat(2).concat(data.position));
+  // The page around a frame may have a theme of its own: it sends "dark" or "light".
+  const dark = [...document.styleSheets].flatMap((sheet) => [...sheet.cssRules])
+    .filter((rule) => rule.media?.mediaText.includes("prefers-color-scheme: dark"));
+  window.addEventListener("message", ({ source, data: theme }) => {
+    if (source !== window.parent || !["dark", "light"].includes(theme)) return;
+    for (const rule of dark) rule.media.mediaText = theme === "dark" ? "screen" : "not all";
+    picture.theme(); picture.draw();
+  });
   let frame = 0, playing = false, now = 0, last = null, shown = true;
 
+  // A line in every curve over time, at the moment that the picture shows.
+  const cursors = [...document.querySelectorAll("svg[data-time]")].map((svg) => {
+    const [start, end, left, right, top, bottom] = svg.dataset.time.split(" ").map(Number), line = document.createElementNS("http://www.w3.org/2000/svg", "line");
+    line.setAttribute("class", "cursor"); line.setAttribute("y1", top); line.setAttribute("y2", bottom); svg.append(line);
+    return (time) => { for (const name of ["x1", "x2"]) line.setAttribute(name, left + ((right - left) * (time - start)) / (end - start)); };
+  });
   const put = (id, text) => { document.getElementById(id).textContent = text; };
   picture.drawn = () => {
     const k = frame;
@@ -25,7 +39,7 @@
     }
     data.pose[k].forEach((value, j) => put("pose" + j, minus(value * data.scales[j], 1)));
     put("clock", data.time[k].toFixed(2) + " of " + data.duration.toFixed(2) + " s");
-    seek.value = k;
+    seek.value = k; cursors.forEach((move) => move(data.time[k]));
     seek.setAttribute("aria-valuetext", data.time[k].toFixed(2) + " seconds");
   };
   function show(k) {

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Callable, Iterable
+from datetime import date
 from importlib.resources import files
 from math import floor, isfinite, log10
 from typing import TYPE_CHECKING, Any
@@ -132,6 +133,11 @@ def prose(text: str) -> Markup:
     return Markup(re.sub(r"(?<!<code>)--[a-z][a-z-]*(?: each)?", _CODE, commands))
 
 
+def _css_string(text: str) -> Markup:
+    """Return a text as the contents of a string in a style sheet, all but letters escaped."""
+    return Markup("".join(c if c.isalnum() else f"\\{ord(c):x} " for c in text))
+
+
 def resource(name: str, folder: str = "report") -> Markup:
     """Return the text of a file of the report, to be embedded in a page."""
     return Markup((files("pteron") / folder / name).read_text(encoding="utf-8"))
@@ -154,6 +160,7 @@ def template(name: str, folder: str = "report", **filters: Callable[..., Any]) -
     """Return a page's template, with the common style and filters, and extra ones."""
     shared: dict[str, Callable[..., Any]] = {
         "compact": compact,
+        "css": _css_string,
         "fixed": format_fixed,
         "mm": _millimetres,
         "percent": percent,
@@ -165,5 +172,7 @@ def template(name: str, folder: str = "report", **filters: Callable[..., Any]) -
         "unit": lambda text: text.replace(" ", _NARROW).replace("^2", "²"),
     }
     page_template = any_template(folder, name, **shared | filters)
-    page_template.globals.update(style=resource("page.css"), version=pteron.__version__)
+    page_template.globals.update(
+        style=resource("page.css"), version=pteron.__version__, today=date.today().isoformat()
+    )
     return page_template

@@ -12,7 +12,7 @@
     socket = new WebSocket(location.href.replace(/^http/, "ws").replace(/[?#].*/, ""));
     socket.onmessage = (event) => {
       const [[kind, data]] = Object.entries(JSON.parse(event.data));
-      ({ machine: takeMachine, state: takeState, settled: takeSettled, slice: takeSlice })[kind](data);
+      ({ machine: takeMachine, state: takeState, spans: takeSpans, settled: takeSettled, slice: takeSlice })[kind](data);
     };
     socket.onopen = () => { the("gone").hidden = true; };
     socket.onclose = () => {
@@ -28,7 +28,7 @@
     machine = found; trail = []; slice = [];
     if (first) {
       picture = new Picture(the("view"), found.still, found.cloud);
-      Object.assign(picture, { whole: true, grab, space: () => the("play").click(), bar: document.querySelector(".top") });
+      Object.assign(picture, { whole: true, grab, space: () => the("play").click(), bar: document.querySelector(".top"), foot: the("transport"), compass: true, drawn: placeHint });
       picture.fit();
     } else { picture.take(found.still, found.cloud); picture.frameAll(); }
     for (const [name, sliders] of [["pose", found.coordinates], ["joint", found.joints]]) {
@@ -44,6 +44,15 @@
     if (status.textContent !== found.message) status.textContent = found.message;
     status.classList.toggle("warns", found.warns);
     the("where").textContent = found.where;
+    the("given").replaceChildren(...found.plotted.forces.flatMap((force, i) => {
+      const one = document.createElement("span"), leg = document.createElement("span");
+      leg.className = `leg leg${(i % 6) + 1}`; leg.textContent = i + 1;
+      one.append(leg, ` ${force === null ? "–" : `${minus(force, Math.abs(force) < 100 ? 1 : 0)} ${machine.forceUnits[i]}`}`);
+      return [one, " "];
+    }));
+    const silent = the("transport").hidden;
+    the("transport").hidden = found.duration === null;
+    if (silent !== the("transport").hidden) picture.fit();
     the("readout").innerHTML = found.readout;
     putAll(); nameAssemblies();
     if (document.activeElement !== the("payload")) the("payload").value = found.payload;
@@ -87,14 +96,19 @@
     if (field && document.activeElement !== field) field.value = round(value);
     if (!field) slider.setAttribute("aria-valuetext", `${value.toFixed(2)} seconds`);
   }
-  function takeSettled(found) {
-    for (const [name, spans] of [["pose", found.poseSpan], ["joint", found.jointSpan]]) {
-      spans[0].forEach((low, i) => {
+  // The band of each slider: how far it may go from here; none for joints whose spans take too long while the machine moves.
+  function takeSpans(found) {
+    for (const name of ["pose", "joint"]) {
+      const spans = found[name];
+      if (!spans) every(`input[type=range][id^=joint]`).forEach((slider) => { slider.style.setProperty("--from", "0%"); slider.style.setProperty("--to", "0%"); slider.title = ""; });
+      else spans[0].forEach((low, i) => {
         const slider = the(name + i), share = (x) => `${(100 * (x - slider.min)) / (slider.max - slider.min)}%`;
         slider.style.setProperty("--from", share(Math.min(low, spans[1][i]))); slider.style.setProperty("--to", share(Math.max(low, spans[1][i])));
         slider.title = `from here ${round(low)} to ${round(spans[1][i])}`;
       });
     }
+  }
+  function takeSettled(found) {
     settled = found; listed = null;
     nameAssemblies();
     setTimeout(putAll, _HELD);
@@ -115,6 +129,16 @@
     const turns = machine.angles > 1 ? [0, 1, 2] : machine.angles ? [0] : [];
     turns.forEach((j) => found.push({ at: add(position, axes[j], (j < 2 ? 0.1 : 0.07) * picture.size), axis: j }));
     return found;
+  }
+  // What a new user cannot guess stands beside the ring until it was dragged once, on this browser.
+  const learned = { get known() { try { return localStorage.getItem("pteron-ring") === "1"; } catch { return this.said; } } };
+  function learn() { learned.said = true; try { localStorage.setItem("pteron-ring", "1"); } catch { /* no storage here */ } the("first").hidden = true; }
+  function placeHint() {
+    const hint = the("first"), ring = free() && !learned.known && !learned.said && the("show-handles").checked && handles()[0];
+    hint.hidden = !ring;
+    if (!ring) return;
+    const [x, y] = picture.pixel(picture.deep(ring.at)), wide = hint.offsetWidth, right = x + 16 + wide < picture.width;
+    hint.style.left = `${Math.max(6, right ? x + 16 : x - 16 - wide)}px`; hint.style.top = `${y + 14}px`;
   }
   const free = () => state && !state.playing && !state.pushing;
   function show() {
@@ -152,7 +176,7 @@
     if (!taken && (away(corner) > 20 || !machine.lengths)) return null;
     const at = taken ? handle.at : corner, axis = taken ? handle.axis : null, offset = taken ? [0, 0, 0] : sub(state.now.position, corner);
     const from = picture.under(x, y, picture.deep(at)), start = picture.deep(at);
-    held = axis + "";
+    held = axis + ""; learn();
     return {
       // A push that begins meanwhile, once its equations are prepared, is not ended by this drag.
       move: (px, py) => { if (!state.pushing) send({ do: "drag", axis, to: add(picture.given(add(start, sub(picture.under(px, py, start), from))), offset) }); },
@@ -232,6 +256,7 @@
   });
   on("drives", "change", () => { if (state.pushing) send({ do: "push", drives: the("drives").value }); });
   for (const id of ["show-forces", "show-handles", "show-trail"]) on(id, "change", () => { if (id === "show-trail") trail = []; show(); });
+  on("first-close", "click", learn);
   on("plots", "toggle", plot);
   on("reset", "click", () => picture.reset());
   on("whole", "click", () => { if (document.fullscreenElement) document.exitFullscreen(); else document.documentElement.requestFullscreen(); });

@@ -32,6 +32,9 @@ _FRAME = 1.0 / 30.0
 _SETTLED = 0.25
 """Time without an action after which results that take longer are shown, s."""
 
+_SPANNED = 0.03
+"""Time that the spans of joints may take while the machine moves, s: about one picture."""
+
 _ONE = 1.0
 """Time, s, within which actions of one name are undone as one."""
 
@@ -182,7 +185,7 @@ class Live:
         """Run the thread: do queued actions, advance the motion, and send the state to the tabs."""
         session = self.session
         last = changed = monotonic()
-        settled = True
+        settled = not session.playing
         while True:
             with self._wake:
                 if not self._actions:
@@ -209,7 +212,7 @@ class Live:
             if not settled and now - changed >= _SETTLED:
                 settled = not moves
                 changed = now
-                self._guard(lambda: self._show(settled=True))
+                self._guard(self._show_spans if moves else lambda: self._show(settled=True))
 
     def _waiting_time(self, last: float, changed: float, settled: bool) -> float | None:
         """Return the time until the next picture, s; None without motion: wait for an action."""
@@ -278,10 +281,18 @@ class Live:
             },
         )
         if settled:
-            shown = panel.settled_values(session, lambda: bool(self._actions))
-            if shown is not None:
-                self._send("settled", shown)
+            spans = panel.span_values(session, lambda: bool(self._actions))
+            if spans["joint"] is not None and not self._actions:
+                self._send("spans", spans)
+                self._send("settled", panel.assembly_values(session))
                 self._show_slice()
+
+    def _show_spans(self) -> None:
+        """Send the sliders' spans and the slice of a machine that moves."""
+        end = monotonic() + _SPANNED
+        spans = panel.span_values(self.session, lambda: bool(self._actions) or monotonic() > end)
+        self._send("spans", spans)
+        self._show_slice()
 
     def _show_slice(self) -> None:
         """Send the slice through the reach or the map of the chosen plane, if it has changed."""

@@ -112,24 +112,23 @@ def joints_in_display_units(robot: Manipulator, joints: Array) -> list[float]:
     return coordinates
 
 
-def settled_values(session: Session, busy: Callable[[], bool]) -> dict[str, Any] | None:
-    """Return values that are slow to compute: assembly modes, and sliders' spans at this pose.
+def span_values(session: Session, busy: Callable[[], bool]) -> dict[str, Any]:
+    """Return the sliders' spans at this pose; those of joints are None if `busy` says so."""
+    robot, joint_span = session.state.robot, session.joint_spans(busy)
+    return {
+        "pose": (pose_factors(robot) * session.pose_spans()).tolist(),
+        "joint": None if joint_span is None else (_joint_factors(robot) * joint_span).tolist(),
+    }
 
-    None if somebody acts meanwhile.
-    """
-    spans = session.spans(busy)
-    if spans is None or busy():
-        return None
-    robot, factors = session.state.robot, pose_factors(session.state.robot)
-    poses, now = session.assemblies()
+
+def assembly_values(session: Session) -> dict[str, Any]:
+    """Return the list of assembly modes at this pose, which are slow to compute."""
+    robot, (poses, now) = session.state.robot, session.assemblies()
     labels = [f"{k}: {_label(robot, pose)}" for k, pose in enumerate(poses, start=1)]
-    pose_span, joint_span = spans
     return {
         "label": _label(robot, session.state.pose),
         "assemblies": labels if now is not None else [*labels, _NO_MODE],
         "assembly": len(labels) if now is None else now,
-        "poseSpan": (factors * pose_span).tolist(),
-        "jointSpan": (_joint_factors(robot) * joint_span).tolist(),
     }
 
 

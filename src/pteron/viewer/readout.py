@@ -31,7 +31,9 @@ PLACES = 2
 
 def readout(state: ViewerState, numbers: Readings) -> str:
     """Return the numbers of a state as HTML."""
-    legs, leg, joint = state.robot.legs, numbers.type_i.argmin(), numbers.clearances.argmin()
+    legs, joint = state.robot.legs, numbers.clearances.argmin()
+    ends = [i for i, leg in enumerate(legs) if not leg.has_constant_measure]
+    leg = min(ends, key=lambda i: float(numbers.type_i[i]), default=0)
     forces = (
         "\u2013" if np.isnan(force) else f"{format_fixed(force, PLACES)} {leg.joint.force_unit}"
         for leg, force in zip(legs, numbers.forces, strict=True)
@@ -40,8 +42,8 @@ def readout(state: ViewerState, numbers: Readings) -> str:
     cells = [map(readable, numbers.joints, units)]
     limited = not np.isnan(numbers.shares).all()
     margins = {
-        f"leg {leg + 1} to its end (type I)": float(numbers.type_i[leg]),
-        "to where drives lose hold (type II)": numbers.type_ii,
+        **({f"leg {leg + 1} to a type-I singularity": float(numbers.type_i[leg])} if ends else {}),
+        "to a type-II singularity": numbers.type_ii,
         f"leg {joint + 1} to a joint's limit": float(numbers.clearances[joint]),
     }
     headings = ["leg", nouns([leg.joint for leg in legs]), "drive"]
@@ -60,10 +62,22 @@ def readout(state: ViewerState, numbers: Readings) -> str:
             )
         ),
         limited=limited,
+        strokes=_strokes(state, numbers),
         condition=numbers.condition,
         margins=[(name, at, level(at), _WORDS[level(at)]) for name, at in margins.items()],
         fault=numbers.fault,
     )
+
+
+def _strokes(state: ViewerState, numbers: Readings) -> list[float]:
+    """Return where each ram stands between its shortest and its longest, %; [] for other legs."""
+    rams = [(leg.has_constant_measure, leg.limits) for leg in state.robot.legs]
+    shares = [
+        100.0 * float((length - limits[0]) / (limits[1] - limits[0]))
+        for length, (is_ram, limits) in zip(numbers.joints, rams, strict=True)
+        if is_ram and limits
+    ]
+    return shares if len(shares) == len(rams) else []
 
 
 @cache

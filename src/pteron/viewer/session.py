@@ -307,11 +307,8 @@ class Session:
 
     # What is shown.
 
-    def spans(self, busy: Callable[[], bool] = lambda: False) -> tuple[Array, Array] | None:
-        """Return the free range of each coordinate (2, m) and each joint (2, n) from here.
-
-        None if somebody acts meanwhile, as `busy` tells.
-        """
+    def pose_spans(self) -> Array:
+        """Return the free range of each coordinate from here (2, m)."""
         robot, pose = self.state.robot, self.state.pose
         ends = np.array([pose, pose])
         for i, (low, high) in enumerate(self.pose_range.T):
@@ -320,6 +317,11 @@ class Session:
                 line[:, i] = np.linspace(pose[i], end, _ALONG)
                 free = is_allowed(robot, line)
                 ends[row, i] = line[-1 if free.all() else max(0, int(free.argmin()) - 1), i]
+        return ends
+
+    def joint_spans(self, busy: Callable[[], bool] = lambda: False) -> Array | None:
+        """Return the free range of each joint from here (2, n); None as soon as `busy` says so."""
+        robot, pose = self.state.robot, self.state.pose
         joints = self.state.joints
         joint_ends = np.array([joints, joints])
         for i in range(len(joints)):
@@ -330,7 +332,7 @@ class Session:
                 target[i] = self.joint_range[row, i]
                 last = follow_joints(robot, pose, joints, target)[0]
                 joint_ends[row, i] = inverse_kinematics(robot, last)[i]
-        return ends, joint_ends
+        return joint_ends
 
     def force_scale(self) -> Array:
         """Return the force of each drive, (n,), that has the standard arrow length.

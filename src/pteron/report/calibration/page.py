@@ -40,11 +40,14 @@ MOST_ROWS = 12
 
 
 class ErrorMap(NamedTuple):
-    """The tool's error on a slice, before and after, with its greatest value as text."""
+    """The tool's error on a slice, before and after, with its greatest value as text.
+
+    `after` is None where all of it has the lightest shade.
+    """
 
     plane: tuple[str, ...]
     before: Figure
-    after: Figure
+    after: Figure | None
     greatest: list[str]
     unit: str
 
@@ -77,14 +80,15 @@ def error_text(error: float, kind: str) -> str:
 def error_maps(calibration: Calibration) -> list[ErrorMap]:
     """Return the tool's errors on the slices through the home pose of a machine's lengths.
 
-    Where the platform turns only they are the angles', on the slices of these.
+    Where the platform turns only they are the angles', on the slices of these. All maps have the
+    same levels, so that they compare.
     """
     robot, home = calibration.drawn, home_pose(calibration.drawn)
     lengths = set(robot.platform.lengths)
     kind = "position" if lengths else "angle"
     planes = slice_planes(robot)
     level = [plane for plane in planes if set(plane) <= lengths]
-    maps = []
+    errors_of_slices = []
     for plane in (level or planes)[:3]:
         with suppress(ModelError):
             cut = reach_slice(robot, home, plane, points=_POINTS)
@@ -94,13 +98,21 @@ def error_maps(calibration: Calibration) -> list[ErrorMap]:
             reached = (cut.status == 0).ravel() & np.isfinite(errors[0]) & np.isfinite(errors[1])
             if not reached.any() or not errors[0][reached].max() > 0.0:
                 continue
-            greatest = [error_text(float(error[reached].max()), kind) for error in errors]
             errors_on_slice = [
                 np.where(reached, 1e3 * error, np.nan).reshape(cut.status.shape) for error in errors
             ]
-            shades = levels(np.stack(errors_on_slice))  # of both, so that they compare
-            drawn = [measure_figure(cut, part, levels=shades) for part in errors_on_slice]
-            maps.append(ErrorMap(tuple(plane), drawn[0], drawn[1], greatest, error_unit(kind)))
+            errors_of_slices.append((plane, cut, errors_on_slice))
+    if not errors_of_slices:
+        return []
+    shades = levels(np.concatenate([e.ravel() for _, _, both in errors_of_slices for e in both]))
+    maps = []
+    for plane, cut, errors_on_slice in errors_of_slices:
+        greatest = [error_text(1e-3 * float(np.nanmax(error)), kind) for error in errors_on_slice]
+        before, after = errors_on_slice
+        is_shaded = np.nanmax(after) > shades[1]
+        drawn = measure_figure(cut, after, levels=shades) if is_shaded else None
+        shown = measure_figure(cut, before, levels=shades)
+        maps.append(ErrorMap(tuple(plane), shown, drawn, greatest, error_unit(kind)))
     return maps
 
 
