@@ -96,4 +96,4 @@ $(VENV)/.docs: pyproject.toml
 
 clean:
 	rm -rf $(VENV) demo dist build docs/_build docs/gallery docs/measured
-	rm -rf docs/reference/functions docs/reference/inside docs/reference/modules
+	rm -rf docs/reference/commands docs/reference/functions docs/reference/inside docs/reference/modules

@@ -78,6 +78,7 @@ def main() -> None:
     _run(*sphinx, "docs", "docs/_build/html")
     INPUTS.write_text(now, encoding="utf-8")
     _run("docs/check_site.py", "docs/_build/html")
+    _run("docs/check_in_browser.py", "docs/_build/html")
 
 
 def _run(*words: str) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from importlib.metadata import metadata
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -31,20 +32,24 @@ extensions = [
     "sphinx_copybutton",
     "sphinxcontrib.bibtex",
     "command_line",
+    "descriptions",
     "equations",
     "for_everyone",
     "handed_out",
+    "linked_names",
+    "machine_cards",
     "reference",
     "results",
     "sources",
+    "topics",
 ]
 exclude_patterns = [
     "_build",
     "_templates",
     "pictures",
     "extensions",
-    "gallery/*.ipynb",
-    "gallery/*.py",
+    "gallery/**/*.ipynb",
+    "gallery/**/*.py",
 ]
 nitpicky = True
 nitpick_ignore_regex = [("py:(obj|class)", "(?s:.*)"), ("py:exc", r"\w+Error|NoSquareRoot")]
@@ -53,12 +58,24 @@ nitpick_ignore_regex = [("py:(obj|class)", "(?s:.*)"), ("py:exc", r"\w+Error|NoS
 # Pages.
 html_theme = "furo"
 html_title = "Pteron"
+html_favicon = html_logo = "_static/icon.svg"
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
+html_js_files = ["frames.js"]
 templates_path = ["_templates"]
 html_search_scorer = str(DOCS / "_static" / "search-order.js")
 # An arrow key in code that scrolls is meant for the code.
 html_theme_options = {"navigation_with_keys": False}
+html_sidebars = {
+    "**": [
+        *("sidebar/brand.html", "sidebar/version.html", "sidebar/search.html"),
+        *("sidebar/scroll-start.html", "sidebar/navigation.html", "sidebar/scroll-end.html"),
+    ]
+}
+# Repository and issues, where whoever publishes has set them in pyproject.toml.
+html_context = {
+    "project_urls": [url.split(", ") for url in metadata("pteron").get_all("Project-URL") or []]
+}
 html_copy_source = False
 html_show_sphinx = False
 toc_object_entries_show_parents = "hide"
@@ -105,6 +122,9 @@ if GALLERY.is_dir() and find_spec("sphinx_gallery") is not None:
     sphinx_gallery_conf = {
         "examples_dirs": str(GALLERY),
         "gallery_dirs": "gallery",
+        # Pages of functions show the examples that call them.
+        "backreferences_dir": "gallery/backreferences",
+        "doc_module": ("pteron",),
         "filename_pattern": r"/plot_",
         "image_scrapers": (FigureScraper(),),
         "abort_on_example_error": True,

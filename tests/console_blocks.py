@@ -256,6 +256,7 @@ NOT_RUN = {
     r"python benchmarks/linuxcnc_moves\.py .*": ("runs LinuxCNC", "test_tilting_exports.py"),
     r"python benchmarks/mujoco_convergence\.py": ("takes minutes", "test_benchmarks.py"),
     r"python benchmarks/environment\.py": ("prints times alone", "test_benchmarks.py"),
+    r"pteron cue --listen .*": ("stays open until it is ended", "test_live_cue.py"),
     r"pteron design .*": ("searches for minutes", "test_design.py"),
     r"pteron choose .*": ("searches for minutes", "test_choosing.py"),
     r"pteron excite (?!.*--seconds).*": (
@@ -396,6 +397,7 @@ GIVEN: dict[str, dict[str, Maker]] = {
     "docs/how-to/from-a-task-to-a-machine.md": {
         "machines/linear-delta.toml": by("pteron new linear-delta --out machines/linear-delta.toml")
     },
+    "docs/how-to/motion-simulators.md": {"drive.csv": flight},
     "docs/how-to/payloads-and-tools.md": {
         "robot.toml": with_gripper,
         "motion.csv": by(f"{EXCITE} robot.toml --out motion.csv"),

@@ -10,7 +10,7 @@ ROOT = Path(__file__).parent.parent
 DOCS = ROOT / "docs"
 
 
-MADE = ("_build", "gallery", "measured", "functions", "inside", "modules")
+MADE = ("_build", "gallery", "measured", "commands", "functions", "inside", "modules")
 """Folders of docs that `make docs` fills."""
 
 

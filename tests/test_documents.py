@@ -228,6 +228,16 @@ def test_pictures_without_a_name_get_the_heading_above_them():
     assert re.findall('alt="(.*?)"', name_pictures(page)) == ["Figure: Forces", "A Delta", "A film"]
 
 
+def test_lines_of_code_break_on_a_phone_and_those_of_tables_do_not():
+    from for_everyone import break_lines
+
+    code = "<pre>&gt;&gt;&gt; f(1)  <span># one</span>\n</pre>"
+    table = "<pre><span>leg</span>  force\n  1  2.0</pre>"
+    assert 'class="breaks"' in break_lines(code)
+    assert 'class="breaks"' not in break_lines(table)
+    assert all("tabindex" in break_lines(block) for block in (code, table))
+
+
 def test_each_page_has_a_title_of_its_own_and_the_how_tos_are_named_by_it():
     pages = [page for page in PAGES if page.is_relative_to(DOCS)]
     titles = {}
@@ -239,6 +249,40 @@ def test_each_page_has_a_title_of_its_own_and_the_how_tos_are_named_by_it():
         for words, path in re.findall(r"\[([^\]]+)\]\(([^)#]+\.(?:md|ipynb))\)", TEXTS[page]):
             target = str(((ROOT / page).parent / path).resolve().relative_to(ROOT))
             assert words == titles[target], page
+
+
+@CLIENTS
+@pytest.mark.parametrize(("columns", "is_cut"), [(30, False), (300, True)])
+def test_the_check_in_a_browser_counts_code_that_is_cut(browser, tmp_path, columns, is_cut):
+    checks = runpy.run_path(str(DOCS / "check_in_browser.py"))
+    code = f"<pre style='overflow: auto'>{'x' * columns}</pre>"
+    (tmp_path / "index.html").write_text(f"<article><details>{code}</details></article>")
+    with checks["served"](tmp_path) as address:
+        page = browser.new_page()
+        faults = checks["code_faults"](page, address, tmp_path, False)
+        page.close()
+    assert len(faults) == (len(checks["CUT"]) if is_cut else 0)
+
+
+def test_the_rank_of_a_page_among_the_results_of_a_search():
+    rank = runpy.run_path(str(DOCS / "check_in_browser.py"))["rank"]
+    links = ["sizing.html", "reference/functions/code.html#pteron.export_c", "view.html#keys"]
+    assert [rank(links, page) for page in ("sizing", "pteron.export_c", "view")] == [1, 2, 4]
+
+
+def test_topics_lead_to_one_page_each():
+    from topics import TOPICS
+
+    topics = [topic for of_page in TOPICS.values() for topic in of_page]
+    assert len(topics) == len(set(topics))
+    assert {str(DOCS / f"{page}.md") for page in TOPICS} <= {str(page) for page in PAGES}
+
+
+def test_the_reference_lists_every_module():
+    from reference import public_modules
+
+    listed = re.findall(r"(?m)^   (pteron\.\w+)$", TEXTS["docs/reference/index.md"])
+    assert sorted(listed) == sorted(module.__name__ for module in public_modules())
 
 
 BREADTH = 88
@@ -277,6 +321,7 @@ def script(path, name):
 COUNTS = (
     ("README.md", r"lists ([\w-]+) robots", lambda: len(pteron.catalog())),
     ("README.md", r"\[([\w-]+) machines\]\(docs/evidence", lambda: intervals_of_evidence()),
+    ("docs/index.md", r"\[([\w-]+) machines to start", lambda: len(pteron.catalog())),
     ("docs/start/tour.md", r"lists ([\w-]+) machines", lambda: len(pteron.catalog())),
     ("docs/start/first-result.md", r"([\w-]+) machines come", lambda: len(pteron.catalog())),
     ("docs/evidence.md", r"all (\w+) machines of the catalog", lambda: len(CATALOG | TILTED)),
@@ -389,9 +434,9 @@ def test_times_of_the_evidence_are_those_that_were_measured():
     assert f"| batch of 100 000 | {batch};" in tables
 
 
-def test_the_catalogs_page_has_a_row_for_each_machine():
-    table, *_ = TEXTS["docs/catalog.md"].partition("\n## ")
-    rows = re.findall(r"(?m)^\| <img [^|]*\| `([\w-]+)` \|", table)
+def test_the_catalogs_page_has_a_card_for_each_machine():
+    tables = re.findall(r"(?ms)^:::\{machines\}\n(.*?)^:::$", TEXTS["docs/catalog.md"])
+    rows = re.findall(r"(?m)^\| `([\w-]+)` \|", "".join(tables))
     assert sorted(rows) == sorted(pteron.catalog())
 
 

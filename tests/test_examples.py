@@ -13,7 +13,7 @@ from pteron.legs import KINDS
 
 FOLDER = Path(__file__).parent.parent / "examples"
 EXAMPLES = sorted(FOLDER.glob("*.py"))
-GALLERY = sorted((FOLDER / "gallery").glob("*.py"))
+GALLERY = sorted((FOLDER / "gallery").rglob("plot_*.py"))
 
 
 SLOW = {"base_parameters.py", "identify.py", "platform_size.py"}

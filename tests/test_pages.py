@@ -220,6 +220,20 @@ def test_in_a_frame_of_another_page_there_is_nothing_to_scroll(browser, page_of,
 
 
 @CLIENTS
+@pytest.mark.parametrize("system", ["dark", "light"])
+def test_a_frame_follows_the_theme_that_the_page_around_it_sends(browser, page_of, system):
+    paper = "getComputedStyle(document.body).backgroundColor"
+    with opened(browser, page_of("motion", "par4"), query="?embedded", color_scheme=system) as page:
+        own, drawn = page.evaluate(paper), picture(page)
+        for theme in ("dark", "light"):
+            page.evaluate("theme => window.postMessage(theme, '*')", theme)
+            page.wait_for_function(
+                f"own => ({paper} === own) === {json.dumps(theme == system)}", arg=own
+            )
+            assert (picture(page) == drawn) == (theme == system)
+
+
+@CLIENTS
 def test_keys_alone_do_everything(browser, page_of):
     with opened(browser, page_of("out", "quadrupteron")) as page:
         order = []

@@ -169,6 +169,7 @@ MADE = {
         workspace.mode_pavings("five-bar", HOME, tolerance=0.2)
     ),
     "cue": _cue,
+    "cue limits": lambda: motion.cue_limits("stewart"),
     "cube": lambda: workspace.largest_cube("five-bar", HOME),
     "drives": _parameters_of_drives,
     "excitation": lambda: (_excitation(), _excitation().with_leads(), _excitation().held_out()),

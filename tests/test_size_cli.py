@@ -1,6 +1,7 @@
 """`pteron size` as a person and as a program meet it."""
 
 import json
+import math
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
@@ -89,12 +90,69 @@ def test_payload_dwell_and_duration_count(driven: str):
 
 def test_friction_is_assumed_and_said_and_its_absence_too():
     line = "size five-bar --within here"
-    text = done(line)
+    text = done(f"{line} --friction 0.1")
     assert "dry friction of 10 % of the drive's peak is assumed, leg by leg: 0.0111 N m, 0." in text
-    free = done(f"{line} --friction 0")
+    free = done(line)
     assert "All drives together: net energy 0 J per cycle (" in free
     assert "J supplied and braked: there is no friction)" in free
     assert "assumed" not in free
+    # All commands say the same, and have the same peaks.
+    assert "No friction is included: the file has none." in free
+    cycle = json.loads(done_with_notes("cycle five-bar --json"))
+    assert cycle["friction"] in free
+    sized = json.loads(done(f"{line} --json"))["drives"]
+    peaks = [peak["size"] for peak in cycle["peaks"] if peak["quantity"] == "torque"]
+    assert peaks == pytest.approx([drive["peak_force"] for drive in sized], rel=2e-3)
+
+
+def done_with_notes(line: str) -> str:
+    """Return the standard output of a command line that succeeds, with notes or without."""
+    result = run(line)
+    assert result.exit_code == 0, result.output
+    return result.stdout
+
+
+def test_torque_and_speed_are_told_at_the_motor_with_the_screws_losses(tmp_path):
+    screw = pteron.legs.Screw(0.005, 0.016, 0.6, efficiency=0.9)
+    ratio = 2 * math.pi / 0.005
+    drive = pteron.legs.Drive(rotor_inertia=1e-4, ratio=ratio, screw=screw, rated_torque=0.5)
+    robot = pteron.load("tripteron")
+    robot = replace(robot, legs=tuple(replace(leg, drive=drive) for leg in robot.legs))
+    path = pteron.save(robot, tmp_path / "screws.toml")
+    assert pteron.load(path) == robot
+    # A rod of steel: own formula of its mass and radius.
+    mass = 7850.0 * math.pi * 0.008**2 * 0.6
+    assert screw.inertia == pytest.approx(mass * 0.008**2 / 2.0, rel=1e-12)
+    assert drive.inertia == pytest.approx(ratio**2 * (1e-4 + screw.inertia), rel=1e-12)
+    # Makers' catalogues allow f d / L^2 10^7 rpm, f = 15.1 (fixed, supported), d and L in mm.
+    turns = 0.8 * screw.critical_speed / 0.005
+    assert turns * 60.0 == pytest.approx(15.1e7 * 16.0 / 600.0**2, rel=2e-3)
+    motion = pick_and_place(robot, duration=0.6)
+    found = size(robot, motion)
+    time = np.linspace(0.0, 0.6, 4001)
+    state = motion.at(time)
+    rates = pteron.kinematics.joint_rates(robot, *state[:2]).actuated
+    gains = pteron.kinematics.joint_accelerations(robot, *state).actuated
+    load = pteron.inverse_dynamics(robot, *state)
+    way = np.sign(load * rates)
+    torque = load / ratio * np.where(way > 0, 1 / 0.9, np.where(way < 0, 0.9, 1.0))
+    torque += drive.inertia / ratio * gains
+    rms, peak = found.motor_torques
+    assert peak == pytest.approx(np.abs(torque).max(axis=0), rel=2e-3)
+    assert rms == pytest.approx(np.sqrt((torque**2).mean(axis=0)), rel=5e-3)
+    assert found.motor_speeds[1] == pytest.approx(ratio * np.abs(rates).max(axis=0), rel=1e-3)
+    assert found.power.max() > (found.forces * found.speeds).max()
+    limits = {margin.limit for margin in found.margins}
+    assert "80% of the screw's critical speed" in limits
+    text = run(f"size {path} --within here").stdout
+    assert "At the motors, screws with an efficiency of 0.9." in text
+    assert " rpm " in text
+
+
+def test_motors_of_unknown_ratio_are_said_to_be_unknown():
+    assert "the drives have no ratio, which is 2 pi / lead" in " ".join(
+        done("size stewart --within here").split()
+    )
 
 
 def test_a_margin_that_is_asked_for_and_missed_is_not_enough(driven: str):

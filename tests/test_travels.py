@@ -80,13 +80,21 @@ def test_what_stops_it_is_named():
         largest_box(rails, home_pose(rails))
 
 
-def test_the_largest_box_is_proved_and_has_the_shape_of_the_travels():
-    robot, pose = LOADED["quadrupteron"], [0.0, 0.0, 0.0, 0.0]
+def test_the_largest_box_is_proved_and_no_smaller_than_in_a_search_at_random():
+    robot, pose = LOADED["quadrupteron"], np.zeros(4)
     box, found = largest_box(robot, pose), travel(robot, pose)
     assert prove(robot, box, type_ii=TYPE_II).holds
-    shares = box.box[1, :3] / found.high[:3]
-    np.testing.assert_allclose(shares, shares[0])
     assert box.low[3] == box.high[3] == 0.0
+    required = conditions(robot, type_ii=TYPE_II)
+    rng = np.random.default_rng(1)
+    places = np.array(np.meshgrid(*[np.linspace(0.0, 1.0, 5)] * 3)).reshape(3, -1).T
+    volumes = [0.0]
+    for shares in rng.uniform(0.0, 1.0, (4000, 2, 3)):
+        low, high = shares[0] * found.low[:3], shares[1] * found.high[:3]
+        if np.prod(high - low) > volumes[-1]:
+            poses = np.pad(low + places * (high - low), ((0, 0), (0, 1)))
+            volumes += [np.prod(high - low)] if keeps(robot, required, poses).all() else []
+    assert np.prod((box.box[1] - box.box[0])[:3]) >= max(volumes)
 
 
 def test_the_command_says_how_far_and_what_stops_it():

@@ -20,7 +20,7 @@ from pteron.kinematics.unit_rows import row_frame, unit_rows
 from pteron.manipulator import with_dimensions
 from pteron.manipulator.commented_file import commented_text
 from pteron.manipulator.machine_warnings import machine_warnings
-from pteron.manipulator.template_masses import template_masses
+from pteron.manipulator.template import template_sentence
 from pteron.thresholds import (
     CROSSING,
     HOLDING_FORCE,
@@ -258,7 +258,7 @@ def test_no_machine_of_the_catalog_is_doubted(name):
     assert (layout_warnings(robot, home), holding_warnings(of)) == ((), ())
     assert of.least_singular_value > 0.3
     assert of.everywhere > 20.0 * of.rounding
-    assert template_masses(robot) == ""
+    assert template_sentence(robot) == ""
 
 
 def test_one_leg_out_of_place_or_of_another_length_is_doubted():
@@ -363,7 +363,8 @@ def test_machines_as_they_are_built_are_reported_and_exported(sort, seed):
 
 def test_templates_keep_their_centres_of_mass_where_mass_is_edited(tmp_path):
     path = tmp_path / "robot.toml"
-    text = commented_text("delta", {"base_radius": 0.18, "crank": 0.2, "rod": 0.42})
+    robot = with_dimensions("delta", base_radius=0.18, crank=0.2, rod=0.42)
+    text = commented_text("delta", robot)
     assert "first_moment =" not in text.replace("#first_moment =", "")
     path.write_text(text, "utf-8")
     before = pteron.load(path)
@@ -388,15 +389,16 @@ def test_a_mass_edited_beside_its_first_moment_is_explained(tmp_path):
 def test_masses_of_the_template_are_named_again_until_they_are_edited(tmp_path):
     robot = with_dimensions("delta", base_radius=0.18, platform_radius=0.05, crank=0.2, rod=0.42)
     robot = replace(robot, name="my delta")
-    assert template_masses(robot).startswith(
-        "masses are still those of delta: upper 1.76 kg (its section), lower 0.418 kg (its section)"
+    assert template_sentence(robot) == (
+        "Still as in delta: platform_mass 2.916 kg, upper 1.76 kg (its mass per length), lower "
+        "0.418 kg (its mass per length); are they this machine's?"
     )
     path = pteron.save(robot, tmp_path / "robot.toml")
-    assert check(path)[0]["template_masses"] == template_masses(robot)
-    assert "masses are still those of delta" in CliRunner().invoke(app, ["cycle", str(path)]).stderr
+    assert check(path)[0]["template"] == template_sentence(robot)
+    assert "Still as in delta" in CliRunner().invoke(app, ["cycle", str(path)]).stderr
     upper = type(robot.legs[0].upper).of_body(1.0, (0.1, 0.0), 0.02)
     legs = [replace(leg, upper=upper) for leg in robot.legs]
-    assert template_masses(replace(robot, legs=tuple(legs))) == ""
+    assert template_sentence(replace(robot, legs=tuple(legs))) == ""
 
 
 def test_links_of_144_kg_a_leg_under_40_kg_are_doubted(tmp_path):

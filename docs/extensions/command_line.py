@@ -1,4 +1,4 @@
-"""The directive `command-line`: every subcommand of `pteron`, as its own help says it."""
+"""The subcommands of `pteron`, as their own help describes them: a list, and pages by panel."""
 
 from __future__ import annotations
 
@@ -43,19 +43,76 @@ def section(command: Any, name: str) -> list[str]:
     return [*lines, "", *(["```console", *examples, "```", ""] if examples else [])]
 
 
-class CommandLine(SphinxDirective):
-    """Show every subcommand."""
+def panels() -> dict[str, dict[str, Any]]:
+    """Return the subcommands by the panel of the program's help."""
+    group: Any = get_command(program)
+    found: dict[str, dict[str, Any]] = {}
+    for name, command in group.commands.items():
+        found.setdefault(command.rich_help_panel, {})[name] = command
+    return found
+
+
+def page_of(panel: str) -> str:
+    """Return the name of a panel's page."""
+    return panel.lower().replace(" ", "-")
+
+
+def write_pages(app: Sphinx) -> None:
+    """Write a page for each panel, where it has changed."""
+    folder = app.srcdir / "reference" / "commands"
+    folder.mkdir(exist_ok=True)
+    wanted = {f"{page_of(panel)}.md": panel for panel in panels()}
+    for old in folder.glob("*.md"):
+        if old.name not in wanted:
+            old.unlink()
+    for name, panel in wanted.items():
+        commands = ", ".join(f"`{command}`" for command in panels()[panel])
+        text = (
+            f"# Commands: {panel[0].lower()}{panel[1:]}\n\nThis page describes the subcommands "
+            f"{commands} of `pteron`. [All commands](../command-line.md)\n\n"
+            f"```{{command-panel}} {panel}\n```\n"
+        )
+        path = folder / name
+        if not path.is_file() or path.read_text(encoding="utf-8") != text:
+            path.write_text(text, encoding="utf-8")
+
+
+class CommandPanel(SphinxDirective):
+    """Show the subcommands of a panel."""
+
+    required_arguments = 1
+    final_argument_whitespace = True
 
     def run(self) -> list[nodes.Node]:
         """Return the sections."""
         self.env.note_reread()
-        group: Any = get_command(program)
-        parts = (section(command, name) for name, command in group.commands.items())
+        commands = panels()[self.arguments[0]]
+        parts = (section(command, name) for name, command in commands.items())
         text = "\n".join(chain.from_iterable(parts))
         return self.parse_text_to_nodes(text, allow_section_headings=True)
 
 
+class CommandList(SphinxDirective):
+    """List the subcommands by panel, with links to their pages."""
+
+    def run(self) -> list[nodes.Node]:
+        """Return a table for each panel, and the pages as children of this one."""
+        self.env.note_reread()
+        lines: list[str] = []
+        for panel, commands in panels().items():
+            lines += [f"## {panel}", "", "| command | what it does |", "| --- | --- |"]
+            for name, command in commands.items():
+                link = f"[`pteron {name}`](commands/{page_of(panel)}.md#pteron-{name})"
+                lines.append(f"| {link} | {plain(command.help.split(chr(10) * 2)[0])} |")
+            lines.append("")
+        pages = [f"commands/{page_of(panel)}" for panel in panels()]
+        lines += ["```{toctree}", ":hidden:", "", *pages, "```"]
+        return self.parse_text_to_nodes("\n".join(lines), allow_section_headings=True)
+
+
 def setup(app: Sphinx) -> dict[str, Any]:
     """Tell Sphinx."""
-    app.add_directive("command-line", CommandLine)
+    app.connect("builder-inited", write_pages)
+    app.add_directive("command-panel", CommandPanel)
+    app.add_directive("command-list", CommandList)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -8,7 +8,10 @@ from typing import Any
 
 from sphinx.application import Sphinx
 
-_SCROLLS = re.compile(r"<pre>")
+_CODE = re.compile(r"<pre>(.*?)</pre>", re.DOTALL)
+_COLUMNS = re.compile(r"\S {2,}(?!#)\S")
+"""A gap in a line that is not before a comment: the lines of the block stand in columns."""
+
 _CAPTION = 'class="caption" role="heading"'
 _HEADING_OR_PICTURE = re.compile(r"<h[1-6][^>]*>(?P<heading>.*?)</h[1-6]>|<img\b[^>]*>", re.DOTALL)
 _NAMELESS = re.compile(r'alt="(?:(?:[\w.-]+/)*[0-9a-f]{32,}(?:\.\w+)?|)"')
@@ -22,10 +25,20 @@ def open_to_all(
 ) -> None:
     """Let code that scrolls be focused, name pictures, and give the sidebar's captions a level."""
     if "body" in context:
-        body = _SCROLLS.sub('<pre tabindex="0">', context["body"])
-        context["body"] = name_pictures(body)
+        context["body"] = name_pictures(break_lines(context["body"]))
     tree = context.get("furo_navigation_tree", "")
     context["furo_navigation_tree"] = tree.replace(_CAPTION, f'{_CAPTION} aria-level="2"')
+
+
+def break_lines(body: str) -> str:
+    """Return a page whose code can be focused; on a phone its lines break, unless it is a table."""
+
+    def block(match: re.Match[str]) -> str:
+        text = unescape(re.sub(r"<[^>]+>", "", match[1]))
+        kind = "" if _COLUMNS.search(text) else ' class="breaks"'
+        return f'<pre tabindex="0"{kind}>{match[1]}</pre>'
+
+    return _CODE.sub(block, body)
 
 
 def name_pictures(body: str) -> str:

@@ -1,4 +1,4 @@
-"""What pages hand out beside themselves: a machine that moves, and the notebooks as one file."""
+"""What pages hand out beside themselves: a moving machine, a report, the notebooks as one file."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from sphinx.application import Sphinx
 
 import pteron
 from pteron.motion import pick_and_place
-from pteron.report import write_motion_page
+from pteron.report import write_motion_page, write_report
 from pteron.workspace import home_pose
 
 
 def hand_out(app: Sphinx) -> None:
-    """Write moving/delta.html and notebooks.zip into the folder of the site."""
+    """Write moving/delta.html, moving/report.html and notebooks.zip into the folder of the site."""
     if app.builder.format != "html":
         return
     out = Path(app.outdir)
@@ -30,6 +30,7 @@ def hand_out(app: Sphinx) -> None:
         page.parent.mkdir(exist_ok=True)
         delta = pteron.load("delta")
         write_motion_page(delta, pick_and_place(delta, home_pose(delta)), page)
+        write_report(delta, page.parent)
 
 
 def setup(app: Sphinx) -> dict[str, Any]:

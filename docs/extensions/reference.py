@@ -9,9 +9,11 @@ from __future__ import annotations
 import inspect
 import re
 import sys
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from functools import cache
 from importlib import import_module
 from inspect import cleandoc
+from itertools import groupby
 from pkgutil import iter_modules
 from types import ModuleType
 from typing import Any
@@ -21,6 +23,7 @@ from sphinx.domains.python import ObjectEntry, PythonDomain
 from sphinx.environment import BuildEnvironment
 from sphinx.ext import autosummary
 from sphinx.pycode import ModuleAnalyzer
+from sphinx.transforms import SphinxTransform
 
 import pteron
 from pteron import dynamics
@@ -95,41 +98,66 @@ def parts(package: str) -> list[str]:
     return sorted(f"{whole.__name__}.{part.name}" for part in iter_modules(whole.__path__))
 
 
-def _documented(owner: ModuleType, names: Iterable[str], told: set[str]) -> list[str]:
-    """Return the lines that list names of a module, and then tell about each.
-
-    What two modules hand on is indexed once; `told` are the places of what is. So is a function
-    whose module has its name and a page of its own.
-    """
-    inside = {part for package in INSIDE for part in parts(package)}
-    lines = [f".. currentmodule:: {owner.__name__}", "", ".. autosummary::", ""]
-    lines += [f"   {name}" for name in names] + [""]
+def _documented(owner: ModuleType, names: Iterable[str]) -> list[str]:
+    """Return the lines that list names of a module, and then tell about each."""
+    lines = _listed(owner, names)
     for name in names:
-        value = getattr(owner, name)
-        place = f"{value.__module__}.{name}" if inspect.isclass(value) else f"{owner}.{name}"
-        twice = place in told or f"{owner.__name__}.{name}" in inside
-        again = ["   :no-index:"] if twice else []
-        told.add(place)
-        lines += [f".. {directive_for(value)}:: {name}", *again, ""]
+        lines += [f".. {directive_for(getattr(owner, name))}:: {name}", ""]
     return lines
+
+
+def _listed(owner: ModuleType, names: Iterable[str]) -> list[str]:
+    """Return the lines of a table of names."""
+    lines = [f".. currentmodule:: {owner.__name__}", "", ".. autosummary::", ""]
+    return lines + [f"   {name}" for name in names] + [""]
 
 
 def _page(title: str, lines: list[str]) -> str:
     return "\n".join([f"# {title}", "", "```{eval-rst}", *lines, "```", ""])
 
 
+def _pages_of_module(module: ModuleType, places: dict[str, str]) -> dict[str, str]:
+    """Return the page of a module, with a list, and a page for each of its names.
+
+    A class that two modules hand on has one page: `places` are those of the modules before. What a
+    module inside has the name of is indexed there.
+    """
+    inside = {part for package in INSIDE for part in parts(package)}
+    short = module.__name__.removeprefix("pteron.")
+    public = sorted((name for name in module.__all__ if name not in _PUBLIC), key=str.lower)
+    pages, listed = {}, []
+    # A function and its result may have names that are one file's where letters have no case.
+    for _, group in groupby(public, str.lower):
+        lines, names = [f".. currentmodule:: {module.__name__}", ""], []
+        for name in group:
+            value = getattr(module, name)
+            full = f"{module.__name__}.{name}"
+            place = f"{value.__module__}.{name}" if inspect.isclass(value) else full
+            first = places.setdefault(place, full)
+            listed.append(name if first == full else f"~{first}")
+            if first == full:
+                names.append(name)
+                again = ["   :no-index:"] if full in inside else []
+                lines += [f".. {directive_for(value)}:: {name}", *again, ""]
+        if names:
+            lines += [f".. minigallery:: {module.__name__}.{names[-1]}", ""]
+            page = _page(", ".join(f"`{name}`" for name in names), lines)
+            pages[f"modules/{short}/{names[-1]}.md"] = (
+                f"---\norphan: true\n---\n\n{page}\n"
+                f"Module: [`{module.__name__}`](../{short}.md), with all its names.\n"
+            )
+    lines = [f".. automodule:: {module.__name__}", "   :no-members:", "", *_listed(module, listed)]
+    return {f"modules/{short}.md": _page(f"`{module.__name__}`", lines)} | pages
+
+
 def pages() -> dict[str, str]:
     """Return the pages in Markdown by where they stand in reference/."""
     found: dict[str, str] = {}
-    told: set[str] = set()
+    places: dict[str, str] = {}
     for topic, names in by_topic().items():
-        found[f"functions/{topic.lower()}.md"] = _page(topic, _documented(pteron, names, set()))
+        found[f"functions/{topic.lower()}.md"] = _page(topic, _documented(pteron, names))
     for module in public_modules():
-        lines = [f".. automodule:: {module.__name__}", "   :no-members:", ""]
-        own = (name for name in module.__all__ if name not in _PUBLIC)
-        lines += _documented(module, sorted(own, key=str.lower), told)
-        path = f"modules/{module.__name__.removeprefix('pteron.')}.md"
-        found[path] = _page(f"`{module.__name__}`", lines)
+        found |= _pages_of_module(module, places)
     for package, intro in INSIDE.items():
         text = [f"# Inside `pteron.{package}`", "", intro, ""]
         for part in parts(package):
@@ -144,12 +172,12 @@ def write_pages(app: Sphinx) -> None:
     folder = app.srcdir / "reference"
     wanted = pages()
     for part in ("functions", "modules", "inside"):
-        (folder / part).mkdir(exist_ok=True)
-        for old in (folder / part).glob("*.md"):
-            if f"{part}/{old.name}" not in wanted:
+        for old in (folder / part).rglob("*.md"):
+            if old.relative_to(folder).as_posix() not in wanted:
                 old.unlink()
     for name, text in wanted.items():
         path = folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
         if not path.is_file() or path.read_text(encoding="utf-8") != text:
             path.write_text(text, encoding="utf-8")
 
@@ -211,6 +239,21 @@ def without_aliases(
     return True if said.startswith("Alias for field number") else None
 
 
+class OneDocument(SphinxTransform):
+    """Give every node the page as its document.
+
+    Nodes of `eval-rst` come from a document of their own, whose settings hold the whole
+    environment: it would be stored with each page, 20 MB and a second every time.
+    """
+
+    default_priority = 999
+
+    def apply(self, **kwargs: Any) -> None:
+        """Set the document of each node."""
+        for node in self.document.findall():
+            node.document = self.document
+
+
 class Names(PythonDomain):
     """Names in docstrings: exactly, in their class or module, or as pteron's public names.
 
@@ -243,12 +286,28 @@ setattr(  # noqa: B010
 )
 
 
+_SIDEBARS: dict[tuple[Sphinx, int], Callable[..., str]] = {}
+"""The sidebars of pages that stand in no table of contents, by the depth of their folder."""
+
+
+def share_sidebar(
+    app: Sphinx, page: str, template: str, context: dict[str, Any], doctree: object
+) -> None:
+    """Compute the sidebar once for all pages of single names, and of sources, of one depth."""
+    depth = page.count("/")
+    if page.startswith("_modules/") or (page.startswith("reference/modules/") and depth == 3):
+        key = (app, -depth if page.startswith("_modules/") else depth)
+        context["toctree"] = _SIDEBARS.setdefault(key, cache(context["toctree"]))
+
+
 def setup(app: Sphinx) -> dict[str, Any]:
     """Tell Sphinx."""
+    app.connect("html-page-context", share_sidebar, priority=400)
     app.connect("builder-inited", write_pages)
     app.connect("autodoc-process-docstring", said_where_defined, priority=440)
     app.connect("autodoc-process-docstring", whole_values, priority=450)
     app.connect("autodoc-process-docstring", plain_bars, priority=550)
     app.connect("autodoc-skip-member", without_aliases)
+    app.add_transform(OneDocument)
     app.add_domain(Names, override=True)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

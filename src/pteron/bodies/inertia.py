@@ -302,6 +302,25 @@ def inertia_count(kinds: Sequence[str]) -> int:
     return sum(kind.startswith("I") for kind in kinds)
 
 
+def about_point(
+    inertia: PlanarInertia | SpatialInertia, point: Sequence[float]
+) -> PlanarInertia | SpatialInertia:
+    """Return a body's inertia about another reference point, given in its frame, m.
+
+    Examples
+    --------
+    >>> about_point(PlanarInertia.of_body(2.0, (0.1, 0.0), 0.05), (0.1, 0.0, 0.0)).values
+    (2.0, 0.0, 0.0, 0.03)
+    """
+    kind = type(inertia)
+    center = (*inertia.center_of_mass, 0.0)[:3]
+    of_mass = kind.shares_of_point(*center).values()
+    central = [i - inertia.mass * share for i, share in zip(inertia.values, of_mass, strict=True)]
+    moved = [x - y for x, y in zip(center, point, strict=True)]
+    count = inertia_count(kind.kinds)
+    return kind.of_values(carried_values(kind, inertia.mass, moved, central[-count:]))
+
+
 def carried_values(
     kind: type[PlanarInertia | SpatialInertia],
     mass: Any,

@@ -31,7 +31,7 @@ Failure = Literal["raise", "nan"]
 MOTION = ("--pose", "--velocity", "--acceleration", "--wrench")
 """The options that give a state of motion, as several numbers each."""
 
-VECTORS = (*MOTION, "--from", "--to", "--around", "--speed", "--force", "--jerk")
+VECTORS = (*MOTION, "--from", "--to", "--around", "--pivot", "--speed", "--force", "--jerk")
 """The options that take several numbers: all that follow them."""
 
 
@@ -188,6 +188,15 @@ def load_robot(name_or_path: str, elbows: str | None = None, *, quiet: bool = Fa
             f"expected, one{' or two' * several} for each leg of {robot.name}, such as {text}"
         )
     return with_elbows(robot, [int(f"{sign}1") for sign in elbows])
+
+
+def about_pivot(robot: Manipulator, text: str | None) -> Manipulator:
+    """Return the machine with poses about the point of `--pivot`, or as it is without one."""
+    if text is None:
+        return robot
+    from pteron.manipulator import with_pivot
+
+    return with_pivot(robot, parsed_numbers([text], ["x", "y", "z"], "--pivot"))
 
 
 def check_rate(rate: float) -> None:

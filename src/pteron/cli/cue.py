@@ -3,39 +3,45 @@
 from __future__ import annotations
 
 import math
-from dataclasses import fields
-from typing import TYPE_CHECKING
+from dataclasses import asdict, replace
+from typing import TYPE_CHECKING, Any
 
-from pteron.cli.arguments import MachineArgument
-from pteron.cli.motion_table import motion_frame, peaks_table
+from pteron.cli.arguments import MachineArgument, about_pivot
+from pteron.cli.cue_options import Filters, Live
+from pteron.cli.motion_argument import Carried, given_pose
+from pteron.cli.motion_table import box_lines, box_record, motion_frame, peaks_table
 from pteron.cli.progress import spinner
 from pteron.cli.result import CommandResult
-from pteron.cli.terminal import note, percent, plain, significant
+from pteron.cli.terminal import note, percent, plain, significant, table
 from pteron.errors import DataError
+from pteron.json_values import json_fields
+from pteron.tolerances import SAME
 
 if TYPE_CHECKING:
-    from pteron.manipulator import Manipulator
-    from pteron.motion import Cue
+    from rich.table import Table
 
+    from pteron.manipulator import Manipulator
+    from pteron.motion import Cue, Peak
 
 _REDUCED = 1e-3
 """Share of reduced amplitudes from which it is stated."""
 
+_DENSE = 4
+"""Moments per sample at which peaks are sought: samples are at most 0.01 s apart."""
+
 
 def cue(
-    motion: str,
+    motion: str | None = None,
     *,
     machine: MachineArgument,
+    around: str | None = None,
+    pivot: str | None = None,
+    carried: Carried,
     out: str | None = None,
     page: str | None = None,
     type_ii: float = 0.0,
-    scale: float | None = None,
-    translation: float | None = None,
-    return_speed: float | None = None,
-    tilting: float | None = None,
-    tilt_rate: float | None = None,
-    rotation: float | None = None,
-    smoothing: float | None = None,
+    live: Live,
+    filters: Filters,
 ) -> CommandResult:
     """Show a vehicle's accelerations and turns with a simulator's platform: a classical washout.
 
@@ -44,6 +50,10 @@ def cue(
     translation, lasting ones by tilt, and the platform returns to the middle. It never leaves a box
     of poses that is proved to lie in the workspace: amplitudes too large for it are reduced.
 
+    With --listen the motion comes from a running simulator, as datagrams, and set points of the
+    drives go out 250 times a second. The platform starts from home when datagrams come, returns
+    when they stop, and rests there after Ctrl-C. A recorded MOTION gives the box its proportions.
+
     Arguments
     ---------
     MOTION: The vehicle's motion, a .csv or .parquet file: t ax ay az wx wy wz.
@@ -51,9 +61,22 @@ def cue(
     Options
     -------
     --robot FILE: A machine whose platform moves and turns freely.
+    --around POSE: Middle of the box, or home. [default: where the largest box of the motion's
+        proportions fits]
     --out FILE: Write poses and joints to a .csv or .parquet file.
     --page FILE: Write a page that shows the motion, a .html file.
     --type-ii: Least type-II measure of the poses used: 0 where the drives cannot hold the platform.
+
+    Live
+    ----
+    --listen PORT: Receive the vehicle's motion as UDP datagrams at this port.
+    --send HOST:PORT: Send set points there, as UDP datagrams. [default: none are sent]
+    --layout NAME: Layout of the datagrams: json, csv (FlightGear), forza, outsim (Live for Speed).
+    --flip NAMES: Columns whose sign is changed, such as ay,wz. [default: none]
+    --set-points NAME: Format of set points: csv (number, s, joints) or json.
+    --timeout: Time without datagrams after which the platform returns home, s.
+    --duration: Time after which the live cue ends, s. [default: until Ctrl-C]
+    --host: Address at which datagrams are received; the default takes those of this computer alone.
 
     Filters
     -------
@@ -69,52 +92,149 @@ def cue(
     Examples
     --------
     pteron cue drive.csv --robot simulator.toml --out cue.csv
-    pteron cue flight.csv --robot simulator.toml --scale 0.3 --page cue.html
+    pteron cue flight.csv --robot simulator.toml --scale 0.3 --payload 90@0,0,0.4 --page cue.html
+    pteron cue --listen 4123 --robot simulator.toml --layout forza --send 127.0.0.1:4124
     """
-    import numpy as np
+    _check_requests(motion, out, page, live)
+    machine = _about_pivot(carried.load_machine(machine), pivot)
+    where: dict[str, Any] = {"washout": filters.washout(), "type_ii": type_ii}
+    if around is not None:
+        where["pose"] = given_pose(machine, None if around == "home" else around, "--around")
+    if live.listen is not None:
+        from pteron.cli.cue_live import run_live
 
-    from pteron.motion import Washout, cue as shown, limits_of, peaks
-    from pteron.tables import check_output
+        return run_live(machine, motion, carried, where, live)
+    from pteron.motion import cue as shown
 
+    assert motion is not None
+    with spinner(f"Showing {motion} with {machine.name}"):
+        cued = shown(machine, motion, **where)
+        largest, motor_rows = _drive_peaks(machine, cued)
+        files = _write(machine, cued, out, page)
+    return _result(machine, motion, carried, cued, largest, motor_rows, files)
+
+
+def _about_pivot(machine: Manipulator, pivot: str | None) -> Manipulator:
+    """Return the machine with poses about the pivot; it rests in the same home as without one."""
+    if pivot is None:
+        return machine
+    from pteron.workspace import home_pose
+
+    return about_pivot(replace(machine, home=tuple(home_pose(machine).tolist())), pivot)
+
+
+def _check_requests(motion: str | None, out: str | None, page: str | None, live: Live) -> None:
+    """Raise DataError unless what is to be read and written is stated and can be written."""
+    if live.listen is not None:
+        if out is not None or page is not None:
+            raise DataError("--out and --page are for a recorded motion; leave them out")
+        return
+    if live.send is not None:
+        raise DataError("--send is for a live cue; give --listen PORT too")
+    if motion is None:
+        raise DataError("no motion given; give a file of t ax ay az wx wy wz, or --listen PORT")
     if out is None and page is None:
         raise DataError("nothing to write; give --out FILE.csv, --page FILE.html or both")
     if out is not None:
+        from pteron.tables import check_output
+
         check_output(out)
     if page is not None:
         from pteron.report.write import checked_page
 
         checked_page(page)
-    options = scale, translation, return_speed, tilting, tilt_rate, rotation, smoothing
-    named = zip((field.name for field in fields(Washout)), options, strict=True)
-    washout = Washout(**{name: setting for name, setting in named if setting is not None})
-    with spinner(f"Showing {motion} with {machine.name}"):
-        cued = shown(machine, motion, washout=washout, type_ii=type_ii)
-        largest = peaks(machine, cued.pose, cued.velocity, cued.acceleration, limits_of(machine))
-        files = _write(machine, cued, out, page)
+
+
+def _drive_peaks(
+    machine: Manipulator, cued: Cue
+) -> tuple[tuple[Peak, ...], list[dict[str, float | None]]]:
+    """Return the peaks of the whole motion, and a row for each motor with a gear ratio."""
+    import numpy as np
+
+    from pteron.dynamics import drive_forces
+    from pteron.motion import limits_of, peaks
+
+    fine = np.linspace(0.0, cued.duration, _DENSE * (len(cued.time) - 1) + 1)
+    motion = cued.at(fine)
+    limits, forces = limits_of(machine), drive_forces(machine, *motion)
+    largest, rows = peaks(machine, *motion, limits), []
+    size = {(peak.name, peak.leg): peak.size for peak in largest}
+    for i, leg in enumerate(machine.legs):
+        ratio = leg.drive.ratio if leg.drive else None
+        if ratio:
+            row = {
+                "leg": i + 1,
+                "speed": abs(ratio) * size["speed", i + 1],
+                "peak_torque": size["force", i + 1] / abs(ratio),
+                "rms_torque": float(np.sqrt(np.mean(forces[:, i] ** 2))) / abs(ratio),
+                "rated_torque": leg.drive.rated_torque if leg.drive else None,
+            }
+            rows.append(row)
+    return largest, rows
+
+
+def _result(
+    machine: Manipulator,
+    motion: str,
+    carried: Carried,
+    cued: Cue,
+    largest: tuple[Peak, ...],
+    motor_rows: list[dict[str, float | None]],
+    files: list[str],
+) -> CommandResult:
+    """Return the summary of a recorded motion's cue."""
+    if cued.resampling:
+        note(f"Note: {motion}: {cued.resampling}")
     for peak in largest:
-        if peak.share > 1.0:
+        if peak.share > 1.0 + SAME:
             note(f"Note: {peak.phrase()}; a smaller --scale asks less")
-    low, high = cued.region.box
-    box = np.stack([low, high], axis=-1).tolist()
     record = {
         "robot": machine.name,
+        **asdict(carried),
         "duration": cued.duration,
         "samples": len(cued.time),
-        "box": dict(zip(machine.coordinates, box, strict=True)),
+        "resampling": cued.resampling,
+        "center": cued.center.tolist(),
+        "box": box_record(machine, cued.region),
         "proved": bool(cued.proof.holds),
         "pressed": cued.pressed,
+        "peaks": [
+            json_fields(quantity=p.name, size=p.size, unit=p.unit, limit=p.limit, share=p.share)
+            | {"leg": p.leg or None}
+            for p in largest
+        ],
+        "motors": motor_rows,
         "files": files,
     }
-    lines = [
-        f"[bold]{plain(machine.name)}[/bold], motion of {plain(motion)}: {cued.duration:.4g} s "
-        f"({len(cued.time)} samples), in a box of poses proved to be in reach and within limits: "
-        f"{_box_text(machine, cued)}.",
-        f"Amplitudes are reduced by at most {percent(cued.pressed)} to stay in the box."
+    lines: list[Any] = [
+        f"[bold]{plain(machine.name)}[/bold]{plain(str(carried))}, motion of {plain(motion)}: "
+        f"{cued.duration:.4g} s ({len(cued.time)} samples)",
+        *box_lines(machine, cued.region),
+        f"Amplitudes are reduced by at most {percent(cued.pressed)} to stay in the box; a smaller "
+        "--scale asks for less."
         if cued.pressed >= _REDUCED
         else "Amplitudes are not reduced: the motion fits into the box.",
         peaks_table(largest),
     ]
-    return CommandResult(record, lines, files)
+    return CommandResult(record, lines + _motor_table(motor_rows), files)
+
+
+def _motor_table(rows: list[dict[str, float | None]]) -> list[Table]:
+    """Return a table of speed and torque at the motors; none where no drive has a gear ratio."""
+    if not rows:
+        return []
+    names = "leg", "speed (1/min)", "peak torque (N m)", "RMS torque (N m)", "rated torque (N m)"
+    cells = [
+        (
+            f"{row['leg']:.0f}",
+            significant((row["speed"] or 0.0) * 30.0 / math.pi),
+            significant(row["peak_torque"] or 0.0),
+            significant(row["rms_torque"] or 0.0),
+            "-" if row["rated_torque"] is None else significant(row["rated_torque"]),
+        )
+        for row in rows
+    ]
+    return [table(*names, rows=cells, numbers=names, caption="At the motors.")]
 
 
 def _write(machine: Manipulator, cued: Cue, out: str | None, page: str | None) -> list[str]:
@@ -130,16 +250,3 @@ def _write(machine: Manipulator, cued: Cue, out: str | None, page: str | None) -
 
         files.append(str(write_motion_page(machine, cued, page)))
     return files
-
-
-def _box_text(machine: Manipulator, cued: Cue) -> str:
-    """Return the box that the motion stays in, mm and degrees."""
-    low, high = cued.region.box
-    return ", ".join(
-        f"{name} {significant(1e3 * a)} to {significant(1e3 * b)} mm"
-        if unit == "m"
-        else f"{name} {math.degrees(a):.3g} to {math.degrees(b):.3g} deg"
-        for name, unit, a, b in zip(
-            machine.coordinates, machine.platform.units, low, high, strict=True
-        )
-    )

@@ -7,7 +7,7 @@ from dataclasses import asdict
 from functools import partial
 from typing import TYPE_CHECKING, Literal
 
-from pteron.cli.arguments import MachineArgument, check_rate, parsed_list
+from pteron.cli.arguments import MachineArgument, about_pivot, check_rate, parsed_list
 from pteron.cli.motion_argument import Carried, given_pose, read_motion
 from pteron.cli.motion_table import motion_frame, peaks_table, travel_text
 from pteron.cli.planned_motions import joint_motion, line_motion, standard_motion
@@ -77,6 +77,7 @@ def cycle(
     tool_speed: float | None = None,
     tool_acceleration: float | None = None,
     carried: Carried,
+    pivot: str | None = None,
     out: str | None = None,
 ) -> CommandResult:
     """Plan a motion within limits, and compute the speeds and forces that it needs of the drives.
@@ -132,9 +133,12 @@ def cycle(
     pteron cycle tripteron --to 0.1 0 0.05 --back --acceleration 10 --out line.csv
     pteron cycle delta --via poses.csv --corner 0.02 --duration 2 --out path.csv
     """
+    from pteron.manipulator.template import template_sentence
     from pteron.motion import limits_of
 
-    machine = carried.load_machine(machine)
+    if text := template_sentence(machine):
+        note(f"Note: {text}")
+    machine = about_pivot(carried.load_machine(machine), pivot)
     check_rate(rate)
     if out is not None:
         from pteron.tables import check_output
@@ -189,11 +193,9 @@ def _result(
     """Write the motion's table if a file is named, and return its summary with the peak loads."""
     import numpy as np
 
-    from pteron.manipulator.template_masses import template_masses
     from pteron.motion import peaks
+    from pteron.motion.sizing.friction_sentence import friction_sentence
 
-    if text := template_masses(machine):
-        note(f"Note: {text}")
     count = _DENSE * (len(motion.time) - 1) + 1
     fine = np.linspace(float(motion.time[0]), float(motion.time[-1]), count)
     largest = peaks(machine, *motion.at(fine), limits)
@@ -230,9 +232,12 @@ def _result(
     )
     if bound is not None:
         text += f"; a polynomial of degree 5 along the same path takes {bound:.4g} s"
+    friction = friction_sentence(machine)
     text += f". Travel: {travel_text(machine, motion)}."
     return CommandResult(
-        record, partial(_show, [text, peaks_table(largest)], out), [out] if out else []
+        record | {"friction": friction},
+        partial(_show, [text, peaks_table(largest), friction], out),
+        [out] if out else [],
     )
 
 

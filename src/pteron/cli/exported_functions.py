@@ -12,10 +12,10 @@ feed_forward_base feed_forward_pd feed_forward_pd_base followed_step forward_dyn
 gravity_forces inverse_dynamics inverse_dynamics_base inverse_kinematics jacobian
 joint_accelerations joint_coordinates joint_feed_forward joint_feed_forward_base joint_points
 joint_rates joint_screws kinetic_energy least_clearances link_jacobians link_vectors
-load_regressor mass_matrix newton_step paper_regressor paper_terms passive_friction passive_room
-pd_gravity pd_gravity_base platform_motion platform_points potential_energy radicands reach
-regressor room set_payload set_payload_base squared_type_i twist twist_jacobian type_ii
-type_ii_distances velocity_of_twist
+load_regressor mass_matrix motion_at_point newton_step paper_regressor paper_terms
+passive_friction passive_room pd_gravity pd_gravity_base platform_motion platform_points
+potential_energy radicands reach regressor room set_payload set_payload_base squared_type_i twist
+twist_jacobian type_ii type_ii_distances velocity_of_twist
 """
 
 FUNCTIONS = tuple(_NAMES.split())

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from pteron.cli.arguments import MOTION, Failure, MachineArgument, parsed_numbers
+from pteron.cli.arguments import MOTION, Failure, MachineArgument, about_pivot, parsed_numbers
 from pteron.cli.table_rows import (
     TableRows,
     check_destination,
@@ -30,6 +30,7 @@ def inverse(
     pose: list[str] | None = None,
     *,
     table: str | None = None,
+    pivot: str | None = None,
     out: str | None = None,
     on_failure: Failure = "raise",
     json: bool = False,
@@ -54,6 +55,7 @@ def inverse(
     from pteron.kinematics import inverse_kinematics
     from pteron.manipulator.readings import from_readings, to_readings
 
+    machine = about_pivot(machine, pivot)
     columns = machine.coordinates
     rows = given_rows(machine, table, pose, "pose", columns)
     added = machine.joint_names
@@ -80,6 +82,7 @@ def direct(
     joints: list[str] | None = None,
     *,
     table: str | None = None,
+    pivot: str | None = None,
     out: str | None = None,
     on_failure: Failure | None = None,
     json: bool = False,
@@ -108,6 +111,7 @@ def direct(
     from pteron.kinematics import direct_kinematics
     from pteron.manipulator.readings import from_readings
 
+    machine = about_pivot(machine, pivot)
     columns = machine.joint_names
     rows = given_rows(machine, table, joints, "joints", columns)
     failure: Failure = on_failure or ("raise" if rows.single else "nan")
@@ -186,6 +190,7 @@ def forces(
     wrench: str | None = None,
     drives: bool = False,
     table: str | None = None,
+    pivot: str | None = None,
     out: str | None = None,
     on_failure: Failure = "raise",
     json: bool = False,
@@ -220,6 +225,7 @@ def forces(
     from pteron.manipulator.readings import reading_scales
     from pteron.motion import overloads
 
+    machine = about_pivot(machine, pivot)
     m, n = machine.freedom, machine.joint_count
     names = machine.column_names
     loads = names["wrench"]

@@ -1,4 +1,4 @@
-"""`pteron catalog`, `new` and `check`: the machines that come with Pteron, and the user's own."""
+"""`pteron catalog` and `check`: the machines that come with Pteron, and the user's own."""
 
 from __future__ import annotations
 
@@ -7,16 +7,15 @@ import re
 from collections.abc import Sequence
 from dataclasses import asdict
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from typer import Exit
 
-from pteron.cli.arguments import elbows_text, load_robot, split_numbers
+from pteron.cli.arguments import elbows_text, load_robot
 from pteron.cli.progress import spinner
 from pteron.cli.result import CommandResult
-from pteron.cli.terminal import complain, plain, show, table, warn, write
-from pteron.errors import ModelError, OutputError, PteronError
+from pteron.cli.terminal import complain, plain, show, table, warn
+from pteron.errors import ModelError, PteronError
 from pteron.json_values import json_fields
 from pteron.short_numbers import runs_text
 
@@ -25,9 +24,6 @@ if TYPE_CHECKING:
 
     from pteron.legs import LegKind
     from pteron.manipulator import Manipulator
-
-_LIMITS = "LOW:HIGH expected, such as -0.3:0.3"
-"""The form of `--limits`."""
 
 _FAULTY = 2
 """Exit code for a faulty file."""
@@ -77,86 +73,6 @@ def _legs_text(legs: Sequence[LegKind]) -> str:
     texts = (f"the {joint} of {', '.join(types)}" for joint, types in actuated.items())
     text = f"Joints from base to platform: {joints}; actuated: {'; '.join(texts)}."
     return " ".join([text, *(f"{kind}: spherical, all axes meet." for kind in spherical)])
-
-
-def new(
-    kind: str | None = None,
-    *,
-    base_radius: float | None = None,
-    platform_radius: float | None = None,
-    crank: float | None = None,
-    rod: float | None = None,
-    limits: str | None = None,
-    mass_from: list[str] | None = None,
-    platform_mass: float | None = None,
-    out: str | None = None,
-    overwrite: bool = False,
-) -> CommandResult:
-    """Write a file for a machine of your own, with a comment that explains every key.
-
-    The file describes a machine like KIND, for you to edit; without KIND the kinds are listed. The
-    dimensions of the options apply to all legs; comments in the file say what follows from them.
-
-    Arguments
-    ---------
-    KIND: A machine of the catalog, or a TOML file.
-
-    Options
-    -------
-    --base-radius: Greatest distance of a guide point from the machine's axis, m.
-    --platform-radius: Greatest distance of a platform point from the platform's axis, m.
-    --crank: Length of the cranks or upper links, m.
-    --rod: Length of the rods or lower links, m.
-    --limits LOW:HIGH: Limits of the actuated joints, m or rad; of rams the lengths.
-    --mass-from STOCK: Compute masses and inertias of links as if cut from aluminium-tube:30x2 or
-        steel-rod:8 (mm); with upper= or lower= before it, of these links alone (repeat it).
-    --platform-mass: Mass of the platform with its bars, kg; its inertia is scaled with it.
-    --out FILE: The TOML file to write. [default: the screen]
-    --overwrite: Replace an existing file.
-
-    Examples
-    --------
-    pteron new
-    pteron new delta --out robot.toml
-    pteron new delta --base-radius 0.2 --crank 0.25 --rod 0.55 --mass-from aluminium-tube:30x2
-    """
-    if kind is None:
-        return catalog()
-    from pteron.atomic import write_text
-    from pteron.manipulator import load
-    from pteron.manipulator.commented_file import commented_text, kept_numbers_sentence
-
-    dimensions = {
-        "base_radius": base_radius,
-        "platform_radius": platform_radius,
-        "crank": crank,
-        "rod": rod,
-        "limits": None if limits is None else split_numbers("--limits", limits, ":", 2, _LIMITS),
-        "stock": _stocks(mass_from),
-        "platform_mass": platform_mass,
-    }
-    dimensions = {key: size for key, size in dimensions.items() if size not in (None, {})}
-    if out is not None and Path(out).exists() and not overwrite:
-        raise OutputError(f"{out}: is there already; name another file, or say --overwrite")
-    text = commented_text(kind, dimensions)
-    if out is not None:
-        write_text(out, text)
-    record = {"kind": kind, "file": out, "text": text}
-    if out is None:
-        return CommandResult(record, partial(write, text))
-    written = f"Written: {plain(out)}. Put in your numbers, then: pteron check {plain(out)}"
-    return CommandResult(
-        record, [written, *map(plain, kept_numbers_sentence(load(kind), dimensions))]
-    )
-
-
-def _stocks(texts: list[str] | None) -> dict[str, str]:
-    """Return the stock of the links by key; a stock without a key is for "upper" and "lower"."""
-    stocks: dict[str, str] = {}
-    for text in texts or ():
-        key, _, stock = text.rpartition("=")
-        stocks |= {key: stock} if key else dict.fromkeys(("upper", "lower"), stock)
-    return stocks
 
 
 def _machine(robot: Manipulator) -> dict[str, Any]:
@@ -221,7 +137,7 @@ def _findings(robot: Manipulator) -> dict[str, Any]:
     import numpy as np
 
     from pteron.kinematics import inverse_kinematics, singular_orientations
-    from pteron.manipulator.template_masses import template_masses
+    from pteron.manipulator.template import template_sentence
     from pteron.workspace import home_poses, limited_joints, pose_margins
     from pteron.workspace.examination import examine
     from pteron.workspace.redundancy import redundancy
@@ -262,7 +178,7 @@ def _findings(robot: Manipulator) -> dict[str, Any]:
         "limited_joints": [asdict(joint) for joint in limited_joints(robot, home)],
         "holds_orientation": examination.architecture.holds,
         "self_motions": list(examination.architecture.self_motions),
-        "template_masses": template_masses(robot),
+        "template": template_sentence(robot),
         "doubts": list(examination.warnings),
     }
 
@@ -308,7 +224,7 @@ def _show(robot: Manipulator, findings: dict[str, Any], further: str, *, each: b
         *_redundancy(robot, findings),
         *_modes(findings["working_modes"]),
         *_passive(findings["limited_joints"], each=each),
-        *([f"Note: {text}"] if (text := findings["template_masses"]) else []),
+        *([f"Note: {text}"] if (text := findings["template"]) else []),
         *(
             f"The platform can move with its rams locked {text}"
             for text in findings["self_motions"]

@@ -30,7 +30,8 @@ from pteron.cli.film import film
 from pteron.cli.identify import identify
 from pteron.cli.interrupts import ended_with_compilers, insistent_interrupts
 from pteron.cli.inverse_direct_forces import direct, forces, inverse
-from pteron.cli.machines import catalog, check, new
+from pteron.cli.machines import catalog, check
+from pteron.cli.new import new
 from pteron.cli.options import help_of, parsed_command
 from pteron.cli.play import play
 from pteron.cli.report import report
@@ -172,7 +173,7 @@ _COMMANDS: dict[str, tuple[Callable[..., CommandResult | None], ...]] = {
 }
 """The subcommands of each panel of the help."""
 
-_NUMERIC = (inverse, direct, forces, cycle)
+_NUMERIC = (inverse, direct, forces, cycle, cue)
 """Subcommands whose arguments may be negative numbers."""
 
 _GENERAL = (check, report, workspace, base, table1, export)

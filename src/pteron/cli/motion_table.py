@@ -1,4 +1,4 @@
-"""Tables of a motion for the command line: its samples, and its peaks beside their limits."""
+"""Tables of a motion for the command line: its samples, its peaks beside limits, its box."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
     from pteron.manipulator import Manipulator
     from pteron.motion import Motion, Peak
+    from pteron.workspace import Box
 
 _BINDS = 0.98
 """Share of a limit from which it counts as reached."""
@@ -86,3 +87,24 @@ def motion_frame(machine: Manipulator, motion: Motion) -> pl.DataFrame:
     forces = drive_forces(machine, *path) * scales
     columns.update(zip(machine.force_names, forces.T, strict=True))
     return pl.DataFrame(columns)
+
+
+def box_record(machine: Manipulator, region: Box) -> dict[str, list[float]]:
+    """Return the box by coordinate, m and rad."""
+    return dict(zip(machine.coordinates, region.box.T.tolist(), strict=True))
+
+
+def box_lines(machine: Manipulator, region: Box) -> list[str]:
+    """Return lines on the box that the platform stays in and on its middle, mm and degrees."""
+    rows = list(zip(machine.coordinates, machine.platform.units, *region.box.tolist(), strict=True))
+    spans = ", ".join(
+        f"{name} {significant(1e3 * a)} to {significant(1e3 * b)} mm"
+        if unit == "m"
+        else f"{name} {math.degrees(a):.3g} to {math.degrees(b):.3g} deg"
+        for name, unit, a, b in rows
+    )
+    middle = " ".join(f"{0.5 * (a + b) + 0.0:.4g}" for _, _, a, b in rows)
+    return [
+        f"It stays in a box of poses proved to be in reach and within limits: {spans}.",
+        f"The middle of the box, to which it returns: {middle} (m, rad).",
+    ]

@@ -44,6 +44,8 @@ ROBOT: A machine of the catalog (see pteron catalog) or a TOML file.
 --payload MASS@X,Y,Z: Payload of the platform: its mass, kg, such as 0.5, at the tool's centre
     point; its centre of mass in the platform's frame, m, as in 0.5@0,0,-0.03; and its moment of
     inertia about that, kg m^2, as in 0.5@0,0,-0.03@2e-4. [default: none]
+--pivot X,Y,Z: Point of the platform that poses refer to, in the platform's frame, m, such as the
+    head of a rider; angles turn the platform about it. [default: P, the platform's own]
 --tool NAME: Mount a tool that the machine's file lists under tools.
 --cycle CYCLE: adept, the standard pick-and-place cycle, or the table of a motion.
 --duration: Duration of the standard cycle, s. [default: tool acceleration up to 10 m/s^2]

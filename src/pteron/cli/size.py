@@ -43,7 +43,7 @@ def size(
     duration: float | None = None,
     dwell: list[float] | None = None,
     within: str | None = None,
-    friction: float = 0.1,
+    friction: float = 0.0,
     motors: str | None = None,
     margin: float = 1.0,
     out: str | None = None,
@@ -55,9 +55,10 @@ def size(
     its place. A motion from a table is taken as it is. Several cycles follow one another, each with
     its dwell.
 
-    Forces are those of the drives: the bodies with the payload, friction and the rotors, as in the
-    machine's file. If the drives in the file, or all motors of a list, are too weak, a warning says
-    for which leg and by how much, and the exit code is 1.
+    Forces are those of the drives: the bodies with the payload, friction, rotors and screws, as in
+    the machine's file. With a drive's ratio, torque and speed are given at the motor too, there
+    with the losses of the screw. If the drives in the file, or all motors of a list, are too weak,
+    a warning says for which leg and by how much, and the exit code is 1.
 
     A list of motors has the columns name, rotor_inertia (kg m^2), rated_torque and peak_torque
     (N m), max_speed (rad/s). For each joint the output lists the motors that are strong enough, the
@@ -75,8 +76,8 @@ def size(
     --within REGION: Where the cycle is placed: workspace, here (where it is defined), or a box of
         poses such as x=-0.1:0.1,y=-0.1:0.1; coordinates not named keep the range of the cycle where
         it is defined. [default: workspace; here for a table]
-    --friction SHARE: Dry friction of a drive without friction in the file, as a share of its
-        largest force; 0 assumes none.
+    --friction SHARE: Dry friction to assume for a drive without friction in the file, as a share
+        of its largest force, such as 0.1 for gears of an efficiency of 0.9. [default: none]
     --motors FILE: List of motors to choose from, a CSV or TOML file.
     --margin: Required margin: limits of drives and motors over what the cycle needs.
     --out DIR|FILE: Write tables, numbers and figures to a folder, or one table to a file.
@@ -240,6 +241,7 @@ def _show(
         *_verdict(sizing, fits, request.margin),
         *([places] if sizing.places else []),
         _loads(sizing),
+        *_at_motors(sizing),
         *_places(sizing),
         _powers(sizing),
         *_rotors(sizing),
@@ -250,7 +252,9 @@ def _show(
 
 
 def _energy(sizing: Sizing, share: float) -> list[str]:
-    """Return lines on the energy of all drives over a cycle, and on assumed friction."""
+    """Return lines on the energy of all drives over a cycle, and on friction."""
+    from pteron.motion.sizing.friction_sentence import friction_sentence
+
     total = sizing.power.sum(axis=-1)
     net = sizing.net_energy
     supplied = significant(float(sizing.given_energy.sum()))
@@ -266,8 +270,10 @@ def _energy(sizing: Sizing, share: float) -> list[str]:
         texts = ", ".join(f"{force:.3g} {unit}" if force else "-" for force, unit in forces)
         lines.append(
             f"Where the file has no friction, dry friction of {percent(share)} of the drive's peak "
-            f"is assumed, leg by leg: {texts} (--friction SHARE; 0 leaves it out)"
+            f"is assumed, leg by leg: {texts}"
         )
+    else:
+        lines.append(friction_sentence(sizing.robot))
     return lines
 
 
@@ -310,8 +316,9 @@ def _places(sizing: Sizing) -> list[rich.table.Table]:
         rows.append((leg, quantity, pose, f"{math.degrees(worst['turn']) % 360:.3g} deg"))
     platform, coordinates = sizing.robot.platform, " ".join(sizing.robot.coordinates)
     units = ", ".join(["m"] * bool(platform.lengths) + ["rad"] * bool(platform.angles))
-    names = "leg", "largest", f"for a cycle centred at {coordinates} ({units})", "and turned by"
-    return [table(*names, rows=rows, numbers=("leg", names[-1]))] if rows else []
+    names = "leg", "largest", "centre of the cycle", "turned by"
+    caption = f"Where each is largest; centre: {coordinates} ({units})."
+    return [table(*names, rows=rows, numbers=("leg", names[-1]), caption=caption)] if rows else []
 
 
 def _loads(sizing: Sizing) -> rich.table.Table:
@@ -325,6 +332,30 @@ def _loads(sizing: Sizing) -> rich.table.Table:
         cells = (f"{significant(v[i])} {unit}" for v, unit in zip(columns, units, strict=True))
         rows.append((str(i + 1), *cells))
     return table(*names, rows=rows, numbers=names)
+
+
+def _at_motors(sizing: Sizing) -> list[Any]:
+    """Return a table of torque and speed at the motors, or a line where their ratio is unknown."""
+    if all(drive.ratio is None for drive in sizing.drives):
+        if all(leg.joint.unit == "rad" for leg in sizing.robot.legs):
+            return []  # the joint's are the motor's
+        return [
+            "Torque and speed of the motors are not known: the drives have no ratio, which is "
+            "2 pi / lead of a ball screw, rad/m (key drive)"
+        ]
+    to_rpm = 30.0 / math.pi
+    names = ("leg", "peak torque", "RMS torque", "peak speed", "RMS speed")
+    rms, peak = sizing.motor_torques
+    mean, fastest = sizing.motor_speeds
+    rows = []
+    for i, drive in enumerate(sizing.drives):
+        torques = (f"{significant(float(part[i]))} N m" for part in (peak, rms))
+        speeds = (f"{significant(to_rpm * float(part[i]))} rpm" for part in (fastest, mean))
+        is_known = drive.ratio is not None
+        rows.append((str(i + 1), *((*torques, *speeds) if is_known else ("-",) * 4)))
+    screws = [drive.screw.efficiency for drive in sizing.drives if drive.screw]
+    losses = f", screws with an efficiency of {min(screws):g}" if screws else ""
+    return [table(*names, rows=rows, numbers=names, caption=f"At the motors{losses}.")]
 
 
 def _powers(sizing: Sizing) -> rich.table.Table:

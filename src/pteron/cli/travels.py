@@ -22,15 +22,15 @@ if TYPE_CHECKING:
 def travel_result(
     robot: Manipulator, text: str, floors: Mapping[str, float], warnings: list[str]
 ) -> CommandResult:
-    """Return the travel from a typed pose along each coordinate, the largest box and the tilt."""
+    """Return the travel from a typed pose along each coordinate, the largest box, tilt and ball."""
     from pteron.kernels.functions import TYPE_II
-    from pteron.workspace import conditions, largest_box, largest_tilt, travel
+    from pteron.workspace import conditions, largest_ball, largest_box, largest_tilt, travel
 
     pose = given_pose(robot, text, "--from")
     warn(warnings)
     type_ii = floors["type_ii"] or TYPE_II
     required = conditions(robot, type_i=floors["type_i"], type_ii=type_ii)
-    box, tilt = None, None
+    box, tilt, radius = None, None, None
     with spinner(f"Proving how far {robot.name} can go"):
         travels = travel(robot, pose, given=required)
         with suppress(ModelError):  # nothing stops it in a direction
@@ -38,6 +38,7 @@ def travel_result(
         # Else it does not tilt to every side, or the level pose at this place cannot be used.
         with suppress(ModelError):
             tilt = largest_tilt(robot, pose, given=required).tilt
+            radius = largest_ball(robot, pose, given=required).radius
     rows = list(zip(robot.coordinates, travels.low, travels.high, travels.stops, strict=True))
     record = {
         "robot": robot.name,
@@ -53,10 +54,11 @@ def travel_result(
         },
         "box": box and dict(zip(robot.coordinates, box.box.T.tolist(), strict=True)),
         "tilt": tilt,
+        "ball": radius,
         "proved": True,
         "warnings": warnings,
     }
-    return CommandResult(record, _lines(robot, travels, box, tilt))
+    return CommandResult(record, _lines(robot, travels, box, tilt, radius))
 
 
 def _number(travel: float) -> float | None:
@@ -64,8 +66,10 @@ def _number(travel: float) -> float | None:
     return float(travel) if math.isfinite(travel) else None
 
 
-def _lines(robot: Manipulator, travels: Travel, box: Box | None, tilt: float | None) -> list[Any]:
-    """Return the lines of a printout: the pose, the table of travels, the largest box, the tilt."""
+def _lines(
+    robot: Manipulator, travels: Travel, box: Box | None, tilt: float | None, radius: float | None
+) -> list[Any]:
+    """Return the lines of a printout: pose, table of travels, largest box, tilt and ball."""
     places = zip(robot.coordinates, travels.pose.tolist(), strict=True)
     where = ", ".join(pose_text(name, q) for name, q in places)
     angles = robot.platform.angles
@@ -92,6 +96,10 @@ def _lines(robot: Manipulator, travels: Travel, box: Box | None, tilt: float | N
         lines.append(f"Largest box about it, proved{held}: {spans}")
     if tilt is not None:
         lines.append(f"Tilt to every side at this place, proved: {math.degrees(tilt):.4g} deg")
+    if radius is not None:
+        lines.append(
+            f"Largest ball of positions about it, level, proved: radius {1e3 * radius:.4g} mm"
+        )
     return lines
 
 

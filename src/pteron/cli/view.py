@@ -11,7 +11,7 @@ from typing import Any
 
 from typer import echo
 
-from pteron.cli.arguments import MachineArgument, load_robot
+from pteron.cli.arguments import MachineArgument, about_pivot, load_robot
 from pteron.cli.motion_argument import Carried
 from pteron.cli.progress import spinner
 from pteron.cli.terminal import note, show_json
@@ -25,6 +25,7 @@ def view(
     *,
     motion: str | None = None,
     carried: Carried,
+    pivot: str | None = None,
     compare: str | None = None,
     enlarge: float | None = None,
     beside: list[str] | None = None,
@@ -60,9 +61,9 @@ def view(
     pteron view delta --beside par4 --beside hexa --motion adept
     """
     if carried.payload_center is None:
-        machine = carried.mount_tool(machine)
+        machine = about_pivot(carried.mount_tool(machine), pivot)
     else:  # the page's own payload is at the tool
-        machine, carried = carried.load_machine(machine), Carried()
+        machine, carried = about_pivot(carried.load_machine(machine), pivot), Carried()
     with spinner(f"Preparing {machine.name}"):
         from pteron.viewer import view as opened
         from pteron.viewer.guard import is_local_address
@@ -70,9 +71,9 @@ def view(
         shown: Any = {
             "motion": motion,
             "payload": carried.payload,
-            "compare": compare,
+            "compare": compare and about_pivot(load_robot(compare), pivot),
             "enlarge": enlarge,
-            "beside": [load_robot(name) for name in beside or ()],
+            "beside": [about_pivot(load_robot(name), pivot) for name in beside or ()],
         }
         viewer = opened(machine, host=host, port=port, **shown)
     # Ctrl-C is the usual way to end it.

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from pteron.atomic import checked_file
-from pteron.cli.arguments import MachineArgument
+from pteron.cli.arguments import MachineArgument, about_pivot
 from pteron.cli.certify import RequestedProofs
 from pteron.cli.map_summary import map_data, map_rows, show_map
 from pteron.cli.pose_ranges import pose_ranges, pose_text
@@ -61,6 +61,7 @@ def workspace(
     tolerance: float | None = None,
     type_i: float | None = None,
     type_ii: float | None = None,
+    pivot: str | None = None,
     engine: Literal["auto", "jax"] = "auto",
     workers: int | None = None,
     scheduler: str | None = None,
@@ -124,6 +125,7 @@ def workspace(
     maps = {"index": index, "points": points, "out": out, "workers": workers}
     other = {"scheduler": scheduler, "engine": None if engine == "auto" else engine}
     proofs.check({**maps, **other}, slice_)
+    machine = about_pivot(machine, pivot)
     warnings = _warnings(machine)
     if proofs.has_requests:
         return proofs.result(machine, slice_, warnings)

@@ -30,6 +30,28 @@ def reach(machine: Machine, pose: Expression) -> list[Reach]:
     return [leg.reach(c.position) for leg, c in legs]
 
 
+def motion_at_point(
+    machine: Machine,
+    pose: Expression,
+    velocity: Expression,
+    acceleration: Expression,
+    pivot: Expression,
+) -> tuple[Expression, Expression, Expression]:
+    """Return pose, velocity and acceleration (m, 1) with another point of the platform for P.
+
+    `pivot` (3, 1) is the point in the platform's frame, m; the angles are the same. Given the
+    motion at the pivot, and minus the pivot, the result is the motion at P.
+    """
+    zero_rates = ca.SX.zeros(machine.freedom)
+    axes = machine.platform.motion(pose, zero_rates, zero_rates).axes
+    count = len(machine.robot.platform.lengths)
+    arm = ca.mtimes(machine.platform.directions.T, ca.mtimes(axes, pivot))
+    shift = ca.vertcat(arm[:count], ca.SX(machine.freedom - count, 1))
+    rate = ca.jtimes(shift, pose, velocity)
+    growth = ca.jtimes(rate, pose, velocity) + ca.jtimes(shift, pose, acceleration)
+    return pose + shift, velocity + rate, acceleration + growth
+
+
 def radicands(machine: Machine, pose: Expression) -> Expression:
     """Return the radicands (k, 1) of all roots of the legs' closures, inner ones first."""
     zero_rates = ca.SX.zeros(machine.freedom)

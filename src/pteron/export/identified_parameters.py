@@ -128,7 +128,7 @@ def _with_friction(leg: LegKind, friction: dict[str, Any]) -> LegKind:
             drive,
             **{name: friction[name] for name in ("coulomb", "viscous", "offset")},
             stribeck=law and Stribeck(law["force"], law["speed"]),
-            rotor_inertia=friction["inertia"] / drive.gear**2,
+            rotor_inertia=(friction["inertia"] - drive.screw_inertia) / drive.gear**2,
         ),
     )
 

@@ -203,6 +203,6 @@ def _motor_data(
     if description.rotor_inertia is not None and description.ratio is not None:
         return tuple(zip(description.rotor_inertia, description.ratio, strict=True))
     drives = [leg.drive for leg in robot.legs]
-    if not any(drive and drive.rotor_inertia for drive in drives):
+    if not any(drive and drive.inertia for drive in drives):
         return None
-    return tuple((d.rotor_inertia, d.gear) for d in (drive or Drive() for drive in drives))
+    return tuple((d.inertia / d.gear**2, d.gear) for d in (drive or Drive() for drive in drives))

@@ -147,7 +147,7 @@ class Identification(Result):
             motors = zip(drives, self.rotors, strict=True)
             drives = [d if r == d.gear else replace(d, ratio=r) for d, (_, r) in motors]
         reflected = zip(drives, self.reflected_inertia.tolist(), strict=True)
-        inertia = [mass / drive.gear**2 for drive, mass in reflected]
+        inertia = [(mass - drive.screw_inertia) / drive.gear**2 for drive, mass in reflected]
         friction = self._friction(self.file_values)
         each = zip(robot.legs, drives, inertia, friction, strict=True)
         legs = [

@@ -70,6 +70,8 @@ class Inputs:
     mass: Expression = None
     center: Expression = None
     inertia: Expression = None
+    pivot: Expression = None
+    """A point of the platform, in its frame (3,)."""
     side: Expression = None
     """Directions in which the joints slide (n,): -1, 1, or 0 where they stick."""
     hold: Expression = None

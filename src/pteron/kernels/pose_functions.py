@@ -176,6 +176,11 @@ TABLE |= {
     ),
     "joint_rates": Entry(RATE, _joint_motion, NEEDS_TYPE_I),
     "joint_accelerations": Entry(MOTION, _joint_motion, NEEDS_TYPE_I),
+    "motion_at_point": equation_entry(
+        kinematics.motion_at_point,
+        (*MOTION, "pivot"),
+        "pivot_pose pivot_velocity pivot_acceleration",
+    ),
     "platform_motion": equation_entry(
         kinematics.platform_rates, _OF_JOINTS, "velocity acceleration", (*NEEDS_ANGLES, "type II")
     ),

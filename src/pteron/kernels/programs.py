@@ -387,6 +387,7 @@ def _input_symbols(
         "twist": 6,
         "mass": 1,
         "center": 3,
+        "pivot": 3,
         "inertia": inertia_count(machine.robot.platform.inertia.kinds),
         **dict.fromkeys(("joints", "joint_rates", "joint_accelerations", "forces"), n),
         "drives": len(Drives._fields) * n,

@@ -23,6 +23,7 @@ from pteron.legs.rrr import RRR as RRR
 from pteron.legs.rrs import RRS as RRS
 from pteron.legs.rss import RSS as RSS
 from pteron.legs.rupu import RUPU as RUPU
+from pteron.legs.screw import Screw as Screw
 from pteron.legs.srrr import SRRR as SRRR
 from pteron.legs.ups import UPS as UPS
 from pteron.legs.upu import UPU as UPU

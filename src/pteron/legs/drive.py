@@ -9,6 +9,7 @@ from typing import Literal
 
 from pteron.bodies.vectors import number
 from pteron.errors import ModelError, shorten
+from pteron.legs.screw import Screw
 from pteron.toml import keep_checked, raise_faults
 
 
@@ -191,6 +192,9 @@ class Drive:
         The motor's winding and its supply.
     ripple, cogging : sequence of Wave
         Waves of the motor's torque: as a share of it, and without current.
+    screw : Screw, optional
+        The ball screw that moves the joint: its inertia counts, and `size` counts its efficiency
+        and its critical speed.
     """
 
     coulomb: float = 0.0
@@ -211,6 +215,7 @@ class Drive:
     ripple: tuple[Wave, ...] = ()
     cogging: tuple[Wave, ...] = ()
     lugre: LuGre | None = None
+    screw: Screw | None = None
 
     def __post_init__(self) -> None:
         faults = self._wrong_parts()
@@ -231,7 +236,13 @@ class Drive:
     def _wrong_parts(self) -> list[str]:
         """Return the faults of drive parts of a wrong type; convert lists to tuples in place."""
         faults = []
-        parts = {"stribeck": Stribeck, "lugre": LuGre, "elastic": Elastic, "winding": Winding}
+        parts: dict[str, type] = {
+            "stribeck": Stribeck,
+            "lugre": LuGre,
+            "elastic": Elastic,
+            "winding": Winding,
+        }
+        parts["screw"] = Screw
         for name, kind in parts.items():
             part = getattr(self, name)
             if part is not None and not isinstance(part, kind):
@@ -266,7 +277,7 @@ class Drive:
             )
         if "lugre" not in wrong and self.lugre and not self.coulomb:
             faults.append("lugre: needs coulomb, the friction at which its bristles slide; give it")
-        for name in sorted({"winding", "ripple", "cogging"} - wrong):
+        for name in sorted({"winding", "ripple", "cogging", "screw"} - wrong):
             if getattr(self, name) and self.ratio is None:
                 faults.append(f"{name}: needs ratio, of the motor's angle; give it, 1 for none")
         curve = () if "curve" in wrong else self.curve
@@ -290,8 +301,16 @@ class Drive:
 
     @property
     def inertia(self) -> float:
-        """The rotor's inertia reflected to the joint, ratio^2 rotor_inertia, kg or kg m^2."""
-        return self.gear**2 * self.rotor_inertia
+        """The inertia of rotor and screw reflected to the joint, kg or kg m^2.
+
+        The rotor's is ratio^2 rotor_inertia.
+        """
+        return self.gear**2 * self.rotor_inertia + self.screw_inertia
+
+    @property
+    def screw_inertia(self) -> float:
+        """The inertia of the screw reflected to the joint, kg; 0 without one."""
+        return 0.0 if self.screw is None else self.screw.reflected_inertia
 
     @property
     def rated_force(self) -> float | None:

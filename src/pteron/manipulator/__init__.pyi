@@ -25,4 +25,8 @@ from pteron.manipulator.robot_like import (
 )
 from pteron.manipulator.saving import dumps as dumps, save as save, to_dict as to_dict
 from pteron.manipulator.tool import Tool as Tool
-from pteron.manipulator.variants import turned as turned, working_modes as working_modes
+from pteron.manipulator.variants import (
+    turned as turned,
+    with_pivot as with_pivot,
+    working_modes as working_modes,
+)

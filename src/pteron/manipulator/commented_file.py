@@ -2,63 +2,52 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from pteron.errors import shorten
-from pteron.manipulator.dimensions import with_dimensions
-from pteron.manipulator.files import DEFAULT_KIND, document, load
+from pteron.manipulator.files import DEFAULT_KIND, catalog, document, load
 from pteron.manipulator.manipulator import Manipulator
 from pteron.manipulator.names import LONGEST_NAME
 from pteron.manipulator.saving import document_of
 from pteron.manipulator.writing import robot_text
 
-_FOLLOWS = {
-    "base_radius": "Base radius {} m: every guide_point follows from it.",
-    "platform_radius": "Platform radius {} m: every platform_point follows from it.",
-    "crank": "Cranks or upper links of {} m: their section stays where no stock is given.",
-    "rod": "Rods or lower links of {} m: their section stays where no stock is given.",
-    "limits": "Joint coordinates from {}.",
-    "stock": "Masses and inertias of links from {}: a first guess, without their ends and joints.",
-    "platform_mass": "Platform of {} kg: its inertia is in proportion.",
-}
-"""The file's comment for each argument of `with_dimensions`."""
-
 LEVEL = "horizontal"
 """The direction, in words, of cranks that point neither up nor down at 0."""
 
 
-def commented_text(name_or_path: str | Path, dimensions: Mapping[str, Any] | None = None) -> str:
+def commented_text(
+    name_or_path: str | Path, changed: Manipulator | None = None, about: Sequence[str] = ()
+) -> str:
     """Return the TOML text of a machine file based on another, with a comment on each key.
 
     Parameters
     ----------
     name_or_path : str or path
         A catalog name, or the path of a file.
-    dimensions : mapping, optional
-        Dimensions to change, as arguments of `with_dimensions`.
+    changed : Manipulator, optional
+        The machine to write, made from the other; by default the other itself.
+    about : sequence of str
+        Sentences on it for the top of the file.
 
     Raises
     ------
     ModelError
-        As `load` and `with_dimensions`.
+        As `load`.
     """
     robot, tables = load(name_or_path), document(name_or_path)
     name = robot.name
-    about = [f"Made after {shorten(name, bare=True)}. Put in your numbers, then: pteron check FILE"]
-    if dimensions:
-        tables = document_of(with_dimensions(robot, **dimensions))
-        about += [
-            _FOLLOWS[key].format(_dimension_text(dimension))
-            for key, dimension in dimensions.items()
-        ]
-        about += kept_numbers_sentence(robot, dimensions)
+    head = [f"Made after {shorten(name, bare=True)}. Put in your numbers, then: pteron check FILE"]
+    if changed is not None:
+        tables = document_of(changed)
+    elif str(name_or_path) in catalog():
+        tables = {**tables, "template": {"kind": str(name_or_path), "confirmed": []}}
     legs = [{"type": DEFAULT_KIND, **leg} for leg in tables["legs"]]
     document_ = {**tables, "name": f"my {name}"[:LONGEST_NAME], "legs": legs}
-    return robot_text(_with_centers(document_), explained=True, about=about)
+    return robot_text(_with_centers(document_), explained=True, about=[*head, *about])
 
 
 def _with_centers(table: Any) -> Any:
@@ -81,36 +70,6 @@ def _with_centers(table: Any) -> Any:
     return converted
 
 
-def kept_numbers_sentence(robot: Manipulator, dimensions: Mapping[str, Any]) -> list[str]:
-    """Return a sentence, or [], on masses and angles that changed dimensions leave as they were.
-
-    The list is empty if no dimension is changed, or all numbers depend on those changed.
-    """
-    if not dimensions:
-        return []
-    changed = with_dimensions(robot, **dimensions)
-    mass = changed.platform.inertia.mass + sum(bar.mass for bar in changed.platform.bars)
-    links, zero = _masses(changed, dimensions.get("stock", {})), crank_direction_text(changed)
-    phrases = []
-    if "platform_mass" not in dimensions:
-        phrases.append(f"mass of the platform, {mass:.3g} kg (--platform-mass)")
-    if links:
-        phrases.append(f"cross-sections of the links, masses now {links} (--mass-from)")
-    if "limits" not in dimensions:
-        phrases.append("joint limits (--limits)")
-    if zero not in ("", LEVEL):
-        phrases.append(f"direction of cranks at 0, {zero}")
-    unchanged = f"Unchanged from {shorten(robot.name, bare=True)}, check them"
-    return [f"{unchanged}: {'; '.join(phrases)}."] if phrases else []
-
-
-def _masses(robot: Manipulator, stock: Mapping[str, Any]) -> str:
-    """Return as text the masses of the first leg's links that are not cut from stock."""
-    leg: Any = robot.legs[0]
-    links = {key: leg.bodies[letter].mass for letter, (key, *_) in leg.extents.items()}
-    return " and ".join(f"{key} {mass:.3g} kg" for key, mass in links.items() if key not in stock)
-
-
 def crank_direction_text(robot: Manipulator) -> str:
     """Return as text the direction of cranks at angle 0: "5.33 deg below horizontal"; '' without.
 
@@ -129,14 +88,3 @@ def crank_direction_text(robot: Manipulator) -> str:
         for angle in angles.tolist()
     )
     return ", ".join(texts)
-
-
-def _dimension_text(dimension: Any) -> str:
-    """Return a dimension as text: a number, a range, or the stock of each link."""
-    if isinstance(dimension, Mapping):
-        return ", ".join(f"{stock} ({key})" for key, stock in dimension.items())
-    return (
-        " to ".join(f"{number:g}" for number in dimension)
-        if isinstance(dimension, tuple)
-        else f"{dimension:g}"
-    )

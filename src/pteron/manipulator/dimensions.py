@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Self
 
 import numpy as np
 
-from pteron.bodies.inertia import SpatialInertia
+from pteron.bodies.inertia import SpatialInertia, carried_values, inertia_count
 from pteron.bodies.vectors import Vector, interval, positive, vector
 from pteron.errors import ModelError
 from pteron.legs import LegKind
+from pteron.legs.drive import Drive
+from pteron.manipulator.joint_pairs import joint_circle
 from pteron.manipulator.manipulator import Manipulator
 from pteron.manipulator.robot_like import RobotLike, as_manipulator
 from pteron.manipulator.stretched_links import with_stretched_bodies
@@ -84,6 +86,10 @@ def with_dimensions(
     limits: tuple[float, float] | None = None,
     stock: Mapping[str, str | Stock] | None = None,
     platform_mass: float | None = None,
+    link_masses: Mapping[str, float] | None = None,
+    rider: float | None = None,
+    rider_center: Sequence[float] = (0.0, 0.0, 0.0),
+    drive: Mapping[str, Any] | None = None,
 ) -> Manipulator:
     """Return a machine of the same kind with other dimensions, equal for all legs.
 
@@ -107,7 +113,17 @@ def with_dimensions(
     stock : mapping, optional
         What links are cut from, by their key, ``upper`` or ``lower``: see `Stock.parse`.
     platform_mass : float, optional
-        Of the platform with its bars, kg: its inertia changes by the same factor.
+        Of the platform with its bars, kg: its inertia changes by the same factor, and by the square
+        of the factor of `platform_radius` where that is given too.
+    link_masses : mapping, optional
+        Mass of each link, kg, by its key, ``upper`` or ``lower``: its inertia changes by the same
+        factor.
+    rider : float, optional
+        Mass of what the platform always carries, kg: a point mass that is added to it.
+    rider_center : vector
+        Where it is in the platform's frame, m.
+    drive : mapping, optional
+        Values of the actuated joints' drives by the keys of the file, such as ``ratio``.
 
     Returns
     -------
@@ -134,8 +150,11 @@ def with_dimensions(
         robot = replace(robot, home=None)
     if base_radius is not None:
         robot = _with_base(robot, positive(base_radius, "base_radius", "m"))
+    growth = 1.0
     if platform_radius is not None:
+        former = joint_circle(robot, "platform").radius
         robot = _with_platform(robot, positive(platform_radius, "platform_radius", "m"))
+        growth = platform_radius / former
     for name, body, dimension in (("crank", "upper", crank), ("rod", "lower", rod)):
         if dimension is not None:
             robot = _with_length(robot, name, body, positive(dimension, name, "m"))
@@ -146,9 +165,39 @@ def with_dimensions(
         robot = _with_stock(
             robot, key, Stock.parse(link_stock) if isinstance(link_stock, str) else link_stock
         )
+    for key, mass in (link_masses or {}).items():
+        robot = _with_link_mass(robot, key, positive(mass, f"{key}_mass", "kg"))
     if platform_mass is not None:
-        robot = _with_mass(robot, positive(platform_mass, "platform_mass", "kg"))
+        mass = positive(platform_mass, "platform_mass", "kg")
+        robot = _with_mass(robot, mass, growth)
+    if rider is not None:
+        center = vector(rider_center, "rider_center")
+        robot = _with_rider(robot, positive(rider, "rider", "kg"), center)
+    if drive:
+        legs = (replace(leg, drive=replace(leg.drive or Drive(), **drive)) for leg in robot.legs)
+        robot = _with_legs(robot, legs)
     return robot
+
+
+def _with_link_mass(robot: Manipulator, key: str, mass: float) -> Manipulator:
+    """Return the machine with a mass, kg, of each leg's link of this key; inertia in proportion."""
+    legs = []
+    for leg in robot.legs:
+        letters = [letter for letter, (name, *_) in leg.extents.items() if name == key]
+        if not letters:
+            raise ModelError(f"{key}_mass: the legs of {robot.name} have no link of this key")
+        body: Any = leg.bodies[letters[0]]
+        scaled = type(body).of_values([mass / body.mass * number for number in body.values])
+        legs.append(leg.with_bodies({**leg.bodies, letters[0]: scaled}))
+    return _with_legs(robot, legs)
+
+
+def _with_rider(robot: Manipulator, mass: float, center: Vector) -> Manipulator:
+    """Return the machine with a point mass, kg, at a point of the platform's frame, m."""
+    inertia = robot.platform.inertia
+    load = carried_values(type(inertia), mass, center, [0.0] * inertia_count(inertia.kinds))
+    total = type(inertia).of_values([a + b for a, b in zip(inertia.values, load, strict=True)])
+    return replace(robot, platform=replace(robot.platform, inertia=total))
 
 
 def _with_limits(leg: LegKind, limits: tuple[float, float]) -> LegKind:
@@ -157,12 +206,16 @@ def _with_limits(leg: LegKind, limits: tuple[float, float]) -> LegKind:
     return changed if changed.extents == leg.extents else with_stretched_bodies(leg, changed)
 
 
-def _with_mass(robot: Manipulator, mass: float) -> Manipulator:
-    """Return the machine with a platform of this mass, kg; inertia and bars scale with it."""
+def _with_mass(robot: Manipulator, mass: float, growth: float) -> Manipulator:
+    """Return the machine with a platform of this mass, kg, whose body has grown by a factor."""
     platform_inertia, bars = robot.platform.inertia, robot.platform.bars
     factor = mass / (platform_inertia.mass + sum(bar.mass for bar in bars))
+    powers = (0 if kind == "m" else 2 if kind[0] == "I" else 1 for kind in platform_inertia.kinds)
     inertia = type(platform_inertia).of_values(
-        [factor * parameter for parameter in platform_inertia.values]
+        [
+            factor * growth**power * parameter
+            for power, parameter in zip(powers, platform_inertia.values, strict=True)
+        ]
     )
     bars = tuple(replace(bar, mass=factor * bar.mass) for bar in bars)
     return replace(robot, platform=replace(robot.platform, inertia=inertia, bars=bars))

@@ -21,6 +21,7 @@ from pteron.manipulator.distribution import Distribution
 from pteron.manipulator.machine_warnings import machine_warnings
 from pteron.manipulator.manipulator import Manipulator, faults_of
 from pteron.manipulator.radii import Radii
+from pteron.manipulator.template_record import Template
 from pteron.manipulator.tool import Tool
 from pteron.platforms import Bar, GearedPart, Platform
 from pteron.toml import fault_lines, joined_faults, parsed_toml, toml_bytes
@@ -271,6 +272,7 @@ def _machine(document: dict[str, Any], source: str) -> Manipulator:
                 home,
                 distribution,
                 machine.owner or {},
+                machine.template and Template(**machine.template.model_dump()),
             )
     subject = shorten(source, bare=True, longest=1000)
     raise ModelError(joined_faults(reading.faults), subject=subject, faults=reading.faults)

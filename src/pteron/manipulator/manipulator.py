@@ -27,6 +27,7 @@ from pteron.manipulator.distribution import (
 from pteron.manipulator.names import name_faults
 from pteron.manipulator.owner_data import OwnerData
 from pteron.manipulator.radii import Radii
+from pteron.manipulator.template_record import Template
 from pteron.manipulator.tool import Tool, tool_faults
 from pteron.platforms import Platform
 from pteron.platforms.coordinates import Unit
@@ -67,6 +68,8 @@ class Manipulator:
     owner : mapping
         Data of the machine's owner, such as a serial number: kept in its file, without effect, and
         not compared.
+    template : Template, optional
+        The machine of the catalog that its file was made from, not compared.
 
     Raises
     ------
@@ -84,6 +87,7 @@ class Manipulator:
     home: tuple[float, ...] | None = None
     distribution: Distribution | None = None
     owner: Mapping[str, Any] = field(default_factory=OwnerData, compare=False, repr=False)
+    template: Template | None = field(default=None, compare=False, repr=False)
 
     def __hash__(self) -> int:
         """Return the machine's hash, computed only once."""

@@ -111,6 +111,8 @@ def document_of(robot: Manipulator) -> dict[str, Any]:
     if robot.distribution is not None:
         shares = asdict(robot.distribution).items()
         machine["distribution"] = {k: v for k, v in shares if v is not None}
+    if robot.template is not None:
+        machine["template"] = asdict(robot.template)
     if robot.owner:
         machine["owner"] = dict(robot.owner)
     machine |= {"platform": platform, "legs": legs}

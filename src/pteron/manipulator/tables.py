@@ -30,6 +30,7 @@ from pteron.bodies.tables import (
 from pteron.legs.cones import Cone
 from pteron.legs.drive import Drive, Elastic, LuGre, Stribeck, Wave, Winding
 from pteron.legs.reading import Reading
+from pteron.legs.screw import Screw
 from pteron.manipulator.manipulator import STANDARD_GRAVITY
 from pteron.manipulator.radii import Radii
 from pteron.platforms.kinds import AngleOrder, kind_of_motion
@@ -76,6 +77,7 @@ def _field_type(hint: Any) -> Any:
 
 ConeTable, StribeckTable, LuGreTable = map(_table_of, (Cone, Stribeck, LuGre))
 ElasticTable, WindingTable, WaveTable = map(_table_of, (Elastic, Winding, Wave))
+ScrewTable = _table_of(Screw)
 DriveTable, ReadingTable, RadiiTable = map(_table_of, (Drive, Reading, Radii))
 
 
@@ -191,6 +193,15 @@ class DistributionTable(TomlTable):
     )
 
 
+class TemplateTable(TomlTable):
+    """`[template]`: the machine of the catalog that the file was made from."""
+
+    kind: str = key("name of the machine in the catalog")
+    confirmed: list[str] = key(
+        "keys of values that are meant to be as in the template: pteron check lists the others", []
+    )
+
+
 class MachineTable(TomlTable):
     """The whole file; each of `legs` is read by its own kind."""
 
@@ -212,6 +223,7 @@ class MachineTable(TomlTable):
     distribution: DistributionTable | None = key(
         "how more legs than freedoms share out their forces", None
     )
+    template: TemplateTable | None = key("machine of the catalog that the file was made from", None)
     owner: dict[str, Any] = key("data of the owner: kept, without effect", {}, {"serial": "Q-07"})
     platform: PlatformTable = key("the platform, which the legs carry")
     legs: list[Any] = key("the legs: one table for each degree of freedom of the platform, or more")

@@ -1,4 +1,4 @@
-"""Variants of a machine: its working modes, and the machine turned as a whole."""
+"""Variants of a machine: its working modes, the machine turned as a whole, another point P."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from itertools import chain, product
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pteron.bodies.inertia import about_point
 from pteron.bodies.vectors import Vector, vector
 from pteron.errors import ModelError
 from pteron.manipulator.manipulator import Manipulator
@@ -124,4 +125,83 @@ def turned(robot: RobotLike, rotation: ArrayLike, *, gravity: bool = True) -> Ma
         tools=tuple(tool.turned(turn) for tool in robot.tools) if on_platform else robot.tools,
         home=home,
         gravity=turn(robot.gravity) if gravity else robot.gravity,
+    )
+
+
+def with_pivot(robot: RobotLike, point: Sequence[float]) -> Manipulator:
+    """Return the same machine with poses that refer to another point of the platform.
+
+    The pivot becomes P: a change of the angles alone turns the platform about it. Platform points,
+    tools, inertia and home are converted; joints, forces and limits remain as they were.
+
+    Parameters
+    ----------
+    robot : Manipulator, name or path
+        The machine.
+    point : vector
+        The pivot in the platform's frame, m.
+
+    Returns
+    -------
+    Manipulator
+        The machine about the pivot. Its geometry's digest differs from the first one's.
+
+    Raises
+    ------
+    ModelError
+        If a joint, planes or sliding parts determine the platform's P, as in wrists and tripods, or
+        if the pivot of a planar machine is out of its plane.
+
+    Examples
+    --------
+    >>> import pteron
+    >>> from pteron.manipulator import with_pivot
+    >>> at_head = with_pivot("stewart", [0.0, 0.0, 0.8])
+    >>> pose = [0.1, 0.0, 2.0, 0.0, 0.0, 0.2]
+    >>> joints = pteron.inverse_kinematics("stewart", pose)
+    >>> about_head = pteron.inverse_kinematics(at_head, [0.1, 0.0, 2.8, 0.0, 0.0, 0.2])
+    >>> bool(abs(joints - about_head).max() < 1e-12)
+    True
+    """
+    robot = as_manipulator(robot)
+    platform, pivot = robot.platform, vector(point, "pivot")
+    if not platform.kind.point_is_free:
+        raise ModelError(
+            f"pivot: {robot.name}'s platform {platform.kind.freedom_text}: its point P cannot be "
+            "chosen",
+            subject=robot.name,
+        )
+    if platform.planar and pivot[2]:
+        raise ModelError(
+            f"pivot: {pivot[2]:g} m out of the plane of {robot.name}; z = 0 expected",
+            subject=robot.name,
+        )
+
+    def relative(place: Vector) -> Vector:
+        """Return a point of the platform's frame as seen from the pivot."""
+        return vector(np.subtract(place, pivot).tolist(), "pivot")
+
+    home = robot.home
+    if home is not None:
+        place, axes = platform.placement(np.array(home))
+        count = len(platform.lengths)
+        home = (*(platform.directions @ (place + pivot @ axes)).tolist(), *home[count:])
+    return replace(
+        robot,
+        platform=replace(
+            platform,
+            inertia=about_point(platform.inertia, pivot),
+            tool=relative(platform.tool),
+            bars=tuple(replace(bar, hinge=relative(bar.hinge)) for bar in platform.bars),
+        ),
+        legs=tuple(replace(leg, platform_point=relative(leg.platform_point)) for leg in robot.legs),
+        tools=tuple(
+            replace(
+                tool,
+                point=relative(tool.point),
+                center_of_mass=tool.center_of_mass and relative(tool.center_of_mass),
+            )
+            for tool in robot.tools
+        ),
+        home=home,
     )

@@ -14,7 +14,13 @@ from pteron.errors import ModelError
 from pteron.legs import LegKind
 from pteron.legs.installed import kind_named, kind_names
 from pteron.manipulator.leg_tables import leg_table
-from pteron.manipulator.tables import DistributionTable, HomeTable, MachineTable, platform_table
+from pteron.manipulator.tables import (
+    DistributionTable,
+    HomeTable,
+    MachineTable,
+    TemplateTable,
+    platform_table,
+)
 
 _WIDTH = 110
 """Width of comments that have lines of their own."""
@@ -43,10 +49,14 @@ def robot_text(
     machine_keys = {
         k: content
         for k, content in document.items()
-        if k not in ("home", "distribution", "owner", "platform", "legs")
+        if k not in ("home", "distribution", "template", "owner", "platform", "legs")
     }
     lines += ["", *_block("", MachineTable, machine_keys, explained)]
-    for name, table in (("home", HomeTable), ("distribution", DistributionTable)):
+    for name, table in (
+        ("home", HomeTable),
+        ("distribution", DistributionTable),
+        ("template", TemplateTable),
+    ):
         if name in document:
             lines += ["", *_block(name, table, document[name], explained)]
     if "owner" in document:

@@ -1,10 +1,15 @@
-from pteron.motion.cueing import Cue as Cue, Washout as Washout, cue as cue
+from pteron.motion.cueing import Cue as Cue, cue as cue
 from pteron.motion.joint_points import (
     Guide as Guide,
     JointPoints as JointPoints,
     Part as Part,
     joint_guides as joint_guides,
     joint_points as joint_points,
+)
+from pteron.motion.live_cue import (
+    CueLimits as CueLimits,
+    LiveCue as LiveCue,
+    cue_limits as cue_limits,
 )
 from pteron.motion.motion import Motion as Motion
 from pteron.motion.overloads import overloads as overloads
@@ -95,3 +100,4 @@ from pteron.motion.tuning import (
     trials as trials,
     tune as tune,
 )
+from pteron.motion.washout import Washout as Washout

@@ -1,47 +1,42 @@
-"""Washout: the accelerations and turns of a vehicle as a motion of its simulator's platform.
+"""Cueing: a vehicle's motion as its simulator's platform shows it, within a proved box of poses.
 
-A classical washout (L. D. Reid, M. A. Nahon, UTIAS Report 296, 1985): the platform follows quick
-accelerations by moving and lasting ones by tilting, so that a part of gravity replaces them, and it
-always returns to the middle. Its poses are then compressed into a box of poses that is proved to
-lie in the workspace.
+The filters of `pteron.motion.washout` turn the vehicle's motion into the platform's, whose poses
+are then compressed into a box that is proved to lie in the workspace. The box's middle is where the
+largest box of the motion's proportions fits.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import scipy  # type: ignore[import-untyped]
 
-from pteron.arguments import checked_arguments, expect
 from pteron.errors import DataError, ModelError
 from pteron.kernels import Array
+from pteron.kernels.bisection import bisect_condition
 from pteron.kinematics.evaluate import finite_pose
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.motion import Motion, interpolate_columns
 from pteron.motion.trajectories.replay import rows_of
+from pteron.motion.washout import Washout, WashoutFilter, compress
 from pteron.shapes import Columns, PoseLike
 from pteron.tables import Table
 from pteron.tolerances import SAME
 from pteron.workspace import Box, Proof, conditions, home_pose
-from pteron.workspace.conditions import Condition
+from pteron.workspace.conditions import Condition, keeps
 from pteron.workspace.largest_proved import largest_proved
 
-COLUMNS = ("t", "ax", "ay", "az", "wx", "wy", "wz")
-"""The columns of a vehicle's motion: s; accelerations without gravity, m/s^2, and angular rates,
+SAMPLE = ("ax", "ay", "az", "wx", "wy", "wz")
+"""The columns of a vehicle's motion: accelerations without gravity, m/s^2, and angular rates,
 rad/s, both in its own axes: x ahead, y to the left, z up."""
 
-_GRAVITY = 9.81
-"""Gravity, m/s^2: a lasting acceleration over it is the sine of the tilt."""
-
-_DAMPING = 1.0
-"""Damping ratio of the filters: critical."""
+COLUMNS = ("t", *SAMPLE)
+"""The columns of a table of it: the time, s, and the motion."""
 
 _ROOM = 3.0
-"""Greatest size of the box, over the range of the uncompressed motion."""
+"""Greatest size of the box, over the range of the uncompressed motion: compression removes less
+than 0.03 % of a motion that takes a third of its box."""
 
 _SAMPLES, _HALVINGS = 2048, 8
 """Number of random poses of the box, and of bisections, for its size before the proof."""
@@ -52,7 +47,11 @@ _STEP = 0.01
 _MANY = 5_000_000
 """Most samples of a motion."""
 
-_WITHIN = 0.999
+_GAP, _STEPS = 1.0, 20.0
+"""A gap between samples that is longer than both, s and median steps, is refused: vehicles brake
+and turn within a second, and what is interpolated across it would be invented."""
+
+WITHIN = 0.999
 """Share of the box to which samples are compressed, so that the curve between them has room."""
 
 _REFINED = 6
@@ -62,41 +61,9 @@ _TRIES = 30
 """Sizes for which a proof is tried, each nine tenths of the one before; if none is proved, the cue
 is refused."""
 
-
-@checked_arguments
-@dataclass(frozen=True)
-class Washout:
-    """The filters of a washout.
-
-    Parameters
-    ----------
-    scale : float
-        Share of the vehicle's accelerations and rates that is shown.
-    translation : float
-        Cut-off, rad/s, of the high-pass filter of accelerations, by which the platform moves.
-    return_speed : float
-        Cut-off, rad/s, of the filter that returns the platform to the middle.
-    tilting : float
-        Cut-off, rad/s, of the low-pass filter of accelerations, by which the platform tilts.
-    tilt_rate : float
-        Greatest rate of that tilt, rad/s: people do not notice one below some 0.05.
-    rotation : float
-        Cut-off, rad/s, of the high-pass filter of the vehicle's turns, by which the platform turns.
-    smoothing : float
-        Cut-off, rad/s, of the low-pass filter of the platform's turns.
-    """
-
-    scale: float = 0.5
-    translation: float = 2.5
-    return_speed: float = 0.25
-    tilting: float = 2.0
-    tilt_rate: float = 0.05
-    rotation: float = 0.7
-    smoothing: float = 30.0
-
-    def __post_init__(self) -> None:
-        for name, setting in vars(self).items():
-            expect(0.0 < setting < np.inf, name, repr(setting), "a number above 0")
+_FIRST, _LAST, _BETTER = 0.25, 2e-3, 1.002
+"""The search of the box's middle: first and last step, in mean leg sizes, and the factor by which
+the box must grow: its size is bisected to 0.1 %."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -111,11 +78,19 @@ class Cue(Motion):
         The proof that all poses of the box lie in the workspace.
     pressed : float
         The largest share of a coordinate's uncompressed motion that compression removed, 0 to 1.
+    resampling : str
+        How the table's times differ from the motion's, in words; empty where they are the same.
     """
 
     region: Box
     proof: Proof = field(repr=False)
     pressed: float
+    resampling: str = ""
+
+    @property
+    def center(self) -> Array:
+        """The pose (m,) at the middle of the box, to which the platform returns."""
+        return np.asarray(self.region.box.mean(axis=0))
 
 
 def cue(
@@ -137,7 +112,8 @@ def cue(
     washout : Washout, optional
         The filters.
     pose : array, shape (m,), optional
-        The middle, to which it returns; by default the home pose.
+        The middle, to which it returns; by default the place, with the home pose's orientation,
+        about which the largest box of the motion's proportions fits.
     type_ii : float
         Least type-II measure in the box.
 
@@ -152,37 +128,26 @@ def cue(
     ModelError
         If the platform does not move freely, or no box about the middle is proved.
     DataError
-        If a column is missing, or times do not ascend; if the motion is too long, or so rough that
-        no steps keep it in the box.
+        If a column is missing, times do not ascend or have a gap; if the motion is too long, or so
+        rough that no steps keep it in the box.
     """
     robot = as_manipulator(robot)
-    if not robot.platform.moves_freely:
-        raise ModelError(
-            f"a {robot.platform.motion} platform shows no vehicle's motion, which has six "
-            "coordinates; take a 3T3R one",
-            subject=robot.name,
-        )
-    middle = home_pose(robot) if pose is None else finite_pose(robot, pose, "pose")
+    expect_free_platform(robot)
     rows = rows_of(table, COLUMNS)
     time, *columns = rows.numbers(COLUMNS).T
-    if len(time) < 2 or not (np.diff(time) > 0.0).all():
-        raise DataError(f"{rows.source}: t: two or more times expected that ascend, in seconds")
-    samples = np.array(columns).T
-    even = _even_times(time - time[0], rows.source)
-    demand = _filter_motion(
-        even, interpolate_columns(time - time[0], samples, even), washout or Washout()
-    )
-    region, proof = _box(robot, middle, np.abs(demand[0]).max(axis=0), type_ii)
+    _check_times(time, rows)
+    time, samples, filters = time - time[0], np.array(columns).T, washout or Washout()
+    even, resampling = _even_times(time, rows.source)
+    demand = _filter_samples(filters, time, samples, even)
+    region, proof = prove_box(robot, np.abs(demand[0]).max(axis=0), pose, type_ii)
     half = 0.5 * np.ptp(region.box, axis=0)
-    parts = _compress(demand, _WITHIN * half)
+    parts = compress(demand, WITHIN * half)
     for _ in range(_REFINED):
         if (_control_points(even, parts) <= half).all():
             break
         even = np.linspace(0.0, even[-1], 2 * len(even) - 1)
-        demand = _filter_motion(
-            even, interpolate_columns(time - time[0], samples, even), washout or Washout()
-        )
-        parts = _compress(demand, _WITHIN * half)
+        demand = _filter_samples(filters, time, samples, even)
+        parts = compress(demand, WITHIN * half)
     else:
         raise DataError(
             f"{rows.source}: accelerations so rough that the motion leaves its box between samples "
@@ -193,18 +158,55 @@ def cue(
     )
     is_moved = np.abs(demand[0]).max(axis=0) > 1e-9
     pressed = float(np.max(removed_shares[is_moved], initial=0.0))
-    return Cue(even, middle + parts[0], parts[1], parts[2], region, proof, pressed)
+    middle = region.box.mean(axis=0)
+    return Cue(even, middle + parts[0], parts[1], parts[2], region, proof, pressed, resampling)
 
 
-def _even_times(time: Array, source: str) -> Array:
-    """Return equidistant times, at most `_STEP` apart, from 0 to the last sample's time, s."""
+def expect_free_platform(robot: Manipulator) -> None:
+    """Raise ModelError unless the platform moves and turns freely."""
+    if not robot.platform.moves_freely:
+        raise ModelError(
+            f"a {robot.platform.motion} platform shows no vehicle's motion, which has six "
+            "coordinates; take a 3T3R one",
+            subject=robot.name,
+        )
+
+
+def _check_times(time: Array, rows: Table) -> None:
+    """Raise DataError unless there are two or more times that ascend without a long gap."""
     steps = np.diff(time)
-    count = len(time)
-    if np.ptp(steps) > SAME * steps.mean() or steps.mean() > _STEP:
-        count = int(np.ceil(time[-1] / min(float(np.median(steps)), _STEP))) + 1
+    if len(time) < 2 or not (steps > 0.0).all():
+        place = rows.place(int(np.argmin(steps > 0.0)) + 1) if len(steps) else rows.source
+        raise DataError(f"{place}: t: two or more times expected that ascend, in seconds")
+    longest = int(steps.argmax())
+    if steps[longest] > max(_GAP, _STEPS * float(np.median(steps))):
+        raise DataError(
+            f"{rows.place(longest + 1)}: t: a gap of {steps[longest]:.3g} s before this row, from "
+            f"{time[longest]:.6g} s; at most {_GAP:g} s can be interpolated: cut the motion there "
+            "into two files"
+        )
+
+
+def _even_times(time: Array, source: str) -> tuple[Array, str]:
+    """Return even times, at most `_STEP` apart, from 0 to the last one, s; why, in words."""
+    steps, count, text = np.diff(time), len(time), ""
+    median = float(np.median(steps))
+    is_uneven = bool(np.ptp(steps) > SAME * steps.mean())
+    if is_uneven or median > _STEP:
+        count = int(np.ceil(time[-1] / min(median, _STEP))) + 1
+        lost = int((np.rint(steps / median) - 1.0).clip(0.0).sum())
+        spread = f"{1e3 * steps.min():.3g} to {1e3 * steps.max():.3g} ms"
+        text = f"time stamps {spread if is_uneven else f'{1e3 * median:.3g} ms'} apart"
+        text += f" ({lost} missing)" * (is_uneven and lost > 0)
+        text += f", interpolated linearly to steps of {1e3 * time[-1] / (count - 1):.3g} ms"
     if count > _MANY:
         raise DataError(f"{source}: {time[-1]:.4g} s make {count} samples, at most {_MANY} serve")
-    return np.linspace(0.0, time[-1], count)
+    return np.linspace(0.0, time[-1], count), text
+
+
+def _filter_samples(washout: Washout, time: Array, samples: Array, even: Array) -> Array:
+    """Return the unlimited motion (3, T, 6) at even times, of samples (R, 6) at times (R,)."""
+    return WashoutFilter(washout, float(even[1])).run(interpolate_columns(time, samples, even))
 
 
 def _control_points(time: Array, parts: Array) -> Array:
@@ -220,83 +222,40 @@ def _control_points(time: Array, parts: Array) -> Array:
     return np.abs(points)
 
 
-def _filter_motion(time: Array, vehicle_motion: Array, washout: Washout) -> Array:
-    """Return the simulator's motion, its limits ignored, and two derivatives (3, T, 6).
+def prove_box(
+    robot: Manipulator, demand: Array, pose: PoseLike | None = None, type_ii: float = 0.0
+) -> tuple[Box, Proof]:
+    """Return a box of poses in proportion to a motion's ranges (6,), and its proof.
 
-    The array is (3, T, 6), in m, rad and s.
-    """
-    accelerations, rates = (
-        washout.scale * part for part in (vehicle_motion[:, :3], vehicle_motion[:, 3:])
-    )
-    w, s = washout.translation, washout.smoothing
-    resonance = [1.0, 2.0 * _DAMPING * w, w * w]
-    quick = np.polymul(resonance, [1.0, washout.return_speed])
-    translations = [_filter_signal(time, a, [1.0, 0.0], quick) for a in accelerations.T]
-    # On a level platform g acts along z, on a tilted one a part of it ahead or to the side.
-    tilt_accelerations = [
-        _filter_signal(
-            time, a, [1.0], [1 / washout.tilting**2, 2 * _DAMPING / washout.tilting, 1.0]
-        )[0]
-        for a in (accelerations[:, 1], -accelerations[:, 0])
-    ]
-    w = washout.rotation
-    turns = [
-        _filter_signal(
-            time, r, [1.0, 0.0], np.polymul([1.0, 2.0 * _DAMPING * w, w * w], [1 / s, 1.0])
-        )
-        for r in rates.T
-    ]
-    for angle, a in enumerate(tilt_accelerations):
-        target = np.arcsin(np.clip(a / _GRAVITY, -0.9, 0.9))
-        steps = washout.tilt_rate * np.diff(time)
-        tilt = np.zeros(len(time))
-        for k, most in enumerate(steps):
-            tilt[k + 1] = tilt[k] + np.clip(target[k + 1] - tilt[k], -most, most)
-        turns[angle] += _filter_signal(time, tilt, [1.0], [1 / s**2, 2 / s, 1.0])
-    return np.moveaxis(np.array([*translations, *turns]), 0, -1)
+    Its middle is the pose, or by default the place where the largest such box fits.
 
-
-def _filter_signal(
-    time: Array, signal: Array, numerator: Sequence[float], denominator: Any
-) -> Array:
-    """Return a linear filter's output and two derivatives (3, T), for a signal (T,)."""
-    return np.array(
-        [
-            scipy.signal.lsim(
-                (np.polymul(numerator, [1.0] + [0.0] * order), denominator), signal, time
-            )[1]
-            for order in range(3)
-        ]
-    )
-
-
-def _compress(demand: Array, half: Array) -> Array:
-    """Return x / (1 + (x / L)^6)^(1 / 6) of x (T, 6), which stays within L, and its derivatives."""
-    x, dx, ddx = demand
-    share = x / half
-    compression = 1.0 + share**6
-    slope = compression ** (-7.0 / 6.0)
-    bend = -7.0 * share**5 * slope / compression / half
-    return np.array([x * compression ** (-1.0 / 6.0), slope * dx, slope * ddx + bend * dx * dx])
-
-
-def _box(robot: Manipulator, middle: Array, demand: Array, type_ii: float) -> tuple[Box, Proof]:
-    """Return a box of poses about the middle, and the proof that it lies in the workspace.
-
-    Its sides are proportional to the ranges of the motion `demand` before compression.
+    Raises
+    ------
+    ModelError
+        If no box about the middle is proved.
     """
     required: tuple[Condition, ...] = conditions(robot, type_ii=type_ii)
-    least = 1e-3 * max(float(demand.max()), 1e-3)
-    ways = np.random.default_rng(0).uniform(-1.0, 1.0, (_SAMPLES, len(middle)))
+    half = np.maximum(demand, 1e-3 * max(float(demand.max()), 1e-3))
+    # Half of the sample poses are corners of the box.
+    ways = np.random.default_rng(0).uniform(-1.0, 1.0, (_SAMPLES, robot.freedom))
     ways[: _SAMPLES // 2] = np.sign(ways[: _SAMPLES // 2])
-    half, shares = np.maximum(demand, least), (0.9**k for k in range(1, _TRIES))
+    if pose is None:
+        middle = _search_center(robot, required, half, ways[_SAMPLES // 2 - 64 :][:128])
+    else:
+        middle = finite_pose(robot, pose, "pose")
 
     def region(size: float) -> Box:
         """Return the box about the middle that is `size` times the half sides."""
         return Box(tuple(middle - size * half), tuple(middle + size * half))
 
     size, proof = largest_proved(
-        robot, required, region, lambda size: middle + size * half * ways, _ROOM, _HALVINGS, shares
+        robot,
+        required,
+        region,
+        lambda size: middle + size * half * ways,
+        _ROOM,
+        _HALVINGS,
+        (0.9**k for k in range(1, _TRIES)),
     )
     if not proof.holds:
         raise ModelError(
@@ -305,3 +264,38 @@ def _box(robot: Manipulator, middle: Array, demand: Array, type_ii: float) -> tu
             subject=robot.name,
         )
     return region(size), proof
+
+
+def _search_center(
+    robot: Manipulator, required: tuple[Condition, ...], half: Array, ways: Array
+) -> Array:
+    """Return the pose, oriented as at home, about which the largest box fits, by its samples.
+
+    A compass search from the home pose: a step along a length that lets the box grow is taken, and
+    steps halve where none does.
+    """
+    middle = home_pose(robot)
+    reach = float(np.mean([leg.size or 1.0 for leg in robot.legs]))
+
+    def box_size(center: Array) -> float:
+        """Return the size up to which all samples of the box keep the conditions."""
+        return float(
+            bisect_condition(
+                lambda size: bool(keeps(robot, required, center + size * half * ways).all()),
+                *(0.0, _ROOM, 10),
+            )[0]
+        )
+
+    lengths = np.flatnonzero(~robot.platform.angular)
+    size, step = box_size(middle), _FIRST * reach
+    while step > _LAST * reach and size < _ROOM / _BETTER:
+        moves = middle + np.concatenate(
+            [step * np.eye(robot.freedom)[lengths] * s for s in (1, -1)]
+        )
+        sizes = [box_size(center) for center in moves]
+        best = int(np.argmax(sizes))
+        if sizes[best] > _BETTER * size:
+            middle, size = moves[best], sizes[best]
+        else:
+            step *= 0.5
+    return middle

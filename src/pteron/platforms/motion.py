@@ -164,6 +164,8 @@ class PlatformEquations(ABC):
     the one about the normal of its two axes, which are perpendicular."""
     axis_distance: Expression | None = None
     """The distance of P from the base's axis that it turns about, m; None where it does not."""
+    point_is_free: ClassVar[bool] = True
+    """Whether P may be any point of the platform: no joint, plane or sliding part fixes it."""
     keeps_points_in_planes: ClassVar[bool] = False
     """Whether planes, in which its legs keep its points, fix its dependent coordinates."""
     wrench_columns: ClassVar[tuple[str, ...]] = ()

@@ -29,7 +29,7 @@ class Sliding(PlatformEquations):
 
     motion_name = "3T1R"
     coordinates = ("x", "y", "z", "phi")
-    slides, point_unit = True, "m/rad"
+    slides, point_is_free, point_unit = True, False, "m/rad"
     axis_angle = spin_angle = "phi"
     freedom_text = (
         "translates in space and turns its tool, as two halves of it slide (3T1R, Schoenflies "

@@ -260,7 +260,7 @@ class _Centred(Tilting):
     """A platform whose point P stays at `center`, on a joint there."""
 
     motion_name = "3R"
-    on_legs_alone, has_center = False, True
+    on_legs_alone, has_center, point_is_free = False, True, False
     freedom_text = "turns any way about a centre that stays (3R)"
 
     def motion(

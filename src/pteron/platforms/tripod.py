@@ -26,7 +26,7 @@ class Tripod(Tilting):
     """
 
     motion_name = "1T2R"
-    keeps_points_in_planes = True
+    keeps_points_in_planes, point_is_free = True, False
     coordinates = ("z", "roll", "pitch")
     freedom_text = "moves along its axis and tilts to every side (1T2R), a tripod's"
     order = ("yaw", "pitch", "roll")

@@ -17,8 +17,9 @@ from pteron.kinematics import singular_orientations
 from pteron.kinematics.jacobian_at import JacobianAtPose, jacobian_at
 from pteron.kinematics.singularities import best_type_ii
 from pteron.manipulator import Manipulator
-from pteron.manipulator.template_masses import template_masses
+from pteron.manipulator.template import template_sentence
 from pteron.motion import Motion, PickAndPlace, Sizing, least_margin, pick_and_place, size
+from pteron.motion.sizing.friction_sentence import friction_sentence
 from pteron.playback import Playback
 from pteron.reduction import BaseParameters, base_parameters
 from pteron.report.costs import Cost, costs
@@ -115,6 +116,7 @@ class Report:
     source: str
     shown: Frames
     sizing: Sizing
+    friction: str
     joints: JointRanges
     workspace_joints: JointRanges
     passive: tuple[LimitedJoint, ...]
@@ -195,7 +197,7 @@ def contents(robot: Manipulator, motion: Playback | None = None) -> Report:
         robot=robot,
         doubts=(
             *examine(robot, home).warnings,
-            *([masses] if (masses := template_masses(robot)) else []),
+            *([kept] if (kept := template_sentence(robot)) else []),
             *(() if motion is None else force_doubts(robot, motion)),
         ),
         home=home,
@@ -205,6 +207,7 @@ def contents(robot: Manipulator, motion: Playback | None = None) -> Report:
         source="" if motion is None else motion.source,
         shown=frames(robot, cycle, sizing.forces[::2], home),
         sizing=sizing,
+        friction=friction_sentence(robot),
         joints=joint_ranges(robot, cycle.pose),
         workspace_joints=joint_ranges(robot, np.vstack([home[None], *reached])),
         passive=tuple(joint for joint in limited_joints(robot, home) if not joint.actuated),

@@ -12,6 +12,14 @@
   const peaks = data.units.map((unit) =>
     data.forces.reduce((most, row) => Math.max(most, ...row.filter((_, i) => data.units[i] === unit).map(Math.abs)), 1e-9));
   const picture = new Picture(canvas, data, data.chains.flat(2).concat(data.position));
+  // The page around a frame may have a theme of its own: it sends "dark" or "light".
+  const dark = [...document.styleSheets].flatMap((sheet) => [...sheet.cssRules])
+    .filter((rule) => rule.media?.mediaText.includes("prefers-color-scheme: dark"));
+  window.addEventListener("message", ({ source, data: theme }) => {
+    if (source !== window.parent || !["dark", "light"].includes(theme)) return;
+    for (const rule of dark) rule.media.mediaText = theme === "dark" ? "screen" : "not all";
+    picture.theme(); picture.draw();
+  });
   let frame = 0, playing = false, now = 0, last = null, shown = true;
 
   // A line in every curve over time, at the moment that the picture shows.

@@ -144,7 +144,7 @@ def condition_margins(robot: Manipulator, required: Sequence[Condition], poses: 
         measure = results[condition.what][condition.output]
         batch_axes = poses.ndim - 1
         if measure.ndim > batch_axes:
-            size = int(np.prod(measure.shape[batch_axes:]))
+            size = math.prod(measure.shape[batch_axes:])
             measure = measure.reshape(*measure.shape[:batch_axes], size)[..., condition.element]
         # An infinite value is as little known as NaN.
         measure = np.where(np.isfinite(measure), measure, np.nan)

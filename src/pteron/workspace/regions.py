@@ -1,4 +1,4 @@
-"""Regions of poses that are asked to lie in a workspace: boxes and cylinders."""
+"""Regions of poses that are asked to lie in a workspace: boxes, cylinders and segments."""
 
 from __future__ import annotations
 
@@ -152,6 +152,57 @@ class Cylinder:
         shadow = half @ np.abs(np.eye(3) - np.outer(axis, axis))
         nearest = np.maximum(np.abs(offsets) - shadow, 0.0)
         return np.asarray(far | (np.linalg.norm(nearest, axis=-1) > self.radius + slack))
+
+
+@dataclass(frozen=True)
+class Segment:
+    """All poses on the straight line between two poses, angles included.
+
+    Parameters
+    ----------
+    start, end : sequence of float
+        The two poses, m and rad.
+    """
+
+    start: tuple[float, ...]
+    end: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        start, end = (_checked_numbers(getattr(self, name), name) for name in ("start", "end"))
+        if len(start) != len(end):
+            raise DataError(f"segment: start {list(start)} and end {list(end)} differ in length")
+        object.__setattr__(self, "start", start)
+        object.__setattr__(self, "end", end)
+
+    @property
+    def box(self) -> Array:
+        """Least and greatest pose (2, m)."""
+        return np.sort([self.start, self.end], axis=0)
+
+    def _shares_within(self, low: Array, high: Array) -> tuple[Array, Array]:
+        """Return the first and last share of the way (...,) within boxes with corners (..., m).
+
+        The first is greater than the last where a box does not meet the line.
+        """
+        start, way = np.array(self.start), np.subtract(self.end, self.start)
+        slack = _WIDER * (1.0 + np.abs(start) + np.abs(way))
+        below, above = low - start - slack, high - start + slack
+        moves = way != 0.0
+        with np.errstate(divide="ignore", invalid="ignore"):
+            bounds = np.sort([below / way, above / way], axis=0)
+        is_beside = ((below > 0.0) | (above < 0.0)) & ~moves
+        first = np.where(moves, bounds[0], np.where(is_beside, np.inf, 0.0)).max(axis=-1)
+        last = np.where(moves, bounds[1], 1.0).min(axis=-1)
+        return np.maximum(first, 0.0), np.minimum(last, 1.0)
+
+    def holds(self, poses: Array) -> NDArray[np.bool_]:
+        """Return which poses (..., m) lie in the region, to rounding."""
+        return ~self.misses(poses, poses)
+
+    def misses(self, low: Array, high: Array) -> NDArray[np.bool_]:
+        """Return which boxes with corners (B, m) are certain not to meet the region."""
+        first, last = self._shares_within(low, high)
+        return np.asarray(first > last)
 
 
 def _checked_numbers(numbers: object, name: str) -> tuple[float, ...]:

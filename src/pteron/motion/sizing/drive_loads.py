@@ -133,7 +133,7 @@ class Sizing(Result):
         """Each load quantity at each place, (W, n), by name; W = 1 without places."""
         shape = len(self.time), -1, self.robot.joint_count
         forces, speeds = self.forces.reshape(shape), self.speeds.reshape(shape)
-        power = forces * speeds
+        power = self.power.reshape(shape)
         driving, braking = np.maximum(power, 0.0), np.maximum(-power, 0.0)
         return {
             "peak_force": np.abs(forces).max(axis=0),
@@ -182,8 +182,8 @@ class Sizing(Result):
 
     @property
     def power(self) -> Array:
-        """Mechanical power of each drive, in the forces' shape, W: negative where it brakes."""
-        return np.asarray(self.forces * self.speeds)
+        """Mechanical power of each motor, in the forces' shape, W: negative where it brakes."""
+        return np.asarray(self.forces_with_losses * self.speeds)
 
     @property
     def peak_power(self) -> PerJoint:
@@ -257,9 +257,39 @@ class Sizing(Result):
 
     @property
     def motor_torques(self) -> tuple[PerJoint, PerJoint]:
-        """Root mean square and peak torque of each motor, N m; at the joint without a ratio."""
-        gears = np.array([abs(drive.gear) for drive in self.drives])
-        return self.rms_forces / gears, self.peak_forces / gears
+        """Root mean square and peak torque of each motor, N m; at the joint without a ratio.
+
+        They include the losses of screws.
+        """
+        forces, gears = self.forces_with_losses, np.abs(self._gears)
+        forces = forces.reshape(len(self.time), -1, self.robot.joint_count)
+        squares = np.sqrt(self.mean(forces**2)).max(axis=0)
+        return squares / gears, np.abs(forces).max(axis=(0, 1)) / gears
+
+    @property
+    def motor_speeds(self) -> tuple[PerJoint, PerJoint]:
+        """Root mean square and peak speed of each motor, rad/s; of the joint without a ratio."""
+        gears = np.abs(self._gears)
+        return self.rms_speeds * gears, self.peak_speeds * gears
+
+    @property
+    def _gears(self) -> PerJoint:
+        """The ratio of each drive (n,), rad/m or rad/rad."""
+        return np.array([drive.gear for drive in self.drives])
+
+    @cached_property
+    def forces_with_losses(self) -> Array:
+        """The forces times ratio that each motor gives, in the forces' shape, N or N m.
+
+        A screw of efficiency e divides by e the load that it drives, and multiplies by e the load
+        that drives it; at rest it passes the load.
+        """
+        screws = [drive.screw for drive in self.drives]
+        shares = np.array([1.0 if screw is None else screw.efficiency for screw in screws])
+        if (shares == 1.0).all():
+            return self.forces
+        way = np.sign(self.loads * self.speeds)
+        return np.asarray(self.loads * shares**-way + self.rotor_inertia * self.accelerations)
 
     def squares(self, leg: int) -> tuple[Array, Array, Array]:
         """Return the cycle means of f^2, f q'' and q''^2, f being the load force of a leg.
@@ -278,7 +308,9 @@ class Sizing(Result):
     @cached_property
     def margins(self) -> tuple[DriveMargin, ...]:
         """The margins (limit over load) of each drive's limits in the cycle, leg by leg."""
-        needed = {name: self._greatest(name) for name in ("rms_force", "peak_force", "peak_speed")}
+        needed = {name: self._greatest(name) for name in ("peak_force", "peak_speed")}
+        # What heats a motor includes the losses of its screw.
+        needed["rms_force"] = self.motor_torques[0] * np.abs(self._gears)
         return drive_margins(self.robot, needed, self.forces, self.speeds)
 
     @cached_property
@@ -311,6 +343,7 @@ class Sizing(Result):
         joints = [leg.joint for leg in self.robot.legs]
         turning = np.array([drive.ratio is not None for drive in self.drives])
         rms, peak = self.motor_torques
+        mean_speed, fastest = self.motor_speeds
         numbers = {
             **json_fields(
                 peak_force=self.peak_forces,
@@ -332,6 +365,8 @@ class Sizing(Result):
             "best_ratio": np.where(np.isfinite(best := best_ratios(self)), best, np.nan),
             "peak_motor_torque": np.where(turning, peak, np.nan),
             "rms_motor_torque": np.where(turning, rms, np.nan),
+            "peak_motor_speed": np.where(turning, fastest, np.nan),
+            "rms_motor_speed": np.where(turning, mean_speed, np.nan),
         }
         columns = [pl.Series(k, np.asarray(v), nan_to_null=True) for k, v in numbers.items()]
         return pl.DataFrame(

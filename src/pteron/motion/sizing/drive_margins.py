@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pteron.kernels import Array
 from pteron.legs import Drive
 from pteron.legs.motor_limits import motor_peak
+from pteron.legs.screw import CRITICAL_SHARE
 from pteron.manipulator import Manipulator
 from pteron.renamed import former_attribute
 from pteron.result import Result
@@ -22,7 +23,7 @@ class DriveMargin(Result):
     leg: int
     limit: str
     """The keys of the file: "rated_torque and ratio", "max_force", "max_speed", or those of "curve"
-    and "winding" that there are."""
+    and "winding" that there are; or the screw's critical speed in words."""
     quantity: str
     """The quantity that it bounds: "rms_force", "peak_force", "peak_speed" or, at the moment where
     the most of what the motor gives at its speed is taken, "force_at_speed"."""
@@ -56,6 +57,16 @@ class DriveMargin(Result):
         )
 
 
+_WHIRL = f"{CRITICAL_SHARE:.0%} of the screw's critical speed"
+
+
+def _screw_speed(drive: Drive) -> float | None:
+    """Return the speed, m/s, up to which a drive's screw does not whirl; None if it is unknown."""
+    if drive.screw is None or drive.screw.critical_speed == math.inf:
+        return None
+    return CRITICAL_SHARE * drive.screw.critical_speed
+
+
 def drive_margins(
     robot: Manipulator, needed: Mapping[str, PerJoint], forces: Array, speeds: Array
 ) -> tuple[DriveMargin, ...]:
@@ -71,6 +82,7 @@ def drive_margins(
             ("rated_torque and ratio", "rms_force", drive.rated_force, force),
             ("max_force", "peak_force", drive.max_force, force),
             ("max_speed", "peak_speed", drive.max_speed, f"{leg.joint.unit}/s"),
+            (_WHIRL, "peak_speed", _screw_speed(drive), f"{leg.joint.unit}/s"),
         )
         margins += [
             DriveMargin(i + 1, key, quantity, most, float(needed[quantity][i]), unit)

@@ -23,6 +23,7 @@ from pteron.legs import Drive
 from pteron.manipulator import Manipulator
 from pteron.motion.motion import Motion
 from pteron.motion.sizing.drive_loads import Sizing
+from pteron.motion.sizing.friction_sentence import has_friction
 from pteron.motion.sizing.places import Course, CyclePlace
 from pteron.motion.trajectories.tool import Curve
 
@@ -146,7 +147,7 @@ class DutyCycle:
     def _assumed_friction(self, forces: Array) -> Array:
         """Return the assumed dry friction (n,), N or N m, of drives without any in the file."""
         most = np.abs(forces).reshape(-1, self.robot.joint_count).max(axis=0)
-        frictionless = [not (d.coulomb or d.viscous or d.stribeck) for d in self.drives]
+        frictionless = [not has_friction(drive) for drive in self.drives]
         return np.asarray(self.friction * most * frictionless)
 
 
