@@ -126,7 +126,7 @@ def test_a_picture_says_how_many_times_differences_are_enlarged():
 def test_a_quantity_has_one_unit_and_values_that_changed_most_come_first(tmp_path: Path):
     text = write_calibration(calibration(), tmp_path).page.read_text("utf-8")
     assert "µm" not in text
-    assert text.count("Before, in mm: up to ") == text.count("after, in mm: up to ") == 3
+    assert text.count("Before, in mm: up to ") == text.count("open after is up to 0.0") == 3
     sizes = [row.size for row in value_rows(calibration())]
     assert sizes == sorted(sizes, reverse=True)
     assert f"{len(sizes) - 12} more, which changed less" in text
