@@ -189,6 +189,24 @@ def test_the_machine_is_in_the_view_at_any_angle(browser, page_of, name, width):
         assert border(image, image.shape[0] // 8).any(), "it fills the view, too"
 
 
+CURSORS = """() => [...document.querySelectorAll("svg[data-time]")].map((svg) => {
+    const [start, end, left, right] = svg.dataset.time.split(" ").map(Number);
+    const x = Number(svg.querySelector(".cursor").getAttribute("x1"));
+    return start + ((x - left) / (right - left)) * (end - start);
+})"""
+"""Times at which the lines in the curves stand."""
+
+
+@CLIENTS
+def test_a_line_in_every_curve_over_time_follows_the_picture(browser, page_of):
+    with opened(browser, page_of("motion", "par4")) as page:
+        data = scene(page)
+        page.fill("#seek", "100")
+        places = page.evaluate(CURSORS)
+        assert len(places) == 4
+        np.testing.assert_allclose(places, data["time"][100], atol=1e-4)
+
+
 @CLIENTS
 @pytest.mark.parametrize("width", [360, 800])
 def test_in_a_frame_of_another_page_there_is_nothing_to_scroll(browser, page_of, width):

@@ -249,7 +249,7 @@ def test_rams_have_a_place_in_their_stroke_and_no_type_i_singularity():
     assert f"left:{100.0 * (length - low) / (high - low):.1f}%" in text
     assert "type-I singularity" not in text
     assert "to a type-II singularity" in text
-    assert "stroke" not in readout(cranks, readings(cranks))
+    assert 'class="stroke"' not in readout(cranks, readings(cranks))
     assert "to a type-I singularity" in readout(cranks, readings(cranks))
 
 

@@ -119,7 +119,7 @@ def _force_origin(motion_shown: ShownMotion) -> tuple[str, str]:
         return "Given", "those of the table."
     if motion_shown.has_drives:
         return "Drive", "what the drives must give, friction and motors included."
-    return "Actuator", "what the bodies take; friction is left out."
+    return "Drive", "what the bodies take; friction is left out."
 
 
 def _figures(motion_shown: ShownMotion) -> dict[str, Figure]:

@@ -24,7 +24,7 @@
 
   // A line in every curve over time, at the moment that the picture shows.
   const cursors = [...document.querySelectorAll("svg[data-time]")].map((svg) => {
-    const [start, end, left, right, top, bottom] = svg.dataset.time.split(" ").map(Number), line = document.createElementNS("http://www.w3.org/2000/svg", "line");
+    const [start, end, left, right, top, bottom] = svg.dataset.time.split(" ").map(Number), line = document.createElementNS(svg.namespaceURI, "line");
     line.setAttribute("class", "cursor"); line.setAttribute("y1", top); line.setAttribute("y2", bottom); svg.append(line);
     return (time) => { for (const name of ["x1", "x2"]) line.setAttribute(name, left + ((right - left) * (time - start)) / (end - start)); };
   });

@@ -267,7 +267,7 @@
   }
   on("fold", "click", () => fold(!document.body.classList.contains("folded")));
   fold(window.matchMedia("(max-width: 759px)").matches);
-  the("legend").open = window.matchMedia("(min-width: 1000px) and (min-height: 700px)").matches;
+  the("legend").open = window.matchMedia("(min-width: 1300px) and (min-height: 700px)").matches;
   document.addEventListener("keydown", (event) => {
     if ((event.ctrlKey || event.metaKey) && event.key === "z" && !event.target.matches("input[type=text]")) { event.preventDefault(); send({ do: "undo" }); }
   });
