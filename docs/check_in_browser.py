@@ -140,8 +140,8 @@ def code_faults(page: Any, address: str, site: Path, name_them: bool) -> list[st
                     print(f"{width} {name}: {columns} columns: {text!r}")
         count += len(wide)
     shares = {width: cut[width] / max(count, 1) for width in CUT}
-    told = ", ".join(f"{100 * share:.1f} % at {width} px" for width, share in shares.items())
-    print(f"Code: of {count} blocks are cut: {told}.")
+    listed = ", ".join(f"{100 * share:.1f} % at {width} px" for width, share in shares.items())
+    print(f"Code: of {count} blocks are cut: {listed}.")
     return [
         f"code: {100 * shares[width]:.1f} % of the blocks are cut at {width} px; "
         f"at most {100 * limit:.0f} % may be"

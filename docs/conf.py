@@ -91,6 +91,7 @@ nb_execution_raise_on_error = True
 nb_merge_streams = True
 copybutton_prompt_text = r">>> |\.\.\. |\$ "
 copybutton_prompt_is_regexp = True
+copybutton_selector = "div:not(.output) > div.highlight pre"  # not what a notebook prints
 copybutton_exclude = ".linenos, .gp, .go, .gt, .gr, .ne"
 
 # Reference.

@@ -31,8 +31,8 @@ def _rows(command: Any, name: str) -> list[tuple[str, str]]:
 
 def section(command: Any, name: str) -> list[str]:
     """Return the lines of a subcommand in Markdown."""
-    told = [plain(part) for part in (command.help or "").split("\n\n")]
-    lines = [f"## `pteron {name}`", "", *chain.from_iterable((part, "") for part in told)]
+    paragraphs = [plain(part) for part in (command.help or "").split("\n\n")]
+    lines = [f"## `pteron {name}`", "", *chain.from_iterable((part, "") for part in paragraphs)]
     lines += ["| argument or option | meaning |", "| --- | --- |"]
     lines += [
         f"| `{call.replace('|', chr(92) + '|')}` | {plain(text)} |"
@@ -46,10 +46,10 @@ def section(command: Any, name: str) -> list[str]:
 def panels() -> dict[str, dict[str, Any]]:
     """Return the subcommands by the panel of the program's help."""
     group: Any = get_command(program)
-    found: dict[str, dict[str, Any]] = {}
+    by_panel: dict[str, dict[str, Any]] = {}
     for name, command in group.commands.items():
-        found.setdefault(command.rich_help_panel, {})[name] = command
-    return found
+        by_panel.setdefault(command.rich_help_panel, {})[name] = command
+    return by_panel
 
 
 def page_of(panel: str) -> str:

@@ -12,6 +12,9 @@ _CODE = re.compile(r"<pre>(.*?)</pre>", re.DOTALL)
 _COLUMNS = re.compile(r"\S {2,}(?!#)\S")
 """A gap in a line that is not before a comment: the lines of the block stand in columns."""
 
+_WRAPPER = re.compile(r'(<div class="math-wrapper[^>]*?) id="[^"]*"')
+"""The box around an equation, which has the equation's own id."""
+
 _CAPTION = 'class="caption" role="heading"'
 _HEADING_OR_PICTURE = re.compile(r"<h[1-6][^>]*>(?P<heading>.*?)</h[1-6]>|<img\b[^>]*>", re.DOTALL)
 _NAMELESS = re.compile(r'alt="(?:(?:[\w.-]+/)*[0-9a-f]{32,}(?:\.\w+)?|)"')
@@ -25,7 +28,7 @@ def open_to_all(
 ) -> None:
     """Let code that scrolls be focused, name pictures, and give the sidebar's captions a level."""
     if "body" in context:
-        context["body"] = name_pictures(break_lines(context["body"]))
+        context["body"] = name_pictures(break_lines(_WRAPPER.sub(r"\1", context["body"])))
     tree = context.get("furo_navigation_tree", "")
     context["furo_navigation_tree"] = tree.replace(_CAPTION, f'{_CAPTION} aria-level="2"')
 
