@@ -151,8 +151,10 @@ def test_a_printer_gets_its_firmwares_values_first(tmp_path: Path):
         "delta radius",
         *(f"angle of tower {k}" for k in (1, 2)),
         *(f"end stop of tower {k}" for k in (1, 2, 3)),
+        *(f"rods of tower {k}" for k in (1, 2, 3)),
     ]
-    changes = [float(row.change.replace("\u2212", "-")) for row in firmware.rows]
+    assert {row.half for row in firmware.rows[6:]} == {"not shown by heights"}
+    changes = [float(row.change.replace("\u2212", "-")) for row in firmware.rows[:6]]
     assert changes == pytest.approx([0.0, 0.0, 0.0, -0.3, 0.2, -0.1], abs=0.06)
     assert result.held_out is None
     assert "at 8 rows held out of the fit, the height error is 0.0" in firmware.sentence

@@ -18,7 +18,7 @@ import pteron
 from pteron.errors import DataError, ModelError
 from pteron.legs.drive import Drive
 from pteron.motion import LiveCue, Washout, cue, cue_limits
-from pteron.motion.live_cue import Follower
+from pteron.motion.follower import Follower
 from pteron.motion.telemetry import LAYOUTS, Telemetry
 from pteron.motion.washout import WashoutFilter
 from pteron.workspace import Box, conditions, prove

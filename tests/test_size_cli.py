@@ -101,7 +101,7 @@ def test_friction_is_assumed_and_said_and_its_absence_too():
     cycle = json.loads(done_with_notes("cycle five-bar --json"))
     assert cycle["friction"] in free
     sized = json.loads(done(f"{line} --json"))["drives"]
-    peaks = [peak["size"] for peak in cycle["peaks"] if peak["quantity"] == "torque"]
+    peaks = [peak["size"] for peak in cycle["peaks"] if peak["unit"] == "N m"]
     assert peaks == pytest.approx([drive["peak_force"] for drive in sized], rel=2e-3)
 
 

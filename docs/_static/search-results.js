@@ -24,9 +24,10 @@
   Search.makeSearchSummary = (html, keywords, anchor) => {
     const text = Search.htmlToText(html.replace(/\\\([^]*?\\\)|\\\[[^]*?\\\]/g, "…"), anchor).replace(/\s+/g, " ");
     const terms = [...words, ...keywords], before = 60;
-    // The first place behind the heading, with some words before it.
-    const first = pattern(terms, "iu").exec(text.slice(before))?.index ?? 0;
-    const shown = (first ? "… " : "") + text.slice(first, first + 180).trim() + " …";
+    // Whole words about the first place behind the heading.
+    const index = pattern(terms, "iu").exec(text.slice(before))?.index ?? 0;
+    const first = index && text.indexOf(" ", index) + 1;
+    const shown = (first ? "… " : "") + text.slice(first, text.lastIndexOf(" ", first + 180)) + " …";
     const summary = document.createElement("p");
     summary.className = "context";
     let last = 0;

@@ -33,7 +33,7 @@ def section(command: Any, name: str) -> list[str]:
     """Return the lines of a subcommand in Markdown."""
     told = [plain(part) for part in (command.help or "").split("\n\n")]
     lines = [f"## `pteron {name}`", "", *chain.from_iterable((part, "") for part in told)]
-    lines += ["| given | what it is |", "| --- | --- |"]
+    lines += ["| argument or option | meaning |", "| --- | --- |"]
     lines += [
         f"| `{call.replace('|', chr(92) + '|')}` | {plain(text)} |"
         for call, text in _rows(command, name)

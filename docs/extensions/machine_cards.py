@@ -15,7 +15,9 @@ _CARD = """
 
 **`{name}`** {sentence}
 
-{legs}. {source}{published}{own}
+**{legs}**
+
+{source}{published}{own}
 
     pteron view {name}
 
@@ -31,7 +33,7 @@ def card(row: str) -> str:
     return _CARD.format(
         name=name.strip("`"),
         sentence=sentence,
-        legs=legs.replace(", ", "; motion "),
+        legs=legs.replace(", ", " · motion "),
         source=f"Source: {source}. " if source else "",
         published=f"Published: {published}. " if published else "",
         own=f"Ours: {own}.",

@@ -206,7 +206,7 @@ def _show(calibration: Calibration, firmware: FirmwareFit | None, left_out: str)
     from pteron.report.calibration.values import notes
 
     verdict, shown = calibration.verdict, calibration.observability
-    color, hidden = GRADE_COLORS[verdict.grade], len(shown.weak) - _WEAK
+    color = GRADE_COLORS[verdict.grade]
     lines: list[str | Table] = [plain(verdict.reasons[0])]
     if firmware:
         lines += [_table(firmware.rows), plain(firmware.sentence)]
@@ -214,16 +214,33 @@ def _show(calibration: Calibration, firmware: FirmwareFit | None, left_out: str)
         f"[bold {color}]{plain(calibration.drawn.name)}: {verdict.grade}[/bold {color}], "
         f"{shown.determined_count} of {shown.columns} combinations of errors determined",
         *lines,
-        _values(calibration),
+        *([] if firmware else [_values(calibration)]),
         *_errors(calibration),
         *map(plain, verdict.reasons[1:]),
-        *(f"Not determined, kept as drawn: {plain(line)}" for line in shown.unseen),
-        *(f"[yellow]Weakly determined:[/yellow] {plain(line)}" for line in shown.weak[:_WEAK]),
-        *([f"{hidden} more weakly determined combinations are on the page."] if hidden > 0 else []),
+        *(_folded(calibration) if firmware else _undetermined(calibration)),
         *map(plain, notes(calibration)),
         *(f"Next: {plain(step)}" for step in verdict.next_steps),
         *([f"[red]{plain(left_out)}[/red]"] if left_out else []),
     )
+
+
+def _folded(calibration: Calibration) -> list[str]:
+    """Return a line on the full geometry, whose values are on the page."""
+    return [
+        f"The {len(calibration.values)} values of the full geometry, and what the measurements "
+        "leave undetermined, are on the page; robot.toml has them."
+    ]
+
+
+def _undetermined(calibration: Calibration) -> list[str]:
+    """Return lines on what the measurements determine weakly or not at all."""
+    shown = calibration.observability
+    hidden = len(shown.weak) - _WEAK
+    return [
+        *(f"Not determined, kept as drawn: {plain(line)}" for line in shown.unseen),
+        *(f"[yellow]Weakly determined:[/yellow] {plain(line)}" for line in shown.weak[:_WEAK]),
+        *([f"{hidden} more weakly determined combinations are on the page."] if hidden > 0 else []),
+    ]
 
 
 def _values(calibration: Calibration) -> Table:

@@ -7,7 +7,7 @@ from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any
 
 from pteron.cli.arguments import MachineArgument, about_pivot
-from pteron.cli.cue_options import Filters, Live
+from pteron.cli.cue_options import FilterOptions, LiveOptions
 from pteron.cli.motion_argument import Carried, given_pose
 from pteron.cli.motion_table import box_lines, box_record, motion_frame, peaks_table
 from pteron.cli.progress import spinner
@@ -40,8 +40,8 @@ def cue(
     out: str | None = None,
     page: str | None = None,
     type_ii: float = 0.0,
-    live: Live,
-    filters: Filters,
+    live: LiveOptions,
+    filters: FilterOptions,
 ) -> CommandResult:
     """Show a vehicle's accelerations and turns with a simulator's platform: a classical washout.
 
@@ -96,7 +96,7 @@ def cue(
     pteron cue --listen 4123 --robot simulator.toml --layout forza --send 127.0.0.1:4124
     """
     _check_requests(motion, out, page, live)
-    machine = _about_pivot(carried.load_machine(machine), pivot)
+    machine = _with_pivot(carried.load_machine(machine), pivot)
     where: dict[str, Any] = {"washout": filters.washout(), "type_ii": type_ii}
     if around is not None:
         where["pose"] = given_pose(machine, None if around == "home" else around, "--around")
@@ -114,7 +114,7 @@ def cue(
     return _result(machine, motion, carried, cued, largest, motor_rows, files)
 
 
-def _about_pivot(machine: Manipulator, pivot: str | None) -> Manipulator:
+def _with_pivot(machine: Manipulator, pivot: str | None) -> Manipulator:
     """Return the machine with poses about the pivot; it rests in the same home as without one."""
     if pivot is None:
         return machine
@@ -123,7 +123,9 @@ def _about_pivot(machine: Manipulator, pivot: str | None) -> Manipulator:
     return about_pivot(replace(machine, home=tuple(home_pose(machine).tolist())), pivot)
 
 
-def _check_requests(motion: str | None, out: str | None, page: str | None, live: Live) -> None:
+def _check_requests(
+    motion: str | None, out: str | None, page: str | None, live: LiveOptions
+) -> None:
     """Raise DataError unless what is to be read and written is stated and can be written."""
     if live.listen is not None:
         if out is not None or page is not None:

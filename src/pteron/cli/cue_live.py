@@ -16,7 +16,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
-from pteron.cli.cue_options import Live
+from pteron.cli.cue_options import LiveOptions
 from pteron.cli.motion_table import box_lines, box_record
 from pteron.cli.progress import spinner
 from pteron.cli.result import CommandResult
@@ -45,7 +45,11 @@ _BIN, _BINS = 1e-5, 10_000
 
 
 def run_live(
-    machine: Manipulator, motion: str | None, carried: Carried, where: dict[str, Any], live: Live
+    machine: Manipulator,
+    motion: str | None,
+    carried: Carried,
+    where: dict[str, Any],
+    live: LiveOptions,
 ) -> CommandResult:
     """Run a live cue until it is ended; return its summary."""
     from pteron.motion import LiveCue, cue, cue_limits
@@ -106,7 +110,7 @@ class _Loop:
         begin, slots, phase = time.monotonic(), 0, self.cue.phase
         end = math.inf if duration is None else begin + duration
         try:
-            while not (self.cue.is_stopping and self.cue.at_home):
+            while not (self.cue.is_stopping and self.cue.is_at_home):
                 slots += 1
                 deadline = begin + slots * self._step
                 sample = self._receive(deadline)
@@ -181,7 +185,9 @@ class _Loop:
 
 
 @contextmanager
-def _open_sockets(live: Live) -> Iterator[tuple[socket.socket, socket.socket, Address | None]]:
+def _open_sockets(
+    live: LiveOptions,
+) -> Iterator[tuple[socket.socket, socket.socket, Address | None]]:
     """Yield the socket that receives, the one that sends and where it sends to, if anywhere."""
     assert live.listen is not None
     family, address = _resolve(live.host, live.listen, "--listen")
@@ -215,10 +221,10 @@ def _resolve(host: str, port: int, option: str) -> tuple[socket.AddressFamily, A
     if not 0 < port < 1 << 16:
         raise DataError(f"{option}: port {shorten(port)} given, 1 to 65535 expected")
     try:
-        found = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)
+        addresses = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)
     except (OSError, UnicodeError):
         raise DataError(f"{option}: {shorten(host)} is no address of a computer") from None
-    return found[0][0], found[0][4]
+    return addresses[0][0], addresses[0][4]
 
 
 def _writer(
@@ -253,21 +259,21 @@ def _numbers(joints: NDArray[np.float64]) -> str:
 @contextmanager
 def _ended_by_signals(stop: Callable[[], None]) -> Iterator[None]:
     """Call `stop` at the first Ctrl-C or request to end; a second one interrupts at once."""
-    asked = False
+    is_asked = False
 
     def handle(number: int, frame: object) -> None:
-        nonlocal asked
-        if asked:
+        nonlocal is_asked
+        if is_asked:
             raise KeyboardInterrupt
-        asked = True
+        is_asked = True
         stop()
 
     numbers = signal.SIGINT, signal.SIGTERM
-    before = [signal.signal(number, handle) for number in numbers]
+    handlers = [signal.signal(number, handle) for number in numbers]
     try:
         yield
     finally:
-        for number, handler in zip(numbers, before, strict=True):
+        for number, handler in zip(numbers, handlers, strict=True):
             signal.signal(number, handler)
 
 
@@ -278,7 +284,7 @@ def _realtime_priority() -> Iterator[None]:
     Under full load a thread of ordinary priority waits some milliseconds for a core.
     """
     try:
-        before = os.sched_getscheduler(0), os.sched_getparam(0)
+        scheduling = os.sched_getscheduler(0), os.sched_getparam(0)
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))
     except (AttributeError, OSError):
         note("Note: no real-time priority: set points may be late while other programs work")
@@ -287,10 +293,10 @@ def _realtime_priority() -> Iterator[None]:
     try:
         yield
     finally:
-        os.sched_setscheduler(0, *before)
+        os.sched_setscheduler(0, *scheduling)
 
 
-def _note_start(machine: Manipulator, live: Live, limits: CueLimits) -> None:
+def _note_start(machine: Manipulator, live: LiveOptions, limits: CueLimits) -> None:
     """State on standard error where the cue listens and sends, and how to end it."""
     from pteron.viewer.guard import is_local_address
 
@@ -308,7 +314,7 @@ def _note_start(machine: Manipulator, live: Live, limits: CueLimits) -> None:
 
 
 def _summary(
-    machine: Manipulator, carried: Carried, live: Live, limits: CueLimits, loop: _Loop
+    machine: Manipulator, carried: Carried, live: LiveOptions, limits: CueLimits, loop: _Loop
 ) -> CommandResult:
     """Return the summary of a live cue: delays, losses, faults, limits."""
     faults = dict(sorted(loop.telemetry.faults.items()))
@@ -328,7 +334,7 @@ def _summary(
         "accepted": loop.telemetry.accepted,
         "faults": faults,
         "delay": {name: None if math.isnan(s) else s for name, s in delays.items()},
-        "at_home": loop.cue.at_home,
+        "at_home": loop.cue.is_at_home,
         "center": limits.center.tolist(),
         "box": box_record(machine, limits.region),
         "proved": bool(limits.proof.holds),
@@ -352,7 +358,7 @@ def _summary(
         lines.append(f"Set points left out: {loop.late} by the clock, {loop.unsent} by the network")
     if rows:
         lines.append(table("datagrams not used", "count", rows=rows, numbers=("count",)))
-    lines.append("The platform rests at home." if loop.cue.at_home else "It is not at home.")
+    lines.append("The platform rests at home." if loop.cue.is_at_home else "It is not at home.")
     return CommandResult(record, lines)
 
 

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Filters:
+class FilterOptions:
     """The options of the filters; None where one is left out."""
 
     scale: float | None = None
@@ -25,11 +25,13 @@ class Filters:
         """Return the filters."""
         from pteron.motion import Washout
 
-        return Washout(**{name: value for name, value in asdict(self).items() if value is not None})
+        return Washout(
+            **{name: number for name, number in asdict(self).items() if number is not None}
+        )
 
 
 @dataclass(frozen=True)
-class Live:
+class LiveOptions:
     """The options of a live cue."""
 
     listen: int | None = None

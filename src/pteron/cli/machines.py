@@ -224,7 +224,7 @@ def _show(robot: Manipulator, findings: dict[str, Any], further: str, *, each: b
         *_redundancy(robot, findings),
         *_modes(findings["working_modes"]),
         *_passive(findings["limited_joints"], each=each),
-        *([f"Note: {text}"] if (text := findings["template"]) else []),
+        *([f"Note: {plain(text)}"] if (text := findings["template"]) else []),
         *(
             f"The platform can move with its rams locked {text}"
             for text in findings["self_motions"]

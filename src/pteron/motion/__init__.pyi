@@ -1,3 +1,4 @@
+from pteron.motion.cue_limits import CueLimits as CueLimits, cue_limits as cue_limits
 from pteron.motion.cueing import Cue as Cue, cue as cue
 from pteron.motion.joint_points import (
     Guide as Guide,
@@ -6,11 +7,7 @@ from pteron.motion.joint_points import (
     joint_guides as joint_guides,
     joint_points as joint_points,
 )
-from pteron.motion.live_cue import (
-    CueLimits as CueLimits,
-    LiveCue as LiveCue,
-    cue_limits as cue_limits,
-)
+from pteron.motion.live_cue import LiveCue as LiveCue
 from pteron.motion.motion import Motion as Motion
 from pteron.motion.overloads import overloads as overloads
 from pteron.motion.payload import with_payload as with_payload, with_tool as with_tool

@@ -7,6 +7,7 @@ largest box of the motion's proportions fits.
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -14,7 +15,6 @@ import numpy as np
 
 from pteron.errors import DataError, ModelError
 from pteron.kernels import Array
-from pteron.kernels.bisection import bisect_condition
 from pteron.kinematics.evaluate import finite_pose
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.motion import Motion, interpolate_columns
@@ -57,13 +57,16 @@ WITHIN = 0.999
 _REFINED = 6
 """Times that steps are halved where the curve between them would leave the box."""
 
-_TRIES = 30
-"""Sizes for which a proof is tried, each nine tenths of the one before; if none is proved, the cue
-is refused."""
+_SIZE_HALVINGS = 10
+"""Bisections of a box's size in the search of its middle: to 0.1 % of the greatest size."""
 
-_FIRST, _LAST, _BETTER = 0.25, 2e-3, 1.002
+_SHARE, _TRIES = 0.97, 30
+"""Share of the size by samples for which a proof is tried first, and number of tries, each nine
+tenths of the one before; if none is proved, the cue is refused."""
+
+_FIRST, _LAST, _BETTER = 0.25, 2e-3, 1.005
 """The search of the box's middle: first and last step, in mean leg sizes, and the factor by which
-the box must grow: its size is bisected to 0.1 %."""
+the box must grow for a step to be taken."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -255,7 +258,7 @@ def prove_box(
         lambda size: middle + size * half * ways,
         _ROOM,
         _HALVINGS,
-        (0.9**k for k in range(1, _TRIES)),
+        (_SHARE * 0.9**k for k in range(_TRIES)),
     )
     if not proof.holds:
         raise ModelError(
@@ -271,31 +274,33 @@ def _search_center(
 ) -> Array:
     """Return the pose, oriented as at home, about which the largest box fits, by its samples.
 
-    A compass search from the home pose: a step along a length that lets the box grow is taken, and
-    steps halve where none does.
+    A compass search from the home pose: a step along lengths or across them that lets the box grow
+    is taken, the best one, and steps halve where none does. The size is a minimum over conditions,
+    whose ridges steps along the lengths alone would not follow.
     """
     middle = home_pose(robot)
     reach = float(np.mean([leg.size or 1.0 for leg in robot.legs]))
 
-    def box_size(center: Array) -> float:
-        """Return the size up to which all samples of the box keep the conditions."""
-        return float(
-            bisect_condition(
-                lambda size: bool(keeps(robot, required, center + size * half * ways).all()),
-                *(0.0, _ROOM, 10),
-            )[0]
-        )
+    def box_sizes(centers: Array) -> Array:
+        """Return the sizes (C,) up to which all samples of the boxes keep the conditions."""
+        low, high = np.zeros(len(centers)), np.full(len(centers), _ROOM)
+        for _ in range(_SIZE_HALVINGS):
+            size = 0.5 * (low + high)
+            poses = centers[:, None] + size[:, None, None] * half * ways
+            fits = keeps(robot, required, poses).all(axis=-1)
+            low, high = np.where(fits, size, low), np.where(fits, high, size)
+        return low
 
     lengths = np.flatnonzero(~robot.platform.angular)
-    size, step = box_size(middle), _FIRST * reach
+    moves = np.array(list(itertools.product((-1.0, 0.0, 1.0), repeat=len(lengths))))
+    steps = moves[np.abs(moves).any(axis=1)] @ np.eye(robot.freedom)[lengths]
+    size, step = float(box_sizes(middle[None])[0]), _FIRST * reach
     while step > _LAST * reach and size < _ROOM / _BETTER:
-        moves = middle + np.concatenate(
-            [step * np.eye(robot.freedom)[lengths] * s for s in (1, -1)]
-        )
-        sizes = [box_size(center) for center in moves]
+        centers = middle + step * steps
+        sizes = box_sizes(centers)
         best = int(np.argmax(sizes))
         if sizes[best] > _BETTER * size:
-            middle, size = moves[best], sizes[best]
+            middle, size = centers[best], float(sizes[best])
         else:
             step *= 0.5
     return middle

@@ -37,7 +37,7 @@ class Paused(Exception):
 
 
 @dataclass(frozen=True)
-class Layout:
+class DatagramLayout:
     """A layout of datagrams.
 
     Attributes
@@ -128,18 +128,20 @@ def _to_car(vector: Sequence[float], angles: Sequence[float]) -> tuple[float, fl
 
 
 LAYOUTS = {
-    "json": Layout("any program, an object with t ax ay az wx wy wz", "RFC 8259", _decode_json),
-    "csv": Layout(
+    "json": DatagramLayout(
+        "any program, an object with t ax ay az wx wy wz", "RFC 8259", _decode_json
+    ),
+    "csv": DatagramLayout(
         "FlightGear by its generic protocol, or any program: t,ax,ay,az,wx,wy,wz",
         "FlightGear, Docs/README.protocol",
         _decode_csv,
     ),
-    "forza": Layout(
+    "forza": DatagramLayout(
         'Forza Motorsport and Forza Horizon, "Data Out"',
         "https://support.forzamotorsport.net/hc/en-us/articles/21742934024211",
         _decode_forza,
     ),
-    "outsim": Layout(
+    "outsim": DatagramLayout(
         "Live for Speed, OutSim",
         "Live for Speed, docs/InSim.txt; https://www.lfs.net/forum/thread/93701",
         _decode_outsim,

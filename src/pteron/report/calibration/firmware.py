@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 from pteron.calibration import Calibration, calibrate
 from pteron.errors import PteronError
 from pteron.export.printers.linear_delta import LinearDelta
-from pteron.report.calibration.values import CalibrationRow
+from pteron.report.calibration.values import CalibrationRow, value_rows
 from pteron.report.typeset import value_with_uncertainty
 
 _FREE = ("radius", "legs[1].angle", "legs[2].angle", "zeros")
@@ -22,7 +22,7 @@ _QUANTILE = 1.96
 
 @dataclass(frozen=True)
 class FirmwareFit:
-    """A calibration of the firmware's six values, in its own units, and its residuals."""
+    """A calibration of the firmware's six values, in its own units, and what shows of its rods."""
 
     rows: tuple[CalibrationRow, ...]
     sentence: str
@@ -65,7 +65,25 @@ def firmware_fit(calibration: Calibration) -> FirmwareFit | None:
         slope[names.index("radius")] = drawn.radius / below
         width = 1e3 * float(np.sqrt(slope @ fitted.fit.covariance @ slope))
         rows.append(_row(f"end stop of tower {k + 1}", 1e3 * old[k], 1e3 * new[k], "mm", width))
-    return FirmwareFit(tuple(rows), _sentence(fitted), fitted)
+    return FirmwareFit((*rows, *_rods(calibration)), _sentence(fitted), fitted)
+
+
+def _rods(calibration: Calibration) -> list[CalibrationRow]:
+    """Return a row for the rods of each tower: as fitted, or as drawn if the data do not show them.
+
+    They are those of the fit of the full geometry: with the six values alone they would be held.
+    """
+    kinds = " and ".join(dict.fromkeys(f"{kind}s" for kind in calibration.measurements.kinds))
+    rows = []
+    for row in value_rows(calibration):
+        if row.name.endswith(".lower_length"):
+            tower = row.name.partition("[")[2].partition("]")[0]
+            row = replace(row, name=f"rods of tower {tower}")
+            if row.origin != "data":
+                unseen = f"not shown by {kinds}"
+                row = replace(row, found=row.drawn, change="-", half=unseen, origin="tolerance")
+            rows.append(row)
+    return sorted(rows, key=lambda row: row.name)
 
 
 def _row(name: str, drawn: float, estimated: float, unit: str, deviation: float) -> CalibrationRow:
