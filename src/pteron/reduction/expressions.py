@@ -97,7 +97,7 @@ def _write_terms(share: Share, digits: int, write: Callable[[Any], str]) -> tupl
     minus, quotient = _signed_text(share)
     top, bottom = quotient.as_numer_denom()
     # A sum needs brackets under a sign or over a denominator.
-    text = f"({write(top)})" if top.is_Add else write(top)
+    text = f"({write(top)})" if top.is_Add and bottom != 1 else write(top)
     if bottom != 1:
         text += f"/({write(bottom)})" if bottom.is_Mul or bottom.is_Add else f"/{write(bottom)}"
     return minus, f"({text})"

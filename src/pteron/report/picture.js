@@ -117,7 +117,8 @@ class Picture {
     const corners = [gridLow, [gridLow[0], gridHigh[1]], gridHigh, [gridHigh[0], gridLow[1]]].map((p) => [...p, this.floor]);
     const base = this.baseAxes.map((axis) => add(this.corner, axis, 0.17 * size));
     this.outer = [...base, ...this.#farthest(this.cloud.concat(corners, base))];
-    this.body = this.machine.planar ? this.outer : this.#farthest(this.cloud.concat([[this.center[0], this.center[1], this.floor]]));
+    const { planar, gravity } = this.machine, falls = planar && Math.hypot(...gravity) ? this.#gravity() : [];
+    this.body = this.#farthest(this.cloud.concat(falls, planar ? [] : [[this.center[0], this.center[1], this.floor]]));
   }
   #farthest(all) {
     const found = new Set();
@@ -219,6 +220,11 @@ class Picture {
     return this.prism(turns.map((t) => add(add(c, b, radius * Math.cos(t)), n, radius * Math.sin(t))), a, long);
   }
 
+  // Where a planar machine's arrow of gravity begins and ends.
+  #gravity() {
+    const from = [this.gridLow[0] + 0.05 * this.size, this.gridHigh[1] - 0.06 * this.size, this.floor];
+    return [from, add(from, this.machine.gravity, 0.15 * this.size)];
+  }
   ground() {
     const { pen, gridLow, gridHigh, floor, size, machine, colors } = this, step = machine.grid;
     pen.lineCap = "butt"; pen.strokeStyle = colors.grid; pen.lineWidth = 1;
@@ -231,8 +237,7 @@ class Picture {
       });
     }
     if (!machine.planar || !Math.hypot(...machine.gravity)) return;
-    const from = [gridLow[0] + 0.05 * size, gridHigh[1] - 0.06 * size, floor], down = machine.gravity, across = [-down[1], down[0], 0];
-    const tip = add(from, down, 0.15 * size);
+    const [from, tip] = this.#gravity(), down = machine.gravity, across = [-down[1], down[0], 0];
     for (const end of [from, add(add(tip, down, -0.04 * size), across, 0.025 * size), add(add(tip, down, -0.04 * size), across, -0.025 * size)]) this.line(tip, end, colors.muted, 1.8);
     this.label(add(from, down, -0.04 * size), "g", colors.muted);
   }

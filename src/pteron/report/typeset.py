@@ -172,7 +172,8 @@ def template(name: str, folder: str = "report", **filters: Callable[..., Any]) -
         "unit": lambda text: text.replace(" ", _NARROW).replace("^2", "²"),
     }
     page_template = any_template(folder, name, **shared | filters)
+    today = date.today()
     page_template.globals.update(
-        style=resource("page.css"), version=pteron.__version__, today=date.today().isoformat()
+        style=resource("page.css"), version=pteron.__version__, today=f"{today.day} {today:%B %Y}"
     )
     return page_template

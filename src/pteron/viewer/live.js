@@ -137,6 +137,7 @@
     const hint = the("first"), ring = free() && !learned.known && !learned.said && the("show-handles").checked && handles()[0];
     hint.hidden = !ring;
     if (!ring) return;
+    the("first-text").textContent = `Drag this ring to ${ring.axis === null ? "move" : "turn"} the platform`;
     const [x, y] = picture.pixel(picture.deep(ring.at)), wide = hint.offsetWidth, right = x + 16 + wide < picture.width;
     hint.style.left = `${Math.max(6, right ? x + 16 : x - 16 - wide)}px`; hint.style.top = `${y + 14}px`;
   }
