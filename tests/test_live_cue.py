@@ -22,6 +22,7 @@ from pteron.motion.follower import Follower
 from pteron.motion.telemetry import LAYOUTS, Telemetry
 from pteron.motion.washout import WashoutFilter
 from pteron.workspace import Box, conditions, prove
+from pteron.workspace.regions import Segment
 
 STEP = 1 / 250
 DRIVE = Drive(max_force=9000.0, max_speed=0.9)
@@ -295,3 +296,24 @@ def test_the_command_listens_to_this_computer_alone_and_ends_at_home(tmp_path):
     np.testing.assert_allclose(
         joints, pteron.inverse_kinematics(short_rams(), short_rams().home), atol=1e-6
     )
+
+
+def test_a_segment_meets_the_boxes_that_hold_a_pose_of_it():
+    rng = np.random.default_rng(3)
+    for level in (False, True):
+        start, end = rng.uniform(-1.0, 1.0, (2, 6))
+        if level:  # some coordinates do not change
+            end[3:] = start[3:]
+        segment = Segment(tuple(start), tuple(end))
+        poses = start + rng.uniform(0.0, 1.0, (200, 1)) * (end - start)
+        assert segment.holds(poses).all()
+        assert not segment.holds(poses + 1e-6 * np.sign(rng.uniform(-1, 1, poses.shape))).any()
+        assert not segment.holds(start - 0.01 * (end - start))
+        sizes = rng.uniform(0.0, 0.3, (2, *poses.shape))
+        assert not segment.misses(poses - sizes[0], poses + sizes[1]).any()
+        beside = poses + np.where(np.arange(6) == 5, 0.5, 0.0)
+        low, high = beside - 0.1 * (np.arange(6) == 5), beside + 0.1
+        samples = start + np.linspace(0.0, 1.0, 5001)[:, None] * (end - start)
+        inside = (low[:, None] <= samples) & (samples <= high[:, None])
+        assert not (segment.misses(low, high) & inside.all(axis=-1).any(axis=1)).any()
+        assert segment.misses(low, high).mean() > 0.9
