@@ -66,7 +66,7 @@ def at_mid_stroke(robot: Manipulator, height: float | None = None) -> Manipulato
             f"{robot.name}; check radii, lengths and limits"
         )
     pose = _level_poses(modes[k], np.array([best]))[0]
-    return replace(modes[k], home=tuple(float(f"{q:.9g}") for q in pose.round(12) + 0.0))
+    return replace(modes[k], home=tuple(float(f"{q:.9g}") for q in pose.round(9) + 0.0))
 
 
 def _level_poses(robot: Manipulator, heights: Array) -> Array:
