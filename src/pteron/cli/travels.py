@@ -86,14 +86,14 @@ def _lines(
         table("towards", "travel", "what stops it", rows=rows, numbers=("travel",)),
     ]
     if box is not None:
-        low, high = box.box
+        low, high = box.box - travels.pose
         spans = ", ".join(
-            f"{name} {1e3 * low[i]:.4g} to {1e3 * high[i]:.4g} mm"
+            f"{name} {1e3 * low[i]:.4g} to +{1e3 * high[i]:.4g} mm"
             for i, name in enumerate(robot.coordinates)
             if name not in angles
         )
         held = ", the orientation held" if angles else ""
-        lines.append(f"Largest box about it, proved{held}: {spans}")
+        lines.append(f"Largest box about it, proved{held}, from the pose: {spans}")
     if tilt is not None:
         lines.append(f"Tilt to every side at this place, proved: {math.degrees(tilt):.4g} deg")
     if radius is not None:
