@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from commands import done, refused
+from commands import done, refused, run
 
 import pteron
 from pteron.errors import ModelError
@@ -99,3 +99,12 @@ def test_commands_take_a_pivot():
     )
     refused("cycle stewart --pivot 0 1", "--pivot: 2 values given, 3 expected: x y z")
     refused("workspace wrist --from 0,0,0 --pivot 0,0,1", "its point P cannot be chosen")
+
+
+def test_a_table_about_another_point_is_doubted(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    line = "cycle delta --around 0 0 -0.9 --scale 0.5 --out about.csv"
+    assert run(f"{line} --pivot 0.01 0 0").exit_code == 0
+    text = run("size delta --cycle about.csv").stderr
+    assert "about another point (--pivot)? The poses count" in text
+    assert "--pivot" not in run("size delta --cycle about.csv --pivot 0.01,0,0").stderr

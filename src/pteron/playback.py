@@ -16,10 +16,10 @@ import numpy as np
 from pteron.errors import DataError, shorten, warn_unlikely
 from pteron.identification.logs import Description, Log, LogFile, find_description, read_log
 from pteron.identification.signals import States, preprocessing_for_log, samples, spline_motion
-from pteron.kernels import Array
+from pteron.kernels import Array, numeric
 from pteron.kinematics.unlikely_values import warn_of_unlikely
 from pteron.manipulator import Manipulator
-from pteron.manipulator.readings import reading_scales
+from pteron.manipulator.readings import from_readings, reading_scales
 from pteron.motion import Motion, Simulation, check_motion, replay
 from pteron.shapes import PoseLike
 from pteron.tables import (
@@ -33,6 +33,10 @@ from pteron.tables import (
     whole_table,
 )
 from pteron.workspace import home_pose
+
+_OTHER = 2e-3
+"""Share of a leg's size, or rad, by which joints of a table may be off from its poses: what
+calibration corrects on a built machine is less."""
 
 _SLOW = 0.5
 """Time between samples above which a warning is given, s."""
@@ -176,6 +180,7 @@ def playback_of_table(robot: Manipulator, rows: Table, start: PoseLike | None = 
     if start is None and not set(rows.columns) >= set(robot.coordinates):
         start = home_pose(robot)
     motion = replay(robot, rows, start=start)
+    _warn_of_other_joints(robot, rows, motion)
     names = [name for name in (*robot.coordinates, *robot.joint_names) if name in rows.columns]
     warn_of_unlikely(robot, names, rows.numbers(names), f"{rows.source}: ")
     if (step := float(np.median(np.diff(motion.time)))) >= _SLOW:
@@ -185,6 +190,23 @@ def playback_of_table(robot: Manipulator, rows: Table, start: PoseLike | None = 
     forces = rows.numbers(robot.force_names) / reading_scales(robot) if has_forces else None
     heaviest = rows.numbers(["payload"]).max() if "payload" in rows.columns else None
     return Playback(motion, forces, Path(rows.source).name, payload=heaviest)
+
+
+def _warn_of_other_joints(robot: Manipulator, rows: Table, motion: Motion) -> None:
+    """Warn if the joints of a table are not those of its poses."""
+    if not set(rows.columns) >= {*robot.coordinates, *robot.joint_names}:
+        return
+    joints = from_readings(robot, rows.numbers(robot.joint_names))
+    off = np.abs(numeric(robot, "joint_coordinates")(motion.pose)[0] - joints)
+    share = off / [leg.size if leg.joint.unit == "m" else 1.0 for leg in robot.legs]
+    if len(share) and (most := float(np.nanmax(share))) > _OTHER:
+        k, i = np.unravel_index(np.nanargmax(share), share.shape)
+        leg = robot.legs[i]
+        warn_unlikely(
+            f"{rows.source}: row {k + 1}: {robot.joint_names[i]} is off by {off[k, i]:.3g} "
+            f"{leg.joint.unit}, {most:.1%} of the leg, from that of its pose: are they of another "
+            "machine, or about another point (--pivot)? The poses count"
+        )
 
 
 def playback_of_log(robot: Manipulator, log: Log) -> Playback:

@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from pteron.cli.arguments import STANDARD, MachineArgument
+from pteron.cli.arguments import STANDARD, MachineArgument, about_pivot
 from pteron.cli.destination import Destination
 from pteron.cli.motion_argument import Carried, cycle_of, cycle_text
 from pteron.cli.motion_table import force_word
@@ -40,6 +40,7 @@ def size(
     *,
     cycle: list[str] | None = None,
     carried: Carried,
+    pivot: str | None = None,
     duration: float | None = None,
     dwell: list[float] | None = None,
     within: str | None = None,
@@ -101,8 +102,10 @@ def size(
     where = within or ("workspace" if cycles == [STANDARD] else "here")
     places: Any = {"workspace": "workspace", "here": None}
     example = ", such as x=-0.1:0.1,y=-0.1:0.1"
+    # Poses of regions and tables are those of the pivot.
     spans = {} if where in places else pose_spans(machine, where, "--within", example)
-    carrying = carried.load_machine(machine)
+    carrying = about_pivot(carried.load_machine(machine), pivot)
+    machine = about_pivot(machine, pivot)
     with spinner(f"Sizing the drives of {machine.name}"):
         motions = [cycle_of(carrying, name, duration) for name in cycles]
         region = _box(machine, spans, motions) if spans else places[where]
