@@ -24,7 +24,7 @@ BUILT = DOCS / "_build"
 INPUTS = BUILT / "inputs.txt"
 
 READ = (
-    *("pyproject.toml", "CITATION.cff", "docs/conf.py", "docs/**/*.py", "docs/_templates/*"),
+    *("pyproject.toml", "CITATION.cff", "docs/conf.py", "docs/**/*.py", "docs/_templates/**/*"),
     *("docs/**/*.png", "docs/**/*.svg", "docs/**/*.gif", "docs/**/*.toml", "docs/*.bib"),
     *("src/**/*", "examples/**/*", "benchmarks/**/*.md", "benchmarks/**/*.svg"),
 )

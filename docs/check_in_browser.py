@@ -124,7 +124,7 @@ def code_faults(page: Any, address: str, site: Path, name_them: bool) -> list[st
         if {*path.relative_to(site).parts} & {*_NO_CODE} or "<pre" not in path.read_text("utf-8"):
             continue
         name = path.relative_to(site).as_posix()
-        page.goto(f"{address}/{name}", wait_until="domcontentloaded")
+        page.goto(f"{address}/{name}")
         for width in CUT:
             page.set_viewport_size({"width": width, "height": 900})
             page.evaluate("document.querySelectorAll('details').forEach((one) => one.open = true)")

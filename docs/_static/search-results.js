@@ -1,10 +1,9 @@
 /* Results of the search: words are found from their beginning, and excerpts have no formulas in TeX. */
 {
-  const starts = (text, term) => text.toLowerCase().split(/[^\p{Letter}\p{Number}]+/u).some((word) => word.startsWith(term));
   const objects = Search.performObjectSearch;
   Search.performObjectSearch = (object, terms) =>
     objects(object, terms).filter(([, name, , description]) =>
-      [...terms].every((term) => name.toLowerCase().endsWith(term) || starts(`${name} ${description}`, term)));
+      [...terms].every((term) => new RegExp(`(?<![\\p{L}\\p{N}])${term}`, "iu").test(`${name} ${description}`)));
 
   const parse = Search._parseQuery;
   let words = [];
