@@ -169,14 +169,14 @@ def body() -> Sheet:
     shape += [(0.18, -0.05), (0, -0.035)]
     sheet.line([o + a * along + b * across for a, b in [*shape, shape[0]]], MUTED, 1.4)
     sheet.arrow(o, o + g, r"$\gamma = h/m$", GIVEN, (-0.9, 0.9), 0.4)
-    sheet.arrow(o, o + np.array([-0.1, 0.06, 0.0]), "$a$", INK, (0.0, 0.8), 0.9)
+    sheet.arrow(o, o + np.array([-0.1, 0.06, 0.0]), r"$\ddot o$", INK, (0.0, 0.8), 0.9)
     center, down = o + g, np.array([0.0, -1.0, 0.0])
     sheet.arrow(center, center + 0.11 * down, "$m g$", LOWER, (1.0, 0.0), 0.8)
     inward = -0.09 * g / np.linalg.norm(g)
     sheet.arrow(center, center + inward, r"$-\omega^2\gamma$", UPPER, (1.3, -0.7), 0.8)
     turned = 0.09 * np.cross([0.0, 0.0, 1.0], g / np.linalg.norm(g))
-    sheet.arrow(center, center + turned, r"$\alpha\,z\times\gamma$", UPPER, (1.8, 0.2), 0.9)
-    sheet.arc(o, 0.05 * np.array([1.0, 0.0, 0.0]), 0.05 * along, r"$\omega,\alpha$", (1.3, 0.0))
+    sheet.arrow(center, center + turned, r"$\dot\omega\,z\times\gamma$", UPPER, (1.8, 0.2), 0.9)
+    sheet.arc(o, 0.05 * np.array([1.0, 0.0, 0.0]), 0.05 * along, r"$\omega,\dot\omega$", (1.3, 0.0))
     sheet.mark(o, INK)
     sheet.name(o, "reference point", INK, (-4.4, -1.1))
     sheet.mark(center, INK, 4.0)
@@ -210,8 +210,8 @@ def transfer() -> Sheet:
     sheet.mark(r2, LOWER, 17.0)
     sheet.mark(r2, UPPER, 10.0)
     sheet.name(r2, "mass goes over", INK, (0.0, 1.6))
-    sheet.name(0.5 * (r1 + r2), r"$+\mu$", UPPER, (-1.2, 0.6))
-    sheet.name(0.5 * (r2 + c), r"$-\mu$", LOWER, (1.2, 0.6))
+    sheet.name(0.5 * (r1 + r2), "$+m_t$", UPPER, (-1.2, 0.6))
+    sheet.name(0.5 * (r2 + c), "$-m_t$", LOWER, (1.2, 0.6))
     for point, name, way in ((r1, "R1", (-0.9, -0.7)), (c, "R3", (0.9, -0.7))):
         sheet.name(point, name, INK, way)
     return sheet
