@@ -135,7 +135,7 @@ def test_pictures_are_those_that_are_drawn(tmp_path, monkeypatch):
     for name in ("cycle", "legs", "vectors"):
         script["DRAWN"][name](tmp_path)
     drawn = [path for path in tmp_path.rglob("*") if path.is_file()]
-    assert len(drawn) == 2 + len(pteron.legs.KINDS) + 19
+    assert len(drawn) == 2 + len(pteron.legs.KINDS) + 21
     for path in drawn:
         kept = DOCS / path.relative_to(tmp_path)
         assert script["alike"](kept, path), f"{kept} is not what is drawn; run make docs"

@@ -11,6 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import machines
 import numpy as np
 import other_vectors
 from legs import GIVEN, INK, LOWER, MUTED, PLATE, UPPER, Posed, Sheet
@@ -168,14 +169,14 @@ def body() -> Sheet:
     shape += [(0.18, -0.05), (0, -0.035)]
     sheet.line([o + a * along + b * across for a, b in [*shape, shape[0]]], MUTED, 1.4)
     sheet.arrow(o, o + g, r"$\gamma = h/m$", GIVEN, (-0.9, 0.9), 0.4)
-    sheet.arrow(o, o + np.array([-0.1, 0.06, 0.0]), "$a$", INK, (0.0, 0.8), 0.9)
+    sheet.arrow(o, o + np.array([-0.1, 0.06, 0.0]), r"$\ddot o$", INK, (0.0, 0.8), 0.9)
     center, down = o + g, np.array([0.0, -1.0, 0.0])
     sheet.arrow(center, center + 0.11 * down, "$m g$", LOWER, (1.0, 0.0), 0.8)
     inward = -0.09 * g / np.linalg.norm(g)
     sheet.arrow(center, center + inward, r"$-\omega^2\gamma$", UPPER, (1.3, -0.7), 0.8)
     turned = 0.09 * np.cross([0.0, 0.0, 1.0], g / np.linalg.norm(g))
-    sheet.arrow(center, center + turned, r"$\alpha\,z\times\gamma$", UPPER, (1.8, 0.2), 0.9)
-    sheet.arc(o, 0.05 * np.array([1.0, 0.0, 0.0]), 0.05 * along, r"$\omega,\alpha$", (1.3, 0.0))
+    sheet.arrow(center, center + turned, r"$\dot\omega\,z\times\gamma$", UPPER, (1.8, 0.2), 0.9)
+    sheet.arc(o, 0.05 * np.array([1.0, 0.0, 0.0]), 0.05 * along, r"$\omega,\dot\omega$", (1.3, 0.0))
     sheet.mark(o, INK)
     sheet.name(o, "reference point", INK, (-4.4, -1.1))
     sheet.mark(center, INK, 4.0)
@@ -209,8 +210,8 @@ def transfer() -> Sheet:
     sheet.mark(r2, LOWER, 17.0)
     sheet.mark(r2, UPPER, 10.0)
     sheet.name(r2, "mass goes over", INK, (0.0, 1.6))
-    sheet.name(0.5 * (r1 + r2), r"$+\mu$", UPPER, (-1.2, 0.6))
-    sheet.name(0.5 * (r2 + c), r"$-\mu$", LOWER, (1.2, 0.6))
+    sheet.name(0.5 * (r1 + r2), "$+m_t$", UPPER, (-1.2, 0.6))
+    sheet.name(0.5 * (r2 + c), "$-m_t$", LOWER, (1.2, 0.6))
     for point, name, way in ((r1, "R1", (-0.9, -0.7)), (c, "R3", (0.9, -0.7))):
         sheet.name(point, name, INK, way)
     return sheet
@@ -281,71 +282,6 @@ def singular() -> Sheet:
     return sheet
 
 
-def school() -> Sheet:
-    """Draw the school machine: three legs at right angles that hold P itself."""
-    robot, sheet = pteron.load(SCHOOL), Sheet(32.0, 24.0, (5.4, 4.4))
-    uppers, lowers = pteron.kinematics.link_vectors(robot, np.zeros(3))
-    names = (
-        ((-2.5, 0.6), (-1.0, 0.4), (1.2, 0.6), (-0.3, -1.0)),
-        ((-1.4, -1.0), (1.0, 0.9), (1.2, -0.2), (0.5, 0.8)),
-        ((-2.4, 0.6), (1.1, 0.4), (-0.6, 1.0), (0.5, 0.8)),
-    )
-    for i, (leg, upper, lower) in enumerate(zip(robot.legs, uppers, lowers, strict=True), 1):
-        assert isinstance(leg, PRRR)
-        r1, d = np.array(leg.guide_point), np.array(leg.direction)
-        sheet.line([r1 - 0.22 * d, r1 + 0.22 * d], MUTED, 2.6)
-        sheet.arrow(r1 + 0.1 * d, r1 + 0.24 * d, f"$d_{i}$", GIVEN, names[i - 1][3], 1.0)
-        sheet.line([r1, r1 + upper], UPPER, 4.0)
-        sheet.line([r1 + upper, r1 + upper + lower], LOWER, 4.0)
-        for point in (r1, r1 + upper, r1 + upper + lower):
-            sheet.axle(point, d, 0.05)
-            sheet.mark(point, INK, 5.0)
-        sheet.name(r1, f"slider {i}", INK, names[i - 1][0])
-        sheet.name(r1 + 0.5 * upper, "0.3", UPPER, names[i - 1][1])
-        sheet.name(r1 + upper + 0.5 * lower, "0.4", LOWER, names[i - 1][2])
-    sheet.frame(np.zeros(3), np.eye(3), "x y z", INK, 0.16)
-    sheet.mark(np.zeros(3), PLATE, 9.0)
-    sheet.name(np.zeros(3), "P", PLATE, (0.9, -0.9))
-    return sheet
-
-
-def delta() -> Sheet:
-    """Draw the Delta of the first result, with the vectors of its first leg."""
-    robot, sheet, pose = pteron.load("delta"), Sheet(-70.0, 18.0, (5.4, 4.6)), DELTA_POSE
-    ends = [np.array(leg.guide_point) for leg in robot.legs]
-    points = [pose + np.array(leg.platform_point) for leg in robot.legs]
-    sheet.line([*ends, ends[0]], MUTED, 1.4)
-    sheet.axes.fill(*(sheet.view @ np.array(points).T), color=PLATE, alpha=0.22, linewidth=0)
-    sheet.line([*points, points[0]], PLATE, 1.4)
-    for leg, q, c in zip(robot.legs, pteron.inverse_kinematics(robot, pose), points, strict=True):
-        assert isinstance(leg, RSS)
-        d, a, r = (np.array(v) for v in (leg.direction, leg.zero_direction, leg.guide_point))
-        crank = leg.upper_length * (np.cos(q) * a + np.sin(q) * np.cross(d, a))
-        first = leg is robot.legs[0]
-        look: dict[str, Any] = {} if first else {"alpha": 0.35}
-        sheet.line([r, r + crank], UPPER, 4.0, **look)
-        for side in (-0.05, 0.05):
-            sheet.line([r + crank + side * d, c + side * d], LOWER, 1.8, **look)
-        for point in (r + crank, c):
-            sheet.line([point - 0.05 * d, point + 0.05 * d], LOWER, 1.2, **look)
-        sheet.axle(r, d, 0.12)
-        if first:
-            tip = r + crank
-            sheet.arrow(r, tip, "$l_u$", UPPER, (0.0, 0.8), linewidth=2.4)
-            sheet.arrow(tip, c, "$b$", LOWER, (1.0, 0.0), linewidth=1.6)
-            sheet.arrow(r, c, "$w$", GIVEN, (-0.8, 0.0), 0.55, **_THIN)
-            sheet.arrow(r, r + 0.2 * d, "$d$", GIVEN, (-0.9, -0.2), 1.0)
-            sheet.arrow(pose, c, "$s$", PLATE, (0.0, -0.8), 0.5)
-            names = ((r, "$r$", (-0.2, 1.0)), (tip, "tip", (1.4, 0.4)), (c, "$c$", (1.0, -0.5)))
-            for point, name, way in names:
-                sheet.mark(point, INK)
-                sheet.name(point, name, INK, way)
-    sheet.frame(np.zeros(3), np.eye(3), "x y z", INK, 0.2)
-    sheet.mark(pose, PLATE, 4.0)
-    sheet.name(pose, "P", PLATE, (-0.6, -0.9))
-    return sheet
-
-
 def friction() -> Sheet:
     """Draw a drive's friction over the joint's rate."""
     coulomb, more, rate, viscous = 3.0, 2.0, 0.05, 12.0
@@ -408,9 +344,6 @@ def fit() -> Sheet:
     return sheet
 
 
-DELTA_POSE = np.array([0.1, 0.05, -0.95])
-"""The pose of the first result."""
-
 SAMPLES = {1.0: ((2.0, 7.1), (-2.0, -0.9)), -1.0: ((2.0, 0.9), (-2.0, -7.1))}
 """Accelerations and forces of docs/theory/identification.md, by the sign of the rate."""
 
@@ -418,13 +351,13 @@ SAMPLES = {1.0: ((2.0, 7.1), (-2.0, -0.9)), -1.0: ((2.0, 0.9), (-2.0, -7.1))}
 DRAWINGS: dict[str, Callable[[], Sheet]] = {
     one.__name__: one
     for one in (
-        *(school, triangle, leg, platform, rates, body, work, transfer, rod, delta, singular),
+        *(triangle, leg, platform, rates, body, work, transfer, rod, singular),
         *(friction, fit),
     )
 }
 
 
-DRAWINGS |= other_vectors.DRAWINGS
+DRAWINGS |= machines.DRAWINGS | other_vectors.DRAWINGS
 
 
 def draw(docs: Path, names: Sequence[str] = tuple(DRAWINGS)) -> None:
