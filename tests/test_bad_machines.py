@@ -268,7 +268,7 @@ def faults_in(text, tmp_path):
     return caught.value.faults
 
 
-KEYS = "name, gravity, radii, tools, home, distribution, owner, platform, legs"
+KEYS = "name, gravity, radii, tools, home, distribution, template, owner, platform, legs"
 
 
 def test_a_fault_hides_none_that_does_not_hang_on_it(tmp_path):

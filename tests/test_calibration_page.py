@@ -163,7 +163,7 @@ def test_a_printer_gets_its_firmwares_values_first(tmp_path: Path):
     assert page.faults == page.open == []
     assert page.ids.index("firmware") < page.ids.index("errors")
     words = " ".join(page.text.split())
-    assert "pteron export robot.toml" in words
+    assert "pteron export firmware.toml" in words
     assert strict(files.numbers.read_text("utf-8"))["firmware"]["values"][0]["unit"] == "mm"
 
 

@@ -90,6 +90,7 @@ def values_for(robot, kernel, lead=()):
         "mass": np.ones((count, 1)),
         "center": np.full((count, 3), 0.1),
         "inertia": np.full((count, 1), 0.01),
+        "pivot": np.full((count, 3), 0.1),
     }
     if kernel.name in CONTROLLERS:
         law = CONTROLLERS[kernel.name].law(robot)
@@ -135,7 +136,7 @@ def test_every_function_compiles_and_gives_what_the_public_one_gives(name, what)
         inputs = {port.name for port in kernel.inputs}
         fixed = {"parameters": len(pteron.parameters(robot)), "drives": len(drive_numbers(robot))}
         assert {port.name for port in kernel.ports} - fixed.keys() == inputs
-        sizes = {**fixed, "twist": 6, "mass": 1, "center": 3, "inertia": 1}
+        sizes = {**fixed, "twist": 6, "mass": 1, "center": 3, "inertia": 1, "pivot": 3}
         if what in CONTROLLERS:
             law = CONTROLLERS[what].law(robot)
             sizes |= {"gains": law.gains.size, "memory": law.memory(*[values[0][0, 0]] * 2).size}

@@ -338,7 +338,10 @@ def calibrated_robot(guess: Guess) -> Manipulator:
         absorbed = leg.with_zero(zero)
         remaining_zero = zero if absorbed is None else 0.0
         reading = Reading(remaining_zero, scale) if remaining_zero or scale != 1.0 else None
-        legs.append(replace(absorbed or leg, reading=reading, limits=leg.limits))
+        # Stops are where they were read, such as a printer's end stops.
+        ends = leg.limits and sorted(remaining_zero + scale * end for end in leg.limits)
+        limits = ends and (ends[0], ends[1])
+        legs.append(replace(absorbed or leg, reading=reading, limits=limits))
     robot = replace(guess.robot, legs=tuple(legs))
     tool = tuple(guess.marks[TOOL].tolist())
     if any(tool) or robot.platform.tool:

@@ -97,7 +97,12 @@ def group_numbers(args: Sequence[str], valued: Collection[str]) -> list[str]:
 
 
 def _meant_for_vector(words: Sequence[str]) -> int:
-    """Return the number of words of an option: up to the last number before the next option."""
+    """Return the number of words of an option: up to the last number before the next option.
+
+    Numbers that are joined by commas are one word, and all of them.
+    """
+    if words and "," in words[0].strip(","):
+        return 1
     count = 0
     for i, word in enumerate(words, start=1):
         if _numeric(word):

@@ -228,7 +228,7 @@ def _folded(calibration: Calibration) -> list[str]:
     """Return a line on the full geometry, whose values are on the page."""
     return [
         f"The {len(calibration.values)} values of the full geometry, and what the measurements "
-        "leave undetermined, are on the page; robot.toml has them."
+        "leave undetermined, are on the page; robot.toml has them, firmware.toml the values above."
     ]
 
 

@@ -29,6 +29,9 @@ _UNITS = {
 }
 """Units that may follow a number, by the unit that a number alone has."""
 
+_MOST_ANGLE = 4.0 * math.pi
+"""Greatest angle, rad, that counts as one in radians: two turns."""
+
 _LIMITS = "LOW:HIGH expected, such as -0.3:0.3"
 """The form of `--limits`."""
 
@@ -189,8 +192,6 @@ def new(
 _CONFIRMS = {
     "base_sides": ("base_radius", "base_pair"),
     "platform_sides": ("platform_radius", "platform_pair"),
-    "crank": ("upper_length",),
-    "rod": ("lower_length",),
     "cone": ("cones",),
     "crank_plane": ("crank_zero",),
     "upper_mass": ("upper",),
@@ -204,20 +205,18 @@ _CONFIRMS = {
 
 def _confirmed(given: Mapping[str, Any]) -> set[str]:
     """Return the keys of a template's values that options give, even if to the same number."""
+    from pteron.manipulator.dimensions import LINKS
+
     keys = {key for name in given for key in _CONFIRMS.get(name, (name,))}
+    lengths = {name: f"{body}_length" for name, body in LINKS.items()}
+    keys |= {lengths[name] for name in keys & lengths.keys()}
     stocks = [text.rpartition("=")[0] for text in given.get("mass_from", ())]
     links = {key for stock in stocks for key in ([stock] if stock else ["upper", "lower"])}
-    known = {"base_radius", "base_pair", "platform_radius", "platform_pair", "upper_length"}
-    known |= {
-        "lower_length",
-        "limits",
-        "cones",
-        "crank_zero",
-        "platform_mass",
-        "upper",
-        "lower",
-        "drive",
+    known = {
+        *("base_radius", "base_pair", "platform_radius", "platform_pair", "limits", "cones"),
+        *("crank_zero", "platform_mass", "upper", "lower", "drive"),
     }
+    known |= set(lengths.values())
     return (keys & known) | links
 
 
@@ -348,6 +347,8 @@ def _number(option: str, text: str | None, unit: str, *, signed: bool = False) -
         number = float(f"{float(words.removesuffix(named)) * units.get(named, 1.0):.12g}")
     except ValueError:
         number = math.nan
+    if unit == "rad" and abs(number) > _MOST_ANGLE:
+        raise DataError(f"{option}: {text!r} is {number:g} rad; degrees are {words}deg")
     if not math.isfinite(number) or (number <= 0.0 and not signed):
         behind = ", ".join(u for u in units if u != unit)
         others = f" (or {behind} behind it)" if behind else ""

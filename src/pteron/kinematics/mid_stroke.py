@@ -17,7 +17,7 @@ from pteron.kernels import Array, numeric
 from pteron.legs.cones import Cone
 from pteron.manipulator import Manipulator
 from pteron.manipulator.joint_pairs import joint_circle
-from pteron.manipulator.variants import elbows_of, with_elbows
+from pteron.manipulator.variants import working_modes
 from pteron.tolerances import ROUNDING
 
 _HEIGHTS, _ROUNDS = 801, 6
@@ -39,8 +39,8 @@ def at_mid_stroke(robot: Manipulator, height: float | None = None) -> Manipulato
     Returns
     -------
     Manipulator
-        With the home pose. If a height is given, all elbows are bent the way that brings the joints
-        nearer to the middle of their limits there.
+        With the home pose. If a height is given, the legs may all be bent to another side, which
+        brings the joints nearer to the middle of their limits there.
 
     Raises
     ------
@@ -54,9 +54,8 @@ def at_mid_stroke(robot: Manipulator, height: float | None = None) -> Manipulato
         )
     if any(leg.limits is None for leg in robot.legs):
         raise ModelError("height: a joint has no limits; give limits")
-    modes = [robot]
-    if height is not None and all(len(leg.sign_choices()) > 1 for leg in robot.legs):
-        modes.append(with_elbows(robot, [-sign for sign in elbows_of(robot)]))
+    every = working_modes(robot)
+    modes = [robot] if height is None else [robot, every[0], every[-1]]
     found = [(*_nearest_height(mode, height), k) for k, mode in enumerate(modes)]
     off, best, k = min(found)
     if off > 1.0:

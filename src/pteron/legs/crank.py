@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, NamedTuple, Self
 
 import casadi as ca
 
@@ -75,6 +75,12 @@ class TurningLeg(LegKind):
     def crank_at_zero(self) -> Vector:
         """The unit vector along which the crank points at angle 0."""
         return self.zero_direction
+
+    def with_turned_crank(self, turn: Callable[[Vector], Vector]) -> Self:
+        """Return the leg with every direction v of its crank replaced by `turn(v)`."""
+        return replace(
+            self, direction=turn(self.direction), zero_direction=turn(self.zero_direction)
+        )
 
     def zero_at(self, zero: float) -> dict[str, Any]:
         """Return the field `zero_direction` that makes the crank's angle count from `zero`, rad."""

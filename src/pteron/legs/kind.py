@@ -239,6 +239,13 @@ class LegKind(ABC):
         """
         return None
 
+    def with_turned_crank(self, turn: Any) -> Self | None:
+        """Return the leg with every direction v of its crank replaced by `turn(v)`, or None.
+
+        None without a crank.
+        """
+        return None
+
     @property
     def goes_round(self) -> bool:
         """Whether a full turn of the actuated joint gives the same pose, as a crank's does."""

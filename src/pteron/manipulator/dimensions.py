@@ -23,6 +23,9 @@ from pteron.manipulator.stretched_links import with_stretched_bodies
 _DENSITIES = {"steel": 7850.0, "aluminium": 2700.0, "carbon": 1600.0}
 """kg/m^3, ordinary ones; carbon is fibre in resin."""
 
+LINKS = {"crank": "upper", "rod": "lower"}
+"""The links of a leg by the words of owners, with the keys of their bodies."""
+
 _STOCK = re.compile(r"(\w+)-(?:tube:([\d.]+)x([\d.]+)|rod:([\d.]+))")
 
 
@@ -155,7 +158,7 @@ def with_dimensions(
         former = joint_circle(robot, "platform").radius
         robot = _with_platform(robot, positive(platform_radius, "platform_radius", "m"))
         growth = platform_radius / former
-    for name, body, dimension in (("crank", "upper", crank), ("rod", "lower", rod)):
+    for (name, body), dimension in zip(LINKS.items(), (crank, rod), strict=True):
         if dimension is not None:
             robot = _with_length(robot, name, body, positive(dimension, name, "m"))
     if limits is not None:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -138,12 +138,11 @@ def with_crank_planes(robot: Manipulator, angle: float) -> Manipulator:
     for i, j in _expect_pairs(robot, circle, "base"):
         middle = circle.azimuths[i] + 0.5 * ((circle.azimuths[j] - circle.azimuths[i]) % math.tau)
         for k, side in ((i, -1.0), (j, 1.0)):
-            leg: Any = legs[k]
-            zero = np.array(leg.crank_at_zero)
+            zero = np.array(legs[k].crank_at_zero)
             turn = _about(axis, middle + side * angle - math.atan2(zero @ y, zero @ x))
-            legs[k] = replace(
-                leg, direction=turn(leg.direction), zero_direction=turn(leg.zero_direction)
-            )
+            if (turned := legs[k].with_turned_crank(turn)) is None:
+                raise ModelError(f"crank_plane: the cranks of {robot.name} cannot be turned")
+            legs[k] = turned
     return replace(robot, legs=tuple(legs), home=None)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from itertools import chain, product
@@ -11,10 +12,13 @@ from numpy.typing import ArrayLike
 
 from pteron.bodies.inertia import about_point
 from pteron.bodies.vectors import Vector, vector
-from pteron.errors import ModelError
+from pteron.errors import ModelError, warn_unlikely
 from pteron.manipulator.manipulator import Manipulator
 from pteron.manipulator.robot_like import RobotLike, as_manipulator
 from pteron.tolerances import ROUNDING
+
+_FAR = 20.0
+"""Distance of a pivot over the legs' size from which it is likely in another unit."""
 
 
 def working_modes(robot: RobotLike) -> tuple[Manipulator, ...]:
@@ -152,6 +156,11 @@ def with_pivot(robot: RobotLike, point: Sequence[float]) -> Manipulator:
         If a joint, planes or sliding parts determine the platform's P, as in wrists and tripods, or
         if the pivot of a planar machine is out of its plane.
 
+    Warns
+    -----
+    UnlikelyValue
+        If the pivot is so far away that it is likely in mm.
+
     Examples
     --------
     >>> import pteron
@@ -165,6 +174,11 @@ def with_pivot(robot: RobotLike, point: Sequence[float]) -> Manipulator:
     """
     robot = as_manipulator(robot)
     platform, pivot = robot.platform, vector(point, "pivot")
+    size = max(leg.size for leg in robot.legs)
+    if size and math.hypot(*pivot) > _FAR * size:
+        warn_unlikely(
+            f"pivot: {math.hypot(*pivot):g} m from P, the legs are {size:.3g} m: is it in mm?"
+        )
     if not platform.kind.point_is_free:
         raise ModelError(
             f"pivot: {robot.name}'s platform {platform.kind.freedom_text}: its point P cannot be "

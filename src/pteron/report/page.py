@@ -17,7 +17,7 @@ from pteron.kernels import Array
 from pteron.kernels.program_cache import cached_result
 from pteron.legs import LegKind
 from pteron.legs.drive_rows import drive_rows
-from pteron.manipulator import Manipulator
+from pteron.manipulator import Manipulator, load
 from pteron.motion.trajectories.pick_and_place import farthest_point
 from pteron.platforms.coordinates import COORDINATES
 from pteron.plots import (
@@ -75,6 +75,7 @@ def page(report: Report) -> str:
         ),
         report=report,
         paper_claim=PAPER_CLAIM,
+        of_the_paper=_is_of_the_paper(robot),
         cycle=report.cycle,
         standard=standard,
         way=way,
@@ -339,3 +340,10 @@ def _symbolic_texts(base: BaseParameters) -> tuple[list[str], list[tuple[str, fl
     by_symbol = base.geometry_values.items()
     lengths = [(str(html_symbol(name)), length) for name, length in by_symbol if name in used]
     return list(map(str, base.expressions("html", symbols=True))), lengths
+
+
+def _is_of_the_paper(robot: Manipulator) -> bool:
+    """Return whether a machine is a Quadrupteron: of the motion and the legs of the catalog's."""
+    paper = load("quadrupteron")
+    alike = robot.platform.motion == paper.platform.motion
+    return alike and [leg.type for leg in robot.legs] == [leg.type for leg in paper.legs]

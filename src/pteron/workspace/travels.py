@@ -252,7 +252,7 @@ def largest_box(
     >>> from pteron.workspace import largest_box
     >>> box = largest_box("delta", [0.0, 0.0, -0.9])
     >>> [round(float(side), 2) for side in box.box[1] - box.box[0]]
-    [0.76, 0.74, 0.4]
+    [0.78, 0.89, 0.35]
     """
     robot = as_manipulator(robot)
     travels = travel(robot, pose, given=given)

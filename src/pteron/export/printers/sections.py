@@ -47,8 +47,12 @@ def reading_comment(robot: Manipulator, leg: int, key: str) -> tuple[str, ...]:
     reading = robot.legs[leg].reading
     if reading is None:
         return ()
-    ratio = "has that in it" if rotation_distance(robot, leg) else "is to have that in it"
+    if rotation_distance(robot, leg):
+        ratio = f"{key} has that in it"
+    else:
+        change = "multiply" if "distance" in key else "divide"
+        ratio = f"{change} your {key} by {reading.scale:.9g}"
     return (
-        f"Its drive counts otherwise: joint = {reading.zero:.9g} + {reading.scale:.9g} reading (m, "
-        f"rad). {key} {ratio}; the zero is not, as the end stop gives it.",
+        f"The drive of leg {leg + 1} counts otherwise: joint = {reading.zero:.9g} + "
+        f"{reading.scale:.9g} reading (m, rad): {ratio}; the end stop gives the zero.",
     )

@@ -75,8 +75,9 @@ def _rods(calibration: Calibration) -> list[CalibrationRow]:
     """
     kinds = " and ".join(dict.fromkeys(f"{kind}s" for kind in calibration.measurements.kinds))
     rows = []
+    lengths = {value.name for value in calibration.values if value.group == "lengths"}
     for row in value_rows(calibration):
-        if row.name.endswith(".lower_length"):
+        if row.name in lengths:
             tower = row.name.partition("[")[2].partition("]")[0]
             row = replace(row, name=f"rods of tower {tower}")
             if row.origin != "data":

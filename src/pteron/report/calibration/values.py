@@ -61,8 +61,9 @@ def next_steps(
     steps = ["Give robot.toml, beside this page, to every command in place of the drawing."]
     if printer:
         steps.append(
-            "pteron export robot.toml --klipper lines writes new lines for printer.cfg; --marlin "
-            "and --reprap write M665 and M666."
+            "pteron export firmware.toml --klipper lines writes lines for printer.cfg; --marlin "
+            "and --reprap write M665 and M666. robot.toml has the full geometry, which firmware "
+            "cannot hold."
         )
     steps += [
         "pteron view robot.toml --compare DRAWING --enlarge 50 shows what changed.",

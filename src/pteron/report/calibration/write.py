@@ -40,7 +40,8 @@ def write_calibration(
     anyway : bool
         Whether the machine's file is written even where it is not trustworthy.
     firmware : FirmwareFit, optional
-        A printer's own values, `firmware_fit`, which the page then shows first.
+        A printer's own values, `firmware_fit`, which the page then shows first; a machine with
+        these alone is written as `firmware.toml`.
 
     Returns
     -------
@@ -55,11 +56,19 @@ def write_calibration(
     from pteron.report.calibration.page import page
 
     target = checked_folder(folder)
-    for file in ("calibration.html", "calibration.json", "robot.toml"):
+    for file in ("calibration.html", "calibration.json", "robot.toml", "firmware.toml"):
         checked_output(target / file, sources)
     models = {}
     if anyway or calibration.verdict.grade != "not trustworthy":
         models["robot.toml"] = comment_lines(_header(calibration)) + text_of(calibration.robot)
+        if firmware is not None:
+            models["firmware.toml"] = comment_lines(
+                [
+                    f"{calibration.drawn.name} with the values that a printer's firmware fits, and "
+                    "all else as drawn.",
+                    firmware.sentence,
+                ]
+            ) + text_of(firmware.result.robot)
     html = page(calibration, written=bool(models), firmware=firmware)
     files = write_found(target, "calibration", html, numbers(calibration, firmware), models)
     if models:
