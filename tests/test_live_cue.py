@@ -223,6 +223,22 @@ def test_without_datagrams_the_platform_returns_and_resumes_smoothly():
     assert (np.abs(acceleration) <= limits().acceleration * (1 + 1e-6)).all()
 
 
+def test_after_a_short_silence_the_platform_catches_up_gently():
+    time_ = STEP * np.arange(6000)
+    gentle = np.zeros((6000, 6))
+    gentle[:, 0], gentle[:, 1] = 1.5 * np.sin(2.0 * time_), 1.0 * np.cos(1.5 * time_)
+    samples = list(gentle)
+    silent = range(4000, 4120)  # 0.48 s
+    for k in silent:
+        samples[k] = None
+    *_, acceleration, _, phase = lived(samples)
+    assert {"returning", "cueing"} <= set(phase[4000:4400])
+    most = np.abs(acceleration[4000:]) / limits().acceleration
+    # As a start or a return, and a little more while the platform catches up: 0.4 s of 2 s.
+    assert most.max() <= 0.3 + 0.7 * 0.2
+    assert (np.abs(acceleration[5500:]) <= 1.3 * np.abs(acceleration[2500:4000]).max(axis=0)).all()
+
+
 def test_the_box_is_where_the_motion_fits_and_the_way_there_is_proved():
     kept = limits()
     assert kept.center[2] > kept.home[2] + 0.05

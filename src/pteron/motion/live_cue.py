@@ -29,8 +29,8 @@ TIMEOUT = 0.3
 _GENTLE = 0.3
 """Share of the acceleration that starting and returning take."""
 
-_CAUGHT_UP = 0.01
-"""Share of the box within which the platform follows the filters again after a silence."""
+_CATCHING = 2.0
+"""Time, s, in which the acceleration that following may take grows from `_GENTLE` to all."""
 
 _ARRIVED = 1e-7
 """Distance, as a share of the way, at which a start or a return is complete."""
@@ -86,7 +86,8 @@ class LiveCue:
         self._share.place(-np.ones(1))
         self._patience = math.ceil(timeout * rate)
         self._silent, self._held = self._patience + 1, np.zeros(6)
-        self._stopping = self._behind = False
+        self._stopping, self._effort = False, 1.0
+        self._growth = (1.0 - _GENTLE) * step / _CATCHING
         self._inverse = numeric(self._robot, "inverse_kinematics")
         self._inverse.tier.fetch(at_any_cost=True)  # now, not in the middle of a motion
         self.phase = "home"
@@ -129,11 +130,10 @@ class LiveCue:
             self._filter.reset()
             self._follower.retarget()
             # After a silence the platform is on its way back: it catches up gently.
-            self._behind, self.phase = True, "cueing"
-        target = compress(self._filter.advance(self._held), WITHIN * self._half)
-        off = np.abs(target[0] - self._follower.position)
-        self._behind = self._behind and bool((off > _CAUGHT_UP * self._half).any())
-        self._follower.advance(target[0], target[1], _GENTLE if self._behind else 1.0)
+            self._effort, self.phase = _GENTLE, "cueing"
+        position, rate = compress(self._filter.advance(self._held), WITHIN * self._half)[:2]
+        self._effort = min(self._effort + self._growth, 1.0)
+        self._follower.advance(position, rate, self._effort)
 
     def _return_to_middle(self) -> None:
         """Advance the platform towards the middle of the box."""
