@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any
 
@@ -10,18 +9,17 @@ from pteron.cli.arguments import MachineArgument, about_pivot
 from pteron.cli.cue_options import FilterOptions, LiveOptions
 from pteron.cli.motion_argument import Carried, given_pose
 from pteron.cli.motion_table import box_lines, box_record, motion_frame, peaks_table
+from pteron.cli.motor_tables import at_motors, motor_rows
 from pteron.cli.progress import spinner
 from pteron.cli.result import CommandResult
-from pteron.cli.terminal import note, percent, plain, significant, table
+from pteron.cli.terminal import note, percent, plain
 from pteron.errors import DataError
 from pteron.json_values import json_fields
 from pteron.tolerances import SAME
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from pteron.manipulator import Manipulator
-    from pteron.motion import Cue, Peak
+    from pteron.motion import Cue, Peak, Sizing
 
 _REDUCED = 1e-3
 """Share of reduced amplitudes from which it is stated."""
@@ -109,9 +107,9 @@ def cue(
     assert motion is not None
     with spinner(f"Showing {motion} with {machine.name}"):
         cued = shown(machine, motion, **where)
-        largest, motor_rows = _drive_peaks(machine, cued)
+        largest, sizing = _drive_peaks(machine, cued)
         files = _write(machine, cued, out, page)
-    return _result(machine, motion, carried, cued, largest, motor_rows, files)
+    return _result(machine, motion, carried, cued, largest, sizing, files)
 
 
 def _with_pivot(machine: Manipulator, pivot: str | None) -> Manipulator:
@@ -147,32 +145,14 @@ def _check_requests(
         checked_page(page)
 
 
-def _drive_peaks(
-    machine: Manipulator, cued: Cue
-) -> tuple[tuple[Peak, ...], list[dict[str, float | None]]]:
-    """Return the peaks of the whole motion, and a row for each motor with a gear ratio."""
+def _drive_peaks(machine: Manipulator, cued: Cue) -> tuple[tuple[Peak, ...], Sizing]:
+    """Return the peaks of the whole motion, and the loads of its drives."""
     import numpy as np
 
-    from pteron.dynamics import drive_forces
-    from pteron.motion import limits_of, peaks
+    from pteron.motion import limits_of, peaks, size
 
     fine = np.linspace(0.0, cued.duration, _DENSE * (len(cued.time) - 1) + 1)
-    motion = cued.at(fine)
-    limits, forces = limits_of(machine), drive_forces(machine, *motion)
-    largest, rows = peaks(machine, *motion, limits), []
-    size = {(peak.name, peak.leg): peak.size for peak in largest}
-    for i, leg in enumerate(machine.legs):
-        ratio = leg.drive.ratio if leg.drive else None
-        if ratio:
-            row = {
-                "leg": i + 1,
-                "speed": abs(ratio) * size["speed", i + 1],
-                "peak_torque": size["force", i + 1] / abs(ratio),
-                "rms_torque": float(np.sqrt(np.mean(forces[:, i] ** 2))) / abs(ratio),
-                "rated_torque": leg.drive.rated_torque if leg.drive else None,
-            }
-            rows.append(row)
-    return largest, rows
+    return peaks(machine, *cued.at(fine), limits_of(machine)), size(machine, cued)
 
 
 def _result(
@@ -181,10 +161,12 @@ def _result(
     carried: Carried,
     cued: Cue,
     largest: tuple[Peak, ...],
-    motor_rows: list[dict[str, float | None]],
+    sizing: Sizing,
     files: list[str],
 ) -> CommandResult:
     """Return the summary of a recorded motion's cue."""
+    from pteron.motion.sizing.friction_sentence import friction_sentence
+
     if cued.resampling:
         note(f"Note: {motion}: {cued.resampling}")
     for peak in largest:
@@ -205,7 +187,8 @@ def _result(
             | {"leg": p.leg or None}
             for p in largest
         ],
-        "motors": motor_rows,
+        "motors": motor_rows(sizing),
+        "friction": friction_sentence(machine),
         "files": files,
     }
     lines: list[Any] = [
@@ -217,26 +200,10 @@ def _result(
         if cued.pressed >= _REDUCED
         else "Amplitudes are not reduced: the motion fits into the box.",
         peaks_table(largest),
+        *at_motors(sizing),
+        friction_sentence(machine),
     ]
-    return CommandResult(record, lines + _motor_table(motor_rows), files)
-
-
-def _motor_table(rows: list[dict[str, float | None]]) -> list[Table]:
-    """Return a table of speed and torque at the motors; none where no drive has a gear ratio."""
-    if not rows:
-        return []
-    names = "leg", "speed (1/min)", "peak torque (N m)", "RMS torque (N m)", "rated torque (N m)"
-    cells = [
-        (
-            f"{row['leg']:.0f}",
-            significant((row["speed"] or 0.0) * 30.0 / math.pi),
-            significant(row["peak_torque"] or 0.0),
-            significant(row["rms_torque"] or 0.0),
-            "-" if row["rated_torque"] is None else significant(row["rated_torque"]),
-        )
-        for row in rows
-    ]
-    return [table(*names, rows=cells, numbers=names, caption="At the motors.")]
+    return CommandResult(record, lines, files)
 
 
 def _write(machine: Manipulator, cued: Cue, out: str | None, page: str | None) -> list[str]:

@@ -1,7 +1,8 @@
-"""Tables of the motors of a list: for each leg, and for legs that are alike together."""
+"""Tables of motors: what they must give, and those of a list for each leg or for equal legs."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from itertools import groupby, islice
 from typing import TYPE_CHECKING, Any
@@ -13,7 +14,7 @@ if TYPE_CHECKING:
     import rich.table
 
     from pteron.manipulator import Manipulator
-    from pteron.motion import CommonFit, MotorFit
+    from pteron.motion import CommonFit, MotorFit, Sizing
 
 _BEST = 3
 """Motors shown for each joint, the best ones."""
@@ -103,3 +104,45 @@ def _margins(common: CommonFit) -> tuple[float, ...]:
 def _ratio_unit(robot: Manipulator, fit: CommonFit) -> str:
     """Return the unit of the gear ratio of a fit: rad of the motor per m or rad of the joint."""
     return f"rad/{robot.legs[fit.legs[0] - 1].joint.unit}"
+
+
+def at_motors(sizing: Sizing) -> list[Any]:
+    """Return a table of torque and speed at the motors, or a line where their ratio is unknown."""
+    if all(drive.ratio is None for drive in sizing.drives):
+        if all(leg.joint.unit == "rad" for leg in sizing.robot.legs):
+            return []  # the joint's are the motor's
+        return [
+            "Torque and speed of the motors are not known: the drives have no ratio, which is "
+            "2 pi / lead of a ball screw, rad/m (key drive)"
+        ]
+    to_rpm = 30.0 / math.pi
+    names = ("leg", "peak torque", "RMS torque", "peak speed", "RMS speed")
+    rms, peak = sizing.motor_torques
+    mean, fastest = sizing.motor_speeds
+    rows = []
+    for i, drive in enumerate(sizing.drives):
+        torques = (f"{significant(float(part[i]))} N m" for part in (peak, rms))
+        speeds = (f"{significant(to_rpm * float(part[i]))} rpm" for part in (fastest, mean))
+        is_known = drive.ratio is not None
+        rows.append((str(i + 1), *((*torques, *speeds) if is_known else ("-",) * 4)))
+    screws = [drive.screw.efficiency for drive in sizing.drives if drive.screw]
+    losses = f", screws with an efficiency of {min(screws):g}" if screws else ""
+    return [table(*names, rows=rows, numbers=names, caption=f"At the motors{losses}.")]
+
+
+def motor_rows(sizing: Sizing) -> list[dict[str, float | None]]:
+    """Return torque (N m) and speed (rad/s) of each motor whose ratio is known, as JSON data."""
+    rms, peak = sizing.motor_torques
+    mean, fastest = sizing.motor_speeds
+    return [
+        {
+            "leg": i + 1,
+            "peak_torque": float(peak[i]),
+            "rms_torque": float(rms[i]),
+            "speed": float(fastest[i]),
+            "rms_speed": float(mean[i]),
+            "rated_torque": drive.rated_torque,
+        }
+        for i, drive in enumerate(sizing.drives)
+        if drive.ratio is not None
+    ]

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from pteron.cli.arguments import split_numbers
 from pteron.cli.machines import catalog
+from pteron.cli.progress import spinner
 from pteron.cli.result import CommandResult
 from pteron.cli.terminal import plain, write
 from pteron.errors import DataError, OutputError
@@ -165,7 +166,8 @@ def new(
     robot, comments, kept = load(kind), [], ""
     changed = None
     if given:
-        changed = _changed(robot, dimensions, masses, transmission)
+        with spinner(f"Making a machine after {robot.name}"):
+            changed = _changed(robot, dimensions, masses, transmission)
         if kind in names():
             template = Template(kind, tuple(sorted(_confirmed(given))))
             changed = replace(changed, name=f"my {robot.name}", template=template)

@@ -13,7 +13,13 @@ from pteron.cli.arguments import STANDARD, MachineArgument, about_pivot
 from pteron.cli.destination import Destination
 from pteron.cli.motion_argument import Carried, cycle_of, cycle_text
 from pteron.cli.motion_table import force_word
-from pteron.cli.motor_tables import common_rows, common_table, fits_frame, motors_table
+from pteron.cli.motor_tables import (
+    at_motors,
+    common_rows,
+    common_table,
+    fits_frame,
+    motors_table,
+)
 from pteron.cli.pose_ranges import box_of, pose_spans
 from pteron.cli.progress import spinner
 from pteron.cli.result import CommandResult
@@ -244,7 +250,7 @@ def _show(
         *_verdict(sizing, fits, request.margin),
         *([places] if sizing.places else []),
         _loads(sizing),
-        *_at_motors(sizing),
+        *at_motors(sizing),
         *_places(sizing),
         _powers(sizing),
         *_rotors(sizing),
@@ -335,30 +341,6 @@ def _loads(sizing: Sizing) -> rich.table.Table:
         cells = (f"{significant(v[i])} {unit}" for v, unit in zip(columns, units, strict=True))
         rows.append((str(i + 1), *cells))
     return table(*names, rows=rows, numbers=names)
-
-
-def _at_motors(sizing: Sizing) -> list[Any]:
-    """Return a table of torque and speed at the motors, or a line where their ratio is unknown."""
-    if all(drive.ratio is None for drive in sizing.drives):
-        if all(leg.joint.unit == "rad" for leg in sizing.robot.legs):
-            return []  # the joint's are the motor's
-        return [
-            "Torque and speed of the motors are not known: the drives have no ratio, which is "
-            "2 pi / lead of a ball screw, rad/m (key drive)"
-        ]
-    to_rpm = 30.0 / math.pi
-    names = ("leg", "peak torque", "RMS torque", "peak speed", "RMS speed")
-    rms, peak = sizing.motor_torques
-    mean, fastest = sizing.motor_speeds
-    rows = []
-    for i, drive in enumerate(sizing.drives):
-        torques = (f"{significant(float(part[i]))} N m" for part in (peak, rms))
-        speeds = (f"{significant(to_rpm * float(part[i]))} rpm" for part in (fastest, mean))
-        is_known = drive.ratio is not None
-        rows.append((str(i + 1), *((*torques, *speeds) if is_known else ("-",) * 4)))
-    screws = [drive.screw.efficiency for drive in sizing.drives if drive.screw]
-    losses = f", screws with an efficiency of {min(screws):g}" if screws else ""
-    return [table(*names, rows=rows, numbers=names, caption=f"At the motors{losses}.")]
 
 
 def _powers(sizing: Sizing) -> rich.table.Table:
