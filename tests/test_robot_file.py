@@ -16,7 +16,8 @@ import pteron
 from pteron import Manipulator, OutputError
 from pteron.legs import KINDS
 from pteron.manipulator import with_dimensions
-from pteron.manipulator.commented_file import commented_text, crank_direction_text
+from pteron.manipulator.commented_file import commented_text
+from pteron.manipulator.crank_direction import crank_direction_text
 from pteron.manipulator.leg_tables import leg_table
 from pteron.manipulator.saving import document_of
 from pteron.manipulator.tables import PlatformTable

@@ -202,7 +202,7 @@ def _show(robot: Manipulator, findings: dict[str, Any], further: str, *, each: b
 
     Equal legs share a row unless `each` has one.
     """
-    from pteron.manipulator.commented_file import crank_direction_text
+    from pteron.manipulator.crank_direction import crank_direction_text
 
     joints = dict.fromkeys(leg.joint for leg in robot.legs)
     counts = re.findall(r"(\d)([TR])", robot.platform.motion)

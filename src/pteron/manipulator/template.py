@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from pteron.manipulator.commented_file import crank_direction_text
+from pteron.manipulator.crank_direction import crank_direction_text
 from pteron.manipulator.files import catalog, contents, load
 from pteron.manipulator.joint_pairs import PLATES, joint_circle
 from pteron.manipulator.manipulator import Manipulator

@@ -17,7 +17,8 @@ from pteron.kernels import Array
 from pteron.kernels.program_cache import cached_result
 from pteron.legs import LegKind
 from pteron.legs.drive_rows import drive_rows
-from pteron.manipulator import Manipulator, load
+from pteron.manipulator import Manipulator
+from pteron.manipulator.files import DEFAULT_KIND
 from pteron.motion.trajectories.pick_and_place import farthest_point
 from pteron.platforms.coordinates import COORDINATES
 from pteron.plots import (
@@ -343,7 +344,6 @@ def _symbolic_texts(base: BaseParameters) -> tuple[list[str], list[tuple[str, fl
 
 
 def _is_of_the_paper(robot: Manipulator) -> bool:
-    """Return whether a machine is a Quadrupteron: of the motion and the legs of the catalog's."""
-    paper = load("quadrupteron")
-    alike = robot.platform.motion == paper.platform.motion
-    return alike and [leg.type for leg in robot.legs] == [leg.type for leg in paper.legs]
+    """Return whether a machine is a Quadrupteron: all its legs are of the paper's kind."""
+    is_turning = robot.platform.turns and not robot.platform.planar
+    return is_turning and {leg.type for leg in robot.legs} == {DEFAULT_KIND}
