@@ -19,11 +19,14 @@ class Written:
     model: Path | None
     left_out: str = ""
     """Why a file was not written; "" where all were."""
+    others: tuple[Path, ...] = ()
+    """Further machines' files."""
 
     @property
     def paths(self) -> tuple[Path, ...]:
         """The files."""
-        return tuple(path for path in (self.page, self.numbers, self.model) if path is not None)
+        first = (self.page, self.numbers, self.model)
+        return (*(path for path in first if path is not None), *self.others)
 
 
 def write_found(
@@ -31,4 +34,4 @@ def write_found(
 ) -> Written:
     """Write a page, numbers and perhaps a machine's file: all of them, or none."""
     paths = write_texts(folder, {f"{stem}.html": page, f"{stem}.json": json_text(numbers), **model})
-    return Written(paths[0], paths[1], paths[2] if model else None)
+    return Written(paths[0], paths[1], paths[2] if model else None, others=tuple(paths[3:]))
