@@ -1,6 +1,7 @@
 """Travel from random poses of ten machines, held against sampling and bisection.
 
-Run: python benchmarks/travels.py [POSES]   (poses of each machine, 100 by default)
+Run: python benchmarks/travels.py [POSES]   (poses of each machine, 100 by default); with --quick
+three poses of two machines.
 
 For every coordinate and direction the farthest pose is found by 3001 samples and 40 bisections of
 the conditions in floating point. A travel beyond it, or more than 1 % short of it, is counted.
@@ -49,10 +50,10 @@ def farthest(robot: Manipulator, pose: Array, way: Array, known: float) -> float
     return float(low)
 
 
-def main(count: int = 100) -> None:
+def main(machines: tuple[str, ...], count: int) -> None:
     """Print a row for each machine."""
     print(f"{'machine':14} poses  travels  beyond  > 1 % short  worst short  s a pose")
-    for name in MACHINES:
+    for name in machines:
         robot = pteron.load(name)
         poses = pteron.random_poses(robot, 4 * count, seed=11, type_i=0.05, type_ii=0.05)
         poses = poses[keeps(robot, conditions(robot, type_ii=TYPE_II), poses)][:count]
@@ -79,4 +80,7 @@ def main(count: int = 100) -> None:
 
 
 if __name__ == "__main__":
-    main(*map(int, sys.argv[1:]))
+    if "--quick" in sys.argv:
+        main(MACHINES[:2], 3)
+    else:
+        main(MACHINES, int(sys.argv[1]) if len(sys.argv) > 1 else 100)
