@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from pteron.cli.arguments import split_numbers
 from pteron.cli.machines import catalog
 from pteron.cli.progress import spinner
+from pteron.cli.quantities import quantity, quantity_range, required_quantity
 from pteron.cli.result import CommandResult
 from pteron.cli.terminal import plain, write
 from pteron.errors import DataError, OutputError
@@ -20,21 +21,6 @@ if TYPE_CHECKING:
     from pteron.legs.screw import Screw
     from pteron.manipulator import Manipulator
     from pteron.manipulator.joint_pairs import Plate
-
-_UNITS = {
-    "m": {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "in": 0.0254},
-    "rad": {"rad": 1.0, "deg": math.pi / 180.0},
-    "kg": {"kg": 1.0, "g": 1e-3},
-    "": {},
-    "kg m^2": {},
-}
-"""Units that may follow a number, by the unit that a number alone has."""
-
-_MOST_ANGLE = 4.0 * math.pi
-"""Greatest angle, rad, that counts as one in radians: two turns."""
-
-_LIMITS = "LOW:HIGH expected, such as -0.3:0.3"
-"""The form of `--limits`."""
 
 
 @dataclass(frozen=True)
@@ -167,9 +153,9 @@ def new(
     changed = None
     if given:
         with spinner(f"Making a machine after {robot.name}"):
-            changed = _changed(robot, dimensions, masses, transmission)
+            changed = _machine_of_options(robot, dimensions, masses, transmission)
         if kind in names():
-            template = Template(kind, tuple(sorted(_confirmed(given))))
+            template = Template(kind, tuple(sorted(_confirmed_keys(given))))
             changed = replace(changed, name=f"my {robot.name}", template=template)
             kept = template_sentence(changed)
         options = " ".join(
@@ -205,7 +191,7 @@ _CONFIRMS = {
 """Keys of a template's values that an option changes, where they have another name."""
 
 
-def _confirmed(given: Mapping[str, Any]) -> set[str]:
+def _confirmed_keys(given: Mapping[str, Any]) -> set[str]:
     """Return the keys of a template's values that options give, even if to the same number."""
     from pteron.manipulator.dimensions import LINKS
 
@@ -222,7 +208,7 @@ def _confirmed(given: Mapping[str, Any]) -> set[str]:
     return (keys & known) | links
 
 
-def _changed(
+def _machine_of_options(
     robot: Manipulator, size: Dimensions, masses: Masses, transmission: Transmission
 ) -> Manipulator:
     """Return the machine with what the options give."""
@@ -233,20 +219,22 @@ def _changed(
     rider, center = _rider(masses.rider)
     sides = {plate: _sides(plate, getattr(size, f"{plate}_sides"), size) for plate in PLATES}
     unit = robot.legs[0].joint.unit
-    limits = size.limits and _range("--limits", size.limits, unit)
+    limits = size.limits and quantity_range("--limits", size.limits, unit)
     links = {"upper": masses.upper_mass, "lower": masses.lower_mass}
     changed = with_dimensions(
         robot,
-        base_radius=_number("--base-radius", size.base_radius, "m") or sides["base"][0],
-        platform_radius=_number("--platform-radius", size.platform_radius, "m")
+        base_radius=quantity("--base-radius", size.base_radius, "m") or sides["base"][0],
+        platform_radius=quantity("--platform-radius", size.platform_radius, "m")
         or sides["platform"][0],
-        crank=_number("--crank", size.crank, "m"),
-        rod=_number("--rod", size.rod, "m"),
+        crank=quantity("--crank", size.crank, "m"),
+        rod=quantity("--rod", size.rod, "m"),
         limits=limits or None,
         stock=_stocks(masses.mass_from),
-        platform_mass=_number("--platform-mass", masses.platform_mass, "kg"),
+        platform_mass=quantity("--platform-mass", masses.platform_mass, "kg"),
         link_masses={
-            key: _needed(f"--{key}-mass", text, "kg") for key, text in links.items() if text
+            key: required_quantity(f"--{key}-mass", text, "kg")
+            for key, text in links.items()
+            if text
         },
         rider=rider,
         rider_center=center,
@@ -257,10 +245,12 @@ def _changed(
         if (angle := _pair_angle(changed, plate, pairs[plate])) or (angle := sides[plate][1]):
             changed = with_pairs(changed, plate, angle)
     if size.crank_plane is not None:
-        changed = with_crank_planes(changed, _needed("--crank-plane", size.crank_plane, "rad"))
+        changed = with_crank_planes(
+            changed, required_quantity("--crank-plane", size.crank_plane, "rad")
+        )
     is_hexapod = robot.platform.moves_freely and all(leg.limits for leg in changed.legs)
-    height = _number("--height", size.height, "m", signed=True)
-    cone = _number("--cone", size.cone, "rad")
+    height = quantity("--height", size.height, "m", signed=True)
+    cone = quantity("--cone", size.cone, "rad")
     if (is_hexapod and any(vars(size).values())) or height is not None or cone is not None:
         changed = at_mid_stroke(changed, height)
         assert changed.home is not None
@@ -276,7 +266,7 @@ def _sides(plate: Plate, text: str | None, size: Dimensions) -> tuple[float | No
     for name in ("radius", "pair"):
         if getattr(size, f"{plate}_{name}") is not None:
             raise DataError(f"{option} and --{plate}-{name} given; give one of them")
-    short, long = _range(option, text, "m")
+    short, long = quantity_range(option, text, "m")
     if not 0.0 < short < long:
         raise DataError(f"{option}: {text!r} given, SHORT:LONG above 0 expected, such as 0.1:0.4")
     # Joints on a circle: three short and three long chords of angles that sum up to a turn.
@@ -292,72 +282,14 @@ def _pair_angle(robot: Manipulator, plate: Plate, text: str | None) -> float | N
     if text is None:
         return None
     if text.strip().endswith(("deg", "rad")):
-        return _needed(option, text, "rad")
-    distance, radius = _needed(option, text, "m"), joint_circle(robot, plate).radius
+        return required_quantity(option, text, "rad")
+    distance, radius = required_quantity(option, text, "m"), joint_circle(robot, plate).radius
     if not distance < 2.0 * radius:
         raise DataError(
             f"{option}: {text} is no distance of two joints at a radius of {radius:.4g} m; an "
             "angle has its unit behind it, such as 12deg"
         )
     return 2.0 * math.asin(distance / (2.0 * radius))
-
-
-def _range(option: str, text: str, unit: str) -> tuple[float, float]:
-    """Return the two numbers of LOW:HIGH, each with a unit or without."""
-    low, colon, high = text.partition(":")
-    if not colon or ":" in high:
-        raise DataError(f"{option}: {text!r} given, {_LIMITS}")
-    # A unit behind the second number alone is that of both.
-    if _is_plain(low) and not _is_plain(high):
-        low += high.strip().lstrip("+-0123456789.eE ")
-    first, second = (_number(option, part, unit, signed=True) for part in (low, high))
-    assert first is not None
-    assert second is not None
-    return first, second
-
-
-def _is_plain(text: str) -> bool:
-    """Return whether a text is a number without a unit."""
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
-
-
-def _needed(option: str, text: str, unit: str) -> float:
-    """Return the number of an option's text; angles may be negative."""
-    number = _number(option, text, unit, signed=unit == "rad")
-    assert number is not None
-    return number
-
-
-def _number(option: str, text: str | None, unit: str, *, signed: bool = False) -> float | None:
-    """Return the number of an option in SI units, from a number with a unit or without; or None.
-
-    Raises
-    ------
-    DataError
-        If it is no number, its unit is another one, or it is not above 0 where it must be.
-    """
-    if text is None:
-        return None
-    units = _UNITS[unit]
-    words = text.strip()
-    named = next((u for u in sorted(units, key=len, reverse=True) if words.endswith(u)), "")
-    try:
-        number = float(f"{float(words.removesuffix(named)) * units.get(named, 1.0):.12g}")
-    except ValueError:
-        number = math.nan
-    if unit == "rad" and abs(number) > _MOST_ANGLE:
-        raise DataError(f"{option}: {text!r} is {number:g} rad; degrees are {words}deg")
-    if not math.isfinite(number) or (number <= 0.0 and not signed):
-        behind = ", ".join(u for u in units if u != unit)
-        others = f" (or {behind} behind it)" if behind else ""
-        above = "" if signed else " above 0"
-        of_unit = f" in {unit}" if unit else ""
-        raise DataError(f"{option}: {text!r} given, a number{above}{of_unit}{others} expected")
-    return number
 
 
 def _stocks(texts: list[str] | None) -> dict[str, str]:
@@ -376,24 +308,24 @@ def _rider(text: str | None) -> tuple[float | None, tuple[float, ...]]:
     mass, _, place = text.partition("@")
     expected = "MASS@X,Y,Z expected, kg and m, such as 80@0,0,0.5"
     center = split_numbers("--rider", place, ",", 3, expected) if place else (0.0, 0.0, 0.0)
-    return _needed("--rider", mass, "kg"), center
+    return required_quantity("--rider", mass, "kg"), center
 
 
 def _screw(transmission: Transmission, lead: float) -> Screw:
     """Return the ball screw of the options, of this lead, m a turn."""
     from pteron.legs.screw import Screw
 
-    size = transmission.screw and _range("--screw", transmission.screw, "m")
-    share = _number("--efficiency", transmission.efficiency, "")
+    size = transmission.screw and quantity_range("--screw", transmission.screw, "m")
+    share = quantity("--efficiency", transmission.efficiency, "")
     diameter, length = size or (None, None)
     return Screw(lead, diameter, length, 1.0 if share is None else share)
 
 
 def _drive(robot: Manipulator, transmission: Transmission) -> dict[str, Any]:
     """Return the values of the drives by key: the motor's angle per joint coordinate, inertia."""
-    lead = _number("--lead", transmission.lead, "m")
-    gear = _number("--gear", transmission.gear, "")
-    inertia = _number("--rotor-inertia", transmission.rotor_inertia, "kg m^2")
+    lead = quantity("--lead", transmission.lead, "m")
+    gear = quantity("--gear", transmission.gear, "")
+    inertia = quantity("--rotor-inertia", transmission.rotor_inertia, "kg m^2")
     slides = robot.legs[0].joint.unit == "m"
     if lead is not None and not slides:
         raise DataError(f"--lead: the actuated joints of {robot.name} turn; give --gear")

@@ -102,13 +102,13 @@ def with_pairs(robot: Manipulator, plate: Plate, angle: float) -> Manipulator:
     points = rest + circle.radii[:, None] * (cos * x + sin * y)
     if plate == "base":
         legs = (
-            replace(leg, guide_point=_rounded(point))
+            replace(leg, guide_point=_round_vector(point))
             for leg, point in zip(robot.legs, points, strict=True)
         )
     else:
         frame = np.array(robot.platform.frame)
         legs = (
-            replace(leg, platform_point=_rounded(frame @ (point - np.array(leg.fixed_offset))))
+            replace(leg, platform_point=_round_vector(frame @ (point - np.array(leg.fixed_offset))))
             for leg, point in zip(robot.legs, points, strict=True)
         )
     return replace(robot, legs=tuple(legs), home=None)
@@ -139,7 +139,7 @@ def with_crank_planes(robot: Manipulator, angle: float) -> Manipulator:
         middle = circle.azimuths[i] + 0.5 * ((circle.azimuths[j] - circle.azimuths[i]) % math.tau)
         for k, side in ((i, -1.0), (j, 1.0)):
             zero = np.array(legs[k].crank_at_zero)
-            turn = _about(axis, middle + side * angle - math.atan2(zero @ y, zero @ x))
+            turn = _rotation_about(axis, middle + side * angle - math.atan2(zero @ y, zero @ x))
             if (turned := legs[k].with_turned_crank(turn)) is None:
                 raise ModelError(f"crank_plane: the cranks of {robot.name} cannot be turned")
             legs[k] = turned
@@ -169,7 +169,7 @@ def _radial(robot: Manipulator, plate: Plate) -> tuple[NDArray[np.float64], NDAr
     return radial, points - radial
 
 
-def _about(axis: NDArray[np.float64], angle: float) -> Callable[[Vector], Vector]:
+def _rotation_about(axis: NDArray[np.float64], angle: float) -> Callable[[Vector], Vector]:
     """Return the function that turns a unit vector about an axis by an angle, rad."""
 
     def turn(direction: Vector) -> Vector:
@@ -178,11 +178,11 @@ def _about(axis: NDArray[np.float64], angle: float) -> Callable[[Vector], Vector
         along = axis * (axis @ v)
         across = v - along
         turned = along + math.cos(angle) * across + math.sin(angle) * np.cross(axis, across)
-        return _rounded(turned)
+        return _round_vector(turned)
 
     return turn
 
 
-def _rounded(components: NDArray[np.float64]) -> Vector:
+def _round_vector(components: NDArray[np.float64]) -> Vector:
     """Return a vector with its components rounded to 12 decimals."""
     return vector([round(float(x), 12) + 0.0 for x in components], "point")
