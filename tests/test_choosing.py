@@ -396,18 +396,20 @@ def test_shares_make_a_duty_cycle():
         robot, middle = evaluator.kind.machine(values)
         rating = Rating(values, middle=middle, worst=np.zeros((0, 3)))
         found, _ = evaluator.loads(evaluator.add_payload(robot), rating, None)
-        loads.append(found.margins(evaluator.options["m"], [0, 1, 2]))
+        loads.append(found.margins(evaluator.options["slider"].numbers(0.5), [0, 1, 2]))
     times = np.array([0.3, 3 * 1.6])
     parts = [1.0 / margins[0] ** 2 for margins in loads]
-    assert (loads[1][0] > loads[0][0]).all()
-    assert (parts[1] >= parts[0] * times[0] / times.sum() * (1 - 1e-9)).all()
+    bearing = loads[0][0] > 0.0  # of others the gear bears less than the motor's friction
+    assert (loads[1][0] > loads[0][0])[bearing].all()
+    assert bearing.sum() > 100
+    assert (parts[1] >= parts[0] * times[0] / times.sum() * (1 - 1e-9))[bearing].all()
     assert loads[1][1:] == pytest.approx(loads[0][1:])
 
 
 def test_why_a_kind_falls_out_is_told():
-    (one,) = choose_machine(of(cell={"height": 0.05}, search={"evaluations": 12})).candidates
+    (one,) = choose_machine(of(cell={"height": 0.12}, search={"evaluations": 12})).candidates
     assert not one.serves
-    assert any("height" in text and "at most 0.05 m asked" in text for text in one.why)
+    assert any("height" in text and "at most 0.12 m asked" in text for text in one.why)
 
 
 def test_kinds_are_those_that_can_do_the_motion():
@@ -481,13 +483,16 @@ def test_machines_of_five_freedoms_and_redundant_ones_are_chosen_and_proved(name
         ({"cell": {"low": [0, 0, 0], "high": [1, 1, 1]}}, "need [workspace] center"),
         ({"motors": "motors.csv"}, "a table expected: [motors] with list"),
         ({"cell": {"footprint": [0.1, 1]}}, "a footprint of 100 x 1000 mm has no room"),
-        ({"cell": {"height": 0.04}}, "a height of 40 mm has no room for the workspace, 50 mm"),
+        (
+            {"cell": {"height": 0.04}},
+            "a height of 40 mm has no room for the workspace with 30 mm about it, 110 mm",
+        ),
         (
             {
                 "workspace": {"size": [0.2, 0.2, 0.05], "center": [0, 0, 0.5]},
                 "cell": {"low": [-1, -1, 0], "high": [0.05, 1, 1]},
             },
-            "along x it goes from -1 to 0.05 m, and the workspace from -0.1 to 0.1 m",
+            "along x it goes from -1 to 0.05 m, and the workspace with 30 mm about it from -0.13",
         ),
         ({"keep_out": [{"low": [0.09, -1, -1], "high": [1, 1, 1]}]}, "it is in the workspace"),
         ({"keep_out": [{"low": [90, -1, -1], "high": [100, 1, 1]}]}, "are these mm?"),
@@ -504,6 +509,25 @@ def test_machines_of_five_freedoms_and_redundant_ones_are_chosen_and_proved(name
         ({"payload": {"mass": 1.0, "tool": [0, 0, -100]}}, "are these mm?"),
         ({"payload": {"mass": 1.0, "inertia": -1.0}}, "payload: inertia"),
         ({"kinds": ["delta", "delta"]}, "given twice"),
+        ({"workspace": {"poses": [[0.0, 0.0, 0.0]]}}, "what works at one pose is a fixture"),
+        ({"payload": {"mass": 5000.0}}, "5000 kg given: is this in grams?"),
+        ({"payload": {"mass": 1.0, "center": [0, 0, -60]}}, "are these mm?"),
+        ({"motion": {"speed": 1000.0}}, "is this in mm/s?"),
+        ({"motion": {"acceleration": 1e4}}, "is this in mm/s^2?"),
+        ({"cycles": [JOB["cycles"][0] | {"duration": 400.0}]}, "400 s given for 160 mm: is this"),
+        ({"cycles": [JOB["cycles"][0] | {"duration": 0.0004}]}, "0.0004 s given for 160 mm, 400"),
+        ({"cycles": [JOB["cycles"][0] | {"dwell": 500.0}]}, "dwell: 500 s given: is this in ms?"),
+        ({"most": {"price": 100}}, "the cheapest drives of linear-delta alone cost 810"),
+        (
+            {"kinds": ["par4"], "workspace": {"size": [0.2, 0.2, 0.1], "turn": [-1, 1]}},
+            "par4 turns",
+        ),
+        ({"limits": {"stress": 2.0}}, "limits.stress"),
+        ({"limits": {"inertia": [10.0, 0.1]}}, "[least, greatest] above 0 expected"),
+        ({"limits": {"buckling": 0.5}}, "limits.buckling"),
+        ({"process": {"force": 0.0}}, "process.force"),
+        ({"links": {"lower": ["steel-rod:2"]}}, "at least 4 and 0.5 mm expected"),
+        ({"keep_out": [{"low": [0.11, -1, -1], "high": [1, 1, 1]}]}, "with 30 mm about it"),
         ({"cycles": [TURNING["cycles"][0]]}, "[workspace] turn is not given; at least [-0.5, 0.5]"),
         ({"cycles": [*TURNING["cycles"], JOB["cycles"][0] | {"share": 2}]}, "share given of some"),
     ],
@@ -528,16 +552,16 @@ def test_a_cycle_that_does_not_fit_and_motors_without_inertia_are_refused(tmp_pa
 
 def test_a_keep_out_box_beside_a_cylinders_corner_is_not_in_it():
     space, box = {"radius": 0.1, "height": 0.1}, {"high": [1.0, 1.0, 1.0]}
-    of(workspace=space, keep_out=[box | {"low": [0.08, 0.08, -1.0]}])
+    of(workspace=space, keep_out=[box | {"low": [0.105, 0.105, -1.0]}])
     with pytest.raises(ValueError, match="it is in the workspace"):
-        of(workspace=space, keep_out=[box | {"low": [0.07, 0.07, -1.0]}])
+        of(workspace=space, keep_out=[box | {"low": [0.095, 0.095, -1.0]}])
 
 
 def test_motors_in_a_toml_file_have_prices(tmp_path):
     file = tmp_path / "motors.toml"
     text = 'name = "a"\nrotor_inertia = 1e-5\nrated_torque = 1\npeak_torque = 3\nmax_speed = 300\n'
     file.write_text(f"[[motors]]\n{text}price = 70\n")
-    options = evaluators_of(of(motors={"list": str(file)}))["linear-delta"].options["m"]
+    options = evaluators_of(of(motors={"list": str(file)}))["linear-delta"].options["slider"]
     assert {one.price - one.gearbox.price for one in options.all} == {70.0}
     file.write_text(f"[[motors]]\n{text}price = -1\n")
     with pytest.raises(DataError, match="motor a: price: -1 given"):
@@ -560,7 +584,7 @@ def test_a_machine_that_no_longer_serves_leaves_the_folder(chosen, tmp_path):
 def test_gearboxes_and_prices_that_cannot_be(tmp_path):
     gears = tmp_path / "gears.csv"
     gears.write_text("name,joint,ratio,inertia,backlash,stiffness,price\na,rad,1,0,0,1e4,1\n")
-    with pytest.raises(DataError, match='no gearbox with joint = "m", as linear-delta needs'):
+    with pytest.raises(DataError, match='no gearbox with joint = "slider", as linear-delta needs'):
         choose_machine(of(motors={"gearboxes": str(gears)}))
     gears.write_text("name,joint,ratio,inertia,backlash,stiffness,price\na,m,1,0,0,1e4,-1\n")
     with pytest.raises(DataError, match="price: -1 given, 0 or more expected"):

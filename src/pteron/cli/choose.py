@@ -125,13 +125,20 @@ def _show(choice: Choice) -> None:
     for candidate in serving:
         show(
             f"[bold]{candidate.kind}[/bold]: {plain(candidate.drive_text)}",
+            f"  joints: {plain(candidate.part_text)}",
             f"  dimensions (mm): {candidate.dimension_text}",
             f"  {plain(candidate.proved)}",
             f"  {plain(candidate.clear)}",
             f"  drive margins, available over needed: {plain(candidate.margin_text)}",
+            *(f"  {plain(candidate.cycle_text)}" for _ in range(bool(candidate.cycle_text))),
+            *(f"  check: {plain(text)}" for text in candidate.checked),
         )
+        limits = ((row.name, *row.texts) for row in candidate.limit_rows)
+        names = ("worst", "permitted", "margin")
+        show(table("limit", *names, "place", rows=limits, numbers=names))
     for candidate in choice.candidates:
         if not candidate.serves:
             show(f"[bold]{candidate.kind}[/bold]: {plain(candidate.verdict)}")
     if serving:
+        show("A place is that of the tool from the middle of the workspace.")
         show(*(f"[dim]Assumed: {plain(line)}[/dim]" for line in choice.assumption_lines()))

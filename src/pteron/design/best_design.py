@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -12,18 +13,21 @@ from numpy.typing import ArrayLike
 from pteron.design.candidate import Candidate
 from pteron.design.cycle_places import Places
 from pteron.design.kind_search import pareto_ratings
-from pteron.design.load_margins import DENSE, margins_of
+from pteron.design.limit_rows import DENSE, limit_rows
+from pteron.design.load_margins import margins_of
 from pteron.design.proofs import is_clear, kind_proofs, proof_sentence
 from pteron.design.rating import KindEvaluator, Rating
-from pteron.design.tool_errors import elasticity, greatest_errors, joint_errors, tolerances
+from pteron.design.structure import Structure
+from pteron.design.tool_errors import greatest_errors, joint_errors, tolerances
 from pteron.design.workspace_samples import sample_poses
 from pteron.errors import PteronError
-from pteron.indices import Tolerances, stiffness
+from pteron.indices import Tolerances
 from pteron.kernels import Array
-from pteron.manipulator import Manipulator
+from pteron.manipulator import Manipulator, loads
 from pteron.manipulator.saving import text_of
-from pteron.motion import Path, limits_of, time_optimal
-from pteron.workspace import Proof, clearance
+from pteron.motion import Motion, Path, limits_of, size, time_optimal
+from pteron.workspace import Proof, clearance, home_pose
+from pteron.workspace.examination import examine
 
 _WORST = 8
 """Number of worst sample poses that local refinement starts from."""
@@ -35,10 +39,7 @@ _TRIED = 9
 def prove_best_design(evaluator: KindEvaluator, ratings: list[Rating]) -> Candidate:
     """Return the best rated design whose workspace is proved; else a candidate with the reasons."""
     objectives = evaluator.job.objectives
-    first, second = shown_objectives(objectives)[:2]
-    good = sorted(
-        (r for r in ratings if not r.misses), key=lambda r: (r.figures[first], r.figures[second])
-    )
+    good = sorted((r for r in ratings if not r.misses), key=lambda r: r.cost(objectives[0]))
     counts = len(ratings), len(good)
     if not good:
         nearest = min(ratings, key=lambda rating: rating.cost(objectives[0]))
@@ -84,13 +85,19 @@ def _exceeded_limit(evaluator: KindEvaluator, candidate: Candidate) -> str:
             f"clearance of {1e3 * figures['clearance']:.3g} mm, "
             f"{1e3 * job.floors.clearance:g} mm required"
         )
+    for row in candidate.limits:
+        if row["margin"] < 1.0:
+            return f"{row['name']} of {row['value']:.3g}, {row['limit']:.3g} permitted"
+    rated = figures.get("rated_margin", np.inf)
+    if rated * job.limits.rated < 1.0:
+        return f"torque over rated torque of {1.0 / rated:.3g}, {job.limits.rated:g} permitted"
     least = candidate.least_margin
     return f"drive margin of {least:.3g} at {candidate.worst}" if least < 1.0 else ""
 
 
 def shown_objectives(objectives: Sequence[str]) -> list[str]:
     """Return the names of the objectives; a single name is followed by that of a tie-breaker."""
-    other = "moving_mass" if objectives[0] != "moving_mass" else "footprint"
+    other = "footprint" if objectives[0] != "footprint" else "height"
     return list(objectives) if len(objectives) > 1 else [objectives[0], other]
 
 
@@ -106,8 +113,11 @@ def _candidate(
     loaded_robot = evaluator.add_payload(robot)
     figures = dict(rating.figures)
     time = evaluator.kind.numbers(rating.values).get("time")
-    margins = margins_of(evaluator, loaded_robot, rating.middle, time)
+    assert rating.structure is not None  # a feasible design has one
+    process = rating.structure.process.max(axis=0)
+    margins = margins_of(evaluator, loaded_robot, rating.middle, time, process)
     figures |= margins.figures
+    limits = tuple(limit_rows(evaluator, rating))
 
     def least(values_of: Callable[[Array], ArrayLike]) -> float:
         """Return the minimum of `values_of(poses)` over the workspace, refined between samples."""
@@ -122,11 +132,19 @@ def _candidate(
     if (accuracy := evaluator.job.accuracy) is not None:
         errors = _tolerances(evaluator, rating)
         figures["error"] = -least(lambda poses: -greatest_errors(accuracy, robot, poses, errors))
-    if evaluator.job.stiffness is not None:
-        gears = [option.gearbox.stiffness for option in rating.options]
-        springs = elasticity(evaluator.sections(rating), gears)
-        stiff = least(lambda poses: stiffness(robot, poses, springs).least)
-        figures["deflection"] = float(evaluator.job.stiffness.force / stiff)
+    if (required := evaluator.job.stiffness) is not None:
+        stiffnesses = np.array([option.stiffness for option in rating.options])
+        tubes = evaluator.kind.tubes(robot, rating.values)
+        still = replace(evaluator.demand(1.0), speed=0.0)
+
+        def gives(poses: Array) -> Array:
+            """Return the tool's least stiffness (K,), N/m, at poses (K, m)."""
+            loads = Structure(loaded_robot, poses, still, tubes).loads
+            return 1.0 / loads.tool_compliance(stiffnesses[:1])[0]
+
+        figures["deflection"] = float(required.force / least(gives))
+    cycle = _cycle_at(rating, margins.place)
+    figures |= _cycle_figures(loaded_robot, cycle, margins.place)
     times = _shortest_times(evaluator, loaded_robot, rating, margins.place)
     objectives = shown_objectives(evaluator.job.objectives)
     return Candidate(
@@ -143,7 +161,65 @@ def _candidate(
         tuple({name: r.figures[name] for name in objectives} for r in best),
         text_of(replace(robot, name=f"{evaluator.kind.name}-chosen")),
         tuple(rating.middle.tolist()),
+        tuple(row.as_dict() for row in limits),
+        tuple(examine_text(text_of(robot))),
+        _part_counts(rating),
+        "" if cycle is None else _table_text(robot, cycle),
     )
+
+
+def _cycle_at(rating: Rating, place: tuple[Places, int] | None) -> Motion | None:
+    """Return the cycle at the place where the drives' margin is least; None without cycles."""
+    if place is None:
+        return None
+    cycle, k = place
+    duration = cycle.duration or rating.figures["cycle_time"]
+    pose, velocity, acceleration = (part[k] for part in cycle.states)
+    time = np.linspace(0.0, duration, cycle.samples)
+    return Motion(time, rating.middle + pose, velocity / duration, acceleration / duration**2)
+
+
+def _table_text(robot: Manipulator, motion: Motion) -> str:
+    """Return a motion as CSV: time, pose and its two derivatives."""
+    import polars as pl
+
+    columns = {"t": motion.time}
+    parts = (motion.pose, motion.velocity, motion.acceleration)
+    for order, part in zip(("", "d", "dd"), parts, strict=True):
+        columns |= {f"{order}{c}": x for c, x in zip(robot.coordinates, part.T, strict=True)}
+    return pl.DataFrame(columns).write_csv()
+
+
+def _cycle_figures(
+    robot: Manipulator, motion: Motion | None, place: tuple[Places, int] | None
+) -> dict[str, float]:
+    """Return what `size` says of the drives in a cycle: torques, speed and energies, by name."""
+    if motion is None or place is None:
+        return {}
+    sizing = size(robot, motion, dwell=place[0].dwell)
+    rms, peak = sizing.motor_torques
+    return {
+        "peak_torque": float(peak.max()),
+        "rms_torque": float(rms.max()),
+        "motor_speed": float(sizing.motor_speeds[1].max()),
+        "energy_given": float(sizing.given_energy.sum()),
+        "energy_braked": float(sizing.braked_energy.sum()),
+    }
+
+
+def _part_counts(rating: Rating) -> dict[str, int]:
+    """Return the names of the joints and rails of a design with their numbers."""
+    counts: Counter[str] = Counter()
+    for joints, parts in zip(rating.joints, rating.parts, strict=True):
+        for joint, part in zip(joints, parts, strict=True):
+            counts[part.name] += joint.count
+    return dict(counts)
+
+
+def examine_text(text: str) -> list[str]:
+    """Return what `pteron check` warns of in a machine's file with this text."""
+    robot = loads(text)
+    return list(examine(robot, home_pose(robot)).warnings)
 
 
 def _clear_words(evaluator: KindEvaluator, robot: Manipulator, middle: Array) -> str:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
+from pteron.design.limit_rows import LimitRow
 from pteron.renamed import former_attribute
 from pteron.result import Result
 
@@ -58,6 +60,14 @@ class Candidate(Result):
         The machine's file, with its drives; empty where there is none.
     middle : tuple of float
         The pose in the middle of its workspace.
+    limits : tuple of dict
+        What an engineer limits in every machine, by the attributes of `LimitRow`.
+    checked : tuple of str
+        What `pteron check` warns of.
+    parts : dict
+        Numbers of joints and rails, by name.
+    cycle : str
+        The cycle at its worst place, a CSV file as `pteron size --cycle` takes it.
     """
 
     kind: str
@@ -74,6 +84,10 @@ class Candidate(Result):
     front: tuple[dict[str, float], ...] = ()
     robot: str = ""
     middle: tuple[float, ...] = ()
+    limits: tuple[dict[str, Any], ...] = ()
+    checked: tuple[str, ...] = ()
+    parts: dict[str, int] = field(default_factory=dict)
+    cycle: str = ""
 
     def __repr__(self) -> str:
         """Return the kind of machine and the count of feasible designs in one line."""
@@ -125,6 +139,29 @@ class Candidate(Result):
         )
         extents = (f"{1e3 * self.figures[name]:.0f}" for name in ("width", "depth", "height"))
         return f"{lengths}; space that it needs {' x '.join(extents)}"
+
+    @property
+    def part_text(self) -> str:
+        """Numbers and names of the joints and rails as text."""
+        return ", ".join(f"{count} x {name}" for name, count in self.parts.items())
+
+    @property
+    def limit_rows(self) -> list[LimitRow]:
+        """The limits of the machine, each with its worst value and place."""
+        return [LimitRow(**row) for row in self.limits]
+
+    @property
+    def cycle_text(self) -> str:
+        """What `pteron size` says of the cycle at its worst place; empty without a cycle."""
+        figures = self.figures
+        if "peak_torque" not in figures:
+            return ""
+        return (
+            f"at {self.worst} the motors give at most {figures['peak_torque']:.3g} N m and "
+            f"{figures['rms_torque']:.3g} N m root mean square, at up to "
+            f"{figures['motor_speed']:.3g} rad/s; the drives give {figures['energy_given']:.3g} J "
+            f"a cycle and brake {figures['energy_braked']:.3g} J"
+        )
 
     @property
     def margin_text(self) -> str:

@@ -14,18 +14,20 @@ import numpy as np
 from pteron.atomic import write_text
 from pteron.design.best_design import prove_best_design
 from pteron.design.candidate import Candidate
-from pteron.design.drive_options import GEARBOXES, MOTORS, Options, read_lists
 from pteron.design.job import Job
 from pteron.design.kind_search import search_kind
-from pteron.design.kinds import Kind, fitting_kinds
+from pteron.design.kinds import Kind, fitting_kinds, joint_kind
 from pteron.design.rating import KindEvaluator
-from pteron.errors import DataError, PteronError
+from pteron.errors import DataError, PteronError, warn_unlikely
 from pteron.html_table import Overview, frame_overview
 from pteron.json_values import json_ready
 from pteron.kernels.one_thread import one_thread
 from pteron.kernels.program_cache import EQUATIONS, name_of
 from pteron.manipulator import load
 from pteron.manipulator.saving import text_of
+from pteron.motion import read_motors
+from pteron.parts.drives import GEARBOXES, MOTORS, Options, read_gearboxes
+from pteron.parts.joints import JOINT_PARTS, read_joints
 from pteron.processes import WorkerPool
 from pteron.progress import Progress, Share
 from pteron.renamed import former_attribute
@@ -43,6 +45,12 @@ the size of its parts."""
 
 _SOURCES = (*EQUATIONS, "design", "dynamics", "indices", "kinematics", "motion", "workspace")
 """The packages that a kept kind depends on: of other code it is searched again."""
+
+_HEAVY = 100.0
+"""Payload, kg, from which a workspace below 1 m is doubted."""
+
+_TUPLES = ("why", "drives", "front", "middle", "limits", "checked")
+"""Attributes of a candidate that a file has as lists."""
 
 _KEPT = "kinds"
 """Folder of the kinds that are finished, in that of the results."""
@@ -88,32 +96,36 @@ class Choice(Result):
         return frame_overview("Kinds of machines", best, self.table(), self.summary().splitlines())
 
     def robots(self) -> dict[str, str]:
-        """Return the machines' files as TOML text, by file name ("<kind>.toml")."""
-        return {
-            f"{candidate.kind}.toml": candidate.robot
-            for candidate in self.candidates
-            if candidate.serves
-        }
+        """Return the machines' files as text, by file name: "<kind>.toml", "<kind>-cycle.csv"."""
+        serving = [candidate for candidate in self.candidates if candidate.serves]
+        machines = {f"{c.kind}.toml": c.robot for c in serving}
+        return machines | {f"{c.kind}-cycle.csv": c.cycle for c in serving if c.cycle}
 
     def assumption_lines(self) -> list[str]:
         """Return the assumptions behind the choice as sentences, one for each list item."""
-        motors, links = self.job.motors, self.job.links
-        examples = [] if motors.list else ["The motors are the package's examples, not products."]
+        motors, links, limits = self.job.motors, self.job.links, self.job.limits
+        lists = [motors.list, motors.gearboxes, motors.joints]
+        examples = ["Motors, gears, joints and rails are the package's examples, not products."]
         stocks = ", ".join(dict.fromkeys([*links.upper, *links.lower]))
         errors = self.job.accuracy
         left_out = errors is not None and not errors.has_part_errors
         exact = ["The tool's error is that of encoders and gearboxes; links are taken as exact."]
         return [
-            *examples,
-            "A price is the sum of those in the lists of motors and gearboxes, in their currency.",
-            f"Drives are chosen with a margin of {motors.margin:g} to what the task needs, with "
-            f"dry friction of {100.0 * motors.friction:.0f} % of their rated torque; the margins "
-            "stated are the smallest also between the places of the search.",
+            *([] if all(lists) else examples),
+            "A price is the sum of those of motors, gearboxes, joints and carriages in the lists, "
+            "in their currency: without tubes, frame, control and assembly.",
+            f"Drives have {motors.margin:g} times the peak torque and speed that the task needs; "
+            f"at rest and as root mean square of a cycle they give at most {limits.rated:g} of "
+            f"their rated torque. Dry friction is {100.0 * motors.friction:.0f} % of the rated "
+            "torque.",
             f"Links are cut from {stocks}; the platform is half of an aluminium disc "
-            f"{1e3 * links.plate:g} mm thick; a carriage has {links.carriage:g} kg.",
-            f"Guides are {2e3 * links.guide:g} mm wide, cylinders of rams as thick as cranks; a "
-            "ram is at most 1.7 times as long as at its shortest; for collisions a pair of rods "
-            "counts as one; ball joints have no limits.",
+            f"{1e3 * links.plate:g} mm thick; the bracket on a carriage has {links.carriage:g} kg. "
+            "Joints are point masses at the ends of links. Base, frame and joints are rigid.",
+            f"The rods of a pair are {links.pair:g} platform radii apart; a ram is at most 1.7 "
+            "times as long as at its shortest; for collisions a pair of rods counts as one; ball "
+            "joints have no limits.",
+            "Stress, compression and joint loads are bounded from above over all directions of "
+            "the greatest acceleration and speed of the cycles and of [motion].",
             "The shortest cycle is the one at its worst place with this margin of peak torque and "
             "speed; repeated without pauses, it may exceed the rated torque.",
             *(exact if left_out else []),
@@ -207,14 +219,14 @@ def choose_machine(
 def evaluators_of(job: Job) -> dict[str, KindEvaluator]:
     """Return an evaluator of the job for each kind of machine that can do the motion, by name."""
     space = job.workspace
-    names = fitting_kinds(job.kinds, job.lengths, space.turn is not None, space.tilts)
-    files = (
-        job.file(job.motors.list or str(MOTORS)),
-        job.file(job.motors.gearboxes or str(GEARBOXES)),
-    )
-    motors, gearboxes = read_lists(*files)
+    names = fitting_kinds(job.kinds, job.lengths, space.turn, space.tilts)
+    lists = job.motors
+    motors = read_motors(job.file(lists.list or str(MOTORS)))
+    gearboxes = read_gearboxes(job.file(lists.gearboxes or str(GEARBOXES)))
+    parts = read_joints(job.file(lists.joints or str(JOINT_PARTS)))
     options = {
-        unit: Options.combine(motors, gearboxes, unit, job.motors.friction) for unit in ("rad", "m")
+        joint: Options.combine(motors, gearboxes, joint, lists.friction)
+        for joint in ("rad", "slider", "ram")
     }
     unpriced = [o.name for some in options.values() for o in some.all if not np.isfinite(o.price)]
     if unpriced and ("price" in job.objectives or job.most.price is not None):
@@ -223,10 +235,18 @@ def evaluators_of(job: Job) -> dict[str, KindEvaluator]:
             '"rated_power"'
         )
     names = [name for name in names if _has_drives(name, options, job)]
+    _expect_price(names, options, job)
     needed = 2.0 * float(job.workspace.half.max())
+    if job.payload.mass > _HEAVY and needed < 1.0:
+        warn_unlikely(
+            f"payload of {job.payload.mass:g} kg for a workspace of {1e3 * needed:g} mm: is it in "
+            "grams?"
+        )
     tool = job.payload.tool
-    kinds = (Kind(name, max(needed, _SMALL), job.links, tool, job.free) for name in names)
-    evaluators = {kind.name: KindEvaluator(job, kind, options) for kind in kinds}
+    kinds = (
+        Kind(name, max(needed, _SMALL), job.links, tool, job.free, job.gravity) for name in names
+    )
+    evaluators = {kind.name: KindEvaluator(job, kind, options, parts) for kind in kinds}
     for evaluator in evaluators.values():
         try:
             evaluator.add_payload(evaluator.kind.robot)
@@ -237,13 +257,29 @@ def evaluators_of(job: Job) -> dict[str, KindEvaluator]:
 
 def _has_drives(name: str, options: Mapping[str, Options], job: Job) -> bool:
     """Return whether gearboxes exist for all joints of a kind; raise if the job names the kind."""
-    units = {leg.joint.unit for leg in load(name).legs}
-    lacking = [unit for unit in sorted(units) if not options[unit].all]
+    joints = {joint_kind(leg) for leg in load(name).legs}
+    lacking = [joint for joint in sorted(joints) if not options[joint].all]
     if lacking and job.kinds is not None:
         raise DataError(
             f'{job.motors.gearboxes}: no gearbox with joint = "{lacking[0]}", as {name} needs'
         )
     return not lacking
+
+
+def _expect_price(names: Sequence[str], options: Mapping[str, Options], job: Job) -> None:
+    """Raise if the cheapest drives of every kind cost more than the job allows in all."""
+    if (most := job.most.price) is None:
+        return
+    least = {
+        name: sum(options[joint_kind(leg)].all[0].price for leg in load(name).legs)
+        for name in names
+    }
+    cheapest = min(least, key=least.__getitem__)
+    if least[cheapest] > most:
+        raise DataError(
+            f"most.price: {most:g} given, but the cheapest drives of {cheapest} alone cost "
+            f"{least[cheapest]:g}, and those of all other kinds more"
+        )
 
 
 def _candidate(evaluator: KindEvaluator, progress: Progress) -> Candidate:
@@ -297,7 +333,10 @@ class _CandidateStore:
             record = json.loads(file.read_text(encoding="utf-8"))
             if record.pop("digest", None) != self._digest(name):
                 return None
-            lists = {key: tuple(record[key]) for key in ("why", "drives", "front", "middle")}
+            lists = {
+                key: tuple(record[key])
+                for key in ("why", "drives", "front", "middle", "limits", "checked")
+            }
             return Candidate(**record | lists)
         except (ValueError, TypeError, KeyError):
             return None

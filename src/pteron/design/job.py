@@ -10,7 +10,7 @@ from typing import Self
 import numpy as np
 from pydantic import Field, PrivateAttr, field_validator, model_validator
 
-from pteron.bodies.tables import TomlTable, key
+from pteron.bodies.tables import Three, TomlTable, key
 from pteron.design.kinds import KINDS
 from pteron.design.load_tables import Names, default_table
 from pteron.design.requirement_tables import (
@@ -19,8 +19,10 @@ from pteron.design.requirement_tables import (
     BoundTable,
     DriveListsTable,
     KindSearchTable,
+    LimitsTable,
     LinksTable,
     LoadTable,
+    ProcessTable,
     RequiredMotionTable,
     StiffnessTable,
     ToolCycleTable,
@@ -31,6 +33,21 @@ from pteron.toml import read_toml, to_model
 
 _ABSENT = "no such file; it should describe what a machine must do"
 """The message where the file is missing."""
+
+_HEAVIEST = 2000.0
+"""Payload, kg, from which it was probably given in grams."""
+
+_FARTHEST = 5.0
+"""Distance of the payload's centre of mass from P, m, from which it was probably given in mm."""
+
+_SLOWEST, _FASTEST = 0.002, 20.0
+"""Mean speed of a cycle, m/s, below and above which times were probably given in another unit."""
+
+_SHARPEST = 1000.0
+"""Acceleration, m/s^2, from which it was probably given in mm/s^2."""
+
+_LONGEST = 60.0
+"""Rest after a cycle over its duration, and in s, beyond which it was probably given in ms."""
 
 OBJECTIVES = {
     "price": "",
@@ -63,6 +80,13 @@ class Job(TomlTable):
     motion: RequiredMotionTable = Field(
         default_factory=lambda: RequiredMotionTable.model_validate({})
     )
+    gravity: Three = key(
+        "m/s^2, in the frame of the workspace; [0, -9.81, 0] for a machine on a wall, "
+        "[0, 0, 9.81] for one turned upside down",
+        (0.0, 0.0, -9.81),
+    )
+    process: ProcessTable | None = None
+    limits: LimitsTable = default_table(LimitsTable)
     accuracy: AccuracyTable | None = None
     stiffness: StiffnessTable | None = None
     cell: CellTable = default_table(CellTable)
@@ -108,6 +132,12 @@ class Job(TomlTable):
             )
         if "cycle_time" in self.objectives and not self.free:
             yield "objectives: cycle_time, but every cycle has its duration; leave one out"
+        if self.workspace.poses is not None and len(set(self.workspace.poses)) == 1:
+            yield (
+                "workspace: poses: one pose given, at least two expected: what works at one pose "
+                "is a fixture"
+            )
+        yield from self._unit_faults()
         for k, cycle in enumerate(self.cycles, start=1):
             yield from (f"cycles[{k}]: {text}" for text in self._cycle_faults(cycle))
         if 0 < sum(cycle.share is None for cycle in self.cycles) < len(self.cycles):
@@ -124,31 +154,62 @@ class Job(TomlTable):
         else:
             yield from self._room_faults()
 
+    def _unit_faults(self) -> Iterator[str]:
+        """Yield sentences on numbers that are off by a factor of a thousand."""
+        payload, motion = self.payload, self.motion
+        if payload.mass > _HEAVIEST:
+            yield f"payload: mass: {payload.mass:g} kg given: is this in grams?"
+        if payload.center is not None and np.linalg.norm(payload.center) > _FARTHEST:
+            yield f"payload: center: {list(payload.center)} m given: are these mm?"
+        if motion.speed > _FASTEST:
+            yield f"motion: speed: {motion.speed:g} m/s given: is this in mm/s?"
+        if motion.acceleration > _SHARPEST:
+            yield f"motion: acceleration: {motion.acceleration:g} m/s^2 given: is this in mm/s^2?"
+        for k, cycle in enumerate(self.cycles, start=1):
+            if cycle.duration is None or len({len(point) for point in cycle.points}) > 1:
+                continue
+            points = np.array(cycle.points)[:, : self.lengths]
+            length = np.linalg.norm(np.diff(points, axis=0), axis=1).sum() * (1 + cycle.back)
+            speed = float(length) / cycle.duration
+            if 0.0 < speed < _SLOWEST:
+                yield (
+                    f"cycles[{k}]: duration: {cycle.duration:g} s given for "
+                    f"{1e3 * float(length):.4g} mm: is this in ms?"
+                )
+            if speed > _FASTEST:
+                yield (
+                    f"cycles[{k}]: duration: {cycle.duration:g} s given for "
+                    f"{1e3 * float(length):.4g} mm, {speed:.3g} m/s"
+                )
+            if cycle.dwell > _LONGEST * cycle.duration + _LONGEST:
+                yield f"cycles[{k}]: dwell: {cycle.dwell:g} s given: is this in ms?"
+
     def _room_faults(self) -> Iterator[str]:
         """Yield sentences on contradictions between the permitted space and the workspace."""
-        cell, space, sides = self.cell, self.workspace, 2.0 * self.workspace.half
-        at = np.array(space.center or (0.0, 0.0, 0.0))
+        cell, space = self.cell, self.workspace
+        sides, margin = 2.0 * (space.half + cell.margin), cell.margin
+        at, body = np.array(space.center or (0.0, 0.0, 0.0)), f"with {1e3 * margin:g} mm about it"
         if cell.footprint is not None and (sides[:2] > cell.footprint).any():
             footprint = " x ".join(f"{1e3 * x:g}" for x in cell.footprint)
             yield (
-                f"cell: a footprint of {footprint} mm has no room for the workspace, "
-                f"{' x '.join(f'{1e3 * x:g}' for x in sides[:2])} mm"
+                f"cell: a footprint of {footprint} mm has no room for the workspace "
+                f"{body}, {' x '.join(f'{1e3 * x:g}' for x in sides[:2])} mm"
             )
         if cell.height is not None and sides[2] > cell.height:
             yield (
-                f"cell: a height of {1e3 * cell.height:g} mm has no room for the workspace, "
-                f"{1e3 * sides[2]:g} mm"
+                f"cell: a height of {1e3 * cell.height:g} mm has no room for the workspace "
+                f"{body}, {1e3 * sides[2]:g} mm"
             )
         if cell.low is not None and cell.high is not None:
-            low, high = at - space.half, at + space.half
+            low, high = at - space.half - margin, at + space.half + margin
             for i in np.flatnonzero((low < cell.low) | (high > cell.high)):
                 yield (
                     f"cell: along {'xyz'[i]} it goes from {cell.low[i]:g} to {cell.high[i]:g} m, "
-                    f"and the workspace from {low[i]:g} to {high[i]:g} m"
+                    f"and the workspace {body} from {low[i]:g} to {high[i]:g} m"
                 )
         for k, box in enumerate(self.keep_out, start=1):
-            if space.meets(np.array(box.low) - at, np.array(box.high) - at):
-                yield f"keep_out[{k}]: it is in the workspace, where the tool must be"
+            if space.meets(np.array(box.low) - at - margin, np.array(box.high) - at + margin):
+                yield f"keep_out[{k}]: it is in the workspace {body}, where the tool must be"
 
     def _cycle_faults(self, cycle: ToolCycleTable) -> Iterator[str]:
         """Yield sentences on contradictions between a tool cycle and the workspace."""
@@ -211,6 +272,8 @@ class Job(TomlTable):
             lines.append(
                 f"tool at {' x '.join(f'{1e3 * x:g}' for x in self.payload.tool)} mm from P"
             )
+        if self.gravity != (0.0, 0.0, -9.81):
+            lines.append(f"gravity {' '.join(f'{x:g}' for x in self.gravity)} m/s^2")
         if self.payload.mass:
             lines.append(f"payload {self.payload.mass:g} kg")
         for k, cycle in enumerate(self.cycles, start=1):
@@ -221,6 +284,8 @@ class Job(TomlTable):
         if self.motion.acceleration:
             speed = f"at up to {self.motion.speed:g} m/s in any direction"
             lines.append(f"{self.motion.acceleration:g} m/s^2 {speed}")
+        if self.process is not None:
+            lines.append(f"process force of {self.process.force:g} N in any direction")
         if self.accuracy is not None:
             lines.append(f"tool within {1e3 * self.accuracy.most:g} mm ({self.accuracy.counted})")
         if self.stiffness is not None:

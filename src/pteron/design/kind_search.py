@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from itertools import islice, product
+from itertools import product
 
 import numpy as np
 import scipy  # type: ignore[import-untyped]
@@ -35,9 +35,9 @@ def search_kind(
     """Search designs of a kind, in equal shares for each objective; return all their ratings.
 
     For each objective a Latin hypercube of designs gives the first population of differential
-    evolution (Storn and Price, Journal of Global Optimization 11, 1997); then every stock of the
-    links is tried, and Nelder and Mead's method improves the other numbers. `progress` is called
-    with the share of the evaluations that is done.
+    evolution (Storn and Price, Journal of Global Optimization 11, 1997); then the links are cut
+    from the next stock up and down, and Nelder and Mead's method improves the other numbers.
+    `progress` is called with the share of the evaluations that is done.
     """
     ratings: list[Rating] = []
     low, high = evaluator.kind.ranges
@@ -106,7 +106,7 @@ def _refine(
     objective: str,
     counts: Array,
 ) -> None:
-    """Improve the design `start` by stock choices and Nelder-Mead until `end` designs are rated.
+    """Improve the design `start` by stock of the next size and Nelder-Mead, up to `end` ratings.
 
     `counts` are the numbers of choices of the coordinates of a design, 0 for continuous ones.
     """
@@ -115,14 +115,16 @@ def _refine(
         """Rate a design given by unit coordinates (V,); return its cost for the objective."""
         return rate(units).cost(objective)
 
-    free = counts == 0
-    stocks = [(np.arange(count) + 0.5) / count for count in counts[~free]]
-    least = np.inf
-    for choice in islice(product(*stocks), max(end - len(ratings), 0)):
-        trial = start.copy()
-        trial[~free] = choice
-        if (trial_cost := cost(trial)) < least:
-            least, best = trial_cost, trial
+    free, best = counts == 0, start
+    least = cost(best) if len(ratings) < end else np.inf
+    improves = True
+    while improves and len(ratings) < end:
+        improves = False
+        for i, step in product(np.flatnonzero(~free), (1.0, -1.0)):
+            trial = best.copy()
+            trial[i] += step / counts[i]
+            if 0.0 < trial[i] < 1.0 and len(ratings) < end and (found := cost(trial)) < least:
+                least, best, improves = found, trial, True
     while len(ratings) < end:
         simplex = best[free] + np.vstack(
             [

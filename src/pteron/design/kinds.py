@@ -9,14 +9,18 @@ from typing import Any
 
 import numpy as np
 
+from pteron.bodies.inertia import SpatialInertia, carried_values
 from pteron.bodies.vectors import Vector
 from pteron.design.requirement_tables import LinksTable
 from pteron.errors import DataError
+from pteron.indices.elasticity import MATERIALS
+from pteron.indices.strength import Tube
 from pteron.kernels import Array
 from pteron.kinematics.sampling import search_ball
 from pteron.manipulator import Manipulator, Radii, load
 from pteron.manipulator.dimensions import Stock, cut_links
 from pteron.manipulator.variants import turned
+from pteron.parts.joints import JointPart
 from pteron.platforms import Platform
 from pteron.toml import joined_faults
 from pteron.workspace import home_pose
@@ -70,6 +74,9 @@ largest level cube of the catalog's machines is a sixth and a fourteenth of the 
 _ALUMINIUM = 2700.0
 """kg/m^3."""
 
+_RAIL = 0.017
+"""Half the width of a rail, m, before it is chosen by its load."""
+
 
 @dataclass(frozen=True)
 class Kind:
@@ -87,6 +94,8 @@ class Kind:
         The tool's centre point in the platform's frame, m.
     free : bool
         Whether a cycle's time is one of the numbers.
+    gravity : vector
+        m/s^2.
     """
 
     name: str
@@ -94,6 +103,7 @@ class Kind:
     links: LinksTable
     tool: Vector = (0.0, 0.0, 0.0)
     free: bool = False
+    gravity: Vector = (0.0, 0.0, -9.81)
 
     @cached_property
     def robot(self) -> Manipulator:
@@ -109,7 +119,8 @@ class Kind:
             ends = dict.fromkeys(cone for cone in cones if hasattr(leg, cone))
             legs.append(replace(leg, **ends | ({"limits": None} if slides(leg) else {})))
         platform = replace(template.platform, tool=self.tool)
-        return replace(template, legs=tuple(legs), platform=platform, radii=None, home=None)
+        robot = replace(template, legs=tuple(legs), platform=platform, radii=None, home=None)
+        return replace(robot, gravity=self.gravity)
 
     @cached_property
     def like(self) -> Manipulator:
@@ -134,10 +145,19 @@ class Kind:
         ranges |= {key: (0.0, len(stock) - 1e-9) for key, stock in self._choices.items()}
         return ranges | ({"time": (np.log(0.05), np.log(5.0))} if self.free else {})
 
-    @property
+    @cached_property
     def stocks(self) -> dict[str, list[str]]:
-        """The names of the bar stock that upper and lower links may be cut from, by link."""
-        return {"upper": self.links.upper, "lower": self.links.lower}
+        """The names of the bar stock of upper and lower links, by link, the least stiff first."""
+
+        def rigidity(name: str) -> float:
+            """Return E (d^4 - d_i^4) of a stock."""
+            stock, material = Stock.parse(name), MATERIALS[name.split("-")[0]]
+            return material.young * (stock.outer**4 - stock.inner**4)
+
+        return {
+            "upper": sorted(self.links.upper, key=rigidity),
+            "lower": sorted(self.links.lower, key=rigidity),
+        }
 
     @cached_property
     def _choices(self) -> dict[str, Sequence[str]]:
@@ -189,6 +209,27 @@ class Kind:
         """Return the stock of each link, parsed from its name, for design variables (V,)."""
         return {key: Stock.parse(name) for key, name in self.link_stocks(point).items()}
 
+    def tubes(self, robot: Manipulator, point: Array) -> dict[str, Tube]:
+        """Return what the links of a machine of design variables (V,) are cut of, by their key."""
+        keys = {key for leg in robot.legs for key, *_ in leg.extents.values()}
+        rods = max(getattr(leg, "rods", 1) for leg in robot.legs)
+        return {
+            key: Tube(
+                stock.outer,
+                stock.inner,
+                MATERIALS[name.split("-")[0]],
+                rods if key == "lower" else 1,
+                self.links.pair * self.platform_radius(robot) if key == "lower" else np.inf,
+            )
+            for key, name in self.link_stocks(point).items()
+            if key in keys or key == "lower"
+            for stock in [Stock.parse(name)]
+        }
+
+    def platform_radius(self, robot: Manipulator) -> float:
+        """Return the greatest distance of a platform point from the platform's axis, m."""
+        return float(np.linalg.norm(platform_points(robot), axis=1).max())
+
     def with_travel(self, leg: Any, travel: tuple[float, float], point: Array) -> Any:
         """Return a leg with travel limits (low, high), m; a ram with tubes of that length."""
         limited = replace(leg, limits=travel)
@@ -201,6 +242,55 @@ def _template(name: str) -> Manipulator:
     """Return the catalog's machine of a kind; one with two rotation axes has both level."""
     robot = load(name)
     return robot if robot.platform.second_axis is None else turned(robot, _LAID, gravity=False)
+
+
+def platform_points(robot: Manipulator) -> Array:
+    """Return the vectors (n, 3), m, from the platform's axis to its points at angles zero."""
+    axis, frame = np.array(robot.platform.axis), np.array(robot.platform.frame)
+    points = [np.array(leg.platform_point) @ frame + leg.fixed_offset for leg in robot.legs]
+    return np.asarray(np.array(points) @ (np.eye(3) - np.outer(axis, axis)))
+
+
+def with_joint_parts(
+    robot: Manipulator, joints: Sequence[Sequence[Any]], parts: Sequence[Sequence[JointPart]]
+) -> Manipulator:
+    """Return the machine with the masses of its joints at the outer ends of its links.
+
+    A rail's carriage, and joints on it, move with the slider. Rails are as wide as their part.
+    """
+    legs, rail = [], 0.0
+    for leg, of_leg, chosen in zip(robot.legs, joints, parts, strict=True):
+        bodies = dict(leg.bodies)
+        ends = {key: (letter, high) for letter, (key, _, high, _) in leg.extents.items()}
+        if slides(leg):
+            ends["base"] = "p", 0.0
+        for joint, part in zip(of_leg, chosen, strict=True):
+            if joint.kind == "guide":
+                rail = max(rail, 0.5 * part.diameter)
+            if joint.link not in ends:
+                continue
+            letter, x = ends[joint.link]
+            body: Any = bodies[letter]
+            added = _point_mass(body, joint.count * part.mass, x)
+            bodies[letter] = body.of_values(np.add(body.values, added).tolist())
+        legs.append(leg.with_bodies(bodies))
+    radii = robot.radii and replace(robot.radii, guide=rail or robot.radii.guide)
+    return replace(robot, legs=tuple(legs), radii=radii)
+
+
+def _point_mass(body: Any, mass: float, x: float) -> list[float]:
+    """Return the inertial parameters of a point mass, kg, at x, m, on a link's axis."""
+    if isinstance(body, SpatialInertia):
+        return carried_values(SpatialInertia, mass, (x, 0.0, 0.0), [0.0] * 6)
+    middle = [0.0] * (len(body.kinds) - 3)
+    return [mass, mass * x, *middle, mass * x**2] if len(body.kinds) > 1 else [mass]
+
+
+def joint_kind(leg: Any) -> str:
+    """Return what a drive of a leg must fit: "rad" of a crank, "slider" or "ram"."""
+    if leg.joint.unit != "m":
+        return "rad"
+    return "slider" if slides(leg) else "ram"
 
 
 def slides(leg: Any) -> bool:
@@ -257,7 +347,7 @@ def _build_machine(
     )
     carried = replace(platform, bars=bars, inertia=plate)
     upper, lower = (stocks[key].outer / 2.0 for key in ("upper", "lower"))
-    radii = Radii(links.guide, upper, lower, links.plate / 2.0)
+    radii = Radii(_RAIL, upper, lower, links.plate / 2.0)
     return replace(robot, legs=tuple(legs), platform=carried, radii=radii)
 
 
@@ -283,8 +373,20 @@ def angle_counts(platform: Platform) -> tuple[int, int]:
     return 2 * platform.tilts, int(platform.spin_angle is not None)
 
 
-def fitting_kinds(names: Sequence[str] | None, lengths: int, turn: bool, tilt: bool) -> list[str]:
+def _hinges(turn: tuple[float, float] | None, platform: Platform) -> str:
+    """Return what the hinges of a platform allow, in words; empty if that is enough."""
+    if turn is None or platform.tilts or not platform.limits:
+        return ""
+    low, high = map(float, platform.limits)  # type: ignore[arg-type]
+    return "" if low <= turn[0] and turn[1] <= high else f"turns from {low:.3g} to {high:.3g} rad"
+
+
+def fitting_kinds(
+    names: Sequence[str] | None, lengths: int, turn: tuple[float, float] | None, tilt: bool
+) -> list[str]:
     """Return the names of the kinds of machine with a task's degrees of freedom; raise if none.
+
+    `turn` is the range of turns, rad, which hinges of a platform may not allow.
 
     Raises
     ------
@@ -300,7 +402,8 @@ def fitting_kinds(names: Sequence[str] | None, lengths: int, turn: bool, tilt: b
             text
             for text, holds in (
                 (f"moves along {' '.join(platform.lengths)} only", len(platform.lengths) < lengths),
-                ("does not turn", turn and not turning),
+                ("does not turn", turn is not None and not turning),
+                (f"{_hinges(turn, platform)} only", bool(_hinges(turn, platform))),
                 ("does not tilt", tilt and not tilting),
             )
             if holds

@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from pteron.design.cycle_places import Places, neighbour_places
-from pteron.design.drive_options import duty_cycle_mean
-from pteron.design.machine_space import tool_places
+from pteron.design.joint_loads import duty_cycle_mean
+from pteron.design.limit_rows import DENSE, place_text
 from pteron.design.rating import KindEvaluator
 from pteron.design.workspace_samples import refine_worst_values
 from pteron.design.worst_cases import worst_forces, worst_speeds
@@ -16,9 +17,6 @@ from pteron.dynamics import drive_forces
 from pteron.kernels import Array
 from pteron.kinematics import jacobian
 from pteron.manipulator import Manipulator
-
-DENSE = 7
-"""Poses along each side of the box in the final evaluation of a design."""
 
 _ROUNDS, _KEPT = 4, 3
 """Rounds of refinement of a cycle's places, and number of worst ones kept in each."""
@@ -67,13 +65,17 @@ class LoadMargins:
 
 
 def margins_of(
-    evaluator: KindEvaluator, robot: Manipulator, middle: Array, time: float | None
+    evaluator: KindEvaluator,
+    robot: Manipulator,
+    middle: Array,
+    time: float | None,
+    process: ArrayLike = 0.0,
 ) -> LoadMargins:
     """Return the drives' margins (limit over load) for all cycles and motions of the job.
 
-    Friction and rotor inertia are included; cycles that may be anywhere are evaluated at all their
-    outermost places. `middle` (m,) is the pose in the middle of the workspace; `time`, s, is the
-    duration of cycles without one.
+    Friction and rotor inertia are included, and the forces (n,) that the process adds; cycles that
+    may be anywhere are evaluated at all their outermost places. `middle` (m,) is the pose in the
+    middle of the workspace; `time`, s, is the duration of cycles without one.
     """
     drives = [leg.drive for leg in robot.legs if leg.drive is not None]
     most, rated, fastest = (
@@ -92,18 +94,18 @@ def margins_of(
             means = (means + cycle.dwell * forces[:, -1] ** 2) / (duration + cycle.dwell)
             greatest = np.maximum(greatest, means.max(axis=0))
             every = [
-                least_margins.take("peak_margin", most, np.abs(forces).max(axis=1)),
+                least_margins.take("peak_margin", most, np.abs(forces).max(axis=1) + process),
                 least_margins.take("speed_margin", fastest, np.abs(rates).max(axis=1)),
             ]
             if not len(shares):
-                every.append(least_margins.take("rated_margin", rated, np.sqrt(means)))
+                every.append(least_margins.take("rated_margin", rated, np.sqrt(means) + process))
             k = int(np.min(every, axis=0).argmin())
             least_margins.note_place(float(np.min(every)), places.words(k), (places, k))
             worst = np.unique(np.argsort([*every, *-means.T], axis=1)[:, :_KEPT])
             places = neighbour_places(evaluator.job, places, worst, 0.5 ** (step + 1))
         squares.append(greatest)
     if len(shares):
-        load = np.sqrt(duty_cycle_mean(np.array(squares), shares))
+        load = np.sqrt(duty_cycle_mean(np.array(squares), shares)) + process
         least = float(least_margins.take("rated_margin", rated, load[None])[0])
         least_margins.note_place(least, "the rated torque of the whole duty cycle")
     required = evaluator.job.motion
@@ -113,16 +115,15 @@ def margins_of(
         def motion_margins(places: Array) -> Array:
             """Return ratios (N, 2 n) of force and speed limits to the worst loads at N poses."""
             poses = middle + places
-            forces = worst_forces(robot, poses, speed, required.acceleration)
+            forces = worst_forces(robot, poses, speed, required.acceleration) + process
             loads = np.hstack([forces, worst_speeds(robot, poses, speed)])
             return np.append(most, fastest) / np.maximum(loads, _NOTHING)
 
         margins, where = refine_worst_values(evaluator.job, robot, motion_margins, DENSE, keep=2)
         least_margins.note("peak_margin", float(margins[: len(most)].min()))
         least_margins.note("speed_margin", float(margins[len(most) :].min()))
-        worst_pose = middle + where[int(margins.argmin())]
-        place = np.subtract(*tool_places(robot, np.array([worst_pose, middle])))
-        at = ", ".join(f"{1e3 * x:+.0f}" for x in place[: len(robot.platform.lengths)])
-        words = f"the motion in any direction, at ({at}) mm"
+        words = (
+            f"the motion in any direction, at {place_text(robot, middle, where[margins.argmin()])}"
+        )
         least_margins.note_place(float(margins.min()), words)
     return least_margins

@@ -128,8 +128,7 @@ class MachineSpace:
             others = np.delete(points, i, axis=-3)
             starts, ends = others[..., :-1, :].reshape(-1, 3), others[..., 1:, :].reshape(-1, 3)
             guide = (np.tile(end[:, None], len(starts)) for end in (low, high))
-            squares = np.array(_squared_distances()(*guide, starts.T, ends.T))
-            distances.append(float(np.sqrt(np.nanmin(squares))) - thick)
+            distances.append(float(np.nanmin(segment_distances(*guide, starts.T, ends.T))) - thick)
         return float(min(distances))
 
     @cached_property
@@ -188,6 +187,12 @@ def _guides(robot: Manipulator) -> Iterator[tuple[int, Array, Array]]:
         if slides(leg) and leg.limits is not None and leg.joint_axis is not None:
             r, e = np.array(leg.guide_point), np.array(leg.joint_axis)
             yield i, r + leg.limits[0] * e, r + leg.limits[1] * e
+
+
+def segment_distances(start: Array, end: Array, other: Array, other_end: Array) -> Array:
+    """Return the distances (K,), m, of pairs of line segments with these ends (3, K)."""
+    squares = np.array(_squared_distances()(start, end, other, other_end))
+    return np.asarray(np.sqrt(squares.reshape(-1)))
 
 
 @lru_cache(maxsize=1)

@@ -5,32 +5,32 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from pteron.design.cycle_places import Places, cycles_of
-from pteron.design.drive_options import JointLoads, Option, Options, power
 from pteron.design.job import OBJECTIVES, Job
-from pteron.design.kinds import Kind, slides
+from pteron.design.joint_loads import JointLoads
+from pteron.design.kinds import Kind, joint_kind, slides, with_joint_parts
 from pteron.design.machine_space import MachineSpace
+from pteron.design.parts_room import check_room
 from pteron.design.quantities import moving_mass
-from pteron.design.tool_errors import (
-    compliance_with,
-    compliances,
-    errors_with,
-    link_sections,
-    unit_errors,
-)
+from pteron.design.structure import Demand, Joint, Structure, structure_figures
+from pteron.design.tool_errors import errors_with, unit_errors
 from pteron.design.workspace_samples import refine_worst_values, sample_poses
 from pteron.design.worst_cases import worst_forces, worst_speeds
-from pteron.dynamics import drive_forces
+from pteron.dynamics import drive_forces, mass_matrix
+from pteron.dynamics.joint_space import moved_inertias
+from pteron.equations.drives import drives_of
 from pteron.errors import ModelError, PteronError
-from pteron.indices import Section
 from pteron.kernels import Array, numeric
 from pteron.kinematics import inverse_kinematics, jacobian, joint_accelerations
 from pteron.kinematics.sampling import holding_measures
 from pteron.legs import Drive
 from pteron.manipulator import Manipulator
+from pteron.parts.drives import Option, Options
+from pteron.parts.joints import JointPart, cheapest_joint
 
 _STROKE = 0.03
 """Share of a slider's travel that is added to its guide at each end."""
@@ -43,6 +43,18 @@ _FLOOR = 1.05
 
 _HEAVY = 1e6
 """kg m^2: an inertia beside which that of a machine is nothing."""
+
+_HEAVIER = 1.25
+"""Loads for which joints are chosen over those without the joints' own mass."""
+
+_SAG = 1e-3
+"""Permitted sag over the workspace's longest side, where no tolerance is given."""
+
+CycleStates = tuple[Array, Array, Array, float]
+"""Forces of the rigid machine, accelerations and speeds of the joints (B, K, n); time step, s."""
+
+_TIE = 2e-3
+"""Weight of the logarithm of a machine's volume beside that of the objective."""
 
 _BY_STAGE = 100.0
 """Cost of a design that fails at the last stage; of one before it is twice as much, and so on."""
@@ -74,6 +86,10 @@ class Rating:
         At which it fell out; 0 where it did not.
     near : float
         How far the next cheaper drives are from serving, from 0 on.
+    structure : Structure or None
+        The loads on links and joints at the corners of the workspace.
+    joints, parts : list of list
+        The joints of each leg, and the part chosen for each.
     """
 
     values: Array
@@ -86,6 +102,9 @@ class Rating:
     worst: Array = field(default_factory=lambda: np.zeros((0, 0)))
     stage: int = 0
     near: float = 1.0
+    structure: Structure | None = None
+    joints: list[list[Joint]] = field(default_factory=list)
+    parts: list[list[JointPart]] = field(default_factory=list)
 
     @property
     def machine(self) -> Manipulator:
@@ -98,6 +117,14 @@ class Rating:
         if share > self.misses.get(name, 0.0):
             self.misses[name], self.shortfalls[name] = float(share), words
 
+    def expect(self, name: str, figure: float, bound: float, at_least: bool) -> None:
+        """Record a violation if `figure` is below a lower `bound`, or above an upper one."""
+        share = bound / max(figure, 1e-12) if at_least else figure / bound
+        if not share <= 1.0:
+            words = "at least" if at_least else "at most"
+            share = min(share - 1.0, 1e3) if np.isfinite(share) else 1e3
+            self.miss(name, share, f"{name} {figure:.3g}, {words} {bound:.3g} permitted")
+
     def expect_least(self, name: str, figure: float, least: float) -> None:
         """Record a violation if `figure` is below `least`."""
         if not figure >= least:
@@ -107,10 +134,12 @@ class Rating:
     def cost(self, objective: str) -> float:
         """Return the scalar cost of the design in a search: objective, or penalty of violations."""
         if self.misses:
-            return _BY_STAGE * (6 - self.stage) + min(sum(self.misses.values()), 0.9 * _BY_STAGE)
-        cost = self.figures[objective]
+            return _BY_STAGE * (7 - self.stage) + min(sum(self.misses.values()), 0.9 * _BY_STAGE)
+        cost, figures = self.figures[objective], self.figures
+        # Of equals the smaller machine is the better.
+        size = _TIE * float(np.log(max(figures["footprint"] * figures["height"], 1e-9)))
         # A price has steps: along one the design is the better whose next step down is nearer.
-        return float(np.log(cost) + 0.01 * min(self.near, 1.0)) if cost > 0.0 else 0.0
+        return float(np.log(max(cost, 1e-9)) + 0.01 * min(self.near, 1.0) + size)
 
 
 class KindEvaluator:
@@ -123,11 +152,19 @@ class KindEvaluator:
     kind : Kind
         The kind.
     options : mapping of str to Options
-        Drives, by the unit of the joint.
+        Drives, by the joint that they fit: "rad", "slider" or "ram".
+    parts : sequence of JointPart
+        Joints and rails.
     """
 
-    def __init__(self, job: Job, kind: Kind, options: Mapping[str, Options]) -> None:
-        self.job, self.kind, self.options = job, kind, options
+    def __init__(
+        self,
+        job: Job,
+        kind: Kind,
+        options: Mapping[str, Options],
+        parts: Sequence[JointPart],
+    ) -> None:
+        self.job, self.kind, self.options, self.parts = job, kind, options, parts
         self.poses = sample_poses(job, kind.robot)
         self.corners = sample_poses(job, kind.robot, 2)
         self.outline = sample_poses(job, kind.robot, 3)
@@ -158,7 +195,14 @@ class KindEvaluator:
             return rating
         rating.robot = robot
         for stage, judge in enumerate(
-            (self._judge_reach, self._judge_room, self._choose_drives, self._judge_bounds), start=1
+            (
+                self._judge_reach,
+                self._judge_room,
+                self._judge_structure,
+                self._choose_drives,
+                self._judge_bounds,
+            ),
+            start=1,
         ):
             judge(rating)
             if rating.misses:
@@ -240,50 +284,123 @@ class KindEvaluator:
         for name, (share, words) in misses.items():
             rating.miss(name, share, words)
 
+    def _judge_structure(self, rating: Rating) -> None:
+        """Choose joints and rails by their loads; record violated limits of the structure."""
+        limits, tubes = self.job.limits, self.kind.tubes(rating.machine, rating.values)
+        poses = rating.middle + np.vstack([self.corners, rating.worst])
+        demand = self.demand(self.kind.numbers(rating.values).get("time"))
+        try:
+            light = Structure(self.add_payload(rating.machine), poses, demand, tubes)
+            parts = [
+                [
+                    cheapest_joint(self.parts, j.kind, _HEAVIER * j.force, _HEAVIER * j.moment)
+                    for j in joints
+                ]
+                for joints in light.joints
+            ]
+            lacking = [
+                joint
+                for joints, chosen in zip(light.joints, parts, strict=True)
+                for joint, part in zip(joints, chosen, strict=True)
+                if part is None
+            ]
+            if lacking:
+                worst = max(lacking, key=lambda joint: float(joint.force.max()))
+                words = f"no {worst.kind} joint for a load of {float(worst.force.max()):.3g} N"
+                rating.miss("joint loads", 1.0, words)
+                return
+            rating.joints, rating.parts = light.joints, parts
+            rating.robot = with_joint_parts(rating.machine, light.joints, parts)
+            structure = Structure(self.add_payload(rating.robot), poses, demand, tubes)
+        except PteronError:
+            rating.miss("loads", 1.0, "a singularity or the edge of its reach")
+            return
+        rating.structure = structure
+        if rating.robot.radii != light.robot.radii:  # rails are wider than was assumed
+            self._judge_room(rating)
+        for name, (figure, bound, at_least) in structure_figures(
+            structure, parts, limits, self.job.links
+        ).items():
+            rating.expect(name, figure, bound, at_least)
+
+    def demand(self, time: float | None) -> Demand:
+        """Return what motions and forces the structure must bear, with the cycles' greatest."""
+        count = len(self.kind.robot.platform.lengths)
+        speed, acceleration = self.job.motion.speed, self.job.motion.acceleration
+        turning = np.zeros(self.kind.robot.freedom - count)
+        for cycle in self.cycles:
+            duration = cycle.duration or time or 1.0
+            _, v, a = cycle.states
+            speed = max(speed, np.linalg.norm(v[..., :count], axis=-1).max() / duration)
+            most = np.linalg.norm(a[..., :count], axis=-1).max() / duration**2
+            acceleration = max(acceleration, most)
+            turning = np.maximum(turning, np.abs(a[..., count:]).max(axis=(0, 1)) / duration**2)
+        force = 0.0 if self.job.process is None else self.job.process.force
+        return Demand(float(speed), float(acceleration), turning, force)
+
+    def cycle_frequency(self, time: float | None) -> float:
+        """Return the greatest frequency, Hz, of a cycle, or of a sine with the required motion."""
+        rates = [1.0 / ((c.duration or time or 1.0) + c.dwell) for c in self.cycles]
+        motion = self.job.motion
+        if motion.speed and motion.acceleration:
+            rates.append(motion.acceleration / (2.0 * np.pi * motion.speed))
+        return max(rates, default=0.0)
+
+    @property
+    def sag(self) -> float:
+        """The permitted displacement of the tool by weights, m."""
+        limits, accuracy = self.job.limits, self.job.accuracy
+        if limits.sag is not None:
+            return limits.sag
+        return accuracy.most if accuracy else _SAG * 2.0 * float(self.job.workspace.half.max())
+
     def _choose_drives(self, rating: Rating) -> None:
         """Choose the cheapest drives that suffice for loads, accuracy and stiffness.
 
         The figures of the rating (masses, energy, errors) are recorded.
         """
-        robot = self.add_payload(rating.machine)
-        numbers = self.kind.numbers(rating.values)
+        robot, structure = self.add_payload(rating.machine), rating.structure
+        assert structure is not None  # the stage before has made it
+        time = self.kind.numbers(rating.values).get("time")
         try:
-            loads, work = self.loads(robot, rating, numbers.get("time"))
-            errors = gives = None
+            loads, states = self.loads(robot, rating, time)
+            errors = None
             if self.job.accuracy is not None:
                 poses = rating.middle + np.vstack([self.poses, rating.worst])
                 errors = unit_errors(self.job.accuracy, robot, poses)
-            if self.job.stiffness is not None:
-                poses = rating.middle + np.vstack([self.corners, rating.worst])
-                gives = compliances(robot, poses, self.sections(rating))
         except PteronError:
             rating.miss("loads", 1.0, "a singularity or the edge of its reach on a cycle")
             return
         options: list[Option | None] = [None] * robot.joint_count
-        margin, near = self.job.motors.margin, 0.0
+        near, frequency = 0.0, self.job.limits.frequency * self.cycle_frequency(time)
         for legs in self.groups:
-            all_ = self.options[robot.legs[legs[0]].joint.unit]
-            margins = loads.margins(all_, legs)
-            shares = {
-                "rated torque": margins[0] / margin,
-                "peak torque": margins[1] / margin,
-                "motor speed": margins[2] / margin,
-            }
+            all_ = self.options[joint_kind(robot.legs[legs[0]])]
+            travel = max(_travel(robot.legs[leg]) for leg in legs)
+            numbers = all_.numbers(travel)
+            shares = self._drive_shares(loads, structure, all_, numbers, legs)
             if self.job.accuracy is not None and errors is not None:
-                of_options = errors_with(self.job.accuracy, errors, *all_.numbers[[0, 5]])
+                of_options = errors_with(self.job.accuracy, errors, *numbers[[0, 5]])
                 shares["accuracy"] = self.job.accuracy.most / of_options
-            if self.job.stiffness is not None and gives is not None:
-                given_way = self.job.stiffness.force * compliance_with(gives, all_.numbers[6])
-                shares["stiffness"] = self.job.stiffness.most / given_way
-            every = np.array(list(shares.values()))
-            least = every.min(axis=0)
+            least = np.min(list(shares.values()), axis=0)
             good = np.flatnonzero(least >= 1.0)
-            if not len(good):
+            # Of drives of one stiffness all are too soft if one is.
+            soft, first = 0.0, None
+            for k in good:
+                if numbers[6, k] <= soft:
+                    continue
+                stiffness = np.full(robot.joint_count, numbers[6, k])
+                found = float(structure.frequency(stiffness).min())
+                if found >= frequency:
+                    first = int(k)
+                    break
+                soft = float(numbers[6, k])
+                shares["natural frequency"] = np.where(numbers[6] <= soft, found / frequency, 1.0)
+            if first is None:
+                least = np.min(list(shares.values()), axis=0)
                 best = int(least.argmax())
                 for name, share in shares.items():
                     _expect_share(rating, name, float(share[best]), all_.all[best].name)
                 return
-            first = int(good[0])
             if first:
                 near += float(1.0 - min(1.0, least[:first].max()))
             for leg in legs:
@@ -291,16 +408,53 @@ class KindEvaluator:
         rating.near = near / len(self.groups)
         rating.options = tuple(o for o in options if o is not None)
         pairs = zip(rating.machine.legs, rating.options, strict=True)
-        legs_with = tuple(replace(leg, drive=option.drive) for leg, option in pairs)
+        legs_with = tuple(replace(leg, drive=o.drive(_travel(leg))) for leg, o in pairs)
         rating.robot = replace(rating.machine, legs=legs_with)
-        friction = np.array([option.drive.coulomb for option in rating.options])
+        joint_prices = (
+            joint.count * part.price
+            for joints, chosen in zip(rating.joints, rating.parts, strict=True)
+            for joint, part in zip(joints, chosen, strict=True)
+        )
         rating.figures |= {
-            "price": float(sum(o.price for o in rating.options)),
-            "rated_power": float(sum(map(power, rating.options))),
+            "price": float(sum(o.price for o in rating.options) + sum(joint_prices)),
+            "rated_power": float(sum(option.power for option in rating.options)),
             "moving_mass": moving_mass(rating.robot),
-            "energy": self._energy([float((w + way @ friction).max()) for w, way in work]),
-            "cycle_time": numbers.get("time", 0.0),
+            "energy": self._energy(rating.robot, states),
+            "cycle_time": time or 0.0,
         }
+        check_room(rating, self.kind)
+
+    def _drive_shares(
+        self,
+        loads: JointLoads,
+        structure: Structure,
+        all_: Options,
+        numbers: Array,
+        legs: list[int],
+    ) -> dict[str, Array]:
+        """Return for each limit what each of O drives has over what it needs, (O,) each."""
+        limits = self.job.limits
+        rated, peak, speed = loads.margins(numbers, legs)
+        ratio, inertia = numbers[0], numbers[1]
+        held = float(structure.holding[:, legs].max())
+        held_torque = np.array([option.rated_torque for option in all_.all])
+        rotor = inertia * ratio**2
+        least, most = loads.inertia[:, legs]
+        shares = {
+            "rated torque": limits.rated * rated,
+            "holding torque": limits.rated * held_torque * ratio / max(held, 1e-12),
+            "peak torque": peak / self.job.motors.margin,
+            "motor speed": speed / self.job.motors.margin,
+            "load inertia over the rotor's": limits.inertia[1] * rotor / most.max(),
+            "rotor inertia over the load's": least.min() / rotor / limits.inertia[0],
+            "screw's buckling load": numbers[7]
+            / (limits.buckling * max(float(structure.actuators[:, legs].max()), 1e-12)),
+            "sag": self.sag / np.maximum(structure.sags(numbers[6]), 1e-12),
+        }
+        if self.job.stiffness is not None:
+            gives = structure.loads.tool_compliance(numbers[6]).max(axis=1)
+            shares["stiffness"] = self.job.stiffness.most / (self.job.stiffness.force * gives)
+        return shares
 
     def worst(
         self,
@@ -320,13 +474,6 @@ class KindEvaluator:
         pairs = [(c.share, (c.duration or time or 1.0) + c.dwell) for c in self.cycles if c.share]
         return np.array([share * duration for share, duration in pairs])
 
-    def _energy(self, worst: Sequence[float]) -> float:
-        """Return the energy of a cycle, J: mean weighted by the cycles' shares, or the maximum."""
-        shares = [cycle.share for cycle in self.cycles]
-        if not any(shares):
-            return max(worst, default=0.0)
-        return float(np.average(worst, weights=shares))
-
     def _judge_bounds(self, rating: Rating) -> None:
         """Record which figures of the design exceed the upper bounds of the job's `[most]`."""
         for name, most in self.job.most.model_dump(exclude_none=True).items():
@@ -339,16 +486,12 @@ class KindEvaluator:
         """Return the machine with the job's payload on its platform."""
         return self.job.payload.add_to(robot)
 
-    def sections(self, rating: Rating) -> dict[str, Section]:
-        """Return the cross-sections of a rated design's upper and lower links, by link."""
-        return link_sections(rating.machine, self.kind.link_stocks(rating.values))
-
     def loads(
         self, robot: Manipulator, rating: Rating, time: float | None
-    ) -> tuple[JointLoads, list[tuple[Array, Array]]]:
-        """Return the loads of all cycles at all places; each cycle's (work, joint travel)."""
+    ) -> tuple[JointLoads, list[CycleStates]]:
+        """Return the loads of all cycles at all places, and the joints' motion in each cycle."""
         n, middle = robot.joint_count, rating.middle
-        squares, forces, rises, work = [], [np.zeros((1, n))], [np.zeros((1, n))], []
+        squares, forces, rises, cycles = [], [np.zeros((1, n))], [np.zeros((1, n))], []
         speeds = np.zeros(n)
         for cycle in self.cycles:
             duration = cycle.duration or time or 1.0
@@ -362,23 +505,22 @@ class KindEvaluator:
             means = np.trapezoid(np.stack([f * f, f * a, a * a], axis=-1), axis=1)
             means = means * duration / (f.shape[1] - 1)
             squares.append((means + dwelling) / (duration + cycle.dwell))
-            step = duration / (f.shape[1] - 1)
-            energy = np.trapezoid(np.maximum(f * v, 0.0), axis=1).sum(axis=-1) * step
-            ways = np.trapezoid(np.abs(v), axis=1) * step
-            work.append((energy, ways))
+            cycles.append((f, a, v, duration / (f.shape[1] - 1)))
             forces.append(f.reshape(-1, n))
             rises.append(a.reshape(-1, n))
             speeds = np.maximum(speeds, np.abs(v).max(axis=(0, 1)))
         required = self.job.motion
         everywhere = np.zeros((2, n))
+        poses = middle + np.vstack([self.outline, rating.worst])
         if required.acceleration or required.speed:
-            poses = middle + np.vstack([self.outline, rating.worst])
             legs = tuple(replace(leg, drive=Drive(rotor_inertia=_HEAVY)) for leg in robot.legs)
             heavy, speed = replace(robot, legs=legs), max(required.speed, 1e-6)
             rise = required.acceleration
             everywhere[0] = worst_forces(robot, poses, speed, rise).max(axis=0)
             everywhere[1] = worst_forces(heavy, poses, speed, rise).max(axis=0) / _HEAVY
             speeds = np.maximum(speeds, worst_speeds(robot, poses, speed).max(axis=0))
+        inertias = moved_inertias(jacobian(robot, poses), mass_matrix(robot, poses))
+        process = 0.0 if rating.structure is None else rating.structure.process.max(axis=0)
         loads = JointLoads(
             tuple(squares) or (np.zeros((1, n, 3)),),
             self.shares(time),
@@ -386,13 +528,34 @@ class KindEvaluator:
             np.concatenate(rises),
             speeds,
             everywhere,
+            np.stack([inertias.min(axis=0), inertias.max(axis=0)]),
+            process + np.zeros(n),
         )
-        return loads, work
+        return loads, cycles
+
+    def _energy(self, robot: Manipulator, cycles: Sequence[CycleStates]) -> float:
+        """Return the energy that the drives give in a cycle, J, at its worst place, as `size` does.
+
+        Of cycles with shares it is their mean, of others the greatest.
+        """
+        drives = drives_of(robot)
+        worst = []
+        for f, a, v, step in cycles:
+            friction = drives.coulomb * np.tanh(v / drives.rest_speed)
+            given = np.maximum((f + drives.inertia * a + friction) * v, 0.0)
+            worst.append(float(np.trapezoid(given, axis=1).sum(axis=-1).max() * step))
+        shares = [cycle.share for cycle in self.cycles]
+        return float(np.average(worst, weights=shares)) if any(shares) else max(worst, default=0.0)
 
     def states(self, cycle: Places, middle: Array, duration: float) -> tuple[Array, Array, Array]:
         """Return poses, velocities and accelerations (B, K, m) of a cycle run in `duration` s."""
         pose, velocity, acceleration = cycle.states
         return middle + pose, velocity / duration, acceleration / duration**2
+
+
+def _travel(leg: Any) -> float:
+    """Return the travel of a slider or ram, m; 0 of a crank."""
+    return float(leg.limits[1] - leg.limits[0]) if leg.joint.unit == "m" else 0.0
 
 
 def _expect_share(rating: Rating, name: str, share: float, option: str) -> None:

@@ -6,11 +6,14 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, field_validator
 
-from pteron.bodies.tables import Count, Number, TomlTable, key
+from pteron.bodies.tables import Count, Number, TomlTable, Two, key
 from pteron.design.load_tables import Floor, Least, Names, PayloadTable, Positive
 from pteron.design.workspace_tables import Fine, Place, expect_near_points
 from pteron.errors import ModelError
 from pteron.manipulator.dimensions import Stock
+
+_LEAST_OUTER, _LEAST_WALL = 4e-3, 0.5e-3
+"""Least diameter and wall of a link, m: thinner ones are bent by hand."""
 
 
 class LoadTable(PayloadTable):
@@ -78,13 +81,56 @@ class StiffnessTable(TomlTable):
     most: Fine = key("m")
 
 
+class ProcessTable(TomlTable):
+    """`[process]`: the force of a process, such as milling, at the tool's centre point."""
+
+    force: Positive = key("in any direction, at every pose, for as long as it takes, N")
+
+
+class LimitsTable(TomlTable):
+    """`[limits]`: what an engineer asks of every machine; docs state where each comes from."""
+
+    rated: Annotated[Number, Field(gt=0.0, le=1.0)] = key(
+        "greatest torque to hold the machine at rest, and root mean square torque of the cycles, "
+        "over the rated torque of motor or gear",
+        0.9,
+    )
+    inertia: Two = key("least and greatest inertia of the load over that of the rotor", (0.1, 10.0))
+    sag: Fine | None = key(
+        "greatest displacement of the tool by payload and weight, m; else [accuracy] most, or "
+        "1/1000 of the workspace's longest side",
+        None,
+    )
+    stress: Annotated[Number, Field(gt=0.0, le=1.0)] = key(
+        "greatest stress over the material's strength", 0.5
+    )
+    buckling: Annotated[Number, Field(ge=1.0)] = key(
+        "least load at which a link buckles over its compression", 3.0
+    )
+    frequency: Annotated[Number, Field(ge=1.0)] = key(
+        "least natural frequency over that of the cycle", 5.0
+    )
+    joints: Annotated[Number, Field(gt=0.0, le=1.0)] = key(
+        "greatest load of a joint or guide over its rating", 1.0
+    )
+
+    @field_validator("inertia")
+    @classmethod
+    def _expect_range(cls, inertia: tuple[float, float]) -> tuple[float, float]:
+        """Return the inertia ratios; raise unless they are an interval of positive numbers."""
+        if not 0.0 < inertia[0] < inertia[1]:
+            raise ValueError(f"{list(inertia)} given, [least, greatest] above 0 expected")
+        return inertia
+
+
 class DriveListsTable(TomlTable):
     """`[motors]`: the lists of motors and gearboxes to choose from."""
 
     list: str | None = key("CSV or TOML file; else the package's examples", None)
     gearboxes: str | None = key("CSV file; else the package's examples", None)
+    joints: str | None = key("CSV file of joints and rails; else the package's examples", None)
     margin: Annotated[Number, Field(ge=1.0)] = key(
-        "what a drive must be able to do, over what is asked", 1.2
+        "peak torque and speed that a drive must have, over what is asked", 1.2
     )
     friction: Annotated[Number, Field(ge=0.0, lt=0.5)] = key(
         "dry friction as a share of the rated torque", 0.05
@@ -94,11 +140,21 @@ class DriveListsTable(TomlTable):
 class LinksTable(TomlTable):
     """`[links]`: the materials and sizes of the moving parts."""
 
-    upper: Names = key("stock of cranks, to choose", ["aluminium-tube:40x2", "aluminium-tube:60x3"])
-    lower: Names = key("stock of rods, to choose from", ["carbon-tube:12x1", "carbon-tube:20x1.5"])
+    upper: Names = key(
+        "stock of cranks and cylinders, to choose from",
+        [f"aluminium-tube:{size}" for size in ("30x2", "40x2", "60x3", "80x4", "120x5", "160x6")],
+    )
+    lower: Names = key(
+        "stock of rods and pistons, to choose from",
+        [
+            *(f"carbon-tube:{size}" for size in ("12x1", "20x1.5", "30x2", "40x2", "60x3")),
+            *(f"aluminium-tube:{size}" for size in ("80x4", "120x5")),
+        ],
+    )
+    slenderness: Two = key("least and greatest length of a link over its diameter", (2.5, 100.0))
+    pair: Positive = key("spacing of a pair of rods over the platform's radius", 1.2)
     plate: Positive = key("thickness of an aluminium platform, m", 0.006)
-    carriage: Positive = key("mass of what slides on a guide, kg", 0.4)
-    guide: Positive = key("half the width of a guide, m", 0.015)
+    carriage: Positive = key("mass of the bracket on a rail's carriage, kg", 0.2)
 
     @field_validator("upper", "lower")
     @classmethod
@@ -106,9 +162,16 @@ class LinksTable(TomlTable):
         """Return the names of bar stock; raise where a name cannot be parsed."""
         for name in names:
             try:
-                Stock.parse(name)
+                stock = Stock.parse(name)
             except ModelError as error:
                 raise ValueError(error.message) from None
+            wall = 0.5 * (stock.outer - stock.inner)
+            if stock.outer < _LEAST_OUTER or wall < _LEAST_WALL:
+                raise ValueError(
+                    f"{name}: a diameter of {1e3 * stock.outer:g} mm and a wall of "
+                    f"{1e3 * wall:g} mm given, at least {1e3 * _LEAST_OUTER:g} and "
+                    f"{1e3 * _LEAST_WALL:g} mm expected of a link"
+                )
         return names
 
 
@@ -123,7 +186,7 @@ class BodyFloorsTable(TomlTable):
 class KindSearchTable(TomlTable):
     """`[search]`: the length of the search, and its seed of random numbers."""
 
-    evaluations: Count = key("designs of each kind", 800)
+    evaluations: Count = key("designs of each kind", 400)
     seed: Annotated[int, Field(ge=0, strict=True)] = 0
 
 

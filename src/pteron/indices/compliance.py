@@ -9,16 +9,20 @@ from numpy.typing import ArrayLike
 
 from pteron.dynamics import mass_matrix
 from pteron.errors import DataError, ModelError
-from pteron.indices.elasticity import Elasticity, Section, Springs
+from pteron.indices.elasticity import Elasticity
 from pteron.indices.internal_forces import (
     Equations,
     balance_loads,
     blocks,
-    force_units,
-    platform_wrench,
-    wrench_shift,
 )
 from pteron.indices.sensitivities import tool_arm
+from pteron.indices.strains import (
+    FREE,
+    energy_matrix,
+    least_energy_forces,
+    strains_of,
+    unit_loads,
+)
 from pteron.kernels import Array, as_array
 from pteron.kinematics import twist
 from pteron.kinematics.evaluate import evaluate_kernel, finite_rows
@@ -26,12 +30,6 @@ from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.renamed import former_attribute
 from pteron.result import Result
 from pteron.shapes import Matrices, Numbers, OnFailure, PerCoordinate, PoseLike
-
-_GAUSS = 0.5 - 0.5 / np.sqrt(3.0), 0.5 + 0.5 / np.sqrt(3.0)
-"""Gauss points along a beam: its energy is quadratic along it, so that two are exact."""
-
-_FREE = 1e-12
-"""Compliance to a self-stress, as a share of the largest, below which it counts as none."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -192,28 +190,16 @@ def _block_compliance(
         robot, "reactions", "nan", poses, zero_rates, zero_rates
     )
     link_lines: tuple[Array, ...] = evaluate_kernel(robot, "beams", "nan", poses)
-    mass: Array = mass_matrix(robot, poses, on_failure="nan")
     size = len(robot.platform.wrench_columns)
     compliance, frequencies = np.full((batch, size, size), np.nan), np.full((batch, m), np.nan)
     solvable = np.asarray(np.isfinite(outputs[0]).all(axis=(-2, -1)))
     if solvable.any():
         balance = Equations(*(array[solvable] for array in outputs))
         beams = [array[solvable] for array in link_lines]
-        energy = _energy_matrix(
-            elasticity.leg_springs(robot), elasticity.rod_distance, balance, beams
-        )
+        energy = energy_matrix(strains_of(elasticity, robot, balance, beams))
         point_compliance = _compliance(robot, balance, energy, np.zeros((len(energy), 3)))
         compliance[solvable] = point_compliance
-        if robot.platform.wrench_in_base_axes:
-            twists = twist(robot, poses[solvable][:, None], np.eye(m)).mT
-            size_of_legs = float(np.mean([leg.size for leg in robot.legs]))
-            point_compliance = np.stack(
-                [
-                    _constrained_compliance(*state, size_of_legs)
-                    for state in zip(point_compliance, twists, strict=True)
-                ]
-            )
-        frequencies[solvable] = _frequencies(point_compliance, mass[solvable])
+        frequencies[solvable] = natural_frequencies(robot, poses[solvable], point_compliance)
         if any(robot.platform.tool):
             arm = tool_arm(robot, poses[solvable])
             compliance[solvable] = _compliance(robot, balance, energy, arm)
@@ -222,7 +208,7 @@ def _block_compliance(
 
 def _compliance(robot: Manipulator, balance: Equations, energy: Array, arm: Array) -> Array:
     """Return the compliance C (B, m, m), or (B, 6, 6), at a point `arm` (B, 3), m, away from P."""
-    load, applied = _unit_loads(robot, balance, arm)
+    load, applied = unit_loads(robot, balance, arm)
     batch, _, count = load.shape
     right = np.zeros((batch, balance.rows.shape[-2], count))
     presumed = np.zeros((batch, balance.presumed_rows.shape[-2], count))
@@ -230,110 +216,9 @@ def _compliance(robot: Manipulator, balance: Equations, energy: Array, arm: Arra
     if presumed.size:  # else a joint holds what the legs do not
         presumed[:, :6] = -load
     balanced = balance_loads(robot, balance, right, presumed)
-    forces, stresses = balanced.forces, balanced.stresses
-    if stresses.shape[-1]:  # the self-stress of the least energy
-        energies, directions = np.linalg.eigh(stresses.mT @ energy @ stresses)
-        energy_scale = (force_units(robot) ** 2 * np.diagonal(energy, axis1=-2, axis2=-1)).sum(
-            axis=-1
-        )
-        resisting = energies > _FREE * energy_scale[:, None]
-        energy_inverse = (
-            directions @ (directions / np.where(resisting, energies, np.inf)[:, None]).mT
-        )
-        forces = forces - stresses @ energy_inverse @ (stresses.mT @ energy @ forces)
+    forces = least_energy_forces(robot, balanced, energy)
     compliance = forces.mT @ energy @ forces
     return np.asarray(0.5 * (compliance + compliance.mT))
-
-
-def _unit_loads(robot: Manipulator, balance: Equations, arm: Array) -> tuple[Array, Array]:
-    """Return unit loads at a point as wrenches about P (B, 6, K) and pose forces (B, m, K)."""
-    batch, m = len(arm), robot.freedom
-    if robot.platform.wrench_in_base_axes:
-        load = wrench_shift(arm)
-        return load, balance.loads @ load
-    wrench = np.broadcast_to(np.eye(m), (batch, m, m)).copy()  # a row for each unit load
-    force = platform_wrench(robot, wrench, np.zeros(3))[..., :3]
-    moment = np.cross(arm[:, None], force)
-    if robot.platform.angles:
-        axis = np.array(robot.platform.axis)
-        wrench[..., robot.platform.angular] += moment @ axis[:, None]
-        # `platform_wrench` has the part about the axis from the wrench.
-        moment = moment - (moment @ axis)[..., None] * axis
-    return platform_wrench(robot, wrench, moment).mT, wrench.mT
-
-
-def _energy_matrix(
-    springs: Springs, rod_distance: float | None, balance: Equations, links: list[Array]
-) -> Array:
-    """Return W (B, 6 n, 6 n): internal forces w of the legs have the elastic energy w^T W w / 2."""
-    actuators, sections = springs
-    starts, ways, axes, couples = links
-    batch, n = couples.shape[:2]
-    rows = balance.driven_rows
-    energy = rows.mT @ (rows / np.array(actuators)[:, None])
-    for i in range(n):
-        block = np.zeros((batch, 6, 6))
-        rods = bool(np.isfinite(couples[:, i]).all())
-        for k, section in enumerate(sections[i]):
-            if section is None or np.isnan(ways[:, i, k]).any():
-                continue
-            if rods and k == 1:
-                block += _rod_energy(section, ways[:, i, k], couples[:, i], rod_distance)
-            else:
-                arms = balance.ends[:, i] - starts[:, i, k]
-                block += _beam_energy(section, arms, ways[:, i, k], axes[:, i, k])
-        energy[:, 6 * i : 6 * i + 6, 6 * i : 6 * i + 6] += block
-    return np.asarray(energy)
-
-
-def _rod_energy(section: Section, way: Array, couple: Array, distance: float | None) -> Array:
-    """Return the energy matrix (B, 6, 6) of a rod, or of a pair of rods with a couple."""
-    length = np.linalg.norm(way, axis=-1)
-    n = way / length[:, None]
-    energy = np.zeros((len(way), 6, 6))
-    energy[:, :3, :3] = _square(n) * (length / section.axial)[:, None, None]
-    if distance is not None and couple.any():
-        # The couple is |bar x n| times their distance, times half the difference of their forces.
-        size = np.linalg.norm(couple, axis=-1)
-        unit = couple / size[:, None]
-        spacing = distance * size / length
-        energy[:, 3:, 3:] = (
-            _square(unit) * (4 * length / (section.axial * spacing**2))[:, None, None]
-        )
-    return energy
-
-
-def _beam_energy(section: Section, arm: Array, way: Array, axis: Array) -> Array:
-    """Return the energy matrix (B, 6, 6) of a beam, for the wrench at c, `arm` from its start.
-
-    The beam bends in its leg's plane about `axis`, and across it.
-    """
-    length = np.linalg.norm(way, axis=-1)
-    x = way / length[:, None]
-    z = axis - (axis * x).sum(axis=-1, keepdims=True) * x
-    size = np.linalg.norm(z, axis=-1, keepdims=True)
-    # A shaft's axis is along it: it has no plane, and any direction will do.
-    other = np.cross(x, np.eye(3)[np.abs(x).argmin(axis=-1)])
-    z = np.where(size > 1e-6, z, other)
-    z = z / np.linalg.norm(z, axis=-1, keepdims=True)
-    y = np.cross(z, x)
-    energy = np.zeros((len(way), 6, 6))
-    for share in _GAUSS:
-        shift = wrench_shift(arm - share * way)
-        for v, part, rigidity in (
-            (x, slice(3), section.axial),
-            (x, slice(3, 6), section.torsion),
-            (y, slice(3, 6), section.sideways),
-            (z, slice(3, 6), section.bending),
-        ):
-            row = np.einsum("bi,bij->bj", v, shift[:, part])
-            energy += _square(row) * (0.5 * length / rigidity)[:, None, None]
-    return energy
-
-
-def _square(rows: Array) -> Array:
-    """Return the products r r^T (B, n, n) of rows (B, n)."""
-    return np.asarray(rows[:, :, None] * rows[:, None, :])
 
 
 def _constrained_compliance(compliance: Array, twists: Array, length: float) -> Array:
@@ -346,18 +231,27 @@ def _constrained_compliance(compliance: Array, twists: Array, length: float) -> 
     scale = np.array([1.0, 1.0, 1.0, length, length, length])
     compliances, axes = np.linalg.eigh(scale[:, None] * compliance * scale)
     scaled = axes.T @ (scale[:, None] * twists)
-    soft = compliances > _FREE * compliances[-1]
+    soft = compliances > FREE * compliances[-1]
     sizes, rows = np.linalg.svd(scaled[~soft], full_matrices=True)[1:]
-    rank = int((sizes > np.sqrt(_FREE) * np.linalg.norm(scaled)).sum())
+    rank = int((sizes > np.sqrt(FREE) * np.linalg.norm(scaled)).sum())
     allowed = rows[rank:].T
     soft_motions = scaled[soft] @ allowed
     stiffness_of_free = soft_motions.T @ (soft_motions / compliances[soft, None])
     return np.asarray(allowed @ np.linalg.solve(stiffness_of_free, allowed.T))
 
 
-def _frequencies(compliance: Array, mass: Array) -> Array:
-    """Return natural frequencies (B, m), Hz, from compliance and mass matrix."""
-    lower = np.linalg.cholesky(mass)
+def natural_frequencies(robot: Manipulator, poses: Array, compliance: Array) -> Array:
+    """Return natural frequencies (B, m), Hz, at poses (B, m) with a compliance (B, c, c) at P."""
+    if robot.platform.wrench_in_base_axes:
+        twists = twist(robot, poses[:, None], np.eye(robot.freedom)).mT
+        size_of_legs = float(np.mean([leg.size for leg in robot.legs]))
+        compliance = np.stack(
+            [
+                _constrained_compliance(*state, size_of_legs)
+                for state in zip(compliance, twists, strict=True)
+            ]
+        )
+    lower = np.linalg.cholesky(mass_matrix(robot, poses))
     squares = np.linalg.eigvalsh(lower.mT @ compliance @ lower)[:, ::-1]
     with np.errstate(divide="ignore"):
         return np.asarray(1.0 / (2 * np.pi * np.sqrt(np.maximum(squares, 0.0))))

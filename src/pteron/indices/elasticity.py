@@ -31,21 +31,33 @@ class Material:
         E, Pa.
     shear : float
         G, Pa.
+    strength : float
+        Stress at which it yields, or breaks under pressure, Pa.
+    density : float
+        kg/m^3.
     """
 
     young: float
     shear: float
+    strength: float = math.inf
+    density: float = math.inf
 
     def __post_init__(self) -> None:
-        for name in ("young", "shear"):
+        for name in ("young", "shear", "strength", "density"):
             object.__setattr__(self, name, _positive_number(name, getattr(self, name)))
 
 
-STEEL = Material(210e9, 81e9)
-"""Steel: 210 and 81 GPa."""
+STEEL = Material(210e9, 81e9, 235e6, 7850.0)
+"""Steel of precision tubes, E235 of EN 10305: 210 and 81 GPa, yields at 235 MPa."""
 
-ALUMINIUM = Material(70e9, 26e9)
-"""Aluminium: 70 and 26 GPa."""
+ALUMINIUM = Material(70e9, 26e9, 160e6, 2700.0)
+"""Aluminium 6060-T66 of EN 755-2: 70 and 26 GPa, yields at 160 MPa."""
+
+CARBON = Material(120e9, 5e9, 400e6, 1600.0)
+"""Carbon fibre in resin, mostly along the tube: breaks under 400 MPa of pressure."""
+
+MATERIALS = {"steel": STEEL, "aluminium": ALUMINIUM, "carbon": CARBON}
+"""Materials of bar stock by name."""
 
 
 @dataclass(frozen=True)
