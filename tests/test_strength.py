@@ -82,7 +82,7 @@ def test_sag_and_stress_are_those_of_beams(crank_mass):
     assert structure.holding[0] == pytest.approx(abs(torque), rel=1e-7)
     # The joints' loads, and the crank's stress at its root.
     elbow = structure.joints[0][0]
-    assert (elbow.kind, elbow.count) == ("ball", 2)
+    assert (elbow.kind, elbow.parts) == ("ball", 2)
     assert elbow.force[0] == pytest.approx(tension / 2.0, rel=1e-6)
     modulus = CRANK.second_moment / (CRANK.outer / 2.0)
     bump = abs(q_across) * a**2 / 8.0  # counted in full, though it is not at the root

@@ -12,11 +12,12 @@ from numpy.typing import ArrayLike
 
 from pteron.design.candidate import Candidate
 from pteron.design.cycle_places import Places
+from pteron.design.kind_evaluator import KindEvaluator
 from pteron.design.kind_search import pareto_ratings
 from pteron.design.limit_rows import DENSE, limit_rows
 from pteron.design.load_margins import margins_of
 from pteron.design.proofs import is_clear, kind_proofs, proof_sentence
-from pteron.design.rating import KindEvaluator, Rating
+from pteron.design.rating import Rating
 from pteron.design.structure import Structure
 from pteron.design.tool_errors import greatest_errors, joint_errors, tolerances
 from pteron.design.workspace_samples import sample_poses
@@ -140,7 +141,7 @@ def _candidate(
         def gives(poses: Array) -> Array:
             """Return the tool's least stiffness (K,), N/m, at poses (K, m)."""
             loads = Structure(loaded_robot, poses, still, tubes).loads
-            return 1.0 / loads.tool_compliance(stiffnesses[:1])[0]
+            return np.asarray(1.0 / loads.tool_compliance(stiffnesses[:1])[0])
 
         figures["deflection"] = float(required.force / least(gives))
     cycle = _cycle_at(rating, margins.place)
@@ -212,7 +213,7 @@ def _part_counts(rating: Rating) -> dict[str, int]:
     counts: Counter[str] = Counter()
     for joints, parts in zip(rating.joints, rating.parts, strict=True):
         for joint, part in zip(joints, parts, strict=True):
-            counts[part.name] += joint.count
+            counts[part.name] += joint.parts
     return dict(counts)
 
 

@@ -15,9 +15,9 @@ from pteron.atomic import write_text
 from pteron.design.best_design import prove_best_design
 from pteron.design.candidate import Candidate
 from pteron.design.job import Job
+from pteron.design.kind_evaluator import KindEvaluator
 from pteron.design.kind_search import search_kind
 from pteron.design.kinds import Kind, fitting_kinds, joint_kind
-from pteron.design.rating import KindEvaluator
 from pteron.errors import DataError, PteronError, warn_unlikely
 from pteron.html_table import Overview, frame_overview
 from pteron.json_values import json_ready

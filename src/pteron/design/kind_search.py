@@ -9,7 +9,8 @@ import numpy as np
 import scipy  # type: ignore[import-untyped]
 
 from pteron.design.evolution import latin_hypercube, pareto_front
-from pteron.design.rating import KindEvaluator, Rating
+from pteron.design.kind_evaluator import KindEvaluator
+from pteron.design.rating import Rating
 from pteron.kernels import Array, sharing_programs
 from pteron.progress import Progress
 

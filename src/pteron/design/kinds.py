@@ -271,7 +271,7 @@ def with_joint_parts(
                 continue
             letter, x = ends[joint.link]
             body: Any = bodies[letter]
-            added = _point_mass(body, joint.count * part.mass, x)
+            added = _point_mass(body, joint.parts * part.mass, x)
             bodies[letter] = body.of_values(np.add(body.values, added).tolist())
         legs.append(leg.with_bodies(bodies))
     radii = robot.radii and replace(robot.radii, guide=rail or robot.radii.guide)

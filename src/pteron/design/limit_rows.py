@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pteron.design.kind_evaluator import KindEvaluator
 from pteron.design.machine_space import tool_places
-from pteron.design.rating import KindEvaluator, Rating
+from pteron.design.rating import Rating
 from pteron.design.structure import Structure
 from pteron.dynamics import mass_matrix
 from pteron.dynamics.joint_space import moved_inertias

@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from pteron.design.cycle_places import Places, neighbour_places
 from pteron.design.joint_loads import duty_cycle_mean
+from pteron.design.kind_evaluator import KindEvaluator
 from pteron.design.limit_rows import DENSE, place_text
-from pteron.design.rating import KindEvaluator
 from pteron.design.workspace_samples import refine_worst_values
 from pteron.design.worst_cases import worst_forces, worst_speeds
 from pteron.dynamics import drive_forces
@@ -69,7 +68,7 @@ def margins_of(
     robot: Manipulator,
     middle: Array,
     time: float | None,
-    process: ArrayLike = 0.0,
+    process: Array | float = 0.0,
 ) -> LoadMargins:
     """Return the drives' margins (limit over load) for all cycles and motions of the job.
 
@@ -105,7 +104,7 @@ def margins_of(
             places = neighbour_places(evaluator.job, places, worst, 0.5 ** (step + 1))
         squares.append(greatest)
     if len(shares):
-        load = np.sqrt(duty_cycle_mean(np.array(squares), shares)) + process
+        load = np.asarray(np.sqrt(duty_cycle_mean(np.array(squares), shares)) + process)
         least = float(least_margins.take("rated_margin", rated, load[None])[0])
         least_margins.note_place(least, "the rated torque of the whole duty cycle")
     required = evaluator.job.motion
@@ -117,7 +116,7 @@ def margins_of(
             poses = middle + places
             forces = worst_forces(robot, poses, speed, required.acceleration) + process
             loads = np.hstack([forces, worst_speeds(robot, poses, speed)])
-            return np.append(most, fastest) / np.maximum(loads, _NOTHING)
+            return np.asarray(np.append(most, fastest) / np.maximum(loads, _NOTHING))
 
         margins, where = refine_worst_values(evaluator.job, robot, motion_margins, DENSE, keep=2)
         least_margins.note("peak_margin", float(margins[: len(most)].min()))

@@ -127,8 +127,10 @@ class MachineSpace:
         for i, low, high in _guides(robot):
             others = np.delete(points, i, axis=-3)
             starts, ends = others[..., :-1, :].reshape(-1, 3), others[..., 1:, :].reshape(-1, 3)
-            guide = (np.tile(end[:, None], len(starts)) for end in (low, high))
-            distances.append(float(np.nanmin(segment_distances(*guide, starts.T, ends.T))) - thick)
+            first, last = (np.tile(end[:, None], len(starts)) for end in (low, high))
+            distances.append(
+                float(np.nanmin(segment_distances(first, last, starts.T, ends.T))) - thick
+            )
         return float(min(distances))
 
     @cached_property

@@ -2,94 +2,88 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import combinations
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pteron.design.kinds import Kind, joint_kind
+from pteron.design.kinds import joint_kind
 from pteron.design.machine_space import segment_distances
+from pteron.design.structure import Joint
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator
+from pteron.parts.drives import Option
+from pteron.parts.joints import JointPart
 
-if TYPE_CHECKING:
-    from pteron.design.rating import Rating
+Joints = Sequence[Sequence[Joint]]
+Parts = Sequence[Sequence[JointPart]]
 
 _Capsules = list[tuple[int, Array, Array, float]]
 """Leg, both ends of the middle line (3,), and radius, m, of each part."""
 
-_ROOM = 0.01
-"""Length, m, of overlap that costs as much as a bound missed by 100 %."""
 
-
-def room_between_parts(rating: Rating, kind: Kind) -> tuple[float, str]:
+def room_between_parts(
+    robot: Manipulator, options: Sequence[Option], joints: Joints, parts: Parts, spacing: float
+) -> tuple[float, str]:
     """Return the least distance, m, of parts of different legs, below 0 if they overlap, and where.
 
     Motor and gearbox of a crank lie along its axis, on one side of all cranks; that of a slider
-    beyond one end of its rail, along it; that of a ram is in line with the ram.
+    beyond one end of its rail, along it; that of a ram is in line with the ram. The rods of a pair
+    are `spacing` apart, m.
     """
-    robot = rating.machine
-    base = max((_least_distance(_on_base(rating, side)), "on the base") for side in (1.0, -1.0))
-    platform = _least_distance(_on_platform(rating, kind, robot)), "on the platform"
+    sides = (_on_base(robot, options, joints, parts, side) for side in (1.0, -1.0))
+    base = max(map(_least_distance, sides)), "on the base"
+    platform = _least_distance(_on_platform(robot, joints, parts, spacing)), "on the platform"
     return min(base, platform)
 
 
-def check_room(rating: Rating, kind: Kind) -> None:
-    """Record a violation where parts of different legs overlap."""
-    distance, where = room_between_parts(rating, kind)
-    if distance < 0.0:
-        words = f"drives, rails or joints overlap by {-1e3 * distance:.3g} mm {where}"
-        rating.miss("room for parts", -distance / _ROOM, words)
-
-
-def _on_base(rating: Rating, side: float) -> _Capsules:
+def _on_base(
+    robot: Manipulator, options: Sequence[Option], joints: Joints, parts: Parts, side: float
+) -> _Capsules:
     """Return the parts on the base, motors on one `side` (1 or -1) of cranks and rails."""
     capsules: _Capsules = []
-    legs = zip(rating.machine.legs, rating.options, rating.joints, rating.parts, strict=True)
-    for i, (leg, option, joints, parts) in enumerate(legs):
+    for i, (leg, option) in enumerate(zip(robot.legs, options, strict=True)):
         width, length = option.outline
         start, kind = np.array(leg.guide_point), joint_kind(leg)
+        base = [
+            (joint.kind, part.diameter)
+            for joint, part in zip(joints[i], parts[i], strict=True)
+            if joint.link == "base"
+        ]
         if kind == "rad":
-            end = start + side * length * np.array(leg.direction)
+            end = start + side * length * np.array(leg.joint_axis)
             capsules.append((i, start, end, 0.5 * width))
         elif kind == "slider":
-            rail = max(p.diameter for j, p in zip(joints, parts, strict=True) if j.kind == "guide")
+            rail = max(diameter for name, diameter in base if name == "guide")
             axis = np.array(leg.joint_axis)
             low, high = (start + x * axis for x in leg.limits or (0.0, 0.0))
             capsules.append((i, low, high, 0.5 * rail))
             end = high if side > 0.0 else low
             capsules.append((i, end, end + side * length * axis, 0.5 * width))
         else:
-            widest = max(
-                [
-                    width,
-                    *(p.diameter for j, p in zip(joints, parts, strict=True) if j.link == "base"),
-                ]
-            )
+            widest = max([width, *(diameter for _, diameter in base)])
             capsules.append((i, start, start, 0.5 * widest))
     return capsules
 
 
-def _on_platform(rating: Rating, kind: Kind, robot: Manipulator) -> _Capsules:
+def _on_platform(robot: Manipulator, joints: Joints, parts: Parts, spacing: float) -> _Capsules:
     """Return the outermost joints in the platform's frame; of a pair of rods both as one bar."""
-    spacing = kind.links.pair * kind.platform_radius(robot)
     frame = np.array(robot.platform.frame)
     capsules: _Capsules = []
-    for i, (leg, joints, parts) in enumerate(
-        zip(robot.legs, rating.joints, rating.parts, strict=True)
-    ):
+    for i, leg in enumerate(robot.legs):
         outer = [
-            (j, p) for j, p in zip(joints, parts, strict=True) if j.link in ("lower", "platform")
+            (joint.parts, part.diameter)
+            for joint, part in zip(joints[i], parts[i], strict=True)
+            if joint.link in ("lower", "platform")
         ]
         if not outer:
             continue
-        joint, part = outer[-1]
+        count, diameter = outer[-1]
         at = np.array(leg.platform_point) @ frame + leg.fixed_offset
         half = np.zeros(3)
-        if joint.count > 1:
-            bar = np.array(getattr(leg, "bar_direction", None) or leg.direction)
-            half = 0.5 * spacing * bar / np.linalg.norm(bar)
-        capsules.append((i, at - half, at + half, 0.5 * part.diameter))
+        if count > 1 and (bar := leg.bar or leg.joint_axis) is not None:
+            half = 0.5 * spacing * np.array(bar) / np.linalg.norm(bar)
+        capsules.append((i, at - half, at + half, 0.5 * diameter))
     return capsules
 
 

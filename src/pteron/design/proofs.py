@@ -14,7 +14,8 @@ from functools import lru_cache
 import numpy as np
 
 from pteron.design.design import Design
-from pteron.design.rating import KindEvaluator, Rating
+from pteron.design.kind_evaluator import KindEvaluator
+from pteron.design.rating import Rating
 from pteron.design.regions import kind_regions, placed_pose, workspace_region
 from pteron.design.spec import ROUNDING
 from pteron.design.task import Task

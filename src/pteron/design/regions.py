@@ -8,7 +8,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from pteron.design.rating import KindEvaluator
+from pteron.design.kind_evaluator import KindEvaluator
 from pteron.design.workspace_samples import orientations, poses_about_tool
 from pteron.design.workspace_tables import WorkspaceTable
 from pteron.kernels import Array

@@ -66,7 +66,7 @@ class Joint(NamedTuple):
     """Key of the link whose outer end it is; "base" of the first one."""
     kind: str
     """One of the kinds of parts: ball, universal, revolute or guide."""
-    count: int
+    parts: int
     """Number of equal parts side by side."""
     force: Array
     """(B,): N on each part."""
@@ -130,7 +130,7 @@ class Structure:
             normal = axial / tube.area + bending[:, :, k] / (tube.count * modulus)
             shear = most[:, :, k, :, TORSION].max(axis=-1) / (2.0 * tube.count * modulus)
             shares.append(np.sqrt(normal**2 + 3.0 * shear**2) / tube.material.strength)
-        return np.nanmax(np.stack(shares, axis=-1), axis=(1, 2))
+        return np.asarray(np.nanmax(np.stack(shares, axis=-1), axis=(1, 2)))
 
     @cached_property
     def buckling_factor(self) -> Array:
@@ -144,7 +144,7 @@ class Structure:
             lengths = effective * self.loads.lengths[:, :, k]
             limit = tube.buckling_load(1.0) / lengths**2
             factors.append(limit / np.maximum(pressed, 1e-9))
-        return np.nanmin(np.stack(factors, axis=-1), axis=(1, 2))
+        return np.asarray(np.nanmin(np.stack(factors, axis=-1), axis=(1, 2)))
 
     @cached_property
     def link_frequency(self) -> Array:
@@ -153,7 +153,7 @@ class Structure:
             tube.bending_frequency(1.0) / self.loads.lengths[:, :, k] ** 2
             for k, tube in enumerate(self._tubes)
         ]
-        return np.nanmin(np.stack(rates, axis=-1), axis=(1, 2))
+        return np.asarray(np.nanmin(np.stack(rates, axis=-1), axis=(1, 2)))
 
     def frequency(self, actuators: Array) -> Array:
         """Return the first natural frequency (B,), Hz, with these actuator stiffnesses (n,)."""
@@ -223,7 +223,7 @@ class Structure:
             for joints, chosen in zip(self.joints, parts, strict=True)
             for joint, part in zip(joints, chosen, strict=True)
         ]
-        return np.max([np.zeros(len(self.poses)), *shares], axis=0)
+        return np.asarray(np.max([np.zeros(len(self.poses)), *shares], axis=0))
 
 
 def structure_figures(
@@ -257,7 +257,7 @@ def _groups(points: Array, leg: LegKind, robot: Manipulator) -> list[tuple[int, 
     that of a ram is inside it.
     """
     groups: list[list[int]] = []
-    for k in np.flatnonzero(np.isfinite(points).all(axis=-1)):
+    for k in map(int, np.flatnonzero(np.isfinite(points).all(axis=-1))):
         together = groups and np.linalg.norm(points[k] - points[groups[-1][0]]) < _TOGETHER
         groups[-1].append(k) if together else groups.append([k])
     planar, rods = robot.platform.plane_normal is not None, hasattr(leg, "rods")
@@ -332,7 +332,7 @@ class _Cases:
                     changes[:, self._crossed][:, at] - diagonal[..., i] - diagonal[..., j]
                 )
                 quadratic[..., i, j] = quadratic[..., j, i] = half
-            known = np.isfinite(quadratic).all(axis=(-2, -1))
+            known = np.asarray(np.isfinite(quadratic).all(axis=(-2, -1)))
             eigenvalues = np.linalg.eigvalsh(np.where(known[..., None, None], quadratic, 0.0))
             spread = spread + np.where(known, np.abs(eigenvalues).max(axis=-1), np.nan)
         return middle, spread

@@ -165,7 +165,8 @@ def link_loads(
 
     per_case = [at(case) for case in range(cases)]
     balance = per_case[0]
-    links = [np.asarray(part) for part in evaluate_kernel(robot, "beams", "nan", poses)]
+    outputs: tuple[Array, ...] = evaluate_kernel(robot, "beams", "nan", poses)
+    links = list(outputs)
     strains = strains_of(elasticity, robot, balance, links)
     arms = tool_arm(robot, poses)
     right = np.stack([equations.right for equations in per_case], axis=-1)

@@ -18,7 +18,7 @@ POSITIVE, NOT_NEGATIVE = "a number above 0", "0 or more"
 """What is expected of a number, in words."""
 
 
-def expected_number(expected: str, **default: float) -> Any:
+def expected_number(expected: str, **default: Any) -> Any:
     """Return a dataclass field of a number with what is expected of it, in words."""
     return field(metadata={"expected": expected}, **default)
 
@@ -58,5 +58,6 @@ def read_parts(path: str | Path, part: type[_Part], joints: Mapping[str, str]) -
                 raise DataError(
                     f"{table.place(k)}: {f.name}: {number:g} given, {expected} expected"
                 )
-        parts.append(part(name=str(table.frame["name"][k]), joint=joint, **values))
+        make: Any = part
+        parts.append(make(name=str(table.frame["name"][k]), joint=joint, **values))
     return tuple(parts)

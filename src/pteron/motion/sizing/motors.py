@@ -118,7 +118,7 @@ class Motor:
         """The given torsional stiffness of the shaft, or an estimate from peak torque, N m/rad."""
         if not math.isnan(self.stiffness):
             return self.stiffness
-        diameter = (16.0 * self.peak_torque / (math.pi * _SHEAR)) ** (1.0 / 3.0)
+        diameter = float(np.cbrt(16.0 * self.peak_torque / (math.pi * _SHEAR)))
         return _STEEL_SHEAR * math.pi * diameter**3 / (32.0 * _SHAFT)
 
     @property
