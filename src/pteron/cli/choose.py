@@ -125,7 +125,7 @@ def _show(choice: Choice) -> None:
     for candidate in serving:
         show(
             f"[bold]{candidate.kind}[/bold]: {plain(candidate.drive_text)}",
-            f"  joints: {plain(candidate.part_text)}",
+            f"  parts: {plain(candidate.part_text)}",
             f"  dimensions (mm): {candidate.dimension_text}",
             f"  {plain(candidate.proved)}",
             f"  {plain(candidate.clear)}",

@@ -165,6 +165,11 @@ def _candidate(
         tuple(row.as_dict() for row in limits),
         tuple(examine_text(text_of(robot))),
         _part_counts(rating),
+        {
+            key: name
+            for key, name in evaluator.kind.link_stocks(rating.values).items()
+            if key in evaluator.kind.tubes(robot, rating.values)
+        },
         "" if cycle is None else _table_text(robot, cycle),
     )
 

@@ -66,6 +66,8 @@ class Candidate(Result):
         What `pteron check` warns of.
     parts : dict
         Numbers of joints and rails, by name.
+    stocks : dict
+        What the links are cut from, by their key: upper (cranks) and lower (rods).
     cycle : str
         The cycle at its worst place, a CSV file as `pteron size --cycle` takes it.
     """
@@ -87,6 +89,7 @@ class Candidate(Result):
     limits: tuple[dict[str, Any], ...] = ()
     checked: tuple[str, ...] = ()
     parts: dict[str, int] = field(default_factory=dict)
+    stocks: dict[str, str] = field(default_factory=dict)
     cycle: str = ""
 
     def __repr__(self) -> str:
@@ -142,8 +145,9 @@ class Candidate(Result):
 
     @property
     def part_text(self) -> str:
-        """Numbers and names of the joints and rails as text."""
-        return ", ".join(f"{count} x {name}" for name, count in self.parts.items())
+        """What links are cut from, and numbers and names of joints and rails, as text."""
+        links = [f"{key} links {stock}" for key, stock in self.stocks.items()]
+        return ", ".join([*links, *(f"{count} x {name}" for name, count in self.parts.items())])
 
     @property
     def limit_rows(self) -> list[LimitRow]:
