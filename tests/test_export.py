@@ -595,12 +595,28 @@ def test_what_the_joints_are_is_said(tmp_path):
         ].read_text()
         for name in ("delta", "mixed", "quadrupteron")
     }
-    assert "in  joints (3): joint coordinates, rad\n" in texts["delta"]
-    assert "out forces (3): actuator forces, N m, positive" in texts["delta"]
-    assert "out forces (3): actuator forces, N, N m, N m (leg by leg), positive" in texts["mixed"]
+    assert "in  joints (3): joint coordinates leg by leg, rad\n" in texts["delta"]
+    assert "out forces (3): actuator forces leg by leg, N m, positive" in texts["delta"]
+    assert "out forces (3): actuator forces leg by leg, N, N m, N m, positive" in texts["mixed"]
     assert "bent the other way" in texts["mixed"]
     assert "bent the other way" not in texts["quadrupteron"]
     assert all("Each row is one assembly mode" in text for text in texts.values())
+
+
+@pytest.mark.parametrize("name", ["five_bar", "quadrupteron"])
+def test_every_argument_and_result_of_every_function_has_its_meaning_and_units(tmp_path, name):
+    left_out = ("base_regressor", "paper_regressor")
+    names = [n for n in pteron.kernels.FUNCTIONS if n not in left_out]
+    header = pteron.export_c(ROBOTS[name], names, tmp_path)[0].read_text()
+    lines = [line for line in header.splitlines() if line.startswith((" * in  ", " * out "))]
+    assert len(lines) > 2 * len(names)
+    assert not [line for line in lines if line.rstrip().endswith("):")]
+    text = " ".join(header.replace("\n *", " ").split())
+    along = f"N along {', '.join(ROBOTS[name].platform.lengths)}"
+    along += " and N m along phi" if name == "quadrupteron" else ""
+    assert f"out gravity ({ROBOTS[name].freedom}): generalised forces in the order of the" in text
+    assert f"pose, {along}" in text
+    assert "platform pose in the base frame: x, " in text
 
 
 def test_a_wrench_on_the_platform_is_an_input_where_it_is_asked_for(tmp_path):
