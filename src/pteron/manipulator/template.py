@@ -166,7 +166,9 @@ def _own_inertia(robot: Manipulator) -> list[float]:
     mass, *center = robot.template.rider
     count = inertia_count(inertia.kinds)
     load = carried_values(type(inertia), mass, center, [0.0] * count)
-    return [a - b for a, b in zip(inertia.values, load, strict=True)]
+    # What is left of the rounding of a file is nothing.
+    pairs = zip(inertia.values, load, strict=True)
+    return [0.0 if abs(a - b) <= SAME * abs(b) else a - b for a, b in pairs]
 
 
 def _cone_names(leg: Any) -> list[str]:
