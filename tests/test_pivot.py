@@ -108,3 +108,16 @@ def test_a_table_about_another_point_is_doubted(tmp_path, monkeypatch):
     text = run("size delta --cycle about.csv").stderr
     assert "about another point (--pivot)? The poses count" in text
     assert "--pivot" not in run("size delta --cycle about.csv --pivot 0.01,0,0").stderr
+
+
+def test_the_home_pose_is_a_word_wherever_a_pose_is_typed(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    home = ",".join(map(str, pteron.workspace.home_pose("delta").tolist()))
+    for line in (
+        "workspace delta --from {} --json",
+        "inverse delta {} --json",
+        "forces delta --pose {} --json",
+        "cycle delta --from 0.1,0,-0.9 --to {} --duration 1 --json",
+    ):
+        assert done(line.format("home")) == done(line.format(home)), line
+    assert "'house' is not a number" in refused("workspace delta --from house")

@@ -19,6 +19,9 @@ if TYPE_CHECKING:
     from pteron.shapes import PoseLike
     from pteron.tables import Table
 
+HOME = "home"
+"""The word for the home pose in place of a pose's numbers."""
+
 _UNLIKE = 3.0
 """Greatest ratio of a motion's length by its velocities to that by its poses, or inverse of it."""
 
@@ -78,15 +81,21 @@ def _playback_of_table(robot: Manipulator, rows: Table, start: PoseLike | None =
         raise PteronError(f"{error}; {file}: {unlikely}") from None
 
 
+def pose_numbers(machine: Manipulator, words: Sequence[str], name: str) -> list[float]:
+    """Return the coordinates of a typed pose: of the home pose where the word is `home`."""
+    if [word.strip() for word in words] == [HOME]:
+        from pteron.workspace import home_pose
+
+        numbers: list[float] = home_pose(machine).tolist()
+        return numbers
+    return parsed_numbers(words, machine.coordinates, name)
+
+
 def given_pose(machine: Manipulator, text: str | None, name: str) -> NDArray[Any]:
     """Return the pose (m,) of an option, or the home pose."""
     import numpy as np
 
-    from pteron.workspace import home_pose
-
-    if text is None:
-        return home_pose(machine)
-    pose = np.array(parsed_numbers([text], machine.coordinates, name))
+    pose = np.array(pose_numbers(machine, [HOME if text is None else text], name))
     note_unlikely(machine, machine.coordinates, pose, name)
     return pose
 
