@@ -674,6 +674,35 @@ def test_what_cannot_be_written_is_said(tmp_path):
 
 
 @CLIENTS
+def test_an_edited_file_is_replaced_aloud_and_another_s_file_refused(tmp_path):
+    runner = CliRunner()
+    folder = tmp_path / "c"
+    arguments = ["export", "five-bar", "--c", str(folder), "--function", "jacobian", "--json"]
+
+    def replaced():
+        result = runner.invoke(app, arguments)
+        assert result.exit_code == 0, result.stderr
+        return json.loads(result.stdout)["replaced"]
+
+    assert replaced() == []
+    assert replaced() == []
+    header = folder / "five_bar.h"
+    original = header.read_text()
+    header.write_text(original + "/* an edit */")
+    assert replaced() == [str(header)]
+    assert header.read_text() == original
+    header.write_text(original + "/* an edit */")
+    assert f"Replaced: {header}\n" in runner.invoke(app, arguments[:-1]).stdout
+    foreign = folder / "CMakeLists.txt"
+    foreign.write_text("project(mine)")
+    header.unlink()
+    result = runner.invoke(app, arguments)
+    assert result.exit_code == 2
+    assert "is there already, and Pteron did not write it" in result.stderr.replace("\n", " ")
+    assert foreign.read_text() == "project(mine)"
+    assert not header.exists()
+
+
 def test_the_command(tmp_path):
     runner = CliRunner()
     arguments = ["export", "delta", "--c", str(tmp_path / "c"), "--st", str(tmp_path / "st")]
