@@ -156,3 +156,22 @@ def test_a_warning_of_arithmetic_is_a_sentence(monkeypatch):
         "be wrong: are all values in m, rad, kg and s?\n"
     )
     assert "RuntimeWarning: overflow" in raw.stderr
+
+
+def test_commands_that_read_a_table_of_a_pivot_have_the_option(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    pivot = "--pivot 0.1,0,0.2"
+    assert run(f"cycle quadrupteron {pivot} --out table.csv").exit_code == 0
+    assert run("cycle quadrupteron --out own.csv").exit_code == 0
+    note = "its joints are not those of its poses: was it made with --pivot"
+    for line in (
+        "simulate quadrupteron --cycle {} --out run.csv",
+        "play quadrupteron {} --out page.html",
+    ):
+        right = run(f"{line.format('table.csv')} {pivot}")
+        assert right.exit_code == 0, right.output
+        assert note not in right.stderr
+        assert note in run(line.format("table.csv")).stderr
+        assert note not in run(line.format("own.csv")).stderr
+    for command in ("film", "tune", "report", "size"):
+        assert "--pivot" in done(f"{command} --help")
