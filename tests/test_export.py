@@ -555,7 +555,7 @@ def test_the_code_is_what_a_controller_asks_for_and_a_person_can_read(tmp_path):
     body = source.split("int quadrupteron_inverse_dynamics(")[1].split("\n}\n")[0]
     assert body.count("return ") == 1
     assert pteron.__version__ in header
-    assert "pose (4): platform pose: x, y, z in m, phi in rad" in header
+    assert "pose (4): platform pose in the base frame: x, y, z in m, phi in rad" in header
     assert "It does not ask whether the legs reach." in header
     count = pteron.compile(ROBOT, "inverse_dynamics", grade="parametric").operations
     assert f"{count} arithmetic operations." in header
