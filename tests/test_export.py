@@ -555,7 +555,7 @@ def test_the_code_is_what_a_controller_asks_for_and_a_person_can_read(tmp_path):
     body = source.split("int quadrupteron_inverse_dynamics(")[1].split("\n}\n")[0]
     assert body.count("return ") == 1
     assert pteron.__version__ in header
-    assert "pose (4): platform pose: x, y, z in m, phi in rad" in header
+    assert "pose (4): platform pose in the base frame: x, y, z in m, phi in rad" in header
     assert "It does not ask whether the legs reach." in header
     count = pteron.compile(ROBOT, "inverse_dynamics", grade="parametric").operations
     assert f"{count} arithmetic operations." in header
@@ -595,12 +595,28 @@ def test_what_the_joints_are_is_said(tmp_path):
         ].read_text()
         for name in ("delta", "mixed", "quadrupteron")
     }
-    assert "in  joints (3): joint coordinates, rad\n" in texts["delta"]
-    assert "out forces (3): actuator forces, N m, positive" in texts["delta"]
-    assert "out forces (3): actuator forces, N, N m, N m (leg by leg), positive" in texts["mixed"]
+    assert "in  joints (3): joint coordinates leg by leg, rad\n" in texts["delta"]
+    assert "out forces (3): actuator forces leg by leg, N m, positive" in texts["delta"]
+    assert "out forces (3): actuator forces leg by leg, N, N m, N m, positive" in texts["mixed"]
     assert "bent the other way" in texts["mixed"]
     assert "bent the other way" not in texts["quadrupteron"]
     assert all("Each row is one assembly mode" in text for text in texts.values())
+
+
+@pytest.mark.parametrize("name", ["five_bar", "quadrupteron"])
+def test_every_argument_and_result_of_every_function_has_its_meaning_and_units(tmp_path, name):
+    left_out = ("base_regressor", "paper_regressor")
+    names = [n for n in pteron.kernels.FUNCTIONS if n not in left_out]
+    header = pteron.export_c(ROBOTS[name], names, tmp_path)[0].read_text()
+    lines = [line for line in header.splitlines() if line.startswith((" * in  ", " * out "))]
+    assert len(lines) > 2 * len(names)
+    assert not [line for line in lines if line.rstrip().endswith("):")]
+    text = " ".join(header.replace("\n *", " ").split())
+    along = f"N along {', '.join(ROBOTS[name].platform.lengths)}"
+    along += " and N m along phi" if name == "quadrupteron" else ""
+    assert f"out gravity ({ROBOTS[name].freedom}): generalised forces in the order of the" in text
+    assert f"pose, {along}" in text
+    assert "platform pose in the base frame: x, " in text
 
 
 def test_a_wrench_on_the_platform_is_an_input_where_it_is_asked_for(tmp_path):
@@ -658,6 +674,35 @@ def test_what_cannot_be_written_is_said(tmp_path):
 
 
 @CLIENTS
+def test_an_edited_file_is_replaced_aloud_and_another_s_file_refused(tmp_path):
+    runner = CliRunner()
+    folder = tmp_path / "c"
+    arguments = ["export", "five-bar", "--c", str(folder), "--function", "jacobian", "--json"]
+
+    def replaced():
+        result = runner.invoke(app, arguments)
+        assert result.exit_code == 0, result.stderr
+        return json.loads(result.stdout)["replaced"]
+
+    assert replaced() == []
+    assert replaced() == []
+    header = folder / "five_bar.h"
+    original = header.read_text()
+    header.write_text(original + "/* an edit */")
+    assert replaced() == [str(header)]
+    assert header.read_text() == original
+    header.write_text(original + "/* an edit */")
+    assert f"Replaced: {header}\n" in runner.invoke(app, arguments[:-1]).stdout
+    foreign = folder / "CMakeLists.txt"
+    foreign.write_text("project(mine)")
+    header.unlink()
+    result = runner.invoke(app, arguments)
+    assert result.exit_code == 2
+    assert "is there already, and Pteron did not write it" in result.stderr.replace("\n", " ")
+    assert foreign.read_text() == "project(mine)"
+    assert not header.exists()
+
+
 def test_the_command(tmp_path):
     runner = CliRunner()
     arguments = ["export", "delta", "--c", str(tmp_path / "c"), "--st", str(tmp_path / "st")]

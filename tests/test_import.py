@@ -417,6 +417,9 @@ def test_an_interrupt_while_a_compilation_begins_leaves_the_way_free(monkeypatch
     class Interrupted:
         """Code whose source is interrupted."""
 
+        def is_cached(self):
+            return False
+
         @property
         def source(self):
             raise KeyboardInterrupt

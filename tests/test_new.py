@@ -161,3 +161,44 @@ def test_cones_of_cranks_have_their_middle_along_the_rods():
 def test_what_cannot_be_is_refused_in_a_line(options, message, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert message in refused(f"new {options} --out robot.toml")
+
+
+def test_a_rider_and_another_radius_do_not_hide_that_the_inertia_is_the_template_s(
+    tmp_path, monkeypatch
+):
+    sizes = "new stewart --base-radius 600mm --platform-radius 400mm --limits 700mm:1100mm"
+    inertia = "platform_inertia without the rider (per kg)"
+    robot = made(f"{sizes} --rider 80@0,0,0.5", tmp_path, monkeypatch)
+    assert robot.template.rider == (80.0, 0.0, 0.0, 0.5)
+    assert {"platform_mass", "platform_inertia"} <= {value.key for value in template_values(robot)}
+    text = json.loads(done("check robot.toml --json"))["template"]
+    assert "platform_mass 1217 kg without the rider" in text
+    assert inertia in text
+    assert "forces and torques depend on these masses and inertias" in text
+    sizes += " --overwrite --platform-mass 40"
+    robot = made(f"{sizes} --rider 80@0,0,0.5", tmp_path, monkeypatch)
+    # The platform's inertia is that of a body of its mass and radius.
+    assert "platform_inertia (per kg and radius squared)" in template_sentence(robot)
+    platform = robot.platform
+    heavier = replace(platform.inertia, inertia=tuple(1.1 * v for v in platform.inertia.inertia))
+    other = replace(robot, platform=replace(platform, inertia=heavier))
+    assert "platform_inertia" not in template_sentence(other)
+
+
+@pytest.mark.parametrize(
+    ("options", "line"),
+    [
+        ("--base-radius 750", "--base-radius 750 is 750 m: if these are millimetres, write 750mm"),
+        ("--limits 2500:3800", "is 3800 m: if these are millimetres, write 2500mm:3800mm"),
+        ("--rider 80@0,0,500", "is 500 m: if these are millimetres, write 80@0,0,0.5"),
+        ("--lead 5", "--lead 5 is 5 m: if these are millimetres, write 5mm"),
+    ],
+)
+def test_lengths_that_are_likely_millimetres_are_doubted_at_once(
+    options, line, tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    result = run(f"new stewart {options} --out robot.toml")
+    assert f"{line}\n" in result.stderr
+    assert result.stderr.count("Warning") == 1
+    assert "Warning" not in run("new stewart --base-radius 2 --lead 5mm --out m.toml").stderr

@@ -1,7 +1,10 @@
 """Poses about another point of the platform: `with_pivot`, `motion_at_point`, `--pivot`."""
 
 import json
+import sys
+import warnings
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -108,3 +111,67 @@ def test_a_table_about_another_point_is_doubted(tmp_path, monkeypatch):
     text = run("size delta --cycle about.csv").stderr
     assert "about another point (--pivot)? The poses count" in text
     assert "--pivot" not in run("size delta --cycle about.csv --pivot 0.01,0,0").stderr
+
+
+def test_the_home_pose_is_a_word_wherever_a_pose_is_typed(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    home = ",".join(map(str, pteron.workspace.home_pose("delta").tolist()))
+    for line in (
+        "workspace delta --from {} --json",
+        "inverse delta {} --json",
+        "forces delta --pose {} --json",
+        "cycle delta --from 0.1,0,-0.9 --to {} --duration 1 --json",
+    ):
+        assert done(line.format("home")) == done(line.format(home)), line
+    assert "'house' is not a number" in refused("workspace delta --from house")
+
+
+def test_a_pivot_in_millimetres_leaves_no_box_and_no_warning_of_arithmetic(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("drive.csv").write_text(
+        "t,ax,ay,az,wx,wy,wz\n0,0,0,0,0,0,0\n0.1,1,0,0,0,0,0.1\n0.2,0,1,0,0,0,0\n1,0,0,0,0,0,0\n"
+    )
+    options = "--limits=-60:60deg --crank 15mm --rod 140mm --base-sides 60mm:130mm"
+    done(f"new hexa {options} --platform-radius 5cm --platform-pair 20mm --out robot.toml")
+    result = run("cue drive.csv --robot robot.toml --pivot 0,0,500 --out cue.csv")
+    assert result.exit_code == 2
+    assert "that serves is a point: there is no room for the motion" in result.stderr
+    assert "pivot: 500 m from P" in result.stderr
+
+
+def test_a_warning_of_arithmetic_is_a_sentence(monkeypatch):
+    def home_pose(robot):
+        warnings.warn("overflow encountered in multiply", RuntimeWarning, stacklevel=1)
+        return np.array([0.0, 0.0, -1.0])
+
+    monkeypatch.setattr(pteron.workspace, "home_pose", home_pose)
+    with warnings.catch_warnings():
+        warnings.simplefilter("default")
+        monkeypatch.setattr(sys, "warnoptions", [])
+        result = run("inverse delta home")
+        monkeypatch.setattr(sys, "warnoptions", ["default"])
+        raw = run("inverse delta home")
+    assert result.stderr == (
+        "Note: a number was not finite on the way (overflow encountered in multiply); results may "
+        "be wrong: are all values in m, rad, kg and s?\n"
+    )
+    assert "RuntimeWarning: overflow" in raw.stderr
+
+
+def test_commands_that_read_a_table_of_a_pivot_have_the_option(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    pivot = "--pivot 0.1,0,0.2"
+    assert run(f"cycle quadrupteron {pivot} --out table.csv").exit_code == 0
+    assert run("cycle quadrupteron --out own.csv").exit_code == 0
+    note = "its joints are not those of its poses: was it made with --pivot"
+    for line in (
+        "simulate quadrupteron --cycle {} --out run.csv",
+        "play quadrupteron {} --out page.html",
+    ):
+        right = run(f"{line.format('table.csv')} {pivot}")
+        assert right.exit_code == 0, right.output
+        assert note not in right.stderr
+        assert note in run(line.format("table.csv")).stderr
+        assert note not in run(line.format("own.csv")).stderr
+    for command in ("film", "tune", "report", "size"):
+        assert "--pivot" in done(f"{command} --help")

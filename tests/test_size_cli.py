@@ -335,3 +335,31 @@ def test_a_table_of_the_joints_alone_is_sized_in_the_home_poses_mode():
     pl.DataFrame(columns).write_csv("motion.csv")
     rows = rows_of("size delta --cycle motion.csv --friction 0")
     assert rows["rms_force"].to_list() == pytest.approx(size(robot, cycle).rms_forces, rel=1e-2)
+
+
+def with_drives(**keys: float) -> str:
+    """Write a Delta whose drives have these keys."""
+    robot = pteron.load("delta")
+    legs = tuple(replace(leg, drive=pteron.legs.Drive(**keys)) for leg in robot.legs)
+    pteron.save(replace(robot, legs=legs), "slow.toml")
+    return "slow.toml"
+
+
+def test_a_standard_cycle_too_fast_for_the_drives_is_named_first_with_a_slower_one():
+    file = with_drives(max_speed=0.05, ratio=100.0)
+    second = run(f"size {file}").stdout.splitlines()[1]
+    assert second.startswith("The standard cycle is too fast for these drives: it takes leg")
+    assert "times max_speed, 0.05 rad/s" in second
+    duration = second.partition("--duration ")[2].partition(",")[0]
+    assert "too fast" not in run(f"size {file} --duration {duration}").stdout
+    # What is asked for is no more than what it takes.
+    lines = run(f"size {file} --duration {0.9 * float(duration):g}")
+    assert "max_speed" in lines.stderr
+
+
+def test_motors_that_would_turn_absurdly_fast_without_a_limit_are_doubted():
+    lines = done(f"size {with_drives(ratio=1000.0)}").splitlines()
+    assert "motors would turn at" in lines[1]
+    assert "no max_speed" in lines[1]
+    assert "--duration" in lines[1]
+    assert "too fast" not in done(f"size {with_drives(ratio=50.0)}")

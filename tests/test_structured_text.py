@@ -311,7 +311,7 @@ def test_exported_blocks_are_those_of_the_library(tmp_path):
     ]
     poses, forces, joints = (Block(read(path.read_text())) for path in files)
     assert {"leg1_n2", "leg2_l_l_x"} <= set(forces.names("VAR"))
-    assert "joint coordinates, rad" in files[0].read_text()
+    assert "joint coordinates leg by leg, rad" in files[0].read_text()
     assert "It calls ATAN2(y, x)" in files[2].read_text()
     push = np.array([1.0, -2.0, 30.0])
     for pose, velocity, acceleration in zip(*states(robot, 3), strict=True):

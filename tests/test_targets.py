@@ -937,6 +937,41 @@ class Turning(SharedCode):
             self.ready = self.code.module is not None
 
 
+class Counted:
+    """Code that counts how often it is loaded."""
+
+    instruction_count = 1000
+
+    def __init__(self, cached):
+        self.cached, self.source, self.loads = cached, "", 0
+
+    def is_cached(self):
+        return self.cached
+
+    @property
+    def module(self):
+        self.loads += 1
+
+
+@needs_compiler
+def test_cached_code_is_loaded_soon_and_other_code_compiled_when_that_pays(monkeypatch):
+    monkeypatch.setenv("PTERON_KERNELS", "auto")
+    cached, absent = Counted(cached=True), Counted(cached=False)
+    for code, patience in ((cached, 2.0), (absent, 2.0)):
+        tier = SharedCode(code, patience)
+        tier.add_interpreter_time(0.05)
+        assert code.loads == 0
+        tier.add_interpreter_time(1.5)
+        assert tier.ready is code.cached
+    assert (cached.loads, absent.loads) == (1, 0)
+    tier.add_interpreter_time(1.0)
+    for _ in range(600):
+        if tier.ready:
+            break
+        time.sleep(0.01)
+    assert absent.loads == 1
+
+
 @needs_compiler
 def test_a_large_batch_changes_over_on_its_way():
     vm = pteron.compile(ROBOT, DYNAMICS, grade="parametric")

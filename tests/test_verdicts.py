@@ -391,7 +391,8 @@ def test_masses_of_the_template_are_named_again_until_they_are_edited(tmp_path):
     robot = replace(robot, name="my delta")
     assert template_sentence(robot) == (
         "Still as in delta: platform_mass 2.916 kg, upper 1.76 kg (its mass per length), lower "
-        "0.418 kg (its mass per length); are they this machine's?"
+        "0.418 kg (its mass per length); forces and torques depend on these masses and inertias; "
+        "are they this machine's?"
     )
     path = pteron.save(robot, tmp_path / "robot.toml")
     assert check(path)[0]["template"] == template_sentence(robot)

@@ -97,7 +97,7 @@ def cue(
     machine = _with_pivot(carried.load_machine(machine), pivot)
     where: dict[str, Any] = {"washout": filters.washout(), "type_ii": type_ii}
     if around is not None:
-        where["pose"] = given_pose(machine, None if around == "home" else around, "--around")
+        where["pose"] = given_pose(machine, around, "--around")
     if live.listen is not None:
         from pteron.cli.cue_live import run_live
 

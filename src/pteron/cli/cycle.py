@@ -98,7 +98,7 @@ def cycle(
         moved straight in joint space, or replay of a table. [default: adept, or the kind that --to,
         --via or --table implies]
     --from POSE: Start pose. [default: the home pose]
-    --to POSE: End pose.
+    --to POSE: End pose; a pose is its numbers, m and rad, or home.
     --via FILE: Table of poses to pass, a .csv or .parquet file.
     --corner: Distance from a corner, m, at which the path is rounded; 0 stops at the corner.
     --back: Return to the start by the same path.

@@ -10,7 +10,7 @@ from pteron.cli.arguments import MachineArgument
 from pteron.cli.motion_argument import Carried
 from pteron.cli.progress import spinner
 from pteron.cli.result import CommandResult
-from pteron.cli.terminal import note
+from pteron.cli.terminal import note, plain
 from pteron.errors import DataError
 
 if TYPE_CHECKING:
@@ -69,6 +69,9 @@ def export(
     `joint_feed_forward_base`. The other formats are written one at a time, with no options but
     --tool, --elbows and --json.
 
+    A file of the same name that Pteron wrote is replaced, and the output says so where its content
+    was another one, as after an edit; one that Pteron did not write is refused.
+
     Options
     -------
     --c DIR: Write C99 to this folder.
@@ -125,7 +128,9 @@ def export(
     _check(targets, [name for name, is_set in options.items() if is_set], tool)
     machine = Carried(tool=tool).mount_tool(machine)
     files = []
-    with spinner(f"Writing code for {machine.name}"):
+    from pteron.export.writing import recorded_replacements
+
+    with spinner(f"Writing code for {machine.name}"), recorded_replacements() as replaced:
         from pteron.controllers import Controller, read_gains
         from pteron.export import Real, export_c, export_cuda, export_st
         from pteron.export.identified_parameters import read_identified
@@ -146,8 +151,13 @@ def export(
             files += _export_target(machine, name, targets[name])
     if grade != _TRUSTED:
         note(f"Warning: {base}: the verdict on these values is: {grade}")
-    record = {"robot": machine.name, "files": [str(path) for path in files]}
-    return CommandResult(record, files=files)
+    record = {
+        "robot": machine.name,
+        "files": [str(path) for path in files],
+        "replaced": [str(path) for path in replaced],
+    }
+    lines = [f"Replaced: {plain(str(path))}" for path in replaced]
+    return CommandResult(record, lines, [path for path in files if path not in replaced])
 
 
 def _export_target(machine: Manipulator, target: str, folder: str) -> list[Path]:

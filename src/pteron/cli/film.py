@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from pteron.cli.arguments import STANDARD, MachineArgument
+from pteron.cli.arguments import STANDARD, MachineArgument, about_pivot
 from pteron.cli.motion_argument import Carried, cycle_of
 from pteron.cli.progress import progress_bar, spinner
 from pteron.cli.result import CommandResult
@@ -26,6 +26,7 @@ def film(
     turns: float = 0.0,
     forces: bool = False,
     carried: Carried,
+    pivot: str | None = None,
 ) -> CommandResult:
     """Film a machine that goes through a cycle, in real time or slow motion, as MP4 or GIF.
 
@@ -55,7 +56,8 @@ def film(
 
     checked_film(out)
     sides = _sides(size)
-    machine, carrying = carried.mount_tool(machine), carried.load_machine(machine)
+    both = carried.mount_tool(machine), carried.load_machine(machine)
+    machine, carrying = (about_pivot(robot, pivot) for robot in both)
     with spinner(f"Planning the cycle of {machine.name}"):
         motion = cycle_of(machine, cycle, duration)
         state = motion.pose, motion.velocity, motion.acceleration

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from pteron.cli.arguments import MOTION, Failure, MachineArgument, about_pivot, parsed_numbers
+from pteron.cli.motion_argument import pose_numbers
 from pteron.cli.table_rows import (
     TableRows,
     check_destination,
@@ -45,7 +46,7 @@ def inverse(
 
     Arguments
     ---------
-    POSE: The pose x y z phi, x y z roll pitch yaw, or what the machine has; m and rad.
+    POSE: The pose x y z phi, x y z roll pitch yaw, or what the machine has, m and rad; or home.
 
     Examples
     --------
@@ -206,7 +207,7 @@ def forces(
 
     Options
     -------
-    --pose NUMBERS: Pose x y z phi, or what the machine has; m and rad.
+    --pose NUMBERS: Pose x y z phi, or what the machine has, m and rad; or home.
     --velocity NUMBERS: Time derivative of the pose. [default: 0]
     --acceleration NUMBERS: Second time derivative of the pose. [default: 0]
     --wrench NUMBERS: External wrench on the platform at its point P: fx fy fz mk, or fx fy fz mx my
@@ -236,7 +237,7 @@ def forces(
     elif table is not None:
         raise DataError("pose and --table given; give one of them")
     else:
-        rows = _typed_row(typed, motion, loads)
+        rows = _typed_row(machine, typed, motion, loads)
     columns = [*motion, *(loads if set(loads) & set(rows.table.columns) else ())]
     added = machine.force_names
     check_destination(out, table, rows.table, added)
@@ -274,15 +275,17 @@ def _forces_caption(robot: Manipulator, *, drives: bool) -> str:
     return f"[bold]{plain(robot.name)}[/bold]: drive forces {terms}"
 
 
-def _typed_row(typed: list[str | None], motion: list[str], loads: tuple[str, ...]) -> TableRows:
+def _typed_row(
+    machine: Manipulator, typed: list[str | None], motion: list[str], loads: tuple[str, ...]
+) -> TableRows:
     """Return a single row of the typed pose, rates, accelerations and wrench; 0 by default."""
     m = len(motion) // 3
     if typed[0] is None:
         raise DataError(f"no pose given; give --pose with {' '.join(motion[:m])}, or --table FILE")
-    names: list[str] = []
-    numbers: list[float] = []
-    parts = (motion[:m], motion[m : 2 * m], motion[2 * m :], loads)
-    for name, text, part in zip(MOTION, typed, parts, strict=True):
+    names = motion[:m]
+    numbers = pose_numbers(machine, [typed[0]], MOTION[0])
+    parts = (motion[m : 2 * m], motion[2 * m :], loads)
+    for name, text, part in zip(MOTION[1:], typed[1:], parts, strict=True):
         if text is None and name == "--wrench":
             continue
         names += part

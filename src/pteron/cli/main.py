@@ -121,11 +121,18 @@ def _clause(docstring: str) -> str:
 
 
 def _note_warnings(message: Warning | str, category: type[Warning], *place: Any, **_: Any) -> None:
-    """Print a warning of unlikely values as a note, any other in Python's format."""
+    """Print a warning as a note, one of arithmetic in words; in Python's format under `-W`."""
     if issubclass(category, UnlikelyValue):
         note(f"Note: {message}")
-    else:
+    elif sys.warnoptions:
         sys.stderr.write(warnings.formatwarning(message, category, *place[:2]))
+    elif issubclass(category, RuntimeWarning):
+        note(
+            f"Note: a number was not finite on the way ({message}); results may be wrong: are all "
+            "values in m, rad, kg and s?"
+        )
+    else:
+        note(f"Note: {message}")
 
 
 def _is_output_error(error: OSError) -> bool:

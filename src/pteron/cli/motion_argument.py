@@ -19,6 +19,13 @@ if TYPE_CHECKING:
     from pteron.shapes import PoseLike
     from pteron.tables import Table
 
+HOME = "home"
+"""The word for the home pose in place of a pose's numbers."""
+
+_OTHER = 0.05
+"""Difference of joints from those of the poses beside them, in sizes of a leg, that is no error of
+tracking."""
+
 _UNLIKE = 3.0
 """Greatest ratio of a motion's length by its velocities to that by its poses, or inverse of it."""
 
@@ -69,6 +76,7 @@ def _playback_of_table(robot: Manipulator, rows: Table, start: PoseLike | None =
     _check_rates(robot, rows)
     names = [n for n in (*robot.coordinates, *robot.joint_names) if n in rows.columns]
     table_columns = rows.numbers(names)
+    _note_other_joints(robot, rows)
     try:
         return playback_of_table(robot, rows, start)
     except (UnreachablePose, SingularPose) as error:
@@ -78,15 +86,21 @@ def _playback_of_table(robot: Manipulator, rows: Table, start: PoseLike | None =
         raise PteronError(f"{error}; {file}: {unlikely}") from None
 
 
+def pose_numbers(machine: Manipulator, words: Sequence[str], name: str) -> list[float]:
+    """Return the coordinates of a typed pose: of the home pose where the word is `home`."""
+    if [word.strip() for word in words] == [HOME]:
+        from pteron.workspace import home_pose
+
+        numbers: list[float] = home_pose(machine).tolist()
+        return numbers
+    return parsed_numbers(words, machine.coordinates, name)
+
+
 def given_pose(machine: Manipulator, text: str | None, name: str) -> NDArray[Any]:
     """Return the pose (m,) of an option, or the home pose."""
     import numpy as np
 
-    from pteron.workspace import home_pose
-
-    if text is None:
-        return home_pose(machine)
-    pose = np.array(parsed_numbers([text], machine.coordinates, name))
+    pose = np.array(pose_numbers(machine, [HOME if text is None else text], name))
     note_unlikely(machine, machine.coordinates, pose, name)
     return pose
 
@@ -150,6 +164,31 @@ def note_unlikely(
 
     for text in unlikely_values(robot, columns, numbers):
         note(f"Note: {source}: {text}")
+
+
+def _note_other_joints(robot: Manipulator, rows: Table) -> None:
+    """Note that a table's joints are not those of its poses, as of those of a pivot."""
+    import numpy as np
+
+    from pteron.kinematics import inverse_kinematics
+    from pteron.manipulator.readings import to_readings
+
+    names = [*robot.coordinates, *robot.joint_names]
+    if not set(names) <= set(rows.columns):
+        return
+    poses, joints = np.split(rows.numbers(names), [robot.freedom], axis=1)
+    expected = to_readings(robot, inverse_kinematics(robot, poses, on_failure="nan"))
+    levers = np.array([leg.lever for leg in robot.legs])
+    sizes = np.array([leg.size or 1.0 for leg in robot.legs])
+    turning = np.array([leg.joint.unit == "rad" for leg in robot.legs])
+    differences = joints - expected
+    turned = (differences + np.pi) % (2.0 * np.pi) - np.pi
+    far = np.abs(np.where(turning, turned, differences)) * levers > _OTHER * sizes
+    if far.any() or np.isnan(expected).all():
+        note(
+            f"Note: {rows.source}: its joints are not those of its poses: was it made with "
+            "--pivot, which must then be given again, or for another machine or working mode?"
+        )
 
 
 def _check_rates(robot: Manipulator, rows: Table) -> None:

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 from pteron.cli.arguments import split_numbers
 from pteron.cli.machines import catalog
 from pteron.cli.progress import spinner
-from pteron.cli.quantities import quantity, quantity_range, required_quantity
+from pteron.cli.quantities import length_doubts, quantity, quantity_range, required_quantity
 from pteron.cli.result import CommandResult
-from pteron.cli.terminal import plain, write
+from pteron.cli.terminal import plain, warn, write
 from pteron.errors import DataError, OutputError
 
 if TYPE_CHECKING:
@@ -151,11 +151,15 @@ def new(
     given = {name: text for name, text in given.items() if text not in (None, [])}
     robot, comments, kept = load(kind), [], ""
     changed = None
+    # Before it is said what cannot be made of such lengths.
+    warn(_unit_doubts(robot, dimensions, masses, transmission))
     if given:
         with spinner(f"Making a machine after {robot.name}"):
             changed = _machine_of_options(robot, dimensions, masses, transmission)
         if kind in names():
-            template = Template(kind, tuple(sorted(_confirmed_keys(given))))
+            mass, center = _rider(masses.rider)
+            rider = () if mass is None else (mass, *center)
+            template = Template(kind, tuple(sorted(_confirmed_keys(given))), rider)
             changed = replace(changed, name=f"my {robot.name}", template=template)
             kept = template_sentence(changed)
         options = " ".join(
@@ -175,6 +179,24 @@ def new(
         return CommandResult(record, partial(write, text))
     written = f"Written: {plain(out)}. Put in your numbers, then: pteron check {plain(out)}"
     return CommandResult(record, [written, *([plain(kept)] if kept else [])])
+
+
+_LONG_LEAD = 0.5
+"""Lead, m a turn, and diameter of a screw, m, beyond which millimetres are likelier."""
+
+
+def _unit_doubts(
+    robot: Manipulator, size: Dimensions, masses: Masses, transmission: Transmission
+) -> list[str]:
+    """Return a line for each option whose lengths are likely in millimetres."""
+    lengths = {f"--{name.replace('_', '-')}": text for name, text in vars(size).items()}
+    angles = {"--crank-plane", "--cone"} | (
+        {"--limits"} if robot.legs[0].joint.unit == "rad" else set()
+    )
+    lengths = {name: text for name, text in lengths.items() if name not in angles}
+    small = {"--lead": transmission.lead, "--screw": transmission.screw}
+    place = {"--rider": masses.rider if masses.rider and "@" in masses.rider else None}
+    return [*length_doubts(lengths | place), *length_doubts(small, _LONG_LEAD)]
 
 
 _CONFIRMS = {

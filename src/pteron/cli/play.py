@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pteron.cli.arguments import STANDARD, MachineArgument
+from pteron.cli.arguments import STANDARD, MachineArgument, about_pivot
 from pteron.cli.motion_argument import Carried, cycle_text, read_playback
 from pteron.cli.progress import spinner
 from pteron.cli.result import CommandResult
@@ -24,6 +24,7 @@ def play(
     out: str = "motion.html",
     cycle: str | None = None,
     carried: Carried,
+    pivot: str | None = None,
 ) -> CommandResult:
     """Show a motion in 3-D: one HTML page that needs no other file or network.
 
@@ -50,7 +51,7 @@ def play(
     """
     from pteron.report.write import checked_page, write_motion_page
 
-    machine = carried.load_machine(machine)
+    machine = about_pivot(carried.load_machine(machine), pivot)
     if motion is not None and cycle is not None:
         raise DataError("MOTION and --cycle given; give one of them")
     checked_page(out)

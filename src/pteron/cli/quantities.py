@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 from pteron.errors import DataError
 
@@ -17,6 +18,9 @@ _UNITS = {
 
 _MOST_ANGLE = 4.0 * math.pi
 """Greatest angle, rad, that counts as one in radians: two turns."""
+
+_LONG = 10.0
+"""Length, m, beyond which a number without a unit is likelier in millimetres."""
 
 _RANGE = "LOW:HIGH expected, such as -0.3:0.3"
 """The form of a range."""
@@ -78,3 +82,22 @@ def quantity(option: str, text: str | None, unit: str, *, signed: bool = False) 
         of_unit = f" in {unit}" if unit else ""
         raise DataError(f"{option}: {text!r} given, a number{above}{of_unit}{others} expected")
     return number
+
+
+def length_doubts(options: Mapping[str, str | None], long: float = _LONG) -> list[str]:
+    """Return a line for each option with a length, without a unit, that is likely in millimetres.
+
+    A text may hold two lengths with a colon between them, or a mass, @ and three lengths.
+    """
+    lines = []
+    for option, text in options.items():
+        mass, at, place = (text or "").rpartition("@")
+        parts = place.split("," if at else ":")
+        if not text or not all(map(_is_plain, parts)):
+            continue
+        most = max(abs(float(part)) for part in parts)
+        if most > long:
+            lengths = [f"{float(part) / 1e3:g}" if at else f"{part.strip()}mm" for part in parts]
+            meant = mass + at + ("," if at else ":").join(lengths)
+            lines.append(f"{option} {text} is {most:g} m: if these are millimetres, write {meant}")
+    return lines

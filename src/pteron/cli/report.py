@@ -7,7 +7,7 @@ import math
 from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any
 
-from pteron.cli.arguments import MachineArgument
+from pteron.cli.arguments import MachineArgument, about_pivot
 from pteron.cli.motion_argument import Carried, read_playback
 from pteron.cli.progress import spinner
 from pteron.cli.result import CommandResult
@@ -21,7 +21,12 @@ _SERIES = ("time", "pose", "velocity", "acceleration", "forces")
 
 
 def report(
-    machine: MachineArgument, *, out: str, motion: str | None = None, carried: Carried
+    machine: MachineArgument,
+    *,
+    out: str,
+    motion: str | None = None,
+    carried: Carried,
+    pivot: str | None = None,
 ) -> CommandResult:
     """Write a report on a machine: one HTML page with figures, and its numbers.
 
@@ -39,7 +44,8 @@ def report(
     pteron report quadrupteron --motion motion.csv --payload 0.5 --out report
     """
     # The name is the page's heading: it says which payload the forces are computed with.
-    machine = replace(carried.load_machine(machine), name=f"{machine.name}{carried}")
+    machine = about_pivot(carried.load_machine(machine), pivot)
+    machine = replace(machine, name=f"{machine.name}{carried}")
     with spinner(f"Writing the report on {machine.name}"):
         from pteron.report import write_report
 

@@ -7,7 +7,7 @@ from dataclasses import asdict, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
 
-from pteron.cli.arguments import STANDARD, MachineArgument, check_rate, load_robot
+from pteron.cli.arguments import STANDARD, MachineArgument, about_pivot, check_rate, load_robot
 from pteron.cli.destination import Destination
 from pteron.cli.motion_argument import Carried, cycle_of, cycle_text
 from pteron.cli.motion_table import force_word
@@ -48,6 +48,7 @@ def simulate(
     bandwidth: float | None = None,
     rate: float = 1000.0,
     carried: Carried,
+    pivot: str | None = None,
     cycles: int = 1,
     duration: float | None = None,
     model: str | None = None,
@@ -107,10 +108,10 @@ def simulate(
     check_rate(rate)
     destination = Destination(out, "simulation")
     destination.check()
-    carrying = carried.load_machine(machine)
+    carrying = about_pivot(carried.load_machine(machine), pivot)
     at_tool = carried.payload_center is None
-    machine = carried.mount_tool(machine) if at_tool else carrying
-    believed = None if model is None else _model(machine, model, elbows)
+    machine = about_pivot(carried.mount_tool(machine), pivot) if at_tool else carrying
+    believed = None if model is None else about_pivot(_model(machine, model, elbows), pivot)
     with spinner(f"Simulating {machine.name}"):
         motion = cycle_of(machine, cycle, duration)
         acts, law_name = controller_of(controller, motion, 1.0 / rate, bandwidth), str(controller)

@@ -37,6 +37,14 @@ if TYPE_CHECKING:
 _OVERLOADED = 1
 """Exit code where a drive is overloaded."""
 
+_TOO_FAST = 2.0
+"""Times a drive's greatest speed at which the output begins with the advice to take a slower cycle:
+a slightly stronger drive does not serve then."""
+
+_UNLIKELY_RPM = 10_000.0
+"""Speed of a motor, rpm, from which the cycle is doubted where the file has no max_speed: servo
+motors reach 3000 to 6000."""
+
 _NAMED = {"peak_force": "peak {}", "rms_force": "RMS {}", "peak_speed": "peak speed"}
 """Quantities whose worst places are shown."""
 
@@ -247,6 +255,7 @@ def _show(
     show(
         f"[bold]{plain(sizing.robot.name)}[/bold]{plain(str(request.carried))}, {plain(cycles)}: "
         f"{sizing.duration:.4g} s{dwell}",
+        *_too_fast(sizing, request.cycles),
         *_verdict(sizing, fits, request.margin),
         *([places] if sizing.places else []),
         _loads(sizing),
@@ -284,6 +293,37 @@ def _energy(sizing: Sizing, share: float) -> list[str]:
     else:
         lines.append(friction_sentence(sizing.robot))
     return lines
+
+
+def _too_fast(sizing: Sizing, cycles: tuple[str, ...]) -> list[str]:
+    """Return a line where the standard cycle is far too fast for the drives, else none."""
+    if cycles != (STANDARD,):
+        return []
+    limits = [limit for limit in sizing.margins if limit.quantity == "peak_speed"]
+    slowest = min(limits, key=lambda limit: limit.margin, default=None)
+    if slowest is not None and slowest.margin * _TOO_FAST < 1.0:
+        ratio = 1.0 / slowest.margin
+        reason = (
+            f"it takes leg {slowest.leg} to {ratio:.3g} times {slowest.limit}, "
+            f"{slowest.most:.4g} {slowest.unit}"
+        )
+    else:
+        geared = [bool(drive.ratio) and drive.max_speed is None for drive in sizing.drives]
+        rpm = 30.0 / math.pi * sizing.motor_speeds[1] * geared
+        ratio = float(rpm.max(initial=0.0)) / _UNLIKELY_RPM
+        if ratio < 1.0:
+            return []
+        reason = (
+            f"motors would turn at {rpm.max():.0f} rpm, and the file has no max_speed that limits "
+            "them"
+        )
+    # The cycle keeps its path: speeds are inversely proportional to its duration.
+    duration = significant(math.ceil(ratio * (sizing.duration - sizing.dwell)), 2)
+    return [
+        f"[yellow]The standard cycle is too fast for these drives: {reason}.[/yellow] Forces, "
+        f"power and speeds below are of no use; size them for a slower one: --duration {duration}, "
+        "or --cycle TABLE for the machine's own motion."
+    ]
 
 
 def _verdict(sizing: Sizing, fits: tuple[MotorFit, ...], margin: float) -> list[str]:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from pteron.cli.arguments import Failure, parsed_numbers
+from pteron.cli.motion_argument import pose_numbers
 from pteron.cli.progress import progress_bar
 from pteron.cli.terminal import is_terminal, note, show, show_json, table, write
 from pteron.errors import DataError, OutputError, PteronError, SingularPose, UnreachablePose
@@ -120,7 +121,9 @@ def given_rows(
         return rows_of_table(robot, file, what, names)
     if file is not None:
         raise DataError(f"{what} and --table given; give one of them")
-    return single_row(names, parsed_numbers(typed, names, what))
+    is_pose = tuple(names) == robot.coordinates
+    numbers = pose_numbers(robot, typed, what) if is_pose else parsed_numbers(typed, names, what)
+    return single_row(names, numbers)
 
 
 def single_row(columns: Sequence[str], numbers: Sequence[float]) -> TableRows:

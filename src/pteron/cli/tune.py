@@ -5,7 +5,13 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from pteron.cli.arguments import STANDARD, MachineArgument, check_rate, parsed_list
+from pteron.cli.arguments import (
+    STANDARD,
+    MachineArgument,
+    about_pivot,
+    check_rate,
+    parsed_list,
+)
 from pteron.cli.destination import Destination
 from pteron.cli.motion_argument import Carried, cycle_of
 from pteron.cli.progress import spinner
@@ -38,6 +44,7 @@ def tune(
     out: str | None = None,
     controller: Name = "feed-forward",
     carried: Carried,
+    pivot: str | None = None,
     duration: float | None = None,
     rate: float = 1000.0,
     bandwidth: float | None = None,
@@ -99,7 +106,7 @@ def tune(
     sensors = Sensors(encoder=encoder, cutoff=cutoff)
     destination = Destination(out, "tuning")
     destination.check()
-    machine = carried.load_machine(machine)
+    machine = about_pivot(carried.load_machine(machine), pivot)
     how: dict[str, Any] = {"sensors": sensors, "delay": delay}
     with spinner(f"Tuning {machine.name}"):
         motion = cycle_of(machine, cycle, duration)

@@ -100,7 +100,7 @@ def workspace(
     --prove NAME=LEAST:GREATEST,...: Prove that all poses of a box can be used:
         x=-0.05:0.05,y=0:0.1,z=0; m and rad.
     --from POSE: Prove how far it can go from a pose along each coordinate, and what stops it;
-        numbers in m and rad, such as 0,0,-0.9.
+        numbers in m and rad, such as 0,0,-0.9, or home.
     --tolerance SHARE: With --certify: largest undecided share of the volume. [default: 0.05]
     --type-i FLOOR: In a proof: least type-I measure of every leg, 0 stretched or folded, 1 at best.
     --type-ii FLOOR: In a proof: least type-II measure, 0 where the drives cannot hold the platform.

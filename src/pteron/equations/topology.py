@@ -51,8 +51,9 @@ def _replace(value: Any, exchange: Callable[[float], Any], is_sign: bool = False
     replaced = object.__new__(type(value))
     for field in fields(value):
         content = getattr(value, field.name)
-        # Which legs hold bars, that do not turn, is the machine's structure.
-        if field.name != "fixed_offset" or any(content):
+        # Which legs hold bars, that do not turn, is the machine's structure; what does not count in
+        # comparisons, such as the record of a template, is no part of the machine.
+        if field.compare and (field.name != "fixed_offset" or any(content)):
             content = _replace(content, exchange, field.name in signs)
         vars(replaced)[field.name] = content
     return replaced

@@ -16,13 +16,13 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from pteron.atomic import write_texts
 from pteron.errors import ModelError
 from pteron.export.command_units import Output
 from pteron.export.descriptions import banner
 from pteron.export.exported_function import ExportedFunction
 from pteron.export.functions import PLACES, FunctionChoice, exported_functions
 from pteron.export.names import prefix_of
+from pteron.export.writing import write_export
 from pteron.kernels import Array
 from pteron.kernels.code import (
     C,
@@ -121,7 +121,7 @@ def export_c(
     exported = exported_functions(
         robot, functions, specialised=specialised, wrench=wrench, output=output, base=base
     )
-    return write_texts(folder, c_texts(robot, exported, real))
+    return write_export(folder, c_texts(robot, exported, real))
 
 
 def c_texts(

@@ -9,7 +9,6 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 
-from pteron.atomic import make_folder, write_files
 from pteron.bodies.motion import Expression
 from pteron.equations import drives
 from pteron.equations.kinematics import jacobian
@@ -18,6 +17,7 @@ from pteron.export.descriptions import banner
 from pteron.export.functions import has_drives
 from pteron.export.names import prefix_of
 from pteron.export.start_pose import good_poses, keeps_limits, start_pose
+from pteron.export.writing import write_export
 from pteron.kernels import program, specialise_program
 from pteron.kernels.code import render_template
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator, parameters
@@ -184,13 +184,12 @@ def export_casadi(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
     """
     robot = as_manipulator(robot)
     functions, prefix = casadi_functions(robot), prefix_of(robot)
-    target = make_folder(folder)
-    files = {}
+    files: dict[str, str | bytes] = {}
     with tempfile.TemporaryDirectory() as scratch:
         for name, function in functions.items():
             path = Path(scratch, f"{prefix}_{name}.casadi")
             function.save(str(path))
-            files[target / path.name] = path.read_bytes()
+            files[path.name] = path.read_bytes()
     start, end = _ends(robot)
     least, most = zip(*(leg.limits or (None, None) for leg in robot.legs), strict=True)
     variables = {
@@ -210,8 +209,8 @@ def export_casadi(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
     }
     for name in ("load", "example"):
         text = render_template("pteron.export", f"{name}_casadi.py.j2", **variables)
-        files[target / f"{name}_{prefix}.py"] = text.encode("utf-8")
-    return write_files(files)
+        files[f"{name}_{prefix}.py"] = text
+    return write_export(folder, files)
 
 
 def _ends(robot: Manipulator) -> tuple[list[float], list[float]]:

@@ -10,11 +10,11 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from pteron.atomic import write_texts
 from pteron.export.c import Real, source_variables
 from pteron.export.command_units import Output
 from pteron.export.functions import FunctionChoice, exported_functions
 from pteron.export.names import prefix_of
+from pteron.export.writing import write_export
 from pteron.kernels.code import render_template
 from pteron.manipulator import RobotLike, as_manipulator
 
@@ -80,4 +80,4 @@ def export_cuda(
         file: render_template("pteron.export", name, **variables) for file, name in files.items()
     }
     texts[f"{prefix}.cuh"] = _MACROS.sub(f"{prefix}_is", texts[f"{prefix}.cuh"])
-    return write_texts(folder, texts)
+    return write_export(folder, texts)

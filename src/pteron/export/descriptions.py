@@ -19,6 +19,14 @@ TEXTS: dict[str, dict[str, str]] = loads(
 """All texts of generated code: tables of summaries, notes, meanings; braces are to be filled."""
 
 
+_MASSES = {
+    (True, False): "kg",
+    (False, True): "kg m^2",
+    (True, True): "kg between lengths, kg m^2 between angles, else kg m",
+}
+"""Units of a mass matrix, by whether a pose has lengths, and angles."""
+
+
 def banner(robot: Manipulator, language: str) -> list[str]:
     """Return the lines that begin a generated file."""
     what = f"{len(robot.legs)} legs, {robot.platform.motion}"
@@ -33,8 +41,8 @@ def banner(robot: Manipulator, language: str) -> list[str]:
     ]
 
 
-def port_meaning(robot: Manipulator, port: Port, output: Output) -> str:
-    """Return the meaning of an input or an output, with its unit."""
+def port_meaning(robot: Manipulator, what: str, port: Port, output: Output) -> str:
+    """Return the meaning of an input or an output of the function `what`, with its unit."""
     platform = robot.platform
     units = [leg.joint.unit for leg in robot.legs]
     kinds = [
@@ -44,6 +52,9 @@ def port_meaning(robot: Manipulator, port: Port, output: Output) -> str:
     ]
     pose = ", ".join(f"{', '.join(names)} in {unit}" for names, unit in kinds)
     rates, seconds = (", ".join(f"{unit}/{per}" for _, unit in kinds) for per in ("s", "s^2"))
+    along = " and ".join(
+        f"{'N' if unit == 'm' else 'N m'} along {', '.join(names)}" for names, unit in kinds
+    )
     moment = ", N m about k" if platform.angles else ""
     in_base_axes = "force, N, and moment about it, N m, in base axes"
     wrench = in_base_axes if platform.wrench_in_base_axes else f"N{moment}"
@@ -66,6 +77,8 @@ def port_meaning(robot: Manipulator, port: Port, output: Output) -> str:
         "joint_rates": _join_units([f"{unit}/s" for unit in units]),
         "joint_accelerations": _join_units([f"{unit}/s^2" for unit in units]),
         "forces": _join_units([leg.joint.force_unit for leg in robot.legs]),
+        "generalised": along,
+        "masses": _MASSES[bool(platform.lengths), bool(platform.angles)],
         "wrench": wrench,
         "center": center,
         "inertia": inertia,
@@ -73,7 +86,8 @@ def port_meaning(robot: Manipulator, port: Port, output: Output) -> str:
     name = port.name.removesuffix("_out")
     if name == NAMES[output] != "forces":
         return command_meaning(robot, output)
-    return TEXTS["ports"].get(name, "").format(**words)
+    texts = TEXTS["ports"]
+    return texts.get(f"{what}.{name}", texts.get(name, "")).format(**words)
 
 
 def law_meanings(what: str, meanings: Mapping[str, str]) -> dict[str, str]:
@@ -85,5 +99,5 @@ def law_meanings(what: str, meanings: Mapping[str, str]) -> dict[str, str]:
 
 
 def _join_units(units: Sequence[str]) -> str:
-    """Return the units of a vector as text: a single unit if all are equal, else leg by leg."""
-    return units[0] if len(set(units)) == 1 else f"{', '.join(units)} (leg by leg)"
+    """Return the units of a vector as text: a single unit if all are equal, else all of them."""
+    return units[0] if len(set(units)) == 1 else ", ".join(units)

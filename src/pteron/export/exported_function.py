@@ -247,9 +247,11 @@ def _meanings(
 ) -> dict[str, str]:
     """Return the meanings of inputs and outputs, with their units."""
     robot, what, unit = request.robot, request.function_name, request.output
-    meanings: dict[str, str] = {port.name: port_meaning(robot, port, unit) for port in ports}
+    meanings: dict[str, str] = {port.name: port_meaning(robot, what, port, unit) for port in ports}
     if request.is_custom:
-        readings = {name: port_meaning(robot, Port(name, (1,)), unit) for name in TEXTS["law"]}
+        readings = {
+            name: port_meaning(robot, what, Port(name, (1,)), unit) for name in TEXTS["law"]
+        }
         own_tables = {name: f"see the table {what}_{name}" for name in shared}
         meanings = {**readings, **meanings} | own_tables
     if not request.tables:

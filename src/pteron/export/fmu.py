@@ -21,7 +21,6 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pteron.atomic import make_folder, write_files
 from pteron.bodies.inertia import inertia_count
 from pteron.dynamics import drive_forces
 from pteron.errors import DataError, ModelError
@@ -32,6 +31,7 @@ from pteron.export.functions import exported_functions
 from pteron.export.names import prefix_of
 from pteron.export.start_pose import start_pose
 from pteron.export.tools import tool_lines
+from pteron.export.writing import write_export
 from pteron.kernels import Array, as_array
 from pteron.kernels.c import c_compiler
 from pteron.kernels.code import render_template
@@ -158,7 +158,7 @@ def export_fmu(
         **{f"sources/{name}": text.encode() for name, text in sources.items()},
         place: binary,
     }
-    return write_files({make_folder(folder) / f"{prefix}.fmu": _zip_files(members)})
+    return write_export(folder, {f"{prefix}.fmu": _zip_files(members)})
 
 
 def _checked_pose(robot: Manipulator, pose: ArrayLike) -> Array:

@@ -14,13 +14,13 @@ from pathlib import Path
 
 import numpy as np
 
-from pteron.atomic import write_texts
 from pteron.equations.machine import Machine, closure_of
 from pteron.export.c import c_texts
 from pteron.export.descriptions import banner
 from pteron.export.functions import exported_functions
 from pteron.export.names import add_checksum, prefix_of
 from pteron.export.start_pose import start_pose
+from pteron.export.writing import write_export
 from pteron.kernels import Array
 from pteron.kernels.code import render_template
 from pteron.kinematics import inverse_kinematics, jacobian
@@ -233,7 +233,7 @@ def export_linuxcnc(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
         )
     # halcompile reads what the locale says: nothing but ASCII.
     plain = {name: text.encode("ascii", "replace").decode() for name, text in files.items()}
-    return write_texts(folder, plain)
+    return write_export(folder, plain)
 
 
 def _component(prefix: str) -> str:

@@ -10,7 +10,6 @@ import textwrap
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
-from pteron.atomic import write_texts
 from pteron.controllers import Custom
 from pteron.equations.machine import closure_of
 from pteron.errors import ModelError
@@ -21,6 +20,7 @@ from pteron.export.functions import FunctionChoice, choice_list, exported_functi
 from pteron.export.guards import INPUT_POWER, Names, Statements, element, power
 from pteron.export.names import prefix_of
 from pteron.export.tools import tool_lines
+from pteron.export.writing import write_export
 from pteron.kernels import Graph, Port
 from pteron.kernels.code import render_template
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
@@ -126,7 +126,9 @@ def export_st(
     )
     prefix = _pascal_case(prefix_of(robot))
     blocks = {f"{prefix}_{_pascal_case(f.name)}": f for f in exported}
-    return write_texts(folder, {f"{name}.st": _block(robot, name, f) for name, f in blocks.items()})
+    return write_export(
+        folder, {f"{name}.st": _block(robot, name, f) for name, f in blocks.items()}
+    )
 
 
 def _block(robot: Manipulator, name: str, code: ExportedFunction) -> str:

@@ -161,6 +161,12 @@ class Code:
         self._program = function, outputs
         self._module: ModuleType | None = None
 
+    @property
+    def instruction_count(self) -> int:
+        """The number of CasADi's instructions, inputs and outputs included."""
+        count: int = self._program[0].n_instructions()
+        return count
+
     @cached_property
     def source(self) -> str:
         """The C code, cached on disk: writing it takes 0.1 s and more."""

@@ -32,8 +32,13 @@ _AT_EXIT = 3.0
 _AT_WORK = threading.Semaphore(1)
 """Admits one compilation at a time; a caller that cannot acquire it tries again later."""
 
-_PATIENCE = 0.1
-"""Seconds of the virtual machine's work before C code is asked for: a fifth of a compilation."""
+_LOOK = 0.1
+"""Seconds of the virtual machine's work after which the cache is searched for C code."""
+
+_BASIC, _EACH = 0.2, 0.7e-3
+"""Seconds that gcc 12 takes for a function, and more for each instruction of it (of functions of
+245 to 3038, on one core). When the virtual machine has worked as long, the function is compiled:
+the two together take at most twice the time of the better one."""
 
 _WAITING: weakref.WeakSet[SharedCode] = weakref.WeakSet()
 """Functions whose code is being compiled in the background."""
@@ -58,14 +63,14 @@ def numeric(
     """Return the kernel that evaluates the function `what` of a machine, compiled when worthwhile.
 
     A first call runs at once, on CasADi's virtual machine: about 1 us a state, nothing to compile.
-    After 0.1 s of work on a function of a machine's layout, C code for it is read from the cache
-    or, if there is a compiler, compiled in the background, which takes half a second or so and
-    delays no call. Later calls, and the rest of a large batch, run that code, at some tens of
-    nanoseconds a state. It returns the same bits, so that a result does not depend on when it is
-    computed. Nothing is compiled at import. A process that ends during a compilation waits for it,
-    three seconds at most, so that the next process has the code. With `PTERON_KERNELS=vm` in the
-    environment only the virtual machine is used; `compile` returns a kernel of any target, compiled
-    at once.
+    After 0.1 s of work on a function of a machine's layout, C code for it is read from the cache.
+    If it is not there and there is a compiler, it is compiled in the background once the virtual
+    machine has worked as long as that takes, half a second or a few; no call waits. Later calls,
+    and the rest of a large batch, run that code, at some tens of nanoseconds a state. It returns
+    the same bits, so that a result does not depend on when it is computed. Nothing is compiled at
+    import. A process that ends during a compilation waits for it, three seconds at most, so that
+    the next process has the code. With `PTERON_KERNELS=vm` in the environment only the virtual
+    machine is used; `compile` returns a kernel of any target, compiled at once.
     """
     columns = None if base is None else columns_of(base)
     # Kernels are kept by machine, not by a name, whose file may change.
@@ -114,7 +119,8 @@ def _tier(built: Program) -> SharedCode:
 
 def _tier_of(code: Code) -> SharedCode:
     """Return C code with the interpreter time after which it is compiled; never if set to "vm"."""
-    return SharedCode(code, math.inf if os.environ.get(VARIABLE) == "vm" else _PATIENCE)
+    is_vm = os.environ.get(VARIABLE) == "vm"
+    return SharedCode(code, math.inf if is_vm else _BASIC + _EACH * code.instruction_count)
 
 
 class SharedCode:
@@ -125,13 +131,14 @@ class SharedCode:
     code : Code
         The code.
     patience : float
-        Seconds of the virtual machine's work before the code is asked for.
+        Seconds of the virtual machine's work before the code is compiled.
     """
 
     def __init__(self, code: Code, patience: float) -> None:
         self.code = code
         self.ready = False
         self._patience = patience
+        self._spent, self._look = 0.0, _LOOK
 
     def fetch(self, *, at_any_cost: bool) -> None:
         """Load the C code if it is cached; otherwise compile it if `at_any_cost`.
@@ -148,23 +155,26 @@ class SharedCode:
                 self._load()
 
     def add_interpreter_time(self, seconds: float) -> None:
-        """Count interpreter time, s; when enough has been spent, compile the C code in a thread."""
-        self._patience -= seconds
+        """Count interpreter time, s: load cached C code after some, compile it after enough."""
+        self._spent += seconds
+        if self._spent > self._look:
+            self._look = math.inf
+            self.fetch(at_any_cost=False)
         taken = _AT_WORK
-        if self._patience > 0.0 or not taken.acquire(blocking=False):
+        if self.ready or self._spent <= self._patience or not taken.acquire(blocking=False):
             return
         worker = threading.Thread(
             target=self._load_and_release, args=(taken,), name="pteron-compile", daemon=True
         )
         try:
-            self._patience = math.inf
+            self._spent = -math.inf
             if compiler() is not None:
                 _ = self.code.source  # not in the thread: CasADi is not made for two at a time
                 _WAITING.add(self)
                 worker.start()
                 atexit.register(_end, worker)
-        except BaseException:  # an interrupt, too: the next call asks again
-            self._patience = _PATIENCE
+        except BaseException:  # an interrupt, too: a later call asks again
+            self._spent = 0.0
             raise
         finally:
             if worker.ident is None:  # it will not release it
@@ -172,7 +182,7 @@ class SharedCode:
 
     def ask_again(self) -> None:
         """Restart the count of interpreter time: the thread that compiled the code is gone."""
-        self._patience = _PATIENCE
+        self._spent, self._look = 0.0, _LOOK
 
     def _load(self) -> None:
         """Load or compile the C module and set `ready`; on failure `ready` stays False."""
@@ -247,6 +257,6 @@ class TieredKernel(VirtualMachine):
             if self.tier.ready:
                 self.tier.code.module.run(*part[0], *part[1])
                 continue
-            begin = time.perf_counter()
+            begin = time.thread_time()  # of this thread, however busy the computer is
             super()._run(stop - start, *part)
-            self.tier.add_interpreter_time(time.perf_counter() - begin)
+            self.tier.add_interpreter_time(time.thread_time() - begin)

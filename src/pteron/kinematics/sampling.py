@@ -30,9 +30,9 @@ of work; what is rarer than one in 10^5 is left to the walk."""
 _MANY = 50
 """Number of wanted poses from which a search that finds few ends after a quarter of its batches."""
 
-_SPARSE = 32
+_SPARSE = 12
 """Batches after which a box in which few poses are in reach is left for poses that Newton's method
-leads to joint coordinates. The machines of the catalog take up to 11."""
+leads to joint coordinates. All machines of the catalog but the 5-RPUR take up to 11."""
 
 _BARREN = 8
 """Batches that are led so in turn and give no pose, after which none is: each gives some hundred
@@ -41,9 +41,14 @@ poses in reach, or the conditions on them are ones that hardly any pose keeps.""
 _SCOUTS = 100
 """Poses found first in the whole box; their own bounding box, widened, serves for the others."""
 
-_LEADING = 20
-"""Steps of Newton's method that lead a pose to joint coordinates: what has not converged by then
-seldom does."""
+_STARTS = 8
+"""Starts of Newton's method for each pose that is still wanted: hexapods with short rams or cranks
+find one from two or three."""
+
+_LEADING = 6, 6
+"""Steps of Newton's method that lead poses to joint coordinates, and further steps of those that
+are then in the box: of what is outside, or has not converged by the last, one in a thousand would
+with 20 steps of all (hexapods with rams and with cranks)."""
 
 _RARE = 1e-3
 """Share of poses in reach of all legs below which a random walk looks for them."""
@@ -112,7 +117,7 @@ def _search(
     widest = widest_box(robot)
     every = np.ones(robot.freedom, dtype=bool)
     if conditions.limits and all(leg.limits for leg in robot.legs):
-        solved = _solved_poses(robot, *widest, rng, conditions)
+        solved = _solved_poses(robot, *widest, _BATCH, rng, conditions)
         if len(solved) >= _SCOUTS:
             return _draw_in_box(
                 robot, *_box_about(solved, 0.05, every, widest), count, rng, conditions
@@ -221,9 +226,14 @@ def joint_limits(robot: Manipulator) -> Array:
 
 
 def _solved_poses(
-    robot: Manipulator, low: Array, high: Array, rng: np.random.Generator, conditions: _Conditions
+    robot: Manipulator,
+    low: Array,
+    high: Array,
+    starts: int,
+    rng: np.random.Generator,
+    conditions: _Conditions,
 ) -> Array:
-    """Return poses found by Newton's method for random joint coordinates, if usable.
+    """Return poses found by Newton's method from random starts and joint coordinates, if usable.
 
     With short rams or cranks hardly any pose of the box is in reach. The result is empty if the
     platform does not tilt, or a joint has no range (`_joint_ranges`).
@@ -231,11 +241,13 @@ def _solved_poses(
     ranges = _joint_ranges(robot, limits=conditions.limits)
     if ranges is None:
         return np.empty((0, robot.freedom))
-    poses = rng.uniform(low, high, (_BATCH, robot.freedom))
-    joints = rng.uniform(ranges[0], ranges[1], (_BATCH, robot.joint_count))
-    for _ in range(_LEADING):
-        poses = numeric(robot, "newton_step")(joints, poses)[0]
-    poses = poses[((low <= poses) & (poses <= high)).all(axis=-1)]
+    poses = rng.uniform(low, high, (starts, robot.freedom))
+    joints = rng.uniform(ranges[0], ranges[1], (starts, robot.joint_count))
+    for steps in _LEADING:
+        for _ in range(steps):
+            poses = numeric(robot, "newton_step")(joints, poses)[0]
+        inside = ((low <= poses) & (poses <= high)).all(axis=-1)
+        joints, poses = joints[inside], poses[inside]
     return conditions.keep_within_limits(robot, conditions.select_reachable(robot, poses))
 
 
@@ -269,7 +281,7 @@ def _draw_in_box(
     """Draw poses from a box until `count` keep the conditions; return the sample."""
     usable = [np.empty((0, robot.freedom))]
     sample = _Sample(usable[0], seen=usable[0])
-    total = barren = 0
+    total = drawn = barren = 0
     attempts = _ATTEMPTS + count // 16
     for k in range(1, attempts + 1):
         poses = rng.uniform(-1.0, 1.0, (_BATCH, robot.freedom))
@@ -281,9 +293,11 @@ def _draw_in_box(
             sample.seen = np.concatenate([sample.seen, poses])
         usable.append(conditions.keep_within_limits(robot, poses))
         total += len(usable[-1])
-        if k >= _SPARSE and barren < _BARREN and total < count * k / attempts:
-            # At this rate the box would not give enough.
-            usable.append(_solved_poses(robot, low, high, rng, conditions))
+        drawn += len(usable[-1])
+        if k >= _SPARSE and barren < _BARREN and total < count and drawn < count * k / attempts:
+            # At its rate the box would not give enough.
+            starts = min(_STARTS * (count - total), _BATCH)
+            usable.append(_solved_poses(robot, low, high, starts, rng, conditions))
             total += len(usable[-1])
             barren = 0 if len(usable[-1]) else barren + 1
         # A quarter of the attempts tells, where many poses are wanted, that they will not be found.

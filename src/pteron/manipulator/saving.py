@@ -112,7 +112,8 @@ def document_of(robot: Manipulator) -> dict[str, Any]:
         shares = asdict(robot.distribution).items()
         machine["distribution"] = {k: v for k, v in shares if v is not None}
     if robot.template is not None:
-        machine["template"] = asdict(robot.template)
+        template = asdict(robot.template)
+        machine["template"] = {k: v for k, v in template.items() if v or k != "rider"}
     if robot.owner:
         machine["owner"] = dict(robot.owner)
     machine |= {"platform": platform, "legs": legs}

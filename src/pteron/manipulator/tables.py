@@ -200,6 +200,9 @@ class TemplateTable(TomlTable):
     confirmed: list[str] = key(
         "keys of values that are meant to be as in the template: pteron check lists the others", []
     )
+    rider: list[float] = key(
+        "mass (kg), x, y, z (m) of the point mass that the platform's mass and inertia contain", []
+    )
 
 
 class MachineTable(TomlTable):

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from pteron.bodies.inertia import carried_values, inertia_count
 from pteron.manipulator.crank_direction import crank_direction_text
 from pteron.manipulator.files import catalog, contents, load
 from pteron.manipulator.joint_pairs import PLATES, joint_circle
@@ -15,6 +16,9 @@ from pteron.tolerances import SAME
 
 _MASSES = ("upper", "lower", "slider", "platform_mass")
 """Values compared with a template that the file does not name."""
+
+_WEIGHTY = (*_MASSES, "platform_inertia")
+"""Values on which forces and torques depend."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +68,9 @@ def template_values(robot: Manipulator) -> list[TemplateValue]:
 
 def _sentence(kind: str, kept: Sequence[TemplateValue], advice: str) -> str:
     """Return the sentence that lists values of a template."""
-    return f"Still as in {kind}: {', '.join(value.text for value in kept)}; {advice}"
+    weighty = any(value.key in _WEIGHTY for value in kept)
+    reason = "forces and torques depend on these masses and inertias; " if weighty else ""
+    return f"Still as in {kind}: {', '.join(value.text for value in kept)}; {reason}{advice}"
 
 
 def _common(robot: Manipulator, template: Manipulator) -> list[TemplateValue]:
@@ -76,7 +82,7 @@ def _common(robot: Manipulator, template: Manipulator) -> list[TemplateValue]:
         value
         for value in _values(robot)
         if value.key in former and _same(value.numbers, former[value.key].numbers)
-    ] + list(_sections(robot, template))
+    ] + [*_grown_inertia(robot, template), *_sections(robot, template)]
 
 
 def _same(values: Sequence[Any], others: Sequence[Any]) -> bool:
@@ -117,14 +123,7 @@ def _values(robot: Manipulator) -> Iterator[TemplateValue]:
     if pairs := robot.platform.angle_limits:
         numbers = tuple(end for pair in pairs.values() for end in pair)
         yield TemplateValue("angles", numbers, f"limits of {', '.join(pairs)} (angles)")
-    inertia = robot.platform.inertia
-    mass = inertia.mass + sum(bar.mass for bar in robot.platform.bars)
-    yield TemplateValue("platform_mass", (mass,), f"platform_mass {mass:.4g} kg")
-    yield TemplateValue(
-        "platform_inertia",
-        tuple(number / inertia.mass for number in inertia.values[1:]),
-        "platform_inertia (per kg)",
-    )
+    yield from _platform_values(robot)
     for name, key in first.every_key().items():
         if key.body:
             masses = tuple(leg.bodies[key.body].values[0] for leg in robot.legs)
@@ -132,6 +131,44 @@ def _values(robot: Manipulator) -> Iterator[TemplateValue]:
     drives = tuple(leg.drive for leg in robot.legs)
     if any(drive is not None for drive in drives):
         yield TemplateValue("drive", drives, "drive")
+
+
+def _platform_values(robot: Manipulator) -> Iterator[TemplateValue]:
+    """Yield mass and inertia of the platform, without a rider that the file names."""
+    mass, *others = _own_inertia(robot)
+    without = " without the rider" if robot.template and robot.template.rider else ""
+    total = mass + sum(bar.mass for bar in robot.platform.bars)
+    yield TemplateValue("platform_mass", (total,), f"platform_mass {total:.4g} kg{without}")
+    if mass > 0.0:
+        per_mass = tuple(number / mass for number in others)
+        yield TemplateValue("platform_inertia", per_mass, f"platform_inertia{without} (per kg)")
+
+
+def _grown_inertia(robot: Manipulator, template: Manipulator) -> Iterator[TemplateValue]:
+    """Yield the platform's inertia if it is the template's, grown with the platform's radius."""
+    circles = [joint_circle(machine, "platform").radius for machine in (robot, template)]
+    (mass, *others), (former_mass, *formers) = map(_own_inertia, (robot, template))
+    count = inertia_count(robot.platform.inertia.kinds)
+    if min(*circles, mass) <= 0.0 or math.isclose(*circles, rel_tol=SAME):
+        return
+    growth = circles[0] / circles[1]
+    powers = [1] * (len(others) - count) + [2] * count
+    grown = [mass / former_mass * v * growth**k for v, k in zip(formers, powers, strict=True)]
+    if _same([*others], grown):
+        yield TemplateValue("platform_inertia", (), "platform_inertia (per kg and radius squared)")
+
+
+def _own_inertia(robot: Manipulator) -> list[float]:
+    """Return the platform's inertial parameters less those of a rider that the file names."""
+    inertia = robot.platform.inertia
+    if not (robot.template and robot.template.rider):
+        return list(inertia.values)
+    mass, *center = robot.template.rider
+    count = inertia_count(inertia.kinds)
+    load = carried_values(type(inertia), mass, center, [0.0] * count)
+    # What is left of the rounding of a file is nothing.
+    pairs = zip(inertia.values, load, strict=True)
+    return [0.0 if abs(a - b) <= SAME * abs(b) else a - b for a, b in pairs]
 
 
 def _cone_names(leg: Any) -> list[str]:

@@ -267,7 +267,14 @@ def prove_box(
             "another middle",
             subject=robot.name,
         )
-    return region(size), proof
+    box = region(size)
+    if not np.ptp(box.box, axis=0).all():
+        raise ModelError(
+            f"the box of poses about {middle.round(6).tolist()} that serves is a point: there is "
+            "no room for the motion; give another middle, and a pivot near the platform, in m",
+            subject=robot.name,
+        )
+    return box, proof
 
 
 def _search_center(

@@ -16,6 +16,8 @@ _HEAVY = 100.0
 
 def load_warnings(robot: Manipulator, pose: Array) -> tuple[str, ...]:
     """Return warnings about the drives under their load in a pose (m,), at rest."""
+    if not any(leg.drive for leg in robot.legs):
+        return ()
     zero_rates = np.zeros(robot.freedom)
     holding = np.abs(drive_forces(robot, pose, zero_rates, zero_rates))
     moved_masses = moved_inertias(jacobian(robot, pose), mass_matrix(robot, pose))

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import scipy  # type: ignore[import-untyped]
 
-from pteron.atomic import write_texts
 from pteron.dynamics import inverse_dynamics
 from pteron.export.engines.formatting import (
     FORMATS,
@@ -23,6 +22,7 @@ from pteron.export.engines.parts import BASE, BodyShape, Tree, TreeBody
 from pteron.export.engines.shapes import add_shapes
 from pteron.export.engines.tree import tree
 from pteron.export.names import identifier
+from pteron.export.writing import write_export
 from pteron.kernels import Array
 from pteron.kernels.code import render_template
 from pteron.manipulator import RobotLike, as_manipulator
@@ -77,7 +77,7 @@ def export_mjcf(
     ['delta.xml']
     """
     robot = as_manipulator(robot)
-    return write_texts(folder, {f"{identifier(robot)}.xml": mjcf(tree(robot, home))})
+    return write_export(folder, {f"{identifier(robot)}.xml": mjcf(tree(robot, home))})
 
 
 def mjcf(opened: Tree, *, step: float = STEP) -> str:

@@ -13,12 +13,12 @@ from typing import Any
 
 import numpy as np
 
-from pteron.atomic import write_texts
 from pteron.errors import ModelError
 from pteron.export.engines.formatting import FORMATS, from_parent, head, number, omission_notes
 from pteron.export.engines.parts import Tree, TreeBody, bodies_at_zero
 from pteron.export.engines.tree import tree
 from pteron.export.names import identifier
+from pteron.export.writing import write_export
 from pteron.extras import install_command
 from pteron.kernels.code import render_template
 from pteron.manipulator import RobotLike, as_manipulator
@@ -69,7 +69,7 @@ def export_pinocchio(
     robot = as_manipulator(robot)
     name = identifier(robot).replace("-", "_")
     name = f"robot_{name}" if name[0].isdigit() else name
-    return write_texts(folder, {f"{name}_pinocchio.py": pinocchio_source(tree(robot, home))})
+    return write_export(folder, {f"{name}_pinocchio.py": pinocchio_source(tree(robot, home))})
 
 
 def pinocchio_model(robot: RobotLike, *, home: PoseLike | None = None) -> Any:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from pteron.atomic import write_texts
 from pteron.export.engines.formatting import FORMATS, frame, head, omission_notes
 from pteron.export.engines.inertia import SHARE
 from pteron.export.engines.links import frame_texts, joint_drive, link_shape, links_of
@@ -12,6 +11,7 @@ from pteron.export.engines.parts import Tree
 from pteron.export.engines.shapes import add_shapes
 from pteron.export.engines.tree import tree
 from pteron.export.names import identifier
+from pteron.export.writing import write_export
 from pteron.kernels.code import render_template
 from pteron.manipulator import RobotLike, as_manipulator
 from pteron.shapes import PoseLike
@@ -55,7 +55,7 @@ def export_sdf(
     ['delta.sdf']
     """
     robot = as_manipulator(robot)
-    return write_texts(folder, {f"{identifier(robot)}.sdf": sdf(tree(robot, home))})
+    return write_export(folder, {f"{identifier(robot)}.sdf": sdf(tree(robot, home))})
 
 
 def sdf(opened: Tree) -> str:

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 
-from pteron.atomic import write_texts
 from pteron.export.engines.formatting import (
     FORMATS,
     body_frame_points,
@@ -21,6 +20,7 @@ from pteron.export.engines.parts import Tree, bodies_at_zero
 from pteron.export.engines.shapes import add_shapes
 from pteron.export.engines.tree import tree
 from pteron.export.names import identifier
+from pteron.export.writing import write_export
 from pteron.kernels.code import render_template
 from pteron.manipulator import RobotLike, as_manipulator
 from pteron.shapes import PoseLike
@@ -71,7 +71,7 @@ def export_urdf(
     robot = as_manipulator(robot)
     opened, name = tree(robot, home), identifier(robot)
     texts = {f"{name}.urdf": urdf(opened), f"{name}.closure.yaml": closure_yaml(opened)}
-    return write_texts(folder, texts)
+    return write_export(folder, texts)
 
 
 def urdf(opened: Tree) -> str:

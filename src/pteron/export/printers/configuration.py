@@ -10,7 +10,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from pteron.atomic import write_texts
 from pteron.equations.machine import Machine
 from pteron.errors import ModelError
 from pteron.export.descriptions import banner
@@ -20,6 +19,7 @@ from pteron.export.printers.centers import Center
 from pteron.export.printers.delta import delta
 from pteron.export.printers.rotary_delta import rotary
 from pteron.export.printers.sections import INSTEAD
+from pteron.export.writing import write_export
 from pteron.kernels.code import render_template
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 
@@ -80,7 +80,7 @@ def export_klipper(robot: RobotLike, folder: str | Path = ".") -> list[Path]:
         found=_values(robot),
         tool=any(robot.platform.tool),
     )
-    return write_texts(folder, {f"{prefix_of(robot)}.cfg": text})
+    return write_export(folder, {f"{prefix_of(robot)}.cfg": text})
 
 
 def _values(robot: Manipulator) -> dict[str, Any]:

@@ -14,12 +14,12 @@ from typing import Any
 
 import numpy as np
 
-from pteron.atomic import write_texts
 from pteron.errors import ModelError
 from pteron.export.descriptions import banner
 from pteron.export.names import prefix_of
 from pteron.export.printers.linear_delta import LinearDelta
 from pteron.export.printers.sections import reading_comment
+from pteron.export.writing import write_export
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 
 _TOWERS = (210.0, 330.0, 90.0)
@@ -130,7 +130,7 @@ def _write(robot: RobotLike, folder: str | Path, firmware: str, lines: Sequence[
     ]
     text = "\n".join([*(f"; {line}".rstrip() for line in (*head, *comments)), *lines]) + "\n"
     name = firmware.lower().removesuffix("firmware")
-    return write_texts(folder, {f"{prefix_of(machine)}_{name}.gcode": text})
+    return write_export(folder, {f"{prefix_of(machine)}_{name}.gcode": text})
 
 
 def _numbers(robot: Manipulator) -> tuple[LinearDelta, list[int]]:
