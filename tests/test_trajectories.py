@@ -258,6 +258,28 @@ def test_a_cycles_path_is_that_of_the_cycle(name):
         assert np.linalg.norm(off) < 1e-6
 
 
+MOUNTINGS = {"upright": (0, 0, -9.81), "hanging": (0, 0, 9.81), "on its side": (6.0, -7.8, 0)}
+
+
+@pytest.mark.parametrize(
+    "name", gated(pteron.catalog(), ["sprint-z3", "ball-table", "ankle-offset", "5-rpur"])
+)
+def test_a_standard_cycle_has_no_cusp_however_the_machine_is_mounted(name):
+    for mounting, gravity in MOUNTINGS.items():
+        robot = replace(pteron.load(name), gravity=gravity)
+        for scale in (0.01, 0.3):
+            path = cycle_path(pick_and_place(robot, home_pose(name), scale=scale))
+            s = np.linspace(0.0, path.length / 2.0, 4001)
+            weights = np.where(robot.platform.angular, 0.1, 1.0)
+            _, first, second = (part * weights for part in path.at(s))
+            tangents = first / np.linalg.norm(first, axis=-1, keepdims=True)
+            turns = np.arccos(np.clip((tangents[40:] * tangents[:-40]).sum(axis=-1), -1.0, 1.0))
+            # In one per cent of the way out the path turns by less than half a right angle.
+            assert np.degrees(turns.max()) < 35.0, mounting
+            bends = np.linalg.norm(second, axis=-1) * path.length / 2.0
+            assert bends.max() < 80.0, mounting
+
+
 @pytest.mark.parametrize(
     ("name", "drive"),
     [
