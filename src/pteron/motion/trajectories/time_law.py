@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,9 +13,16 @@ from pteron.kernels import Array
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
 from pteron.motion.motion import Motion
 from pteron.motion.trajectories.checks import check_path
-from pteron.motion.trajectories.demand import curve_rate, demand_between, most_rate, peaks
+from pteron.motion.trajectories.demand import (
+    curve_rate,
+    demand,
+    demand_between,
+    most_rate,
+    peaks,
+)
 from pteron.motion.trajectories.limits import MotionLimits, limits_of
-from pteron.motion.trajectories.path import Path
+from pteron.motion.trajectories.path import Path, path_corners
+from pteron.motion.trajectories.path_nodes import path_nodes
 from pteron.motion.trajectories.time_polynomials import PolynomialLaw, Progress, polynomial
 from pteron.motion.trajectories.timed_path import Timed, timed_path
 from pteron.motion.trajectories.tool import Curve
@@ -150,15 +158,15 @@ def polynomial_motion(
     robot = as_manipulator(robot)
     check_path(robot, path)
     motion_limits = limits_of(robot) if limits is None else limits
-    laws = (polynomial(law),) * (len(path.rests) - 1)
     sizes = np.diff(path.rests)
     # Where nothing limits a motion the stretches have the same peak acceleration.
-    shares: Sequence[float] = [float(np.sqrt(size)) for size in sizes]
+    times = StretchTimes(tuple(path.rests), [float(np.sqrt(size)) for size in sizes])
     if motion_limits.is_limited:
-        shares = stretch_times(robot, path, laws[0], motion_limits)
+        times = stretch_times(robot, path, polynomial(law), motion_limits)
     elif duration is None:
         raise _no_limit_error()
-    course = timed_path(path, shares, laws)
+    laws = [polynomial(law)] * len(times.durations)
+    course = timed_path(path, times.durations, laws, times.rests)
     if duration is None:
         return limit_motion(robot, course, motion_limits, step)
     _expect_time("duration", duration)
@@ -168,23 +176,84 @@ def polynomial_motion(
     return sample_curve(slowed_course.at, duration, step)
 
 
+class StretchTimes(NamedTuple):
+    """Arc lengths s, m, at which a motion along a path rests, and the durations between, s."""
+
+    rests: tuple[float, ...]
+    durations: list[float]
+
+
 def stretch_times(
     robot: Manipulator, path: Path, law: Progress, limits: MotionLimits
-) -> list[float]:
-    """Return the shortest duration, s, of each part of a path between rests within the limits."""
-    durations = []
-    tau = np.linspace(0.0, 1.0, _LOOK)
-    share, rate, gain = law(tau)
+) -> StretchTimes:
+    """Return the shortest duration of each part of a path between rests within the limits.
+
+    A rounded corner at which stopping takes less time than passing it is a rest too.
+    """
+    rests, durations = [0.0], []
     for begin, end in zip(path.rests[:-1], path.rests[1:], strict=True):
+        stretch = _Stretch(robot, path, law, limits, begin, end)
+        stops = [begin, *(s for s in path_corners(path) if begin < s < end), end]
+        through = [begin, end], [stretch.shortest(begin, end)]
+        stopping = _stops_that_save_time(stretch, stops) if len(stops) > 2 else through
+        places, times = min(through, stopping, key=lambda way: sum(way[1]))
+        rests += places[1:]
+        durations += times
+    return StretchTimes(tuple(rests), durations)
+
+
+class _Stretch:
+    """The demand of a path between two rests, by which its parts are timed."""
+
+    def __init__(
+        self,
+        robot: Manipulator,
+        path: Path,
+        law: Progress,
+        limits: MotionLimits,
+        begin: float,
+        end: float,
+    ) -> None:
+        self._robot, self._law, self._limits = robot, law, limits
+        self._tau = np.linspace(0.0, 1.0, 10 * _LOOK)
+        self._shares = law(self._tau)[0]
+        even = begin + (end - begin) * self._shares[::10]
+        self._s = np.union1d(even, path_nodes(path, robot.platform, begin, end))
+        self._poses, first, second = path.at(self._s)
+        self._needs = demand(robot, self._poses, first, second)
+
+    def shortest(self, begin: float, end: float) -> float:
+        """Return the shortest duration, s, of the time law from rest at s to rest, m."""
+        first, last = np.searchsorted(self._s, [begin, end])
+        last = max(last + 1, first + 2)
+        share = np.clip((self._s[first:last] - begin) / (end - begin), 0.0, 1.0)
+        _, rate, gain = self._law(np.interp(share, self._shares, self._tau))
         size = end - begin
-        pose, by_s, bend = path.at(begin + size * share)
-        first = by_s * size * rate[:, None]
-        second = bend * (size * rate[:, None]) ** 2 + by_s * size * gain[:, None]
-        most = curve_rate(robot, (pose, first, second), limits)
+        needs = self._needs.between(first, last).by_parameter(size * rate, size * gain)
+        most = most_rate(self._robot, needs, self._limits, self._poses[first:last])
         if not np.isfinite(most):
             raise _no_limit_error()
-        durations.append(1.0 / most)
-    return durations
+        return 1.0 / most
+
+
+def _stops_that_save_time(
+    stretch: _Stretch, stops: Sequence[float]
+) -> tuple[list[float], list[float]]:
+    """Return those of the stops, m, at which a stop is quicker, and the durations between, s."""
+    rests, durations = [stops[0]], []
+    here = stops[1]
+    duration = stretch.shortest(rests[-1], here)
+    for there in stops[2:]:
+        passing = stretch.shortest(rests[-1], there)
+        onward = stretch.shortest(here, there)
+        if passing <= duration + onward:
+            duration = passing
+        else:
+            rests.append(here)
+            durations.append(duration)
+            duration = onward
+        here = there
+    return [*rests, here], [*durations, duration]
 
 
 def _expect_kept(
