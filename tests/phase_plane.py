@@ -85,7 +85,11 @@ def _coefficients(robot, path, limits, s):
         )
     stacked = np.array(rows).reshape(-1, 4, len(s)).transpose(1, 2, 0)
     products = (tool * tool).sum(1), (tool * tool_bend).sum(1), (tool_bend**2).sum(1)
-    return tuple(np.ascontiguousarray(part) for part in stacked), np.minimum(most, 1e9) ** 2, products
+    return (
+        tuple(np.ascontiguousarray(part) for part in stacked),
+        np.minimum(most, 1e9) ** 2,
+        products,
+    )
 
 
 @njit

@@ -210,9 +210,7 @@ def most_rate(
     return least
 
 
-def expect_strength(
-    robot: Manipulator, needs: Demand, limits: MotionLimits, poses: Array
-) -> None:
+def expect_strength(robot: Manipulator, needs: Demand, limits: MotionLimits, poses: Array) -> None:
     """Raise if forces at rest at poses (K, m) exceed a drive's limit: no speed is slow enough."""
     joints, force, _, _ = limits.force_lines
     strength = np.full(needs.static.shape[-1], np.inf)

@@ -19,8 +19,7 @@ _BEND = 2e-3
 """Turn of the tangent, rad, by which an interval may differ from a curve of linear curvature."""
 
 _TURN = 0.05
-"""Greatest turn of the tangent in an interval, rad: some forty intervals for a right angle, whatever
-its size."""
+"""Greatest turn of the tangent in an interval, rad: a right angle of any size has some forty."""
 
 _HALVINGS = 24
 """Rounds of halving: an interval of a metre becomes 1e-10 m."""

@@ -21,14 +21,21 @@ from pteron.motion.trajectories.demand import (
     peaks,
 )
 from pteron.motion.trajectories.limits import MotionLimits, limits_of
-from pteron.motion.trajectories.path import Path, path_corners
+from pteron.motion.trajectories.path import TURN, Path, path_corners, path_weights
 from pteron.motion.trajectories.path_nodes import path_nodes
 from pteron.motion.trajectories.time_polynomials import PolynomialLaw, Progress, polynomial
 from pteron.motion.trajectories.timed_path import Timed, timed_path
 from pteron.motion.trajectories.tool import Curve
 
 STEP = 1e-3
-"""Time between the samples of a motion, s."""
+"""Time between the samples of a motion, s, where no step is given and the path is smooth enough."""
+
+_OFF = 1e-4
+"""Share of a path's extent by which a motion may leave it between samples. Chosen: 0.03 mm on the
+standard cycle, where steps of 1 ms leave it by less than a nanometre."""
+
+_FINEST = 256
+"""Samples in `STEP`, at most, where no step is given."""
 
 _MOST = 10_000_000
 """Most samples of a motion; a longer one is refused."""
@@ -49,7 +56,10 @@ suffice."""
 
 
 def shortest(
-    robot: RobotLike, curve: Callable[[Array], Curve], limits: MotionLimits, step: float = STEP
+    robot: RobotLike,
+    curve: Callable[[Array], Curve],
+    limits: MotionLimits,
+    step: float | None = None,
 ) -> Motion:
     """Return the motion along a curve of poses in the shortest time that keeps the limits.
 
@@ -61,8 +71,9 @@ def shortest(
         From tau (T,) in [0, 1] to poses (T, m) and two derivatives by tau.
     limits : MotionLimits
         At least one.
-    step : float
-        Time between samples, s.
+    step : float, optional
+        Time between samples, s; by default 1 ms, or a whole fraction of it where the curve needs
+        more samples.
 
     Returns
     -------
@@ -71,7 +82,7 @@ def shortest(
     Raises
     ------
     DataError
-        If there is no limit.
+        If there is no limit, or between samples that are `step` apart the motion leaves the curve.
     ModelError
         If the drives cannot hold the machine somewhere on the curve.
     """
@@ -87,14 +98,14 @@ def time_curve(
     curve: Callable[[Array], Curve],
     duration: float | None,
     limits: MotionLimits,
-    step: float = STEP,
+    step: float | None = None,
 ) -> Motion:
     """Return the motion along a curve of poses in `duration` s, or in the shortest time."""
     if duration is None:
         return shortest(robot, curve, limits, step)
     course = Timed(curve, _expect_time("duration", duration))
     _expect_kept(robot, course, limits)
-    return sample_curve(course.at, duration, step)
+    return _sample_closely(robot, course, step)
 
 
 def _no_limit_error() -> DataError:
@@ -112,7 +123,7 @@ def polynomial_motion(
     duration: float | None = None,
     limits: MotionLimits | None = None,
     law: PolynomialLaw = "quintic",
-    step: float = STEP,
+    step: float | None = None,
 ) -> Motion:
     """Return the motion along a path with a polynomial time law between each two rests.
 
@@ -129,8 +140,9 @@ def polynomial_motion(
         Of joints, drives and tool; by default those of the machine's drives.
     law : {"quintic", "seventh"}
         The polynomial's degree; see `polynomial`.
-    step : float
-        Time between samples, s; at most that.
+    step : float, optional
+        Time between samples, s, at most; by default 1 ms, or a whole fraction of it where corners
+        need more samples.
 
     Returns
     -------
@@ -142,7 +154,8 @@ def polynomial_motion(
     UnreachablePose, SingularPose
         If the machine cannot go the path; see `check_path`.
     DataError
-        If the duration is too short for the limits, or neither it nor a limit is given.
+        If the duration is too short for the limits, or neither it nor a limit is given, or between
+        samples that are `step` apart the motion leaves the path.
     ModelError
         If the drives cannot hold the machine somewhere on the path.
 
@@ -173,7 +186,7 @@ def polynomial_motion(
     slowed_course = course.slow_down(duration / course.duration)
     if motion_limits.is_limited:
         _expect_kept(robot, slowed_course, motion_limits, course.duration)
-    return sample_curve(slowed_course.at, duration, step)
+    return _sample_closely(robot, slowed_course, step)
 
 
 class StretchTimes(NamedTuple):
@@ -273,18 +286,39 @@ def _expect_kept(
     )
 
 
-def limit_motion(robot: Manipulator, course: Timed, limits: MotionLimits, step: float) -> Motion:
+def limit_motion(
+    robot: Manipulator,
+    course: Timed,
+    limits: MotionLimits,
+    step: float | None,
+    longest: float = STEP,
+) -> Motion:
     """Return the motion along a timed curve, slowed down until it keeps the limits everywhere.
 
     The limits are checked at ten times as many samples as the motion has, and where joints reverse.
 
     The duration is a multiple of the step; the course is slowed by the factor by which it exceeds a
-    limit.
+    limit. Without a step it is at most `longest`, and so short that the motion stays on the curve.
     """
+    if step is not None:
+        return _slow_to_limits(robot, course, limits, step)
+    count = max(1, int(np.ceil(STEP / longest)))
+    while True:
+        try:
+            return _slow_to_limits(robot, course, limits, STEP / count)
+        except DataError:
+            if count >= _FINEST:
+                raise
+            count *= 2
+
+
+def _slow_to_limits(robot: Manipulator, course: Timed, limits: MotionLimits, step: float) -> Motion:
+    """Return the motion with samples `step` apart; raise if that suits neither path nor limits."""
     for _ in range(_TRIES):
         count = max(1, int(np.ceil(course.duration / _expect_time("step", step) - 1e-9)))
         course = course.slow_down(count * step / course.duration)
         motion = sample_curve(course.at, count * step, step)
+        _expect_on_curve(robot, motion, course, step)
         fine = np.linspace(0.0, motion.duration, _FINER * count + 1)
         _, needs, poses = demand_between(robot, motion.at, fine)
         rate = most_rate(robot, needs, limits, poses, 1.0)
@@ -292,8 +326,41 @@ def limit_motion(robot: Manipulator, course: Timed, limits: MotionLimits, step: 
             return motion
         course = course.slow_down(1.0 / rate)
     raise DataError(
-        f"step: {step:g} s suits no motion of {course.duration:.3g} s; give a hundredth of it"
+        f"step: {step:g} s suits no motion of {course.duration:.3g} s along this path: between "
+        "samples it exceeds the limits however slow it is; give a tenth of it, or none"
     )
+
+
+def _sample_closely(robot: Manipulator, course: Timed, step: float | None) -> Motion:
+    """Return a motion's samples, so close that between them it stays on its curve."""
+    count = 1
+    while True:
+        spacing = STEP / count if step is None else step
+        motion = sample_curve(course.at, course.duration, spacing)
+        try:
+            _expect_on_curve(robot, motion, course, spacing)
+        except DataError:
+            if step is not None or count >= _FINEST:
+                raise
+            count *= 2
+        else:
+            return motion
+
+
+def _expect_on_curve(robot: Manipulator, motion: Motion, course: Timed, step: float) -> None:
+    """Raise if between its samples a motion leaves its curve."""
+    weights = path_weights(robot.platform)
+    middles = 0.5 * (motion.time[1:] + motion.time[:-1])
+    exact = course.at(middles)[0]
+    errors = np.linalg.norm((motion.at(middles)[0] - exact) * weights, axis=-1)
+    extent = float(np.linalg.norm(np.ptp(np.vstack([motion.pose, exact]), axis=0) * weights))
+    error = float(errors.max())
+    if error > _OFF * extent:
+        raise DataError(
+            f"step: between samples {step:g} s apart the motion leaves its path by "
+            f"{1e3 * error:.3g} mm (an angle of 1 rad counts as {TURN:g} m); give a shorter one, "
+            "or none"
+        )
 
 
 def sample_curve(states: Callable[[Array], Curve], duration: float, step: float = STEP) -> Motion:

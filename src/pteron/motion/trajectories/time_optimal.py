@@ -6,15 +6,15 @@ largest x on nodes that are dense where the path bends.
 
 Viscous friction is proportional to s' = sqrt(x), which is not linear in x. Where it opposes the
 drive, a tangent of the root bounds it from above; where it helps to brake, a chord from rest to a
-largest speed bounds it from below. Both are close near the speeds of the pass before, for which
-they are made. Dry friction has the sign of the joint's motion: where it opposes the drive it counts
+largest speed bounds it from below, until the speeds change little from pass to pass and a tangent
+serves. Both are close near the speeds of the pass before, for which they are made. Dry friction has the sign of the joint's motion: where it opposes the drive it counts
 in full, where it helps without Stribeck's part, which a joint in motion does not have.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -23,10 +23,10 @@ import numpy as np
 from pteron.errors import DataError
 from pteron.kernels import Array
 from pteron.manipulator import Manipulator, RobotLike, as_manipulator
-from pteron.motion.motion import Motion
+from pteron.motion.motion import Motion, interpolate
 from pteron.motion.trajectories.acceleration_profile import Profile
 from pteron.motion.trajectories.checks import check_path
-from pteron.motion.trajectories.demand import demand_between, expect_strength
+from pteron.motion.trajectories.demand import demand, demand_between, expect_strength
 from pteron.motion.trajectories.limit_rows import POLYGON_SHARE, LimitRows, limit_rows
 from pteron.motion.trajectories.limits import MotionLimits, limits_of
 from pteron.motion.trajectories.path import Path
@@ -40,9 +40,10 @@ from pteron.motion.trajectories.tool import Curve
 _PASSES = 6
 """Passes over a stretch, each with tighter limits where the pass before exceeded one."""
 
-_AHEAD = (math.inf, 4.0, 2.0, 1.4, 1.2, 1.1, 1.05)
+_AHEAD = (math.inf, 4.0, 2.0, 1.4, 1.1, None, None)
 """Bounds of s'^2 in first passes, which viscous friction needs, over that of the pass before: the
-smaller the bound, the closer the chord."""
+smaller the bound, the closer the chord. The last passes take tangents, which are exact in the
+end."""
 
 _SLOWEST = 1e-4
 """Share of the largest s'^2 below which no tangent of its root is taken."""
@@ -57,6 +58,9 @@ samples the motion exceeds a limit by less than 1 % of the jump."""
 
 _SHARE = 3e-3
 """Greatest value of that time, as a share of a stretch's time, which it prolongs by twice that."""
+
+_MOST_SHARE = 0.02
+"""Greatest value of that share where the samples that are asked for are coarse."""
 
 _DIP = 0.5
 """Greatest value of that time, as a share of the time in which the path is slowest at a corner."""
@@ -78,6 +82,13 @@ _SURE = 1.5
 """Factor on the change of the duration with half as many nodes, beyond which the duration is no
 shorter; with ever more nodes the durations change by as much again in all, where their error is of
 first order."""
+
+_SHORT = 0.2
+"""Share of a sample within which an interval of nodes is passed if the path bends there: such bends
+are checked between samples too."""
+
+_FINER = 10
+"""Points at which such a bend is checked, for each sample."""
 
 _SPARE = 1e-3
 """Share of a limit that is kept as a margin between samples."""
@@ -106,7 +117,7 @@ class TimeOptimal(Motion):
 
 
 def time_optimal(
-    robot: RobotLike, path: Path, limits: MotionLimits | None = None, *, step: float = STEP
+    robot: RobotLike, path: Path, limits: MotionLimits | None = None, *, step: float | None = None
 ) -> TimeOptimal:
     """Return the fastest motion along a path that keeps the limits.
 
@@ -122,9 +133,9 @@ def time_optimal(
         The path, such as `line_path` returns.
     limits : MotionLimits, optional
         Limits of joints, drives and tool; by default those of the machine's drives.
-    step : float
-        Time between samples, s; a whole fraction of it where the motion is short or corners are
-        small.
+    step : float, optional
+        Time between samples, s; by default 1 ms, or a whole fraction of it where the motion is
+        short or corners are small. With coarse samples the motion takes longer.
 
     Returns
     -------
@@ -135,7 +146,8 @@ def time_optimal(
     UnreachablePose, SingularPose
         If a pose of the path is out of reach or singular; see `check_path`.
     DataError
-        If nothing limits the acceleration.
+        If nothing limits the acceleration, or between samples that are `step` apart the motion
+        leaves the path.
     ModelError
         If the drives cannot hold the machine somewhere on the path, or overcome its friction.
 
@@ -160,7 +172,8 @@ def time_optimal(
     check_path(robot, path)
     quintic = sum(stretch_times(robot, path, polynomial("quintic"), motion_limits).durations)
     stretches = [
-        _fastest_law(robot, path, j, motion_limits, step) for j in range(len(path.rests) - 1)
+        _fastest_law(_part_of_path(robot, path, j, motion_limits), step)
+        for j in range(len(path.rests) - 1)
     ]
     course = timed_path(
         path,
@@ -168,7 +181,7 @@ def time_optimal(
         [stretch.progress for stretch in stretches],
     )
     finest = min(stretch.spread for stretch in stretches) / _DENSE
-    motion = limit_motion(robot, course, motion_limits, step / max(1, math.ceil(step / finest)))
+    motion = limit_motion(robot, course, motion_limits, step, finest)
     parts = motion.time, motion.pose, motion.velocity, motion.acceleration
     return TimeOptimal(*parts, sum(stretch.bound for stretch in stretches), quintic)
 
@@ -182,7 +195,7 @@ class _Stretch(NamedTuple):
     """Time before and after a jump of the acceleration over which it is spread, s."""
     slower: float
     """Factor by which it must be slowed to keep its limits; 1 where it does."""
-    bound: float
+    bound: float = math.nan
     """Duration that no time law falls below, s."""
 
     @property
@@ -191,39 +204,45 @@ class _Stretch(NamedTuple):
         return self.duration * self.slower
 
 
-class _Limits(NamedTuple):
-    """The limits of a stretch by its share s (0 to 1): at nodes, and at places to check them."""
+class _Part(NamedTuple):
+    """A part of a path between two rests, with its limits by its share s (0 to 1)."""
 
+    robot: Manipulator
+    limits: MotionLimits
+    states: Callable[[Array], Curve]
+    """Returns poses (T, m) and two derivatives by the share."""
     grid: Array
     rows: LimitRows
+    """The limits at the nodes of the grid."""
     places: Array
+    """Shares at which the limits are checked, with those at which joints reverse."""
     place_rows: LimitRows
 
 
-def _fastest_law(
-    robot: Manipulator, path: Path, j: int, limits: MotionLimits, step: float
-) -> _Stretch:
-    """Return the fastest time law of part j of a path, between two rests."""
-    stretch = _stretch_limits(robot, path, j, limits)
-    squares = _fastest_squares(stretch.rows, stretch.grid)
-    profile = Profile.from_squares(stretch.grid, squares)
-    bound = profile.duration - _SURE * _duration_error(stretch, profile.duration)
-    if math.isfinite(limits.tool_acceleration):
+def _fastest_law(part: _Part, step: float | None) -> _Stretch:
+    """Return the fastest time law of a part of a path."""
+    squares = _fastest_squares(part.rows, part.grid)
+    profile = Profile.from_squares(part.grid, squares)
+    bound = profile.duration - _SURE * _duration_error(part, profile.duration)
+    if math.isfinite(part.limits.tool_acceleration):
         bound *= POLYGON_SHARE**0.5
-    spread = min(_SPREAD * step, _SHARE * profile.duration, _DIP * _shortest_dip(profile))
+    spread = min(_SPREAD * (step or STEP), _SHARE * profile.duration, _DIP * _shortest_dip(profile))
     least = _LEAST_SHARE * profile.duration
+    if step is not None:
+        least = max(least, min(step / _DENSE, _MOST_SHARE * profile.duration))
     attempts: list[_Stretch] = []
     while True:
         spread = max(spread, least)
-        attempts += _smooth_laws(stretch, squares, spread, bound)
+        laws = _smooth_laws(part, squares, spread, step or spread / _DENSE)
+        attempts += (law._replace(bound=bound) for law in laws)
         best = min(attempts, key=lambda attempt: attempt.slowed_duration)
         if best.slowed_duration <= _CLOSE * profile.duration or spread <= least:
             return best
         spread *= 0.5
 
 
-def _stretch_limits(robot: Manipulator, path: Path, j: int, limits: MotionLimits) -> _Limits:
-    """Return the limits of part j of a path; raise if a drive cannot hold the machine there."""
+def _part_of_path(robot: Manipulator, path: Path, j: int, limits: MotionLimits) -> _Part:
+    """Return part j of a path with its limits; raise if a drive cannot hold the machine there."""
     begin, end = path.rests[j : j + 2]
 
     def states(share: Array) -> Curve:
@@ -237,16 +256,16 @@ def _stretch_limits(robot: Manipulator, path: Path, j: int, limits: MotionLimits
     expect_strength(robot, needs, limits, poses)
     place_rows = limit_rows(needs, limits)
     at_nodes = np.searchsorted(places, grid)
-    rows = LimitRows(*(part[at_nodes] for part in place_rows))
-    return _Limits(grid, rows, places, place_rows)
+    rows = LimitRows(*(matrix[at_nodes] for matrix in place_rows))
+    return _Part(robot, limits, states, grid, rows, places, place_rows)
 
 
-def _duration_error(stretch: _Limits, duration: float) -> float:
-    """Return by how much a stretch's duration, s, changes with half as many nodes."""
-    half = np.unique(np.append(np.arange(0, len(stretch.grid), 2), len(stretch.grid) - 1))
-    rows = LimitRows(*(part[half] for part in stretch.rows))
-    squares = _fastest_squares(rows, stretch.grid[half])
-    return abs(Profile.from_squares(stretch.grid[half], squares).duration - duration)
+def _duration_error(part: _Part, duration: float) -> float:
+    """Return by how much a part's duration, s, changes with half as many nodes."""
+    half = np.unique(np.append(np.arange(0, len(part.grid), 2), len(part.grid) - 1))
+    rows = LimitRows(*(matrix[half] for matrix in part.rows))
+    squares = _fastest_squares(rows, part.grid[half])
+    return abs(Profile.from_squares(part.grid[half], squares).duration - duration)
 
 
 def _shortest_dip(profile: Profile) -> float:
@@ -257,22 +276,22 @@ def _shortest_dip(profile: Profile) -> float:
     return float((rate[dips] / steepest).min(initial=math.inf))
 
 
-def _smooth_laws(
-    stretch: _Limits, squares: Array, spread: float, bound: float
-) -> Iterator[_Stretch]:
+def _smooth_laws(part: _Part, squares: Array, spread: float, step: float) -> Iterator[_Stretch]:
     """Yield time laws whose jumps of acceleration are spread, each with limits tighter by need."""
-    rows = stretch.rows
-    margin, most = np.full_like(rows.c, 1.0 - _SPARE), rows.most
+    margin, most = np.full_like(part.rows.c, 1.0 - _SPARE), part.rows.most
     for _ in range(_PASSES):
-        tighter = rows._replace(most=most)
-        squares = _viscous_pass(tighter, stretch.grid, squares, _AHEAD[-1], margin)
-        profile = Profile.from_squares(stretch.grid, squares)
+        tighter = part.rows._replace(most=most)
+        squares = _viscous_pass(tighter, part.grid, squares, margin=margin)
+        profile = Profile.from_squares(part.grid, squares)
         progress, duration = profile.smooth(spread), profile.duration + 2.0 * spread
-        x, u, times = _rates_at(profile, progress, spread, stretch.places)
-        usage = stretch.place_rows.usage(u, x)
-        speed_usage = x / stretch.place_rows.most
+        x, u, times = _rates_at(profile, progress, spread, part.places)
+        used = times, part.place_rows.usage(u, x), x / part.place_rows.most
+        if between := _usage_between_samples(part, profile, progress, spread, step):
+            order = np.argsort(np.concatenate([times, between[0]]), kind="stable")
+            used = tuple(np.concatenate(both)[order] for both in zip(used, between, strict=True))
+        times, usage, speed_usage = used
         slower = max(1.0, float(usage.max(initial=0.0)) ** 0.5, float(speed_usage.max()) ** 0.5)
-        yield _Stretch(progress, duration, spread, slower, bound)
+        yield _Stretch(progress, duration, spread, slower)
         if slower <= 1.0:
             break
         # Limits are tightened by what the spread motion exceeds them.
@@ -284,6 +303,41 @@ def _smooth_laws(
         most = np.where(far > _FAR, np.minimum(most, squares), most) / np.where(
             far > _FAR, far, np.maximum(speed_excess, 1.0)
         )
+
+
+def _usage_between_samples(
+    part: _Part, profile: Profile, progress: Progress, spread: float, step: float
+) -> tuple[Array, Array, Array] | None:
+    """Return times (T,), load / limit (T, R) and x / its limit of a sampled motion; None: smooth.
+
+    It is the motion between samples `step` apart where the path bends between two of them.
+    """
+    spans = np.diff(profile.time)
+    bends = np.flatnonzero(spans < _SHORT * step)
+    if not len(bends):
+        return None
+    duration = profile.duration + 2.0 * spread
+    near = np.floor((profile.time[bends] + spread) / step)
+    starts = np.unique(np.add.outer(near, np.arange(-1.0, 3.0)))
+    starts = np.concatenate([starts, starts - 0.5]) * step  # samples may lie otherwise in the end
+    starts = starts[(starts >= 0.0) & (starts <= duration - step)]
+    ends = np.stack([starts, starts + step])
+    s, rate, gain = progress(ends.ravel() / duration)
+    pose, first, second = part.states(s)
+    rate, gain = rate[:, None] / duration, gain[:, None] / duration**2
+    samples = pose, first * rate, second * rate**2 + first * gain
+    fine = np.linspace(0.0, step, _FINER + 1)
+    curves = [
+        interpolate((np.array([0.0, step]), *(p[[k, k + len(starts)]] for p in samples)), fine)
+        for k in range(len(starts))
+    ]
+    needs = demand(part.robot, *(np.concatenate(parts) for parts in zip(*curves, strict=True)))
+    rows = limit_rows(needs, part.limits)
+    times = np.add.outer(starts - spread, fine).ravel()
+    order = np.argsort(times, kind="stable")
+    one = np.ones(len(times))
+    usage, speed_usage = rows.usage(0.0 * one, one), 1.0 / rows.most
+    return times[order], usage[order], speed_usage[order]
 
 
 def _rates_at(
@@ -299,7 +353,11 @@ def _rates_at(
     s, rate, gain = progress(tau)
     s = np.maximum.accumulate(s)
     x = np.interp(places, s, (rate / duration) ** 2)
-    return x, np.interp(places, s, gain / duration**2), np.interp(places, s, tau * duration - spread)
+    return (
+        x,
+        np.interp(places, s, gain / duration**2),
+        np.interp(places, s, tau * duration - spread),
+    )
 
 
 def _fastest_squares(rows: LimitRows, grid: Array) -> Array:
@@ -312,25 +370,33 @@ def _fastest_squares(rows: LimitRows, grid: Array) -> Array:
 
 
 def _viscous_pass(
-    rows: LimitRows, grid: Array, last_squares: Array, ahead: float, margin: Array | float = 1.0
+    rows: LimitRows,
+    grid: Array,
+    last_squares: Array,
+    ahead: float | None = None,
+    margin: Array | float = 1.0,
 ) -> Array:
     """Return the largest x = s'^2 (K,) with viscous friction linear about the pass before.
 
-    With viscous friction x is at most `ahead` times its previous value: there the linearisation
-    ends.
+    Where it helps to brake, it is on a chord from rest to `ahead` times the previous x, which bounds
+    x then, or on the tangent.
     """
     if not rows.v.any():
         return squared_rates(rows, grid, margin)
-    chord = np.maximum(last_squares, _SLOWEST * last_squares.max())
-    most = np.minimum(rows.most, ahead * chord)
-    # sqrt(x) <= sqrt(at) / 2 + x / (2 sqrt(at)), and for x <= top: sqrt(x) >= x / sqrt(top).
-    against = rows.v > 0.0
+    last_squares = np.maximum(last_squares, _SLOWEST * last_squares.max())
     with np.errstate(divide="ignore"):
-        steep = _STEEP * (1.0 - rows.c) / rows.v
-    at = np.where(against, np.minimum(np.sqrt(chord)[:, None], steep), 1.0)
-    b = rows.b + np.where(against, rows.v / (2.0 * at), rows.v / np.sqrt(most)[:, None])
-    c = rows.c + np.where(against, rows.v * at / 2.0, 0.0)
-    return squared_rates(rows._replace(b=b, c=c, most=most), grid, margin)
+        steep = np.where(rows.v > 0.0, _STEEP * (1.0 - rows.c) / rows.v, math.inf)
+    # A tangent: sqrt(x) <= rate / 2 + x / (2 rate).
+    rate = np.minimum(np.sqrt(last_squares)[:, None], steep)
+    slope, start, most = 0.5 / rate, 0.5 * rate, rows.most
+    if ahead is not None:
+        # A chord: sqrt(x) >= x / sqrt(most) for x <= most.
+        most = np.minimum(most, ahead * last_squares)
+        helps = rows.v < 0.0
+        slope = np.where(helps, 1.0 / np.sqrt(most)[:, None], slope)
+        start = np.where(helps, 0.0, start)
+    linear = rows._replace(b=rows.b + rows.v * slope, c=rows.c + rows.v * start, most=most)
+    return squared_rates(linear, grid, margin)
 
 
 def _ranges_near(times: Array, nodes: Array, span: float) -> Array:
