@@ -6,11 +6,15 @@ public functions of kinematics and dynamics. A node's limits hold over the inter
 that the error is of first order in the nodes' distances: two grids give its limit.
 """
 
+from itertools import pairwise
+
 import numpy as np
 
 import pteron
 from pteron.kinematics import joint_accelerations, joint_rates
 from pteron.legs import Drive
+from pteron.motion import check_path, limits_of, line_path, polynomial_motion
+from pteron.motion.trajectories.tool import tool_path
 
 try:
     from numba import njit
@@ -24,20 +28,16 @@ def shortest_duration(robot, path, limits, nodes=400):
     `nodes` are those of each piece between the path's knots; the second grid has twice as many.
     """
     rough, fine = (
-        sum(_duration(robot, path, limits, begin, end, n) for begin, end in _between(path.rests))
+        sum(_duration(robot, path, limits, begin, end, n) for begin, end in pairwise(path.rests))
         for n in (nodes, 2 * nodes)
     )
     return 2.0 * fine - rough
 
 
-def _between(places):
-    return zip(places[:-1], places[1:], strict=True)
-
-
 def _duration(robot, path, limits, begin, end, nodes):
     knots = [s for s in getattr(path, "knots", ()) if begin < s < end]
     share = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, nodes + 1))
-    pieces = [a + (b - a) * share[:-1] for a, b in _between([begin, *knots, end])]
+    pieces = [a + (b - a) * share[:-1] for a, b in pairwise([begin, *knots, end])]
     s = np.append(np.concatenate(pieces), end)
     rows, most, tool = _coefficients(robot, path, limits, s)
     squares = _integrate(s, *rows, most, *tool, limits.tool_acceleration)
@@ -75,8 +75,6 @@ def _coefficients(robot, path, limits, s):
                         side * (drive.viscous + back) * q[:, i] + fall * np.abs(q[:, i]),
                     )
                     rows.append([p / force for p in part])
-    from pteron.motion.trajectories.tool import tool_path
-
     _, tool, tool_bend = tool_path(robot.platform, pose, first, second)
     with np.errstate(divide="ignore"):
         most = np.minimum(
@@ -136,3 +134,57 @@ def _integrate(s, a, b, c, v, most, p, r, w, tool_limit):
             min(squares[i] + 2.0 * (s[i + 1] - s[i]) * greatest, largest[i + 1]), 0.0
         )
     return squares
+
+
+def random_poses(robot, home, rng):
+    """Return four random poses about home whose lines the machine can follow, rounded or not."""
+    size, amplitude = size_of(robot), 0.15
+    while amplitude > 1e-6:
+        steps = np.where(robot.platform.angular, 2.0 * amplitude, amplitude * size)
+        poses = home + steps * rng.uniform(-1.0, 1.0, (4, robot.freedom))
+        try:
+            for corner in (0.0, 0.1 * size):
+                check_path(robot, line_path(robot, poses, corner))
+        except pteron.PteronError:
+            amplitude *= 0.85
+        else:
+            return poses
+    raise RuntimeError(f"{robot.name}: no path about home")
+
+
+def size_of(robot):
+    """Return the greatest distance of a guide point from the base frame's origin, m."""
+    return max(float(np.linalg.norm(leg.guide_point)) for leg in robot.legs)
+
+
+def random_limits(robot, path, rng):
+    """Return random limits, of the size of what the path takes in a second, two of five or so."""
+    free = limits_of(robot, speed=np.inf, force=np.inf)
+    motion = polynomial_motion(robot, path, duration=1.0, limits=free)
+    states = motion.pose, motion.velocity, motion.acceleration
+    slow = motion.pose, 0.01 * motion.velocity, 1e-4 * motion.acceleration
+    rates, gains, forces, hold = (
+        np.abs(part).max(axis=0)
+        for part in (
+            joint_rates(robot, *states[:2]).actuated,
+            joint_accelerations(robot, *states).actuated,
+            pteron.drive_forces(robot, *states),
+            pteron.drive_forces(robot, *slow),
+        )
+    )
+    _, tool, bend = (np.linalg.norm(p, axis=-1).max() for p in tool_path(robot.platform, *states))
+    count = robot.joint_count
+    chosen = {}
+    while not {"acceleration", "force", "tool_acceleration"} & set(chosen):
+        values = {
+            "acceleration": gains * rng.uniform(0.3, 3.0, count) + 1e-3 * gains.max(),
+            "force": 1.3 * hold + (forces + hold).max() * rng.uniform(0.2, 2.0, count),
+            "speed": rates * rng.uniform(0.5, 1.5, count) + 0.01 * rates.max(),
+            "tool_speed": tool * rng.uniform(0.5, 1.5),
+            "tool_acceleration": bend * rng.uniform(0.3, 3.0),
+        }
+        shares = {"tool_speed": 0.3 * (tool > 1e-6), "tool_acceleration": 0.3 * (bend > 1e-3)}
+        chosen = {
+            name: value for name, value in values.items() if rng.random() < shares.get(name, 0.5)
+        }
+    return limits_of(robot, **chosen)

@@ -34,6 +34,9 @@ _OFF = 1e-4
 """Share of a path's extent by which a motion may leave it between samples. Chosen: 0.03 mm on the
 standard cycle, where steps of 1 ms leave it by less than a nanometre."""
 
+_SLOWED = 1.004
+"""Factor by which a motion without a step may be slowed before it gets twice as many samples."""
+
 _FINEST = 256
 """Samples in `STEP`, at most, where no step is given."""
 
@@ -103,7 +106,7 @@ def time_curve(
     """Return the motion along a curve of poses in `duration` s, or in the shortest time."""
     if duration is None:
         return shortest(robot, curve, limits, step)
-    course = Timed(curve, _expect_time("duration", duration))
+    course = Timed(curve, expect_time("duration", duration))
     _expect_kept(robot, course, limits)
     return _sample_closely(robot, course, step)
 
@@ -182,7 +185,7 @@ def polynomial_motion(
     course = timed_path(path, times.durations, laws, times.rests)
     if duration is None:
         return limit_motion(robot, course, motion_limits, step)
-    _expect_time("duration", duration)
+    expect_time("duration", duration)
     slowed_course = course.slow_down(duration / course.duration)
     if motion_limits.is_limited:
         _expect_kept(robot, slowed_course, motion_limits, course.duration)
@@ -302,20 +305,28 @@ def limit_motion(
     """
     if step is not None:
         return _slow_to_limits(robot, course, limits, step)
-    count = max(1, int(np.ceil(STEP / longest)))
+    count, best = max(1, int(np.ceil(STEP / longest))), None
     while True:
         try:
-            return _slow_to_limits(robot, course, limits, STEP / count)
+            motion = _slow_to_limits(robot, course, limits, STEP / count)
         except DataError:
             if count >= _FINEST:
                 raise
-            count *= 2
+        else:
+            # Samples that are too far apart show as a motion that is slowed.
+            least = _SLOWED * course.duration + STEP / count
+            if motion.duration <= least or count >= _FINEST:
+                return motion
+            if best is not None and motion.duration * _SLOWED > best.duration:
+                return min(motion, best, key=lambda one: one.duration)
+            best = motion
+        count *= 2
 
 
 def _slow_to_limits(robot: Manipulator, course: Timed, limits: MotionLimits, step: float) -> Motion:
     """Return the motion with samples `step` apart; raise if that suits neither path nor limits."""
     for _ in range(_TRIES):
-        count = max(1, int(np.ceil(course.duration / _expect_time("step", step) - 1e-9)))
+        count = max(1, int(np.ceil(course.duration / expect_time("step", step) - 1e-9)))
         course = course.slow_down(count * step / course.duration)
         motion = sample_curve(course.at, count * step, step)
         _expect_on_curve(robot, motion, course, step)
@@ -368,7 +379,7 @@ def sample_curve(states: Callable[[Array], Curve], duration: float, step: float 
 
     `states` takes times (T,), s, and returns pose, velocity and acceleration, (T, m) each.
     """
-    count = _expect_time("duration", duration) / _expect_time("step", step)
+    count = expect_time("duration", duration) / expect_time("step", step)
     if count > _MOST:
         raise DataError(
             f"step: {step:g} s gives {count:.0f} samples in {duration:g} s; at most {_MOST} are "
@@ -378,7 +389,7 @@ def sample_curve(states: Callable[[Array], Curve], duration: float, step: float 
     return Motion(time, *states(time))
 
 
-def _expect_time(name: str, seconds: float) -> float:
+def expect_time(name: str, seconds: float) -> float:
     """Return a time in s; raise unless it is finite and above 0."""
     expect(np.isfinite(seconds) and seconds > 0.0, name, seconds, "a time above 0 s")
     return seconds

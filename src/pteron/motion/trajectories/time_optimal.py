@@ -7,8 +7,9 @@ largest x on nodes that are dense where the path bends.
 Viscous friction is proportional to s' = sqrt(x), which is not linear in x. Where it opposes the
 drive, a tangent of the root bounds it from above; where it helps to brake, a chord from rest to a
 largest speed bounds it from below, until the speeds change little from pass to pass and a tangent
-serves. Both are close near the speeds of the pass before, for which they are made. Dry friction has the sign of the joint's motion: where it opposes the drive it counts
-in full, where it helps without Stribeck's part, which a joint in motion does not have.
+serves. Both are close near the speeds of the pass before, for which they are made. Dry friction has
+the sign of the joint's motion: where it opposes the drive it counts in full, where it helps without
+Stribeck's part, which a joint in motion does not have.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ from pteron.motion.trajectories.limits import MotionLimits, limits_of
 from pteron.motion.trajectories.path import Path
 from pteron.motion.trajectories.path_nodes import path_nodes
 from pteron.motion.trajectories.squared_rates import squared_rates
-from pteron.motion.trajectories.time_law import STEP, limit_motion, stretch_times
+from pteron.motion.trajectories.time_law import STEP, expect_time, limit_motion, stretch_times
 from pteron.motion.trajectories.time_polynomials import Progress, polynomial
 from pteron.motion.trajectories.timed_path import timed_path
 from pteron.motion.trajectories.tool import Curve
@@ -82,6 +83,9 @@ _SURE = 1.5
 """Factor on the change of the duration with half as many nodes, beyond which the duration is no
 shorter; with ever more nodes the durations change by as much again in all, where their error is of
 first order."""
+
+_CHECKED = 8
+"""Places of each interval of nodes at which the limits are checked."""
 
 _SHORT = 0.2
 """Share of a sample within which an interval of nodes is passed if the path bends there: such bends
@@ -164,6 +168,8 @@ def time_optimal(
     """
     robot = as_manipulator(robot)
     motion_limits = limits_of(robot) if limits is None else limits
+    if step is not None:
+        expect_time("step", step)
     if not motion_limits.bounds_acceleration:
         raise DataError(
             "nothing limits the acceleration: neither a limit given nor the drives' max_force; "
@@ -251,7 +257,8 @@ def _part_of_path(robot: Manipulator, path: Path, j: int, limits: MotionLimits) 
         return pose, (end - begin) * first, (end - begin) ** 2 * second
 
     grid = (path_nodes(path, robot.platform, begin, end) - begin) / (end - begin)
-    places = np.sort(np.concatenate([grid, 0.5 * (grid[1:] + grid[:-1])]))
+    shares = np.arange(_CHECKED) / _CHECKED
+    places = np.append(grid[:-1, None] + np.diff(grid)[:, None] * shares, grid[-1])
     places, needs, poses = demand_between(robot, states, places)
     expect_strength(robot, needs, limits, poses)
     place_rows = limit_rows(needs, limits)
@@ -378,8 +385,8 @@ def _viscous_pass(
 ) -> Array:
     """Return the largest x = s'^2 (K,) with viscous friction linear about the pass before.
 
-    Where it helps to brake, it is on a chord from rest to `ahead` times the previous x, which bounds
-    x then, or on the tangent.
+    Where it helps to brake, it is on a chord from rest to `ahead` times the previous x, which then
+    bounds x, or on the tangent.
     """
     if not rows.v.any():
         return squared_rates(rows, grid, margin)
