@@ -24,7 +24,7 @@ from pteron.workspace import home_pose
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
-from phase_plane import random_limits, random_poses, shortest_duration, size_of  # noqa: E402
+from phase_plane import random_limits, random_poses, shortest_duration, size_of
 
 _MICROMETRE = 1e-6
 _SHARES = (1e-5, 1e-4, 1e-3, 1e-2, 1e-1)

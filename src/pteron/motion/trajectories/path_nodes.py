@@ -9,9 +9,6 @@ from pteron.kernels import Array
 from pteron.motion.trajectories.path import Path, path_weights
 from pteron.platforms import Platform
 
-_INTERVALS = 400
-"""Intervals of a stretch between two rests before any is halved."""
-
 _EVEN = 0.3
 """Share of these intervals that is spaced evenly; the others are denser towards the rests."""
 
@@ -25,9 +22,12 @@ _HALVINGS = 24
 """Rounds of halving: an interval of a metre becomes 1e-10 m."""
 
 
-def path_nodes(path: Path, platform: Platform, begin: float, end: float) -> Array:
+def path_nodes(
+    path: Path, platform: Platform, begin: float, end: float, intervals: int = 400
+) -> Array:
     """Return ascending arc lengths s (K,), m, from `begin` to `end`, dense where the path bends.
 
+    `intervals` are those before any is halved.
     Intervals are halved until pose and tangent at their ends agree with the integrals of tangent
     and curvature over them, so that corners are found, however small, where no node is on them.
     """
@@ -38,7 +38,7 @@ def path_nodes(path: Path, platform: Platform, begin: float, end: float) -> Arra
         pose, first, second = path.at(s)
         return pose * weights, first * weights, second * weights
 
-    even = np.linspace(0.0, 1.0, _INTERVALS + 1)
+    even = np.linspace(0.0, 1.0, intervals + 1)
     s = begin + (end - begin) * (_EVEN * even + (1.0 - _EVEN) * (0.5 - 0.5 * np.cos(np.pi * even)))
     curve = weighted(s)
     low, high = np.arange(len(s) - 1), np.arange(1, len(s))
