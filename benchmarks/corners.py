@@ -15,7 +15,7 @@ import zlib
 from pathlib import Path
 
 import numpy as np
-from measuring import catalog, quick
+from measuring import quick
 from time_optimal import driven
 
 import pteron
@@ -34,7 +34,7 @@ def main() -> None:
     """Print the worst durations of each machine, by the size of the corners."""
     heads = "".join(f"{share:>9.0e}" for share in _SHARES)
     print(f"{'duration / least':<22}{'1 um':>9}{heads}{'bound / least':>20}{'search':>9}")
-    names = ["tripteron", "3-rrr"] if quick() else catalog()
+    names = ["tripteron", "3-rrr"] if quick() else pteron.catalog()
     worst, bounds, slowest = 0.0, [], 0.0
     for name in names:
         ratios, shares, took = measure(name, 1 if quick() else 3)

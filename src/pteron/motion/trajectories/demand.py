@@ -79,9 +79,15 @@ class Demand(NamedTuple):
     def between(self, first: int, last: int) -> Demand:
         """Return the demand at poses from index `first` to before `last`."""
         part = slice(first, last)
-        parts = (p[part] for p in (self.first, self.second, self.static, self.growth, self.square))
         speed, bend = self.tool
-        return Demand(*parts, self.dry, self.viscous, (speed[part], bend[part]))
+        return self._replace(
+            first=self.first[part],
+            second=self.second[part],
+            static=self.static[part],
+            growth=self.growth[part],
+            square=self.square[part],
+            tool=(speed[part], bend[part]),
+        )
 
     def drive_forces(self, rate: Array, gain: Array) -> Array:
         """Return drive forces (2, K, n) at p' and p'' (K,), with least and greatest dry friction.

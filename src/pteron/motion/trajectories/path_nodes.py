@@ -53,9 +53,10 @@ def path_nodes(
             break
         new = len(s) + np.arange(int(bent.sum()))
         s = np.concatenate([s, middles[bent]])
-        curve = tuple(
+        places, tangents, bends = (
             np.concatenate([part, more[bent]]) for part, more in zip(curve, between, strict=True)
         )
+        curve = places, tangents, bends
         low, high = np.concatenate([low[bent], new]), np.concatenate([new, high[bent]])
     return np.sort(s)
 

@@ -311,11 +311,13 @@ def _smooth_laws(part: _Part, squares: Array, spread: float, step: float) -> Ite
         profile = Profile.from_squares(part.grid, squares)
         progress, duration = profile.smooth(spread), profile.duration + 2.0 * spread
         x, u, times = _rates_at(profile, progress, spread, part.places)
-        used = times, part.place_rows.usage(u, x), x / part.place_rows.most
+        usage, speed_usage = part.place_rows.usage(u, x), x / part.place_rows.most
         if between := _usage_between_samples(part, profile, progress, spread, step):
             order = np.argsort(np.concatenate([times, between[0]]), kind="stable")
-            used = tuple(np.concatenate(both)[order] for both in zip(used, between, strict=True))
-        times, usage, speed_usage = used
+            times, usage, speed_usage = (
+                np.concatenate(both)[order]
+                for both in zip((times, usage, speed_usage), between, strict=True)
+            )
         slower = max(1.0, float(usage.max(initial=0.0)) ** 0.5, float(speed_usage.max()) ** 0.5)
         yield _Stretch(progress, duration, spread, slower)
         if slower <= 1.0:
@@ -351,12 +353,13 @@ def _usage_between_samples(
     s, rate, gain = progress(ends.ravel() / duration)
     pose, first, second = part.states(s)
     rate, gain = rate[:, None] / duration, gain[:, None] / duration**2
-    samples = pose, first * rate, second * rate**2 + first * gain
-    fine = np.linspace(0.0, step, _FINER + 1)
-    curves = [
-        interpolate((np.array([0.0, step]), *(p[[k, k + len(starts)]] for p in samples)), fine)
-        for k in range(len(starts))
-    ]
+    velocity, acceleration = first * rate, second * rate**2 + first * gain
+    instants, fine = np.array([0.0, step]), np.linspace(0.0, step, _FINER + 1)
+    curves = []
+    for k in range(len(starts)):
+        pair = [k, k + len(starts)]
+        samples = instants, pose[pair], velocity[pair], acceleration[pair]
+        curves.append(interpolate(samples, fine))
     needs = demand(part.robot, *(np.concatenate(parts) for parts in zip(*curves, strict=True)))
     rows = limit_rows(needs, part.limits)
     times = np.add.outer(starts - spread, fine).ravel()
