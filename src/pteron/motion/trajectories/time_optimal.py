@@ -118,8 +118,8 @@ class TimeOptimal(Motion):
     bound : float
         Duration, s, that no motion along the path within the limits falls below, were its
         acceleration to jump. The motion takes longer, as jumps are spread over time and limits are
-        kept between samples too. It is the computed duration less what halving the number of nodes
-        changes in it.
+        kept between samples too. It is the computed duration less three times what halving the
+        number of nodes changes in it.
     polynomial : float
         Duration of the quintic along the same path within the same limits, s.
     """
