@@ -70,12 +70,11 @@ wheels:
 	$(PYTHON) tests/installed/matrix.py
 
 # A small part of pip's time; pip where uv cannot. Sources are translated when they are first imported: all
-# of them would take a minute. Those of toppra are now, since under -W error its own warning would be a fault.
+# of them would take a minute.
 define install
 test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 $(PIP) install uv && $(UV) install --python $(BIN)/python --editable '.[$(EXTRAS)]' \
 	|| $(PIP) install --editable '.[$(EXTRAS)]'
-$(BIN)/python -W ignore -m compileall -qq $(VENV)/lib/*/site-packages/toppra || true
 endef
 $(VENV)/.runtime: EXTRAS := consistency,design,film,viewer
 $(VENV)/.dev: EXTRAS := dev

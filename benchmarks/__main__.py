@@ -34,6 +34,7 @@ _SCRIPTS = {
     "The same free motion in MuJoCo": "mujoco_convergence.py",
     "Limits of excitation": "excitation_limits.py",
     "Time-optimal cycles": "time_optimal.py",
+    "Time-optimal motions on corners": "corners.py",
     "Control": "control.py",
     "Simulation": "simulation.py",
     "Energy": "energy.py",

@@ -3,7 +3,7 @@
 For each machine of the catalog, with drives that have friction and rotors, force limits a third
 above what the pick-and-place cycle at 10 m/s^2 takes, and speed limits likewise: the durations of
 the cycle slowed as a whole until it keeps them, of one quintic along its way and another back, of
-the time-optimal motion along the same way, and what TOPP-RA finds where the acceleration may jump.
+the time-optimal motion along the same way, and its bound, where the acceleration may jump.
 The share is the largest of any limit at ten times as many samples, by the public functions.
 `--quick` takes two machines.
 """
@@ -35,7 +35,7 @@ _FINER = 10
 def main() -> None:
     """Print the durations of each machine's cycles, and the largest share of a limit."""
     print(
-        f"{'':<22}{'cycle':>8}{'quintic':>9}{'optimal':>9}{'TOPP-RA':>9}{'saved':>7}"
+        f"{'':<22}{'cycle':>8}{'quintic':>9}{'optimal':>9}{'bound':>9}{'saved':>7}"
         f"{'share of limits':>17}"
     )
     saved, searches = [], []

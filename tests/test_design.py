@@ -638,6 +638,32 @@ def test_the_shortest_time_brings_a_drive_to_its_limit():
     assert shortest_time(robot, motion) == pytest.approx(0.5 * speeds.max() / 2.0)
 
 
+@pytest.mark.parametrize("kind", ["curve", "winding"])
+def test_the_shortest_time_keeps_what_the_motor_gives_at_speed(kind):
+    given = {
+        "curve": {"curve": ((0.0, 2.0), (0.5, 2.0), (6.0, 0.0))},
+        "winding": {"winding": pteron.legs.Winding(1.0, 0.05, 4.0)},
+    }
+    drive = pteron.legs.Drive(coulomb=0.05, viscous=0.01, ratio=10.0, **given[kind])
+    robot = pteron.load("five-bar")
+    robot = replace(robot, legs=tuple(replace(leg, drive=drive) for leg in robot.legs))
+    motion = pick_and_place(robot, scale=0.1, duration=0.5, samples=61)
+
+    def most(time):
+        rate = motion.duration / time
+        state = motion.pose, rate * motion.velocity, rate**2 * motion.acceleration
+        rates = np.abs(pteron.kinematics.joint_rates(robot, *state[:2]).actuated)
+        forces = pteron.drive_forces(robot, *state)
+        if kind == "curve":
+            return (np.abs(forces) / np.interp(rates, *np.array(drive.curve).T)).max()
+        moving = pteron.kinematics.joint_rates(robot, *state[:2]).actuated
+        return np.abs((forces / 0.5 + 0.5 * moving) / 4.0).max()
+
+    time = shortest_time(robot, motion)
+    assert most(time) == pytest.approx(1.0, rel=1e-6)
+    assert all(most(slower * time) < 1.0 for slower in (1.01, 1.5, 5.0))
+
+
 def test_the_margin_of_a_motor_is_the_most_at_any_ratio():
     robot = pteron.load("five-bar")
     found = size(robot, pick_and_place(robot, scale=0.1, duration=0.3, samples=61), dwell=0.1)

@@ -356,7 +356,7 @@ def test_an_application_of_pyinstaller_has_all_modules_and_files(tmp_path):
     )
     # Optional packages beside pteron's own, which make the application ten times as large.
     left_out = "mujoco pinocchio jax pydrake gymnasium zarr xarray distributed dask numba pandas"
-    left_out += " codac sphinx IPython playwright pymoo clarabel toppra hypothesis pytest sdformat"
+    left_out += " codac sphinx IPython playwright pymoo clarabel hypothesis pytest sdformat"
     excluded = [word for name in left_out.split() for word in ("--exclude-module", name)]
     build = [sys.executable, "-m", "PyInstaller", "--log-level", "ERROR", "app.py", *excluded]
     subprocess.run(build, check=True, cwd=tmp_path, timeout=900)

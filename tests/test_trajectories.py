@@ -9,6 +9,7 @@ import polars as pl
 import pytest
 from differences import along as derivative
 from mechanisms import CATALOG, CLIENTS, MECHANISMS, NIGHTLY, gated, random_machine, states
+from phase_plane import random_limits, random_poses, shortest_duration, size_of
 from scipy.integrate import solve_ivp
 from typer.testing import CliRunner
 
@@ -258,6 +259,28 @@ def test_a_cycles_path_is_that_of_the_cycle(name):
         assert np.linalg.norm(off) < 1e-6
 
 
+MOUNTINGS = {"upright": (0, 0, -9.81), "hanging": (0, 0, 9.81), "on its side": (6.0, -7.8, 0)}
+
+
+@pytest.mark.parametrize(
+    "name", gated(pteron.catalog(), ["sprint-z3", "ball-table", "ankle-offset", "5-rpur"])
+)
+def test_a_standard_cycle_has_no_cusp_however_the_machine_is_mounted(name):
+    for mounting, gravity in MOUNTINGS.items():
+        robot = replace(pteron.load(name), gravity=gravity)
+        for scale in (0.01, 0.3):
+            path = cycle_path(pick_and_place(robot, home_pose(name), scale=scale))
+            s = np.linspace(0.0, path.length / 2.0, 4001)
+            weights = np.where(robot.platform.angular, 0.1, 1.0)
+            _, first, second = (part * weights for part in path.at(s))
+            tangents = first / np.linalg.norm(first, axis=-1, keepdims=True)
+            turns = np.arccos(np.clip((tangents[40:] * tangents[:-40]).sum(axis=-1), -1.0, 1.0))
+            # In one per cent of the way out the path turns by less than half a right angle.
+            assert np.degrees(turns.max()) < 35.0, mounting
+            bends = np.linalg.norm(second, axis=-1) * path.length / 2.0
+            assert bends.max() < 80.0, mounting
+
+
 @pytest.mark.parametrize(
     ("name", "drive"),
     [
@@ -326,7 +349,7 @@ def test_the_fastest_motion_keeps_every_limit_and_is_never_slower(name):
     assert used(robot, fastest, limits) <= 1.0 + 1e-8
     assert fastest.duration < polynomial_motion(robot, path, limits=limits).duration
     assert fastest.duration < shortest(robot, cycle.cycle.at, limits).duration
-    assert fastest.duration < 1.08 * fastest.bound
+    assert fastest.duration < 1.03 * fastest.bound
     np.testing.assert_allclose(fastest.pose[[0, -1]], cycle.pose[[0, -1]], atol=1e-9)
     for part in (fastest.velocity, fastest.acceleration):
         np.testing.assert_allclose(part[[0, -1]], 0.0, atol=1e-6)
@@ -354,6 +377,62 @@ def test_a_force_keeps_its_limit_where_a_joint_reverses_between_samples(name):
     assert (rates[1:] * rates[:-1] < 0.0).any()
 
 
+@pytest.mark.parametrize("corner", [1e-6, 1e-4, 2e-4, 5e-4, 1e-2])
+def test_small_corners_take_the_time_of_the_phase_plane(corner):
+    robot = MACHINES["tripteron"]
+    poses = [[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.1, 0.1, 0.0], [0.0, 0.1, 0.0]]
+    limits = limits_of(robot, acceleration=15.0)
+    path = line_path(robot, poses, corner)
+    fastest, exact = time_optimal(robot, path, limits), shortest_duration(robot, path, limits, 60)
+    assert 0.99 * exact < fastest.bound <= exact * (1.0 + 1e-5)
+    assert exact < fastest.duration < 1.015 * exact
+    assert sides(robot, fastest)[1].max() <= 15.0 * (1.0 + 1e-8)
+    # A polynomial time law stops at small corners, where passing them takes longer.
+    stops = polynomial_motion(robot, line_path(robot, poses), limits=limits).duration
+    rounded = polynomial_motion(robot, path, limits=limits).duration
+    assert rounded < (1.002 if corner < 1e-3 else 1.3) * stops
+
+
+@pytest.mark.parametrize("name", gated(pteron.catalog(), ["five-bar"]))
+def test_random_paths_take_the_time_of_the_phase_plane(name):
+    pytest.importorskip("numba")
+    generator = np.random.default_rng(sum(map(ord, name)))
+    robot = pteron.load(name)
+    pose = home_pose(robot)
+    hold = max(float(np.abs(pteron.inverse_dynamics(robot, pose, 0 * pose, 0 * pose)).max()), 1.0)
+    robot = driven(robot, pteron.legs.Drive(0.03 * hold, 0.05 * hold, rotor_inertia=1e-5))
+    poses = random_poses(robot, pose, generator)
+    limits = random_limits(robot, line_path(robot, poses, 0.1 * size_of(robot)), generator)
+    for corner in (1e-6, 1e-3 * size_of(robot), 0.1 * size_of(robot)):
+        path = line_path(robot, poses, corner)
+        fastest, exact = time_optimal(robot, path, limits), shortest_duration(robot, path, limits)
+        assert fastest.bound <= exact * (1.0 + 1e-4)
+        assert 0.999 * exact < fastest.duration < 1.02 * exact
+
+
+def test_samples_too_far_apart_for_the_path_are_refused():
+    robot = MACHINES["tripteron"]
+    poses = [[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.1, 0.1, 0.0]]
+    path = line_path(robot, poses, 0.02)
+    limits = limits_of(robot, acceleration=15.0)
+    with pytest.raises(pteron.DataError, match=r"step: between samples 0\.2 s apart .* by \d.* mm"):
+        polynomial_motion(robot, path, duration=1.0, step=0.2)
+    with pytest.raises(pteron.DataError, match=r"step: .* leaves its path"):
+        time_optimal(robot, path, limits, step=0.1)
+    with pytest.raises(pteron.DataError, match=r"step: .* leaves its path"):
+        jerk_limited(robot, poses[0], poses[2], 500.0, limits, step=0.1)
+    # Without a step there are enough of them; a line needs few.
+    motion = polynomial_motion(robot, line_path(robot, poses, 1e-4), duration=0.6)
+    assert polynomial_motion(robot, line_path(robot, poses[:2]), duration=1.0, step=0.2)
+    for line in (motion, time_optimal(robot, path, limits)):
+        fine = line.at(np.linspace(0.0, line.duration, 10 * len(line.time)))[0]
+        corner = np.minimum(np.abs(fine[:, 1]), np.abs(fine[:, 0] - 0.1))
+        apart = np.abs(fine[:, :2] - [0.1, 0.0]).max(axis=1) > 0.0201
+        assert corner[apart].max() < 2e-5
+    with pytest.raises(pteron.DataError, match=r"step: 0\.0 given"):
+        time_optimal(robot, path, limits, step=0.0)
+
+
 def axis_move(**drive):
     """Return a Tripteron that moves along its first slider alone, and the mass that this moves."""
     robot = MACHINES["tripteron, no gravity"]
@@ -371,7 +450,7 @@ def test_the_fastest_motion_of_one_slider_is_the_textbook_s():
     finer = time_optimal(robot, path, limits_of(robot, acceleration=20.0), step=1e-5)
     assert 1.0 < finer.duration / finer.bound < 1.0015
     tool = time_optimal(robot, path, limits_of(robot, tool_acceleration=20.0), step=1e-4)
-    assert tool.bound == pytest.approx(bang.bound, rel=1e-6)
+    assert 0.998 < tool.bound / bang.bound <= 1.0
 
 
 def test_viscous_friction_is_bounded_tightly():
@@ -395,8 +474,8 @@ def test_viscous_friction_is_bounded_tightly():
         back[j - 1] = back[j] + 2.0 * h * loss
     rate = np.sqrt(np.minimum(ahead, back))
     exact = (2.0 * h / (rate[1:] + rate[:-1])).sum()
-    # Where friction helps to brake it is a chord below the root: a little is given away.
-    assert 0.999 < fastest.bound / exact < 1.006
+    assert 0.99 < fastest.bound / exact <= 1.0
+    assert 1.0 <= fastest.duration / exact < 1.012
 
 
 FALLS = pteron.legs.Drive(rotor_inertia=0.1, curve=((0.0, 60.0), (0.4, 60.0), (1.2, 0.0)))
@@ -432,8 +511,8 @@ def test_the_fastest_motion_of_one_slider_is_what_its_motor_can_do(drive):
 
     speeds = np.minimum(reached(push, -4.0), reached(brake, 4.0)[::-1])
     exact = (2.0 * 0.15 / 20_000 / (speeds[1:] + speeds[:-1])).sum()
-    assert 0.999 < fastest.bound / exact < 1.006
-    assert fastest.duration < 1.02 * fastest.bound
+    assert 0.99 < fastest.bound / exact <= 1.0
+    assert 1.0 <= fastest.duration / exact < 1.012
 
 
 def of_motor(robot, motion, finer=10):
@@ -724,7 +803,7 @@ def test_the_command_writes_a_cycle_that_forces_reads(tmp_path):
         np.testing.assert_allclose(frames[0][name], frames[1][name], atol=1e-9)
     assert frames[0].columns[:4] == ["t", "x", "y", "z"]
     for rate, joint in (("drho1", "rho1"), ("ddrho1", "drho1")):
-        slope = np.gradient(frames[0][joint].to_numpy(), 1e-3)
+        slope = np.gradient(frames[0][joint].to_numpy(), frames[0]["t"].to_numpy())
         own = frames[0][rate].to_numpy()
         assert np.median(np.abs(slope - own)) < 1e-3 * np.abs(own).max()
 

@@ -161,7 +161,7 @@ EXTRAS: dict[str, tuple[Callable[[], None], str]] = {
     "film": (film, "imageio_ffmpeg"),
     "gymnasium": (gymnasium, "gymnasium"),
     "jax": (jax, "jax"),
-    "motion": (motion, "toppra"),
+    "motion": (motion, "ruckig"),
     "numba": (numba, "numba"),
     "oracles": (oracles, "mujoco"),
     "surfaces": (surfaces, "skimage"),

@@ -69,7 +69,7 @@ def cycle(
     duration: float | None = None,
     optimal: bool = False,
     law: Literal["quintic", "seventh"] = "quintic",
-    rate: float = 1000.0,
+    rate: float | None = None,
     speed: str | None = None,
     acceleration: str | None = None,
     force: str | None = None,
@@ -111,7 +111,7 @@ def cycle(
     --duration: Duration of the whole motion, s. [default: the shortest within the limits]
     --optimal: Minimise the time along the path: at each point a limit is reached.
     --law: Time law of a line: polynomial of degree five or seven.
-    --rate: Samples per second.
+    --rate: Samples per second. [default: 1000, or a multiple where the motion needs them]
 
     Limits
     ------
@@ -139,7 +139,8 @@ def cycle(
     if text := template_sentence(machine):
         note(f"Note: {text}")
     machine = about_pivot(carried.load_machine(machine), pivot)
-    check_rate(rate)
+    if rate is not None:
+        check_rate(rate)
     if out is not None:
         from pteron.tables import check_output
 
@@ -155,7 +156,7 @@ def cycle(
     if way == "replay" and table is None:
         raise DataError("no motion given; give --table FILE")
     with spinner(f"Planning a motion of {machine.name}"):
-        step = 1.0 / rate
+        step = None if rate is None else 1.0 / rate
         if table is not None:
             start = None if from_ is None else given_pose(machine, from_, "--from")
             motion = read_motion(machine, table, start)

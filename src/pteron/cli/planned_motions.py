@@ -21,7 +21,7 @@ def standard_motion(
     limits: MotionLimits,
     duration: float | None,
     optimal: bool,
-    step: float,
+    step: float | None,
 ) -> Motion:
     """Return the pick-and-place cycle about a pose, within limits or the usual acceleration."""
     from dataclasses import replace
@@ -61,7 +61,7 @@ def line_motion(
     duration: float | None,
     optimal: bool,
     law: Literal["quintic", "seventh"],
-    step: float,
+    step: float | None,
 ) -> Motion:
     """Return the motion on straight lines from a pose, through a table's poses, to a pose."""
     import numpy as np
@@ -93,7 +93,7 @@ def joint_motion(
     to: str | None,
     jerk: Sequence[float] | None,
     limits: MotionLimits,
-    step: float,
+    step: float | None,
 ) -> Motion:
     """Return the motion of the joints from a pose to a pose with limited jerk."""
     from pteron.motion import jerk_limited

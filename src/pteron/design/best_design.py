@@ -280,7 +280,7 @@ def _shortest_times(
     limits = replace(
         drive_limits, force=drive_limits.force / share, speed=drive_limits.speed / share
     )
-    with suppress(PteronError):  # TOPP-RA is an extra
+    with suppress(PteronError):
         return {"shortest_time": time_optimal(robot, path, limits).duration}
     return {}
 

@@ -12,7 +12,7 @@ from pteron.kernels import Array
 
 
 class Profile(NamedTuple):
-    """s(t) with piecewise constant accelerations between nodes (K,), computed by TOPP-RA."""
+    """s(t) with piecewise constant accelerations between nodes (K,)."""
 
     time: Array
     s: Array

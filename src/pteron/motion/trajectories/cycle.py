@@ -32,6 +32,13 @@ _ACROSS_BEGINS = 0.15
 """Share of the way out after which the platform sets off across: to start before it is up rounds
 the corners and saves time."""
 
+_TURNS = {
+    2: np.array([[1.0, -1.0], [1.0, 1.0]]),
+    3: np.array([[1.0, -1.0, 0.5], [0.5, 1.0, -1.0]]),
+}
+"""Turns of a platform that tilts, by its number of angles: on the way across, and on the way up.
+They are not parallel: the angles go round a corner as the tool does, and nothing reverses."""
+
 
 def quintic(tau: Array, begin: float, end: float) -> tuple[Array, Array, Array]:
     """Return a smooth step s(tau) from 0 to 1 within [begin, end], and its first two derivatives.
@@ -70,9 +77,8 @@ class Cycle:
     across, up : array, shape (3,)
         Unit vectors of the two moves, in the base frame.
     turn : float
-        By how much the platform turns on its way across, rad; without effect where it does not. Of
-        several angles it is the last; where the pose's lengths do not go across, as those of a
-        tripod, the other angles turn by as much on the way up, and back on the way down.
+        By how much the platform turns on its way across, rad; without effect where it does not. A
+        platform that tilts turns about all its axes, across and up.
     scale : float
         Factor on lift, width and turn alike, so that a cycle of scale 0 stays at `around`.
     """
@@ -108,8 +114,7 @@ class Cycle:
         place, velocity, acceleration = self.path(tau)
         angular = self.platform.angular
         if self.platform.tilts:
-            turn = self.scale * self.turn * np.array([1.0, -1.0, 0.5])[: angular.sum()]
-            lift = np.roll(turn, 1)
+            turn, lift = self.scale * self.turn * _TURNS[int(angular.sum())]
             states = []
             for lengths, a, b in zip((place, velocity, acceleration), *_shares(tau), strict=True):
                 state = np.empty((len(lengths), len(angular)))

@@ -64,6 +64,31 @@ class Demand(NamedTuple):
     tool: tuple[Array, Array]
     """Derivatives of the tool's place (K, k) by p."""
 
+    def by_parameter(self, rate: Array, gain: Array) -> Demand:
+        """Return the demand by another parameter, by which p has the derivatives (K,)."""
+        r, g = rate[:, None], gain[:, None]
+        speed, bend = self.tool
+        return self._replace(
+            first=self.first * r,
+            second=self.second * r**2 + self.first * g,
+            growth=self.growth * r,
+            square=self.square * r**2 + self.growth * g,
+            tool=(speed * r, bend * r**2 + speed * g),
+        )
+
+    def between(self, first: int, last: int) -> Demand:
+        """Return the demand at poses from index `first` to before `last`."""
+        part = slice(first, last)
+        speed, bend = self.tool
+        return self._replace(
+            first=self.first[part],
+            second=self.second[part],
+            static=self.static[part],
+            growth=self.growth[part],
+            square=self.square[part],
+            tool=(speed[part], bend[part]),
+        )
+
     def drive_forces(self, rate: Array, gain: Array) -> Array:
         """Return drive forces (2, K, n) at p' and p'' (K,), with least and greatest dry friction.
 
@@ -166,9 +191,9 @@ def most_rate(
         return least
     # The margin on each side of a drive's force: square p'^2 + root p' <= margin.
     rows, first = [], needs.first[:, joints]
+    expect_strength(robot, needs, limits, poses)
     for dry in needs.dry:
         static_forces = needs.static + dry * np.sign(needs.first)
-        _expect_strength(robot, static_forces, limits, poses)
         for side in (1.0, -1.0):
             parts = force - side * static_forces[:, joints], side * needs.square[:, joints]
             root = side * (needs.viscous[joints] + back) * first + fall * np.abs(first)
@@ -191,13 +216,13 @@ def most_rate(
     return least
 
 
-def _expect_strength(
-    robot: Manipulator, static_forces: Array, limits: MotionLimits, poses: Array
-) -> None:
-    """Raise if static forces (K, n) exceed a drive's limit, so that no speed is slow enough."""
+def expect_strength(robot: Manipulator, needs: Demand, limits: MotionLimits, poses: Array) -> None:
+    """Raise if forces at rest at poses (K, m) exceed a drive's limit: no speed is slow enough."""
     joints, force, _, _ = limits.force_lines
-    strength = np.full(static_forces.shape[-1], np.inf)
+    strength = np.full(needs.static.shape[-1], np.inf)
     np.minimum.at(strength, joints, force)
+    both = needs.static + needs.dry[:, None] * np.sign(needs.first)
+    static_forces = both[np.abs(both).argmax(axis=0), *np.indices(needs.static.shape)]
     over = np.abs(static_forces) - strength
     if not (over >= 0.0).any():
         return

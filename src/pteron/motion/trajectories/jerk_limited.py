@@ -36,7 +36,7 @@ def jerk_limited(
     jerk: PerJointLimit,
     limits: MotionLimits | None = None,
     *,
-    step: float = STEP,
+    step: float | None = None,
 ) -> Motion:
     """Return the motion of the joints from rest in one pose to rest in another, with limited jerk.
 
@@ -54,8 +54,9 @@ def jerk_limited(
     limits : MotionLimits, optional
         Of joints, drives and tool; every joint needs an acceleration. By default those of the
         machine's drives.
-    step : float
-        Time between samples, s.
+    step : float, optional
+        Time between samples, s; by default 1 ms, or a whole fraction of it where the motion needs
+        more samples.
 
     Returns
     -------
@@ -68,7 +69,8 @@ def jerk_limited(
     Raises
     ------
     DataError
-        If a joint's acceleration has no limit, or the poses are the same.
+        If a joint's acceleration has no limit, the poses are the same, or samples `step` apart do
+        not tell the motion.
     UnreachablePose
         If the joints leave their limits on their path, or do not lead to the other pose.
     SingularPose
@@ -123,7 +125,7 @@ def jerk_limited(
         return poses, planned.duration * velocity, planned.duration**2 * acceleration
 
     course = Timed(curve, planned.duration)
-    rough = sample_curve(course.at, course.duration, min(step, course.duration / 100.0))
+    rough = sample_curve(course.at, course.duration, min(step or STEP, course.duration / 100.0))
     check_motion(robot, rough)
     _expect_modes(robot, rough, planned, ends[1])
     return limit_motion(robot, course, motion_limits, step)

@@ -1,4 +1,4 @@
-"""Limits of a motion along a path s as rows for TOPP-RA: linear in s'' and s'^2, with friction."""
+"""Limits of a motion along a path s as rows: linear in s'' and s'^2, with friction."""
 
 from __future__ import annotations
 
@@ -11,8 +11,12 @@ from pteron.kernels import Array
 from pteron.motion.trajectories.demand import Demand
 from pteron.motion.trajectories.limits import MotionLimits
 
-_SIDES = 16
-"""Sides of the polygon, inscribed in a circle, within which the tool's acceleration stays."""
+_SIDES = 48
+"""Sides of the polygon, inscribed in a circle, within which the tool's acceleration stays: 0.2 % of
+it are given away where the polygon is nearest to the middle."""
+
+POLYGON_SHARE = math.cos(math.pi / _SIDES)
+"""Distance of its sides from the middle, as a share of the circle's radius."""
 
 
 class LimitRows(NamedTuple):
@@ -33,11 +37,8 @@ class LimitRows(NamedTuple):
         return np.asarray(self.a * u + self.b * x + self.c + self.v * np.sqrt(x))
 
 
-def limit_rows(needs: Demand, limits: MotionLimits, unit: float) -> LimitRows:
-    """Return the motion limits as linear constraints on s'' and s'^2 at K points of a path.
-
-    Times are in units of `unit` seconds.
-    """
+def limit_rows(needs: Demand, limits: MotionLimits) -> LimitRows:
+    """Return the motion limits as linear constraints on s'' and s'^2 at K points of a path."""
     count = len(needs.first)
     none = np.zeros((count, 0))
     a, b, c, v = [none], [none], [none], [none]
@@ -45,9 +46,7 @@ def limit_rows(needs: Demand, limits: MotionLimits, unit: float) -> LimitRows:
     def add(linear: Array, square: Array, constant: Array, root: Array, limit: Array) -> None:
         """Append constraint rows to a, b, c and v: coefficients over `limit`, where finite."""
         has = np.isfinite(limit)
-        for part, coefficients in zip(
-            (a, b, c, v), (linear / unit**2, square / unit**2, constant, root / unit), strict=True
-        ):
+        for part, coefficients in zip((a, b, c, v), (linear, square, constant, root), strict=True):
             part.append((np.broadcast_to(coefficients, linear.shape) / limit)[:, has])
 
     zero = np.zeros_like(needs.first)
@@ -73,7 +72,7 @@ def limit_rows(needs: Demand, limits: MotionLimits, unit: float) -> LimitRows:
         across_speed = np.linalg.norm(bend - along_speed[:, None] * direction, axis=-1)
         angles = 2.0 * np.pi * (np.arange(_SIDES) + 0.5) / _SIDES
         cos, sin = np.cos(angles), np.sin(angles)
-        most = np.full(_SIDES, limits.tool_acceleration * np.cos(np.pi / _SIDES))
+        most = np.full(_SIDES, limits.tool_acceleration * POLYGON_SHARE)
         linear = size[:, None] * cos
         square = along_speed[:, None] * cos + across_speed[:, None] * sin
         add(linear, square, np.zeros_like(linear), np.zeros_like(linear), most)
@@ -83,4 +82,4 @@ def limit_rows(needs: Demand, limits: MotionLimits, unit: float) -> LimitRows:
             limits.tool_speed / np.linalg.norm(speed, axis=-1),
         )
     matrices = [np.hstack(part) for part in (a, b, c, v)]
-    return LimitRows(matrices[0], matrices[1], matrices[2], matrices[3], (rates * unit) ** 2)
+    return LimitRows(matrices[0], matrices[1], matrices[2], matrices[3], rates**2)

@@ -201,6 +201,11 @@ def _round_corners(
     return LinePath(platform, np.array(knots), np.array(controls), tuple(rests), tuple(corners))
 
 
+def path_corners(path: Path) -> tuple[float, ...]:
+    """Return the arc lengths s, m, of a path's corners, rounded or not; none where it has none."""
+    return tuple(getattr(path, "corners", ()))
+
+
 class BackPath:
     """A path followed by its reverse."""
 
@@ -208,6 +213,8 @@ class BackPath:
         self._out = out
         self.length = 2.0 * out.length
         self.rests = (*out.rests, *(self.length - s for s in out.rests[-2::-1]))
+        corners = path_corners(out)
+        self.corners = (*corners, *(self.length - s for s in corners[-2::-1]))
 
     def at(self, s: Array) -> Curve:
         """Return poses (T, m) at arc lengths s (T,), m, and two derivatives by s."""

@@ -82,7 +82,8 @@ def pick_and_place(
     duration : float, optional
         Of the cycle, out and back, s; by default what gives the peak acceleration.
     samples : int
-        Number of samples; an odd number includes the turning point.
+        Number of samples; an odd number includes the turning point. Between few samples
+        `Motion.at` leaves the path, of which `cycle.at` returns every point.
     direction : array, shape (3,), optional
         Where the cycle goes across; see `scaled_to_reach`.
     turn : float

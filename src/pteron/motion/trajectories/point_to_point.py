@@ -9,7 +9,7 @@ from pteron.manipulator import RobotLike, as_manipulator
 from pteron.motion.motion import Motion
 from pteron.motion.trajectories.limits import MotionLimits
 from pteron.motion.trajectories.path import line_path
-from pteron.motion.trajectories.time_law import STEP, polynomial_motion
+from pteron.motion.trajectories.time_law import polynomial_motion
 from pteron.motion.trajectories.time_polynomials import PolynomialLaw
 from pteron.shapes import PoseLike
 
@@ -22,7 +22,7 @@ def point_to_point(
     duration: float | None = None,
     limits: MotionLimits | None = None,
     law: PolynomialLaw = "quintic",
-    step: float = STEP,
+    step: float | None = None,
 ) -> Motion:
     """Return the straight motion of the tool from rest in one pose to rest in another.
 

@@ -38,8 +38,17 @@ class Timed:
         return pose, first / self.duration, second / self.duration**2
 
 
-def timed_path(path: Path, durations: Sequence[float], laws: Sequence[Progress]) -> Timed:
-    """Return a path with time: a duration, s, and a time law for each part between rests."""
+def timed_path(
+    path: Path,
+    durations: Sequence[float],
+    laws: Sequence[Progress],
+    rests: Sequence[float] | None = None,
+) -> Timed:
+    """Return a path with time: a duration, s, and a time law for each part between rests.
+
+    The rests are arc lengths s, m; by default the path's.
+    """
+    rests = path.rests if rests is None else rests
     duration = float(sum(durations))
     starts = np.concatenate([[0.0], np.cumsum(durations)]) / duration
 
@@ -49,7 +58,7 @@ def timed_path(path: Path, durations: Sequence[float], laws: Sequence[Progress])
         s, rate, gain = np.zeros((3, len(tau)))
         for j, law in enumerate(laws):
             in_stretch, span = k == j, starts[j + 1] - starts[j]
-            begin, end = path.rests[j : j + 2]
+            begin, end = rests[j : j + 2]
             share, first, second = law((tau[in_stretch] - starts[j]) / span)
             s[in_stretch] = begin + (end - begin) * share
             rate[in_stretch] = (end - begin) * first / span
