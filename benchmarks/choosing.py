@@ -18,6 +18,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 from measuring import quick
@@ -222,7 +223,9 @@ def driven(job: Job, robot: Manipulator, one: Candidate) -> str:
     carrying, limits = job.payload.add_to(robot), limits_of(robot).force
     soft, sensors = as_they_are(carrying), Sensors(1e-6)
     told = [f"simulated: {motion.duration:g} s"]
-    runs = [("rigid", carrying, CONTROLLERS["computed_torque"], None)]
+    runs: list[tuple[str, Manipulator, Any, Sensors | None]] = [
+        ("rigid", carrying, CONTROLLERS["computed_torque"], None)
+    ]
     try:
         tuned = tune(soft, motion, ComputedTorque(), model=carrying, sensors=sensors).controller
         runs.append(("as they are", soft, tuned, sensors))
